@@ -1,0 +1,1 @@
+"""Minimum-time motion of redundant robots along prescribed paths."""

@@ -1,0 +1,201 @@
+"""Errors that brachis raises: one base class, subclasses that carry data.
+
+Every message says what was found, what is allowed, where, and what to try; the same facts are attributes, so that a
+caller need not parse text. ``exit_code`` is what the command line returns: 2 for wrong input, 1 for a plan that could
+not be made although the input was sound.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+
+
+class BrachisError(Exception):
+    """Base class of all errors of brachis.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong, in a few words.
+    found : object, optional
+        What was found.
+    allowed : object, optional
+        What would have been accepted.
+    where : str, optional
+        File and key, joint, or interval of the path coordinate.
+    hint : str, optional
+        What to try.
+    """
+
+    exit_code = 1
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        found: object = None,
+        allowed: object = None,
+        where: str | None = None,
+        hint: str | None = None,
+    ) -> None:
+        self.problem = problem
+        self.found = found
+        self.allowed = allowed
+        self.where = where
+        self.hint = hint
+        super().__init__(self._message())
+
+    def _message(self) -> str:
+        text = f"{self.where}: {self.problem}" if self.where else self.problem
+        if self.found is not None:
+            text += f"; found {self.found}"
+        if self.allowed is not None:
+            text += f"; allowed: {self.allowed}"
+        if self.hint is not None:
+            text += f". {self.hint}"
+        return text
+
+
+class InputError(BrachisError):
+    """The input is wrong: a file, a key, a value."""
+
+    exit_code = 2
+
+
+class TaskError(InputError):
+    """A task file or task mapping is wrong; ``where`` names the file and the key."""
+
+
+class UrdfError(InputError):
+    """A URDF file is missing, broken, or describes a robot that brachis cannot plan for."""
+
+
+class UnknownNameError(InputError):
+    """A name (joint, frame, solver, branch, ...) does not exist.
+
+    Attributes
+    ----------
+    kind : str
+        What was looked for, for example ``"joint"``.
+    name : str
+        The name that was asked for.
+    valid : tuple of str
+        The names that exist.
+    """
+
+    def __init__(self, kind: str, name: str, valid: Iterable[str], *, where: str | None = None) -> None:
+        self.kind = kind
+        self.name = name
+        self.valid = tuple(valid)
+        near = nearest(name, self.valid)
+        super().__init__(
+            f"there is no {kind} named {name!r}",
+            allowed=", ".join(self.valid) or "none",
+            where=where,
+            hint=f"Did you mean {near!r}?" if near else None,
+        )
+
+
+class LimitError(InputError):
+    """A limit is missing or not usable.
+
+    Attributes
+    ----------
+    joint : str
+        The joint's name.
+    key : str
+        The task key that supplies the limit, for example ``robot.limits.torque.j1``.
+    """
+
+    def __init__(self, problem: str, *, joint: str, key: str, found: object = None, allowed: object = None) -> None:
+        self.joint = joint
+        self.key = key
+        super().__init__(
+            problem, found=found, allowed=allowed, where=f"joint {joint!r}", hint=f"Set {key} in the task file"
+        )
+
+
+class PathError(InputError):
+    """The prescribed path is wrong.
+
+    Attributes
+    ----------
+    s_interval : tuple of float or None
+        Where on the path, in the dimensionless path coordinate.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        s_interval: tuple[float, float] | None = None,
+        found: object = None,
+        allowed: object = None,
+        where: str | None = None,
+        hint: str | None = None,
+    ) -> None:
+        self.s_interval = s_interval
+        if s_interval is not None and where is None:
+            where = f"path, s in [{s_interval[0]:.4g}, {s_interval[1]:.4g}]"
+        super().__init__(problem, found=found, allowed=allowed, where=where, hint=hint)
+
+
+class StartError(InputError):
+    """The start or end posture contradicts the limits, the path or the branch."""
+
+
+class DecompositionError(InputError):
+    """No closed form fits the asked choice of redundant joints.
+
+    Attributes
+    ----------
+    redundant_joints : tuple of str
+        What was asked for.
+    reasons : dict of str to str
+        For every family that was tried, why it does not fit.
+    available : tuple of tuple of str
+        Choices of redundant joints of this robot and task space that do have a closed form.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        redundant_joints: Sequence[str],
+        reasons: dict[str, str] | None = None,
+        available: Sequence[tuple[str, ...]] = (),
+        found: object = None,
+        allowed: object = None,
+    ) -> None:
+        self.redundant_joints = tuple(redundant_joints)
+        self.reasons = dict(reasons or {})
+        self.available = tuple(available)
+        if self.reasons:
+            problem += "; tried " + "; ".join(f"{family}: {why}" for family, why in self.reasons.items())
+        choices = " | ".join("[" + ", ".join(names) + "]" for names in self.available)
+        super().__init__(
+            problem,
+            found=found,
+            allowed=allowed,
+            where="redundant_joints",
+            hint=f"Choices with a closed form: {choices}" if choices else None,
+        )
+
+
+class ResultFileError(InputError):
+    """A saved result is missing, broken, or of another schema version."""
+
+
+class UnreachableError(BrachisError):
+    """A trial point of the optimiser has a collocation point outside the branch; solvers back off from it."""
+
+
+class PlanningError(BrachisError):
+    """The input was sound, yet no plan could be made; the message says which attempts were made."""
+
+
+def nearest(name: str, valid: Iterable[str]) -> str | None:
+    """Return the valid name most like `name`, or None where none is near."""
+    near = difflib.get_close_matches(name, list(valid), n=1, cutoff=0.5)
+    return near[0] if near else None
