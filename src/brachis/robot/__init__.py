@@ -1,0 +1,7 @@
+"""URDF to Pinocchio model, limits and friction."""
+
+from brachis.robot.friction import Friction
+from brachis.robot.limits import FROM_URDF, Limits, LimitSpec
+from brachis.robot.robot import Robot
+
+__all__ = ["FROM_URDF", "Friction", "LimitSpec", "Limits", "Robot"]

@@ -1,0 +1,69 @@
+"""Joint torques that the rigid-body model does not know: rotor inertia and friction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.errors import InputError
+from brachis.robot.limits import per_joint_values
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Armature, viscous and Coulomb terms of every joint.
+
+    The joint torque is ``rnea(q, qdot, qddot) + armature * qddot + viscous * qdot + coulomb * tanh(qdot / v_eps)``.
+    Pinocchio's ``rnea`` would add ``model.armature``; brachis keeps that at zero and adds the term here. Pinocchio
+    reads ``damping`` and ``friction`` of a URDF but its ``rnea`` does not use them, and neither does brachis.
+
+    Attributes
+    ----------
+    armature : (n,) ndarray
+        Rotor inertia seen at the joint, kg m^2 or kg.
+    viscous : (n,) ndarray
+        Nm s/rad or N s/m.
+    coulomb : (n,) ndarray
+        Nm or N.
+    v_eps : float
+        Speed over which the Coulomb torque changes sign, rad/s or m/s.
+    """
+
+    armature: np.ndarray
+    viscous: np.ndarray
+    coulomb: np.ndarray
+    v_eps: float
+
+    @classmethod
+    def of(
+        cls,
+        joint_names: Sequence[str],
+        *,
+        armature: object = 0.0,
+        viscous: object = 0.0,
+        coulomb: object = 0.0,
+        coulomb_velocity: float = 0.01,
+    ) -> Friction:
+        """Spread scalars, lists or mappings over the joints of a chain."""
+        given = {"armature": armature, "viscous": viscous, "coulomb": coulomb}
+        spread = {}
+        for key, value in given.items():
+            where = f"robot.friction.{key}"
+            spread[key] = np.array(per_joint_values(where, value, list(joint_names), 0.0), dtype=float)
+            if not np.all(spread[key] >= 0.0):
+                raise InputError("is negative or not a number", where=where, found=value, allowed="numbers >= 0")
+        if not coulomb_velocity > 0.0:
+            raise InputError(
+                "is not positive", where="robot.friction.coulomb_velocity", found=coulomb_velocity, allowed="> 0 rad/s"
+            )
+        return cls(**spread, v_eps=coulomb_velocity)
+
+    def torque(self, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+        """Torque of these terms, (..., n), for velocities and accelerations (..., n)."""
+        return self.armature * qddot + self.viscous * qdot + self.coulomb * np.tanh(qdot / self.v_eps)
+
+    def velocity_derivative(self, qdot: np.ndarray) -> np.ndarray:
+        """Derivative of `torque` with respect to qdot (diagonal), (..., n)."""
+        return self.viscous + self.coulomb / self.v_eps / np.cosh(np.clip(qdot / self.v_eps, -350.0, 350.0)) ** 2

@@ -1,0 +1,181 @@
+"""Joint limits: from the URDF, overridden or completed by the task."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from brachis.errors import InputError, LimitError, UnknownNameError
+
+FROM_URDF = "urdf"
+"""Marks a limit that is taken from the URDF (the default of every `LimitSpec` entry)."""
+
+PerJoint = float | Sequence[float | None] | Mapping[str, float | None] | None | str
+PerJointRange = Sequence[Sequence[float] | None] | Mapping[str, Sequence[float] | None] | None | str
+
+
+@dataclass(frozen=True)
+class LimitSpec:
+    """What the user says about limits; the URDF fills the rest.
+
+    Each entry is ``FROM_URDF``, None (not limited), one number for all joints, a list in chain order, or a mapping
+    from joint name to number or None. Units: torque Nm or N, velocity rad/s or m/s, acceleration rad/s^2 or m/s^2,
+    position rad or m. ``scale`` multiplies torque, velocity and acceleration limits after all else.
+    """
+
+    torque: PerJoint = FROM_URDF
+    velocity: PerJoint = FROM_URDF
+    acceleration: PerJoint = FROM_URDF
+    position: PerJointRange = FROM_URDF
+    scale: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of every joint of the chain; infinite where a joint is not limited.
+
+    Attributes
+    ----------
+    position_lower, position_upper : (n,) ndarray
+        rad or m.
+    velocity : (n,) ndarray
+        rad/s or m/s.
+    acceleration : (n,) ndarray
+        rad/s^2 or m/s^2.
+    torque : (n,) ndarray
+        Nm or N.
+    """
+
+    position_lower: np.ndarray
+    position_upper: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    torque: np.ndarray
+
+
+@dataclass(frozen=True)
+class UrdfLimit:
+    """One joint's limits as the URDF states them; None where it states nothing."""
+
+    lower: float | None
+    upper: float | None
+    velocity: float | None
+    effort: float | None
+
+
+def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[UrdfLimit]) -> Limits:
+    """Combine the user's limits with the URDF's.
+
+    Parameters
+    ----------
+    spec : LimitSpec
+        The user's limits.
+    joint_names : sequence of str
+        The chain's joints.
+    urdf : sequence of UrdfLimit
+        The URDF's limits of the same joints.
+
+    Returns
+    -------
+    Limits
+
+    Raises
+    ------
+    LimitError
+        A limit is not positive, or a joint has neither a torque nor an acceleration limit.
+    UnknownNameError
+        A limit names a joint that is not of the chain.
+    """
+    names = list(joint_names)
+    torque = _per_joint("torque", spec.torque, names, [u.effort for u in urdf])
+    velocity = _per_joint("velocity", spec.velocity, names, [u.velocity for u in urdf])
+    acceleration = _per_joint("acceleration", spec.acceleration, names, [None] * len(names))
+    for name, tau, acc in zip(names, torque, acceleration, strict=True):
+        if np.isinf(tau) and np.isinf(acc):
+            raise LimitError(
+                "has neither a torque nor an acceleration limit, so its time would go to zero",
+                joint=name,
+                key=f"robot.limits.torque.{name} or robot.limits.acceleration.{name}",
+            )
+    lower, upper = _ranges(spec.position, names, urdf)
+    return Limits(
+        position_lower=lower,
+        position_upper=upper,
+        velocity=velocity * spec.scale.get("velocity", 1.0),
+        acceleration=acceleration * spec.scale.get("acceleration", 1.0),
+        torque=torque * spec.scale.get("torque", 1.0),
+    )
+
+
+def per_joint_values(key: str, value: object, names: Sequence[str], missing: object) -> list[object]:
+    """Spread a scalar, list or mapping over the joints; `missing` where a mapping leaves a joint out.
+
+    Raises
+    ------
+    InputError
+        A list has the wrong length.
+    UnknownNameError
+        A mapping names a joint that is not of the chain.
+    """
+    if isinstance(value, Mapping):
+        for name in value:
+            if name not in names:
+                raise UnknownNameError("joint", name, names, where=key)
+        return [value.get(name, missing) for name in names]
+    if isinstance(value, (Sequence, np.ndarray)) and not isinstance(value, str):
+        if len(value) != len(names):
+            raise InputError(
+                "has the wrong number of values",
+                where=key,
+                found=len(value),
+                allowed=f"{len(names)}, one for each of {', '.join(names)}",
+            )
+        return list(value)
+    return [value] * len(names)
+
+
+def _per_joint(kind: str, value: PerJoint, names: list[str], urdf: Sequence[float | None]) -> np.ndarray:
+    """Spread one kind of limit over the joints; inf where not limited."""
+    key = f"robot.limits.{kind}"
+    listed = per_joint_values(key, value, names, FROM_URDF)
+    limit = np.full(len(names), np.inf)
+    for i, (name, entry, stated) in enumerate(zip(names, listed, urdf, strict=True)):
+        chosen = stated if entry == FROM_URDF else entry
+        if chosen is None:
+            continue
+        number = float(chosen)  # type: ignore[arg-type]
+        if not number > 0.0:
+            where = "the URDF" if entry == FROM_URDF else "the task"
+            raise LimitError(
+                f"{kind} limit in {where} is not positive",
+                joint=name,
+                key=f"{key}.{name}",
+                found=f"{number:g}",
+                allowed="a number > 0, or null for no limit",
+            )
+        limit[i] = number
+    return limit
+
+
+def _ranges(value: PerJointRange, names: list[str], urdf: Sequence[UrdfLimit]) -> tuple[np.ndarray, np.ndarray]:
+    """Spread the position ranges over the joints; infinite where not limited."""
+    listed = per_joint_values("robot.limits.position", value, names, FROM_URDF)
+    lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
+    for i, (name, entry, stated) in enumerate(zip(names, listed, urdf, strict=True)):
+        chosen = (stated.lower, stated.upper) if entry == FROM_URDF else entry
+        if chosen is None:
+            continue
+        low, high = chosen  # type: ignore[misc]
+        lower[i] = -np.inf if low is None else float(low)
+        upper[i] = np.inf if high is None else float(high)
+        if not lower[i] < upper[i]:
+            raise LimitError(
+                "position range is empty",
+                joint=name,
+                key=f"robot.limits.position.{name}",
+                found=f"[{lower[i]:g}, {upper[i]:g}]",
+                allowed="[lower, upper] with lower < upper",
+            )
+    return lower, upper

@@ -1,0 +1,174 @@
+"""The robot: a Pinocchio model of the chain from base to tool, its limits and friction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from brachis.errors import InputError, UrdfError
+from brachis.robot.friction import Friction
+from brachis.robot.limits import Limits, LimitSpec, per_joint_values, resolve_limits
+from brachis.robot.urdf import read_chain
+
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A serial chain of one-coordinate joints with limits.
+
+    Attributes
+    ----------
+    model : pinocchio.Model
+        The chain alone; ``nq == nv == n``. Treat it as read-only.
+    joint_names : tuple of str
+        Names of the n joints, from base to tool.
+    tool_frame, base_frame : str
+        Link names of the URDF.
+    limits : Limits
+        Limits of the n joints.
+    friction : Friction
+        Torque terms beside the rigid-body model's.
+    source : str
+        The URDF file that the robot was read from.
+    """
+
+    model: pin.Model
+    joint_names: tuple[str, ...]
+    tool_frame: str
+    base_frame: str
+    limits: Limits
+    friction: Friction
+    source: str
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path: str | Path,
+        *,
+        tool_frame: str | None = None,
+        base_frame: str | None = None,
+        gravity: Sequence[float] = STANDARD_GRAVITY,
+        locked_joints: Mapping[str, float] | None = None,
+        limits: LimitSpec | None = None,
+        friction: Mapping[str, object] | None = None,
+    ) -> Robot:
+        """Build the model of the chain base -> tool; every joint off the chain is locked.
+
+        Parameters
+        ----------
+        path : path
+            URDF file. Mesh files are not read.
+        tool_frame : str, optional
+            Link at the end of the chain; the only leaf link if left out.
+        base_frame : str, optional
+            Link at the beginning of the chain; the root link if left out. Positions stay those of the URDF's root
+            link, called the world frame.
+        gravity : (3,) sequence of float, optional
+            Gravitational acceleration in the world frame, m/s^2.
+        locked_joints : mapping of str to float, optional
+            Joints held at a position, rad or m.
+        limits : LimitSpec, optional
+            Limits that override or complete the URDF's.
+        friction : mapping, optional
+            Keyword arguments of `Friction.of`.
+
+        Returns
+        -------
+        Robot
+
+        Raises
+        ------
+        UrdfError, UnknownNameError, LimitError, InputError
+        """
+        chain = read_chain(path, tool_frame=tool_frame, base_frame=base_frame, locked_joints=dict(locked_joints or {}))
+        vector = np.asarray(gravity, dtype=float)
+        if vector.shape != (3,) or not np.all(np.isfinite(vector)):
+            raise InputError("is not a vector", where="robot.gravity", found=list(gravity), allowed="[x, y, z] in m/s^2")
+        model = _build_model(chain.xml, chain.locked, str(path))
+        model.gravity.linear = vector
+        model.armature = np.zeros(model.nv)
+        names = tuple(str(name) for name in list(model.names)[1:])
+        if names != chain.joint_names or model.nq != model.nv:
+            raise UrdfError("the chain is not serial", where=str(path), found=list(names), allowed=list(chain.joint_names))
+        return cls(
+            model=model,
+            joint_names=names,
+            tool_frame=chain.tool_frame,
+            base_frame=chain.base_frame,
+            limits=resolve_limits(limits or LimitSpec(), names, chain.limits),
+            friction=Friction.of(names, **dict(friction or {})),  # type: ignore[arg-type]
+            source=str(path),
+        )
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.joint_names)
+
+    @property
+    def frame_id(self) -> int:
+        """Pinocchio's index of the tool frame."""
+        return int(self.model.getFrameId(self.tool_frame))
+
+    @property
+    def position_units(self) -> tuple[str, ...]:
+        """Unit of every joint's position, ``rad`` or ``m``."""
+        return tuple("m" if "P" in joint.shortname() else "rad" for joint in list(self.model.joints)[1:])
+
+    def posture(self, joints: object, where: str) -> np.ndarray:
+        """Check a list or mapping of joint positions and return it as (n,) in chain order, rad or m.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A joint is missing, unknown or not finite, or the list has another length than the chain.
+        """
+        values = per_joint_values(where, joints, list(self.joint_names), None)
+        missing = [name for name, value in zip(self.joint_names, values, strict=True) if value is None]
+        if missing:
+            raise InputError("joints are missing", where=where, found=", ".join(missing), allowed="a position for each")
+        q = np.array(values, dtype=float)
+        if not np.all(np.isfinite(q)):
+            raise InputError("is not finite", where=where, found=list(q), allowed="finite numbers, rad or m")
+        return q
+
+    def tool_placement(self, q: np.ndarray) -> pin.SE3:
+        """Placement of the tool frame in the world frame at one posture `q`, (n,)."""
+        data = self.model.createData()
+        pin.framesForwardKinematics(self.model, data, np.asarray(q, dtype=float))
+        return data.oMf[self.frame_id].copy()
+
+    def torque(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+        """Joint torques of K states.
+
+        Parameters
+        ----------
+        q, qdot, qddot : (K, n) ndarray
+            Positions, velocities, accelerations.
+
+        Returns
+        -------
+        (K, n) ndarray
+            ``rnea + armature * qddot + viscous * qdot + coulomb * tanh(qdot / v_eps)``, Nm or N.
+        """
+        data = self.model.createData()
+        rigid = np.array([pin.rnea(self.model, data, *state) for state in zip(q, qdot, qddot, strict=True)])
+        return rigid.reshape(len(q), self.n) + self.friction.torque(qdot, qddot)
+
+
+def _build_model(xml: str, locked: Mapping[str, float], where: str) -> pin.Model:
+    """Let Pinocchio parse the plain URDF and lock the joints off the chain."""
+    try:
+        full = pin.buildModelFromXML(xml)
+    except (ValueError, RuntimeError) as error:
+        raise UrdfError("Pinocchio cannot build the model", where=where, found=str(error)) from error
+    present = {name: value for name, value in locked.items() if full.existJointName(name)}
+    reference = pin.neutral(full)
+    for name, value in present.items():
+        reference[full.idx_qs[full.getJointId(name)]] = value
+    return pin.buildReducedModel(full, [full.getJointId(name) for name in present], reference)

@@ -1,0 +1,281 @@
+"""Reading and checking a URDF with yourdfpy, and the chain from base to tool within it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from brachis.errors import UnknownNameError, UrdfError
+from brachis.robot.limits import UrdfLimit
+
+if TYPE_CHECKING:
+    import yourdfpy
+
+MOVING_TYPES = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True)
+class UrdfChain:
+    """The chain from base to tool of a URDF, all other joints fixed.
+
+    Attributes
+    ----------
+    joint_names : tuple of str
+        Moving joints of the chain, from base to tool.
+    limits : tuple of UrdfLimit
+        Their limits as the URDF states them.
+    locked : dict of str to float
+        Every other moving joint and the position it is held at, rad or m.
+    tool_frame, base_frame : str
+        Link names.
+    xml : str
+        The URDF that Pinocchio reads: ``continuous`` joints have become ``revolute`` ones without range, so that
+        every joint has one coordinate, and unsupported joints off the chain have become fixed.
+    """
+
+    joint_names: tuple[str, ...]
+    limits: tuple[UrdfLimit, ...]
+    locked: dict[str, float]
+    tool_frame: str
+    base_frame: str
+    xml: str
+
+
+def read_chain(
+    path: str | Path,
+    *,
+    tool_frame: str | None,
+    base_frame: str | None,
+    locked_joints: Mapping[str, float],
+) -> UrdfChain:
+    """Read a URDF file and find the chain from `base_frame` to `tool_frame`.
+
+    Parameters
+    ----------
+    path : path
+        The URDF file.
+    tool_frame : str or None
+        Link at the chain's end; None takes the URDF's only leaf link.
+    base_frame : str or None
+        Link at the chain's beginning; None takes the root link.
+    locked_joints : mapping of str to float
+        Joints held at a position, rad or m.
+
+    Raises
+    ------
+    UrdfError
+        The file is missing or broken, the chain has an unsupported joint, or a moving link lacks a physical inertia.
+    UnknownNameError
+        A frame or joint does not exist.
+    """
+    urdf = _load(Path(path))
+    where = str(path)
+    parents = {joint.child: joint for joint in urdf.robot.joints}
+    links = [link.name for link in urdf.robot.links]
+    tool = _tool(urdf, tool_frame, where)
+    root = _root(links, parents, where)
+    base = base_frame if base_frame is not None else root
+    if base not in links:
+        raise UnknownNameError("frame", base, links, where=f"{where}: base_frame")
+    path_joints = _joints_between(base, tool, parents, where)
+    by_name = {joint.name: joint for joint in urdf.robot.joints if joint.type != "fixed"}
+    for name in locked_joints:
+        if name not in by_name:
+            raise UnknownNameError("moving joint", name, by_name, where=f"{where}: locked_joints")
+    chain = [joint for joint in path_joints if joint.type != "fixed" and joint.name not in locked_joints]
+    _check_joints(chain, {joint.name for joint in chain}, by_name, where)
+    if not chain:
+        raise UrdfError("no joint moves the tool", where=where, found=f"chain {base} -> {tool}")
+    locked = {name: _lock_position(by_name[name], locked_joints) for name in by_name if name not in {j.name for j in chain}}
+    _check_inertias(urdf, chain, parents, where)
+    limits = tuple(_limit_of(joint, where) for joint in chain)
+    return UrdfChain(tuple(j.name for j in chain), limits, locked, tool, base, _plain_xml(urdf))
+
+
+def _load(path: Path) -> yourdfpy.URDF:
+    """Parse the file, or say why it is not a URDF."""
+    import yourdfpy  # noqa: PLC0415  (imports trimesh: one second that only this stage needs)
+    from lxml import etree  # noqa: PLC0415  (comes with yourdfpy)
+
+    if not path.is_file():
+        raise UrdfError("the URDF file does not exist", where=str(path))
+    try:
+        root = etree.parse(str(path)).getroot()
+    except etree.XMLSyntaxError as error:
+        raise UrdfError("the URDF file is not well-formed XML", where=str(path), found=str(error)) from error
+    if root.tag != "robot":
+        raise UrdfError(
+            "the file is not a URDF",
+            where=str(path),
+            found=f"root element <{root.tag}>",
+            allowed="<robot>",
+            hint="Expand xacro files first",
+        )
+    try:
+        urdf = yourdfpy.URDF.load(
+            str(path), build_scene_graph=False, build_collision_scene_graph=False, load_meshes=False
+        )
+    except (ValueError, TypeError, KeyError, AttributeError, IndexError) as error:
+        raise UrdfError("the URDF cannot be read", where=str(path), found=f"{type(error).__name__}: {error}") from error
+    if not urdf.robot.links:
+        raise UrdfError("the URDF has no links", where=str(path))
+    return urdf
+
+
+def _tool(urdf: yourdfpy.URDF, tool_frame: str | None, where: str) -> str:
+    """Check the named tool frame, or take the only leaf link."""
+    links = [link.name for link in urdf.robot.links]
+    if tool_frame is not None:
+        if tool_frame not in links:
+            raise UnknownNameError("frame", tool_frame, links, where=f"{where}: tool_frame")
+        return tool_frame
+    inner = {joint.parent for joint in urdf.robot.joints}
+    leaves = [name for name in links if name not in inner]
+    if len(leaves) != 1:
+        raise UrdfError(
+            "the tool frame is not clear",
+            where=where,
+            found=f"{len(leaves)} links without children: {', '.join(leaves)}",
+            hint="Set robot.tool_frame to one of the robot's links",
+        )
+    return leaves[0]
+
+
+def _root(links: Sequence[str], parents: Mapping[str, Any], where: str) -> str:
+    """Find the only link without a parent."""
+    roots = [name for name in links if name not in parents]
+    if len(roots) != 1:
+        raise UrdfError("the links do not form one tree", where=where, found=f"root links: {', '.join(roots) or 'none'}")
+    return roots[0]
+
+
+def _joints_between(base: str, tool: str, parents: Mapping[str, Any], where: str) -> list[Any]:
+    """List the joints from base to tool, in chain order."""
+    joints: list[Any] = []
+    link = tool
+    while link != base:
+        joint = parents.get(link)
+        if joint is None or joint in joints:
+            raise UrdfError("the tool frame is not below the base frame", where=where, found=f"{base} -> {tool}")
+        joints.append(joint)
+        link = joint.parent
+    return joints[::-1]
+
+
+def _check_joints(chain: Sequence[Any], names: set[str], by_name: Mapping[str, Any], where: str) -> None:
+    """Refuse joints that a serial chain of one-coordinate joints cannot have."""
+    for joint in chain:
+        if joint.type not in MOVING_TYPES:
+            raise UrdfError(
+                f"joint {joint.name!r} cannot be planned for",
+                where=where,
+                found=f"type {joint.type!r}",
+                allowed=", ".join(MOVING_TYPES),
+                hint="Lock it with robot.locked_joints, or set robot.base_frame below it",
+            )
+    for joint in by_name.values():
+        if joint.mimic is not None and (joint.name in names or joint.mimic.joint in names):
+            raise UrdfError(
+                f"joint {joint.name!r} mimics {joint.mimic.joint!r}",
+                where=where,
+                found="a mimic joint that moves with the chain",
+                allowed="independent joints",
+                hint="Remove the mimic element, or lock the joint that it follows with robot.locked_joints",
+            )
+
+
+def _lock_position(joint: Any, locked_joints: Mapping[str, float]) -> float:  # noqa: ANN401 (yourdfpy is untyped)
+    """Position at which a joint off the chain is held: the user's, else zero or the range's nearest end."""
+    if joint.name in locked_joints:
+        return float(locked_joints[joint.name])
+    if joint.limit is None or joint.type == "continuous":
+        return 0.0
+    low = -np.inf if joint.limit.lower is None else joint.limit.lower
+    high = np.inf if joint.limit.upper is None else joint.limit.upper
+    return float(np.clip(0.0, low, high)) if low <= high else 0.0
+
+
+def _limit_of(joint: Any, where: str) -> UrdfLimit:  # noqa: ANN401
+    """Read the limits of one joint; a prismatic or revolute joint must state its range."""
+    limit = joint.limit
+    if joint.type == "continuous":
+        return UrdfLimit(None, None, limit.velocity if limit else None, limit.effort if limit else None)
+    if limit is None or limit.lower is None or limit.upper is None:
+        missing = "no <limit>" if limit is None else "a <limit> without lower and upper"
+        raise UrdfError(
+            f"joint {joint.name!r} has no position range",
+            where=where,
+            found=missing,
+            allowed='<limit lower="..." upper="..." .../>, or type="continuous"',
+        )
+    return UrdfLimit(limit.lower, limit.upper, limit.velocity, limit.effort)
+
+
+def _check_inertias(urdf: yourdfpy.URDF, chain: Sequence[Any], parents: Mapping[str, Any], where: str) -> None:
+    """Refuse moving bodies without mass and inertias that no body can have.
+
+    A body is the links that move as one, that is, up to the next moving joint of the chain. Massless links (frames)
+    are fine so long as the body as a whole has mass.
+    """
+    moving = {joint.name for joint in chain}
+    bodies: dict[str, list[str]] = {name: [] for name in moving}
+    masses: dict[str, float] = dict.fromkeys(moving, 0.0)
+    for link in urdf.robot.links:
+        joint = parents.get(link.name)
+        while joint is not None and joint.name not in moving:
+            joint = parents.get(joint.parent)
+        if joint is None:
+            continue
+        bodies[joint.name].append(link.name)
+        if link.inertial is not None:
+            masses[joint.name] += link.inertial.mass or 0.0
+            _check_inertia(link, where)
+    for joint in chain:
+        if not masses[joint.name] > 0.0:
+            raise UrdfError(
+                f"the body moved by joint {joint.name!r} has no mass",
+                where=where,
+                found=f"links {', '.join(bodies[joint.name])} without <inertial>",
+                allowed="at least one link with <inertial> and mass > 0 kg",
+            )
+
+
+def _check_inertia(link: Any, where: str) -> None:  # noqa: ANN401
+    """Refuse a negative mass and an inertia matrix that breaks the triangle inequality."""
+    mass, matrix = link.inertial.mass or 0.0, link.inertial.inertia
+    if not np.isfinite(mass) or mass < 0.0:
+        raise UrdfError(f"link {link.name!r} has a non-physical mass", where=where, found=f"{mass:g} kg", allowed=">= 0 kg")
+    if matrix is None:
+        return
+    moments = np.linalg.eigvalsh(np.asarray(matrix, dtype=float)) if np.all(np.isfinite(matrix)) else np.array([np.nan])
+    slack = 1e-3 * max(abs(moments).max(), 1e-12)  # figures from CAD are rounded
+    physical = moments[0] >= -slack and (len(moments) < 3 or moments[0] + moments[1] >= moments[2] - slack)  # noqa: PLR2004
+    if not physical:
+        raise UrdfError(
+            f"link {link.name!r} has a non-physical inertia",
+            where=where,
+            found="principal moments " + ", ".join(f"{m:.4g}" for m in moments) + " kg m^2",
+            allowed="moments >= 0, none above the sum of the other two",
+        )
+
+
+def _plain_xml(urdf: yourdfpy.URDF) -> str:
+    """Write the URDF with one-coordinate joints only; Pinocchio gives a continuous joint two coordinates."""
+    from yourdfpy import Limit  # noqa: PLC0415
+
+    for joint in urdf.robot.joints:
+        joint.mimic = None
+        if joint.type == "continuous":
+            joint.type = "revolute"
+            joint.limit = Limit(effort=0.0, velocity=0.0, lower=-1e9, upper=1e9)
+        elif joint.type not in (*MOVING_TYPES, "fixed"):
+            joint.type = "fixed"
+        elif joint.type != "fixed":
+            joint.limit = Limit(effort=0.0, velocity=0.0, lower=-1e9, upper=1e9)
+    for link in urdf.robot.links:
+        link.visuals, link.collisions = [], []
+    return str(urdf.write_xml_string().decode() if isinstance(urdf.write_xml_string(), bytes) else urdf.write_xml_string())
