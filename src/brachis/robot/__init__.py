@@ -3,5 +3,6 @@
 from brachis.robot.friction import Friction
 from brachis.robot.limits import FROM_URDF, Limits, LimitSpec
 from brachis.robot.robot import Robot
+from brachis.robot.task_space import TaskSpace
 
-__all__ = ["FROM_URDF", "Friction", "LimitSpec", "Limits", "Robot"]
+__all__ = ["FROM_URDF", "Friction", "LimitSpec", "Limits", "Robot", "TaskSpace"]

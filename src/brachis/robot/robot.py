@@ -143,23 +143,6 @@ class Robot:
         pin.framesForwardKinematics(self.model, data, np.asarray(q, dtype=float))
         return data.oMf[self.frame_id].copy()
 
-    def torque(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
-        """Joint torques of K states.
-
-        Parameters
-        ----------
-        q, qdot, qddot : (K, n) ndarray
-            Positions, velocities, accelerations.
-
-        Returns
-        -------
-        (K, n) ndarray
-            ``rnea + armature * qddot + viscous * qdot + coulomb * tanh(qdot / v_eps)``, Nm or N.
-        """
-        data = self.model.createData()
-        rigid = np.array([pin.rnea(self.model, data, *state) for state in zip(q, qdot, qddot, strict=True)])
-        return rigid.reshape(len(q), self.n) + self.friction.torque(qdot, qddot)
-
 
 def _build_model(xml: str, locked: Mapping[str, float], where: str) -> pin.Model:
     """Let Pinocchio parse the plain URDF and lock the joints off the chain."""

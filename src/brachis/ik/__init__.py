@@ -1,0 +1,19 @@
+"""Closed-form inverse kinematics: protocol, families, and the registry that finds them by geometry."""
+
+from brachis.ik.geometry import ChainGeometry
+from brachis.ik.protocol import Family, IKSolver, NotApplicableError, ik_family, margin_gradient
+from brachis.ik.registry import BUILTIN, Candidate, check_answers, find, find_all
+
+__all__ = [
+    "BUILTIN",
+    "Candidate",
+    "ChainGeometry",
+    "Family",
+    "IKSolver",
+    "NotApplicableError",
+    "check_answers",
+    "find",
+    "find_all",
+    "ik_family",
+    "margin_gradient",
+]

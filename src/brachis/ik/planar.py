@@ -1,0 +1,220 @@
+"""Planar chains: one or two non-redundant joints of any kind, three where yaw is prescribed.
+
+With A, B, C the maps of the joints before, between and after the non-redundant joints a and b (`planar_chain`), the
+target z fixes
+
+    two joints    A^-1(z) = J_a(B(J_b(c))),  c = C(tool):    two circles, circle and line, or two lines
+    one joint     one row of A(J_a(c)):                      a cosine, or a line
+    with yaw      the last revolute joint c follows from the angle; the position of its centre is known, slides after
+                  it run in known directions, and two joints are left.
+
+Two branches at most; they differ by the sign of det J_nr, which is the branch margin.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.ik.geometry import ChainGeometry
+from brachis.ik.planar_chain import PlanarChain
+from brachis.ik.protocol import Kind, NotApplicableError, ik_family
+from brachis.robot import TaskSpace
+
+_SAMPLES = 64
+_LABELS = {"RR": "elbow", "RP": "reach", "PR": "reach", "PP": "slides", "R": "swing", "P": "slide"}
+
+
+class PlanarSolver:
+    """Closed form of a planar chain; see the module's formulas."""
+
+    kind: Kind = "closed_form"
+
+    def __init__(self, chain: PlanarChain, redundant: tuple[int, ...], *, yaw: bool) -> None:
+        self._chain = chain
+        self._n = len(chain.revolute)
+        self._redundant = list(redundant)
+        self._rest = [i for i in range(self._n) if i not in redundant]
+        self._yaw = yaw
+        turning = [i for i in self._rest if chain.revolute[i]]
+        self._last = turning[-1] if yaw else self._n
+        self._pair = [i for i in self._rest if i != self._last]
+        self._scale = self._largest_determinant()
+        pattern = "".join("R" if chain.revolute[i] else "P" for i in self._pair)
+        label = _LABELS[pattern]
+        self.branches: tuple[str, ...] = (f"{label}_positive", f"{label}_negative")
+
+    def _largest_determinant(self) -> float:
+        """Size of det J_nr over random postures, by which branch margins are made dimensionless."""
+        postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, self._n))
+        determinant = self._chain.jacobian_determinant(postures, self._rest, len(self._rest))
+        scale = float(np.abs(determinant).max())
+        if scale < 1e-9:  # noqa: PLR2004
+            raise NotApplicableError("J_nr is singular everywhere")
+        return scale
+
+    def _plane_target(self, targets: np.ndarray) -> np.ndarray:
+        """Plane coordinates (K,) of targets with two position rows."""
+        position = targets[:, :2] - self._chain.offset
+        plane = np.linalg.solve(self._chain.to_plane, position.T)
+        return plane[0] + 1j * plane[1]
+
+    def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
+        """See `IKSolver.solve`."""
+        known = np.zeros((len(q_r), self._n))
+        known[:, self._redundant] = q_r
+        with np.errstate(invalid="ignore", divide="ignore"):
+            if len(self._pair) == 1 and not self._yaw:
+                roots = self._single(targets, known)
+            elif self._yaw:
+                roots = self._with_yaw(targets, known)
+            else:
+                roots = self._two(self._plane_target(targets), known, self._chain.tool, range(self._n))
+        return self._by_sign(known, roots)
+
+    def _by_sign(self, known: np.ndarray, roots: np.ndarray) -> np.ndarray:
+        """Order the roots (K, 2, m) by the sign of det J_nr; NaN where a sign has none."""
+        count = len(known)
+        q = np.repeat(known[:, None], 2, axis=1)
+        q[:, :, self._rest] = roots
+        determinant = self._chain.jacobian_determinant(q.reshape(2 * count, -1), self._rest, len(self._rest))
+        first_positive = determinant.reshape(count, 2) > 0.0
+        first_negative = determinant.reshape(count, 2) < 0.0
+        ordered = np.full_like(roots, np.nan)
+        for slot, match in enumerate((first_positive, first_negative)):
+            root = np.argmax(match, axis=1)
+            found = np.any(match, axis=1)
+            ordered[found, slot] = roots[found, root[found]]
+        return ordered
+
+    def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
+        """See `IKSolver.branch_margins`: det J_nr, divided by its largest size."""
+        determinant = self._chain.jacobian_determinant(q, self._rest, len(self._rest))
+        return (1.0 if branch == 0 else -1.0) * determinant[:, None] / self._scale
+
+    def _single(self, targets: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """One joint for one position row: row = Re(conj(nu) z)."""
+        chain, joint = self._chain, self._pair[0]
+        nu = chain.to_plane[0, 0] + 1j * chain.to_plane[0, 1]
+        alpha, beta = chain.compose(range(joint), known)
+        after_alpha, after_beta = chain.compose(range(joint + 1, self._n), known)
+        tool = after_alpha * chain.tool + after_beta
+        value = targets[:, 0] - chain.offset[0]
+        if chain.revolute[joint]:
+            level = value - (np.conj(nu) * (alpha * chain.centre[joint] + beta)).real
+            lever = np.conj(nu) * alpha * (tool - chain.centre[joint])
+            swing = np.arccos(level / np.abs(lever))
+            angles = np.stack([swing, -swing], axis=1) - np.angle(lever)[:, None]
+            return (chain.sigma[joint] * _wrap(angles))[:, :, None]
+        rate = (np.conj(nu) * alpha * chain.slide[joint]).real
+        slide = (value - (np.conj(nu) * (alpha * tool + beta)).real) / rate
+        return np.repeat(slide[:, None, None], 2, axis=1)
+
+    def _two(self, z: np.ndarray, known: np.ndarray, tool: complex, joints: range) -> np.ndarray:
+        """Two joints a, b for a point in the plane that the `joints` carry from `tool`: (K, 2, 2)."""
+        chain, (a, b) = self._chain, self._pair
+        alpha, beta = chain.compose(range(a), known)
+        between = chain.compose(range(a + 1, b), known)
+        after = chain.compose(range(b + 1, len(joints)), known)
+        w = (z - beta) / alpha
+        c = after[0] * tool + after[1]
+        if chain.revolute[a] and chain.revolute[b]:
+            return self._circles(w - chain.centre[a], between, c)
+        if chain.revolute[a]:
+            return self._circle_line(w - chain.centre[a], between, c)
+        if chain.revolute[b]:
+            lever = between[0] * (c - chain.centre[b])
+            centre = between[0] * chain.centre[b] + between[1]
+            return self._line_circle(w - centre, np.broadcast_to(chain.slide[a], w.shape), lever, b)
+        return _lines(w - (between[0] * c + between[1]), chain.slide[a], between[0] * chain.slide[b])
+
+    def _circles(self, w: np.ndarray, between: tuple[np.ndarray, np.ndarray], c: np.ndarray) -> np.ndarray:
+        """Solve w = exp(i a) (L1 + exp(i b) L2)."""
+        chain, (a, b) = self._chain, self._pair
+        first = between[0] * chain.centre[b] + between[1] - chain.centre[a]
+        second = between[0] * (c - chain.centre[b])
+        cosine = (np.abs(w) ** 2 - np.abs(first) ** 2 - np.abs(second) ** 2) / (2.0 * np.abs(first) * np.abs(second))
+        bend = np.arccos(cosine)
+        relative = np.stack([bend, -bend], axis=1)
+        inner = relative - np.angle(second / first)[:, None]
+        outer = np.angle(w[:, None] / (first[:, None] + np.exp(1j * inner) * second[:, None]))
+        return np.stack([chain.sigma[a] * outer, chain.sigma[b] * _wrap(inner)], axis=2)
+
+    def _circle_line(self, w: np.ndarray, between: tuple[np.ndarray, np.ndarray], c: np.ndarray) -> np.ndarray:
+        """Solve w = exp(i a) (g + u t), u of unit length."""
+        chain, (a, b) = self._chain, self._pair
+        g = between[0] * c + between[1] - chain.centre[a]
+        u = between[0] * chain.slide[b]
+        along = (np.conj(g) * u).real
+        root = np.sqrt(along**2 + np.abs(w) ** 2 - np.abs(g) ** 2)
+        slide = np.stack([root, -root], axis=1) - along[:, None]
+        outer = np.angle(w[:, None] / (g[:, None] + u[:, None] * slide))
+        return np.stack([chain.sigma[a] * outer, slide], axis=2)
+
+    def _line_circle(self, h: np.ndarray, u: np.ndarray, lever: np.ndarray, turning: int) -> np.ndarray:
+        """Solve h = u t + exp(i theta) lever, u of unit length; answers (t, theta)."""
+        across, along = (np.conj(u) * h).imag, (np.conj(u) * h).real
+        root = np.sqrt(np.abs(lever) ** 2 - across**2)
+        slide = along[:, None] + np.stack([root, -root], axis=1)
+        angle = np.angle((h[:, None] - u[:, None] * slide) / lever[:, None])
+        return np.stack([slide, self._chain.sigma[turning] * angle], axis=2)
+
+    def _with_yaw(self, targets: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """Three joints for a point and an angle: (K, 2, 3)."""
+        chain, last = self._chain, self._last
+        turned = targets[:, 2] - chain.yaw
+        after_last = chain.compose(range(last + 1, self._n), known)
+        world = np.exp(1j * turned) / after_last[0]
+        z = self._plane_target(targets) - world * (after_last[0] * chain.tool + after_last[1] - chain.centre[last])
+        late = [i for i in self._pair if i > last]
+        early = [i for i in self._pair if i < last]
+        if not late:
+            pair = self._two(z, known, complex(chain.centre[last]), range(last))
+        else:
+            directions = [world * chain.compose(range(last + 1, i), known)[0] * chain.slide[i] for i in late]
+            pair = self._late(z, known, early, directions)
+        angles = np.zeros((len(targets), 2))
+        others = [i for i in range(self._n) if i != last and chain.revolute[i]]
+        for i in others:
+            angles = angles + chain.sigma[i] * (pair[:, :, self._pair.index(i)] if i in self._pair else known[:, i, None])
+        final = chain.sigma[last] * _wrap(turned[:, None] - angles)
+        order = [(*self._pair, last).index(i) for i in self._rest]
+        return np.concatenate([pair, final[:, :, None]], axis=2)[:, :, order]
+
+    def _late(self, z: np.ndarray, known: np.ndarray, early: list[int], directions: list[np.ndarray]) -> np.ndarray:
+        """Two joints of which one or both are slides after the last revolute joint, along known world directions."""
+        chain, last = self._chain, self._last
+        if not early:
+            alpha, beta = chain.compose(range(last), known)
+            return _lines(z - (alpha * chain.centre[last] + beta), directions[0], directions[1])
+        a = early[0]
+        alpha, beta = chain.compose(range(a), known)
+        between = chain.compose(range(a + 1, last), known)
+        point = between[0] * chain.centre[last] + between[1]
+        if not chain.revolute[a]:
+            return _lines(z - (alpha * point + beta), alpha * chain.slide[a], directions[0])
+        centre = alpha * chain.centre[a] + beta
+        answers = self._line_circle(z - centre, directions[0], alpha * (point - chain.centre[a]), a)
+        return answers[:, :, ::-1]
+
+
+def _lines(h: np.ndarray, first: np.ndarray | complex, second: np.ndarray | complex) -> np.ndarray:
+    """Solve h = first t1 + second t2: (K, 2, 2), the one answer twice."""
+    determinant = (np.conj(first) * second).imag
+    answers = np.stack([(np.conj(h) * second).imag / determinant, (np.conj(first) * h).imag / determinant], axis=1)
+    return np.repeat(answers[:, None], 2, axis=1)
+
+
+def _wrap(angle: np.ndarray) -> np.ndarray:
+    """Return the same angle in (-pi, pi]."""
+    return np.pi - np.mod(np.pi - angle, 2.0 * np.pi)
+
+
+@ik_family("planar", source="two circles, circle and line, two lines: elementary plane geometry")
+def planar(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> PlanarSolver:
+    """Fit the family: all joints move in one plane that the prescribed rows can see."""
+    chain = PlanarChain.of(geometry, task_space)
+    yaw = task_space.yaw_axis is not None
+    rest = [i for i in range(geometry.n) if i not in redundant]
+    if yaw and not any(geometry.revolute[i] for i in rest):
+        raise NotApplicableError("no revolute joint is left to set yaw")
+    return PlanarSolver(chain, redundant, yaw=yaw)

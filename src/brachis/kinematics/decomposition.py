@@ -1,0 +1,191 @@
+"""Joint motion along a path as a function of y = (s, q_r): the joint space decomposition.
+
+The non-redundant joints follow from the closed form, q_nr = IK(z(s), q_r). With J = [J_r | J_nr] the task Jacobian
+and xi = dz/ds, velocities and accelerations follow from J qdot = xi sdot and
+J qddot + Jdot qdot = xi_ds sdot^2 + xi sddot:
+
+    G = dq/dy:        G_r = (0, I),  G_nr = J_nr^-1 [xi, -J_r]
+    qdot            = G ydot
+    qddot_nr        = J_nr^-1 (xi_ds sdot^2 + xi sddot - J_r qddot_r - Jdot qdot)
+    dqdot/dydot     = G
+    dqdot_nr/dy     = J_nr^-1 ([xi_ds sdot, 0] - V_q G)
+    dqddot/dyddot   = G
+    dqddot_nr/dydot = J_nr^-1 ([2 xi_ds sdot, 0] - A_v G)
+    dqddot_nr/dy    = J_nr^-1 ([xi_dds sdot^2 + xi_ds sddot, 0] - A_q G - A_v dqdot/dy)
+
+with V_q, A_q, A_v the derivatives of task velocity and acceleration (`task_kinematics`). Rows of redundant joints are
+constant: their derivatives vanish.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.errors import UnreachableError
+from brachis.ik import ChainGeometry, IKSolver
+from brachis.kinematics.task_kinematics import TaskKinematics
+from brachis.path import Path, PathSample
+from brachis.robot import Robot, TaskSpace
+
+
+@dataclass(frozen=True)
+class JointState:
+    """Motion of all joints at K times.
+
+    Attributes
+    ----------
+    y, ydot, yddot : (K, 1 + r) ndarray
+        Path coordinate and redundant joints, and their time derivatives.
+    q, qdot, qddot : (K, n) ndarray
+    path : PathSample
+    gradient : (K, n, 1 + r) ndarray
+        G = dq/dy.
+    inverse : (K, m, m) ndarray
+        J_nr^-1.
+    """
+
+    y: np.ndarray
+    ydot: np.ndarray
+    yddot: np.ndarray
+    q: np.ndarray
+    qdot: np.ndarray
+    qddot: np.ndarray
+    path: PathSample
+    gradient: np.ndarray
+    inverse: np.ndarray
+
+
+@dataclass(frozen=True)
+class JointDerivatives:
+    """Derivatives of a `JointState`, each (K, n, 1 + r); dqdot/dydot = dqddot/dyddot = G are not repeated.
+
+    Attributes
+    ----------
+    qdot_y, qddot_y, qddot_ydot : (K, n, 1 + r) ndarray
+    """
+
+    qdot_y: np.ndarray
+    qddot_y: np.ndarray
+    qddot_ydot: np.ndarray
+
+
+class Decomposition:
+    """Robot, path, closed form and branch, put together.
+
+    Parameters
+    ----------
+    robot : Robot
+    task_space : TaskSpace
+    path : Path
+    solver : IKSolver
+    redundant : tuple of int
+        Indices of the redundant joints, ascending.
+    branch : int
+        Index into ``solver.branches``.
+    start : (n,) ndarray
+        Start posture; angles are lifted (by multiples of 2 pi) to begin nearest to it.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        task_space: TaskSpace,
+        path: Path,
+        solver: IKSolver,
+        redundant: tuple[int, ...],
+        branch: int,
+        start: np.ndarray,
+    ) -> None:
+        self.robot = robot
+        self.task_space = task_space
+        self.path = path
+        self.solver = solver
+        self.redundant = list(redundant)
+        self.rest = [i for i in range(robot.n) if i not in redundant]
+        self.branch = branch
+        self.start = start
+        self.kinematics = TaskKinematics(robot, task_space)
+        self._turning = ChainGeometry.of(robot).revolute[self.rest]
+
+    @property
+    def r(self) -> int:
+        """Degree of redundancy."""
+        return len(self.redundant)
+
+    def postures(self, y: np.ndarray, sample: PathSample | None = None) -> np.ndarray:
+        """Joint positions at K successive times, continuous from the start posture on.
+
+        Parameters
+        ----------
+        y : (K, 1 + r) ndarray
+            In the order of time, beginning at the start.
+        sample : PathSample, optional
+            The path at ``y[:, 0]`` if already known.
+
+        Returns
+        -------
+        (K, n) ndarray
+            NaN in the non-redundant joints where the branch has no answer.
+        """
+        sample = sample or self.path.sample(y[:, 0])
+        answers = self.solver.solve(sample.target, y[:, 1:])[:, self.branch]
+        turning = self._turning
+        if turning.any() and np.all(np.isfinite(answers)):
+            turns = np.vstack([self.start[self.rest][None, turning], answers[:, turning]])
+            answers[:, turning] = np.unwrap(turns, axis=0)[1:]
+        q = np.empty((len(y), self.robot.n))
+        q[:, self.redundant] = y[:, 1:]
+        q[:, self.rest] = answers
+        return q
+
+    def state(self, y: np.ndarray, ydot: np.ndarray, yddot: np.ndarray) -> JointState:
+        """Joint motion at K successive times from y and its time derivatives, each (K, 1 + r).
+
+        Raises
+        ------
+        UnreachableError
+            The branch has no answer at one of the times, or J_nr is singular there.
+        """
+        sample = self.path.sample(y[:, 0])
+        q = self.postures(y, sample)
+        if not np.all(np.isfinite(q)):
+            raise UnreachableError("the target is out of the branch's reach")
+        jacobian = self.kinematics.jacobian(q)
+        try:
+            inverse = np.linalg.inv(jacobian[:, :, self.rest])
+        except np.linalg.LinAlgError as error:
+            raise UnreachableError("J_nr is singular") from error
+        gradient = self._gradient(sample, jacobian, inverse)
+        qdot = np.einsum("kij,kj->ki", gradient, ydot)
+        # What the redundant joints and the path leave to the non-redundant ones.
+        wanted = sample.xi_ds * ydot[:, :1] ** 2 - self.kinematics.bias(q, qdot)
+        qddot = np.einsum("kij,kj->ki", gradient, yddot)
+        qddot[:, self.rest] += np.einsum("kij,kj->ki", inverse, wanted)
+        return JointState(y, ydot, yddot, q, qdot, qddot, sample, gradient, inverse)
+
+    def _gradient(self, sample: PathSample, jacobian: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+        """G = dq/dy, (K, n, 1 + r)."""
+        gradient = np.zeros((len(jacobian), self.robot.n, 1 + self.r))
+        gradient[:, self.redundant, np.arange(1, 1 + self.r)] = 1.0
+        columns = np.concatenate([sample.xi[:, :, None], -jacobian[:, :, self.redundant]], axis=2)
+        gradient[:, self.rest] = inverse @ columns
+        return gradient
+
+    def derivatives(self, state: JointState) -> JointDerivatives:
+        """Exact derivatives of a state; see the module's formulas."""
+        task = self.kinematics.derivatives(state.q, state.qdot, state.qddot)
+        sdot, sddot = state.ydot[:, :1], state.yddot[:, :1]
+        sample, zeros = state.path, np.zeros_like(state.gradient)
+        qdot_y, qddot_y, qddot_ydot = zeros, zeros.copy(), zeros.copy()
+        right = -task.velocity_q @ state.gradient
+        right[:, :, 0] += sample.xi_ds * sdot
+        qdot_y[:, self.rest] = state.inverse @ right
+        right = -task.acceleration_qdot @ state.gradient
+        right[:, :, 0] += 2.0 * sample.xi_ds * sdot
+        qddot_ydot[:, self.rest] = state.inverse @ right
+        right = -task.acceleration_q @ state.gradient - task.acceleration_qdot @ qdot_y
+        right[:, :, 0] += sample.xi_dds * sdot**2 + sample.xi_ds * sddot
+        qddot_y[:, self.rest] = state.inverse @ right
+        return JointDerivatives(qdot_y, qddot_y, qddot_ydot)

@@ -1,0 +1,102 @@
+"""Task velocity and acceleration of a batch of states and their derivatives, through Pinocchio.
+
+Rows are those of the task space: the tool frame origin's velocity and classical acceleration in world axes
+(LOCAL_WORLD_ALIGNED), and for yaw the angular velocity and acceleration about the plane's normal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from brachis.robot import Robot, TaskSpace
+
+_WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+@dataclass(frozen=True)
+class TaskDerivatives:
+    """Derivatives of task velocity and acceleration for K states, each (K, m, n).
+
+    Attributes
+    ----------
+    velocity_q : (K, m, n) ndarray
+        V_q = d(J qdot)/dq.
+    acceleration_q, acceleration_qdot : (K, m, n) ndarray
+        A_q and A_v, of J qddot + Jdot qdot.
+    """
+
+    velocity_q: np.ndarray
+    acceleration_q: np.ndarray
+    acceleration_qdot: np.ndarray
+
+
+class TaskKinematics:
+    """First- and second-order task kinematics of a robot.
+
+    Parameters
+    ----------
+    robot : Robot
+    task_space : TaskSpace
+    """
+
+    def __init__(self, robot: Robot, task_space: TaskSpace) -> None:
+        self.robot = robot
+        self.task_space = task_space
+        self._data = robot.model.createData()
+        self._frame = robot.frame_id
+        frame = robot.model.frames[self._frame]
+        self._joint, self._placement = frame.parentJoint, frame.placement
+        self._axes = list(task_space.axes)
+        self._yaw = None if task_space.yaw_axis is None else (task_space.yaw_world_axis, task_space.yaw_sign)
+
+    def position(self, q: np.ndarray) -> np.ndarray:
+        """Task coordinates (K, m) of K postures (K, n)."""
+        model, data = self.robot.model, self._data
+        values = np.empty((len(q), self.task_space.m))
+        for k in range(len(q)):
+            pin.forwardKinematics(model, data, q[k])
+            values[k] = self.task_space.value(pin.updateFramePlacement(model, data, self._frame))
+        return values
+
+    def jacobian(self, q: np.ndarray) -> np.ndarray:
+        """Task Jacobian J (K, m, n) of K postures (K, n)."""
+        model, data, frame = self.robot.model, self._data, self._frame
+        full = np.empty((len(q), 6, self.robot.n))
+        for k in range(len(q)):
+            full[k] = pin.computeFrameJacobian(model, data, q[k], frame, _WORLD_ALIGNED)
+        return self._rows(full[:, :3], full[:, 3:])
+
+    def bias(self, q: np.ndarray, qdot: np.ndarray) -> np.ndarray:
+        """Velocity-dependent task acceleration Jdot qdot (K, m)."""
+        model, data, frame, zero = self.robot.model, self._data, self._frame, np.zeros(self.robot.n)
+        full = np.empty((len(q), 6, 1))
+        for k in range(len(q)):
+            pin.forwardKinematics(model, data, q[k], qdot[k], zero)
+            full[k, :, 0] = pin.getFrameClassicalAcceleration(model, data, frame, _WORLD_ALIGNED).vector
+        return self._rows(full[:, :3], full[:, 3:])[:, :, 0]
+
+    def derivatives(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:
+        """V_q, A_q and A_v of K states (K, n)."""
+        model, data = self.robot.model, self._data
+        linear = np.empty((3, len(q), 3, self.robot.n))
+        angular = np.zeros((3, len(q), 3, self.robot.n))
+        for k in range(len(q)):
+            pin.computeForwardKinematicsDerivatives(model, data, q[k], qdot[k], qddot[k])
+            linear[0, k], linear[1, k], linear[2, k], _ = pin.getPointClassicAccelerationDerivatives(
+                model, data, self._joint, self._placement, _WORLD_ALIGNED
+            )
+            if self._yaw is not None:
+                spatial = pin.getFrameAccelerationDerivatives(model, data, self._frame, _WORLD_ALIGNED)
+                angular[0, k], angular[1, k], angular[2, k] = (part[3:] for part in spatial[:3])
+        return TaskDerivatives(*(self._rows(linear[i], angular[i]) for i in range(3)))
+
+    def _rows(self, linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
+        """Select the task space's rows from (K, 3, n) linear and angular parts."""
+        rows = linear[:, self._axes]
+        if self._yaw is None:
+            return rows
+        axis, sign = self._yaw
+        return np.concatenate([rows, sign * angular[:, [axis]]], axis=1)

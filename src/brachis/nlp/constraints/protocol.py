@@ -1,0 +1,54 @@
+"""What a constraint on the joint motion is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from brachis.kinematics import Decomposition, JointState
+
+
+@dataclass(frozen=True)
+class Partials:
+    """Partial derivatives of a constraint's c values at K times, each (K, c, n), or None where they vanish."""
+
+    q: np.ndarray | None = None
+    qdot: np.ndarray | None = None
+    qddot: np.ndarray | None = None
+
+
+class Constraint(Protocol):
+    """c values of the joint motion at every collocation point, held between bounds.
+
+    Attributes
+    ----------
+    kind : str
+        Key in the table of constraints.
+    labels : tuple of str
+        What each of the c values belongs to, for example a joint name.
+    lower, upper : (c,) ndarray
+        Bounds, dimensionless: values are divided by their limits.
+    """
+
+    kind: str
+    labels: tuple[str, ...]
+    lower: np.ndarray
+    upper: np.ndarray
+
+    def values(self, state: JointState) -> np.ndarray:
+        """Values (K, c)."""
+        ...
+
+    def partials(self, state: JointState) -> Partials:
+        """Derivatives of `values` with respect to q, qdot, qddot, each taken as independent."""
+        ...
+
+
+class Build(Protocol):
+    """Makes a constraint for a decomposition, or None where nothing is limited."""
+
+    def __call__(self, decomposition: Decomposition) -> Constraint | None:
+        """Build the constraint."""
+        ...

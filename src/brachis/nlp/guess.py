@@ -1,0 +1,170 @@
+"""Initial guesses: a smooth s(t), redundant joints from numeric inverse kinematics along the path, a long enough t_E.
+
+As in the paper, a numeric inverse kinematics carries the start posture along the path. Its null-space motion climbs the
+branch margin and stays within the joint ranges, so that the closed form can follow. The end time is then stretched
+until all limits hold, which gives the solver a feasible start wherever gravity leaves one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.errors import UnreachableError
+from brachis.ik import margin_gradient
+from brachis.kinematics import Decomposition
+from brachis.nlp.transcription import Motion, Transcription
+
+_STEPS = 40
+_DAMPING = 1e-6
+_STRETCH = 1.1
+_LONGEST_TIME = 200.0
+
+
+@dataclass(frozen=True)
+class Strategy:
+    """How numeric inverse kinematics uses the null space.
+
+    Attributes
+    ----------
+    push : float
+        Strength with which a branch margin below `threshold` is raised.
+    threshold : float
+        Dimensionless.
+    drift : float
+        Constant motion along the first null-space direction, rad or m per unit s; other valleys lie beyond it.
+    """
+
+    push: float
+    threshold: float
+    drift: float = 0.0
+
+
+STRATEGIES = (
+    Strategy(push=2.0, threshold=0.4),
+    Strategy(push=6.0, threshold=0.8),
+    Strategy(push=4.0, threshold=0.6, drift=1.0),
+    Strategy(push=4.0, threshold=0.6, drift=-1.0),
+    Strategy(push=15.0, threshold=1.0),
+    Strategy(push=4.0, threshold=0.6, drift=3.0),
+    Strategy(push=4.0, threshold=0.6, drift=-3.0),
+)
+
+
+def guesses(problem: Transcription) -> Iterator[np.ndarray]:
+    """Yield starting points x whose every collocation point is reachable, the most natural first.
+
+    Parameters
+    ----------
+    problem : Transcription
+
+    Yields
+    ------
+    (v,) ndarray
+    """
+    strategies = STRATEGIES if problem.decomposition.r else STRATEGIES[:1]
+    for strategy in strategies:
+        course = numeric_course(problem.decomposition, strategy)
+        if course is None:
+            continue
+        x = _starting_point(problem, course)
+        if x is not None:
+            yield x
+
+
+def numeric_course(decomposition: Decomposition, strategy: Strategy) -> np.ndarray | None:
+    """Redundant joints along the path by numeric inverse kinematics from the start posture.
+
+    Parameters
+    ----------
+    decomposition : Decomposition
+    strategy : Strategy
+
+    Returns
+    -------
+    (steps + 1, r) ndarray or None
+        At equidistant s; None where the target cannot be followed.
+    """
+    kinematics, n = decomposition.kinematics, decomposition.robot.n
+    s = np.linspace(0.0, 1.0, _STEPS + 1)
+    targets = decomposition.path.sample(s).target
+    q = decomposition.start.astype(float).copy()
+    previous = np.zeros(n)
+    course = [q[decomposition.redundant].copy()]
+    for target in targets[1:]:
+        for correction in range(4):
+            miss = target - kinematics.position(q[None])[0]
+            if correction and np.abs(miss).max() < 1e-3:  # noqa: PLR2004  (the closed form takes it from here)
+                break
+            jacobian = kinematics.jacobian(q[None])[0]
+            square = jacobian @ jacobian.T + _DAMPING * np.eye(len(miss))
+            step = jacobian.T @ np.linalg.solve(square, miss)
+            if correction == 0 and decomposition.r:
+                wish = _wish(decomposition, strategy, q, previous) / _STEPS
+                previous = wish - jacobian.T @ np.linalg.solve(square, jacobian @ wish)
+                step = step + previous
+            q = q + step
+        else:
+            return None
+        course.append(q[decomposition.redundant].copy())
+    return np.array(course)
+
+
+def _wish(decomposition: Decomposition, strategy: Strategy, q: np.ndarray, previous: np.ndarray) -> np.ndarray:
+    """Joint motion per unit s that the null space may realise, (n,)."""
+    limits = decomposition.robot.limits
+    wish = np.zeros_like(q)
+    margins = decomposition.solver.branch_margins(q[None], decomposition.branch)[0]
+    if np.any(margins < strategy.threshold):
+        gradients = margin_gradient(decomposition.solver, q[None], decomposition.branch)[0]
+        shortfall = np.clip(strategy.threshold - margins, 0.0, 2.0 * strategy.threshold)
+        wish += strategy.push * shortfall @ gradients
+    half = 0.5 * (limits.position_upper - limits.position_lower)
+    with np.errstate(invalid="ignore"):
+        place = (q - limits.position_lower) / half - 1.0
+    near = np.isfinite(place) & (np.abs(place) > 0.8)  # noqa: PLR2004
+    wish[near] -= strategy.push * np.sign(place[near]) * (np.abs(place[near]) - 0.8) * half[near]
+    if strategy.drift:
+        direction = previous if previous.any() else np.eye(len(q))[decomposition.redundant[0]]
+        wish += strategy.drift * direction / np.linalg.norm(direction)
+    return wish
+
+
+def _starting_point(problem: Transcription, course: np.ndarray) -> np.ndarray | None:
+    """Fit splines to a course, and stretch the time until the limits hold; None where the fit is unreachable."""
+    tau = problem.splines[0].greville
+    s = tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)
+    grid = np.linspace(0.0, 1.0, len(course))
+    points = [s, *(np.interp(s, grid, column) for column in course.T)]
+    x = problem.variables_from(Motion(1.0, problem.knots, problem.degree, np.array(points)))
+    try:
+        return stretched(problem, x)
+    except UnreachableError:
+        return None
+
+
+def stretched(problem: Transcription, x: np.ndarray) -> np.ndarray:
+    """Return x with t_E so long that velocity, acceleration and torque limits hold, where any time does.
+
+    Raises
+    ------
+    UnreachableError
+        A collocation point is out of the branch's reach.
+    """
+    x = x.copy()
+    while x[0] < _LONGEST_TIME:
+        excess = worst_timed_ratio(problem, x)
+        if excess <= 1.0:
+            break
+        # Without gravity and friction, torque falls with the square of the time.
+        x[0] *= _STRETCH * min(np.sqrt(excess), 8.0)
+    return x
+
+
+def worst_timed_ratio(problem: Transcription, x: np.ndarray) -> float:
+    """Largest ratio to a limit that a longer time relieves: velocity, acceleration, torque."""
+    state = problem.state(x)
+    timed = [c.values(state) for c in problem.constraints if c.kind in ("torque", "velocity", "acceleration")]
+    return float(max(np.abs(values).max() for values in timed))

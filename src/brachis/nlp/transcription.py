@@ -1,0 +1,248 @@
+"""The nonlinear program: minimum end time of spline trajectories along a path.
+
+    minimise    t_E
+    over        x = (t_E, s, q_r1, ..., q_rr)
+    subject to  lower <= rows(x) <= upper,   x_lower <= x <= x_upper
+
+Variables: the end time t_E in seconds, then the free control points (see `curves`) of s(t), then those of each
+redundant joint in chain order. s(0) = 0, s(t_E) = 1, the start posture and rest at both ends are built into the control
+points and have no rows.
+
+Rows: for each constraint of `constraints.TABLE` that applies, in the table's order, its c values at collocation point
+0, then at point 1, and so on; last the differences of successive control points of s, which are >= 0 so that
+ds/dt >= 0 holds at all times. All rows are dimensionless.
+
+Derivatives: with y = (s, q_r) and basis matrices B, B', B'' in normalised time,
+
+    dy/dc = B,  dydot/dc = B' / t_E,  dyddot/dc = B'' / t_E^2,  dydot/dt_E = -ydot / t_E,  dyddot/dt_E = -2 yddot / t_E
+
+and a constraint with partials (p_q, p_v, p_a) has d/dy = p_q G + p_v dqdot/dy + p_a dqddot/dy,
+d/dydot = p_v G + p_a dqddot/dydot and d/dyddot = p_a G, with G and the rest from `kinematics.decomposition`.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.bspline import basis_matrix, clamped_uniform_knots
+from brachis.kinematics import Decomposition, JointDerivatives, JointState
+from brachis.nlp import constraints
+from brachis.nlp.constraints import Constraint, Partials
+from brachis.nlp.curves import SampledSpline, TiedSpline
+
+_SHORTEST_TIME = 1e-4
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A point x of the NLP as curves.
+
+    Attributes
+    ----------
+    t_end : float
+        s.
+    knots : ndarray
+        In normalised time.
+    degree : int
+    control_points : (1 + r, N + d) ndarray
+        Of s, then of each redundant joint in chain order.
+    """
+
+    t_end: float
+    knots: np.ndarray
+    degree: int
+    control_points: np.ndarray
+
+
+class Transcription:
+    """The NLP as functions of x; see the module for its mathematics, variables and rows.
+
+    Parameters
+    ----------
+    decomposition : Decomposition
+    degree, intervals : int
+    derivatives_at_rest : int
+        1: zero velocity at both ends; 2: zero acceleration too.
+    tau : (K,) ndarray
+        Collocation points in normalised time, ascending, from 0 to 1.
+    end : (n,) ndarray or None
+        End posture, None where free.
+
+    Attributes
+    ----------
+    x_lower, x_upper : (v,) ndarray
+    lower, upper : (c,) ndarray
+        Bounds of the rows.
+    jacobian_rows, jacobian_columns : (nnz,) int ndarray
+        Fixed sparsity pattern; each place occurs once.
+    evaluations : dict of str to int
+        How often states and Jacobians were computed.
+    """
+
+    def __init__(
+        self,
+        decomposition: Decomposition,
+        *,
+        degree: int,
+        intervals: int,
+        derivatives_at_rest: int,
+        tau: np.ndarray,
+        end: np.ndarray | None = None,
+    ) -> None:
+        self.decomposition = decomposition
+        self.knots = clamped_uniform_knots(degree, intervals)
+        self.degree = degree
+        self.tau = tau
+        self.splines = self._make_splines(derivatives_at_rest, end)
+        bases = [basis_matrix(self.knots, degree, tau, order) for order in range(3)]
+        self._samples = [SampledSpline.of(spline, bases) for spline in self.splines]
+        built = (build(decomposition) for build in constraints.TABLE.values())
+        self.constraints: tuple[Constraint, ...] = tuple(c for c in built if c is not None)
+        self.evaluations = {"states": 0, "jacobians": 0}
+        self._last: tuple[bytes, JointState] | None = None
+        self._lay_out_variables()
+        self._lay_out_rows()
+
+    def _make_splines(self, derivatives: int, end: np.ndarray | None) -> tuple[TiedSpline, ...]:
+        """s, then the redundant joints."""
+        pairs: list[tuple[float | None, float | None]] = [(0.0, 1.0)]
+        for joint in self.decomposition.redundant:
+            pairs.append((self.decomposition.start[joint], None if end is None else end[joint]))
+        return tuple(
+            TiedSpline.resting(self.knots, self.degree, derivatives=derivatives, start=first, end=last)
+            for first, last in pairs
+        )
+
+    def _lay_out_variables(self) -> None:
+        """Slices of x and bounds on it."""
+        ends = np.cumsum([1, *(spline.free for spline in self.splines)])
+        self.slices = tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
+        self.x_lower = np.full(ends[-1], -np.inf)
+        self.x_upper = np.full(ends[-1], np.inf)
+        self.x_lower[0] = _SHORTEST_TIME
+        self.x_lower[self.slices[0]], self.x_upper[self.slices[0]] = 0.0, 1.0
+
+    def _lay_out_rows(self) -> None:
+        """Bounds of the rows and the Jacobian's sparsity pattern."""
+        count = len(self.tau)
+        lower, upper, rows, columns = [], [], [], []
+        first = 0
+        for constraint in self.constraints:
+            size = len(constraint.lower)
+            lower.append(np.tile(constraint.lower, count))
+            upper.append(np.tile(constraint.upper, count))
+            places = first + np.arange(count * size).reshape(count, size)
+            rows.append(places.ravel())
+            columns.append(np.zeros(count * size, dtype=int))
+            for sample, part in zip(self._samples, self.slices, strict=True):
+                rows.append(places[sample.point].ravel())
+                columns.append(np.repeat(sample.column + part.start, size))
+            first += count * size
+        steps = self.splines[0].free - 1
+        places = first + np.arange(steps)
+        rows += [places, places]
+        columns += [self.slices[0].start + np.arange(steps), self.slices[0].start + 1 + np.arange(steps)]
+        lower.append(np.zeros(steps))
+        upper.append(np.full(steps, np.inf))
+        self.lower, self.upper = np.concatenate(lower), np.concatenate(upper)
+        self.jacobian_rows, self.jacobian_columns = np.concatenate(rows), np.concatenate(columns)
+
+    @property
+    def variables(self) -> int:
+        """Number of variables."""
+        return len(self.x_lower)
+
+    def motion(self, x: np.ndarray) -> Motion:
+        """Curves that belong to x."""
+        points = [spline.control_points(x[part]) for spline, part in zip(self.splines, self.slices, strict=True)]
+        return Motion(float(x[0]), self.knots, self.degree, np.array(points))
+
+    def variables_from(self, motion: Motion) -> np.ndarray:
+        """Point x nearest to given curves over the same knots."""
+        free = [spline.free_from(c) for spline, c in zip(self.splines, motion.control_points, strict=True)]
+        return np.concatenate([[motion.t_end], *free])
+
+    def objective(self, x: np.ndarray) -> float:
+        """End time t_E, s."""
+        return float(x[0])
+
+    def gradient(self) -> np.ndarray:
+        """Gradient of the objective (constant)."""
+        unit = np.zeros(self.variables)
+        unit[0] = 1.0
+        return unit
+
+    def state(self, x: np.ndarray) -> JointState:
+        """Joint motion at the collocation points; kept until x changes, so that rows and Jacobian share it.
+
+        Raises
+        ------
+        UnreachableError
+            A collocation point is out of the branch's reach.
+        """
+        key = x.tobytes()
+        if self._last is None or self._last[0] != key:
+            self.evaluations["states"] += 1
+            curves = np.array([s.values(x[part]) for s, part in zip(self._samples, self.slices, strict=True)])
+            y, ydot, yddot = (np.ascontiguousarray(curves[:, order].T) / x[0] ** order for order in range(3))
+            self._last = (key, self.decomposition.state(y, ydot, yddot))
+        return self._last[1]
+
+    def rows(self, x: np.ndarray) -> np.ndarray:
+        """Values of the rows, (c,).
+
+        Raises
+        ------
+        UnreachableError
+            See `state`.
+        """
+        state = self.state(x)
+        values = [constraint.values(state).ravel() for constraint in self.constraints]
+        return np.concatenate([*values, np.diff(x[self.slices[0]])])
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Entries of the rows' Jacobian on its sparsity pattern, (nnz,).
+
+        Raises
+        ------
+        UnreachableError
+            See `state`.
+        """
+        state = self.state(x)
+        self.evaluations["jacobians"] += 1
+        exact = self.decomposition.derivatives(state)
+        entries: list[np.ndarray] = []
+        for constraint in self.constraints:
+            by_y, by_ydot, by_yddot = chain(constraint.partials(state), state, exact)
+            by_time = np.einsum("kcj,kj->kc", by_ydot, state.ydot) + 2.0 * np.einsum("kcj,kj->kc", by_yddot, state.yddot)
+            entries.append(by_time.ravel() / -x[0])
+            for j, sample in enumerate(self._samples):
+                point, basis = sample.point, sample.entries[:, :, None]
+                entry = by_y[point, :, j] * basis[0]
+                entry += by_ydot[point, :, j] * (basis[1] / x[0])
+                entry += by_yddot[point, :, j] * (basis[2] / x[0] ** 2)
+                entries.append(entry.ravel())
+        steps = self.splines[0].free - 1
+        return np.concatenate([*entries, np.full(steps, -1.0), np.ones(steps)])
+
+
+def chain(
+    partials: Partials, state: JointState, exact: JointDerivatives
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Derivatives of a constraint with respect to y, ydot and yddot, each (K, c, 1 + r), from its partials."""
+    given = next(part for part in (partials.q, partials.qdot, partials.qddot) if part is not None)
+    zeros = np.zeros((*given.shape[:2], state.y.shape[1]))
+    by_y, by_ydot, by_yddot = zeros, zeros, zeros
+    if partials.q is not None:
+        by_y = by_y + partials.q @ state.gradient
+    if partials.qdot is not None:
+        by_y = by_y + partials.qdot @ exact.qdot_y
+        by_ydot = by_ydot + partials.qdot @ state.gradient
+    if partials.qddot is not None:
+        by_y = by_y + partials.qddot @ exact.qddot_y
+        by_ydot = by_ydot + partials.qddot @ exact.qddot_ydot
+        by_yddot = by_yddot + partials.qddot @ state.gradient
+    return by_y, by_ydot, by_yddot

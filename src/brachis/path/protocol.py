@@ -1,0 +1,83 @@
+"""What a path is to the rest of the package, and what a curve is to a path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class PathSample:
+    """A path at K values of the path coordinate s.
+
+    `xi` is the task velocity per unit s: ``J qdot = xi sdot`` and ``J qddot + Jdot qdot = xi_ds sdot**2 + xi sddot``.
+    For task spaces of rows it is the plain derivative of the target.
+
+    Attributes
+    ----------
+    target : ndarray, shape (K, m)
+        Task coordinates z(s): m for position rows, rad for yaw.
+    xi : ndarray, shape (K, m)
+        dz/ds.
+    xi_ds : ndarray, shape (K, m)
+        d2z/ds2.
+    xi_dds : ndarray, shape (K, m)
+        d3z/ds3.
+    """
+
+    target: Array
+    xi: Array
+    xi_ds: Array
+    xi_dds: Array
+
+
+class Path(Protocol):
+    """A prescribed path."""
+
+    @property
+    def length(self) -> float:
+        """Length of what the position rows describe, m."""
+        ...
+
+    @property
+    def breaks(self) -> Array:
+        """Values of s where segments and blends join, from 0 to 1; the path is C3 there."""
+        ...
+
+    def sample(self, s: Sequence[float] | Array) -> PathSample:
+        """Return the path at K values of s, shape (K,).
+
+        Beyond [0, 1] the path continues as the formula of its first or last piece, so that an optimiser's trial point
+        just outside meets smooth derivatives.
+        """
+        ...
+
+
+class Curve(Protocol):
+    """One piece of a path over a parameter sigma in [0, length].
+
+    Sigma is the arc length of the position rows, m; for a spline the cumulative chord length of its waypoints; for a
+    motion of yaw alone the angle, rad.
+    """
+
+    @property
+    def length(self) -> float:
+        """Range of sigma."""
+        ...
+
+    @property
+    def knots(self) -> Array:
+        """Values of sigma between which the curve is analytic, from 0 to `length`."""
+        ...
+
+    def derivatives(self, sigma: Array, order: int = 3) -> Array:
+        """Return the curve and its derivatives by sigma up to `order`, shape (order + 1, K, m)."""
+        ...

@@ -1,0 +1,94 @@
+"""Where a segment stands: its key and the point it starts from, with the checks that all builders share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brachis.errors import PathError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from brachis.path.protocol import Array
+
+ZERO_LENGTH = 1e-9
+"""Lengths (m) and angles (rad) below are rounding of the start posture's coordinates, not a motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """Place of one segment.
+
+    Attributes
+    ----------
+    key : str
+        Key of what describes the segment, for example ``path[0].line``.
+    start : ndarray, shape (m,)
+        Task coordinates at which the segment starts.
+    rows : tuple of str
+        Rows of the task space.
+    """
+
+    key: str
+    start: Array
+    rows: tuple[str, ...]
+
+    @property
+    def positions(self) -> tuple[str, ...]:
+        """The position rows."""
+        return tuple(row for row in self.rows if row != "yaw")
+
+    @property
+    def position(self) -> Array:
+        """The start in the position rows."""
+        return self.start[: len(self.positions)]
+
+    @property
+    def has_yaw(self) -> bool:
+        """Whether yaw is a row of the task space."""
+        return "yaw" in self.rows
+
+    def coordinates(self, values: Sequence[float], key: str, rows: Sequence[str]) -> Array:
+        """Return values as an array, after a check that there is one for each of `rows`.
+
+        Raises
+        ------
+        PathError
+            The number of values differs.
+        """
+        if len(values) != len(rows):
+            problem = "wrong number of coordinates"
+            raise PathError(
+                problem,
+                found=f"{len(values)}: {list(values)}",
+                allowed=f"{len(rows)}: [{', '.join(rows)}]",
+                where=f"{self.key}.{key}",
+            )
+        return np.asarray(values, dtype=float)
+
+    def need_plane(self, what: str, counts: tuple[int, ...] = (2, 3)) -> None:
+        """Refuse a form of segment that the number of position rows does not allow.
+
+        Raises
+        ------
+        PathError
+            The task space has another number of position rows than `counts`.
+        """
+        if len(self.positions) not in counts:
+            problem = f"{what} needs {' or '.join(map(str, counts))} position rows"
+            raise PathError(
+                problem,
+                found=f"task_space [{', '.join(self.rows)}]",
+                where=self.key,
+                hint="Use line: {to: [...]}, line: {by: [...]} or a spline",
+            )
+
+    def zero_length(self, *, key: str, found: object) -> PathError:
+        """Return the error that the segment has zero length."""
+        problem = "the segment has zero length"
+        return PathError(
+            problem, found=found, allowed="a motion away from the segment's start", where=f"{self.key}{key}"
+        )

@@ -1,0 +1,94 @@
+"""Smooth curves through waypoints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brachis.errors import PathError
+from brachis.path.line import LineCurve
+from brachis.path.site import ZERO_LENGTH, Site
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+    from brachis.path.protocol import Array
+    from brachis.task import SplineThrough
+
+_DEGREE = 5
+_FEWEST_WAYPOINTS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class SplineCurve:
+    """The natural quintic spline through waypoints, C4, over their cumulative chord length.
+
+    Of all curves through the waypoints it has the least integral of the squared third derivative; its third and fourth
+    derivatives vanish at both ends. That holds from three waypoints on, where it is a parabola.
+
+    Attributes
+    ----------
+    spline : BSpline
+        The spline with values of shape (m,).
+    length : float
+        Cumulative chord length of the position rows, m (of yaw, rad, where they stand still).
+    knots : ndarray
+        Chord lengths of the waypoints.
+    """
+
+    spline: BSpline
+    length: float
+    knots: Array
+
+    def derivatives(self, sigma: Array, order: int = 3) -> Array:
+        """Return the curve and its derivatives by sigma, shape (order + 1, K, m)."""
+        return np.stack([self.spline(sigma, nu=k) for k in range(order + 1)])
+
+
+def spline_through(shape: SplineThrough, site: Site) -> SplineCurve | LineCurve:
+    """Return the smooth curve from the segment's start through waypoints; a line where there is only one."""
+    points = [
+        site.coordinates(point, f"through[{i}]", site.rows) + (site.start if shape.relative else 0.0)
+        for i, point in enumerate(shape.through)
+    ]
+    waypoints = np.stack([site.start, *points])
+    steps = np.diff(waypoints, axis=0)
+    chords = np.linalg.norm(steps[:, : len(site.positions)], axis=1)
+    if np.all(chords < ZERO_LENGTH):
+        chords = np.linalg.norm(steps, axis=1)
+    if np.all(chords < ZERO_LENGTH):
+        raise site.zero_length(key=".through", found=[list(point) for point in shape.through])
+    if np.any(chords < ZERO_LENGTH):
+        repeated = int(np.argmax(chords < ZERO_LENGTH))
+        problem = "a waypoint repeats its predecessor"
+        if repeated == 0:
+            problem = "the first waypoint is the segment's start, which is implied"
+        raise PathError(
+            problem,
+            found=list(shape.through[repeated]),
+            allowed="waypoints that differ from their predecessors in the position rows",
+            where=f"{site.key}.through[{repeated}]",
+        )
+    knots = np.concatenate([[0.0], np.cumsum(chords)])
+    if len(waypoints) < _FEWEST_WAYPOINTS:
+        return LineCurve(site.start, steps[0] / chords[0], float(chords[0]))
+    return SplineCurve(_natural(knots, waypoints), float(knots[-1]), knots)
+
+
+def _natural(knots: Array, waypoints: Array) -> BSpline:
+    # Imported here: it takes half a second, which tasks without a spline need not wait for.
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415
+
+    # Over a parameter in [0, 1], so that the derivatives at the ends are of the same magnitude as the values.
+    unit = knots / knots[-1]
+    if len(knots) == _FEWEST_WAYPOINTS:
+        # The conditions at the ends leave a parabola, but as equations they lose digits where a chord is short.
+        spline = make_interp_spline(unit, waypoints, k=2, t=np.repeat([0.0, 1.0], 3))
+    else:
+        zero = np.zeros(waypoints.shape[1])
+        ends = [(3, zero), (4, zero)]
+        # The stubs do not know conditions on chosen derivatives, which SciPy documents.
+        spline = make_interp_spline(unit, waypoints, k=_DEGREE, bc_type=(ends, ends))  # type: ignore[arg-type]
+    return type(spline)(spline.t * knots[-1], spline.c, spline.k)

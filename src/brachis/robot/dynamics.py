@@ -1,0 +1,61 @@
+"""Joint torques of a batch of states and their exact derivatives, through Pinocchio."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from brachis.robot.robot import Robot
+
+
+@dataclass(frozen=True)
+class TorqueDerivatives:
+    """Derivatives of the torque of K states, each (K, n, n): row joint torque, column joint.
+
+    Attributes
+    ----------
+    q, qdot, qddot : (K, n, n) ndarray
+        With respect to position, velocity, acceleration (the last is the mass matrix plus armature).
+    """
+
+    q: np.ndarray
+    qdot: np.ndarray
+    qddot: np.ndarray
+
+
+def torque(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+    """Joint torques of K states.
+
+    Parameters
+    ----------
+    robot : Robot
+    q, qdot, qddot : (K, n) ndarray
+        Positions, velocities, accelerations.
+
+    Returns
+    -------
+    (K, n) ndarray
+        ``rnea + armature * qddot + viscous * qdot + coulomb * tanh(qdot / v_eps)``, Nm or N.
+    """
+    model, data, rnea = robot.model, robot.model.createData(), pin.rnea
+    rigid = np.empty_like(q)
+    for k in range(len(q)):
+        rigid[k] = rnea(model, data, q[k], qdot[k], qddot[k])
+    return rigid + robot.friction.torque(qdot, qddot)
+
+
+def torque_derivatives(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TorqueDerivatives:
+    """Exact derivatives of `torque`; parameters as there."""
+    model, data, derivatives = robot.model, robot.model.createData(), pin.computeRNEADerivatives
+    by_q, by_qdot, by_qddot = (np.empty((len(q), robot.n, robot.n)) for _ in range(3))
+    for k in range(len(q)):
+        by_q[k], by_qdot[k], by_qddot[k] = derivatives(model, data, q[k], qdot[k], qddot[k])
+    # Some versions of Pinocchio fill the upper triangle of the mass matrix only.
+    upper = np.triu(by_qddot)
+    by_qddot = upper + np.swapaxes(np.triu(by_qddot, 1), 1, 2)
+    diagonal = np.arange(robot.n)
+    by_qddot[:, diagonal, diagonal] += robot.friction.armature
+    by_qdot[:, diagonal, diagonal] += robot.friction.velocity_derivative(qdot)
+    return TorqueDerivatives(by_q, by_qdot, by_qddot)

@@ -1,0 +1,82 @@
+"""IPOPT through the ipyopt wheel: an interior-point method, for many intervals and as a second opinion.
+
+The Hessian is IPOPT's limited-memory approximation. https://coin-or.github.io/Ipopt
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.errors import UnreachableError
+from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
+from brachis.solvers.watch import Watch
+
+name = "ipopt"
+
+_STATUS = {
+    0: SolveStatus.OPTIMAL,
+    1: SolveStatus.ACCEPTABLE,
+    2: SolveStatus.INFEASIBLE,
+    3: SolveStatus.ACCEPTABLE,  # search direction too small: judged by its residuals
+    -1: SolveStatus.ITERATION_LIMIT,
+    -4: SolveStatus.TIME_LIMIT,
+    -5: SolveStatus.TIME_LIMIT,
+    -13: SolveStatus.EVALUATION_ERROR,
+}
+_INFINITY = 2e19  # IPOPT takes bounds beyond 1e19 for none
+
+
+def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
+    """See `brachis.solvers.protocol.Solver`."""
+    import ipyopt  # noqa: PLC0415  (a solver is imported when it is used)
+
+    watch = Watch(problem, options, progress)
+    gradient = problem.gradient()
+
+    def objective_gradient(_x: np.ndarray, out: np.ndarray) -> None:
+        out[:] = gradient
+
+    def rows(point: np.ndarray, out: np.ndarray) -> None:
+        try:
+            out[:] = watch.rows(point)
+        except UnreachableError:
+            out[:] = np.nan  # IPOPT shortens the step
+
+    def jacobian(point: np.ndarray, out: np.ndarray) -> None:
+        try:
+            out[:] = watch.jacobian(point)
+        except UnreachableError:
+            out[:] = np.nan
+
+    def intermediate(_mode: int, _iteration: int, objective: float, *_: float) -> bool:
+        return not watch.between_iterations(objective)
+
+    backend = ipyopt.Problem(
+        len(x),
+        np.clip(problem.x_lower, -_INFINITY, _INFINITY),
+        np.clip(problem.x_upper, -_INFINITY, _INFINITY),
+        len(problem.lower),
+        np.clip(problem.lower, -_INFINITY, _INFINITY),
+        np.clip(problem.upper, -_INFINITY, _INFINITY),
+        (problem.jacobian_rows, problem.jacobian_columns),
+        (np.array([], dtype=int), np.array([], dtype=int)),
+        problem.objective,
+        objective_gradient,
+        rows,
+        jacobian,
+        intermediate_callback=intermediate,
+        ipopt_options={
+            "print_level": 0,
+            "sb": "yes",
+            "tol": options.tolerance,
+            "constr_viol_tol": options.tolerance,
+            "max_iter": options.max_iterations,
+            "hessian_approximation": "limited-memory",
+            "mu_strategy": "adaptive",
+            "bound_relax_factor": 0.0,
+        },
+    )
+    multipliers = np.zeros(len(problem.lower))
+    answer, _, code = backend.solve(x.copy(), mult_g=multipliers)
+    status = _STATUS.get(int(code), SolveStatus.FAILED)
+    return watch.report(name, status, np.array(answer), -multipliers, f"return code {code}")

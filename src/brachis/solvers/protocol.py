@@ -1,0 +1,126 @@
+"""What a solver backend is: problem in, report out."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+
+class SolveStatus(enum.Enum):
+    """How a solve ended; the value is the advice to the user."""
+
+    OPTIMAL = "optimal: first-order conditions hold"
+    ACCEPTABLE = "acceptable: feasible, but the solver could not confirm optimality; another start may be better"
+    ITERATION_LIMIT = "iteration limit reached; raise solver.max_iterations"
+    TIME_LIMIT = "time limit reached; raise solver.time_limit"
+    INFEASIBLE = "no feasible point near this start; check limits, choose another redundant joint or start posture"
+    EVALUATION_ERROR = "the motion could not be evaluated near this start; choose another redundant joint"
+    FAILED = "the solver broke down; choose another solver"
+
+    @property
+    def usable(self) -> bool:
+        """True where the answer satisfies the rows."""
+        return self in (SolveStatus.OPTIMAL, SolveStatus.ACCEPTABLE)
+
+
+class Problem(Protocol):
+    """A sparse nonlinear program; `brachis.nlp.Transcription` is one."""
+
+    x_lower: np.ndarray
+    x_upper: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    jacobian_rows: np.ndarray
+    jacobian_columns: np.ndarray
+
+    def objective(self, x: np.ndarray) -> float:
+        """Value to be minimised."""
+        ...
+
+    def gradient(self) -> np.ndarray:
+        """Gradient of the objective."""
+        ...
+
+    def rows(self, x: np.ndarray) -> np.ndarray:
+        """Values of the rows; raises UnreachableError where they do not exist."""
+        ...
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Entries of the Jacobian on its pattern; raises UnreachableError as `rows` does."""
+        ...
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """Bounds on a solve.
+
+    Attributes
+    ----------
+    tolerance : float
+        On constraint violation and optimality, dimensionless.
+    max_iterations : int
+    time_limit : float
+        s.
+    """
+
+    tolerance: float = 1e-6
+    max_iterations: int = 300
+    time_limit: float = 20.0
+
+
+@dataclass(frozen=True)
+class SolverReport:
+    """Answer of a solver.
+
+    Attributes
+    ----------
+    solver : str
+    status : SolveStatus
+        Judged by the residuals below, not by the backend's word alone.
+    x : (v,) ndarray
+    objective : float
+        s.
+    violation : float
+        Largest violation of rows and bounds, recomputed by brachis; infinite if `x` cannot be evaluated.
+    multipliers : (c,) ndarray
+        Of the rows, L = objective - multipliers . rows; zeros where the backend gives none.
+    iterations : int
+    wall_time : float
+        s.
+    message : str
+        The backend's own words.
+    """
+
+    solver: str
+    status: SolveStatus
+    x: np.ndarray
+    objective: float
+    violation: float
+    multipliers: np.ndarray
+    iterations: int
+    wall_time: float
+    message: str
+
+
+Progress = Callable[[int, float], None]
+"""Called between iterations with the iteration's number and the objective in seconds; may raise KeyboardInterrupt."""
+
+
+class Solver(Protocol):
+    """A backend."""
+
+    name: str
+
+    def solve(self, problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
+        """Solve `problem` from the start `x`.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            The user interrupted; passed on once the backend has returned.
+        """
+        ...

@@ -1,0 +1,66 @@
+"""SciPy's SLSQP (Kraft): a dense SQP that is always there; for small problems and as a third opinion."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from brachis.errors import UnreachableError
+from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
+from brachis.solvers.watch import Watch
+
+name = "slsqp"
+
+_STATUS = {0: SolveStatus.OPTIMAL, 4: SolveStatus.INFEASIBLE, 8: SolveStatus.ACCEPTABLE, 9: SolveStatus.ITERATION_LIMIT}
+_UNREACHABLE_ROWS = -1e3
+"""SLSQP cannot back off from NaN; a violation far above any real one makes its line search shorten the step."""
+
+
+class _StopSolveError(Exception):
+    """Leaves SciPy's loop when the solve has to stop."""
+
+
+def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
+    """See `brachis.solvers.protocol.Solver`."""
+    from scipy.optimize import Bounds, minimize  # noqa: PLC0415  (a solver is imported when it is used)
+
+    watch = Watch(problem, options, progress)
+    below, above = np.isfinite(problem.lower), np.isfinite(problem.upper)
+    shape = (len(problem.lower), len(x))
+    last = x.copy()
+
+    def rows(point: np.ndarray) -> np.ndarray:
+        try:
+            values = watch.rows(point)
+        except UnreachableError:
+            if watch.must_stop():
+                raise _StopSolveError from None
+            return np.full(below.sum() + above.sum(), _UNREACHABLE_ROWS)
+        return np.concatenate([(values - problem.lower)[below], (problem.upper - values)[above]])
+
+    def jacobian(point: np.ndarray) -> np.ndarray:
+        entries = watch.jacobian(point)
+        dense = sparse.coo_array((entries, (problem.jacobian_rows, problem.jacobian_columns)), shape=shape).toarray()
+        return np.concatenate([dense[below], -dense[above]])
+
+    def callback(point: np.ndarray) -> None:
+        last[:] = point
+        if watch.between_iterations(problem.objective(point)):
+            raise _StopSolveError
+
+    try:
+        result = minimize(
+            problem.objective,
+            x,
+            method="SLSQP",
+            jac=lambda _x: problem.gradient(),
+            bounds=Bounds(problem.x_lower, problem.x_upper),
+            constraints=[{"type": "ineq", "fun": rows, "jac": jacobian}],
+            callback=callback,
+            options={"maxiter": options.max_iterations, "ftol": options.tolerance},
+        )
+    except (_StopSolveError, UnreachableError):
+        status = SolveStatus.TIME_LIMIT if watch.timed_out else SolveStatus.EVALUATION_ERROR
+        return watch.report(name, status, last, None, "stopped")
+    status = _STATUS.get(int(result.status), SolveStatus.FAILED)
+    return watch.report(name, status, np.array(result.x), None, str(result.message))

@@ -1,0 +1,113 @@
+"""The seam between a problem and a backend: counting, interruption, deadline and the judgement of the answer."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from brachis.errors import UnreachableError
+from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
+
+_FEASIBLE = 10.0
+"""An answer counts as feasible up to this many times the solver's tolerance."""
+
+
+class Watch:
+    """Watches one solve.
+
+    A backend written in another language must not see a KeyboardInterrupt: it is kept here, the backend is told to
+    stop, and `report` raises it again.
+
+    Parameters
+    ----------
+    problem : Problem
+    options : SolverOptions
+    progress : Progress or None
+    """
+
+    def __init__(self, problem: Problem, options: SolverOptions, progress: Progress | None) -> None:
+        self.problem = problem
+        self.options = options
+        self.iterations = 0
+        self.interrupt: KeyboardInterrupt | None = None
+        self.timed_out = False
+        self._progress = progress
+        self._began = time.perf_counter()
+
+    @property
+    def elapsed(self) -> float:
+        """Wall time since the beginning, s."""
+        return time.perf_counter() - self._began
+
+    def between_iterations(self, objective: float) -> bool:
+        """Count an iteration, tell the user, and answer whether the backend has to stop."""
+        self.iterations += 1
+        if self._progress is not None:
+            try:
+                self._progress(self.iterations, objective)
+            except KeyboardInterrupt as interrupt:
+                self.interrupt = interrupt
+        return self.must_stop()
+
+    def must_stop(self) -> bool:
+        """True once the user has interrupted or the time is over."""
+        self.timed_out = self.timed_out or self.elapsed > self.options.time_limit
+        return self.timed_out or self.interrupt is not None
+
+    def rows(self, x: np.ndarray) -> np.ndarray:
+        """Rows at x; raises UnreachableError there, and everywhere once the solve has to stop."""
+        return self._evaluate(self.problem.rows, x)
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Jacobian entries at x; raises as `rows` does."""
+        return self._evaluate(self.problem.jacobian, x)
+
+    def _evaluate(self, function: object, x: np.ndarray) -> np.ndarray:
+        if self.must_stop():
+            raise UnreachableError("the solve has to stop")
+        try:
+            return np.asarray(function(np.array(x)))  # type: ignore[operator]
+        except KeyboardInterrupt as interrupt:
+            self.interrupt = interrupt
+            raise UnreachableError("the solve has to stop") from interrupt
+
+    def report(
+        self, solver: str, status: SolveStatus, x: np.ndarray, multipliers: np.ndarray | None, message: str
+    ) -> SolverReport:
+        """Judge the answer by its own residuals.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            If one was kept.
+        """
+        if self.interrupt is not None:
+            raise self.interrupt
+        violation = residual(self.problem, x)
+        feasible = violation <= _FEASIBLE * self.options.tolerance
+        if status.usable and not feasible:
+            status = SolveStatus.INFEASIBLE
+        elif self.timed_out and not status.usable:
+            status = SolveStatus.TIME_LIMIT
+        return SolverReport(
+            solver=solver,
+            status=status,
+            x=x,
+            objective=self.problem.objective(x),
+            violation=violation,
+            multipliers=np.zeros(len(self.problem.lower)) if multipliers is None else multipliers,
+            iterations=self.iterations,
+            wall_time=self.elapsed,
+            message=message,
+        )
+
+
+def residual(problem: Problem, x: np.ndarray) -> float:
+    """Largest violation of rows and bounds at x; infinite where x cannot be evaluated."""
+    try:
+        rows = problem.rows(x)
+    except UnreachableError:
+        return np.inf
+    gaps = (problem.lower - rows, rows - problem.upper, problem.x_lower - x, x - problem.x_upper)
+    return float(max(0.0, *(gap.max(initial=0.0) for gap in gaps)))

@@ -1,0 +1,117 @@
+"""Building blocks of the task models: the base class, strict scalar types, and unions chosen by form or by key.
+
+A plain pydantic union answers a wrong value with one complaint per member. Here a function looks at the value first and
+picks the member that was meant, so that a wrong value gets one complaint, about what the user had in mind. Tags are
+written ``<like this>`` because they appear in pydantic's error locations; `brachis.task.messages` removes them there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Strict
+from pydantic_core import PydanticCustomError
+
+REFUSED = "brachis_refused"
+"""Error type of a value that a validator of ours refuses; see `refuse`."""
+WRONG_FORM = "brachis_form"
+"""Error type of a value that has none of a union's forms; see `by_form`."""
+WRONG_KEYS = "brachis_keys"
+"""Error type of a mapping whose keys do not select one member of a union; see `by_key`."""
+
+
+class Model(BaseModel):
+    """Base class of all parts of a task: frozen, without unknown keys, without NaN or infinity."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+# Strict: the string "3" or the boolean true where a number belongs is a slip of the user's, not a number. Whole numbers
+# are accepted as real ones.
+Number = Annotated[float, Strict()]
+Positive = Annotated[float, Strict(), Field(gt=0)]
+NonNegative = Annotated[float, Strict(), Field(ge=0)]
+Count = Annotated[int, Strict()]
+Flag = Annotated[bool, Strict()]
+Name = Annotated[str, Strict(), Field(min_length=1)]
+Vector = Annotated[tuple[Number, ...], Field(min_length=1)]
+
+
+def refuse(problem: str, *, key: str = "", found: object = None, allowed: str = "") -> PydanticCustomError:
+    """Return the error that a validator raises to refuse a value.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong.
+    key : str, optional
+        Where, below the validated value, for example ``"[2].blend"`` or ``".degree"``.
+    found : object, optional
+        What was found; the validated value itself where it is None.
+    allowed : str, optional
+        What would have been accepted.
+    """
+    # Pydantic fills braces of the template from the context; the facts travel in the context, not in the text.
+    return PydanticCustomError(
+        REFUSED, "{problem}", {"problem": problem, "key": key, "found": found, "allowed": allowed}
+    )
+
+
+def by_form(allowed: str, *words: str) -> Discriminator:
+    """Choose a union's member by the form of the value: a word, a number, a list, a mapping or null.
+
+    Parameters
+    ----------
+    allowed : str
+        The accepted forms, in words, for the error message.
+    *words : str
+        The strings that select the member tagged ``<word>``; any other string is refused.
+    """
+
+    def form(value: object) -> str | None:
+        if isinstance(value, str):
+            return "<word>" if value in words else None
+        if value is None:
+            return "<null>"
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return "<number>"
+        if isinstance(value, list | tuple):
+            return "<list>"
+        return "<mapping>" if isinstance(value, Mapping | BaseModel) else None
+
+    return Discriminator(
+        form,
+        custom_error_type=WRONG_FORM,
+        custom_error_message="must be {allowed}",
+        custom_error_context={"allowed": allowed},
+    )
+
+
+def by_key(problem: str, members: Mapping[str, tuple[str, ...]]) -> Discriminator:
+    """Choose a union's member by the keys of the mapping.
+
+    Parameters
+    ----------
+    problem : str
+        What to say where the keys select no member, or more than one.
+    members : mapping of str to tuple of str
+        For every member's class name, the keys that select it. Its tag is ``<class name>``.
+    """
+    allowed = " | ".join("{" + ", ".join(keys) + "}" for keys in members.values())
+    known = [key for keys in members.values() for key in keys]
+
+    def member(value: object) -> str | None:
+        if isinstance(value, BaseModel):
+            return f"<{type(value).__name__}>"
+        if not isinstance(value, Mapping):
+            return None
+        chosen = [name for name, keys in members.items() if any(key in value for key in keys)]
+        return f"<{chosen[0]}>" if len(chosen) == 1 else None
+
+    return Discriminator(
+        member,
+        custom_error_type=WRONG_KEYS,
+        custom_error_message="{problem}",
+        custom_error_context={"problem": problem, "allowed": allowed, "known": " ".join(known)},
+    )

@@ -1,0 +1,107 @@
+"""Making a `Task` from a file or from a mapping."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from brachis.errors import TaskError
+from brachis.task.messages import show, task_error
+from brachis.task.models import Task
+from brachis.task.yaml_reader import read_yaml
+
+
+def load_task(source: str | os.PathLike[str] | Mapping[str, object] | Task) -> Task:
+    """Return the task that a file or a mapping describes.
+
+    Parameters
+    ----------
+    source : path-like, mapping or Task
+        A YAML file; or what such a file would contain, as a mapping (NumPy arrays are accepted as lists); or a task,
+        which is returned as it is.
+
+    Returns
+    -------
+    Task
+        The validated task. The path of the URDF is absolute: it was relative to the file's folder, or to the current
+        folder for a mapping.
+
+    Raises
+    ------
+    TaskError
+        The file cannot be read or is not YAML, or the task is wrong. All mistakes are in one message, a line each, with
+        file, key, what was found and what is allowed.
+
+    Examples
+    --------
+    >>> task = load_task({
+    ...     "brachis": 1,
+    ...     "start": {"joints": [0.1, 0.2, 0.3]},
+    ...     "task_space": ["x", "y"],
+    ...     "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
+    ...     "redundant_joints": ["joint_3"],
+    ... })
+    >>> task.spline.degree
+    3
+    """
+    if isinstance(source, Task):
+        return source
+    if isinstance(source, Mapping):
+        return _task_from(source, "task", Path.cwd())
+    if not isinstance(source, str | os.PathLike):
+        problem = "a task is loaded from a file or a mapping"
+        raise TaskError(problem, found=type(source).__name__, allowed="a file name, a mapping, or a Task")
+    path = Path(source)
+    task = _task_from(read_yaml(_read(path), str(path)), str(path), path.absolute().parent)
+    if task.robot.urdf is None:
+        problem = "this key is required in a task file, and missing"
+        raise TaskError(problem, where=f"{path}: robot.urdf", hint="Give the URDF's path, relative to the task file")
+    return task
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        problem = "there is no such file"
+        raise TaskError(problem, where=str(path), hint=f"Paths are relative to {Path.cwd()}") from None
+    except UnicodeDecodeError as error:
+        problem = f"not a text file in UTF-8: {error.reason} at byte {error.start}"
+        raise TaskError(problem, where=str(path)) from None
+    except OSError as error:
+        problem = f"the file cannot be read: {error.strerror}"
+        raise TaskError(problem, where=str(path)) from None
+
+
+def _task_from(content: object, source: str, folder: Path) -> Task:
+    if not isinstance(content, Mapping):
+        problem = "a task is a mapping"
+        raise TaskError(problem, found=show(content), allowed=", ".join(Task.model_fields), where=source)
+    try:
+        task = Task.model_validate(_plain(content))
+    except ValidationError as error:
+        raise task_error(error, source, Task) from None
+    except RecursionError:
+        problem = "the task contains itself (a YAML alias inside its own anchor)"
+        raise TaskError(problem, where=source) from None
+    if task.robot.urdf is None:
+        return task
+    # Not Path.resolve: a linked folder keeps its name, beside which the URDF's meshes may be.
+    urdf = os.path.abspath(folder / task.robot.urdf)  # noqa: PTH100
+    return task.model_copy(update={"robot": task.robot.model_copy(update={"urdf": urdf})})
+
+
+def _plain(value: object) -> object:
+    """Return `value` with arrays as lists, array scalars as numbers, and path objects as strings."""
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    # By its method and not by its class: this stage has no need for NumPy.
+    to_list = getattr(value, "tolist", None)
+    return to_list() if callable(to_list) else value

@@ -1,0 +1,187 @@
+"""Pydantic's validation errors in plain words: key, what was found, what is allowed, what to try."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, get_args
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from brachis.errors import TaskError, nearest
+from brachis.task.fields import REFUSED, WRONG_FORM, WRONG_KEYS, Model
+
+_LONGEST_VALUE = 60
+
+
+@dataclass(frozen=True)
+class _Complaint:
+    """One mistake: the fields of a `TaskError` before the file's name is known."""
+
+    problem: str
+    found: str | None = None
+    allowed: str | None = None
+    hint: str | None = None
+    key: str = ""
+
+
+def task_error(error: ValidationError, source: str, model: type[Model]) -> TaskError:
+    """Return the `TaskError` that says in plain words what `error` says.
+
+    Parameters
+    ----------
+    error : ValidationError
+        What pydantic found.
+    source : str
+        File name, or what else the task came from.
+    model : type
+        The model that was validated; its fields tell which keys are allowed.
+    """
+    details = error.errors(include_url=False)
+    errors = [_one(detail, source, model) for detail in details if not _is_echo(detail)]
+    if len(errors) == 1:
+        return errors[0]
+    lines = "".join(f"\n  {one}" for one in errors)
+    return TaskError(f"{len(errors)} mistakes{lines}", where=source)
+
+
+def show(value: object) -> str:
+    """Return a value as a task file would write it, shortened, with its type where that is the question."""
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return f"{str(value).lower()} (a boolean)"
+    if isinstance(value, str):
+        return f"{_short(repr(value))} (a string)"
+    if isinstance(value, Mapping):
+        return f"a mapping with the keys {_short(', '.join(map(str, value)) or 'none')}"
+    if isinstance(value, list | tuple):
+        return f"{_short(repr(list(value)))} (a list)"
+    return _short(repr(value))
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
+
+
+def _one(detail: ErrorDetails, source: str, model: type[Model]) -> TaskError:
+    describe = _DESCRIPTIONS.get(detail["type"], _unforeseen)
+    complaint = describe(detail, model)
+    key = _dotted(detail["loc"]) + complaint.key
+    where = f"{source}: {key}" if key else source
+    return TaskError(
+        complaint.problem, found=complaint.found, allowed=complaint.allowed, where=where, hint=complaint.hint
+    )
+
+
+def _is_tag(part: str | int) -> bool:
+    return isinstance(part, str) and part.startswith("<") and part.endswith(">")
+
+
+def _dotted(location: tuple[str | int, ...]) -> str:
+    """Return a location as ``path[0].line.to``, without the tags of unions."""
+    text = ""
+    for part in location:
+        if _is_tag(part) or part == "[key]":
+            continue
+        text += f"[{part}]" if isinstance(part, int) else f".{part}"
+    return text.removeprefix(".")
+
+
+def _models_in(annotation: object) -> Iterator[type[Model]]:
+    if isinstance(annotation, type) and issubclass(annotation, Model):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models_in(part)
+
+
+def _keys_at(location: tuple[str | int, ...], model: type[Model]) -> list[str]:
+    """Return the keys that are allowed at a location: the fields of the models that the way there leads to."""
+    models = [model]
+    for part in location:
+        if _is_tag(part):
+            chosen = [one for one in models if f"<{one.__name__}>" == part]
+            models = chosen or models
+        elif isinstance(part, str):
+            fields = [one.model_fields[part].annotation for one in models if part in one.model_fields]
+            models = [found for annotation in fields for found in _models_in(annotation)]
+    return [name for one in models for name in one.model_fields]
+
+
+def _is_echo(detail: ErrorDetails) -> bool:
+    """Whether a list is called too short only because pydantic does not count its wrong items."""
+    return detail["type"] == "too_short" and len(detail["input"]) >= detail["ctx"]["min_length"]
+
+
+def _missing(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
+    if isinstance(detail["loc"][-1], int):
+        return _Complaint("the list is too short: this item is missing", show(detail["input"]))
+    return _Complaint("this key is required, and missing")
+
+
+def _unknown(detail: ErrorDetails, model: type[Model]) -> _Complaint:
+    name = str(detail["loc"][-1])
+    keys = _keys_at(detail["loc"][:-1], model)
+    near = nearest(name, keys)
+    return _Complaint("unknown key", name, ", ".join(keys), f"Did you mean {near!r}?" if near else None)
+
+
+def _refused(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
+    facts = detail["ctx"]
+    found = detail["input"] if facts["found"] is None else facts["found"]
+    return _Complaint(facts["problem"], show(found), facts["allowed"] or None, key=facts["key"])
+
+
+def _wrong_form(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
+    return _Complaint("wrong form", show(detail["input"]), detail["ctx"]["allowed"])
+
+
+def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
+    facts, found = detail["ctx"], detail["input"]
+    known = facts["known"].split()
+    near = None
+    if isinstance(found, Mapping) and not any(key in found for key in known):
+        near = next(filter(None, (nearest(str(key), known) for key in found)), None)
+    return _Complaint(facts["problem"], show(found), facts["allowed"], f"Did you mean {near!r}?" if near else None)
+
+
+def _unforeseen(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
+    return _Complaint(detail["msg"], show(detail["input"]))
+
+
+def _plain(problem: str, allowed: str | None = None) -> Callable[[ErrorDetails, type[Model]], _Complaint]:
+    """Return a description whose texts may name pydantic's facts in braces, such as ``{gt}``."""
+
+    def describe(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
+        facts: dict[str, Any] = detail.get("ctx", {})
+        if detail["loc"] and detail["loc"][-1] == "[key]":
+            return _Complaint("a name must be a string", show(detail["input"]), "a string, in quotes if need be")
+        return _Complaint(problem.format(**facts), show(detail["input"]), allowed and allowed.format(**facts))
+
+    return describe
+
+
+_DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Complaint]]] = {
+    REFUSED: _refused,
+    WRONG_FORM: _wrong_form,
+    WRONG_KEYS: _wrong_keys,
+    "missing": _missing,
+    "extra_forbidden": _unknown,
+    "float_type": _plain("wrong type", "a number"),
+    "int_type": _plain("wrong type", "a whole number"),
+    "bool_type": _plain("wrong type", "true or false"),
+    "string_type": _plain("wrong type", "a string"),
+    "tuple_type": _plain("wrong type", "a list"),
+    "dict_type": _plain("wrong type", "a mapping"),
+    "model_type": _plain("wrong type", "a mapping"),
+    "none_required": _plain("wrong type", "null"),
+    "finite_number": _plain("not a finite number", "a finite number"),
+    "greater_than": _plain("out of range", "> {gt:g}"),
+    "greater_than_equal": _plain("out of range", ">= {ge:g}"),
+    "less_than_equal": _plain("out of range", "<= {le:g}"),
+    "literal_error": _plain("not one of the allowed values", "{expected}"),
+    "too_short": _plain("too few items", "at least {min_length}"),
+    "too_long": _plain("too many items", "at most {max_length}"),
+    "string_too_short": _plain("the string is empty", "a string of at least one character"),
+}

@@ -1,0 +1,149 @@
+"""The task: what is asked of the planner.
+
+`Task` mirrors the task file key by key. Use `brachis.task.load_task` to make one: it reads files and mappings alike,
+and answers mistakes with a `brachis.errors.TaskError` that names the key.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import AfterValidator, Field, Tag, field_validator, model_validator
+
+from brachis.task.fields import Count, Model, Name, Positive, by_form, refuse
+from brachis.task.robot_models import JointValues, RobotSettings
+from brachis.task.segments import Segment
+
+Row = Literal["x", "y", "z", "yaw"]
+_Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll"]
+POSITION_ROWS: Final[tuple[Row, ...]] = ("x", "y", "z")
+_SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll"
+_FULL_REST_DEGREE = 3
+
+
+def _expand_position(space: _Space) -> _Space:
+    """Spell ``position`` out, so that equal task spaces compare equal."""
+    return POSITION_ROWS if space == "position" else space
+
+
+def _check_rows(rows: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(rows)) < len(rows):
+        problem = "a row occurs twice in the task space"
+        raise refuse(problem, found=list(rows), allowed="each row once")
+    if "yaw" in rows and (len(rows) != len(POSITION_ROWS) or rows[-1] != "yaw"):
+        problem = "yaw needs exactly two position rows, and comes last"
+        raise refuse(problem, found=list(rows), allowed="for example [x, y, yaw]")
+    return rows
+
+
+TaskSpace = Annotated[
+    Annotated[Literal["position", "pose", "pose_free_roll"], Tag("<word>")]
+    | Annotated[Annotated[tuple[Row, ...], Field(min_length=1), AfterValidator(_check_rows)], Tag("<list>")],
+    by_form(_SPACE_FORMS, "position", "pose", "pose_free_roll"),
+    AfterValidator(_expand_position),
+]
+
+
+class Posture(Model):
+    """A configuration of the robot."""
+
+    joints: JointValues = Field(description="Joint positions, rad (m): in the order of the chain, or by joint name.")
+
+
+End = Annotated[
+    Annotated[Literal["free"], Tag("<word>")] | Annotated[Posture, Tag("<mapping>")],
+    by_form("free, or a mapping {joints: [...]}", "free"),
+]
+
+
+class SplineSettings(Model):
+    """The B-splines of the path coordinate and the redundant joints."""
+
+    degree: Count = Field(
+        default=3, ge=2, le=7, description="Degree; 3 gives continuous torque, 4 continuous torque rate."
+    )
+    intervals: Count = Field(default=20, ge=4, description="Number of knot intervals.")
+    rest: Literal["full", "velocity"] = Field(
+        default="full", description="What vanishes at both ends: velocity and acceleration (full), or velocity alone."
+    )
+    points_per_interval: Count = Field(default=3, ge=1, description="Collocation points per knot interval.")
+
+    @model_validator(mode="after")
+    def _rest_needs_degree(self) -> SplineSettings:
+        if self.rest == "full" and self.degree < _FULL_REST_DEGREE:
+            problem = "rest: full asks for a continuous acceleration that is zero at the ends: degree 2 cannot give it"
+            raise refuse(problem, key=".degree", found=self.degree, allowed=">= 3, or rest: velocity")
+        return self
+
+
+class SolverSettings(Model):
+    """The solver of the optimisation problem and its bounds."""
+
+    name: Name = Field(default="auto", description="Solver; auto takes the best one installed.")
+    max_iterations: Count = Field(default=300, ge=1, description="Largest number of iterations.")
+    time_limit: Positive = Field(default=20.0, description="Largest time, s.")
+    tolerance: Positive = Field(default=1.0e-6, description="Tolerance of the optimality conditions.")
+
+
+class RefinementSettings(Model):
+    """Adding collocation points until the limits hold in between them as well."""
+
+    tolerance: Positive = Field(default=1.0e-4, description="Largest relative excess over a limit, anywhere.")
+    density: Count = Field(default=10, ge=10, description="Check points per knot interval.")
+    max_rounds: Count = Field(default=10, ge=0, description="Largest number of rounds; 0 switches refinement off.")
+
+
+class Task(Model):
+    """A task: a robot, a path for its tool, and how to plan.
+
+    Constructed directly it raises pydantic's own errors; `brachis.task.load_task` puts them in plain words.
+    """
+
+    brachis: Literal[1] = Field(description="Version of the task format.")
+    robot: RobotSettings = Field(default_factory=RobotSettings, description="The robot.")
+    start: Posture = Field(description="Configuration at the start of the path.")
+    end: End = Field(default="free", description="Configuration at the end of the path: free, or {joints: ...}.")
+    task_space: TaskSpace = Field(
+        description="What the path prescribes: rows out of x, y, z, yaw (yaw last, with two others), or a word."
+    )
+    path: Annotated[tuple[Segment, ...], Field(min_length=1)] = Field(description="Segments of the path, in order.")
+    redundant_joints: tuple[Name, ...] = Field(default=(), description="Joints that are free along the path.")
+    branch: Name | None = Field(default=None, description="Label of the branch of the closed form. Null: the start's.")
+    spline: SplineSettings = Field(default_factory=SplineSettings, description="B-splines.")
+    solver: SolverSettings = Field(default_factory=SolverSettings, description="Solver.")
+    refinement: RefinementSettings = Field(default_factory=RefinementSettings, description="Refinement.")
+
+    @field_validator("brachis", mode="before")
+    @classmethod
+    def _version_is_a_number(cls, version: object) -> object:
+        # Python holds true == 1, so that the literal alone would accept `brachis: true`.
+        if type(version) is not int:
+            problem = "the version of the task format must be a whole number"
+            raise refuse(problem, found=version, allowed="1")
+        return version
+
+    @field_validator("path")
+    @classmethod
+    def _no_blend_at_the_end(cls, path: tuple[Segment, ...]) -> tuple[Segment, ...]:
+        if path[-1].blend is not None:
+            problem = "the last segment has no corner to blend"
+            raise refuse(
+                problem, key=f"[{len(path) - 1}].blend", found=path[-1].blend, allowed="no blend on the last segment"
+            )
+        return path
+
+    @field_validator("redundant_joints")
+    @classmethod
+    def _joints_once(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
+        if len(set(joints)) < len(joints):
+            problem = "a joint occurs twice"
+            raise refuse(problem, found=list(joints), allowed="each joint once")
+        return joints
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the task as plain mappings, lists, numbers and strings.
+
+        All defaults are spelled out, so that the result keeps its meaning should a default change.
+        ``load_task(task.to_dict()) == task``.
+        """
+        return self.model_dump(mode="json")

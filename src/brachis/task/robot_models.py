@@ -1,0 +1,119 @@
+"""The robot as the task file describes it: where its URDF is, its limits and its friction.
+
+Limits
+------
+For ``torque``, ``velocity`` and ``position`` three cases differ: the key is absent, and the limit comes from the URDF;
+the key is null, and there is no limit; the key has a value. The models write the absent key as the word `FROM_URDF`,
+which a task file may also spell out. Thus absent and null stay distinguishable in comparisons and in saved tasks. A
+joint that a mapping leaves out keeps the limit of the URDF. A URDF has no ``acceleration``: absent means none.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+from pydantic import AfterValidator, Field, Tag
+
+from brachis.task.fields import Model, Name, NonNegative, Number, Positive, by_form, refuse
+
+FROM_URDF: Final = "urdf"
+"""The value of a limit whose key is absent: the URDF supplies it."""
+
+_LIMIT_FORMS = (
+    "a number > 0 for all joints, a list of numbers > 0, a mapping of joint name to number > 0 or null, null (no limit)"
+)
+
+
+def _increasing(pair: tuple[float, float]) -> tuple[float, float]:
+    if not pair[0] < pair[1]:
+        problem = "the lower limit must be below the upper one"
+        raise refuse(problem, found=list(pair), allowed="[low, high] with low < high")
+    return pair
+
+
+Interval = Annotated[tuple[Number, Number], AfterValidator(_increasing)]
+
+_Number = Annotated[Positive, Tag("<number>")]
+_List = Annotated[Annotated[tuple[Positive, ...], Field(min_length=1)], Tag("<list>")]
+_Mapping = Annotated[dict[Name, Positive | None], Tag("<mapping>")]
+_Null = Annotated[None, Tag("<null>")]
+_Word = Annotated[Literal["urdf"], Tag("<word>")]
+
+UrdfLimit = Annotated[
+    _Word | _Number | _List | _Mapping | _Null, by_form(_LIMIT_FORMS + ", urdf (as in the URDF)", FROM_URDF)
+]
+OwnLimit = Annotated[_Number | _List | _Mapping | _Null, by_form(_LIMIT_FORMS)]
+PositionLimit = Annotated[
+    _Word
+    | Annotated[Annotated[tuple[Interval, ...], Field(min_length=1)], Tag("<list>")]
+    | Annotated[dict[Name, Interval | None], Tag("<mapping>")]
+    | _Null,
+    by_form(
+        "a list of [low, high], a mapping of joint name to [low, high] or null, null (no limit), urdf (as in the URDF)",
+        FROM_URDF,
+    ),
+]
+PerJoint = Annotated[
+    Annotated[NonNegative, Tag("<number>")]
+    | Annotated[Annotated[tuple[NonNegative, ...], Field(min_length=1)], Tag("<list>")]
+    | Annotated[dict[Name, NonNegative], Tag("<mapping>")],
+    by_form("a number >= 0 for all joints, a list of numbers, a mapping of joint name to number"),
+]
+PerJointPositive = Annotated[
+    _Number | _List | Annotated[dict[Name, Positive], Tag("<mapping>")],
+    by_form("a number > 0 for all joints, a list of numbers, a mapping of joint name to number"),
+]
+JointValues = Annotated[
+    Annotated[Annotated[tuple[Number, ...], Field(min_length=1)], Tag("<list>")]
+    | Annotated[Annotated[dict[Name, Number], Field(min_length=1)], Tag("<mapping>")],
+    by_form("a list of numbers in the order of the chain, or a mapping of joint name to number"),
+]
+
+
+class LimitScale(Model):
+    """Factors on the limits, to keep a distance from them."""
+
+    torque: Positive = Field(default=1.0, description="Factor on all torque and force limits.")
+    velocity: Positive = Field(default=1.0, description="Factor on all velocity limits.")
+    acceleration: Positive = Field(default=1.0, description="Factor on all acceleration limits.")
+
+
+class LimitSettings(Model):
+    """Joint limits: an absent key takes the URDF's, null removes the limit (see the module's documentation)."""
+
+    torque: UrdfLimit = Field(
+        default=FROM_URDF, description="Largest torque, N m (force, N). Absent: URDF. Null: none."
+    )
+    velocity: UrdfLimit = Field(default=FROM_URDF, description="Largest speed, rad/s (m/s). Absent: URDF. Null: none.")
+    acceleration: OwnLimit = Field(
+        default=None, description="Largest acceleration, rad/s^2 (m/s^2). Absent or null: none."
+    )
+    position: PositionLimit = Field(default=FROM_URDF, description="[low, high], rad (m). Absent: URDF. Null: none.")
+    scale: LimitScale = Field(default_factory=LimitScale, description="Factors on the limits.")
+
+
+class FrictionSettings(Model):
+    """Drive inertia and friction at the joints: each a number for all joints, a list, or a mapping by joint name."""
+
+    armature: PerJoint = Field(default=0.0, description="Inertia of the drive seen at the joint, kg m^2 (kg).")
+    viscous: PerJoint = Field(default=0.0, description="Viscous friction, N m s/rad (N s/m).")
+    coulomb: PerJoint = Field(default=0.0, description="Coulomb friction, N m (N).")
+    coulomb_velocity: PerJointPositive = Field(
+        default=0.01, description="Speed at which Coulomb friction is developed to 76 % (tanh 1), rad/s (m/s)."
+    )
+
+
+class RobotSettings(Model):
+    """The robot: its URDF and what the task adds to it."""
+
+    urdf: Name | None = Field(
+        default=None, description="URDF file, relative to the task file's folder. Required in a task file."
+    )
+    tool_frame: Name | None = Field(default=None, description="Frame that follows the path. Null: the only leaf link.")
+    base_frame: Name | None = Field(default=None, description="First frame of the chain. Null: the root of the URDF.")
+    gravity: tuple[Number, Number, Number] = Field(
+        default=(0.0, 0.0, -9.81), description="Gravity, m/s^2, world frame."
+    )
+    locked_joints: dict[Name, Number] = Field(default={}, description="Joints that stay at a value, rad (m), by name.")
+    limits: LimitSettings = Field(default_factory=LimitSettings, description="Joint limits.")
+    friction: FrictionSettings = Field(default_factory=FrictionSettings, description="Drive inertia and friction.")

@@ -1,0 +1,173 @@
+"""Every way in which a path can be wrong, and what is said about it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brachis.errors import PathError, UnknownNameError
+from brachis.path import build_path
+from brachis.path.blend import septic
+from brachis.path.joins import mismatch
+from brachis.task import LineBy, LineSegment, load_task
+
+X, XY, XYZ, XYW = ["x"], ["x", "y"], ["x", "y", "z"], ["x", "y", "yaw"]
+RIGHT: dict[str, Any] = {"line": {"by": [1, 0]}}
+UP: dict[str, Any] = {"line": {"by": [0, 1]}}
+
+
+def build(segments: list[dict[str, Any]], rows: list[str]) -> None:
+    task = load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": rows, "path": segments})
+    build_path(task.path, [0.0] * len(rows), rows)
+
+
+def refused(segments: list[dict[str, Any]], rows: list[str]) -> PathError:
+    with pytest.raises(PathError) as caught:
+        build(segments, rows)
+    return caught.value
+
+
+SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
+    ({"line": {"to": [0, 0]}}, XY, ["path[0].line.to: the segment has zero length", "found [0.0, 0.0]"]),
+    ({"line": {"by": [0, 0, 0]}}, XYW, ["path[0].line.by: the segment has zero length"]),
+    ({"line": {"length": 0, "angle_deg": 5}}, XY, ["path[0].line.length: the segment has zero length"]),
+    ({"line": {"to": [1, 2, 3]}}, XY, ["path[0].line.to: wrong number", "found 3: [1.0, 2.0, 3.0]", "2: [x, y]"]),
+    ({"line": {"by": [1, 2]}}, XYW, ["path[0].line.by: wrong number", "allowed: 3: [x, y, yaw]"]),
+    ({"line": {"length": 1, "angle_deg": 0}}, XYZ, ["path[0].line: ", "needs 2 position rows", "[x, y, z]"]),
+    ({"line": {"length": 1, "angle_deg": 0}}, X, ["path[0].line: ", "needs 2 position rows"]),
+    ({"arc": {"center": [1], "angle_deg": 9}}, X, ["path[0].arc: an arc needs 2 or 3 position rows", "Use line"]),
+    ({"arc": {"via": [1], "to": [2]}}, X, ["path[0].arc: an arc needs 2 or 3 position rows"]),
+    ({"circle": {"center": [1]}}, X, ["path[0].circle: an arc needs 2 or 3 position rows"]),
+    ({"arc": {"center": [0, 0], "angle_deg": 9}}, XY, ["path[0].arc.center: ", "zero length", "centre is its start"]),
+    ({"arc": {"center": [1, 0], "angle_deg": 0}}, XY, ["path[0].arc.angle_deg: the segment has zero length"]),
+    ({"arc": {"center": [1, 0, 0], "angle_deg": 9}}, XYW, ["path[0].arc.center: wrong number", "2: [x, y]"]),
+    ({"circle": {"center": [1, 0, 0]}}, XYZ, ["path[0].circle.normal: ", "found no normal", "via and to"]),
+    ({"circle": {"center": [1, 0, 0], "normal": [0, 0, 0]}}, XYZ, ["circle.normal: the normal has zero length"]),
+    ({"circle": {"center": [1, 0, 0], "normal": [1, 0, 1]}}, XYZ, ["circle.normal: ", "found 135 degrees"]),
+    ({"circle": {"center": [1, 0], "normal": [0, 0, 1]}}, XY, ["path[0].circle.normal: ", "allowed: no normal"]),
+    ({"circle": {"center": [1, 0], "yaw": "tangent"}}, XY, ["path[0].circle.yaw: yaw is not a row", "Add yaw"]),
+    ({"arc": {"via": [1, 1], "to": [2, 2]}}, XY, ["path[0].arc.via: ", "lie on a line", "to [2.0, 2.0]"]),
+    ({"arc": {"via": [0, 0], "to": [2, 2]}}, XY, ["path[0].arc.via: ", "lie on a line"]),
+    ({"arc": {"via": [2, 2], "to": [2, 2]}}, XY, ["path[0].arc.via: ", "lie on a line"]),
+    ({"arc": {"via": [2, 2], "to": [0, 0]}}, XY, ["path[0].arc.to: the segment has zero length"]),
+    ({"arc": {"via": [1, 2, 3], "to": [2, 2]}}, XY, ["path[0].arc.via: wrong number of coordinates"]),
+    ({"arc": {"via": [1, 2], "to": [2, 2, 2]}}, XYW, ["path[0].arc.to: wrong number of coordinates", "2: [x, y]"]),
+    ({"spline": {"through": [[1, 1], [1]]}}, XY, ["path[0].spline.through[1]: wrong number", "2: [x, y]"]),
+    ({"spline": {"through": [[1, 1], [1, 1]]}}, XY, ["spline.through[1]: a waypoint repeats its predecessor"]),
+    ({"spline": {"through": [[0, 0], [1, 1]]}}, XY, ["spline.through[0]: the first waypoint is the segment's start"]),
+    ({"spline": {"through": [[0, 0]]}}, XY, ["path[0].spline.through: the segment has zero length"]),
+    ({"spline": {"through": [[1, 0, 0], [1, 0, 2]]}}, XYW, ["spline.through[1]: a waypoint repeats"]),
+]
+
+
+@pytest.mark.parametrize(("segment", "rows", "expected"), SEGMENTS, ids=[str(one[0]) for one in SEGMENTS])
+def test_wrong_segments(segment: dict[str, Any], rows: list[str], expected: list[str]) -> None:
+    message = str(refused([segment], rows))
+    for text in expected:
+        assert text in message
+
+
+def test_the_key_counts_segments() -> None:
+    assert "path[1].line.by: " in str(refused([RIGHT, {"line": {"by": [0, 0]}}], XY))
+
+
+def test_a_corner_names_place_angle_and_key() -> None:
+    error = refused([RIGHT, UP], XY)
+    assert str(error) == (
+        "path[0] to path[1], at s = 0.5, x = 1, y = 0: the path must be smooth to the third derivative; found a corner "
+        "of 90 degrees; allowed: segments that continue each other, or a blend. Set path[0].blend (m) to round it"
+    )
+    assert error.s_interval == (0.5, 0.5)
+
+
+def test_all_corners_are_named() -> None:
+    assert "likewise path[1].blend, path[3].blend" in str(refused([RIGHT, UP, RIGHT, RIGHT, UP], XY))
+
+
+@pytest.mark.parametrize(
+    ("segments", "rows", "expected"),
+    [
+        ([RIGHT, {"arc": {"center": [1, 0.5], "angle_deg": 90}}], XY, "a curvature jump of 2 1/m"),
+        (
+            [{"arc": {"center": [0, 1], "angle_deg": 90}}, {"arc": {"center": [0.5, 1], "angle_deg": 90}}],
+            XY,
+            "a curvature jump of 1 1/m",
+        ),
+        (
+            [{"line": {"by": [1, 0, 1]}}, {"line": {"by": [1, 0, 3]}}],
+            XYW,
+            "in yaw alone, which turns by 1 rad/m before and 3 rad/m after",
+        ),
+        ([{"line": {"by": [1, 0, 0]}}, {"line": {"by": [0, 0, 1]}}], XYW, "a corner of 90 degrees"),
+        ([RIGHT, {"line": {"by": [-1, 0]}}], XY, "a corner of 180 degrees"),
+        ([{"spline": {"through": [[1, 1], [2, 0]]}}, RIGHT], XY, "a corner of "),
+    ],
+)
+def test_what_jumps_at_a_join(segments: list[dict[str, Any]], rows: list[str], expected: str) -> None:
+    assert expected in str(refused(segments, rows))
+
+
+@pytest.mark.parametrize(
+    ("order", "jump", "expected"),
+    [
+        (1, [0.1, 0.0], "the parameter's speed changing from 1 to 1.1"),
+        (1, [-1.0, 0.0], "the parameter's speed changing from 1 to 0"),
+        (1, [-1.0, 1.0], "a corner of 90 degrees"),
+        (2, [0.0, 0.1], "a curvature jump of 0.1 1/m"),
+        (3, [0.0, 0.1], "a jump of 0.1 1/m^2 in the third derivative"),
+        (3, [0.0, 1e-8], None),
+    ],
+)
+def test_every_derivative_is_compared(order: int, jump: list[float], expected: str | None) -> None:
+    before, after, far = np.zeros((3, 4, 2))
+    before[1] = after[1] = far[1] = [1.0, 0.0]
+    far[0] = [2.0, 1.0]
+    after[order] += jump
+    assert mismatch(septic(-far, before, 2.0), septic(after, far, 2.0), 2) == expected
+
+
+def test_a_blend_that_is_too_long_is_told_the_longest() -> None:
+    short = {"line": {"by": [0, 0.3]}}
+    error = refused([RIGHT | {"blend": 0.2}, short], XY)
+    assert "path[0].blend: " in str(error)
+    assert "longer than half of a neighbouring segment; found 0.2 m; allowed: at most 0.15 m" in str(error)
+    assert error.s_interval == pytest.approx((1 / 1.3, 1 / 1.3))
+    build([RIGHT | {"blend": 0.15}, short], XY)
+
+
+def test_the_longest_blend_is_accepted_as_the_message_writes_it() -> None:
+    segments = [RIGHT | {"blend": 1.0}, {"line": {"by": [0.1, 1 / 3]}}]
+    longest = float(str(refused(segments, XY)).split("at most ")[1].removesuffix(" m"))
+    segments[0]["blend"] = longest
+    build(segments, XY)
+
+
+def test_neighbouring_blends_do_not_overlap() -> None:
+    segments = [RIGHT | {"blend": 0.5}, UP | {"blend": 0.51}, RIGHT]
+    assert "path[1].blend: " in str(refused(segments, XY))
+
+
+@pytest.mark.parametrize("by", [[-1, 0], [-1, 0.05]])
+def test_a_blend_that_would_reverse(by: list[float]) -> None:
+    error = refused([RIGHT | {"blend": 0.2}, {"line": {"by": by}}], XY)
+    assert "too sharp for a blend" in str(error)
+    assert "allowed: more than 0.2" in str(error)
+
+
+def test_a_blend_beside_a_turn_on_the_spot() -> None:
+    segments = [{"line": {"by": [1, 0, 0]}, "blend": 0.1}, {"line": {"by": [0, 0, 1]}}]
+    assert "a blend needs motion of the position on both sides" in str(refused(segments, XYW))
+
+
+def test_the_start_must_fit_the_rows() -> None:
+    segments = [LineSegment(line=LineBy(by=(1.0, 0.0)))]
+    with pytest.raises(PathError, match=r"start: .*found \[0.0\]; allowed: \[x, y\]"):
+        build_path(segments, [0.0], XY)
+    with pytest.raises(PathError, match="start: "):
+        build_path(segments, [0.0, float("nan")], XY)
+    with pytest.raises(PathError, match="at least one segment"):
+        build_path([], [0.0, 0.0], XY)
+    with pytest.raises(UnknownNameError, match="no row of the task space named 'w'"):
+        build_path(segments, [0.0, 0.0], ["x", "w"])

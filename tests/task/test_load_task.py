@@ -1,0 +1,311 @@
+"""Loading tasks: what is accepted, what comes back, and what every mistake is told."""
+
+from __future__ import annotations
+
+import copy
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from brachis.errors import TaskError
+from brachis.task import FROM_URDF, LineBy, Task, load_task
+
+COMPLETE = """
+brachis: 1
+robot:
+  urdf: ../robots/scara3/robot.urdf
+  tool_frame: tool
+  base_frame: null
+  gravity: [0, 0, -9.81]
+  locked_joints: {finger: 0.02}
+  limits:
+    torque: {j1: 10, j2: null}
+    velocity: null
+    acceleration: 2.0
+    position: {j1: [-1, 1], j2: null}
+    scale: {torque: 0.9, velocity: 1.0, acceleration: 1.0}
+  friction: {armature: 0, viscous: [0.1, 0.2, 0], coulomb: {j1: 2}, coulomb_velocity: 0.01}
+start: {joints: [0.1, 0.2, 0.3]}
+end: {joints: {j1: 1, j2: 2, j3: 3}}
+task_space: [x, y]
+path:
+  - line: {to: [1, 2]}
+    blend: 0.1
+  - line: {by: [1, 2]}
+  - line: {length: 1.0, angle_deg: 90}
+  - arc: {center: [1, 2], angle_deg: 90}
+  - arc: {via: [1, 2], to: [3, 4]}
+  - circle: {center: [1, 2]}
+  - spline: {through: [[1, 2], [3, 4]], relative: true}
+redundant_joints: [j3]
+branch: elbow up
+spline: {degree: 4, intervals: 30, rest: full, points_per_interval: 3}
+solver: {name: uno, max_iterations: 100, time_limit: 20, tolerance: 1e-6}
+refinement: {tolerance: 1.0e-4, density: 10, max_rounds: 10}
+"""
+
+
+def minimal(**changes: Any) -> dict[str, Any]:
+    task = {
+        "brachis": 1,
+        "start": {"joints": [0.1, 0.2, 0.3]},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
+        "redundant_joints": ["j3"],
+    }
+    return task | changes
+
+
+def written(folder: Path, text: str) -> Path:
+    file = folder / "task.yaml"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+@pytest.fixture
+def complete(tmp_path: Path) -> Task:
+    return load_task(written(tmp_path, COMPLETE))
+
+
+def test_a_complete_file_is_read(complete: Task, tmp_path: Path) -> None:
+    assert complete.robot.urdf == str(tmp_path.parent / "robots" / "scara3" / "robot.urdf")
+    assert complete.robot.limits.torque == {"j1": 10.0, "j2": None}
+    assert complete.robot.limits.position == {"j1": (-1.0, 1.0), "j2": None}
+    assert complete.robot.friction.viscous == (0.1, 0.2, 0.0)
+    assert complete.path[0].blend == 0.1
+    assert complete.path[1].shape == LineBy(by=(1.0, 2.0))
+    assert [segment.kind for segment in complete.path] == ["line", "line", "line", "arc", "arc", "circle", "spline"]
+    assert complete.solver.tolerance == 1e-6  # YAML 1.1 would read the string '1e-6'
+
+
+def test_defaults() -> None:
+    task = load_task(minimal())
+    assert task.robot.gravity == (0.0, 0.0, -9.81)
+    assert task.end == "free"
+    assert (task.spline.degree, task.spline.intervals, task.spline.rest, task.spline.points_per_interval) == (
+        3,
+        20,
+        "full",
+        3,
+    )
+    assert (task.solver.name, task.solver.max_iterations, task.solver.time_limit, task.solver.tolerance) == (
+        "auto",
+        300,
+        20.0,
+        1e-6,
+    )
+    assert (task.refinement.tolerance, task.refinement.density, task.refinement.max_rounds) == (1e-4, 10, 10)
+    assert task.robot.friction.coulomb_velocity == 0.01
+
+
+def test_a_task_is_returned_as_it_is(complete: Task) -> None:
+    assert load_task(complete) is complete
+
+
+@pytest.mark.parametrize("text", [COMPLETE, COMPLETE.replace("velocity: null\n", "\n")])
+def test_round_trip_through_json(tmp_path: Path, text: str) -> None:
+    task = load_task(written(tmp_path, text))
+    assert load_task(json.loads(json.dumps(task.to_dict(), allow_nan=False))) == task
+
+
+@pytest.mark.parametrize("key", ["torque", "velocity", "position"])
+def test_an_absent_limit_differs_from_none(key: str) -> None:
+    absent = load_task(minimal())
+    none = load_task(minimal(robot={"limits": {key: None}}))
+    assert getattr(absent.robot.limits, key) == FROM_URDF
+    assert getattr(none.robot.limits, key) is None
+    assert absent != none
+    for task in (absent, none):
+        assert load_task(task.to_dict()) == task
+
+
+@given(
+    st.one_of(
+        st.just(FROM_URDF),
+        st.none(),
+        st.floats(1e-6, 1e6),
+        st.lists(st.floats(1e-6, 1e6), min_size=1, max_size=7),
+        st.dictionaries(st.text(min_size=1, max_size=5), st.none() | st.floats(1e-6, 1e6), max_size=7),
+    )
+)
+def test_every_form_of_limit_survives_the_round_trip(limit: object) -> None:
+    task = load_task(minimal(robot={"limits": {"torque": limit}}))
+    assert load_task(task.to_dict()) == task
+
+
+def test_position_is_the_three_rows() -> None:
+    assert load_task(minimal(task_space="position")) == load_task(minimal(task_space=["x", "y", "z"]))
+    assert load_task(minimal(task_space="pose_free_roll")).task_space == "pose_free_roll"
+
+
+def test_arrays_and_paths_are_accepted_in_mappings() -> None:
+    task = load_task(minimal(start={"joints": np.array([1.0, 2.0])}, robot={"urdf": Path("a.urdf")}))
+    assert task.start.joints == (1.0, 2.0)
+    assert task.robot.urdf == str(Path.cwd() / "a.urdf")
+
+
+def test_a_task_is_frozen(complete: Task) -> None:
+    with pytest.raises(ValidationError, match="frozen"):
+        complete.branch = None
+
+
+def refused(source: Any) -> TaskError:
+    with pytest.raises(TaskError) as caught:
+        load_task(source)
+    assert caught.value.__cause__ is None
+    assert "pydantic" not in str(caught.value)
+    return caught.value
+
+
+LINE = {"line": {"to": [1, 0]}}
+MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
+    ({"brachis": 2}, ["task: brachis: ", "found 2", "allowed: 1"]),
+    ({"brachis": True}, ["task: brachis: ", "found true (a boolean)"]),
+    ({"strat": 1}, ["task: strat: unknown key", "allowed: brachis, robot, start", "Did you mean 'start'?"]),
+    (
+        {"robot": {"urdff": "a"}},
+        ["task: robot.urdff: unknown key", "allowed: urdf, tool_frame", "Did you mean 'urdf'?"],
+    ),
+    ({"robot": {"limits": {"torque": "10"}}}, ["robot.limits.torque: ", "found '10' (a string)", "a number > 0"]),
+    ({"robot": {"limits": {"torque": True}}}, ["robot.limits.torque: ", "found true (a boolean)"]),
+    ({"robot": {"limits": {"torque": 0}}}, ["robot.limits.torque: out of range; found 0; allowed: > 0"]),
+    ({"robot": {"limits": {"velocity": {"j1": -1}}}}, ["robot.limits.velocity.j1: out of range; found -1"]),
+    ({"robot": {"limits": {"velocity": {1: 1}}}}, ["robot.limits.velocity[1]: a name must be a string"]),
+    ({"robot": {"limits": {"acceleration": [float("nan")]}}}, ["limits.acceleration[0]: not a finite number"]),
+    ({"robot": {"limits": {"acceleration": "urdf"}}}, ["robot.limits.acceleration: ", "found 'urdf'"]),
+    ({"robot": {"limits": {"position": [[1, -1]]}}}, ["limits.position[0]: ", "found [1.0, -1.0]", "low < high"]),
+    ({"robot": {"limits": {"position": [[1]]}}}, ["limits.position[0][1]: the list is too short"]),
+    ({"robot": {"limits": {"position": {"j": [1, 2, 3]}}}}, ["limits.position.j: too many items", "at most 2"]),
+    ({"robot": {"limits": {"scale": {"torque": 0}}}}, ["robot.limits.scale.torque: out of range", "> 0"]),
+    ({"robot": {"gravity": [0, 0]}}, ["robot.gravity[2]: the list is too short"]),
+    ({"robot": {"gravity": [0, 0, float("inf")]}}, ["robot.gravity[2]: not a finite number; found inf"]),
+    ({"robot": {"friction": {"viscous": -1}}}, ["robot.friction.viscous: out of range; found -1; allowed: >= 0"]),
+    ({"robot": {"friction": {"coulomb_velocity": 0}}}, ["coulomb_velocity: out of range; found 0; allowed: > 0"]),
+    ({"robot": 3}, ["task: robot: wrong type; found 3; allowed: a mapping"]),
+    ({"start": {"joints": []}}, ["start.joints: too few items", "at least 1"]),
+    ({"start": {"joints": [1, "2"]}}, ["start.joints[1]: wrong type; found '2' (a string); allowed: a number"]),
+    ({"start": {}}, ["start.joints: this key is required, and missing"]),
+    ({"end": "fre"}, ["task: end: ", "found 'fre'", "allowed: free, or a mapping"]),
+    ({"task_space": ["x", "yaw"]}, ["task_space: yaw needs exactly two position rows"]),
+    ({"task_space": ["yaw", "x", "y"]}, ["task_space: yaw needs", "comes last"]),
+    ({"task_space": ["x", "x"]}, ["task_space: a row occurs twice", "found ['x', 'x']"]),
+    ({"task_space": ["x", "w"]}, ["task_space[1]: not one of the allowed values; found 'w'", "'yaw'"]),
+    ({"task_space": "poses"}, ["task_space: ", "found 'poses'", "pose_free_roll"]),
+    ({"path": []}, ["task: path: too few items"]),
+    ({"path": [{"lien": {"to": [1, 0]}}]}, ["path[0]: a segment needs exactly one kind", "Did you mean 'line'?"]),
+    ({"path": [LINE | {"arc": {}}]}, ["path[0]: a segment needs exactly one kind", "keys line, arc"]),
+    ({"path": [{"line": {"to": [1], "by": [1]}}]}, ["path[0].line: a line needs exactly one", "{length, angle_deg}"]),
+    ({"path": [{"arc": {"via": [1], "center": [1]}}]}, ["path[0].arc: an arc needs exactly one of its forms"]),
+    ({"path": [{"line": {"to": ["1", 0]}}]}, ["path[0].line.to[0]: wrong type; found '1' (a string)"]),
+    ({"path": [{"line": {"length": 1}}]}, ["path[0].line.angle_deg: this key is required"]),
+    ({"path": [{"line": {"length": -1, "angle_deg": 0}}]}, ["path[0].line.length: out of range; found -1"]),
+    (
+        {"path": [{"line": {"length": 1, "angle": 2, "angle_deg": 2}}]},
+        ["path[0].line.angle: unknown key; found angle; allowed: length, angle_deg. Did you mean 'angle_deg'?"],
+    ),
+    ({"path": [{"circle": {"center": [0, 0], "turns": 0}}]}, ["path[0].circle.turns: ", "zero length"]),
+    ({"path": [{"circle": {"center": [0, 0], "yaw": "on"}}]}, ["path[0].circle.yaw: ", "'fixed' or 'tangent'"]),
+    ({"path": [{"spline": {"through": []}}]}, ["path[0].spline.through: too few items"]),
+    ({"path": [{"spline": {"through": [[1, 2]], "relative": 1}}]}, ["spline.relative: ", "true or false"]),
+    ({"path": [LINE | {"blend": -0.1}, LINE]}, ["path[0].blend: out of range; found -0.1; allowed: > 0"]),
+    ({"path": [LINE, LINE | {"blend": 0.1}]}, ["path[1].blend: the last segment", "found 0.1"]),
+    ({"redundant_joints": ["a", "a"]}, ["redundant_joints: a joint occurs twice"]),
+    ({"redundant_joints": "j3"}, ["redundant_joints: wrong type; found 'j3' (a string); allowed: a list"]),
+    ({"spline": {"degree": 2}}, ["spline.degree: rest: full", "found 2", "allowed: >= 3, or rest: velocity"]),
+    ({"spline": {"degree": 8}}, ["spline.degree: out of range; found 8; allowed: <= 7"]),
+    ({"spline": {"intervals": 20.5}}, ["spline.intervals: wrong type; found 20.5; allowed: a whole number"]),
+    ({"spline": {"intervals": 3}}, ["spline.intervals: out of range; found 3; allowed: >= 4"]),
+    ({"spline": {"rest": "none"}}, ["spline.rest: not one of the allowed values", "'full' or 'velocity'"]),
+    ({"solver": {"name": ""}}, ["solver.name: the string is empty"]),
+    ({"solver": {"time_limit": 0}}, ["solver.time_limit: out of range"]),
+    ({"refinement": {"density": 9}}, ["refinement.density: out of range; found 9; allowed: >= 10"]),
+]
+
+
+@pytest.mark.parametrize(("change", "expected"), MISTAKES, ids=[json.dumps(change) for change, _ in MISTAKES])
+def test_every_mistake_is_named(change: dict[str, Any], expected: list[str]) -> None:
+    error = refused(minimal(**change))
+    assert "mistakes" not in str(error), "one mistake, one complaint"
+    for text in expected:
+        assert text in str(error)
+
+
+def test_degree_two_is_accepted_where_only_the_velocity_vanishes() -> None:
+    assert load_task(minimal(spline={"degree": 2, "rest": "velocity"})).spline.degree == 2
+
+
+@pytest.mark.parametrize("key", ["brachis", "start", "task_space", "path"])
+def test_required_keys(key: str) -> None:
+    task = minimal()
+    del task[key]
+    assert f"task: {key}: this key is required, and missing" in str(refused(task))
+
+
+def test_all_mistakes_are_in_one_message(tmp_path: Path) -> None:
+    text = COMPLETE.replace("0.9", ".nan").replace("to: [1, 2]", "to: [1, x]").replace("uno", "3")
+    file = written(tmp_path, text)
+    lines = str(refused(file)).splitlines()
+    assert lines[0] == f"{file}: 3 mistakes"
+    keys = ["robot.limits.scale.torque", "path[0].line.to[1]", "solver.name"]
+    assert [line.startswith(f"  {file}: {key}: ") for line, key in zip(lines[1:], keys, strict=True)] == [True] * 3
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("brachis: 1\nstart: [1, 2", ["line 2, column ", "not valid YAML"]),
+        ("brachis: 1\nstart: 1\nbrachis: 1", ["line 3, column 1", "'brachis' occurs twice"]),
+        ("robot: {limits: {torque: 1, torque: 2}}", ["line 1, column 29", "'torque' occurs twice"]),
+        ("[1, 2]", ["a task is a mapping; found [1, 2] (a list)"]),
+        ("", ["a task is a mapping; found null"]),
+        ("a: 1\n---\nb: 2", ["not valid YAML"]),
+        ("a: !!python/object:os.system {}", ["not valid YAML"]),
+        ("when: 2024-13-45", ["not valid YAML"]),
+        ("\x07", ["not valid YAML"]),
+        ("a: &a [*a]", ["contains itself"]),
+    ],
+)
+def test_broken_files(tmp_path: Path, text: str, expected: list[str]) -> None:
+    file = written(tmp_path, text)
+    message = str(refused(file))
+    assert message.startswith(str(file))
+    for part in expected:
+        assert part in message
+
+
+def test_merge_keys_may_be_overridden(tmp_path: Path) -> None:
+    text = COMPLETE.replace("j1: 10, j2: null", "<<: &limits {j1: 1, j2: 2}, j2: 3")
+    assert load_task(written(tmp_path, text)).robot.limits.torque == {"j1": 1.0, "j2": 3.0}
+
+
+def test_a_missing_file_and_a_folder(tmp_path: Path) -> None:
+    assert "nothing.yaml: there is no such file" in str(refused(tmp_path / "nothing.yaml"))
+    assert "the file cannot be read" in str(refused(str(tmp_path)))
+
+
+def test_a_binary_file(tmp_path: Path) -> None:
+    file = tmp_path / "task.yaml"
+    file.write_bytes(b"\xff\xfe\x00")
+    assert "not a text file" in str(refused(file))
+
+
+def test_what_is_no_source() -> None:
+    assert "found int; allowed: a file name, a mapping, or a Task" in str(refused(3))
+
+
+def test_a_file_needs_a_urdf(tmp_path: Path) -> None:
+    file = written(tmp_path, COMPLETE.replace("  urdf: ../robots/scara3/robot.urdf\n", ""))
+    assert f"{file}: robot.urdf: this key is required" in str(refused(file))
+
+
+def test_the_given_mapping_is_not_changed() -> None:
+    given_task = minimal(robot={"urdf": "a.urdf"})
+    before = copy.deepcopy(given_task)
+    load_task(given_task)
+    assert given_task == before

@@ -1,0 +1,75 @@
+"""The JSON Schema agrees with the loader on what a task looks like."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from brachis.task import json_schema, load_task
+
+jsonschema = pytest.importorskip("jsonschema")
+
+
+def task(**changes: Any) -> dict[str, Any]:
+    segments = [
+        {"line": {"to": [1, 2]}, "blend": 0.1},
+        {"line": {"length": 1.0, "angle_deg": 90}},
+        {"arc": {"center": [1, 2], "angle_deg": 90, "yaw": "tangent"}},
+        {"arc": {"via": [1, 2], "to": [3, 4]}},
+        {"circle": {"center": [1, 2], "turns": -2}},
+        {"spline": {"through": [[1, 2], [3, 4]]}},
+    ]
+    limits = {"torque": {"j1": 10, "j2": None}, "velocity": None, "acceleration": 2, "position": [[-1, 1]]}
+    return {
+        "brachis": 1,
+        "robot": {"urdf": "robot.urdf", "limits": limits, "friction": {"viscous": [0, 1]}},
+        "start": {"joints": {"j1": 0.5}},
+        "end": "free",
+        "task_space": ["x", "y"],
+        "path": segments,
+    } | changes
+
+
+@pytest.fixture(scope="module")
+def validator() -> Any:
+    schema = json_schema()
+    cls = jsonschema.validators.validator_for(schema)
+    cls.check_schema(schema)
+    return cls(schema)
+
+
+@pytest.mark.parametrize("change", [{}, {"task_space": "position"}, {"end": {"joints": [1]}}])
+def test_the_schema_accepts_what_the_loader_accepts(validator: Any, change: dict[str, Any]) -> None:
+    load_task(task(**change))
+    assert validator.is_valid(task(**change))
+
+
+def test_the_schema_accepts_a_saved_task(validator: Any) -> None:
+    assert validator.is_valid(load_task(task()).to_dict())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"pth": []},
+        {"brachis": 2},
+        {"path": []},
+        {"path": [{"lien": {"to": [1]}}]},
+        {"path": [{"line": {"to": [1], "by": [1]}}]},
+        {"path": [{"line": {"to": "1"}}]},
+        {"robot": {"limits": {"torque": -1}}},
+        {"task_space": "posse"},
+        {"spline": {"degree": 8}},
+    ],
+)
+def test_the_schema_refuses_what_the_loader_refuses(validator: Any, change: dict[str, Any]) -> None:
+    assert not validator.is_valid(task(**change))
+
+
+def test_the_schema_tells_an_editor_what_keys_mean() -> None:
+    schema = json_schema()
+    assert schema["$schema"].startswith("https://json-schema.org/")
+    assert schema["title"]
+    described = [key for key, value in schema["properties"].items() if value.get("description")]
+    assert described == list(schema["properties"])
