@@ -1,6 +1,7 @@
 """Decomposition kinematics: joint motion and its derivatives from y = (s, q_r)."""
 
 from brachis.kinematics.decomposition import Decomposition, JointDerivatives, JointState
+from brachis.kinematics.interpolation import Nodes, interpolate
 from brachis.kinematics.task_kinematics import TaskDerivatives, TaskKinematics
 
-__all__ = ["Decomposition", "JointDerivatives", "JointState", "TaskDerivatives", "TaskKinematics"]
+__all__ = ["Decomposition", "JointDerivatives", "JointState", "Nodes", "TaskDerivatives", "TaskKinematics", "interpolate"]

@@ -22,6 +22,7 @@ d/dydot = p_v G + p_a dqddot/dydot and d/dyddot = p_a G, with G and the rest fro
 
 from __future__ import annotations
 
+import copy
 import itertools
 from dataclasses import dataclass
 
@@ -55,6 +56,17 @@ class Motion:
     knots: np.ndarray
     degree: int
     control_points: np.ndarray
+
+    @property
+    def breaks(self) -> np.ndarray:
+        """Times between which the curves are polynomials, (N + 1,), s."""
+        return np.unique(self.knots) * self.t_end
+
+    def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """y, ydot and yddot, each (K, 1 + r), at times t, (K,), in seconds."""
+        bases = (basis_matrix(self.knots, self.degree, t / self.t_end, order) for order in range(3))
+        y, ydot, yddot = (basis @ self.control_points.T / self.t_end**order for order, basis in enumerate(bases))
+        return y, ydot, yddot
 
 
 class Transcription:
@@ -95,16 +107,26 @@ class Transcription:
         self.decomposition = decomposition
         self.knots = clamped_uniform_knots(degree, intervals)
         self.degree = degree
-        self.tau = tau
         self.splines = self._make_splines(derivatives_at_rest, end)
-        bases = [basis_matrix(self.knots, degree, tau, order) for order in range(3)]
-        self._samples = [SampledSpline.of(spline, bases) for spline in self.splines]
         built = (build(decomposition) for build in constraints.TABLE.values())
         self.constraints: tuple[Constraint, ...] = tuple(c for c in built if c is not None)
+        self._lay_out_variables()
+        self._collocate(tau)
+
+    def _collocate(self, tau: np.ndarray) -> None:
+        """Set the collocation points and all that depends on them."""
+        self.tau = tau
+        bases = [basis_matrix(self.knots, self.degree, tau, order) for order in range(3)]
+        self._samples = [SampledSpline.of(spline, bases) for spline in self.splines]
         self.evaluations = {"states": 0, "jacobians": 0}
         self._last: tuple[bytes, JointState] | None = None
-        self._lay_out_variables()
         self._lay_out_rows()
+
+    def resampled(self, tau: np.ndarray) -> Transcription:
+        """Return the same problem with other collocation points `tau`, (K,); x keeps its meaning."""
+        other = copy.copy(self)
+        other._collocate(tau)  # noqa: SLF001  (its own class)
+        return other
 
     def _make_splines(self, derivatives: int, end: np.ndarray | None) -> tuple[TiedSpline, ...]:
         """s, then the redundant joints."""
@@ -202,6 +224,28 @@ class Transcription:
         state = self.state(x)
         values = [constraint.values(state).ravel() for constraint in self.constraints]
         return np.concatenate([*values, np.diff(x[self.slices[0]])])
+
+    def excess(self, x: np.ndarray) -> np.ndarray:
+        """How far the physical limits are exceeded at every collocation point, (K, c); negative inside.
+
+        Branch margins are left out: they guard the computation, and falling a little short of one harms nobody.
+
+        Raises
+        ------
+        UnreachableError
+            See `state`.
+        """
+        return self._excess(self.state(x))
+
+    def excess_at(self, x: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """As `excess`, at other normalised times `tau`, (K,), ascending."""
+        motion = self.motion(x)
+        return self._excess(self.decomposition.state(*motion.at(tau * motion.t_end)))
+
+    def _excess(self, state: JointState) -> np.ndarray:
+        limits = [c for c in self.constraints if c.kind != "branch_margin"]
+        values = [(constraint.values(state), constraint) for constraint in limits]
+        return np.concatenate([np.maximum(v - c.upper, c.lower - v) for v, c in values], axis=1)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,).

@@ -27,14 +27,14 @@ class Friction:
         Nm s/rad or N s/m.
     coulomb : (n,) ndarray
         Nm or N.
-    v_eps : float
+    v_eps : (n,) ndarray
         Speed over which the Coulomb torque changes sign, rad/s or m/s.
     """
 
     armature: np.ndarray
     viscous: np.ndarray
     coulomb: np.ndarray
-    v_eps: float
+    v_eps: np.ndarray
 
     @classmethod
     def of(
@@ -44,7 +44,7 @@ class Friction:
         armature: object = 0.0,
         viscous: object = 0.0,
         coulomb: object = 0.0,
-        coulomb_velocity: float = 0.01,
+        coulomb_velocity: object = 0.01,
     ) -> Friction:
         """Spread scalars, lists or mappings over the joints of a chain."""
         given = {"armature": armature, "viscous": viscous, "coulomb": coulomb}
@@ -54,11 +54,11 @@ class Friction:
             spread[key] = np.array(per_joint_values(where, value, list(joint_names), 0.0), dtype=float)
             if not np.all(spread[key] >= 0.0):
                 raise InputError("is negative or not a number", where=where, found=value, allowed="numbers >= 0")
-        if not coulomb_velocity > 0.0:
-            raise InputError(
-                "is not positive", where="robot.friction.coulomb_velocity", found=coulomb_velocity, allowed="> 0 rad/s"
-            )
-        return cls(**spread, v_eps=coulomb_velocity)
+        where = "robot.friction.coulomb_velocity"
+        v_eps = np.array(per_joint_values(where, coulomb_velocity, list(joint_names), 0.01), dtype=float)
+        if not np.all(v_eps > 0.0):
+            raise InputError("is not positive", where=where, found=coulomb_velocity, allowed="> 0 rad/s or m/s")
+        return cls(**spread, v_eps=v_eps)
 
     def torque(self, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
         """Torque of these terms, (..., n), for velocities and accelerations (..., n)."""

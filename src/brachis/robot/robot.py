@@ -12,7 +12,7 @@ import pinocchio as pin
 from brachis.errors import InputError, UrdfError
 from brachis.robot.friction import Friction
 from brachis.robot.limits import Limits, LimitSpec, per_joint_values, resolve_limits
-from brachis.robot.urdf import read_chain
+from brachis.robot.urdf import read_chain, read_file
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 
@@ -35,6 +35,8 @@ class Robot:
         Torque terms beside the rigid-body model's.
     source : str
         The URDF file that the robot was read from.
+    urdf : str
+        Text of that file.
     """
 
     model: pin.Model
@@ -44,12 +46,14 @@ class Robot:
     limits: Limits
     friction: Friction
     source: str
+    urdf: str
 
     @classmethod
     def from_urdf(
         cls,
         path: str | Path,
         *,
+        urdf_text: str | None = None,
         tool_frame: str | None = None,
         base_frame: str | None = None,
         gravity: Sequence[float] = STANDARD_GRAVITY,
@@ -63,6 +67,8 @@ class Robot:
         ----------
         path : path
             URDF file. Mesh files are not read.
+        urdf_text : str, optional
+            Text of the URDF where it is already known; `path` then only names it.
         tool_frame : str, optional
             Link at the end of the chain; the only leaf link if left out.
         base_frame : str, optional
@@ -85,7 +91,10 @@ class Robot:
         ------
         UrdfError, UnknownNameError, LimitError, InputError
         """
-        chain = read_chain(path, tool_frame=tool_frame, base_frame=base_frame, locked_joints=dict(locked_joints or {}))
+        text = read_file(Path(path)) if urdf_text is None else urdf_text
+        chain = read_chain(
+            text, str(path), tool_frame=tool_frame, base_frame=base_frame, locked_joints=dict(locked_joints or {})
+        )
         vector = np.asarray(gravity, dtype=float)
         if vector.shape != (3,) or not np.all(np.isfinite(vector)):
             raise InputError("is not a vector", where="robot.gravity", found=list(gravity), allowed="[x, y, z] in m/s^2")
@@ -103,6 +112,7 @@ class Robot:
             limits=resolve_limits(limits or LimitSpec(), names, chain.limits),
             friction=Friction.of(names, **dict(friction or {})),  # type: ignore[arg-type]
             source=str(path),
+            urdf=text,
         )
 
     @property

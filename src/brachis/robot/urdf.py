@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,18 +47,21 @@ class UrdfChain:
 
 
 def read_chain(
-    path: str | Path,
+    text: str | bytes,
+    where: str,
     *,
     tool_frame: str | None,
     base_frame: str | None,
     locked_joints: Mapping[str, float],
 ) -> UrdfChain:
-    """Read a URDF file and find the chain from `base_frame` to `tool_frame`.
+    """Read a URDF and find the chain from `base_frame` to `tool_frame`.
 
     Parameters
     ----------
-    path : path
-        The URDF file.
+    text : str or bytes
+        The URDF.
+    where : str
+        Name of the file, for messages.
     tool_frame : str or None
         Link at the chain's end; None takes the URDF's only leaf link.
     base_frame : str or None
@@ -68,12 +72,11 @@ def read_chain(
     Raises
     ------
     UrdfError
-        The file is missing or broken, the chain has an unsupported joint, or a moving link lacks a physical inertia.
+        The text is broken, the chain has an unsupported joint, or a moving link lacks a physical inertia.
     UnknownNameError
         A frame or joint does not exist.
     """
-    urdf = _load(Path(path))
-    where = str(path)
+    urdf = _parse(text, where)
     parents = {joint.child: joint for joint in urdf.robot.joints}
     links = [link.name for link in urdf.robot.links]
     tool = _tool(urdf, tool_frame, where)
@@ -96,33 +99,48 @@ def read_chain(
     return UrdfChain(tuple(j.name for j in chain), limits, locked, tool, base, _plain_xml(urdf))
 
 
-def _load(path: Path) -> yourdfpy.URDF:
-    """Parse the file, or say why it is not a URDF."""
-    import yourdfpy  # noqa: PLC0415  (imports trimesh: one second that only this stage needs)
-    from lxml import etree  # noqa: PLC0415  (comes with yourdfpy)
+def read_file(path: Path) -> str:
+    """Text of a URDF file.
 
+    Raises
+    ------
+    UrdfError
+        The file is missing or not text.
+    """
     if not path.is_file():
         raise UrdfError("the URDF file does not exist", where=str(path))
     try:
-        root = etree.parse(str(path)).getroot()
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise UrdfError("the URDF file cannot be read", where=str(path), found=str(error)) from error
+
+
+def _parse(text: str | bytes, where: str) -> yourdfpy.URDF:
+    """Parse the text, or say why it is not a URDF."""
+    import yourdfpy  # noqa: PLC0415  (imports trimesh: one second that only this stage needs)
+    from lxml import etree  # noqa: PLC0415  (comes with yourdfpy)
+
+    data = text.encode() if isinstance(text, str) else text
+    try:
+        root = etree.fromstring(data)
     except etree.XMLSyntaxError as error:
-        raise UrdfError("the URDF file is not well-formed XML", where=str(path), found=str(error)) from error
+        raise UrdfError("the URDF file is not well-formed XML", where=where, found=str(error)) from error
     if root.tag != "robot":
         raise UrdfError(
             "the file is not a URDF",
-            where=str(path),
+            where=where,
             found=f"root element <{root.tag}>",
             allowed="<robot>",
             hint="Expand xacro files first",
         )
     try:
         urdf = yourdfpy.URDF.load(
-            str(path), build_scene_graph=False, build_collision_scene_graph=False, load_meshes=False
+            io.BytesIO(data), build_scene_graph=False, build_collision_scene_graph=False, load_meshes=False
         )
     except (ValueError, TypeError, KeyError, AttributeError, IndexError) as error:
-        raise UrdfError("the URDF cannot be read", where=str(path), found=f"{type(error).__name__}: {error}") from error
+        raise UrdfError("the URDF cannot be read", where=where, found=f"{type(error).__name__}: {error}") from error
     if not urdf.robot.links:
-        raise UrdfError("the URDF has no links", where=str(path))
+        raise UrdfError("the URDF has no links", where=where)
     return urdf
 
 
@@ -278,4 +296,5 @@ def _plain_xml(urdf: yourdfpy.URDF) -> str:
             joint.limit = Limit(effort=0.0, velocity=0.0, lower=-1e9, upper=1e9)
     for link in urdf.robot.links:
         link.visuals, link.collisions = [], []
-    return str(urdf.write_xml_string().decode() if isinstance(urdf.write_xml_string(), bytes) else urdf.write_xml_string())
+    xml = urdf.write_xml_string()
+    return xml.decode() if isinstance(xml, bytes) else str(xml)

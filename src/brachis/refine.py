@@ -1,0 +1,154 @@
+"""Refinement to truth: from limits at collocation points to limits everywhere.
+
+After a solve the limits are evaluated on a grid many times denser. Where one is exceeded between collocation points, a
+point is added at the worst place of each stretch and the problem is solved again from where it stands, until the worst
+ratio is within the tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.errors import UnreachableError
+from brachis.nlp import Transcription
+from brachis.solvers import SolverReport
+
+Solve = Callable[[Transcription, np.ndarray], SolverReport]
+_LARGEST_STRETCH = 0.01
+_NEAR = 0.02
+_FINE = 9
+_CLOSEST = 1e-5
+
+
+@dataclass(frozen=True)
+class RefinementOptions:
+    """When refinement is content.
+
+    Attributes
+    ----------
+    tolerance : float
+        Largest excess over a limit, as a fraction of it.
+    density : int
+        Grid points per collocation point of the first solve.
+    max_rounds : int
+        Solves after the first one.
+    """
+
+    tolerance: float = 1e-4
+    density: int = 10
+    max_rounds: int = 10
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A solve and what refinement made of it.
+
+    Attributes
+    ----------
+    problem : Transcription
+        With all collocation points.
+    reports : tuple of SolverReport
+        Of every round, the first one included.
+    x : (v,) ndarray
+        The answer.
+    excess : float
+        Largest excess over a limit on the dense grid, as a fraction of it; infinite where out of reach.
+    stretched : float
+        Factor by which t_E was lengthened at the very end, 1 if not at all.
+    """
+
+    problem: Transcription
+    reports: tuple[SolverReport, ...]
+    x: np.ndarray
+    excess: float
+    stretched: float
+
+    @property
+    def converged(self) -> bool:
+        """True where the last round's answer satisfies its rows."""
+        return self.reports[-1].status.usable
+
+
+def refine(problem: Transcription, x: np.ndarray, solve: Solve, options: RefinementOptions) -> Refined:
+    """Solve, and add collocation points until the limits hold on the dense grid.
+
+    Parameters
+    ----------
+    problem : Transcription
+    x : (v,) ndarray
+        Starting point.
+    solve : callable
+        ``solve(problem, x)`` returns a `SolverReport`.
+    options : RefinementOptions
+
+    Returns
+    -------
+    Refined
+    """
+    dense = problem.resampled(np.linspace(0.0, 1.0, options.density * (len(problem.tau) - 1) + 1))
+    reports = [solve(problem, x)]
+    # Aimed at half the tolerance: the verification's grid is another one.
+    goal = 0.5 * options.tolerance
+    for _ in range(options.max_rounds):
+        if not reports[-1].status.usable:
+            break
+        excess, places = _violations(dense, reports[-1].x, goal)
+        if excess <= goal:
+            return Refined(problem, tuple(reports), reports[-1].x, excess, 1.0)
+        problem = problem.resampled(_merged(problem.tau, places))
+        reports.append(solve(problem, reports[-1].x))
+    return _stretch(problem, dense, reports, goal)
+
+
+def _violations(dense: Transcription, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
+    """Largest excess, and the times tau at which collocation points are missing.
+
+    Around every peak of the grid that comes near a limit a finer grid looks for the true peak.
+    """
+    tau = dense.tau
+    try:
+        table = dense.excess(x)
+        padded = np.pad(table, ((1, 1), (0, 0)), constant_values=-np.inf)
+        peaks = (table > goal - _NEAR) & (table >= padded[:-2]) & (table > padded[2:])
+        centres = np.flatnonzero(peaks.any(axis=1))
+        if not len(centres):
+            return float(table.max()), centres.astype(float)
+        left, right = tau[np.maximum(centres - 1, 0)], tau[np.minimum(centres + 1, len(tau) - 1)]
+        fine = np.linspace(left, right, _FINE, axis=1)
+        order = np.argsort(fine.ravel(), kind="stable")
+        closer = np.empty((fine.size, table.shape[1]))
+        closer[order] = dense.excess_at(x, fine.ravel()[order])
+    except UnreachableError:
+        return np.inf, 0.5 * (tau[1::10] + tau[:-1:10])
+    # The worst row decides where in its stretch the new points go.
+    closer = closer.reshape(*fine.shape, -1).max(axis=2)
+    best = np.argmax(closer, axis=1)
+    missing = closer[np.arange(len(centres)), best] > goal
+    at = fine[np.arange(len(centres)), best][missing]
+    step = tau[1] - tau[0]
+    around = np.clip(at[:, None] + step * np.array([-1.0, 0.0, 1.0]), 0.0, 1.0)  # the peak moves when it is held down
+    return float(closer.max()), np.unique(around)
+
+
+def _merged(tau: np.ndarray, extra: np.ndarray) -> np.ndarray:
+    """Collocation points with extra ones, without pairs so close that their rows would be the same."""
+    gap = np.min(np.abs(extra[:, None] - tau[None]), axis=1)
+    return np.union1d(tau, extra[gap > _CLOSEST])
+
+
+def _stretch(problem: Transcription, dense: Transcription, reports: list[SolverReport], goal: float) -> Refined:
+    """Lengthen the time by up to one per cent where that is all that is missing."""
+    x = reports[-1].x.copy()
+    excess, _ = _violations(dense, x, goal)
+    factor = 1.0
+    while goal < excess and factor * np.sqrt(1.0 + excess) < 1.0 + _LARGEST_STRETCH:
+        factor *= np.sqrt(1.0 + excess)
+        x[0] = reports[-1].x[0] * factor
+        before = excess
+        excess, _ = _violations(dense, x, goal)
+        if excess > 0.9 * before:
+            break
+    return Refined(problem, tuple(reports), x, excess, factor)

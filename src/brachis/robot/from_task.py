@@ -1,0 +1,53 @@
+"""The robot that a task file describes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from brachis.errors import TaskError
+from brachis.robot.limits import LimitSpec
+from brachis.robot.robot import Robot
+from brachis.task import RobotSettings
+
+
+def robot_from_settings(
+    settings: RobotSettings, *, urdf: str | Path | None = None, urdf_text: str | None = None
+) -> Robot:
+    """Build the robot of a task.
+
+    Parameters
+    ----------
+    settings : RobotSettings
+        The task's ``robot`` part.
+    urdf : path, optional
+        URDF file to use in place of the one that the task names.
+    urdf_text : str, optional
+        Text of the URDF, where it has been kept beside the task; nothing is read from disk then.
+
+    Raises
+    ------
+    TaskError
+        No URDF is named.
+    UrdfError, UnknownNameError, LimitError, InputError
+        See `Robot.from_urdf`.
+    """
+    source = urdf if urdf is not None else settings.urdf
+    if source is None and urdf_text is None:
+        raise TaskError("no URDF is named", where="robot.urdf", allowed="path of a URDF file")
+    limits = settings.limits
+    return Robot.from_urdf(
+        source if source is not None else "saved URDF",
+        urdf_text=urdf_text,
+        tool_frame=settings.tool_frame,
+        base_frame=settings.base_frame,
+        gravity=settings.gravity,
+        locked_joints=settings.locked_joints,
+        limits=LimitSpec(
+            torque=limits.torque,
+            velocity=limits.velocity,
+            acceleration=limits.acceleration,
+            position=limits.position,
+            scale=limits.scale.model_dump(),
+        ),
+        friction=settings.friction.model_dump(),
+    )

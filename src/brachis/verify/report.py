@@ -1,0 +1,66 @@
+"""The outcome of a verification, as data."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that was checked.
+
+    Attributes
+    ----------
+    name : str
+        For example ``torque`` or ``path error``.
+    value : float
+        The worst value found: a ratio to the limit, or an error in `unit`.
+    allowed : float
+        Largest value that passes.
+    unit : str
+        ``-`` for ratios.
+    passed : bool
+    joint : str or None
+        Where a joint is to blame.
+    time : float or None
+        When, s.
+    """
+
+    name: str
+    value: float
+    allowed: float
+    unit: str
+    passed: bool
+    joint: str | None = None
+    time: float | None = None
+
+
+@dataclass(frozen=True)
+class Verification:
+    """All checks of one trajectory.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+    points : int
+        Number of times at which the trajectory was evaluated.
+    worst_ratio : float
+        Largest ratio of any quantity to its limit (torque, velocity, acceleration, position).
+    path_error : float
+        Largest distance from the path: m for position rows, rad for yaw, whichever is larger.
+    """
+
+    checks: tuple[Check, ...]
+    points: int
+    worst_ratio: float
+    path_error: float
+
+    @property
+    def passed(self) -> bool:
+        """True where every check passed."""
+        return all(check.passed for check in self.checks)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return {"passed": self.passed, **asdict(self)}
