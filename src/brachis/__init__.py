@@ -1,1 +1,59 @@
-"""Minimum-time motion of redundant robots along prescribed paths."""
+"""Minimum-time motion of redundant robots along prescribed paths.
+
+The names below are the public interface; they are imported when first used, so that ``import brachis`` is quick.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from brachis.errors import BrachisError as BrachisError
+    from brachis.errors import InputError as InputError
+    from brachis.errors import PlanningError as PlanningError
+    from brachis.planner import Result as Result
+    from brachis.planner import plan as plan
+    from brachis.planner import transcribe as transcribe
+    from brachis.robot import LimitSpec as LimitSpec
+    from brachis.robot import Robot as Robot
+    from brachis.robot import TaskSpace as TaskSpace
+    from brachis.task import Task as Task
+    from brachis.task import load_task as load_task
+    from brachis.trajectory import Trajectory as Trajectory
+    from brachis.verify import Verification as Verification
+    from brachis.verify import verify as verify
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "BrachisError": "brachis.errors",
+    "InputError": "brachis.errors",
+    "LimitSpec": "brachis.robot",
+    "PlanningError": "brachis.errors",
+    "Result": "brachis.planner",
+    "Robot": "brachis.robot",
+    "Task": "brachis.task",
+    "TaskSpace": "brachis.robot",
+    "Trajectory": "brachis.trajectory",
+    "Verification": "brachis.verify",
+    "load_task": "brachis.task",
+    "plan": "brachis.planner",
+    "transcribe": "brachis.planner",
+    "verify": "brachis.verify",
+}
+
+__all__ = sorted([*_HOME, "__version__"])
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name when it is first used."""
+    if name not in _HOME:
+        message = f"module 'brachis' has no attribute {name!r}"
+        raise AttributeError(message)
+    return getattr(importlib.import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    """Names for completion."""
+    return list(__all__)

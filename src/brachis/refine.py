@@ -1,8 +1,8 @@
 """Refinement to truth: from limits at collocation points to limits everywhere.
 
 After a solve the limits are evaluated on a grid many times denser. Where one is exceeded between collocation points, a
-point is added at the worst place of each stretch and the problem is solved again from where it stands, until the worst
-ratio is within the tolerance.
+points are added around the worst place of each stretch and the problem is solved again from where it stands, until the
+worst ratio is within the tolerance. A last excess of the tolerance's own size is met by lengthening t_E by as little.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from brachis.solvers import SolverReport
 
 Solve = Callable[[Transcription, np.ndarray], SolverReport]
 _LARGEST_STRETCH = 0.01
+_GOAL = 0.5
+"""Refinement aims at this part of the tolerance: the verification's grid is another one."""
 _NEAR = 0.02
 _FINE = 9
 _CLOSEST = 1e-5
@@ -90,17 +92,19 @@ def refine(problem: Transcription, x: np.ndarray, solve: Solve, options: Refinem
     """
     dense = problem.resampled(np.linspace(0.0, 1.0, options.density * (len(problem.tau) - 1) + 1))
     reports = [solve(problem, x)]
-    # Aimed at half the tolerance: the verification's grid is another one.
-    goal = 0.5 * options.tolerance
-    for _ in range(options.max_rounds):
+    for round_number in range(options.max_rounds + 1):
         if not reports[-1].status.usable:
             break
-        excess, places = _violations(dense, reports[-1].x, goal)
-        if excess <= goal:
-            return Refined(problem, tuple(reports), reports[-1].x, excess, 1.0)
+        answer = reports[-1].x
+        excess, places = _violations(dense, answer, options.tolerance * _GOAL)
+        last = round_number == options.max_rounds
+        stretch = _LARGEST_STRETCH if last else options.tolerance
+        stretched, remaining = _stretched(dense, answer, excess, options.tolerance * _GOAL, stretch)
+        if last or remaining <= options.tolerance * _GOAL:
+            return Refined(problem, tuple(reports), stretched, remaining, float(stretched[0] / answer[0]))
         problem = problem.resampled(_merged(problem.tau, places))
-        reports.append(solve(problem, reports[-1].x))
-    return _stretch(problem, dense, reports, goal)
+        reports.append(solve(problem, answer))
+    return Refined(problem, tuple(reports), reports[-1].x, np.inf, 1.0)
 
 
 def _violations(dense: Transcription, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
@@ -139,16 +143,20 @@ def _merged(tau: np.ndarray, extra: np.ndarray) -> np.ndarray:
     return np.union1d(tau, extra[gap > _CLOSEST])
 
 
-def _stretch(problem: Transcription, dense: Transcription, reports: list[SolverReport], goal: float) -> Refined:
-    """Lengthen the time by up to one per cent where that is all that is missing."""
-    x = reports[-1].x.copy()
-    excess, _ = _violations(dense, x, goal)
-    factor = 1.0
-    while goal < excess and factor * np.sqrt(1.0 + excess) < 1.0 + _LARGEST_STRETCH:
-        factor *= np.sqrt(1.0 + excess)
-        x[0] = reports[-1].x[0] * factor
-        before = excess
-        excess, _ = _violations(dense, x, goal)
-        if excess > 0.9 * before:
+def _stretched(
+    dense: Transcription, x: np.ndarray, excess: float, goal: float, largest: float
+) -> tuple[np.ndarray, float]:
+    """Lengthen the time by a fraction of up to `largest` where that brings the excess to the goal.
+
+    Without gravity and friction torques fall with the square of the time; with them this is tried, not trusted.
+    """
+    x, first = x.copy(), x[0]
+    while goal < excess:
+        t_end = x[0] * np.sqrt((1.0 + excess) / (1.0 + 0.9 * goal))
+        if not t_end <= first * (1.0 + largest):
             break
-    return Refined(problem, tuple(reports), x, excess, factor)
+        x[0] = t_end
+        before, (excess, _) = excess, _violations(dense, x, goal)
+        if excess > 0.99 * before:
+            break
+    return x, excess

@@ -104,7 +104,7 @@ class Trajectory:
         """Joint positions as SciPy's piecewise polynomial over time."""
         from scipy.interpolate import BPoly  # noqa: PLC0415  (imports in 0.3 s)
 
-        return BPoly.from_derivatives(self.times, np.stack([self.q, self.qdot, self.qddot], axis=1))
+        return BPoly(_bernstein(self.times, self.q, self.qdot, self.qddot), self.times)
 
     @cached_property
     def path_spline(self) -> BSpline:
@@ -242,6 +242,19 @@ class Trajectory:
                 allowed=f"0 s to {self.t_end:.6g} s",
             )
         return np.clip(times, 0.0, self.t_end)
+
+
+def _bernstein(times: np.ndarray, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+    """Bernstein coefficients (6, L, n) of the quintic Hermite pieces between nodes.
+
+    A Bezier curve of degree 5 and length h begins with q = c0, qdot = 5 (c1 - c0) / h and
+    qddot = 20 (c2 - 2 c1 + c0) / h^2, and ends likewise.
+    """
+    h = np.diff(times)[:, None]
+    slope, bend = h / 5.0, h**2 / 20.0
+    left = [q[:-1], q[:-1] + slope * qdot[:-1], q[:-1] + 2.0 * slope * qdot[:-1] + bend * qddot[:-1]]
+    right = [q[1:] - 2.0 * slope * qdot[1:] + bend * qddot[1:], q[1:] - slope * qdot[1:], q[1:]]
+    return np.stack([*left, *right])
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

@@ -1,16 +1,25 @@
-"""Sparse B-spline basis matrices and their derivatives."""
+"""B-spline basis functions and their derivatives, as windows or sparse matrices.
+
+At any time only d + 1 basis functions of degree d differ from zero: a window. The derivative of a spline of degree d
+is a spline of degree d - 1 whose control points are scaled differences, d (c[i+1] - c[i]) / (t[i+d+1] - t[i+1])
+(de Boor, A Practical Guide to Splines, chapter X); read backwards, this turns windows of degree d - 1 into windows of
+derivatives of degree d.
+"""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy import sparse
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 
-def basis_matrix(knots: np.ndarray, degree: int, tau: np.ndarray, derivative: int = 0) -> sparse.csr_array:
-    """Matrix B with ``B @ control_points`` the spline's derivative at the times `tau`.
-
-    The derivative of a spline of degree d is a spline of degree d - 1 whose control points are scaled differences,
-    d (c[i+1] - c[i]) / (t[i+d+1] - t[i+1]) (de Boor, A Practical Guide to Splines, chapter X).
+def basis_windows(
+    knots: np.ndarray, degree: int, tau: np.ndarray, derivative: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Basis functions, or one of their derivatives, at the times `tau`.
 
     Parameters
     ----------
@@ -19,22 +28,47 @@ def basis_matrix(knots: np.ndarray, degree: int, tau: np.ndarray, derivative: in
     degree : int
         d.
     tau : (K,) ndarray
-        Times within the knots.
+        Times; beyond the knots they are taken back to the nearest end.
     derivative : int, optional
         Order of differentiation, at most d; with respect to the knots' time.
 
     Returns
     -------
-    (K, N + d) csr_array
+    first : (K,) int ndarray
+        Control point to which the window's first entry belongs.
+    values : (K, d + 1) ndarray
     """
     from scipy.interpolate import BSpline  # noqa: PLC0415  (imports in 0.3 s)
 
-    factor = sparse.eye_array(len(knots) - degree - 1, format="csr")
-    inner, d = knots, degree
-    for _ in range(derivative):
-        count = len(inner) - d - 2
-        scale = d / (inner[d + 1 : d + 1 + count] - inner[1 : 1 + count])
-        factor = sparse.diags_array([-scale, scale], offsets=[0, 1], shape=(count, count + 1), format="csr") @ factor
-        inner, d = inner[1:-1], d - 1
-    matrix = BSpline.design_matrix(np.clip(tau, knots[0], knots[-1]), inner, d)
-    return sparse.csr_array(matrix @ factor)
+    inner = knots[derivative : len(knots) - derivative]
+    low = degree - derivative
+    matrix = BSpline.design_matrix(np.clip(tau, knots[0], knots[-1]), inner, low)
+    first = matrix.indices.reshape(len(tau), low + 1)[:, 0].astype(int)
+    values = matrix.data.reshape(len(tau), low + 1)
+    for d in range(low + 1, degree + 1):
+        trim = degree - d
+        outer = knots[trim : len(knots) - trim]
+        scale = d / (outer[d + 1 : -1] - outer[1 : -d - 1])
+        scaled = values * scale[first[:, None] + np.arange(d)]
+        values = np.zeros((len(tau), d + 1))
+        values[:, 1:] += scaled
+        values[:, :-1] -= scaled
+    return first, values
+
+
+def basis_matrix(knots: np.ndarray, degree: int, tau: np.ndarray, derivative: int = 0) -> sparse.csr_array:
+    """Matrix B with ``B @ control_points`` the spline's derivative at the times `tau`.
+
+    Parameters are those of `basis_windows`.
+
+    Returns
+    -------
+    (K, N + d) csr_array
+    """
+    from scipy import sparse  # noqa: PLC0415
+
+    first, values = basis_windows(knots, degree, tau, derivative)
+    columns = first[:, None] + np.arange(degree + 1)
+    rows = np.repeat(np.arange(len(tau)), degree + 1)
+    shape = (len(tau), len(knots) - degree - 1)
+    return sparse.csr_array((values.ravel(), (rows, columns.ravel())), shape=shape)

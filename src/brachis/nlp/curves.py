@@ -1,17 +1,20 @@
 """Splines whose first and last control points are fixed or tied by the boundary conditions.
 
 For a clamped spline, zero velocity at an end means that the first two control points there are equal, and zero
-acceleration besides that the first three are. Boundary conditions therefore need no rows in the NLP: the control
-points are ``tie @ free + fixed`` with fewer free variables.
+acceleration besides that the first three are. Boundary conditions therefore need no rows in the NLP: control points at
+an end share one free variable, or are fixed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
+
+from brachis.bspline import basis_windows
+
+ORDERS = 3
+"""Value and two derivatives."""
 
 
 @dataclass(frozen=True)
@@ -23,14 +26,15 @@ class TiedSpline:
     knots : (N + 2 d + 1,) ndarray
     degree : int
         d.
-    tie : (N + d, free) csr_array
+    variable : (N + d,) int ndarray
+        Free variable of every control point, -1 for a fixed one.
     fixed : (N + d,) ndarray
-        Control points are ``tie @ free + fixed``.
+        Value of the fixed control points, 0 for the others.
     """
 
     knots: np.ndarray
     degree: int
-    tie: sparse.csr_array
+    variable: np.ndarray
     fixed: np.ndarray
 
     @classmethod
@@ -50,71 +54,75 @@ class TiedSpline:
         """
         count = len(knots) - degree - 1
         still = derivatives + 1
+        group = np.clip(np.arange(count), still - 1, count - still)
         fixed = np.zeros(count)
-        column = np.concatenate([np.zeros(still), np.arange(1, count - 2 * still + 1), np.full(still, count - 2 * still + 1)])
-        kept = np.ones(count, dtype=bool)
         for value, ends in ((start, slice(None, still)), (end, slice(count - still, None))):
             if value is not None:
                 fixed[ends] = value
-                kept[ends] = False
-        rows = np.flatnonzero(kept)
-        _, columns = np.unique(column[kept], return_inverse=True)
-        free = int(columns.max()) + 1
-        tie = sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, free))
-        return cls(knots, degree, tie, fixed)
+                group[ends] = -1
+        variable = np.full(count, -1)
+        _, variable[group >= 0] = np.unique(group[group >= 0], return_inverse=True)
+        return cls(knots, degree, variable, fixed)
 
     @property
     def free(self) -> int:
         """Number of free variables."""
-        return int(self.tie.shape[1])
+        return int(self.variable.max()) + 1
 
     @property
     def greville(self) -> np.ndarray:
         """Greville abscissae (N + d,): the normalised times to which the control points belong."""
-        d = self.degree
-        return np.array([self.knots[i + 1 : i + d + 1].mean() for i in range(len(self.fixed))])
+        windows = np.lib.stride_tricks.sliding_window_view(self.knots[1:-1], self.degree)
+        return np.asarray(windows.mean(axis=1))
 
     def control_points(self, free: np.ndarray) -> np.ndarray:
         """Control points (N + d,) from the free variables."""
-        return np.asarray(self.tie @ free + self.fixed)
+        return np.where(self.variable >= 0, free[self.variable], self.fixed)
 
     def free_from(self, control_points: np.ndarray) -> np.ndarray:
         """Free variables that come nearest to given control points (mean over tied ones)."""
-        counts = self.tie.sum(axis=0)
-        return np.asarray(self.tie.T @ (control_points - self.fixed)) / counts
+        kept = self.variable >= 0
+        sums = np.bincount(self.variable[kept], weights=control_points[kept])
+        return np.asarray(sums / np.bincount(self.variable[kept]))
 
 
 @dataclass(frozen=True)
-class SampledSpline:
-    """A `TiedSpline` seen at K times: value and two derivatives, linear in its free variables.
+class Windows:
+    """Basis functions of value and two derivatives at K times.
 
     Attributes
     ----------
-    matrices : tuple of three (K, free) csr_array
-    offsets : (3, K) ndarray
-        The derivative of order i is ``matrices[i] @ free + offsets[i]``, per unit of normalised time.
-    point, column : (z,) int ndarray
-        Common sparsity pattern: time index and free variable.
-    entries : (3, z) ndarray
-        The matrices' entries on that pattern.
+    columns : (K, d + 1) int ndarray
+        Control points that matter at each time.
+    values : (3, K, d + 1) ndarray
+        Per unit of normalised time.
     """
 
-    matrices: tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]
-    offsets: np.ndarray
-    point: np.ndarray
-    column: np.ndarray
-    entries: np.ndarray
+    columns: np.ndarray
+    values: np.ndarray
 
     @classmethod
-    def of(cls, spline: TiedSpline, bases: Sequence[sparse.csr_array]) -> SampledSpline:
-        """Sample a spline through the basis matrices (K, N + d) of its value and two derivatives."""
-        matrices = [sparse.csr_array(basis @ spline.tie) for basis in bases]
-        pattern = sparse.coo_array(abs(matrices[0]) + abs(matrices[1]) + abs(matrices[2]))
-        point, column = pattern.coords
-        entries = np.array([matrix[point, column] for matrix in matrices])
-        offsets = np.array([basis @ spline.fixed for basis in bases])
-        return cls((matrices[0], matrices[1], matrices[2]), offsets, point, column, entries)
+    def of(cls, knots: np.ndarray, degree: int, tau: np.ndarray) -> Windows:
+        """Sample the basis at normalised times `tau`, (K,)."""
+        first, value = basis_windows(knots, degree, tau)
+        derivatives = [basis_windows(knots, degree, tau, order)[1] for order in range(1, ORDERS)]
+        return cls(first[:, None] + np.arange(degree + 1), np.array([value, *derivatives]))
 
-    def values(self, free: np.ndarray) -> np.ndarray:
-        """Value and two derivatives, (3, K)."""
-        return np.array([matrix @ free for matrix in self.matrices]) + self.offsets
+    def curves(self, control_points: np.ndarray) -> np.ndarray:
+        """Value and two derivatives (3, K, c) of c splines with control points (c, N + d)."""
+        return np.asarray(np.einsum("okw,ckw->okc", self.values, control_points[:, self.columns]))
+
+    def entries(self, spline: TiedSpline) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Derivatives of the curves with respect to the free variables, each place once.
+
+        Returns
+        -------
+        point, variable : (z,) int ndarray
+        entries : (3, z) ndarray
+        """
+        variable = spline.variable[self.columns]
+        kept = variable >= 0
+        place = (np.arange(len(variable))[:, None] * spline.free + variable)[kept]
+        unique, inverse = np.unique(place, return_inverse=True)
+        entries = np.array([np.bincount(inverse, weights=values[kept]) for values in self.values])
+        return unique // spline.free, unique % spline.free, entries

@@ -28,11 +28,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.bspline import basis_matrix, clamped_uniform_knots
+from brachis.bspline import clamped_uniform_knots
 from brachis.kinematics import Decomposition, JointDerivatives, JointState
 from brachis.nlp import constraints
 from brachis.nlp.constraints import Constraint, Partials
-from brachis.nlp.curves import SampledSpline, TiedSpline
+from brachis.nlp.curves import TiedSpline, Windows
 
 _SHORTEST_TIME = 1e-4
 
@@ -64,9 +64,9 @@ class Motion:
 
     def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """y, ydot and yddot, each (K, 1 + r), at times t, (K,), in seconds."""
-        bases = (basis_matrix(self.knots, self.degree, t / self.t_end, order) for order in range(3))
-        y, ydot, yddot = (basis @ self.control_points.T / self.t_end**order for order, basis in enumerate(bases))
-        return y, ydot, yddot
+        windows = Windows.of(self.knots, self.degree, t / self.t_end)
+        y, ydot, yddot = windows.curves(self.control_points)
+        return y, ydot / self.t_end, yddot / self.t_end**2
 
 
 class Transcription:
@@ -116,8 +116,8 @@ class Transcription:
     def _collocate(self, tau: np.ndarray) -> None:
         """Set the collocation points and all that depends on them."""
         self.tau = tau
-        bases = [basis_matrix(self.knots, self.degree, tau, order) for order in range(3)]
-        self._samples = [SampledSpline.of(spline, bases) for spline in self.splines]
+        self._windows = Windows.of(self.knots, self.degree, tau)
+        self._entries = [self._windows.entries(spline) for spline in self.splines]
         self.evaluations = {"states": 0, "jacobians": 0}
         self._last: tuple[bytes, JointState] | None = None
         self._lay_out_rows()
@@ -159,9 +159,9 @@ class Transcription:
             places = first + np.arange(count * size).reshape(count, size)
             rows.append(places.ravel())
             columns.append(np.zeros(count * size, dtype=int))
-            for sample, part in zip(self._samples, self.slices, strict=True):
-                rows.append(places[sample.point].ravel())
-                columns.append(np.repeat(sample.column + part.start, size))
+            for (point, variable, _), part in zip(self._entries, self.slices, strict=True):
+                rows.append(places[point].ravel())
+                columns.append(np.repeat(variable + part.start, size))
             first += count * size
         steps = self.splines[0].free - 1
         places = first + np.arange(steps)
@@ -179,8 +179,12 @@ class Transcription:
 
     def motion(self, x: np.ndarray) -> Motion:
         """Curves that belong to x."""
-        points = [spline.control_points(x[part]) for spline, part in zip(self.splines, self.slices, strict=True)]
-        return Motion(float(x[0]), self.knots, self.degree, np.array(points))
+        return Motion(float(x[0]), self.knots, self.degree, self._control_points(x))
+
+    def _control_points(self, x: np.ndarray) -> np.ndarray:
+        """Control points (1 + r, N + d)."""
+        parts = zip(self.splines, self.slices, strict=True)
+        return np.array([spline.control_points(x[part]) for spline, part in parts])
 
     def variables_from(self, motion: Motion) -> np.ndarray:
         """Point x nearest to given curves over the same knots."""
@@ -208,8 +212,8 @@ class Transcription:
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
             self.evaluations["states"] += 1
-            curves = np.array([s.values(x[part]) for s, part in zip(self._samples, self.slices, strict=True)])
-            y, ydot, yddot = (np.ascontiguousarray(curves[:, order].T) / x[0] ** order for order in range(3))
+            y, ydot, yddot = self._windows.curves(self._control_points(x))
+            ydot, yddot = ydot / x[0], yddot / x[0] ** 2
             self._last = (key, self.decomposition.state(y, ydot, yddot))
         return self._last[1]
 
@@ -263,11 +267,10 @@ class Transcription:
             by_y, by_ydot, by_yddot = chain(constraint.partials(state), state, exact)
             by_time = np.einsum("kcj,kj->kc", by_ydot, state.ydot) + 2.0 * np.einsum("kcj,kj->kc", by_yddot, state.yddot)
             entries.append(by_time.ravel() / -x[0])
-            for j, sample in enumerate(self._samples):
-                point, basis = sample.point, sample.entries[:, :, None]
-                entry = by_y[point, :, j] * basis[0]
-                entry += by_ydot[point, :, j] * (basis[1] / x[0])
-                entry += by_yddot[point, :, j] * (basis[2] / x[0] ** 2)
+            for j, (point, _, basis) in enumerate(self._entries):
+                entry = by_y[point, :, j] * basis[0][:, None]
+                entry += by_ydot[point, :, j] * (basis[1] / x[0])[:, None]
+                entry += by_yddot[point, :, j] * (basis[2] / x[0] ** 2)[:, None]
                 entries.append(entry.ravel())
         steps = self.splines[0].free - 1
         return np.concatenate([*entries, np.full(steps, -1.0), np.ones(steps)])

@@ -82,9 +82,13 @@ class TaskSpace:
 
     def value(self, placement: pin.SE3) -> np.ndarray:
         """Task coordinates, (m,), of one tool placement in the world frame; yaw in (-pi, pi]."""
+        return self.values(np.array(placement.translation)[None], np.array(placement.rotation)[None])[0]
+
+    def values(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """Task coordinates, (K, m), of tool positions (K, 3) and rotations (K, 3, 3)."""
         rows = list(self.axes)
-        position = np.asarray(placement.translation)[rows]
+        coordinates = positions[:, rows]
         if self.yaw_axis is None:
-            return position
-        direction = np.asarray(placement.rotation)[rows, self.yaw_axis]
-        return np.append(position, np.arctan2(direction[1], direction[0]))
+            return coordinates
+        direction = rotations[:, rows, self.yaw_axis]
+        return np.column_stack([coordinates, np.arctan2(direction[:, 1], direction[:, 0])])

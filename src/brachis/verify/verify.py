@@ -36,7 +36,7 @@ class VerifyOptions:
 
     ratio_tolerance: float = 1e-4
     path_tolerance: float = 1e-9
-    points_per_interval: int = 40
+    points_per_interval: int = 32
 
 
 def verify(trajectory: Trajectory, options: VerifyOptions | None = None, *, robot: Robot | None = None) -> Verification:
@@ -57,9 +57,9 @@ def verify(trajectory: Trajectory, options: VerifyOptions | None = None, *, robo
     options = options or VerifyOptions()
     robot = robot or trajectory.robot
     breaks = np.unique(trajectory.knots) * trajectory.t_end
-    steps = np.arange(options.points_per_interval) / options.points_per_interval
+    steps = (np.arange(options.points_per_interval) + 0.5) / options.points_per_interval  # between the nodes
     grid = (breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel()
-    t = np.union1d(np.append(grid, breaks[-1]), trajectory.times)
+    t = np.union1d(grid, trajectory.times)
     q, qdot, qddot = (np.asarray(trajectory.pieces(t, nu=order)) for order in range(3))
     tau = _torques(robot, q, qdot, qddot)
     path_check = _path_error(trajectory, robot, t, q, options)
@@ -78,9 +78,22 @@ def verify(trajectory: Trajectory, options: VerifyOptions | None = None, *, robo
 def _torques(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
     """Joint torques (K, n): rnea, armature, viscous and Coulomb friction."""
     data = robot.model.createData()
-    rigid = np.array([pin.rnea(robot.model, data, *state).copy() for state in zip(q, qdot, qddot, strict=True)])
+    rigid = np.empty_like(q)
+    for k in range(len(q)):
+        rigid[k] = pin.rnea(robot.model, data, q[k], qdot[k], qddot[k])
     f = robot.friction
     return rigid + f.armature * qddot + f.viscous * qdot + f.coulomb * np.tanh(qdot / f.v_eps)
+
+
+def _tool_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (K, 3) and rotations (K, 3, 3) of the tool frame by forward kinematics."""
+    data, frame = robot.model.createData(), robot.frame_id
+    positions, rotations = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
+    for k, posture in enumerate(q):
+        pin.forwardKinematics(robot.model, data, posture)
+        placement = pin.updateFramePlacement(robot.model, data, frame)
+        positions[k], rotations[k] = placement.translation, placement.rotation
+    return positions, rotations
 
 
 def _path_error(trajectory: Trajectory, robot: Robot, t: np.ndarray, q: np.ndarray, options: VerifyOptions) -> Check:
@@ -89,14 +102,10 @@ def _path_error(trajectory: Trajectory, robot: Robot, t: np.ndarray, q: np.ndarr
     start = robot.posture(trajectory.task.start.joints, "start.joints")
     path = build_path(trajectory.task.path, task_space.value(robot.tool_placement(start)), task_space.rows)
     targets = path.sample(np.clip(trajectory.path_spline(t), 0.0, 1.0)).target
-    data = robot.model.createData()
-    errors = np.empty(len(t))
+    miss = task_space.values(*_tool_placements(robot, q)) - targets
     positions = len(task_space.axes)
-    for k, posture in enumerate(q):
-        pin.framesForwardKinematics(robot.model, data, posture)
-        miss = task_space.value(data.oMf[robot.frame_id]) - targets[k]
-        angle = np.abs(np.remainder(miss[positions:] + np.pi, 2.0 * np.pi) - np.pi)
-        errors[k] = max(np.linalg.norm(miss[:positions]), *angle, 0.0)
+    angles = np.abs(np.remainder(miss[:, positions:] + np.pi, 2.0 * np.pi) - np.pi)
+    errors = np.maximum(np.linalg.norm(miss[:, :positions], axis=1), angles.max(axis=1, initial=0.0))
     worst = int(np.argmax(errors))
     tolerance = options.path_tolerance
     return Check("path error", float(errors[worst]), tolerance, "m, rad", bool(errors[worst] <= tolerance), time=float(t[worst]))
