@@ -22,6 +22,7 @@ _GOAL = 0.5
 """Refinement aims at this part of the tolerance: the verification's grid is another one."""
 _NEAR = 0.02
 _FINE = 9
+_ZOOMS = 2
 _CLOSEST = 1e-5
 
 
@@ -110,31 +111,35 @@ def refine(problem: Transcription, x: np.ndarray, solve: Solve, options: Refinem
 def _violations(dense: Transcription, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
     """Largest excess, and the times tau at which collocation points are missing.
 
-    Around every peak of the grid that comes near a limit a finer grid looks for the true peak.
+    Around every peak of the grid that comes near a limit ever finer grids look for the true peak.
     """
     tau = dense.tau
     try:
         table = dense.excess(x)
         padded = np.pad(table, ((1, 1), (0, 0)), constant_values=-np.inf)
         peaks = (table > goal - _NEAR) & (table >= padded[:-2]) & (table > padded[2:])
-        centres = np.flatnonzero(peaks.any(axis=1))
-        if not len(centres):
-            return float(table.max()), centres.astype(float)
-        left, right = tau[np.maximum(centres - 1, 0)], tau[np.minimum(centres + 1, len(tau) - 1)]
-        fine = np.linspace(left, right, _FINE, axis=1)
-        order = np.argsort(fine.ravel(), kind="stable")
-        closer = np.empty((fine.size, table.shape[1]))
-        closer[order] = dense.excess_at(x, fine.ravel()[order])
+        centres = tau[peaks.any(axis=1)]
+        heights = table.max(axis=1)[peaks.any(axis=1)]
+        reach = tau[1] - tau[0]
+        for _ in range(_ZOOMS if len(centres) else 0):
+            centres, heights = _zoomed(dense, x, centres, reach)
+            reach *= 2.0 / (_FINE - 1)
     except UnreachableError:
         return np.inf, 0.5 * (tau[1::10] + tau[:-1:10])
-    # The worst row decides where in its stretch the new points go.
-    closer = closer.reshape(*fine.shape, -1).max(axis=2)
-    best = np.argmax(closer, axis=1)
-    missing = closer[np.arange(len(centres)), best] > goal
-    at = fine[np.arange(len(centres)), best][missing]
     step = tau[1] - tau[0]
-    around = np.clip(at[:, None] + step * np.array([-1.0, 0.0, 1.0]), 0.0, 1.0)  # the peak moves when it is held down
-    return float(closer.max()), np.unique(around)
+    around = centres[heights > goal, None] + step * np.array([-1.0, 0.0, 1.0])  # the peak moves when it is held down
+    return float(max(table.max(), heights.max(initial=-np.inf))), np.unique(np.clip(around, 0.0, 1.0))
+
+
+def _zoomed(dense: Transcription, x: np.ndarray, centres: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Look on a fine grid within `reach` of every centre: the places of the largest excess, and its size there."""
+    fine = np.clip(centres[:, None] + reach * np.linspace(-1.0, 1.0, _FINE), 0.0, 1.0)
+    order = np.argsort(fine.ravel(), kind="stable")
+    worst = np.empty(fine.size)
+    worst[order] = dense.excess_at(x, fine.ravel()[order]).max(axis=1)
+    best = np.argmax(worst.reshape(fine.shape), axis=1)
+    chosen = np.arange(len(centres)), best
+    return fine[chosen], worst.reshape(fine.shape)[chosen]
 
 
 def _merged(tau: np.ndarray, extra: np.ndarray) -> np.ndarray:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 import zipfile
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brachis.errors import InputError, ResultFileError
+from brachis.files import atomic_write
 from brachis.robot import Robot, dynamics
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import Task, load_task
@@ -189,18 +189,9 @@ class Trajectory:
             "degree": self.degree,
             "joint_names": list(self.joint_names),
         }
-        target = Path(path)
         arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
-        try:
-            handle, temporary = tempfile.mkstemp(dir=target.parent, suffix=".npz.part")
-            try:
-                with os.fdopen(handle, "wb") as stream:
-                    np.savez(stream, meta=np.array(json.dumps(meta)), **arrays)
-                Path(temporary).replace(target)
-            finally:
-                Path(temporary).unlink(missing_ok=True)
-        except OSError as error:
-            raise InputError("cannot be written", where=str(target), found=str(error.strerror)) from error
+        with atomic_write(path) as stream:
+            np.savez(stream, meta=np.array(json.dumps(meta)), **arrays)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Trajectory:

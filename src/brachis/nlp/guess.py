@@ -20,6 +20,10 @@ from brachis.nlp.transcription import Motion, Transcription
 _STEPS = 40
 _DAMPING = 1e-6
 _STRETCH = 1.1
+_CORRECTIONS = 5
+_UNFOLDING_STEPS = 20
+_UNFOLDING_STEP = 0.06
+_LARGEST_STEP = 0.2
 _LONGEST_TIME = 200.0
 
 
@@ -77,6 +81,9 @@ def guesses(problem: Transcription) -> Iterator[np.ndarray]:
 def numeric_course(decomposition: Decomposition, strategy: Strategy) -> np.ndarray | None:
     """Redundant joints along the path by numeric inverse kinematics from the start posture.
 
+    Near a branch boundary the posture is unfolded first, while the tool stays where it is: there any motion of the tool
+    would need fast joints.
+
     Parameters
     ----------
     decomposition : Decomposition
@@ -84,32 +91,58 @@ def numeric_course(decomposition: Decomposition, strategy: Strategy) -> np.ndarr
 
     Returns
     -------
-    (steps + 1, r) ndarray or None
-        At equidistant s; None where the target cannot be followed.
+    (steps, 1 + r) ndarray or None
+        Successive values of s and the redundant joints; None where the target cannot be followed.
     """
-    kinematics, n = decomposition.kinematics, decomposition.robot.n
     s = np.linspace(0.0, 1.0, _STEPS + 1)
     targets = decomposition.path.sample(s).target
-    q = decomposition.start.astype(float).copy()
-    previous = np.zeros(n)
-    course = [q[decomposition.redundant].copy()]
-    for target in targets[1:]:
-        for correction in range(4):
-            miss = target - kinematics.position(q[None])[0]
-            if correction and np.abs(miss).max() < 1e-3:  # noqa: PLR2004  (the closed form takes it from here)
-                break
-            jacobian = kinematics.jacobian(q[None])[0]
-            square = jacobian @ jacobian.T + _DAMPING * np.eye(len(miss))
-            step = jacobian.T @ np.linalg.solve(square, miss)
-            if correction == 0 and decomposition.r:
-                wish = _wish(decomposition, strategy, q, previous) / _STEPS
-                previous = wish - jacobian.T @ np.linalg.solve(square, jacobian @ wish)
-                step = step + previous
-            q = q + step
-        else:
+    q = decomposition.start.astype(float)
+    previous = np.zeros_like(q)
+    course = [np.append(0.0, q[decomposition.redundant])]
+    for _ in range(_UNFOLDING_STEPS if decomposition.r else 0):
+        if decomposition.solver.branch_margins(q[None], decomposition.branch).min(initial=1.0) > 0.5 * strategy.threshold:
+            break
+        moved = _follow(decomposition, strategy, q, previous, targets[0], unfolding=True)
+        if moved is None:
+            break
+        q, previous = moved
+        course.append(np.append(0.0, q[decomposition.redundant]))
+    for station, target in zip(s[1:], targets[1:], strict=True):
+        moved = _follow(decomposition, strategy, q, previous, target, unfolding=False)
+        if moved is None:
             return None
-        course.append(q[decomposition.redundant].copy())
+        q, previous = moved
+        course.append(np.append(station, q[decomposition.redundant]))
     return np.array(course)
+
+
+def _follow(
+    decomposition: Decomposition,
+    strategy: Strategy,
+    q: np.ndarray,
+    previous: np.ndarray,
+    target: np.ndarray,
+    *,
+    unfolding: bool,
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """One step to the next target: the new posture and the null-space motion made; None if it is not met."""
+    kinematics = decomposition.kinematics
+    for correction in range(_CORRECTIONS):
+        miss = target - kinematics.position(q[None])[0]
+        if correction and np.abs(miss).max() < 1e-3:  # noqa: PLR2004  (the closed form takes it from here)
+            return q, previous
+        jacobian = kinematics.jacobian(q[None])[0]
+        square = jacobian @ jacobian.T + _DAMPING * np.eye(len(miss))
+        step = jacobian.T @ np.linalg.solve(square, miss)
+        if correction == 0 and decomposition.r:
+            wish = _wish(decomposition, strategy, q, previous)
+            free = wish - jacobian.T @ np.linalg.solve(square, jacobian @ wish)
+            size = float(np.abs(free).max())
+            largest = _UNFOLDING_STEP if unfolding else _LARGEST_STEP
+            previous = free * (largest / max(size, 1e-9) if unfolding else min(1.0 / _STEPS, largest / max(size, 1e-9)))
+            step = step + previous
+        q = q + step
+    return None
 
 
 def _wish(decomposition: Decomposition, strategy: Strategy, q: np.ndarray, previous: np.ndarray) -> np.ndarray:
@@ -135,9 +168,9 @@ def _wish(decomposition: Decomposition, strategy: Strategy, q: np.ndarray, previ
 def _starting_point(problem: Transcription, course: np.ndarray) -> np.ndarray | None:
     """Fit splines to a course, and stretch the time until the limits hold; None where the fit is unreachable."""
     tau = problem.splines[0].greville
-    s = tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)
+    u = tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)
     grid = np.linspace(0.0, 1.0, len(course))
-    points = [s, *(np.interp(s, grid, column) for column in course.T)]
+    points = [np.interp(u, grid, column) for column in course.T]
     x = problem.variables_from(Motion(1.0, problem.knots, problem.degree, np.array(points)))
     try:
         return stretched(problem, x)

@@ -9,7 +9,8 @@ from brachis.kinematics import Decomposition, JointState
 from brachis.nlp.constraints.protocol import Partials
 
 MARGIN = 5e-3
-"""Least branch margin, dimensionless. Nearer to the boundary the non-redundant joints outrun any collocation grid."""
+"""Least branch margin, dimensionless. Nearer to the boundary the non-redundant joints outrun any collocation grid. A start posture that is nearer
+still may come half as near again."""
 
 
 class BranchMarginConstraint:
@@ -17,12 +18,13 @@ class BranchMarginConstraint:
 
     kind = "branch_margin"
 
-    def __init__(self, decomposition: Decomposition, count: int) -> None:
+    def __init__(self, decomposition: Decomposition, at_start: np.ndarray) -> None:
         self._solver = decomposition.solver
         self._branch = decomposition.branch
         label = decomposition.solver.branches[decomposition.branch]
+        count = len(at_start)
         self.labels = tuple(f"{label} {i}" for i in range(count)) if count > 1 else (label,)
-        self.lower, self.upper = np.full(count, MARGIN), np.full(count, np.inf)
+        self.lower, self.upper = np.minimum(MARGIN, 0.5 * at_start), np.full(count, np.inf)
 
     def values(self, state: JointState) -> np.ndarray:
         """See `Constraint.values`."""
@@ -35,5 +37,5 @@ class BranchMarginConstraint:
 
 def build(decomposition: Decomposition) -> BranchMarginConstraint | None:
     """Build the constraint where the closed form has margins."""
-    count = decomposition.solver.branch_margins(decomposition.start[None], decomposition.branch).shape[1]
-    return BranchMarginConstraint(decomposition, count) if count else None
+    at_start = decomposition.solver.branch_margins(decomposition.start[None], decomposition.branch)[0]
+    return BranchMarginConstraint(decomposition, at_start) if len(at_start) else None

@@ -1,0 +1,40 @@
+"""Figures of a trajectory; a plot is one file here and one line in `PLOTS`.
+
+Every function returns a Matplotlib figure of its own, made without pyplot and without touching Matplotlib's settings.
+Matplotlib is imported when the first figure is made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from brachis.plots.comparison import plot_comparison
+from brachis.plots.motion import plot_motion
+from brachis.plots.overview import plot_overview
+from brachis.plots.postures import plot_postures
+from brachis.plots.save import SUFFIXES, save_figure
+from brachis.plots.torques import plot_torques
+from brachis.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PLOTS: dict[str, Callable[[Trajectory], Figure]] = {
+    "torques": plot_torques,
+    "postures": plot_postures,
+    "motion": plot_motion,
+    "overview": plot_overview,
+}
+"""Plots of one trajectory by name; `plot_comparison` compares many."""
+
+__all__ = [
+    "PLOTS",
+    "SUFFIXES",
+    "plot_comparison",
+    "plot_motion",
+    "plot_overview",
+    "plot_postures",
+    "plot_torques",
+    "save_figure",
+]

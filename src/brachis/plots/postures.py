@@ -1,0 +1,149 @@
+"""Postures of the robot along the path."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from brachis.plots import style
+from brachis.plots.curves import dense_samples
+from brachis.plots.skeleton import drawing_plane, skeleton
+from brachis.robot import TaskSpace
+from brachis.trajectory import Samples, Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.gridspec import SubplotSpec
+
+_POSTURES = 7
+_FIRST, _LAST = np.array([0.72, 0.83, 0.91]), np.array([0.03, 0.23, 0.39])
+_PATH_COLOUR = "#D55E00"
+_REDUNDANT_COLOUR = "#E69F00"
+_GROUND = ((0.0, 0.0), (-0.7, -1.0), (0.7, -1.0))
+_WORLD = "xyz"
+
+
+def plot_postures(trajectory: Trajectory) -> Figure:
+    """Plot the robot as a stick figure at equidistant times, and the path of its tool (Fig. 1 of the paper).
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+
+    Returns
+    -------
+    Figure
+        One column wide, equal scales. A planar chain is projected onto its plane; any other is drawn in space.
+        Later postures are darker. Squares are prismatic joints, filled markers redundant ones.
+    """
+    figure = style.new_figure(style.COLUMN_WIDTH, 80.0)
+    ax = add_posture_axes(figure, trajectory)
+    draw_postures(ax, trajectory, dense_samples(trajectory))
+    legend_postures(ax, trajectory, style.COLUMN_WIDTH - 5.0)
+    return figure
+
+
+def add_posture_axes(figure: Figure | SubFigure, trajectory: Trajectory, place: SubplotSpec | None = None) -> Axes:
+    """Add axes that suit the robot: in its plane, or in space."""
+    where = () if place is None else (place,)
+    if _plane(trajectory) is not None:
+        return figure.add_subplot(*where)
+    axes: Axes = figure.add_subplot(*where, projection="3d", computed_zorder=False)
+    return axes
+
+
+def draw_postures(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
+    """Draw tool path and postures into the axes that `add_posture_axes` made."""
+    plane = _plane(trajectory)
+    view = list(plane or (0, 1, 2))
+    robot = trajectory.robot
+    tool = skeleton(robot, samples.q).tool[:, view]
+    figures = skeleton(robot, trajectory.position(np.linspace(0.0, trajectory.t_end, _POSTURES)))
+    for k, shade in enumerate(_shades()):
+        _draw_links(ax, figures.bones[k][:, view], tuple(shade), k)
+        _draw_joints(ax, trajectory, figures.joints[k][:, view], tuple(shade), k)
+    ax.plot(*tool.T, color=_PATH_COLOUR, linewidth=1.4, zorder=20.0, gid="tool path")
+    ax.plot(*tool[-1:].T, "o", color=_PATH_COLOUR, markersize=3.0, zorder=21.0)
+    ax.plot(*figures.bones[0, :1][:, view].T, marker=_GROUND, color=style.GREY, markersize=12.0, zorder=0.5)
+    style.dress(ax, f"${_WORLD[view[0]]}$ (m)", f"${_WORLD[view[1]]}$ (m)")
+    if plane is None:
+        _dress_space(ax)
+    else:
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.margins(0.06)
+
+
+def legend_postures(ax: Axes, trajectory: Trajectory, width: float) -> None:
+    """Put the legend above the axes; `width` is its room, mm."""
+    from matplotlib.lines import Line2D  # noqa: PLC0415
+
+    first, *_, last = _shades()
+    handles: list[Artist] = [
+        Line2D([], [], color=tuple(first), linewidth=2.2),
+        Line2D([], [], color=tuple(last), linewidth=2.2),
+        Line2D([], [], color=_PATH_COLOUR, linewidth=1.4),
+    ]
+    labels = ["start", "end", "tool path"]
+    if trajectory.redundant_joints:
+        marker = {"linestyle": "", "markersize": 4.5, "markeredgecolor": tuple(last)}
+        handles.append(Line2D([], [], marker="o", markerfacecolor=_REDUNDANT_COLOUR, **marker))  # type: ignore[arg-type]
+        labels.append("redundant")
+    style.legend_above(ax, width, handles, labels)
+
+
+def _plane(trajectory: Trajectory) -> tuple[int, int] | None:
+    task_space = TaskSpace.of(trajectory.robot, trajectory.task.task_space)
+    return drawing_plane(trajectory.robot, trajectory.q[0], task_space.axes)
+
+
+def _shades() -> np.ndarray:
+    """Colours (postures, 3) from the first to the last posture."""
+    return np.linspace(_FIRST, _LAST, _POSTURES)
+
+
+def _draw_links(ax: Axes, bones: np.ndarray, shade: tuple[float, ...], k: int) -> None:
+    """Draw the links of posture number `k` as one line; later postures lie on top."""
+    ax.plot(
+        *bones.T,
+        color=shade,
+        linewidth=2.2 if k in {0, _POSTURES - 1} else 1.0,
+        solid_capstyle="round",
+        solid_joinstyle="round",
+        zorder=2.0 + k,
+        gid=f"posture {k}",
+    )
+
+
+def _draw_joints(ax: Axes, trajectory: Trajectory, joints: np.ndarray, shade: tuple[float, ...], k: int) -> None:
+    """Draw the joints of posture number `k`."""
+    units = trajectory.robot.position_units
+    for name, unit, point in zip(trajectory.joint_names, units, joints, strict=True):
+        ax.plot(
+            *point[:, None],
+            linestyle="",
+            marker="s" if unit == "m" else "o",
+            markersize=4.5,
+            markeredgecolor=shade,
+            markerfacecolor=_REDUNDANT_COLOUR if name in trajectory.redundant_joints else "white",
+            zorder=2.5 + k,
+        )
+
+
+def _dress_space(ax: Any) -> None:  # noqa: ANN401  (3-D axes have methods that Axes lacks)
+    """Labels, equal scales and quiet panes of axes in space."""
+    ax.set_zlabel("$z$ (m)", fontsize=style.LABEL_SIZE, labelpad=-4.0)
+    ax.xaxis.labelpad = ax.yaxis.labelpad = -4.0
+    ax.tick_params(pad=-2.0)
+    ax.set_box_aspect([np.ptp(limits) for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())], zoom=0.95)
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
+        axis.set_major_locator(_few_ticks())
+
+
+def _few_ticks() -> Any:  # noqa: ANN401
+    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415
+
+    return MaxNLocator(4, steps=[1, 2, 5, 10])

@@ -1,0 +1,150 @@
+"""What all figures share: sizes, fonts, colours, axes and legends.
+
+Everything is set on the figure at hand; Matplotlib's own settings are left alone.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLUMN_WIDTH = 89.0
+"""One column of a journal, mm."""
+PAGE_WIDTH = 183.0
+"""Two columns, mm."""
+LABEL_SIZE = 8.0
+"""Font size of axis labels, points."""
+TICK_SIZE = 7.0
+"""Font size of all other text, points."""
+LINE_WIDTH = 1.2
+"""Of data, points."""
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Okabe and Ito's colours, told apart by colour-blind readers; their yellow is too faint on white."""
+LINE_STYLES = ("-", "--", ":")
+GREY = "#666666"
+FAINT = "#CFCFCF"
+
+_MM_PER_INCH = 25.4
+_MM_PER_CHARACTER = 1.45  # of TICK_SIZE, with some reserve
+_MM_PER_HANDLE = 9.0
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Make an empty figure of `width` times `height`, mm, that no global state knows of."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  (imports in 0.3 s, and only plots need it)
+
+    figure = Figure(figsize=(width / _MM_PER_INCH, height / _MM_PER_INCH), layout="constrained", facecolor="white")
+    figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.04)  # type: ignore[union-attr,call-arg]
+    return figure
+
+
+def joint_style(joint: int) -> dict[str, Any]:
+    """Line properties of the joint with this index; other line styles begin where the colours are used up."""
+    turn, colour = divmod(joint, len(COLOURS))
+    return {"color": COLOURS[colour], "linestyle": LINE_STYLES[turn % len(LINE_STYLES)], "linewidth": LINE_WIDTH}
+
+
+def dress(ax: Axes, xlabel: str, ylabel: str) -> None:
+    """Set labels, fonts and spines of one pair of axes."""
+    ax.set_xlabel(xlabel, fontsize=LABEL_SIZE)
+    ax.set_ylabel(ylabel, fontsize=LABEL_SIZE)
+    ax.tick_params(which="both", labelsize=TICK_SIZE, direction="in", width=0.6, colors="black")
+    ax.tick_params(which="major", length=3.0)
+    for spine in ax.spines.values():
+        spine.set_linewidth(0.6)
+
+
+def dress_time(ax: Axes, t_end: float, knots: np.ndarray) -> None:
+    """Let the time axis run from start to end, with the knots (s) as faint ticks inside the lower edge."""
+    ax.set_xlim(0.0, t_end)
+    ax.set_xticks(knots[(knots > 0.0) & (knots < t_end)], minor=True)
+    ax.tick_params(axis="x", which="minor", length=2.0, color="#A0A0A0", width=0.5)
+
+
+def mark_end(ax: Axes, t_end: float) -> None:
+    """Write the end time beside the right edge, where no data are."""
+    ax.text(
+        1.02,
+        0.5,
+        rf"$t_\mathrm{{E}} = {t_end:.3f}$ s",
+        transform=ax.transAxes,
+        rotation=90.0,
+        fontsize=TICK_SIZE,
+        verticalalignment="center",
+    )
+
+
+def legend_above(
+    ax: Axes, width: float, handles: Sequence[Artist] | None = None, labels: Sequence[str] | None = None
+) -> None:
+    """Put a legend above the axes, in as many columns as fit.
+
+    Parameters
+    ----------
+    ax : Axes
+    width : float
+        Room, mm.
+    handles, labels : sequences, optional
+        What the legend shows; the labelled artists of the axes if left out.
+    """
+    if handles is None or labels is None:
+        handles, labels = ax.get_legend_handles_labels()
+    if not labels:
+        return
+    ax.legend(
+        handles,
+        labels,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=_columns_that_fit(labels, width),
+        fontsize=TICK_SIZE,
+        frameon=False,
+        handlelength=1.6,
+        columnspacing=1.2,
+        borderaxespad=0.2,
+        borderpad=0.2,
+    )
+
+
+def legend_below(figure: Figure, width: float, handles: Sequence[Artist], labels: Sequence[str]) -> None:
+    """Put one legend for all axes at the foot of the figure, in as many columns as fit `width`, mm."""
+    figure.legend(
+        handles,
+        labels,
+        loc="outside lower center",
+        ncols=_columns_that_fit(labels, width),
+        fontsize=TICK_SIZE,
+        frameon=False,
+        handlelength=1.6,
+        columnspacing=1.2,
+    )
+
+
+def _columns_that_fit(labels: Sequence[str], width: float) -> int:
+    """Return the largest number of legend columns within `width`, mm; Matplotlib fills column by column."""
+    for columns in range(len(labels), 1, -1):
+        rows, longer = divmod(len(labels), columns)
+        starts = [column * rows + min(column, longer) for column in range(columns + 1)]
+        longest = [max(map(len, labels[begin:end])) for begin, end in itertools.pairwise(starts)]
+        if columns * _MM_PER_HANDLE + sum(longest) * _MM_PER_CHARACTER <= width:
+            return columns
+    return 1
+
+
+def plain(name: str) -> str:
+    """Keep Matplotlib from reading a joint's name as mathematics."""
+    return name.replace("$", r"\$")
+
+
+def unit_of(units: Sequence[str], per_time: str = "") -> str:
+    """Join the units that occur: ``rad``, ``m`` or ``rad, m``, with ``/s`` and the like after each."""
+    return ", ".join(f"{unit}{per_time}" for unit in ("rad", "m", "Nm", "N") if unit in units)
