@@ -21,6 +21,7 @@ _LARGEST_STRETCH = 0.01
 _GOAL = 0.5
 """Refinement aims at this part of the tolerance: the verification's grid is another one."""
 _NEAR = 0.02
+_COARSE = 20.0
 _FINE = 9
 _ZOOMS = 2
 _CLOSEST = 1e-5
@@ -114,21 +115,37 @@ def _violations(dense: Transcription, x: np.ndarray, goal: float) -> tuple[float
     Around every peak of the grid that comes near a limit ever finer grids look for the true peak.
     """
     tau = dense.tau
+    reach = tau[1] - tau[0]
     try:
         table = dense.excess(x)
-        padded = np.pad(table, ((1, 1), (0, 0)), constant_values=-np.inf)
-        peaks = (table > goal - _NEAR) & (table >= padded[:-2]) & (table > padded[2:])
-        centres = tau[peaks.any(axis=1)]
-        heights = table.max(axis=1)[peaks.any(axis=1)]
-        reach = tau[1] - tau[0]
+        centres = _suspects(tau, table, dense.knots, goal - _NEAR)
+        heights = table.max(axis=1)[np.searchsorted(tau, centres - 1e-9).clip(max=len(tau) - 1)]
+        if table.max() > _COARSE * goal:  # the grid's own peaks will do until they are nearly held down
+            return float(table.max()), _around(centres[heights > goal], reach)
         for _ in range(_ZOOMS if len(centres) else 0):
             centres, heights = _zoomed(dense, x, centres, reach)
             reach *= 2.0 / (_FINE - 1)
     except UnreachableError:
         return np.inf, 0.5 * (tau[1::10] + tau[:-1:10])
-    step = tau[1] - tau[0]
-    around = centres[heights > goal, None] + step * np.array([-1.0, 0.0, 1.0])  # the peak moves when it is held down
-    return float(max(table.max(), heights.max(initial=-np.inf))), np.unique(np.clip(around, 0.0, 1.0))
+    return float(max(table.max(), heights.max(initial=-np.inf))), _around(centres[heights > goal], tau[1] - tau[0])
+
+
+def _around(centres: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Times at and beside the centres: a peak moves when it is held down."""
+    return np.unique(np.clip(centres[:, None] + step * np.array([-1.0, 0.0, 1.0]), 0.0, 1.0))
+
+
+def _suspects(tau: np.ndarray, table: np.ndarray, knots: np.ndarray, near: float) -> np.ndarray:
+    """Times around which an excess may hide: the grid's peaks near a limit, and both sides of knots near one.
+
+    The motion's higher derivatives jump at knots, so that a peak beside a knot need not show on the grid.
+    """
+    padded = np.pad(table, ((1, 1), (0, 0)), constant_values=-np.inf)
+    peaks = (table > near) & (table >= padded[:-2]) & (table > padded[2:])
+    at_knots = np.searchsorted(tau, np.unique(knots) - 1e-9)
+    close = tau[at_knots[(table[at_knots] > near).any(axis=1)]]
+    half = 0.5 * (tau[1] - tau[0])
+    return np.unique(np.clip(np.concatenate([tau[peaks.any(axis=1)], close - half, close + half]), 0.0, 1.0))
 
 
 def _zoomed(dense: Transcription, x: np.ndarray, centres: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from brachis.errors import InputError, UrdfError
 from brachis.robot.friction import Friction
-from brachis.robot.limits import Limits, LimitSpec, per_joint_values, resolve_limits
+from brachis.robot.limits import Limits, LimitSpec, UrdfLimit, per_joint_values, resolve_limits
 from brachis.robot.urdf import read_chain, read_file
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
@@ -31,6 +31,8 @@ class Robot:
         Link names of the URDF.
     limits : Limits
         Limits of the n joints.
+    stated_limits : tuple of UrdfLimit
+        Limits as the URDF states them.
     friction : Friction
         Torque terms beside the rigid-body model's.
     source : str
@@ -44,6 +46,7 @@ class Robot:
     tool_frame: str
     base_frame: str
     limits: Limits
+    stated_limits: tuple[UrdfLimit, ...]
     friction: Friction
     source: str
     urdf: str
@@ -110,6 +113,7 @@ class Robot:
             tool_frame=chain.tool_frame,
             base_frame=chain.base_frame,
             limits=resolve_limits(limits or LimitSpec(), names, chain.limits),
+            stated_limits=chain.limits,
             friction=Friction.of(names, **dict(friction or {})),  # type: ignore[arg-type]
             source=str(path),
             urdf=text,

@@ -1,0 +1,5 @@
+"""``python -m brachis``."""
+
+from brachis.cli.main import main
+
+main()

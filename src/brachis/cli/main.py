@@ -1,0 +1,129 @@
+"""The command line: ``brachis plan | verify | export | plot | inspect | schema``.
+
+Exit codes: 0 planned and verified, 1 no verified plan, 2 wrong input. Results go to standard output, everything else to
+standard error.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from brachis.cli.output import print_error
+from brachis.errors import BrachisError
+
+app = typer.Typer(
+    name="brachis",
+    help="Plan minimum-time motions of redundant robots along prescribed paths.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+TaskFile = Annotated[Path, typer.Argument(help="Task file (YAML).", metavar="TASK")]
+ResultFile = Annotated[Path, typer.Argument(help="Result file (npz) written by 'brachis plan --out'.", metavar="RESULT")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+
+
+@app.command()
+def plan(
+    task: TaskFile,
+    out: Annotated[Path | None, typer.Option(help="Folder for result.npz, result.json and overview.png.")] = None,
+    urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
+    json: Json = False,
+) -> None:
+    """Plan a task, verify the motion, and show what came out."""
+    from brachis.cli import planning  # noqa: PLC0415  (each command imports what it needs)
+
+    raise typer.Exit(planning.plan_command(task, urdf=urdf, out=out, as_json=json))
+
+
+@app.command()
+def verify(
+    result: ResultFile,
+    urdf: Annotated[Path | None, typer.Option(help="Check against this URDF instead of the saved one.")] = None,
+    json: Json = False,
+) -> None:
+    """Check a saved motion again: path, limits, start and end, continuity."""
+    from brachis.cli import results  # noqa: PLC0415
+
+    raise typer.Exit(results.verify_command(result, urdf=urdf, as_json=json))
+
+
+@app.command()
+def export(
+    result: ResultFile,
+    csv: Annotated[Path, typer.Option(help="CSV file to write: t, then q_, qd_, qdd_, tau_ of every joint; SI units.")],
+    dt: Annotated[float, typer.Option(help="Period of the controller, s.")] = 0.001,
+) -> None:
+    """Sample a saved motion at a controller's rate."""
+    from brachis.cli import results  # noqa: PLC0415
+
+    results.export_command(result, csv=csv, dt=dt)
+
+
+@app.command()
+def plot(
+    result: ResultFile,
+    out: Annotated[Path, typer.Option(help="Figure to write: png, pdf or svg.")],
+    kind: Annotated[str, typer.Option(help="Which figure: torques, postures, motion or overview.")] = "overview",
+) -> None:
+    """Draw a saved motion."""
+    from brachis.cli import results  # noqa: PLC0415
+
+    results.plot_command(result, out=out, kind=kind)
+
+
+@app.command()
+def inspect(
+    urdf: Annotated[Path, typer.Argument(help="URDF file.", metavar="URDF")],
+    task_space: Annotated[str, typer.Option(help="Rows that the path prescribes, for example x,y or x,z,yaw.")] = "x,y",
+    tool_frame: Annotated[str | None, typer.Option(help="Link at the chain's end.")] = None,
+    base_frame: Annotated[str | None, typer.Option(help="Link at the chain's beginning.")] = None,
+    lock: Annotated[list[str] | None, typer.Option(help="Joint held at a position: name=value, repeatable.")] = None,
+    json: Json = False,
+) -> None:
+    """List a robot's joints, and which choices of redundant joints have a closed form."""
+    from brachis.cli import inspection  # noqa: PLC0415
+
+    inspection.inspect_command(
+        urdf, task_space=task_space, tool_frame=tool_frame, base_frame=base_frame, lock=lock or [], as_json=json
+    )
+
+
+@app.command()
+def schema(
+    out: Annotated[Path | None, typer.Option(help="File to write instead of standard output.")] = None,
+) -> None:
+    """Print the JSON schema of task files, for editors."""
+    from brachis.cli import results  # noqa: PLC0415
+
+    results.schema_command(out)
+
+
+def main() -> None:
+    """Run the command line; no exception leaves it as a traceback."""
+    try:
+        app()
+    except BrachisError as error:
+        print_error(str(error))
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        print_error("interrupted")
+        sys.exit(130)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except Exception as error:
+        if os.environ.get("BRACHIS_DEBUG"):
+            raise
+        print_error(
+            f"internal error: {type(error).__name__}: {error}. This is a fault of brachis; "
+            "run again with BRACHIS_DEBUG=1 for the traceback and report it"
+        )
+        sys.exit(1)

@@ -1,0 +1,70 @@
+"""How the command line speaks: results on standard output, the rest on standard error."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.table import Table
+
+from brachis.verify import Verification
+
+
+def print_error(message: str) -> None:
+    """One message on standard error."""
+    Console(stderr=True, soft_wrap=True, highlight=False, markup=False).print(f"brachis: {message}")
+
+
+def print_json(data: Mapping[str, object]) -> None:
+    """One JSON object on standard output; numbers that JSON does not know become null."""
+    sys.stdout.write(json.dumps(_plain(data), indent=2) + "\n")
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def result_console() -> Console:
+    """Console for results."""
+    return Console(highlight=False, markup=False, soft_wrap=not sys.stdout.isatty())
+
+
+@contextmanager
+def progress() -> Iterator[object]:
+    """A listener that shows what the planner does on a terminal, and nothing in a pipe."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda _text: None
+        return
+    with console.status("reading the task") as status:
+        yield lambda text: status.update(text, spinner=None)
+
+
+def verification_table(verification: Verification) -> Table:
+    """The checks, one a row."""
+    title = "verification: passed" if verification.passed else "verification: FAILED"
+    table = Table(title=f"{title} ({verification.points} times checked)", title_justify="left")
+    for column in ("check", "worst", "allowed", "unit", "joint", "time [s]", ""):
+        table.add_column(column, justify="right" if column in ("worst", "allowed", "time [s]") else "left")
+    for check in verification.checks:
+        ratio = check.unit == "-" and check.allowed > 1.0
+        table.add_row(
+            check.name,
+            f"{check.value:.6f}" if ratio else f"{check.value:.1e}",
+            f"{check.allowed:.6g}",
+            check.unit,
+            check.joint or "",
+            "" if check.time is None else f"{check.time:.4f}",
+            "ok" if check.passed else "FAILED",
+        )
+    return table

@@ -1,0 +1,58 @@
+"""``brachis verify | export | plot | schema``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from brachis.cli.output import print_json, result_console, verification_table
+from brachis.errors import UnknownNameError
+from brachis.files import atomic_write
+from brachis.robot.from_task import robot_from_settings
+from brachis.task import json_schema
+from brachis.trajectory import Trajectory
+from brachis.verify import VerifyOptions
+from brachis.verify import verify as verify_trajectory
+
+
+def verify_command(result: Path, *, urdf: Path | None, as_json: bool) -> int:
+    """Verify a saved motion; returns the exit code."""
+    trajectory = Trajectory.load(result)
+    robot = None if urdf is None else robot_from_settings(trajectory.task.robot, urdf=urdf)
+    options = VerifyOptions(ratio_tolerance=trajectory.task.refinement.tolerance)
+    verification = verify_trajectory(trajectory, options, robot=robot)
+    if as_json:
+        print_json(verification.to_dict())
+    else:
+        result_console().print(verification_table(verification))
+    return 0 if verification.passed else 1
+
+
+def export_command(result: Path, *, csv: Path, dt: float) -> None:
+    """Write a saved motion as CSV."""
+    from brachis.export import export_csv  # noqa: PLC0415
+
+    export_csv(Trajectory.load(result), csv, dt)
+    result_console().print(f"wrote {csv}")
+
+
+def plot_command(result: Path, *, out: Path, kind: str) -> None:
+    """Draw a saved motion."""
+    from brachis.plots import PLOTS, save_figure  # noqa: PLC0415
+
+    if kind not in PLOTS:
+        raise UnknownNameError("figure", kind, PLOTS, where="--kind")
+    save_figure(PLOTS[kind](Trajectory.load(result)), out)
+    result_console().print(f"wrote {out}")
+
+
+def schema_command(out: Path | None) -> None:
+    """Print or write the JSON schema of task files."""
+    text = json.dumps(json_schema(), indent=2) + "\n"
+    if out is None:
+        sys.stdout.write(text)
+        return
+    with atomic_write(out) as stream:
+        stream.write(text.encode())
+    result_console().print(f"wrote {out}")
