@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from brachis.errors import BrachisError as BrachisError
     from brachis.errors import InputError as InputError
     from brachis.errors import PlanningError as PlanningError
-    from brachis.planner import Result as Result
     from brachis.planner import plan as plan
     from brachis.planner import transcribe as transcribe
+    from brachis.result import Result as Result
     from brachis.robot import LimitSpec as LimitSpec
     from brachis.robot import Robot as Robot
     from brachis.robot import TaskSpace as TaskSpace
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from brachis.task import load_task as load_task
     from brachis.trajectory import Trajectory as Trajectory
     from brachis.verify import Verification as Verification
-    from brachis.verify import verify as verify
+    from brachis.verify import verify_trajectory as verify_trajectory
 
 __version__ = "0.1.0"
 
@@ -31,7 +31,7 @@ _HOME = {
     "InputError": "brachis.errors",
     "LimitSpec": "brachis.robot",
     "PlanningError": "brachis.errors",
-    "Result": "brachis.planner",
+    "Result": "brachis.result",
     "Robot": "brachis.robot",
     "Task": "brachis.task",
     "TaskSpace": "brachis.robot",
@@ -40,10 +40,26 @@ _HOME = {
     "load_task": "brachis.task",
     "plan": "brachis.planner",
     "transcribe": "brachis.planner",
-    "verify": "brachis.verify",
+    "verify_trajectory": "brachis.verify",
 }
 
-__all__ = sorted([*_HOME, "__version__"])
+__all__ = [
+    "BrachisError",
+    "InputError",
+    "LimitSpec",
+    "PlanningError",
+    "Result",
+    "Robot",
+    "Task",
+    "TaskSpace",
+    "Trajectory",
+    "Verification",
+    "__version__",
+    "load_task",
+    "plan",
+    "transcribe",
+    "verify_trajectory",
+]
 
 
 def __getattr__(name: str) -> object:

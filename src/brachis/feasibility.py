@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.errors import BrachisError, PathError, StartError, UnknownNameError
-from brachis.ik import Candidate
+from brachis.ik import Match
 from brachis.kinematics import Decomposition
 from brachis.path import Path
 from brachis.robot import Robot, TaskSpace, dynamics
@@ -45,7 +45,9 @@ def check_start(robot: Robot, start: np.ndarray, end: np.ndarray | None, path: P
 
 def _check_range(robot: Robot, posture: np.ndarray, name: str) -> None:
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
-    for joint, value, low, high, unit in zip(robot.joint_names, posture, lower, upper, robot.position_units, strict=True):
+    for joint, value, low, high, unit in zip(
+        robot.joint_names, posture, lower, upper, robot.position_units, strict=True
+    ):
         if not low - _RANGE_SLACK <= value <= high + _RANGE_SLACK:
             raise StartError(
                 f"joint {joint!r} is out of its range",
@@ -59,7 +61,9 @@ def _check_range(robot: Robot, posture: np.ndarray, name: str) -> None:
 def _check_holding(robot: Robot, posture: np.ndarray, name: str) -> None:
     still = np.zeros((1, robot.n))
     tau = dynamics.torque(robot, posture[None], still, still)[0]
-    for joint, value, limit, unit in zip(robot.joint_names, tau, robot.limits.torque, robot.position_units, strict=True):
+    for joint, value, limit, unit in zip(
+        robot.joint_names, tau, robot.limits.torque, robot.position_units, strict=True
+    ):
         if abs(value) > limit:
             nm = "Nm" if unit == "rad" else "N"
             raise StartError(
@@ -71,9 +75,7 @@ def _check_holding(robot: Robot, posture: np.ndarray, name: str) -> None:
             )
 
 
-def start_branch(
-    robot: Robot, task_space: TaskSpace, candidate: Candidate, start: np.ndarray, wanted: str | None
-) -> int:
+def start_branch(robot: Robot, task_space: TaskSpace, candidate: Match, start: np.ndarray, wanted: str | None) -> int:
     """Index of the closed form's branch on which the start posture lies.
 
     Raises
@@ -84,7 +86,6 @@ def start_branch(
         There is no branch of the wanted name.
     """
     solver = candidate.solver
-    assert solver is not None  # noqa: S101  (find() raises otherwise; for the type checker)
     if wanted is not None and wanted not in solver.branches:
         raise UnknownNameError("branch", wanted, solver.branches, where="branch")
     redundant = [robot.joint_names.index(name) for name in candidate.redundant_joints]
@@ -173,8 +174,8 @@ def _postures_along(decomposition: Decomposition, s: np.ndarray) -> np.ndarray:
     postures[..., rest] = answers.reshape(len(s), tries, branches, -1)
     middle = 0.5 * (low + high)
     lifted = np.where(turning, postures - 2.0 * np.pi * np.round((postures - middle) / (2.0 * np.pi)), postures)
-    inside = ((lifted >= lower - _RANGE_SLACK) & (lifted <= upper + _RANGE_SLACK)).all(axis=-1)
-    return np.where(inside[..., None], lifted, np.nan)
+    inside = np.all((lifted >= lower - _RANGE_SLACK) & (lifted <= upper + _RANGE_SLACK), axis=-1, keepdims=True)
+    return np.where(inside, lifted, np.nan)
 
 
 def _held(decomposition: Decomposition, postures: np.ndarray, reached: np.ndarray) -> np.ndarray:
@@ -184,5 +185,6 @@ def _held(decomposition: Decomposition, postures: np.ndarray, reached: np.ndarra
     for station, (choices, exist) in enumerate(zip(postures, reached, strict=True)):
         q = choices[exist][:60]
         still = np.zeros_like(q)
-        held[station] = bool((np.abs(dynamics.torque(robot, q, still, still)) <= robot.limits.torque).all(axis=1).any())
+        tau = np.abs(dynamics.torque(robot, q, still, still))
+        held[station] = bool(np.any(np.all(tau <= robot.limits.torque, axis=1)))
     return held

@@ -4,126 +4,24 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from brachis import ik
-from brachis.errors import BrachisError, PlanningError, UnreachableError
-from brachis.feasibility import check_start, explain_failure, start_branch
+from brachis.attempts import Listener, search
+from brachis.errors import PlanningError, UnreachableError
+from brachis.feasibility import check_start, start_branch
 from brachis.kinematics import Decomposition, interpolate
 from brachis.nlp import Transcription
-from brachis.nlp.guess import guesses
 from brachis.path import build_path
-from brachis.refine import Refined, RefinementOptions, refine
+from brachis.refine import Refined
+from brachis.result import Result
 from brachis.robot import Robot, TaskSpace
 from brachis.robot.from_task import robot_from_settings
-from brachis.solvers import Solver, SolverOptions, SolverReport, solver_named
 from brachis.task import Task, load_task
 from brachis.trajectory import Trajectory
-from brachis.verify import Verification, VerifyOptions, verify
-
-Listener = Callable[[str], None]
-"""Told in plain words what the planner is doing, between iterations; may raise KeyboardInterrupt."""
-
-_PATIENCE = 100
-"""Iterations that ``auto`` grants a solver on one guess: an active-set method that needs more is grinding."""
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """One initial guess with one solver.
-
-    Attributes
-    ----------
-    solver : str
-    guess : int
-        Number of the initial guess.
-    reports : tuple of SolverReport
-        Of the first solve and every refinement round.
-    excess : float
-        Largest excess over a limit on the dense grid, as a fraction.
-    stretched : float
-        Factor by which the end time was lengthened at the very end.
-    collocation_points : int
-    outcome : str
-        In plain words.
-    """
-
-    solver: str
-    guess: int
-    reports: tuple[SolverReport, ...]
-    excess: float
-    stretched: float
-    collocation_points: int
-    outcome: str
-
-
-@dataclass(frozen=True)
-class Result:
-    """What a plan gives: trajectory, verification, and how they came about.
-
-    Attributes
-    ----------
-    task : Task
-        All that was asked, defaults spelled out; ``plan(result.task)`` repeats the plan.
-    trajectory : Trajectory
-    verification : Verification
-    family : str
-        Family of the closed form.
-    attempts : tuple of Attempt
-        The last one gave the trajectory.
-    timing : dict of str to float
-        Wall time of every stage, s.
-    """
-
-    task: Task
-    trajectory: Trajectory
-    verification: Verification
-    family: str
-    attempts: tuple[Attempt, ...]
-    timing: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def t_end(self) -> float:
-        """End time, s."""
-        return self.trajectory.t_end
-
-    @property
-    def verified(self) -> bool:
-        """True where every check of the verification passed."""
-        return self.verification.passed
-
-    @property
-    def report(self) -> SolverReport:
-        """The last solve's report."""
-        return self.attempts[-1].reports[-1]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the figures of the plan as plain data for JSON."""
-        last = self.attempts[-1]
-        return {
-            "t_end": self.t_end,
-            "redundant_joints": list(self.trajectory.redundant_joints),
-            "branch": self.trajectory.branch,
-            "family": self.family,
-            "status": self.report.status.name.lower(),
-            "advice": self.report.status.value,
-            "solver": self.report.solver,
-            "iterations": sum(report.iterations for report in last.reports),
-            "refinement_rounds": len(last.reports) - 1,
-            "collocation_points": last.collocation_points,
-            "stretched": last.stretched,
-            "attempts": [attempt.outcome for attempt in self.attempts],
-            "wall_time_s": self.timing["total"],
-            "timing_s": self.timing,
-            "verified": self.verified,
-            "worst_ratio": self.verification.worst_ratio,
-            "path_error": self.verification.path_error,
-            "joint_names": list(self.trajectory.joint_names),
-        }
+from brachis.verify import VerifyOptions, verify_trajectory
 
 
 def plan(
@@ -171,11 +69,11 @@ def plan(
     clock.stage("load")
     problem, family = transcribe(robot, task, families=families)
     clock.stage("transcribe")
-    attempts, refined = _search(problem, task, listener or (lambda _text: None))
+    attempts, refined = search(problem, task, listener or (lambda _text: None))
     clock.stage("solve")
     trajectory = _trajectory(problem.decomposition, refined, task)
     clock.stage("trajectory")
-    verification = verify(trajectory, VerifyOptions(ratio_tolerance=task.refinement.tolerance))
+    verification = verify_trajectory(trajectory, VerifyOptions(ratio_tolerance=task.refinement.tolerance))
     clock.stage("verify")
     return Result(task, trajectory, verification, family, attempts, clock.total())
 
@@ -220,67 +118,6 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
         end=end,
     )
     return problem, str(candidate.family)
-
-
-def _search(problem: Transcription, task: Task, listener: Listener) -> tuple[tuple[Attempt, ...], Refined]:
-    """Try guesses and solvers until one gives a motion within the limits everywhere."""
-    settings = task.refinement
-    options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds)
-    attempts: list[Attempt] = []
-    best: Refined | None = None
-    for number, (x, solver) in enumerate(_pairs(problem, task)):
-        refined = refine(problem, x, _solve_with(solver, task, listener), options)
-        attempts.append(_attempt(refined, number, settings.tolerance))
-        listener(attempts[-1].outcome)
-        if refined.converged and refined.excess <= settings.tolerance:
-            return tuple(attempts), refined
-        if refined.converged and (best is None or refined.excess < best.excess):
-            best = refined
-    if best is not None and np.isfinite(best.excess):
-        return tuple(attempts), best
-    reason = explain_failure(problem.decomposition)
-    if isinstance(reason, BrachisError):
-        raise reason
-    outcomes = "; ".join(attempt.outcome for attempt in attempts) or "no reachable initial guess"
-    raise PlanningError(f"no motion within the limits was found: {outcomes}", hint=reason)
-
-
-def _pairs(problem: Transcription, task: Task) -> Iterator[tuple[np.ndarray, Solver]]:
-    """Guesses and solvers in the order of trying: all guesses with the first solver, then the next solver."""
-    backends = solver_named(task.solver.name)
-    known: list[np.ndarray] = []
-    for x in guesses(problem):
-        known.append(x)
-        yield x, backends[0]
-    for solver in backends[1:]:
-        for x in known[:2]:
-            yield x, solver
-
-
-def _solve_with(solver: Solver, task: Task, listener: Listener) -> Callable[[Transcription, np.ndarray], SolverReport]:
-    """A function that runs one backend under the task's bounds."""
-    settings = task.solver
-    patience = min(settings.max_iterations, _PATIENCE) if settings.name == "auto" else settings.max_iterations
-    options = SolverOptions(settings.tolerance, patience, settings.time_limit)
-
-    def progress(iteration: int, objective: float) -> None:
-        listener(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s")
-
-    return lambda problem, x: solver.solve(problem, x, options, progress)
-
-
-def _attempt(refined: Refined, number: int, tolerance: float) -> Attempt:
-    """Put the outcome of an attempt into words."""
-    last = refined.reports[-1]
-    rounds = len(refined.reports) - 1
-    if not last.status.usable:
-        outcome = f"{last.solver}: {last.status.value}" + (f" (refinement round {rounds})" if rounds else "")
-    else:
-        inside = "limits hold" if refined.excess <= tolerance else f"limits exceeded by {100.0 * refined.excess:.2g} %"
-        outcome = f"{last.solver}: t_E = {refined.x[0]:.4f} s after {rounds} refinement rounds, {inside}"
-    return Attempt(
-        last.solver, number, refined.reports, refined.excess, refined.stretched, len(refined.problem.tau), outcome
-    )
 
 
 def _trajectory(decomposition: Decomposition, refined: Refined, task: Task) -> Trajectory:

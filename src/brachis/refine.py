@@ -131,12 +131,12 @@ def _violations(dense: Transcription, x: np.ndarray, goal: float) -> tuple[float
 
 
 def _around(centres: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Times at and beside the centres: a peak moves when it is held down."""
+    """List times at and beside the centres: a peak moves when it is held down."""
     return np.unique(np.clip(centres[:, None] + step * np.array([-1.0, 0.0, 1.0]), 0.0, 1.0))
 
 
 def _suspects(tau: np.ndarray, table: np.ndarray, knots: np.ndarray, near: float) -> np.ndarray:
-    """Times around which an excess may hide: the grid's peaks near a limit, and both sides of knots near one.
+    """List times around which an excess may hide: the grid's peaks near a limit, and both sides of knots near one.
 
     The motion's higher derivatives jump at knots, so that a peak beside a knot need not show on the grid.
     """

@@ -166,7 +166,9 @@ class Trajectory:
             `dt` is not positive, or so small that there would be more than ten million samples.
         """
         if not (np.isfinite(dt) and dt > 0.0 and self.t_end / dt < 1e7):  # noqa: PLR2004
-            raise InputError("is not a usable period", where="dt", found=f"{dt} s", allowed="> 0 s, at most 1e7 samples")
+            raise InputError(
+                "is not a usable period", where="dt", found=f"{dt} s", allowed="> 0 s, at most 1e7 samples"
+            )
         whole = int(np.ceil(self.t_end / dt * (1.0 - 1e-12)))
         return self.at(np.append(np.arange(whole) * dt, self.t_end))
 
@@ -258,7 +260,10 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
             arrays = {name: archive[name] for name in _ARRAYS}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise ResultFileError(
-            "the file is not a brachis result", where=str(path), found=str(error), allowed="a file written by brachis plan"
+            "the file is not a brachis result",
+            where=str(path),
+            found=str(error),
+            allowed="a file written by brachis plan",
         ) from error
     if meta.get("schema") != SCHEMA:
         raise ResultFileError("unknown schema version", where=str(path), found=meta.get("schema"), allowed=SCHEMA)

@@ -11,7 +11,7 @@ from brachis import ik
 from brachis.cli.output import print_json, result_console
 from brachis.errors import InputError
 from brachis.robot import LimitSpec, Robot, TaskSpace
-from brachis.robot.urdf import UrdfLimit
+from brachis.robot.limits import UrdfLimit
 
 
 def inspect_command(

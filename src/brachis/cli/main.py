@@ -26,7 +26,9 @@ app = typer.Typer(
 )
 
 TaskFile = Annotated[Path, typer.Argument(help="Task file (YAML).", metavar="TASK")]
-ResultFile = Annotated[Path, typer.Argument(help="Result file (npz) written by 'brachis plan --out'.", metavar="RESULT")]
+ResultFile = Annotated[
+    Path, typer.Argument(help="Result file (npz) written by 'brachis plan --out'.", metavar="RESULT")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 
 
@@ -113,9 +115,6 @@ def main() -> None:
     except BrachisError as error:
         print_error(str(error))
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        print_error("interrupted")
-        sys.exit(130)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 from rich.console import Console
@@ -40,8 +40,8 @@ def result_console() -> Console:
 
 
 @contextmanager
-def progress() -> Iterator[object]:
-    """A listener that shows what the planner does on a terminal, and nothing in a pipe."""
+def progress() -> Iterator[Callable[[str], None]]:
+    """Give a listener that shows what the planner does on a terminal, and nothing in a pipe."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield lambda _text: None
@@ -51,7 +51,7 @@ def progress() -> Iterator[object]:
 
 
 def verification_table(verification: Verification) -> Table:
-    """The checks, one a row."""
+    """Lay out the checks, one a row."""
     title = "verification: passed" if verification.passed else "verification: FAILED"
     table = Table(title=f"{title} ({verification.points} times checked)", title_justify="left")
     for column in ("check", "worst", "allowed", "unit", "joint", "time [s]", ""):

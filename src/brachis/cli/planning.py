@@ -9,17 +9,26 @@ from rich.table import Table
 
 from brachis import planner
 from brachis.cli.output import print_error, print_json, progress, result_console, verification_table
-from brachis.errors import InputError
+from brachis.errors import BrachisError, InputError
 from brachis.files import atomic_write
-from brachis.planner import Result
+from brachis.result import Result
+
+
+class InterruptedByUserError(BrachisError):
+    """The user pressed Ctrl-C."""
+
+    exit_code = 130
 
 
 def plan_command(task: Path, *, urdf: Path | None, out: Path | None, as_json: bool) -> int:
     """Plan, show, write; returns the exit code."""
     if out is not None:
         _make_folder(out)
-    with progress() as listener:
-        result = planner.plan(urdf, task, listener=listener)  # type: ignore[arg-type]
+    try:
+        with progress() as listener:
+            result = planner.plan(urdf, task, listener=listener)
+    except KeyboardInterrupt as interrupt:
+        raise InterruptedByUserError("interrupted; nothing was written") from interrupt
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
     if out is not None:
         data["files"] = _write(result, data, out)

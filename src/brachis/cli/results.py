@@ -12,8 +12,7 @@ from brachis.files import atomic_write
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import json_schema
 from brachis.trajectory import Trajectory
-from brachis.verify import VerifyOptions
-from brachis.verify import verify as verify_trajectory
+from brachis.verify import VerifyOptions, verify_trajectory
 
 
 def verify_command(result: Path, *, urdf: Path | None, as_json: bool) -> int:

@@ -2,7 +2,7 @@
 
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError, ik_family, margin_gradient
-from brachis.ik.registry import BUILTIN, Candidate, check_answers, find, find_all
+from brachis.ik.registry import BUILTIN, Candidate, Match, check_answers, find, find_all
 
 __all__ = [
     "BUILTIN",
@@ -10,6 +10,7 @@ __all__ = [
     "ChainGeometry",
     "Family",
     "IKSolver",
+    "Match",
     "NotApplicableError",
     "check_answers",
     "find",

@@ -175,7 +175,9 @@ class PlanarSolver:
         angles = np.zeros((len(targets), 2))
         others = [i for i in range(self._n) if i != last and chain.revolute[i]]
         for i in others:
-            angles = angles + chain.sigma[i] * (pair[:, :, self._pair.index(i)] if i in self._pair else known[:, i, None])
+            angles = angles + chain.sigma[i] * (
+                pair[:, :, self._pair.index(i)] if i in self._pair else known[:, i, None]
+            )
         final = chain.sigma[last] * _wrap(turned[:, None] - angles)
         order = [(*self._pair, last).index(i) for i in self._rest]
         return np.concatenate([pair, final[:, :, None]], axis=2)[:, :, order]

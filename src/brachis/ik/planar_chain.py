@@ -101,7 +101,7 @@ class PlanarChain:
         return alpha, beta
 
     def jacobian_determinant(self, q: np.ndarray, columns: list[int], rows: int) -> np.ndarray:
-        """Determinant of the task Jacobian's columns of some joints, up to a constant factor.
+        """Compute the determinant of the task Jacobian's columns of some joints, up to a constant factor.
 
         Parameters
         ----------
@@ -149,7 +149,7 @@ class PlanarChain:
 
 
 def _determinant(matrix: np.ndarray) -> np.ndarray:
-    """Determinants (K,) of matrices (K, m, m), m <= 3; written out, three times faster than LAPACK's batch."""
+    """Compute determinants (K,) of matrices (K, m, m), m <= 3; written out, faster than LAPACK's batch."""
     if matrix.shape[1] == 1:
         return matrix[:, 0, 0]
     if matrix.shape[1] == 2:  # noqa: PLR2004
@@ -167,7 +167,9 @@ def _normal(geometry: ChainGeometry) -> np.ndarray:
         cosine = abs(geometry.axes[i] @ normal)
         name = geometry.joint_names[i]
         if geometry.revolute[i] and cosine < 1.0 - _PARALLEL:
-            raise NotApplicableError(f"not planar: the axes of {geometry.joint_names[turning[0]]} and {name} are not parallel")
+            raise NotApplicableError(
+                f"not planar: the axes of {geometry.joint_names[turning[0]]} and {name} are not parallel"
+            )
         if not geometry.revolute[i] and _PARALLEL < cosine < 1.0 - _PARALLEL:
             raise NotApplicableError(f"not planar: {name} slides at an angle to the plane")
     return normal

@@ -105,7 +105,7 @@ def ik_family(name: str, *, source: str) -> Callable[[Build], Family]:
 
 
 def margin_gradient(solver: IKSolver, q: np.ndarray, branch: int) -> np.ndarray:
-    """Derivatives of the branch margins with respect to all joints, exact by complex steps.
+    """Differentiate the branch margins with respect to all joints, exact by complex steps.
 
     Parameters
     ----------

@@ -48,6 +48,14 @@ class Candidate:
     reasons: dict[str, str]
 
 
+@dataclass(frozen=True)
+class Match(Candidate):
+    """A choice of redundant joints that has a closed form."""
+
+    family: str
+    solver: IKSolver
+
+
 @cache
 def plugin_families() -> tuple[Family, ...]:
     """Families of other packages, from the entry-point group ``brachis.ik``."""
@@ -56,7 +64,7 @@ def plugin_families() -> tuple[Family, ...]:
 
 def find(
     robot: Robot, task_space: TaskSpace, redundant_joints: Sequence[str], *, families: Sequence[Family] = ()
-) -> Candidate:
+) -> Match:
     """Find the closed form for a choice of redundant joints.
 
     Parameters
@@ -70,8 +78,7 @@ def find(
 
     Returns
     -------
-    Candidate
-        With a solver.
+    Match
 
     Raises
     ------
@@ -90,10 +97,12 @@ def find(
             "wrong number of redundant joints" if r >= 0 else "the robot has fewer joints than the task space has rows",
             redundant_joints=names,
             found=f"{len(names)} ({', '.join(names) or 'none'})",
-            allowed=f"{r}: {robot.n} joints less {task_space.m} rows ({', '.join(task_space.rows)})" if r >= 0 else None,
+            allowed=f"{r}: {robot.n} joints less {task_space.m} rows ({', '.join(task_space.rows)})"
+            if r >= 0
+            else None,
         )
     candidate = _try(robot, task_space, names, families)
-    if candidate.solver is None:
+    if not isinstance(candidate, Match):
         available = [c.redundant_joints for c in find_all(robot, task_space, families=families) if c.solver is not None]
         raise DecompositionError(
             f"no closed form for redundant joints [{', '.join(names)}]",
@@ -125,12 +134,17 @@ def _try(robot: Robot, task_space: TaskSpace, names: tuple[str, ...], families: 
         except NotApplicableError as reason:
             reasons[family.name] = str(reason)
         else:
-            return Candidate(ordered, family.name, solver, reasons)
+            return Match(ordered, family.name, solver, reasons)
     return Candidate(ordered, None, None, reasons)
 
 
 def check_answers(
-    robot: Robot, task_space: TaskSpace, redundant: tuple[int, ...], solver: IKSolver, *, postures: int = _CHECKED_POSTURES
+    robot: Robot,
+    task_space: TaskSpace,
+    redundant: tuple[int, ...],
+    solver: IKSolver,
+    *,
+    postures: int = _CHECKED_POSTURES,
 ) -> None:
     """Put a solver's answers for random postures into Pinocchio's forward kinematics.
 
@@ -160,7 +174,9 @@ def check_answers(
     for k, branch in zip(*np.nonzero(np.all(np.isfinite(answers), axis=2)), strict=True):
         posture = q[k].copy()
         posture[rest] = answers[k, branch]
-        miss = np.abs(_difference(task_space.value(robot.tool_placement(posture)), targets[k], task_space_angles(task_space)))
+        miss = np.abs(
+            _difference(task_space.value(robot.tool_placement(posture)), targets[k], task_space_angles(task_space))
+        )
         if not miss.max() < _POSE_TOLERANCE:
             raise NotApplicableError(f"its answers miss the target by {miss.max():.1e}")
 

@@ -4,4 +4,12 @@ from brachis.kinematics.decomposition import Decomposition, JointDerivatives, Jo
 from brachis.kinematics.interpolation import Nodes, interpolate
 from brachis.kinematics.task_kinematics import TaskDerivatives, TaskKinematics
 
-__all__ = ["Decomposition", "JointDerivatives", "JointState", "Nodes", "TaskDerivatives", "TaskKinematics", "interpolate"]
+__all__ = [
+    "Decomposition",
+    "JointDerivatives",
+    "JointState",
+    "Nodes",
+    "TaskDerivatives",
+    "TaskKinematics",
+    "interpolate",
+]

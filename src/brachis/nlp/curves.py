@@ -113,7 +113,7 @@ class Windows:
         return np.asarray(np.einsum("okw,ckw->okc", self.values, control_points[:, self.columns]))
 
     def entries(self, spline: TiedSpline) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Derivatives of the curves with respect to the free variables, each place once.
+        """Differentiate the curves with respect to the free variables, each place once.
 
         Returns
         -------

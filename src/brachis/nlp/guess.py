@@ -100,7 +100,10 @@ def numeric_course(decomposition: Decomposition, strategy: Strategy) -> np.ndarr
     previous = np.zeros_like(q)
     course = [np.append(0.0, q[decomposition.redundant])]
     for _ in range(_UNFOLDING_STEPS if decomposition.r else 0):
-        if decomposition.solver.branch_margins(q[None], decomposition.branch).min(initial=1.0) > 0.5 * strategy.threshold:
+        if (
+            decomposition.solver.branch_margins(q[None], decomposition.branch).min(initial=1.0)
+            > 0.5 * strategy.threshold
+        ):
             break
         moved = _follow(decomposition, strategy, q, previous, targets[0], unfolding=True)
         if moved is None:

@@ -130,9 +130,9 @@ class Transcription:
 
     def _make_splines(self, derivatives: int, end: np.ndarray | None) -> tuple[TiedSpline, ...]:
         """s, then the redundant joints."""
+        start = self.decomposition.start
         pairs: list[tuple[float | None, float | None]] = [(0.0, 1.0)]
-        for joint in self.decomposition.redundant:
-            pairs.append((self.decomposition.start[joint], None if end is None else end[joint]))
+        pairs += [(start[joint], None if end is None else end[joint]) for joint in self.decomposition.redundant]
         return tuple(
             TiedSpline.resting(self.knots, self.degree, derivatives=derivatives, start=first, end=last)
             for first, last in pairs
@@ -164,8 +164,7 @@ class Transcription:
                 columns.append(np.repeat(variable + part.start, size))
             first += count * size
         steps = self.splines[0].free - 1
-        places = first + np.arange(steps)
-        rows += [places, places]
+        rows += [first + np.arange(steps), first + np.arange(steps)]
         columns += [self.slices[0].start + np.arange(steps), self.slices[0].start + 1 + np.arange(steps)]
         lower.append(np.zeros(steps))
         upper.append(np.full(steps, np.inf))
@@ -265,7 +264,9 @@ class Transcription:
         entries: list[np.ndarray] = []
         for constraint in self.constraints:
             by_y, by_ydot, by_yddot = chain(constraint.partials(state), state, exact)
-            by_time = np.einsum("kcj,kj->kc", by_ydot, state.ydot) + 2.0 * np.einsum("kcj,kj->kc", by_yddot, state.yddot)
+            by_time = np.einsum("kcj,kj->kc", by_ydot, state.ydot) + 2.0 * np.einsum(
+                "kcj,kj->kc", by_yddot, state.yddot
+            )
             entries.append(by_time.ravel() / -x[0])
             for j, (point, _, basis) in enumerate(self._entries):
                 entry = by_y[point, :, j] * basis[0][:, None]
@@ -276,10 +277,8 @@ class Transcription:
         return np.concatenate([*entries, np.full(steps, -1.0), np.ones(steps)])
 
 
-def chain(
-    partials: Partials, state: JointState, exact: JointDerivatives
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivatives of a constraint with respect to y, ydot and yddot, each (K, c, 1 + r), from its partials."""
+def chain(partials: Partials, state: JointState, exact: JointDerivatives) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Differentiate a constraint with respect to y, ydot and yddot, each (K, c, 1 + r), from its partials."""
     given = next(part for part in (partials.q, partials.qdot, partials.qddot) if part is not None)
     zeros = np.zeros((*given.shape[:2], state.y.shape[1]))
     by_y, by_ydot, by_yddot = zeros, zeros, zeros

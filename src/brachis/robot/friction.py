@@ -65,5 +65,5 @@ class Friction:
         return self.armature * qddot + self.viscous * qdot + self.coulomb * np.tanh(qdot / self.v_eps)
 
     def velocity_derivative(self, qdot: np.ndarray) -> np.ndarray:
-        """Derivative of `torque` with respect to qdot (diagonal), (..., n)."""
+        """Differentiate `torque` with respect to qdot (diagonal), (..., n)."""
         return self.viscous + self.coulomb / self.v_eps / np.cosh(np.clip(qdot / self.v_eps, -350.0, 350.0)) ** 2

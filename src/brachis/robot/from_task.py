@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import os
 
 from brachis.errors import TaskError
 from brachis.robot.limits import LimitSpec
@@ -11,7 +11,7 @@ from brachis.task import RobotSettings
 
 
 def robot_from_settings(
-    settings: RobotSettings, *, urdf: str | Path | None = None, urdf_text: str | None = None
+    settings: RobotSettings, *, urdf: str | os.PathLike[str] | None = None, urdf_text: str | None = None
 ) -> Robot:
     """Build the robot of a task.
 

@@ -167,9 +167,9 @@ def _ranges(value: PerJointRange, names: list[str], urdf: Sequence[UrdfLimit]) -
         chosen = (stated.lower, stated.upper) if entry == FROM_URDF else entry
         if chosen is None:
             continue
-        low, high = chosen  # type: ignore[misc]
-        lower[i] = -np.inf if low is None else float(low)
-        upper[i] = np.inf if high is None else float(high)
+        ends: Sequence[float | None] = chosen  # type: ignore[assignment]
+        lower[i] = -np.inf if ends[0] is None else float(ends[0])
+        upper[i] = np.inf if ends[1] is None else float(ends[1])
         if not lower[i] < upper[i]:
             raise LimitError(
                 "position range is empty",

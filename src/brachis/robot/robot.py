@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,7 +55,7 @@ class Robot:
     @classmethod
     def from_urdf(
         cls,
-        path: str | Path,
+        path: str | os.PathLike[str],
         *,
         urdf_text: str | None = None,
         tool_frame: str | None = None,
@@ -100,13 +101,17 @@ class Robot:
         )
         vector = np.asarray(gravity, dtype=float)
         if vector.shape != (3,) or not np.all(np.isfinite(vector)):
-            raise InputError("is not a vector", where="robot.gravity", found=list(gravity), allowed="[x, y, z] in m/s^2")
+            raise InputError(
+                "is not a vector", where="robot.gravity", found=list(gravity), allowed="[x, y, z] in m/s^2"
+            )
         model = _build_model(chain.xml, chain.locked, str(path))
         model.gravity.linear = vector
         model.armature = np.zeros(model.nv)
         names = tuple(str(name) for name in list(model.names)[1:])
         if names != chain.joint_names or model.nq != model.nv:
-            raise UrdfError("the chain is not serial", where=str(path), found=list(names), allowed=list(chain.joint_names))
+            raise UrdfError(
+                "the chain is not serial", where=str(path), found=list(names), allowed=list(chain.joint_names)
+            )
         return cls(
             model=model,
             joint_names=names,
@@ -114,7 +119,7 @@ class Robot:
             base_frame=chain.base_frame,
             limits=resolve_limits(limits or LimitSpec(), names, chain.limits),
             stated_limits=chain.limits,
-            friction=Friction.of(names, **dict(friction or {})),  # type: ignore[arg-type]
+            friction=Friction.of(names, **dict(friction or {})),
             source=str(path),
             urdf=text,
         )

@@ -43,12 +43,17 @@ class TaskSpace:
         names = tuple(rows)
         positions = [row for row in names if row in AXES]
         if any(row not in (*AXES, YAW) for row in names) or len(set(names)) != len(names) or not positions:
-            raise InputError("rows are not usable", where="task_space", found=list(names), allowed="x, y, z, yaw, each once")
+            raise InputError(
+                "rows are not usable", where="task_space", found=list(names), allowed="x, y, z, yaw, each once"
+            )
         if YAW not in names:
             return cls(names)
         if names[-1] != YAW or len(positions) != 2:  # noqa: PLR2004
             raise InputError(
-                "yaw needs exactly two position rows before it", where="task_space", found=list(names), allowed="[x, y, yaw]"
+                "yaw needs exactly two position rows before it",
+                where="task_space",
+                found=list(names),
+                allowed="[x, y, yaw]",
             )
         rotation = robot.tool_placement(np.zeros(robot.n)).rotation
         in_plane = np.linalg.norm(rotation[[AXES.index(row) for row in positions]], axis=0)

@@ -12,11 +12,10 @@ import numpy as np
 
 from brachis.errors import UnknownNameError, UrdfError
 from brachis.robot.limits import UrdfLimit
+from brachis.robot.urdf_checks import MOVING_TYPES, check_inertias, check_joints
 
 if TYPE_CHECKING:
     import yourdfpy
-
-MOVING_TYPES = ("revolute", "continuous", "prismatic")
 
 
 @dataclass(frozen=True)
@@ -90,11 +89,13 @@ def read_chain(
         if name not in by_name:
             raise UnknownNameError("moving joint", name, by_name, where=f"{where}: locked_joints")
     chain = [joint for joint in path_joints if joint.type != "fixed" and joint.name not in locked_joints]
-    _check_joints(chain, {joint.name for joint in chain}, by_name, where)
+    check_joints(chain, {joint.name for joint in chain}, by_name, where)
     if not chain:
         raise UrdfError("no joint moves the tool", where=where, found=f"chain {base} -> {tool}")
-    locked = {name: _lock_position(by_name[name], locked_joints) for name in by_name if name not in {j.name for j in chain}}
-    _check_inertias(urdf, chain, parents, where)
+    locked = {
+        name: _lock_position(by_name[name], locked_joints) for name in by_name if name not in {j.name for j in chain}
+    }
+    check_inertias(urdf, chain, parents, where)
     limits = tuple(_limit_of(joint, where) for joint in chain)
     return UrdfChain(tuple(j.name for j in chain), limits, locked, tool, base, _plain_xml(urdf))
 
@@ -167,7 +168,9 @@ def _root(links: Sequence[str], parents: Mapping[str, Any], where: str) -> str:
     """Find the only link without a parent."""
     roots = [name for name in links if name not in parents]
     if len(roots) != 1:
-        raise UrdfError("the links do not form one tree", where=where, found=f"root links: {', '.join(roots) or 'none'}")
+        raise UrdfError(
+            "the links do not form one tree", where=where, found=f"root links: {', '.join(roots) or 'none'}"
+        )
     return roots[0]
 
 
@@ -182,28 +185,6 @@ def _joints_between(base: str, tool: str, parents: Mapping[str, Any], where: str
         joints.append(joint)
         link = joint.parent
     return joints[::-1]
-
-
-def _check_joints(chain: Sequence[Any], names: set[str], by_name: Mapping[str, Any], where: str) -> None:
-    """Refuse joints that a serial chain of one-coordinate joints cannot have."""
-    for joint in chain:
-        if joint.type not in MOVING_TYPES:
-            raise UrdfError(
-                f"joint {joint.name!r} cannot be planned for",
-                where=where,
-                found=f"type {joint.type!r}",
-                allowed=", ".join(MOVING_TYPES),
-                hint="Lock it with robot.locked_joints, or set robot.base_frame below it",
-            )
-    for joint in by_name.values():
-        if joint.mimic is not None and (joint.name in names or joint.mimic.joint in names):
-            raise UrdfError(
-                f"joint {joint.name!r} mimics {joint.mimic.joint!r}",
-                where=where,
-                found="a mimic joint that moves with the chain",
-                allowed="independent joints",
-                hint="Remove the mimic element, or lock the joint that it follows with robot.locked_joints",
-            )
 
 
 def _lock_position(joint: Any, locked_joints: Mapping[str, float]) -> float:  # noqa: ANN401 (yourdfpy is untyped)
@@ -231,54 +212,6 @@ def _limit_of(joint: Any, where: str) -> UrdfLimit:  # noqa: ANN401
             allowed='<limit lower="..." upper="..." .../>, or type="continuous"',
         )
     return UrdfLimit(limit.lower, limit.upper, limit.velocity, limit.effort)
-
-
-def _check_inertias(urdf: yourdfpy.URDF, chain: Sequence[Any], parents: Mapping[str, Any], where: str) -> None:
-    """Refuse moving bodies without mass and inertias that no body can have.
-
-    A body is the links that move as one, that is, up to the next moving joint of the chain. Massless links (frames)
-    are fine so long as the body as a whole has mass.
-    """
-    moving = {joint.name for joint in chain}
-    bodies: dict[str, list[str]] = {name: [] for name in moving}
-    masses: dict[str, float] = dict.fromkeys(moving, 0.0)
-    for link in urdf.robot.links:
-        joint = parents.get(link.name)
-        while joint is not None and joint.name not in moving:
-            joint = parents.get(joint.parent)
-        if joint is None:
-            continue
-        bodies[joint.name].append(link.name)
-        if link.inertial is not None:
-            masses[joint.name] += link.inertial.mass or 0.0
-            _check_inertia(link, where)
-    for joint in chain:
-        if not masses[joint.name] > 0.0:
-            raise UrdfError(
-                f"the body moved by joint {joint.name!r} has no mass",
-                where=where,
-                found=f"links {', '.join(bodies[joint.name])} without <inertial>",
-                allowed="at least one link with <inertial> and mass > 0 kg",
-            )
-
-
-def _check_inertia(link: Any, where: str) -> None:  # noqa: ANN401
-    """Refuse a negative mass and an inertia matrix that breaks the triangle inequality."""
-    mass, matrix = link.inertial.mass or 0.0, link.inertial.inertia
-    if not np.isfinite(mass) or mass < 0.0:
-        raise UrdfError(f"link {link.name!r} has a non-physical mass", where=where, found=f"{mass:g} kg", allowed=">= 0 kg")
-    if matrix is None:
-        return
-    moments = np.linalg.eigvalsh(np.asarray(matrix, dtype=float)) if np.all(np.isfinite(matrix)) else np.array([np.nan])
-    slack = 1e-3 * max(abs(moments).max(), 1e-12)  # figures from CAD are rounded
-    physical = moments[0] >= -slack and (len(moments) < 3 or moments[0] + moments[1] >= moments[2] - slack)  # noqa: PLR2004
-    if not physical:
-        raise UrdfError(
-            f"link {link.name!r} has a non-physical inertia",
-            where=where,
-            found="principal moments " + ", ".join(f"{m:.4g}" for m in moments) + " kg m^2",
-            allowed="moments >= 0, none above the sum of the other two",
-        )
 
 
 def _plain_xml(urdf: yourdfpy.URDF) -> str:

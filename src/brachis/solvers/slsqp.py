@@ -49,7 +49,7 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
             raise _StopSolveError
 
     try:
-        result = minimize(
+        result = minimize(  # type: ignore[call-overload]  # the stubs know neither Bounds nor this callback
             problem.objective,
             x,
             method="SLSQP",

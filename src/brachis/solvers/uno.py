@@ -51,7 +51,7 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
     def jacobian(point: np.ndarray, out: np.ndarray) -> None:
         out[:] = watch.jacobian(point)
 
-    model.set_objective(unopy.MINIMIZE, lambda point: problem.objective(point), objective_gradient)
+    model.set_objective(unopy.MINIMIZE, problem.objective, objective_gradient)
     model.set_constraints(
         len(problem.lower),
         rows,

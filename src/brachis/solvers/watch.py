@@ -51,7 +51,7 @@ class Watch:
         return self.must_stop()
 
     def must_stop(self) -> bool:
-        """True once the user has interrupted or the time is over."""
+        """Tell whether the user has interrupted or the time is over."""
         self.timed_out = self.timed_out or self.elapsed > self.options.time_limit
         return self.timed_out or self.interrupt is not None
 

@@ -1,6 +1,6 @@
 """Independent verification of a trajectory from URDF, path and limits alone."""
 
 from brachis.verify.report import Check, Verification
-from brachis.verify.verify import VerifyOptions, verify
+from brachis.verify.verify import VerifyOptions, verify_trajectory
 
-__all__ = ["Check", "Verification", "VerifyOptions", "verify"]
+__all__ = ["Check", "Verification", "VerifyOptions", "verify_trajectory"]

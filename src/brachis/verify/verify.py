@@ -39,7 +39,9 @@ class VerifyOptions:
     points_per_interval: int = 32
 
 
-def verify(trajectory: Trajectory, options: VerifyOptions | None = None, *, robot: Robot | None = None) -> Verification:
+def verify_trajectory(
+    trajectory: Trajectory, options: VerifyOptions | None = None, *, robot: Robot | None = None
+) -> Verification:
     """Check path, limits, start and end, and continuity of a trajectory.
 
     Parameters
@@ -108,7 +110,9 @@ def _path_error(trajectory: Trajectory, robot: Robot, t: np.ndarray, q: np.ndarr
     errors = np.maximum(np.linalg.norm(miss[:, :positions], axis=1), angles.max(axis=1, initial=0.0))
     worst = int(np.argmax(errors))
     tolerance = options.path_tolerance
-    return Check("path error", float(errors[worst]), tolerance, "m, rad", bool(errors[worst] <= tolerance), time=float(t[worst]))
+    return Check(
+        "path error", float(errors[worst]), tolerance, "m, rad", bool(errors[worst] <= tolerance), time=float(t[worst])
+    )
 
 
 def _limit_checks(
@@ -154,7 +158,7 @@ def _limit_checks(
 
 
 def _progress_checks(trajectory: Trajectory, t: np.ndarray) -> list[Check]:
-    """The path is travelled once, forwards, from its beginning to its end."""
+    """Check that the path is travelled once, forwards, from its beginning to its end."""
     spline = trajectory.path_spline
     backwards = float(max(0.0, -spline(t, nu=1).min()))
     ends = float(max(abs(spline(0.0)), abs(spline(trajectory.t_end) - 1.0)))
@@ -165,14 +169,14 @@ def _progress_checks(trajectory: Trajectory, t: np.ndarray) -> list[Check]:
 
 
 def _end_checks(trajectory: Trajectory, robot: Robot) -> list[Check]:
-    """The motion begins and ends as the task says."""
+    """Check that the motion begins and ends as the task says."""
     task = trajectory.task
     pieces, t_end = trajectory.pieces, trajectory.t_end
     checks = []
     wanted = {"start": (0.0, task.start), "end": (t_end, None if task.end == "free" else task.end)}
     for name, (time, posture) in wanted.items():
         if posture is not None:
-            miss = np.abs(pieces(time) - robot.posture(posture.joints, f"{name}.joints"))  # type: ignore[union-attr]
+            miss = np.abs(pieces(time) - robot.posture(posture.joints, f"{name}.joints"))
             checks.append(_worst_joint(f"{name} posture", miss, 1e-9, "rad, m", robot, time))
         checks.append(_worst_joint(f"{name} velocity", np.abs(pieces(time, nu=1)), 1e-8, "rad/s, m/s", robot, time))
         if task.spline.rest == "full":
@@ -203,7 +207,7 @@ def _continuity_checks(trajectory: Trajectory, robot: Robot) -> list[Check]:
 
 
 def _one_sided(c: np.ndarray, lengths: np.ndarray, order: int, *, at_end: bool) -> np.ndarray:
-    """Derivative of Bernstein pieces c (6, L, n) at one end of every piece, (L, n), from their end coefficients."""
+    """Differentiate Bernstein pieces c (6, L, n) at one end of every piece, (L, n)."""
     degree = len(c) - 1
     differences = np.diff(c, n=order, axis=0)
     factor = np.prod(np.arange(degree, degree - order, -1)) / lengths**order
@@ -212,4 +216,6 @@ def _one_sided(c: np.ndarray, lengths: np.ndarray, order: int, *, at_end: bool) 
 
 def _worst_joint(name: str, misses: np.ndarray, allowed: float, unit: str, robot: Robot, time: float) -> Check:
     joint = int(np.argmax(misses))
-    return Check(name, float(misses[joint]), allowed, unit, bool(misses[joint] <= allowed), robot.joint_names[joint], time)
+    return Check(
+        name, float(misses[joint]), allowed, unit, bool(misses[joint] <= allowed), robot.joint_names[joint], time
+    )

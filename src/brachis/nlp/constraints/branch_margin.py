@@ -9,8 +9,8 @@ from brachis.kinematics import Decomposition, JointState
 from brachis.nlp.constraints.protocol import Partials
 
 MARGIN = 5e-3
-"""Least branch margin, dimensionless. Nearer to the boundary the non-redundant joints outrun any collocation grid. A start posture that is nearer
-still may come half as near again."""
+"""Least branch margin, dimensionless. Nearer to the boundary the non-redundant joints outrun any collocation grid.
+A start posture that is nearer still may come half as near again."""
 
 
 class BranchMarginConstraint:

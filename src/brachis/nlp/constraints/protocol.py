@@ -42,7 +42,7 @@ class Constraint(Protocol):
         ...
 
     def partials(self, state: JointState) -> Partials:
-        """Derivatives of `values` with respect to q, qdot, qddot, each taken as independent."""
+        """Differentiate `values` with respect to q, qdot, qddot, each taken as independent."""
         ...
 
 

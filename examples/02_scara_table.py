@@ -1,0 +1,75 @@
+"""All lines of the paper: eight angles and all three choices of the redundant joint, as a table and a figure.
+
+Usage: python examples/02_scara_table.py [FIGURE.png]
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from pathlib import Path
+
+import brachis
+
+HERE = Path(__file__).parent
+ANGLES_DEG = tuple(range(0, 360, 45))
+JOINTS = ("j1", "j2", "j3")
+PUBLISHED_S = {(90, "j3"): 2.51}
+"""End times that the paper prints."""
+
+
+def plan_all(intervals: int = 20) -> dict[tuple[int, str], brachis.Result]:
+    """Plan the 24 motions; keys are angle in degrees and redundant joint."""
+    limits = brachis.LimitSpec(torque=10.0, velocity=None)
+    robot = brachis.Robot.from_urdf(HERE.parent / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
+    results = {}
+    for angle in ANGLES_DEG:
+        for joint in JOINTS:
+            task = {
+                "brachis": 1,
+                "start": {"joints": [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]},
+                "task_space": ["x", "y"],
+                "path": [{"line": {"length": 1.0, "angle_deg": angle}}],
+                "redundant_joints": [joint],
+                "spline": {"degree": 3, "intervals": intervals, "rest": "full"},
+            }
+            results[angle, joint] = brachis.plan(robot, task)
+    return results
+
+
+def markdown_table(results: dict[tuple[int, str], brachis.Result]) -> str:
+    """End times in seconds, one line an angle; an unverified plan is marked."""
+    lines = [
+        "| angle | q_r = j1 | q_r = j2 | q_r = j3 | the paper |",
+        "|---|---|---|---|---|",
+    ]
+    for angle in ANGLES_DEG:
+        cells = [
+            f"{results[angle, joint].t_end:.3f} s" + ("" if results[angle, joint].verified else " (unverified)")
+            for joint in JOINTS
+        ]
+        published = "; ".join(f"{PUBLISHED_S[key]:.2f} s (q_r = {key[1]})" for key in PUBLISHED_S if key[0] == angle)
+        lines.append(f"| {angle} deg | {' | '.join(cells)} | {published} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Print the table, and draw the figure if a file is named."""
+    began = time.perf_counter()
+    results = plan_all()
+    print(markdown_table(results))
+    verified = sum(result.verified for result in results.values())
+    print(f"\n{verified} of {len(results)} plans verified, {time.perf_counter() - began:.1f} s in all")
+    if len(sys.argv) > 1:
+        from brachis.plots import plot_comparison, save_figure  # noqa: PLC0415  (only when a figure is wanted)
+
+        rows = [(float(angle), joint, result.t_end) for (angle, joint), result in results.items()]
+        save_figure(plot_comparison(rows), sys.argv[1])
+        print(f"wrote {sys.argv[1]}")
+    if verified < len(results):
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,110 @@
+"""Trying initial guesses and solvers until one gives a motion within the limits everywhere."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from brachis.errors import BrachisError, PlanningError
+from brachis.feasibility import explain_failure
+from brachis.nlp import Transcription
+from brachis.nlp.guess import guesses
+from brachis.refine import Refined, RefinementOptions, refine
+from brachis.result import Attempt
+from brachis.solvers import Solver, SolverOptions, SolverReport, solver_named
+from brachis.task import Task
+
+Listener = Callable[[str], None]
+"""Told in plain words what the planner is doing, between iterations; may raise KeyboardInterrupt."""
+
+_PATIENCE = 100
+"""Iterations that ``auto`` grants a solver on one guess: an active-set method that needs more is grinding."""
+
+
+def search(problem: Transcription, task: Task, listener: Listener) -> tuple[tuple[Attempt, ...], Refined]:
+    """Try guesses and solvers until one gives a motion within the limits everywhere.
+
+    Parameters
+    ----------
+    problem : Transcription
+    task : Task
+    listener : callable
+
+    Returns
+    -------
+    attempts : tuple of Attempt
+    refined : Refined
+        Of the last attempt, or of the one that came nearest to the limits.
+
+    Raises
+    ------
+    PathError
+        The path is out of reach, or too heavy to hold.
+    PlanningError
+        No attempt gave a motion.
+    """
+    settings = task.refinement
+    options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds)
+    attempts: list[Attempt] = []
+    best: Refined | None = None
+    for number, (x, solver) in enumerate(_pairs(problem, task)):
+        refined = refine(problem, x, _solve_with(solver, task, listener), options)
+        attempts.append(_attempt(refined, number, settings.tolerance))
+        listener(attempts[-1].outcome)
+        if refined.converged and refined.excess <= settings.tolerance:
+            return tuple(attempts), refined
+        if refined.converged and (best is None or refined.excess < best.excess):
+            best = refined
+    if best is not None and np.isfinite(best.excess):
+        return tuple(attempts), best
+    reason = explain_failure(problem.decomposition)
+    if isinstance(reason, BrachisError):
+        raise reason
+    outcomes = _summary(attempts) or "no reachable initial guess"
+    raise PlanningError(f"no motion within the limits was found: {outcomes}", hint=reason)
+
+
+def _pairs(problem: Transcription, task: Task) -> Iterator[tuple[np.ndarray, Solver]]:
+    """Guesses and solvers in the order of trying: all guesses with the first solver, then the next solver."""
+    backends = solver_named(task.solver.name)
+    known: list[np.ndarray] = []
+    for x in guesses(problem):
+        known.append(x)
+        yield x, backends[0]
+    for solver in backends[1:]:
+        for x in known[:2]:
+            yield x, solver
+
+
+def _solve_with(solver: Solver, task: Task, listener: Listener) -> Callable[[Transcription, np.ndarray], SolverReport]:
+    """Make a function that runs one backend under the task's bounds."""
+    settings = task.solver
+    patience = min(settings.max_iterations, _PATIENCE) if settings.name == "auto" else settings.max_iterations
+    options = SolverOptions(settings.tolerance, patience, settings.time_limit)
+
+    def progress(iteration: int, objective: float) -> None:
+        listener(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s")
+
+    return lambda problem, x: solver.solve(problem, x, options, progress)
+
+
+def _attempt(refined: Refined, number: int, tolerance: float) -> Attempt:
+    """Put the outcome of an attempt into words."""
+    last = refined.reports[-1]
+    rounds = len(refined.reports) - 1
+    if not last.status.usable:
+        outcome = f"{last.solver}: {last.status.value}" + (f" (refinement round {rounds})" if rounds else "")
+    else:
+        inside = "limits hold" if refined.excess <= tolerance else f"limits exceeded by {100.0 * refined.excess:.2g} %"
+        outcome = f"{last.solver}: t_E = {refined.x[0]:.4f} s after {rounds} refinement rounds, {inside}"
+    return Attempt(
+        last.solver, number, refined.reports, refined.excess, refined.stretched, len(refined.problem.tau), outcome
+    )
+
+
+def _summary(attempts: Sequence[Attempt]) -> str:
+    """List the outcomes, equal ones once with their number."""
+    counts = Counter(attempt.outcome for attempt in attempts)
+    return "; ".join(outcome if n == 1 else f"{outcome} ({n} times)" for outcome, n in counts.items())

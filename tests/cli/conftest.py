@@ -1,0 +1,58 @@
+"""Running the command line in this process."""
+
+from __future__ import annotations
+
+import copy
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import yaml
+
+from brachis.cli.main import main
+
+ROOT = Path(__file__).parents[2]
+SCARA = ROOT / "robots/scara3/robot.urdf"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
+    def run(*arguments: object) -> Outcome:
+        monkeypatch.setattr(sys, "argv", ["brachis", *map(str, arguments)])
+        monkeypatch.setenv("COLUMNS", "200")
+        code: object = 0
+        try:
+            main()
+        except SystemExit as stop:
+            code = stop.code or 0
+        streams = capfd.readouterr()
+        return Outcome(int(code), streams.out, streams.err)
+
+    return run
+
+
+@pytest.fixture
+def task() -> dict:
+    """The first example as a mapping, with an absolute URDF path."""
+    content = yaml.safe_load((ROOT / "examples/01_scara_line.yaml").read_text())
+    content["robot"]["urdf"] = str(SCARA)
+    return copy.deepcopy(content)
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[[dict], Path]:
+    def write(content: dict) -> Path:
+        path = tmp_path / "task.yaml"
+        path.write_text(yaml.safe_dump(content))
+        return path
+
+    return write

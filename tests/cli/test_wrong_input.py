@@ -1,0 +1,153 @@
+"""Wrong input: exit code 2, one clear message on standard error, nothing written."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from brachis.errors import nearest
+
+
+def set_key(task: dict, dotted: str, value: object) -> None:
+    *parents, last = dotted.split(".")
+    for key in parents:
+        task = task[int(key)] if key.isdigit() else task[key]
+    task[last] = value
+
+
+WRONG_TASKS = {
+    "unknown key": ("robot.limits.torqe", 10, ["robot.limits.torqe", "torque"]),
+    "wrong type": ("spline.degree", "three", ["spline.degree", "three"]),
+    "NaN": ("start.joints", [0.1, math.nan, 0.2], ["start.joints", "nan"]),
+    "infinity": ("path", [{"line": {"length": math.inf, "angle_deg": 0}}], ["path[0].line", "inf"]),
+    "number of joints": ("start.joints", [0.1, 0.2], ["start.joints", "found 2", "j1, j2, j3"]),
+    "unknown redundant joint": ("redundant_joints", ["j9"], ["'j9'", "j1, j2, j3"]),
+    "too many redundant joints": ("redundant_joints", ["j1", "j2"], ["found 2", "allowed: 1", "3 joints less 2 rows"]),
+    "too few redundant joints": ("redundant_joints", [], ["found 0", "allowed: 1"]),
+    "zero-length path": ("path", [{"line": {"length": 0.0, "angle_deg": 0}}], ["path[0].line", "zero"]),
+    "out of reach": ("path", [{"line": {"length": 5.0, "angle_deg": 0}}], ["out of reach from s = 0.2"]),
+    "out of limits": ("robot.limits.position", {"j2": [-1.0, 1.0]}, ["'j2'", "-2.0944 rad", "-1 rad to 1 rad"]),
+    "end off the path": ("end", {"joints": [0.0, 0.0, 0.0]}, ["end.joints", "off the path", "m off in"]),
+    "unknown branch": ("branch", "elbow_up", ["'elbow_up'", "elbow_positive, elbow_negative"]),
+    "other branch": ("branch", "elbow_positive", ["another branch", "elbow_negative"]),
+    "unknown solver": ("solver.name", "snopt", ["'snopt'", "uno", "ipopt", "slsqp"]),
+    "unknown tool frame": ("robot.tool_frame", "tol", ["'tol'", "Did you mean 'tool'"]),
+    "missing URDF": ("robot.urdf", "nowhere.urdf", ["nowhere.urdf", "does not exist"]),
+    "no limit at all": ("robot.limits.torque", None, ["'j1'", "robot.limits.torque.j1"]),
+    "torque limit not positive": ("robot.limits.torque", -1, ["robot.limits.torque", "-1"]),
+    "singular start": ("start.joints", [0.3, 0.0, 0.0], ["start.joints", "branches of the closed form meet"]),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_TASKS)
+def test_wrong_task(case, run, task, write, tmp_path):
+    key, value, expected = WRONG_TASKS[case]
+    set_key(task, key, value)
+    out = tmp_path / "out"
+    outcome = run("plan", write(task), "--out", out)
+    assert outcome.code == 2, outcome.err
+    assert outcome.out == ""
+    assert outcome.err.startswith("brachis: ")
+    for part in expected:
+        assert part in outcome.err
+    assert "Traceback" not in outcome.err
+    assert not out.exists() or not list(out.iterdir())
+
+
+def test_torque_cannot_hold_the_arm(run, task, write):
+    # In the vertical plane the first joint alone carries 10 kg at 0.5 m, 1.5 m and 2.5 m from its axis.
+    task["robot"]["gravity"] = [0.0, -9.81, 0.0]
+    task["start"] = {"joints": [0.0, 0.3, 0.3]}
+    outcome = run("plan", write(task))
+    assert outcome.code == 2
+    for part in ("'j1' cannot hold the arm against gravity", "Nm needed at rest", "10 Nm", "robot.limits.torque.j1"):
+        assert part in outcome.err
+
+
+def test_torque_cannot_hold_the_arm_further_along(run, task, write):
+    # Hanging down costs no torque; the path leads to where no posture can be held.
+    task["robot"]["gravity"] = [0.0, -9.81, 0.0]
+    task["robot"]["limits"]["torque"] = [120, 60, 20]
+    task["start"] = {"joints": [-math.pi / 2 - 0.2, 0.2, 0.2]}
+    task["path"] = [{"line": {"to": [2.4, -1.0]}}]
+    outcome = run("plan", write(task))
+    assert outcome.code == 2, outcome.err
+    assert "cannot hold the arm against gravity from s = " in outcome.err
+
+
+def test_no_closed_form(run, task, write, tmp_path):
+    # The second joint's axis lies across the plane of the others.
+    text = (write.__globals__["SCARA"]).read_text()
+    urdf = tmp_path / "crooked.urdf"
+    urdf.write_text(
+        text.replace(
+            '<origin xyz="1 0 0"/>\n    <axis xyz="0 0 1"/>', '<origin xyz="1 0 0"/>\n    <axis xyz="0 1 0"/>', 1
+        )
+    )
+    task["robot"]["urdf"] = str(urdf)
+    task["start"] = {"joints": [0.1, 0.4, 0.3]}
+    outcome = run("plan", write(task))
+    assert outcome.code == 2
+    assert "no closed form for redundant joints [j3]" in outcome.err
+    assert "planar: not planar: the axes of j1 and j2 are not parallel" in outcome.err
+    assert "prismatic: j1, j2 would be left over" in outcome.err
+
+
+URDFS = {
+    "broken XML": ("<robot name='x'><link", "not well-formed XML"),
+    "not a URDF": ("<sdf version='1.6'/>", "root element <sdf>"),
+    "no links": ("<robot name='x'/>", "no links"),
+    "not text": ("", "not well-formed XML"),
+}
+
+
+@pytest.mark.parametrize("case", URDFS)
+def test_wrong_urdf(case, run, task, write, tmp_path):
+    text, expected = URDFS[case]
+    urdf = tmp_path / "robot.urdf"
+    urdf.write_text(text)
+    task["robot"]["urdf"] = str(urdf)
+    for arguments in (("plan", write(task)), ("inspect", urdf)):
+        outcome = run(*arguments)
+        assert outcome.code == 2
+        assert expected in outcome.err
+        assert str(urdf) in outcome.err
+
+
+def test_missing_task_file(run, tmp_path):
+    outcome = run("plan", tmp_path / "nothing.yaml")
+    assert outcome.code == 2
+    assert "nothing.yaml" in outcome.err
+
+
+@pytest.mark.parametrize("command", [("verify",), ("export", "--csv", "x.csv"), ("plot", "--out", "x.png")])
+def test_result_that_is_none(command, run, tmp_path):
+    broken = tmp_path / "result.npz"
+    broken.write_bytes(b"PK no archive")
+    for path, expected in ((broken, "not a brachis result"), (tmp_path / "gone.npz", "does not exist")):
+        outcome = run(command[0], path, *command[1:])
+        assert outcome.code == 2
+        assert expected in outcome.err
+
+
+def test_unusable_output_folder(run, task, write, tmp_path):
+    occupied = tmp_path / "file"
+    occupied.write_text("")
+    outcome = run("plan", write(task), "--out", occupied)
+    assert outcome.code == 2
+    assert "cannot be made" in outcome.err
+    assert occupied.read_text() == ""
+
+
+def test_fault_of_our_own_is_not_a_traceback(run, task, write, monkeypatch):
+    monkeypatch.setattr("brachis.planner.transcribe", lambda *_args, **_kwargs: 1 / 0)
+    outcome = run("plan", write(task))
+    assert outcome.code == 1
+    assert "internal error: ZeroDivisionError" in outcome.err
+    assert "Traceback" not in outcome.err
+
+
+def test_suggestions_come_from_the_valid_names():
+    assert nearest("torqe", ["torque", "velocity"]) == "torque"
+    assert nearest("xyz", ["torque", "velocity"]) is None

@@ -1,0 +1,100 @@
+import csv
+
+import numpy as np
+import pytest
+
+from brachis.errors import InputError
+from brachis.export import FORMATS, csv_table, export_csv
+
+HEADER = "t,q_j1,q_j2,q_j3,qd_j1,qd_j2,qd_j3,qdd_j1,qdd_j2,qdd_j3,tau_j1,tau_j2,tau_j3"
+DT = 0.004
+
+
+@pytest.fixture(scope="module")
+def table(line_trajectory, tmp_path_factory):
+    path = tmp_path_factory.mktemp("csv") / "motion.csv"
+    export_csv(line_trajectory, path, DT)
+    return path
+
+
+def numbers(path):
+    return np.array([[float(cell) for cell in line.split(",")] for line in path.read_text().splitlines()[1:]])
+
+
+def test_header_names_every_column(table):
+    assert table.read_bytes().split(b"\n")[0] == HEADER.encode()
+
+
+def test_values_read_back_equal_the_trajectory_exactly(table, line_trajectory):
+    values = numbers(table)
+    at = line_trajectory.at(values[:, 0])
+    assert np.array_equal(values[:, 1:], np.hstack([at.q, at.qdot, at.qddot, at.tau]))
+
+
+def test_rows_are_at_multiples_of_the_period_and_at_the_end_time_exactly(table, line_trajectory):
+    t = numbers(table)[:, 0]
+    assert np.array_equal(t[:-1], np.arange(len(t) - 1) * DT)
+    assert t[-1] == line_trajectory.t_end
+    assert 0.0 < t[-1] - t[-2] <= DT * (1.0 + 1e-9)
+
+
+def test_lines_end_with_one_newline(table):
+    content = table.read_bytes()
+    assert b"\r" not in content
+    assert content.endswith(b"\n")
+    assert not content.endswith(b"\n\n")
+
+
+def test_joint_names_with_commas_stay_one_column(line_trajectory, tmp_path, monkeypatch):
+    monkeypatch.setattr(type(line_trajectory), "joint_names", ("a,b", 'c"d', "e"))
+    export_csv(line_trajectory, tmp_path / "motion.csv", 0.5)
+    with (tmp_path / "motion.csv").open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.reader(stream))
+    assert rows[0][1:4] == ["q_a,b", 'q_c"d', "q_e"]
+    assert {len(row) for row in rows} == {13}
+
+
+def test_a_missing_folder_is_named(line_trajectory, tmp_path):
+    path = tmp_path / "nowhere" / "motion.csv"
+    with pytest.raises(InputError, match="No such file") as caught:
+        export_csv(line_trajectory, path, DT)
+    assert caught.value.where == str(path)
+    assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize("dt", [0.0, -0.1, float("nan"), 1e-9])
+def test_an_unusable_period_leaves_the_old_file(line_trajectory, tmp_path, dt):
+    path = tmp_path / "motion.csv"
+    path.write_text("old")
+    with pytest.raises(InputError, match="period"):
+        export_csv(line_trajectory, path, dt)
+    assert path.read_text() == "old"
+
+
+def test_a_full_disk_leaves_the_old_file_and_nothing_else(line_trajectory, tmp_path, monkeypatch):
+    path = tmp_path / "motion.csv"
+    path.write_text("old")
+
+    class FullDisk:
+        def writerow(self, row):
+            pass
+
+        def writerows(self, _rows):
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(csv_table.csv, "writer", lambda *_, **__: FullDisk())
+    with pytest.raises(InputError, match="No space left on device"):
+        export_csv(line_trajectory, path, DT)
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("suffix", sorted(FORMATS))
+def test_every_format_writes_its_file(line_trajectory, tmp_path, suffix):
+    path = tmp_path / f"motion.{suffix}"
+    FORMATS[suffix](line_trajectory, path, 0.1)
+    assert path.stat().st_size > 0
+
+
+def test_csv_is_a_format():
+    assert FORMATS["csv"] is export_csv

@@ -1,0 +1,93 @@
+import itertools
+import math
+
+import pytest
+
+from brachis.errors import InputError
+from brachis.plots import plot_comparison
+
+JOINTS = ("j1", "j2", "j3")
+NAN = math.nan
+
+
+def paper_rows(step=45, joints=JOINTS):
+    return [(float(a), j, 2.0 + 0.4 * math.sin(a + 3 * i)) for a in range(0, 360, step) for i, j in enumerate(joints)]
+
+
+def heights(ax):
+    return {c.get_label(): [bar.get_height() for bar in c] for c in ax.containers}
+
+
+def test_bars_are_the_end_times():
+    rows = paper_rows()
+    (ax,) = plot_comparison(rows).axes
+    assert heights(ax) == {joint: [t for _, name, t in rows if name == joint] for joint in JOINTS}
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == [f"{a}°" for a in range(0, 360, 45)]
+    assert ax.get_ylim()[0] == 0.0
+    assert ax.get_ylabel() == r"$t_\mathrm{E}$ (s)"
+
+
+def test_angles_are_sorted_and_joints_keep_their_order():
+    (ax,) = plot_comparison([(90.0, "b", 3.0), (-45.0, "a", 1.0), (90.0, "a", 2.0), (-45.0, "b", 4.0)]).axes
+    assert list(heights(ax).items()) == [("b", [4.0, 3.0]), ("a", [1.0, 2.0])]
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["-45°", "90°"]
+
+
+def test_every_value_is_written_above_its_bar_and_the_shortest_is_bold():
+    (ax,) = plot_comparison([(0.0, "j1", 2.0), (0.0, "j2", 1.5), (90.0, "j1", 1.25), (90.0, "j2", 3.0)]).axes
+    written = {text.get_text(): text for text in ax.texts}
+    assert set(written) == {"2.000", "1.500", "1.250", "3.000"}
+    assert {label for label, text in written.items() if text.get_fontweight() == "bold"} == {"1.500", "1.250"}
+    bars = {f"{bar.get_height():.3f}": bar for container in ax.containers for bar in container}
+    for label, text in written.items():
+        assert text.xy[0] == pytest.approx(bars[label].get_x() + 0.5 * bars[label].get_width())
+        assert text.xy[1] == bars[label].get_height()
+
+
+def test_a_plan_that_was_not_found_is_said_and_a_missing_row_is_a_gap():
+    (ax,) = plot_comparison([(0.0, "j1", 2.0), (0.0, "j2", NAN), (90.0, "j2", 3.0)]).axes
+    assert sorted(text.get_text() for text in ax.texts) == ["2.000", "3.000", "no plan"]
+    assert heights(ax) == {"j1": [2.0], "j2": [3.0]}
+
+
+def test_a_table_without_any_plan_is_drawn():
+    (ax,) = plot_comparison([(0.0, "j1", NAN)]).axes
+    assert [text.get_text() for text in ax.texts] == ["no plan"]
+
+
+@pytest.mark.parametrize("step", [45, 30, 10])
+def test_value_labels_are_legible(step):
+    figure = plot_comparison(paper_rows(step))
+    figure.draw_without_rendering()
+    written = 0
+    for ax in figure.axes:
+        boxes = [text.get_window_extent() for text in ax.texts]
+        written += len(boxes)
+        assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].overlaps(pair[1])]
+        assert max(box.y1 for box in boxes) < ax.get_window_extent().y1
+        assert min(text.get_fontsize() for text in ax.texts) >= 6.0
+    assert written == len(paper_rows(step))
+
+
+def test_many_angles_go_to_more_panels_in_order():
+    figure = plot_comparison(paper_rows(10))
+    assert len(figure.axes) > 1
+    labels = [tick.get_text() for ax in figure.axes for tick in ax.get_xticklabels()]
+    assert labels == [f"{a}°" for a in range(0, 360, 10)]
+
+
+@pytest.mark.parametrize(
+    ("rows", "message", "where"),
+    [
+        ([], "nothing to compare", "rows"),
+        ([(0.0, "j1", 2.0), (math.inf, "j1", 2.0)], "is not an angle", "rows[1]"),
+        ([(0.0, "j1", 0.0)], "is not an end time", "rows[0]"),
+        ([(0.0, "j1", -1.0)], "is not an end time", "rows[0]"),
+        ([(0.0, "j1", math.inf)], "is not an end time", "rows[0]"),
+        ([(0.0, "j1", 1.0), (0.0, "j1", 2.0)], "comes twice", "rows[1]"),
+    ],
+)
+def test_wrong_tables_are_refused(rows, message, where):
+    with pytest.raises(InputError, match=message) as caught:
+        plot_comparison(rows)
+    assert caught.value.where == where

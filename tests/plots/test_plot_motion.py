@@ -1,0 +1,110 @@
+import numpy as np
+import pytest
+
+from brachis.plots import plot_motion, plot_overview
+
+INF = float("inf")
+
+
+def labelled(ax):
+    return {line.get_label(): line for line in ax.get_lines() if not line.get_label().startswith("_")}
+
+
+def levels(ax):
+    return sorted(line.get_ydata()[0] for line in ax.get_lines() if line.get_linestyle() == "--")
+
+
+def test_panels_show_the_trajectory(line_trajectory):
+    positions, velocities, progress, speed = plot_motion(line_trajectory).axes
+    for joint, name in enumerate(line_trajectory.joint_names):
+        t, q = labelled(positions)[name].get_data()
+        assert np.array_equal(q, line_trajectory.position(t)[:, joint])
+        t, qdot = labelled(velocities)[name].get_data()
+        assert np.array_equal(qdot, line_trajectory.velocity(t)[:, joint])
+    t, s = progress.get_lines()[0].get_data()
+    assert np.array_equal(s, line_trajectory.path_coordinate(t))
+    t, s_dt = speed.get_lines()[0].get_data()
+    middle = (t > 1e-3) & (t < line_trajectory.t_end - 1e-3)
+    h = 1e-6
+    slope = (line_trajectory.path_coordinate(t[middle] + h) - line_trajectory.path_coordinate(t[middle] - h)) / (
+        2.0 * h
+    )
+    np.testing.assert_allclose(s_dt[middle], slope, atol=1e-7)
+    assert s_dt.max() > 0.5
+
+
+def test_panels_share_the_time_axis(line_trajectory):
+    panels = plot_motion(line_trajectory).axes
+    panels[0].set_xlim(0.1, 0.2)
+    assert {ax.get_xlim() for ax in panels} == {(0.1, 0.2)}
+    assert [ax.get_xlabel() for ax in panels] == ["", "", "", "$t$ (s)"]
+
+
+def test_units_of_revolute_and_of_mixed_chains(line_trajectory, spatial_trajectory):
+    labels = [ax.get_ylabel() for ax in plot_motion(line_trajectory).axes]
+    assert labels == ["$q$ (rad)", r"$\dot{q}$ (rad/s)", "$s$", r"$\dot{s}$ (1/s)"]
+    labels = [ax.get_ylabel() for ax in plot_motion(spatial_trajectory).axes]
+    assert labels[:2] == ["$q$ (rad, m)", r"$\dot{q}$ (rad/s, m/s)"]
+
+
+def test_limits_are_drawn_where_the_joint_comes_near(line_trajectory, with_limits):
+    peak = np.abs(line_trajectory.qdot).max(axis=0)
+    fastest = int(np.argmax(peak))
+    velocity = np.full(3, INF)
+    velocity[fastest] = 1.05 * peak[fastest]
+    ax = plot_motion(with_limits(line_trajectory, velocity=velocity)).axes[1]
+    (limit,) = [line for line in ax.get_lines() if line.get_linestyle() == "--"]
+    assert abs(limit.get_ydata()[0]) == velocity[fastest]
+    assert limit.get_color() == labelled(ax)[line_trajectory.joint_names[fastest]].get_color()
+    assert ax.get_ylim()[0] < limit.get_ydata()[0] < ax.get_ylim()[1]
+
+
+def test_far_and_infinite_limits_do_not_squeeze_the_data(line_trajectory, with_limits):
+    free = plot_motion(line_trajectory).axes[1]
+    assert levels(free) == []
+    far = plot_motion(with_limits(line_trajectory, velocity=np.array([50.0, INF, 60.0]))).axes[1]
+    assert far.get_ylim() == free.get_ylim()
+
+
+def test_a_limit_that_all_joints_share_is_one_grey_line(line_trajectory, with_limits):
+    limit = 1.02 * np.abs(line_trajectory.qdot).max()
+    ax = plot_motion(with_limits(line_trajectory, velocity=np.full(3, limit))).axes[1]
+    dashed = [line for line in ax.get_lines() if line.get_linestyle() == "--"]
+    assert len(dashed) in {1, 2}
+    assert {line.get_color() for line in dashed} == {"#666666"}
+    assert {abs(line.get_ydata()[0]) for line in dashed} == {limit}
+
+
+def test_position_ranges_are_drawn(line_trajectory, with_limits):
+    low, high = line_trajectory.q.min(axis=0) - 0.05, line_trajectory.q.max(axis=0) + 0.07
+    ax = plot_motion(with_limits(line_trajectory, position_lower=low, position_upper=high)).axes[0]
+    assert levels(ax) == sorted([*low, *high])
+
+
+def test_the_overview_has_every_curve(line_trajectory):
+    figure = plot_overview(line_trajectory)
+    postures, *panels = figure.axes
+    assert len([line for line in postures.get_lines() if (line.get_gid() or "").startswith("posture")]) > 2
+    wanted = {
+        r"$\tau / \tau_\mathrm{max}$": lambda t: line_trajectory.torque(t) / line_trajectory.robot.limits.torque,
+        "$q$ (rad)": line_trajectory.position,
+        r"$\dot{q}$ (rad/s)": line_trajectory.velocity,
+    }
+    found = {ax.get_ylabel(): ax for ax in panels}
+    for label, function in wanted.items():
+        curves = labelled(found[label])
+        assert list(curves) == list(line_trajectory.joint_names)
+        t = curves["j1"].get_xdata()
+        assert np.array_equal(np.column_stack([line.get_ydata() for line in curves.values()]), function(t))
+    assert {"$s$", r"$\dot{s}$ (1/s)"} < set(found)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == list(line_trajectory.joint_names)
+
+
+@pytest.mark.parametrize("name", ["line_trajectory", "spatial_trajectory"])
+def test_nothing_on_the_overview_overlaps(name, request):
+    figure = plot_overview(request.getfixturevalue(name))
+    figure.draw_without_rendering()
+    boxes = [ax.get_window_extent() for ax in figure.axes]
+    boxes += [legend.get_window_extent() for legend in [*figure.legends, figure.axes[0].get_legend()]]
+    for i, box in enumerate(boxes):
+        assert not [other for other in boxes[:i] if box.padded(-1.0).overlaps(other)]

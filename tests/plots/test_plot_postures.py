@@ -1,0 +1,121 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from brachis.plots import plot_postures
+from brachis.plots.skeleton import drawing_plane, skeleton
+
+POSTURES = 7
+
+
+def drawn(figure, gid):
+    (line,) = [line for line in figure.axes[0].get_lines() if line.get_gid() == gid]
+    return line
+
+
+def planar_arm(q):
+    """Elbow, wrist and tool of the paper's arm, links of 1 m."""
+    angles = np.cumsum(q)
+    return np.cumsum(np.column_stack([np.cos(angles), np.sin(angles)]), axis=0)
+
+
+def test_postures_are_the_arm_at_equidistant_times(line_trajectory):
+    figure = plot_postures(line_trajectory)
+    for k, t in enumerate(np.linspace(0.0, line_trajectory.t_end, POSTURES)):
+        bones = np.column_stack(drawn(figure, f"posture {k}").get_data())
+        expected = np.vstack([[0.0, 0.0], planar_arm(line_trajectory.position(t))])
+        corners = bones[np.append(True, np.linalg.norm(np.diff(bones, axis=0), axis=1) > 1e-9)]
+        np.testing.assert_allclose(corners, expected, atol=1e-12)
+
+
+def test_the_tool_path_is_the_prescribed_line(line_trajectory):
+    x, y = drawn(plot_postures(line_trajectory), "tool path").get_data()
+    np.testing.assert_allclose(x, np.sqrt(3.0), atol=1e-9)
+    np.testing.assert_allclose([y[0], y[-1]], [0.0, 1.0], atol=1e-9)
+    assert len(y) > 100
+
+
+def test_later_postures_are_darker_and_on_top(line_trajectory):
+    figure = plot_postures(line_trajectory)
+    postures = [drawn(figure, f"posture {k}") for k in range(POSTURES)]
+    brightness = [sum(line.get_color()) for line in postures]
+    assert all(np.diff(brightness) < -0.01)
+    assert all(np.diff([line.get_zorder() for line in postures]) > 0.0)
+
+
+def test_only_the_redundant_joint_is_filled(line_trajectory):
+    lines = plot_postures(line_trajectory).axes[0].get_lines()
+    joints = [line for line in lines if line.get_marker() == "o" and line.get_linestyle() == "None"]
+    filled = [line for line in joints if line.get_markerfacecolor() not in {"white", line.get_color()}]
+    wrists = [planar_arm(line_trajectory.position(t))[1] for t in np.linspace(0.0, line_trajectory.t_end, POSTURES)]
+    np.testing.assert_allclose(np.array([np.ravel(line.get_data()) for line in filled]), wrists, atol=1e-12)
+
+
+def test_scales_are_equal_and_axes_labelled(line_trajectory):
+    figure = plot_postures(line_trajectory)
+    figure.draw_without_rendering()
+    ax = figure.axes[0]
+    box = ax.get_window_extent()
+    assert box.width / np.ptp(ax.get_xlim()) == pytest.approx(
+        box.height / np.ptp(ax.get_ylim()),
+        rel=0.006,  # Matplotlib leaves half a per cent as it is
+    )
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ (m)", "$y$ (m)")
+
+
+def test_a_spatial_chain_is_drawn_in_space_with_equal_scales(spatial_trajectory):
+    figure = plot_postures(spatial_trajectory)
+    ax = figure.axes[0]
+    assert ax.name == "3d"
+    assert ax.get_zlabel() == "$z$ (m)"
+    end = np.column_stack(drawn(figure, f"posture {POSTURES - 1}").get_data_3d())
+    tool = spatial_trajectory.robot.tool_placement(spatial_trajectory.q[-1]).translation
+    np.testing.assert_allclose(end[-1], tool, atol=1e-12)
+    path = np.column_stack(drawn(figure, "tool path").get_data_3d())
+    np.testing.assert_allclose(path[-1], tool, atol=1e-12)
+    spans = np.ptp([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()], axis=1)
+    ratios = np.array(ax._box_aspect) / spans
+    np.testing.assert_allclose(ratios, ratios[0])
+
+
+def test_a_prismatic_joint_is_drawn_from_its_rest_to_where_it_is(spatial_trajectory):
+    q = spatial_trajectory.q[-1:]
+    figures = skeleton(spatial_trajectory.robot, q)
+    np.testing.assert_allclose(
+        figures.bones[0, :3], [[0.0, 0.0, 0.0], [0.0, 0.0, 0.2], [0.0, q[0, 0], 0.2]], atol=1e-12
+    )
+    np.testing.assert_allclose(figures.joints[0, 0], [0.0, q[0, 0], 0.2], atol=1e-12)
+    assert figures.bones.shape == (1, 16, 3)
+
+
+TURN = {axis: ("revolute", axis, "0.5 0 0.1") for axis in ("1 0 0", "0 1 0", "0 0 1")}
+SLIDE = {axis: ("prismatic", axis, "0.5 0 0.1") for axis in ("1 0 0", "0 1 0", "0 0 1")}
+
+
+@pytest.mark.parametrize(
+    ("joints", "axes", "plane"),
+    [
+        ([TURN["0 0 1"], TURN["0 0 1"]], (0, 1), (0, 1)),
+        ([TURN["0 0 1"], TURN["0 0 1"]], (1, 0), (0, 1)),
+        ([TURN["0 0 1"], TURN["0 0 1"]], (0,), (0, 1)),
+        ([TURN["0 1 0"], SLIDE["1 0 0"]], (0, 2), (0, 2)),
+        ([TURN["0 1 0"], SLIDE["0 1 0"]], (0, 2), None),
+        ([TURN["0 0 1"], TURN["0 1 0"]], (0, 1), None),
+        ([TURN["0 0 1"], TURN["0 0 1"]], (0, 2), None),
+        ([SLIDE["1 0 0"], SLIDE["0 0 1"]], (0,), (0, 2)),
+        ([SLIDE["1 0 0"], SLIDE["0 1 0"], SLIDE["0 0 1"]], (0, 1), None),
+        ([SLIDE["1 0 0"], SLIDE["0 1 0"]], (0, 1, 2), (0, 1)),
+    ],
+)
+def test_drawing_plane(chain, joints, axes, plane):
+    robot = chain({f"j{i}": joint for i, joint in enumerate(joints)})
+    assert drawing_plane(robot, np.full(len(joints), 0.3), axes) == plane
+
+
+def test_no_legend_entry_for_redundant_joints_where_there_are_none(line_trajectory):
+    labels = [text.get_text() for text in plot_postures(line_trajectory).axes[0].get_legend().get_texts()]
+    assert labels == ["start", "end", "tool path", "redundant"]
+    without = dataclasses.replace(line_trajectory, redundant_joints=())
+    labels = [text.get_text() for text in plot_postures(without).axes[0].get_legend().get_texts()]
+    assert labels == ["start", "end", "tool path"]

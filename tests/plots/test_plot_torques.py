@@ -1,0 +1,93 @@
+import numpy as np
+import pytest
+
+from brachis.plots import plot_torques
+
+INF = float("inf")
+
+
+def lines(ax):
+    return {line.get_label(): line for line in ax.get_lines() if not line.get_label().startswith("_")}
+
+
+def levels(ax):
+    return sorted(line.get_ydata()[0] for line in ax.get_lines() if line.get_linestyle() == "--")
+
+
+def test_lines_are_the_torques_over_their_limits(line_trajectory, with_limits):
+    limits = np.array([10.0, 20.0, 5.0])
+    trajectory = with_limits(line_trajectory, torque=limits)
+    drawn = lines(plot_torques(trajectory).axes[0])
+    assert list(drawn) == ["j1", "j2", "j3"]
+    for joint, line in enumerate(drawn.values()):
+        t, ratio = line.get_data()
+        assert np.array_equal(ratio, trajectory.torque(t)[:, joint] / limits[joint])
+
+
+def test_lines_cover_the_motion_and_miss_no_knot(line_trajectory):
+    t = lines(plot_torques(line_trajectory).axes[0])["j1"].get_xdata()
+    assert t[0] == 0.0
+    assert t[-1] == line_trajectory.t_end
+    knots = np.unique(line_trajectory.knots) * line_trajectory.t_end
+    assert len(knots) > 2
+    assert np.abs(t[:, None] - knots).min(axis=0).max() < 1e-12
+
+
+def test_the_band_is_drawn_and_visible(line_trajectory):
+    ax = plot_torques(line_trajectory).axes[0]
+    assert levels(ax) == [-1.0, 1.0]
+    low, high = ax.get_ylim()
+    assert low < -1.0
+    assert high > 1.0
+
+
+def test_a_torque_beyond_the_limit_stays_in_view(line_trajectory, with_limits):
+    ax = plot_torques(with_limits(line_trajectory, torque=np.array([4.0, 4.0, 4.0]))).axes[0]
+    peak = max(np.abs(line.get_ydata()).max() for line in lines(ax).values())
+    assert peak > 2.0
+    assert ax.get_ylim()[1] > peak
+
+
+def test_knots_are_minor_ticks(line_trajectory):
+    ax = plot_torques(line_trajectory).axes[0]
+    knots = np.unique(line_trajectory.knots)[1:-1] * line_trajectory.t_end
+    assert np.array_equal(ax.get_xticks(minor=True), knots)
+
+
+def test_the_end_time_is_written_and_there_is_no_title(line_trajectory):
+    ax = plot_torques(line_trajectory).axes[0]
+    assert [text for text in ax.texts if f"= {line_trajectory.t_end:.3f}$ s" in text.get_text()]
+    assert ax.get_title() == ""
+    assert ax.get_xlabel() == "$t$ (s)"
+
+
+def test_joints_without_torque_limit_are_left_out(line_trajectory, with_limits):
+    ax = plot_torques(with_limits(line_trajectory, torque=np.array([10.0, INF, 10.0]))).axes[0]
+    assert list(lines(ax)) == ["j1", "j3"]
+    full = lines(plot_torques(line_trajectory).axes[0])
+    assert lines(ax)["j3"].get_color() == full["j3"].get_color()
+
+
+def test_without_any_torque_limit_the_torques_themselves_are_drawn(line_trajectory, with_limits):
+    ax = plot_torques(with_limits(line_trajectory, torque=np.full(3, INF))).axes[0]
+    t, tau = lines(ax)["j2"].get_data()
+    assert np.array_equal(tau, line_trajectory.torque(t)[:, 1])
+    assert levels(ax) == []
+    assert ax.get_ylabel() == r"$\tau$ (Nm)"
+
+
+def test_torque_units_of_mixed_chains(spatial_trajectory, with_limits):
+    ax = plot_torques(with_limits(spatial_trajectory, torque=np.full(7, INF))).axes[0]
+    assert ax.get_ylabel() == r"$\tau$ (Nm, N)"
+
+
+@pytest.mark.parametrize("name", ["line_trajectory", "spatial_trajectory"])
+def test_the_legend_covers_no_data_and_fits_the_figure(name, request):
+    figure = plot_torques(request.getfixturevalue(name))
+    figure.draw_without_rendering()
+    ax = figure.axes[0]
+    box = ax.get_legend().get_window_extent()
+    assert box.y0 >= ax.get_window_extent().y1 - 1.0
+    assert box.x0 >= 0.0
+    assert box.x1 <= figure.bbox.x1
+    assert box.y1 <= figure.bbox.y1 + 1.0

@@ -1,0 +1,129 @@
+import re
+import struct
+import subprocess
+import sys
+
+import matplotlib as mpl
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+
+from brachis.errors import InputError
+from brachis.plots import PLOTS, SUFFIXES, plot_comparison, plot_torques, save_figure, style
+
+MAGIC = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_the_suffix_gives_the_format(line_trajectory, tmp_path, suffix):
+    path = tmp_path / f"figure.{suffix.upper()}"
+    save_figure(plot_torques(line_trajectory), path)
+    assert path.read_bytes().startswith(MAGIC[suffix])
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_the_same_figure_gives_the_same_file(line_trajectory, tmp_path, suffix):
+    paths = [tmp_path / f"{k}.{suffix}" for k in range(2)]
+    for path in paths:
+        save_figure(plot_torques(line_trajectory), path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+@pytest.mark.parametrize("name", ["figure.jpg", "figure", "figure.csv"])
+def test_an_unknown_suffix_is_refused_with_those_allowed(tmp_path, name):
+    path = tmp_path / name
+    with pytest.raises(InputError, match=r"allowed: \.png, \.pdf, \.svg") as caught:
+        save_figure(Figure(), path)
+    assert caught.value.where == str(path)
+    assert not path.exists()
+
+
+def test_a_missing_folder_is_named(tmp_path):
+    path = tmp_path / "nowhere" / "figure.png"
+    with pytest.raises(InputError, match="cannot be written") as caught:
+        save_figure(Figure(), path)
+    assert caught.value.where == str(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "width"), [("torques", 89.0), ("postures", 89.0), ("motion", 89.0), ("overview", 183.0)]
+)
+def test_figures_have_the_width_of_journal_columns(line_trajectory, tmp_path, name, width):
+    path = tmp_path / "figure.png"
+    save_figure(PLOTS[name](line_trajectory), path)
+    pixels = struct.unpack(">I", path.read_bytes()[16:20])[0]
+    assert pixels == pytest.approx(width / 25.4 * 300.0, abs=1.0)
+
+
+@pytest.mark.parametrize("name", sorted(PLOTS))
+@pytest.mark.parametrize("fixture", ["line_trajectory", "spatial_trajectory"])
+def test_all_text_is_readable_and_inside_the_figure(name, fixture, request):
+    figure = PLOTS[name](request.getfixturevalue(fixture))
+    figure.draw_without_rendering()
+    texts = [text for text in figure.findobj(mpl.text.Text) if text.get_visible() and text.get_text().strip()]
+    assert len(texts) > 5
+    assert min(text.get_fontsize() for text in texts) >= 6.0
+    page = figure.bbox.padded(2.0)
+    ticks = {
+        id(label) for ax in figure.axes for axis in ax._axis_map.values() for label in axis.get_ticklabels(which="both")
+    }
+    for text in texts:
+        box = text.get_window_extent()  # tick labels beyond the view have a place but are not drawn
+        assert id(text) in ticks or (page.contains(box.x0, box.y0) and page.contains(box.x1, box.y1)), text.get_text()
+
+
+def test_pdf_fonts_are_truetype_and_svg_text_is_text(line_trajectory, tmp_path):
+    figure = plot_torques(line_trajectory)
+    save_figure(figure, tmp_path / "figure.pdf")
+    content = (tmp_path / "figure.pdf").read_bytes()
+    assert b"/CIDFontType2" in content
+    assert b"/Type3" not in content
+    save_figure(figure, tmp_path / "figure.svg")
+    assert re.search(r"<text[^>]*>j1</text>", (tmp_path / "figure.svg").read_text(encoding="utf-8"))
+
+
+def test_matplotlib_settings_are_left_alone(line_trajectory, tmp_path):
+    before = dict(mpl.rcParams)
+    for name, plot in PLOTS.items():
+        save_figure(plot(line_trajectory), tmp_path / f"{name}.svg")
+    save_figure(plot_comparison([(0.0, "j1", 1.0)]), tmp_path / "comparison.pdf")
+    assert dict(mpl.rcParams) == before
+
+
+def test_joints_are_told_apart():
+    looks = {(look["color"], look["linestyle"]) for look in map(style.joint_style, range(21))}
+    assert len(looks) == 21
+    for colour in style.COLOURS:
+        r, g, b = to_rgb(colour)
+        assert 0.2126 * r + 0.7152 * g + 0.0722 * b < 0.75, f"{colour} is too faint on white"
+
+
+def test_a_dollar_in_a_joint_name_is_no_mathematics(line_trajectory, monkeypatch):
+    monkeypatch.setattr(type(line_trajectory), "joint_names", ("a$\\x", "b$", "c"))
+    figure = plot_torques(line_trajectory)
+    figure.draw_without_rendering()
+    assert figure.axes[0].get_lines()[-3].get_label() == r"a\$\x"
+
+
+LAZY = """
+import sys
+import brachis.plots, brachis.export
+assert "matplotlib" not in sys.modules, "imported with the package"
+from brachis.trajectory import Trajectory
+from brachis.plots import PLOTS, plot_comparison, save_figure
+trajectory = Trajectory.load(sys.argv[1])
+for name, plot in PLOTS.items():
+    save_figure(plot(trajectory), f"{sys.argv[2]}/{name}.png")
+save_figure(plot_comparison([(0.0, "j1", 1.0)]), f"{sys.argv[2]}/comparison.pdf")
+assert "matplotlib.figure" in sys.modules
+assert "matplotlib.pyplot" not in sys.modules, "pyplot was imported"
+"""
+
+
+def test_matplotlib_is_imported_late_and_pyplot_never(line_trajectory, tmp_path):
+    line_trajectory.save(tmp_path / "result.npz")
+    arguments = [sys.executable, "-W", "error", "-c", LAZY, str(tmp_path / "result.npz"), str(tmp_path)]
+    run = subprocess.run(arguments, capture_output=True, text=True, check=False)  # noqa: S603
+    assert run.returncode == 0, run.stderr
+    assert {path.stem for path in tmp_path.glob("*.p[nd][gf]")} == {*PLOTS, "comparison"}
