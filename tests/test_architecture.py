@@ -13,9 +13,27 @@ SOURCE = Path(__file__).parents[1] / "src/brachis"
 
 # Data flows from left to right; a stage may import those before it.
 ORDER = (
-    "errors", "files", "task", "robot", "path", "ik", "kinematics", "bspline", "nlp", "solvers", "refine", "feasibility",
-    "trajectory", "verify", "result", "attempts", "planner", "plots", "export", "cli",
-)  # fmt: skip
+    "errors",
+    "files",
+    "task",
+    "robot",
+    "path",
+    "ik",
+    "kinematics",
+    "bspline",
+    "nlp",
+    "solvers",
+    "refine",
+    "feasibility",
+    "trajectory",
+    "verify",
+    "result",
+    "attempts",
+    "planner",
+    "plots",
+    "export",
+    "cli",
+)
 VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "bspline", "nlp", "solvers", "refine"}
 HEAVY = {"matplotlib", "viser", "yourdfpy", "unopy", "ipyopt"}
 

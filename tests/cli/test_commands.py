@@ -25,9 +25,17 @@ def planned(run, task, write, tmp_path):
 def test_plan_json(planned):
     data, _ = planned
     required = {
-        "t_end", "redundant_joints", "branch", "status", "solver", "iterations", "wall_time_s", "verified", "worst_ratio",
+        "t_end",
+        "redundant_joints",
+        "branch",
+        "status",
+        "solver",
+        "iterations",
+        "wall_time_s",
+        "verified",
+        "worst_ratio",
         "path_error",
-    }  # fmt: skip
+    }
     assert required <= data.keys()
     assert data["verified"] is True
     assert 2.0 < data["t_end"] <= 2.478

@@ -1,0 +1,37 @@
+"""Fixtures of the benchmarks."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+import brachis
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="session")
+def robot() -> brachis.Robot:
+    limits = brachis.LimitSpec(torque=10.0, velocity=None)
+    return brachis.Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
+
+
+@pytest.fixture(scope="session")
+def make_task():
+    def make(joint: str, *, intervals: int = 20, rounds: int = 10, solver: str = "auto") -> brachis.Task:
+        return brachis.load_task(
+            {
+                "brachis": 1,
+                "start": {"joints": [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]},
+                "task_space": ["x", "y"],
+                "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
+                "redundant_joints": [joint],
+                "spline": {"intervals": intervals},
+                "refinement": {"max_rounds": rounds},
+                "solver": {"name": solver},
+            }
+        )
+
+    return make

@@ -1,0 +1,59 @@
+"""Timings of one plan and its parts: ``python3 tasks.py bench``.
+
+Goals (planar 3R, N = 20): 40 ms a plan without refinement, 80 ms with refinement and verification, 1.5 ms for the rows
+and the whole Jacobian at 61 collocation points. ``--benchmark-save`` and ``--benchmark-compare`` compare two runs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brachis import plan, transcribe
+from brachis.nlp.guess import guesses
+from brachis.solvers import SolverOptions, solver_named
+
+
+@pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
+def test_plan_solved_once(benchmark, robot, make_task, joint):
+    """Transcribe, guess and solve at N = 20: no refinement, no verification."""
+    task = make_task(joint)
+
+    def solve():
+        problem, _ = transcribe(robot, task)
+        return solver_named("uno")[0].solve(problem, next(guesses(problem)), SolverOptions(), None)
+
+    report = benchmark(solve)
+    assert report.status.usable
+
+
+@pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
+def test_plan_refined_and_verified(benchmark, robot, make_task, joint):
+    """The library call at N = 20."""
+    result = benchmark(plan, robot, make_task(joint))
+    assert result.verified
+
+
+def test_plan_from_urdf(benchmark, robot, make_task):
+    """The library call with reading the URDF."""
+    result = benchmark(plan, robot.source, {**make_task("j1").to_dict(), "robot": {"gravity": [0, 0, 0]}})
+    assert result.verified
+
+
+@pytest.mark.parametrize("part", ["rows", "rows and Jacobian"])
+def test_evaluation(benchmark, robot, make_task, part):
+    """Rows, or rows and the whole Jacobian, at K = 61."""
+    problem, _ = transcribe(robot, make_task("j1"))
+    assert len(problem.tau) == 61
+    x = next(guesses(problem))
+    step = np.zeros_like(x)
+    step[0] = 1e-9  # another x every time, so that nothing is reused
+
+    def evaluate():
+        nonlocal x
+        x = x + step
+        problem.rows(x)
+        if part != "rows":
+            problem.jacobian(x)
+
+    benchmark(evaluate)
