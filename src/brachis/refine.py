@@ -20,7 +20,7 @@ Solve = Callable[[Transcription, np.ndarray], SolverReport]
 _LARGEST_STRETCH = 0.01
 _GOAL = 0.5
 """Refinement aims at this part of the tolerance: the verification's grid is another one."""
-_NEAR = 0.02
+_NEAR = 0.005
 _COARSE = 20.0
 _FINE = 9
 _ZOOMS = 2
@@ -122,9 +122,13 @@ def _violations(dense: Transcription, x: np.ndarray, goal: float) -> tuple[float
         heights = table.max(axis=1)[np.searchsorted(tau, centres - 1e-9).clip(max=len(tau) - 1)]
         if table.max() > _COARSE * goal:  # the grid's own peaks will do until they are nearly held down
             return float(table.max()), _around(centres[heights > goal], reach)
-        for _ in range(_ZOOMS if len(centres) else 0):
+        for _ in range(_ZOOMS):
+            if not len(centres):
+                break
             centres, heights = _zoomed(dense, x, centres, reach)
             reach *= 2.0 / (_FINE - 1)
+            kept = heights > goal - 0.1 * _NEAR
+            centres, heights = centres[kept], heights[kept]
     except UnreachableError:
         return np.inf, 0.5 * (tau[1::10] + tau[:-1:10])
     return float(max(table.max(), heights.max(initial=-np.inf))), _around(centres[heights > goal], tau[1] - tau[0])
