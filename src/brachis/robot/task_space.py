@@ -40,6 +40,10 @@ class TaskSpace:
         InputError
             A row is unknown, or no axis of the tool frame lies in the yaw plane.
         """
+        if isinstance(rows, str):
+            raise InputError(
+                "this task space is not supported yet", where="task_space", found=rows, allowed="rows out of x, y, z, yaw"
+            )
         names = tuple(rows)
         positions = [row for row in names if row in AXES]
         if any(row not in (*AXES, YAW) for row in names) or len(set(names)) != len(names) or not positions:

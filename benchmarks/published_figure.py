@@ -1,0 +1,39 @@
+"""Where the paper's one published end time lies: 90 degrees, redundant joint j3, by number of intervals."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from brachis import LimitSpec, Robot, plan
+
+ROOT = Path(__file__).parents[1]
+PUBLISHED_S = 2.51
+
+
+def end_time(intervals: int) -> float:
+    """Verified end time, s."""
+    limits = LimitSpec(torque=10.0, velocity=None)
+    robot = Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
+    result = plan(
+        robot,
+        {
+            "brachis": 1,
+            "start": {"joints": [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]},
+            "task_space": ["x", "y"],
+            "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
+            "redundant_joints": ["j3"],
+            "spline": {"intervals": intervals},
+        },
+    )
+    return result.t_end if result.verified else math.nan
+
+
+def main() -> None:
+    """Print one line for every number of intervals."""
+    for intervals in (10, 15, 16, 17, 18, 20, 50):
+        print(f"N = {intervals}: {end_time(intervals):.3f} s (the paper: {PUBLISHED_S} s)")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,136 @@
+"""The README's commands, snippets and table, the docs' snippets, and the examples, all executed."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import brachis
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+BIN = Path(sys.executable).parent
+
+
+@pytest.fixture
+def clone(tmp_path):
+    """A folder that looks like the repository but may be written to."""
+    for name in ("robots", "examples", "docs", "pyproject.toml"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    return tmp_path
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+
+
+def load(path: Path):
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+SNIPPETS = [
+    (page, number)
+    for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+    for number in range(len(blocks(page, "python")))
+]
+
+
+def test_there_are_snippets():
+    assert {page.name for page, _ in SNIPPETS} == {"README.md", "closed_forms.md"}
+
+
+@pytest.mark.parametrize(("page", "number"), SNIPPETS, ids=lambda value: getattr(value, "name", str(value)))
+def test_python_snippet_runs(page, number, clone):
+    code = blocks(page, "python")[number]
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], cwd=clone, capture_output=True, text=True)  # noqa: PLW1510
+    assert done.returncode == 0, done.stderr
+
+
+def test_commands_run(clone):
+    """Every brachis command of the README, in order."""
+    lines = [line.split("#")[0].strip() for line in README.splitlines() if re.match(r"brachis \w", line)]
+    assert len(lines) >= 6
+    environment = {**os.environ, "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
+    for line in lines:
+        done = subprocess.run(shlex.split(line), cwd=clone, env=environment, capture_output=True, text=True)  # noqa: PLW1510
+        assert done.returncode == 0, f"{line}: {done.stderr}"
+    assert (clone / "out/motion.csv").stat().st_size > 1000
+    assert (clone / "out/torques.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_task_commands_exist():
+    tasks = load(ROOT / "tasks.py")
+    for task in re.findall(r"python3 tasks\.py (\w+)", README):
+        assert task in tasks.COMMANDS
+
+
+def test_task_file_of_the_readme_is_planned(clone):
+    (task,) = blocks(ROOT / "README.md", "yaml")
+    (clone / "task.yaml").write_text(task)
+    result = brachis.plan(None, clone / "task.yaml")
+    assert result.verified
+    # The corner of 90 degrees is rounded: the path is shorter than its two legs.
+    assert 0.9 < brachis.transcribe(result.trajectory.robot, result.task)[0].decomposition.path.length < 1.0
+
+
+def test_example_01_python(capsys):
+    result = load(ROOT / "examples/01_scara_line.py").main()
+    assert result.verified
+    assert "end time 2.47" in capsys.readouterr().out
+
+
+@pytest.fixture(scope="module")
+def table():
+    module = load(ROOT / "examples/02_scara_table.py")
+    return module, module.plan_all()
+
+
+def test_example_02_every_plan_is_verified(table):
+    _, results = table
+    assert len(results) == 24
+    assert all(result.verified for result in results.values())
+    assert max(result.verification.worst_ratio for result in results.values()) <= 1 + 1e-4
+    assert max(result.verification.path_error for result in results.values()) <= 1e-9
+
+
+def test_example_02_reaches_the_reference_figures(table):
+    _, results = table
+    assert results[90, "j1"].t_end <= 2.260
+    assert results[90, "j2"].t_end <= 2.267
+    assert results[90, "j3"].t_end <= 2.478
+
+
+def test_table_of_the_readme_is_what_the_example_prints(table):
+    module, results = table
+    printed = README.split("<!-- table: examples/02_scara_table.py -->")[1].split("<!-- end of table -->")[0].strip()
+    made = module.markdown_table(results)
+    number = re.compile(r"\d+\.\d+")
+    assert number.sub("#", printed) == number.sub("#", made)
+    ours, theirs = ([float(value) for value in number.findall(text)] for text in (printed, made))
+    assert ours == pytest.approx(theirs, abs=0.003)  # the last digit differs between machines
+
+
+def test_published_figure_lies_between_16_and_17_intervals():
+    benchmark = load(ROOT / "benchmarks/published_figure.py")
+    assert benchmark.end_time(17) < benchmark.PUBLISHED_S < benchmark.end_time(16)
+
+
+def test_task_reference_is_up_to_date():
+    reference = load(ROOT / "docs/make_task_reference.py")
+    assert reference.PAGE.read_text() == reference.page(), "run python docs/make_task_reference.py"
+
+
+def test_robots_say_where_their_figures_come_from():
+    for folder in (ROOT / "robots").iterdir():
+        assert (folder / "robot.urdf").is_file()
+        assert len((folder / "README.md").read_text()) > 200
