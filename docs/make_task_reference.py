@@ -46,8 +46,8 @@ A task file is YAML. Paths in it are relative to the file; SI units; unknown key
 JSON schema that editors use for completion: put `# yaml-language-server: $schema=task.schema.json` at the top of a task
 file, with the schema saved beside it by `brachis schema --out task.schema.json`.
 
-Limits: an absent key takes the URDF's limit, `null` removes it, a number holds for all joints, a list is in the order of
-the chain, a mapping names joints (others keep the URDF's).
+Limits: an absent key takes the URDF's limit, `null` removes it, a number holds for all joints, a list is in the order
+of the chain, a mapping names joints (others keep the URDF's).
 """
 
 

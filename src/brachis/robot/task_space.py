@@ -42,7 +42,10 @@ class TaskSpace:
         """
         if isinstance(rows, str):
             raise InputError(
-                "this task space is not supported yet", where="task_space", found=rows, allowed="rows out of x, y, z, yaw"
+                "this task space is not supported yet",
+                where="task_space",
+                found=rows,
+                allowed="rows out of x, y, z, yaw",
             )
         names = tuple(rows)
         positions = [row for row in names if row in AXES]
