@@ -18,6 +18,7 @@ from brachis.solvers import SolverReport
 
 Solve = Callable[[Transcription, np.ndarray], SolverReport]
 _LARGEST_STRETCH = 0.01
+_FEASIBLE = 1e-5
 _GOAL = 0.5
 """Refinement aims at this part of the tolerance: the verification's grid is another one."""
 _NEAR = 0.005
@@ -72,18 +73,18 @@ class Refined:
 
     @property
     def converged(self) -> bool:
-        """True where the last round's answer satisfies its rows."""
-        return self.reports[-1].status.usable
+        """True where the first solve ended well, so that `x` is a motion and not a mere iterate."""
+        return self.reports[0].status.usable
 
 
-def refine(problem: Transcription, x: np.ndarray, solve: Solve, options: RefinementOptions) -> Refined:
-    """Solve, and add collocation points until the limits hold on the dense grid.
+def refine(problem: Transcription, first: SolverReport, solve: Solve, options: RefinementOptions) -> Refined:
+    """Add collocation points to a solved problem until the limits hold on the dense grid.
 
     Parameters
     ----------
     problem : Transcription
-    x : (v,) ndarray
-        Starting point.
+    first : SolverReport
+        Of the problem's solve.
     solve : callable
         ``solve(problem, x)`` returns a `SolverReport`.
     options : RefinementOptions
@@ -93,20 +94,30 @@ def refine(problem: Transcription, x: np.ndarray, solve: Solve, options: Refinem
     Refined
     """
     dense = problem.resampled(np.linspace(0.0, 1.0, options.density * (len(problem.tau) - 1) + 1))
-    reports = [solve(problem, x)]
-    for round_number in range(options.max_rounds + 1):
-        if not reports[-1].status.usable:
-            break
+    goal = options.tolerance * _GOAL
+    reports = [first]
+    if not first.status.usable:
+        return Refined(problem, (first,), first.x, np.inf, 1.0)
+    for _ in range(options.max_rounds):
         answer = reports[-1].x
-        excess, places = _violations(dense, answer, options.tolerance * _GOAL)
-        last = round_number == options.max_rounds
-        stretch = _LARGEST_STRETCH if last else options.tolerance
-        stretched, remaining = _stretched(dense, answer, excess, options.tolerance * _GOAL, stretch)
-        if last or remaining <= options.tolerance * _GOAL:
-            return Refined(problem, tuple(reports), stretched, remaining, float(stretched[0] / answer[0]))
-        problem = problem.resampled(_merged(problem.tau, places))
-        reports.append(solve(problem, answer))
-    return Refined(problem, tuple(reports), reports[-1].x, np.inf, 1.0)
+        excess, places = _violations(dense, answer, goal)
+        x, remaining = _stretched(dense, answer, excess, goal, options.tolerance)
+        if remaining <= goal:
+            return Refined(problem, tuple(reports), x, remaining, float(x[0] / answer[0]))
+        finer = problem.resampled(_merged(problem.tau, places))
+        report = solve(finer, answer)
+        if not report.status.usable and not _still_good(report, reports[-1]):
+            break
+        problem = finer
+        reports.append(report)
+    answer = reports[-1].x
+    x, remaining = _stretched(dense, answer, _violations(dense, answer, goal)[0], goal, _LARGEST_STRETCH)
+    return Refined(problem, tuple(reports), x, remaining, float(x[0] / answer[0]))
+
+
+def _still_good(report: SolverReport, before: SolverReport) -> bool:
+    """Tell whether a solve that ended early left a feasible motion about as fast as the one before it."""
+    return report.violation <= _FEASIBLE and report.objective <= before.objective * (1.0 + _LARGEST_STRETCH)
 
 
 def _violations(dense: Transcription, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:

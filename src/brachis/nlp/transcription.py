@@ -32,6 +32,7 @@ from brachis.bspline import clamped_uniform_knots
 from brachis.kinematics import Decomposition, JointDerivatives, JointState
 from brachis.nlp import constraints
 from brachis.nlp.constraints import Constraint, Partials
+from brachis.nlp.constraints.branch_margin import BranchMarginConstraint
 from brachis.nlp.curves import TiedSpline, Windows
 
 _SHORTEST_TIME = 1e-4
@@ -170,6 +171,27 @@ class Transcription:
         upper.append(np.full(steps, np.inf))
         self.lower, self.upper = np.concatenate(lower), np.concatenate(upper)
         self.jacobian_rows, self.jacobian_columns = np.concatenate(rows), np.concatenate(columns)
+
+    def with_margin(self, margin: float) -> Transcription:
+        """Return the same problem with another least branch margin; x keeps its meaning."""
+        other = copy.copy(self)
+        other.constraints = tuple(
+            c.with_margin(margin) if isinstance(c, BranchMarginConstraint) else c for c in self.constraints
+        )
+        other._lay_out_rows()  # noqa: SLF001  (its own class)
+        return other
+
+    def least_margin(self, x: np.ndarray) -> float:
+        """Smallest branch margin at the collocation points; infinite where the closed form has none.
+
+        Raises
+        ------
+        UnreachableError
+            See `state`.
+        """
+        state = self.state(x)
+        margins = [c.values(state).min() for c in self.constraints if isinstance(c, BranchMarginConstraint)]
+        return float(min(margins, default=np.inf))
 
     @property
     def variables(self) -> int:

@@ -81,7 +81,9 @@ class SolverSettings(Model):
 
     name: Name = Field(default="auto", description="Solver; auto takes the best one installed.")
     max_iterations: Count = Field(default=300, ge=1, description="Largest number of iterations.")
-    time_limit: Positive = Field(default=20.0, description="Largest time, s.")
+    time_limit: Positive = Field(
+        default=20.0, description="Time after which no further attempt is begun, and largest time of one solve, s."
+    )
     tolerance: Positive = Field(default=1.0e-6, description="Tolerance of the optimality conditions.")
 
 

@@ -18,13 +18,18 @@ class BranchMarginConstraint:
 
     kind = "branch_margin"
 
-    def __init__(self, decomposition: Decomposition, at_start: np.ndarray) -> None:
+    def __init__(self, decomposition: Decomposition, at_start: np.ndarray, margin: float = MARGIN) -> None:
         self._solver = decomposition.solver
         self._branch = decomposition.branch
         label = decomposition.solver.branches[decomposition.branch]
         count = len(at_start)
         self.labels = tuple(f"{label} {i}" for i in range(count)) if count > 1 else (label,)
-        self.lower, self.upper = np.minimum(MARGIN, 0.5 * at_start), np.full(count, np.inf)
+        self._decomposition, self._at_start = decomposition, at_start
+        self.lower, self.upper = np.minimum(margin, 0.5 * at_start), np.full(count, np.inf)
+
+    def with_margin(self, margin: float) -> BranchMarginConstraint:
+        """Return the same constraint with another least margin."""
+        return BranchMarginConstraint(self._decomposition, self._at_start, margin)
 
     def values(self, state: JointState) -> np.ndarray:
         """See `Constraint.values`."""
