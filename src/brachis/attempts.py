@@ -24,6 +24,8 @@ Listener = Callable[[str], None]
 MARGINS = (0.1, 0.02, MARGIN)
 """Branch margins that are tried in turn; see `continued`."""
 _HELD_BACK = 1.01
+_MANY_VARIABLES = 150
+"""Above this an active-set method spends its time in linear algebra, and ``auto`` begins with the interior point."""
 _PATIENCE = 100
 """Iterations that ``auto`` grants a solver on one guess: an active-set method that needs more is grinding."""
 
@@ -55,9 +57,9 @@ def search(problem: Transcription, task: Task, listener: Listener) -> tuple[tupl
     began = time.perf_counter()
     attempts: list[Attempt] = []
     best: Refined | None = None
-    for x, number, solver, margins in _ways(problem, task):
+    for x, number, solver in _ways(problem, task):
         solve = _solve_with(solver, task, listener)
-        refined = refine(*continued(problem, x, solve, margins), solve, options)
+        refined = refine(*continued(problem, x, solve, MARGINS), solve, options)
         attempts.append(_attempt(refined, number, settings.tolerance))
         listener(attempts[-1].outcome)
         if refined.converged and refined.excess <= settings.tolerance:
@@ -113,16 +115,19 @@ def continued(
     return best or last  # type: ignore[return-value]
 
 
-def _ways(problem: Transcription, task: Task) -> Iterator[tuple[np.ndarray, int, Solver, tuple[float, ...]]]:
-    """Yield guesses, solvers and margins in the order of trying: all guesses with the first solver, then the next."""
+def _ways(problem: Transcription, task: Task) -> Iterator[tuple[np.ndarray, int, Solver]]:
+    """Yield guesses and solvers in the order of trying: every guess with the first two solvers, then the rest."""
     backends = solver_named(task.solver.name)
+    if task.solver.name == "auto" and problem.variables > _MANY_VARIABLES:
+        backends = (backends[1], backends[0], *backends[2:])
     known: list[np.ndarray] = []
     for number, x in enumerate(guesses(problem)):
         known.append(x)
-        yield x, number, backends[0], MARGINS
-    for solver in backends[1:]:
+        for solver in backends[:2]:
+            yield x, number, solver
+    for solver in backends[2:]:
         for number, x in enumerate(known[:2]):
-            yield x, number, solver, MARGINS
+            yield x, number, solver
 
 
 def _solve_with(solver: Solver, task: Task, listener: Listener) -> Solve:

@@ -7,6 +7,7 @@ Uno's limited-memory approximation, the subproblem solver its BQPD. https://gith
 from __future__ import annotations
 
 import io
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +16,11 @@ from brachis.solvers.watch import Watch
 
 name = "uno"
 
-_TRUST_RADIUS = 1.0
-"""Uno's own 10 lets the first step wreck its Hessian approximation: steps then stay tiny for hundreds of iterations
-(seen on 1 of 8 random lines of the planar arm, on none with 1)."""
+_TRUST_RADII = (1.0, 0.2, 0.04)
+"""First trust region radius, and those of the restarts after a stall. Uno's own 10 stalls on 1 of 8 random lines."""
+_STALL_ITERATIONS = 7
+_STALL_PROGRESS = 1e-3
+_STALL_STATIONARITY = 0.1
 _STATUS = {
     "FEASIBLE_KKT_POINT": SolveStatus.OPTIMAL,
     "FEASIBLE_FJ_POINT": SolveStatus.ACCEPTABLE,
@@ -34,9 +37,54 @@ _STOPPED = {
 
 def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
     """See `brachis.solvers.protocol.Solver`."""
+    watch = Watch(problem, options, progress)
+    for radius in _TRUST_RADII:
+        stall = _Stall(watch)
+        result = _run(watch, x, radius, stall)
+        x = np.array(result.primal_solution)
+        if not stall.seen or watch.must_stop():
+            break
+    ending = result.optimization_status.name
+    status = _STOPPED.get(ending) or _STATUS.get(result.solution_status.name, SolveStatus.FAILED)
+    if stall.seen or watch.iterations >= options.max_iterations:
+        status = SolveStatus.ITERATION_LIMIT
+    message = f"{ending.lower()}, {result.solution_status.name.lower()}"
+    return watch.report(name, status, x, np.array(result.constraint_dual_solution), message)
+
+
+class _Stall:
+    """Uno's termination callback, which also stops a solve that creeps.
+
+    Now and then the first steps wreck the Hessian approximation: steps then stay tiny for hundreds of iterations, far
+    from stationarity. A new approximation and a smaller trust region cure it.
+    """
+
+    def __init__(self, watch: Watch) -> None:
+        self._watch = watch
+        self._objectives: list[float] = []
+        self.seen = False
+
+    def __call__(self, point: np.ndarray, *rest: object) -> bool:
+        *_, infeasibility, stationarity, _complementarity = rest
+        objective = self._watch.problem.objective(point)
+        self._objectives.append(objective)
+        stop = self._watch.between_iterations(objective) or self._watch.iterations >= self._watch.options.max_iterations
+        recent = self._objectives[-_STALL_ITERATIONS:]
+        self.seen = (
+            not stop
+            and len(recent) == _STALL_ITERATIONS
+            and max(recent) - min(recent) < _STALL_PROGRESS * abs(objective)
+            and infeasibility < _STALL_PROGRESS  # type: ignore[operator]
+            and stationarity > _STALL_STATIONARITY  # type: ignore[operator]
+        )
+        return stop or self.seen
+
+
+def _run(watch: Watch, x: np.ndarray, radius: float, terminate: _Stall) -> Any:  # noqa: ANN401 (unopy is untyped)
+    """One call of Uno."""
     import unopy  # noqa: PLC0415  (a solver is imported when it is used)
 
-    watch = Watch(problem, options, progress)
+    problem, options = watch.problem, watch.options
     model = unopy.Model(
         unopy.PROBLEM_NONLINEAR, len(x), problem.x_lower.tolist(), problem.x_upper.tolist(), unopy.ZERO_BASED_INDEXING
     )
@@ -66,17 +114,16 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
     backend = unopy.UnoSolver()
     backend.set_preset("filtersqp")
     backend.set_logger_stream(io.StringIO())  # Uno would print to standard output
-    backend.set_option("logger", "SILENT")
-    backend.set_option("print_solution", False)  # noqa: FBT003
-    backend.set_option("primal_tolerance", options.tolerance)
-    backend.set_option("dual_tolerance", options.tolerance)
-    backend.set_option("TR_radius", _TRUST_RADIUS)
-    backend.set_option("max_iterations", options.max_iterations)
-    backend.set_option("time_limit", float(options.time_limit))
-    backend.set_termination_callback(lambda point, *_: watch.between_iterations(float(point[0])))
-    result = backend.optimize(model)
-    answer = np.array(result.primal_solution)
-    ending = result.optimization_status.name
-    status = _STOPPED.get(ending) or _STATUS.get(result.solution_status.name, SolveStatus.FAILED)
-    message = f"{ending.lower()}, {result.solution_status.name.lower()}"
-    return watch.report(name, status, answer, np.array(result.constraint_dual_solution), message)
+    settings = {
+        "logger": "SILENT",
+        "print_solution": False,
+        "primal_tolerance": options.tolerance,
+        "dual_tolerance": options.tolerance,
+        "TR_radius": radius,
+        "max_iterations": options.max_iterations,
+        "time_limit": float(options.time_limit),
+    }
+    for key, value in settings.items():
+        backend.set_option(key, value)
+    backend.set_termination_callback(terminate)
+    return backend.optimize(model)
