@@ -29,9 +29,7 @@ def check_start(robot: Robot, start: np.ndarray, end: np.ndarray | None, path: P
         _check_range(robot, posture, name)
         _check_holding(robot, posture, name)
         target = path.sample(np.array([s])).target[0]
-        miss = task_space.value(robot.tool_placement(posture)) - target
-        angle = np.array([unit == "rad" for unit in task_space.units])
-        miss = np.where(angle, np.remainder(miss + np.pi, 2.0 * np.pi) - np.pi, miss)
+        miss = task_space.difference(task_space.value(robot.tool_placement(posture)), target)
         if np.abs(miss).max() > _ON_PATH:
             worst = int(np.argmax(np.abs(miss)))
             raise StartError(

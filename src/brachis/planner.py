@@ -20,7 +20,7 @@ from brachis.result import Result
 from brachis.robot import Robot, TaskSpace
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import Task, load_task
-from brachis.trajectory import Trajectory
+from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
 from brachis.verify import VerifyOptions, verify_trajectory
 
 
@@ -124,7 +124,7 @@ def _trajectory(decomposition: Decomposition, refined: Refined, task: Task) -> T
     """Turn the answer into a trajectory that can be evaluated without the closed form."""
     motion = refined.problem.motion(refined.x)
     try:
-        nodes = interpolate(decomposition, motion.at, motion.breaks)
+        nodes = interpolate(decomposition, motion.at, motion.breaks, jumps=motion.degree < CONTINUOUS_TORQUE)
     except UnreachableError as error:
         raise PlanningError("the motion found leaves the branch between collocation points") from error
     robot = decomposition.robot
@@ -138,6 +138,7 @@ def _trajectory(decomposition: Decomposition, refined: Refined, task: Task) -> T
         q=nodes.q,
         qdot=nodes.qdot,
         qddot=nodes.qddot,
+        qddot_before=nodes.qddot_before,
         knots=motion.knots,
         degree=motion.degree,
         control_points=motion.control_points,

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from scipy.interpolate import BPoly, BSpline
 
 SCHEMA = 1
-_ARRAYS = ("times", "q", "qdot", "qddot", "knots", "control_points")
+CONTINUOUS_TORQUE = 3
+"""Least B-spline degree that gives continuous acceleration, and so torque."""
+_ARRAYS = ("times", "q", "qdot", "qddot", "qddot_before", "knots", "control_points")
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +54,8 @@ class Trajectory:
     """Joint motion along a path.
 
     Joint positions are quintic polynomials between nodes, which meet the closed form to 1e-11 rad or m and join with
-    continuous position, velocity and acceleration. The path coordinate and the redundant joints are also kept as the
-    B-splines that the optimiser found.
+    continuous position, velocity and (from degree 3 on) acceleration. The path coordinate and the redundant joints are
+    also kept as the B-splines that the optimiser found.
 
     Attributes
     ----------
@@ -68,6 +70,8 @@ class Trajectory:
         Nodes, from 0 to t_end, s.
     q, qdot, qddot : (L + 1, n) ndarray
         Joint motion at the nodes.
+    qddot_before : (L + 1, n) ndarray
+        Acceleration just before the nodes; differs from `qddot` at knots of splines of degree 2.
     knots : (N + 2 d + 1,) ndarray
         B-spline knots in normalised time.
     degree : int
@@ -85,6 +89,7 @@ class Trajectory:
     q: np.ndarray
     qdot: np.ndarray
     qddot: np.ndarray
+    qddot_before: np.ndarray
     knots: np.ndarray
     degree: int
     control_points: np.ndarray
@@ -104,7 +109,7 @@ class Trajectory:
         """Joint positions as SciPy's piecewise polynomial over time."""
         from scipy.interpolate import BPoly  # noqa: PLC0415  (imports in 0.3 s)
 
-        return BPoly(_bernstein(self.times, self.q, self.qdot, self.qddot), self.times)
+        return BPoly(_bernstein(self.times, self.q, self.qdot, self.qddot, self.qddot_before), self.times)
 
     @cached_property
     def path_spline(self) -> BSpline:
@@ -220,7 +225,8 @@ class Trajectory:
         except (KeyError, TypeError) as error:
             raise ResultFileError("the result file lacks a part", where=str(path), found=str(error)) from error
         shape = (len(trajectory.times), robot.n)
-        if any(part.shape != shape for part in (trajectory.q, trajectory.qdot, trajectory.qddot)):
+        parts = (trajectory.q, trajectory.qdot, trajectory.qddot, trajectory.qddot_before)
+        if any(part.shape != shape for part in parts):
             raise ResultFileError("the result file does not fit its robot", where=str(path), allowed=f"{shape} values")
         return trajectory
 
@@ -237,7 +243,7 @@ class Trajectory:
         return np.clip(times, 0.0, self.t_end)
 
 
-def _bernstein(times: np.ndarray, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+def _bernstein(times: np.ndarray, q: np.ndarray, qdot: np.ndarray, after: np.ndarray, before: np.ndarray) -> np.ndarray:
     """Bernstein coefficients (6, L, n) of the quintic Hermite pieces between nodes.
 
     A Bezier curve of degree 5 and length h begins with q = c0, qdot = 5 (c1 - c0) / h and
@@ -245,8 +251,8 @@ def _bernstein(times: np.ndarray, q: np.ndarray, qdot: np.ndarray, qddot: np.nda
     """
     h = np.diff(times)[:, None]
     slope, bend = h / 5.0, h**2 / 20.0
-    left = [q[:-1], q[:-1] + slope * qdot[:-1], q[:-1] + 2.0 * slope * qdot[:-1] + bend * qddot[:-1]]
-    right = [q[1:] - 2.0 * slope * qdot[1:] + bend * qddot[1:], q[1:] - slope * qdot[1:], q[1:]]
+    left = [q[:-1], q[:-1] + slope * qdot[:-1], q[:-1] + 2.0 * slope * qdot[:-1] + bend * after[:-1]]
+    right = [q[1:] - 2.0 * slope * qdot[1:] + bend * before[1:], q[1:] - slope * qdot[1:], q[1:]]
     return np.stack([*left, *right])
 
 

@@ -62,6 +62,7 @@ def spatial_trajectory(line_trajectory):
         q=q,
         qdot=np.zeros_like(q),
         qddot=np.zeros_like(q),
+        qddot_before=np.zeros_like(q),
     )
 
 

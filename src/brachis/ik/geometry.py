@@ -41,7 +41,7 @@ class ChainGeometry:
         """Read the screws off the world Jacobian at the zero posture: columns (v, w), a point is w x v."""
         zero = np.zeros(robot.n)
         data = robot.model.createData()
-        columns = pin.computeJointJacobians(robot.model, data, zero)
+        columns = pin.computeJointJacobians(robot.model, data, zero).reshape(6, robot.n)
         linear, angular = columns[:3].T, columns[3:].T
         revolute = np.linalg.norm(angular, axis=1) > 0.5  # noqa: PLR2004  (unit or zero)
         placement = robot.tool_placement(zero)

@@ -174,16 +174,9 @@ def check_answers(
     for k, branch in zip(*np.nonzero(np.all(np.isfinite(answers), axis=2)), strict=True):
         posture = q[k].copy()
         posture[rest] = answers[k, branch]
-        miss = np.abs(
-            _difference(task_space.value(robot.tool_placement(posture)), targets[k], task_space_angles(task_space))
-        )
+        miss = np.abs(task_space.difference(task_space.value(robot.tool_placement(posture)), targets[k]))
         if not miss.max() < _POSE_TOLERANCE:
             raise NotApplicableError(f"its answers miss the target by {miss.max():.1e}")
-
-
-def task_space_angles(task_space: TaskSpace) -> np.ndarray:
-    """(m,) bool: which rows are angles."""
-    return np.array([unit == "rad" for unit in task_space.units])
 
 
 def _difference(first: np.ndarray, second: np.ndarray, angles: np.ndarray) -> np.ndarray:

@@ -2,7 +2,8 @@
 
 A saved trajectory must be evaluated without the closed form (its family may be a plug-in, and the verification must
 not depend on it). Joint positions, velocities and accelerations at the nodes define quintic Hermite pieces, which join
-with continuous acceleration. Nodes are added until the pieces agree with the closed form in between.
+with continuous acceleration where the curves have one (splines of degree 2 have not, at knots). Nodes are added until
+the pieces agree with the closed form in between.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ _PIECES_PER_INTERVAL = 4
 _POSITION_TOLERANCE = 1e-11
 _ACCELERATION_TOLERANCE = 1e-6
 _ROUNDS = 8
+_JUST_BEFORE = 1e-11
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,8 @@ class Nodes:
     times : (L + 1,) ndarray
         s, ascending from 0 to t_end.
     q, qdot, qddot : (L + 1, n) ndarray
+    qddot_before : (L + 1, n) ndarray
+        Acceleration just before the nodes; differs from `qddot` where it jumps.
     position_error : float
         Largest difference found between the quintic pieces and the closed form, rad or m.
     """
@@ -39,10 +43,11 @@ class Nodes:
     q: np.ndarray
     qdot: np.ndarray
     qddot: np.ndarray
+    qddot_before: np.ndarray
     position_error: float
 
 
-def interpolate(decomposition: Decomposition, curves: Curves, breaks: np.ndarray) -> Nodes:
+def interpolate(decomposition: Decomposition, curves: Curves, breaks: np.ndarray, *, jumps: bool) -> Nodes:
     """Place nodes so densely that quintic pieces stand for the closed form.
 
     Parameters
@@ -52,6 +57,8 @@ def interpolate(decomposition: Decomposition, curves: Curves, breaks: np.ndarray
         ``curves(t)`` returns y, ydot, yddot, each (K, 1 + r), at times (K,) in seconds.
     breaks : (N + 1,) ndarray
         Times between which the curves are polynomials, s.
+    jumps : bool
+        Whether accelerations may jump at the breaks.
 
     Returns
     -------
@@ -67,35 +74,31 @@ def interpolate(decomposition: Decomposition, curves: Curves, breaks: np.ndarray
     error = np.inf
     for _ in range(_ROUNDS):
         middle = 0.5 * (times[1:] + times[:-1])
-        order = np.argsort(merged := np.concatenate([times, middle]))
-        state = decomposition.state(*curves(merged[order]))
-        nodes, between = _pick(state, slice(None, None, 2)), _pick(state, slice(1, None, 2))
-        gap_q, gap_qddot = _middle_gaps(times, nodes, between)
+        merged = np.sort(np.concatenate([times, middle]))
+        state = decomposition.state(*curves(merged))
+        before = state.qddot
+        if jumps:
+            shift = _JUST_BEFORE * breaks[-1] * (np.arange(len(merged)) > 0)
+            before = decomposition.state(*curves(merged - shift)).qddot
+        gap_q, gap_qddot = _middle_gaps(times, state, before)
         error = float(gap_q.max())
-        bad = (gap_q > _POSITION_TOLERANCE) | (gap_qddot > _ACCELERATION_TOLERANCE * (1.0 + np.abs(nodes[2]).max()))
+        bad = (gap_q > _POSITION_TOLERANCE) | (gap_qddot > _ACCELERATION_TOLERANCE * (1.0 + np.abs(state.qddot).max()))
         if not bad.any():
             break
         times = np.union1d(times, middle[bad])
     # The middles are known exactly as well; as nodes they make the error 64 times smaller still.
-    return Nodes(merged[order], state.q, state.qdot, state.qddot, error)
+    return Nodes(merged, state.q, state.qdot, state.qddot, before, error)
 
 
-def _pick(state: JointState, part: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return state.q[part], state.qdot[part], state.qddot[part]
-
-
-def _middle_gaps(
-    times: np.ndarray,
-    nodes: tuple[np.ndarray, np.ndarray, np.ndarray],
-    between: tuple[np.ndarray, np.ndarray, np.ndarray],
-) -> tuple[np.ndarray, np.ndarray]:
+def _middle_gaps(times: np.ndarray, state: JointState, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Largest differences of position and acceleration in the middle of every piece, (L,) each.
 
-    In the middle of a quintic Hermite piece of length h:
+    States alternate between nodes and middles. In the middle of a quintic Hermite piece of length h:
     q = (q0 + q1)/2 + 5h/32 (v0 - v1) + h^2/64 (a0 + a1),  qddot = 3 (v1 - v0) / (2h) - (a0 + a1)/4.
     """
     h = np.diff(times)[:, None]
-    q, v, a = nodes
-    position = 0.5 * (q[1:] + q[:-1]) - 5.0 * h / 32.0 * np.diff(v, axis=0) + h**2 / 64.0 * (a[1:] + a[:-1])
-    acceleration = 1.5 * np.diff(v, axis=0) / h - 0.25 * (a[1:] + a[:-1])
-    return np.abs(position - between[0]).max(axis=1), np.abs(acceleration - between[2]).max(axis=1)
+    q, v = state.q[::2], state.qdot[::2]
+    ends = state.qddot[:-1:2] + before[2::2]
+    position = 0.5 * (q[1:] + q[:-1]) - 5.0 * h / 32.0 * np.diff(v, axis=0) + h**2 / 64.0 * ends
+    acceleration = 1.5 * np.diff(v, axis=0) / h - 0.25 * ends
+    return np.abs(position - state.q[1::2]).max(axis=1), np.abs(acceleration - state.qddot[1::2]).max(axis=1)

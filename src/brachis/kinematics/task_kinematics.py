@@ -66,7 +66,7 @@ class TaskKinematics:
         model, data, frame = self.robot.model, self._data, self._frame
         full = np.empty((len(q), 6, self.robot.n))
         for k in range(len(q)):
-            full[k] = pin.computeFrameJacobian(model, data, q[k], frame, _WORLD_ALIGNED)
+            full[k].flat = pin.computeFrameJacobian(model, data, q[k], frame, _WORLD_ALIGNED)  # (6,) for one joint
         return self._rows(full[:, :3], full[:, 3:])
 
     def bias(self, q: np.ndarray, qdot: np.ndarray) -> np.ndarray:
@@ -83,14 +83,16 @@ class TaskKinematics:
         model, data = self.robot.model, self._data
         linear = np.empty((3, len(q), 3, self.robot.n))
         angular = np.zeros((3, len(q), 3, self.robot.n))
+        shape = linear.shape[2:]
         for k in range(len(q)):
             pin.computeForwardKinematicsDerivatives(model, data, q[k], qdot[k], qddot[k])
-            linear[0, k], linear[1, k], linear[2, k], _ = pin.getPointClassicAccelerationDerivatives(
+            parts = pin.getPointClassicAccelerationDerivatives(
                 model, data, self._joint, self._placement, _WORLD_ALIGNED
             )
+            linear[0, k], linear[1, k], linear[2, k] = (part.reshape(shape) for part in parts[:3])
             if self._yaw is not None:
                 spatial = pin.getFrameAccelerationDerivatives(model, data, self._frame, _WORLD_ALIGNED)
-                angular[0, k], angular[1, k], angular[2, k] = (part[3:] for part in spatial[:3])
+                angular[0, k], angular[1, k], angular[2, k] = (part[3:].reshape(shape) for part in spatial[:3])
         return TaskDerivatives(*(self._rows(linear[i], angular[i]) for i in range(3)))
 
     def _rows(self, linear: np.ndarray, angular: np.ndarray) -> np.ndarray:

@@ -131,7 +131,7 @@ def _follow(
     """One step to the next target: the new posture and the null-space motion made; None if it is not met."""
     kinematics = decomposition.kinematics
     for correction in range(_CORRECTIONS):
-        miss = target - kinematics.position(q[None])[0]
+        miss = decomposition.task_space.difference(target, kinematics.position(q[None])[0])
         if correction and np.abs(miss).max() < 1e-3:  # noqa: PLR2004  (the closed form takes it from here)
             return q, previous
         jacobian = kinematics.jacobian(q[None])[0]
@@ -157,11 +157,11 @@ def _wish(decomposition: Decomposition, strategy: Strategy, q: np.ndarray, previ
         gradients = margin_gradient(decomposition.solver, q[None], decomposition.branch)[0]
         shortfall = np.clip(strategy.threshold - margins, 0.0, 2.0 * strategy.threshold)
         wish += strategy.push * shortfall @ gradients
-    half = 0.5 * (limits.position_upper - limits.position_lower)
-    with np.errstate(invalid="ignore"):
-        place = (q - limits.position_lower) / half - 1.0
-    near = np.isfinite(place) & (np.abs(place) > 0.8)  # noqa: PLR2004
-    wish[near] -= strategy.push * np.sign(place[near]) * (np.abs(place[near]) - 0.8) * half[near]
+    # A tenth of the range, or of a radian or metre where it is open, is kept clear at each end.
+    stroke = limits.position_upper - limits.position_lower
+    clear = 0.1 * np.where(np.isfinite(stroke), stroke, 1.0)
+    wish += strategy.push * np.maximum(limits.position_lower + clear - q, 0.0)
+    wish -= strategy.push * np.maximum(q - limits.position_upper + clear, 0.0)
     if strategy.drift:
         direction = previous if previous.any() else np.eye(len(q))[decomposition.redundant[0]]
         wish += strategy.drift * direction / np.linalg.norm(direction)

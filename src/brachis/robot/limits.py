@@ -9,6 +9,7 @@ import numpy as np
 
 from brachis.errors import InputError, LimitError, UnknownNameError
 
+_SCALABLE = ("torque", "velocity", "acceleration")
 FROM_URDF = "urdf"
 """Marks a limit that is taken from the URDF (the default of every `LimitSpec` entry)."""
 
@@ -89,6 +90,7 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
         A limit names a joint that is not of the chain.
     """
     names = list(joint_names)
+    _check_scale(spec.scale)
     torque = _per_joint("torque", spec.torque, names, [u.effort for u in urdf])
     velocity = _per_joint("velocity", spec.velocity, names, [u.velocity for u in urdf])
     acceleration = _per_joint("acceleration", spec.acceleration, names, [None] * len(names))
@@ -107,6 +109,16 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
         acceleration=acceleration * spec.scale.get("acceleration", 1.0),
         torque=torque * spec.scale.get("torque", 1.0),
     )
+
+
+def _check_scale(scale: Mapping[str, float]) -> None:
+    for kind, factor in scale.items():
+        if kind not in _SCALABLE:
+            raise UnknownNameError("limit to scale", kind, _SCALABLE, where="robot.limits.scale")
+        if not (np.isfinite(factor) and factor > 0.0):
+            raise InputError(
+                "is not a factor", where=f"robot.limits.scale.{kind}", found=factor, allowed="a finite number > 0"
+            )
 
 
 def per_joint_values(key: str, value: object, names: Sequence[str], missing: object) -> list[object]:
@@ -167,7 +179,15 @@ def _ranges(value: PerJointRange, names: list[str], urdf: Sequence[UrdfLimit]) -
         chosen = (stated.lower, stated.upper) if entry == FROM_URDF else entry
         if chosen is None:
             continue
-        ends: Sequence[float | None] = chosen  # type: ignore[assignment]
+        ends = chosen if isinstance(chosen, Sequence) else ()
+        if len(ends) != 2:  # noqa: PLR2004
+            raise LimitError(
+                "position range is not a pair",
+                joint=name,
+                key=f"robot.limits.position.{name}",
+                found=chosen,
+                allowed="[lower, upper]",
+            )
         lower[i] = -np.inf if ends[0] is None else float(ends[0])
         upper[i] = np.inf if ends[1] is None else float(ends[1])
         if not lower[i] < upper[i]:

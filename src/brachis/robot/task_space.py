@@ -13,6 +13,7 @@ from brachis.robot.robot import Robot
 
 AXES = ("x", "y", "z")
 YAW = "yaw"
+_IN_PLANE = 1.0 - 1e-9
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,14 @@ class TaskSpace:
             )
         rotation = robot.tool_placement(np.zeros(robot.n)).rotation
         in_plane = np.linalg.norm(rotation[[AXES.index(row) for row in positions]], axis=0)
-        return cls(names, int(np.argmax(in_plane > 0.9)))  # noqa: PLR2004  (an axis of a planar robot's tool is in or off)
+        if in_plane.max() < _IN_PLANE:
+            raise InputError(
+                "no axis of the tool frame lies in the plane in which yaw turns",
+                where="task_space",
+                found=list(names),
+                hint="Attach a tool frame with an axis in this plane",
+            )
+        return cls(names, int(np.argmax(in_plane >= _IN_PLANE)))
 
     @property
     def m(self) -> int:
@@ -104,3 +112,10 @@ class TaskSpace:
             return coordinates
         direction = rotations[:, rows, self.yaw_axis]
         return np.column_stack([coordinates, np.arctan2(direction[:, 1], direction[:, 0])])
+
+    def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Difference of task coordinates (..., m); angles in [-pi, pi)."""
+        delta = np.asarray(first - second, dtype=float).copy()
+        if self.yaw_axis is not None:
+            delta[..., -1] = np.remainder(delta[..., -1] + np.pi, 2.0 * np.pi) - np.pi
+        return delta

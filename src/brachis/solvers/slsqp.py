@@ -15,6 +15,9 @@ _STATUS = {0: SolveStatus.OPTIMAL, 4: SolveStatus.INFEASIBLE, 8: SolveStatus.ACC
 _UNREACHABLE_ROWS = -1e3
 """SLSQP cannot back off from NaN; a violation far above any real one makes its line search shorten the step."""
 
+_ACTIVE = 1e-5
+_STATIONARY = 1e-3
+
 
 class _StopSolveError(Exception):
     """Leaves SciPy's loop when the solve has to stop."""
@@ -63,4 +66,30 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
         status = SolveStatus.TIME_LIMIT if watch.timed_out else SolveStatus.EVALUATION_ERROR
         return watch.report(name, status, last, None, "stopped")
     status = _STATUS.get(int(result.status), SolveStatus.FAILED)
-    return watch.report(name, status, np.array(result.x), None, str(result.message))
+    answer = np.array(result.x)
+    if status is SolveStatus.OPTIMAL and not _is_stationary(problem, answer):
+        status = SolveStatus.ACCEPTABLE
+    return watch.report(name, status, answer, None, str(result.message))
+
+
+def _is_stationary(problem: Problem, x: np.ndarray) -> bool:
+    """Tell whether multipliers of the right sign balance the gradient.
+
+    SciPy also stops where the objective stands still while rows come true, and calls that a success.
+    """
+    from scipy.optimize import nnls  # noqa: PLC0415
+
+    try:
+        rows, entries = problem.rows(x), problem.jacobian(x)
+    except UnreachableError:
+        return False
+    shape = (len(rows), len(x))
+    dense = sparse.coo_array((entries, (problem.jacobian_rows, problem.jacobian_columns)), shape=shape).toarray()
+    slopes = np.vstack([dense, np.eye(len(x))])
+    values = np.concatenate([rows, x])
+    lower = np.concatenate([problem.lower, problem.x_lower])
+    upper = np.concatenate([problem.upper, problem.x_upper])
+    pushing = np.vstack([slopes[values <= lower + _ACTIVE], -slopes[values >= upper - _ACTIVE]])
+    gradient = problem.gradient()
+    _, distance = nnls(pushing.T, gradient) if len(pushing) else (None, np.linalg.norm(gradient))
+    return bool(distance <= _STATIONARY * np.linalg.norm(gradient))

@@ -66,7 +66,8 @@ class _Stall:
 
     def __call__(self, point: np.ndarray, *rest: object) -> bool:
         *_, infeasibility, stationarity, _complementarity = rest
-        objective = self._watch.problem.objective(point)
+        problem = self._watch.problem
+        objective = problem.objective(point[: len(problem.x_lower)])  # in restoration Uno appends elastic variables
         self._objectives.append(objective)
         stop = self._watch.between_iterations(objective) or self._watch.iterations >= self._watch.options.max_iterations
         recent = self._objectives[-_STALL_ITERATIONS:]

@@ -110,4 +110,5 @@ def residual(problem: Problem, x: np.ndarray) -> float:
     except UnreachableError:
         return np.inf
     gaps = (problem.lower - rows, rows - problem.upper, problem.x_lower - x, x - problem.x_upper)
-    return float(max(0.0, *(gap.max(initial=0.0) for gap in gaps)))
+    worst = float(np.max([gap.max(initial=0.0) for gap in gaps]))
+    return np.inf if np.isnan(worst) else worst

@@ -1,0 +1,167 @@
+"""The registry: what it refuses, what it says then, and that it believes no family."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brachis.errors import DecompositionError, UnknownNameError
+from brachis.ik import NotApplicableError, check_answers, find, find_all, ik_family
+from brachis.robot import Robot, TaskSpace
+from support.chains import Joint, chain_urdf, planar_robot
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return planar_robot("RRR")
+
+
+@pytest.fixture(scope="module")
+def plane(arm):
+    return TaskSpace.of(arm, ["x", "y"])
+
+
+def spatial_robot() -> Robot:
+    """Three joints whose axes are neither parallel nor do they leave slides."""
+    joints = [
+        Joint("revolute", axis=(0.0, 0.0, 1.0)),
+        Joint("revolute", axis=(0.0, 1.0, 0.0), xyz=(0.1, 0.0, 0.4)),
+        Joint("revolute", axis=(0.0, 1.0, 0.0), xyz=(0.5, 0.0, 0.0)),
+    ]
+    return Robot.from_urdf("spatial", urdf_text=chain_urdf(joints, tool=(0.4, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize("names", [[], ["j1", "j2"], ["j1", "j1"]], ids=str)
+def test_wrong_number_of_redundant_joints(arm, plane, names):
+    with pytest.raises(DecompositionError) as caught:
+        find(arm, plane, names)
+    assert caught.value.redundant_joints == tuple(names)
+    assert "3 joints less 2 rows (x, y)" in str(caught.value)
+    assert f"found {len(names)} (" in str(caught.value)
+
+
+def test_more_rows_than_joints():
+    robot = planar_robot("RR")
+    with pytest.raises(DecompositionError, match="fewer joints than the task space has rows"):
+        find(robot, TaskSpace.of(robot, ["x", "y", "yaw"]), [])
+    assert find_all(robot, TaskSpace.of(robot, ["x", "y", "yaw"])) == []
+
+
+def test_unknown_joint_with_suggestion(arm, plane):
+    with pytest.raises(UnknownNameError) as caught:
+        find(arm, plane, ["j33"])
+    assert caught.value.name == "j33"
+    assert caught.value.valid == ("j1", "j2", "j3")
+    assert "Did you mean 'j3'?" in str(caught.value)
+    assert caught.value.where == "redundant_joints"
+
+
+def test_no_closed_form_names_every_reason():
+    robot = spatial_robot()
+    with pytest.raises(DecompositionError) as caught:
+        find(robot, TaskSpace.of(robot, ["x", "y", "z"]), [])
+    reasons = caught.value.reasons
+    assert "j1, j2, j3 would be left over and not prismatic" in reasons["prismatic"]
+    assert "the axes of j1 and j2 are not parallel" in reasons["planar"]
+    assert all(reason in str(caught.value) for reason in reasons.values())
+    assert caught.value.available == ()
+
+
+def test_no_closed_form_lists_the_choices_that_have_one():
+    # Joint 1 slides along the normal: with joint 2 or 3 redundant, x and y hang on one turning joint alone.
+    joints = [Joint("prismatic"), Joint("revolute"), Joint("revolute", xyz=(0.4, 0.0, 0.0))]
+    robot = Robot.from_urdf("scara", urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0)))
+    space = TaskSpace.of(robot, ["x", "y"])
+    with pytest.raises(DecompositionError) as caught:
+        find(robot, space, ["j3"])
+    assert caught.value.reasons["planar"] == "J_nr is singular everywhere"
+    assert caught.value.available == (("j1",),)
+    assert "Choices with a closed form: [j1]" in str(caught.value)
+
+
+def test_yaw_in_another_plane_than_the_joints_is_refused():
+    robot = planar_robot("RRR", "tilted")
+    with pytest.raises(DecompositionError, match="yaw turns in another plane than the joints"):
+        find(robot, TaskSpace(("x", "y", "yaw"), yaw_axis=0), [])
+
+
+def test_rows_that_the_plane_cannot_tell_apart_are_refused():
+    # In the xz-plane y stands still: rows x and y are of rank one.
+    robot = planar_robot("RR", "xz")
+    with pytest.raises(DecompositionError, match="do not fit the plane"):
+        find(robot, TaskSpace.of(robot, ["x", "y"]), [])
+
+
+def test_find_all_reports_every_choice(arm, plane):
+    candidates = find_all(arm, plane)
+    assert [c.redundant_joints for c in candidates] == [("j1",), ("j2",), ("j3",)]
+    assert all(c.family == "planar" and c.solver is not None for c in candidates)
+
+
+def test_order_of_the_redundant_joints_does_not_matter():
+    robot = planar_robot("RRRR")
+    candidate = find(robot, TaskSpace.of(robot, ["x", "y"]), ["j3", "j1"])
+    assert candidate.redundant_joints == ("j1", "j3")
+
+
+class Wrapped:
+    """A solver that changes another one's answers."""
+
+    kind = "closed_form"
+
+    def __init__(self, inner, change):
+        self.branches, self._inner, self._change = inner.branches, inner, change
+
+    def solve(self, targets, q_r):
+        return self._change(self._inner.solve(targets, q_r))
+
+    def branch_margins(self, q, branch):
+        return self._inner.branch_margins(q, branch)
+
+
+def third_party(arm, plane, change):
+    """A family of another package that answers for redundant joint j3 only."""
+    inner = find(arm, plane, ["j3"]).solver
+
+    @ik_family("third_party", source="this test")
+    def family(geometry, _task_space, redundant):
+        if geometry.joint_names[redundant[0]] != "j3":
+            raise NotApplicableError("only j3")
+        return Wrapped(inner, change)
+
+    return family
+
+
+def test_a_third_party_family_comes_first_where_it_fits(arm, plane):
+    family = third_party(arm, plane, lambda answers: answers)
+    assert family.source == "this test"
+    candidate = find(arm, plane, ["j3"], families=[family])
+    assert candidate.family == "third_party"
+    assert isinstance(candidate.solver, Wrapped)
+    other = find(arm, plane, ["j1"], families=[family])
+    assert other.family == "planar"
+    assert other.reasons["third_party"] == "only j3"
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda answers: answers + 1e-4, "leave out postures"),
+        (lambda answers: answers[:, ::-1] * np.array([1.0, np.nan])[:, None], "leave out postures"),
+        (lambda answers: np.concatenate([answers, answers + 1e-6], axis=1), "miss the target by"),
+        (lambda answers: np.full_like(answers, np.nan), "leave out postures"),
+    ],
+    ids=["off by 1e-4", "one branch lost", "a branch that misses", "no answers"],
+)
+def test_a_wrong_family_is_rejected_and_the_next_one_taken(arm, plane, change, reason):
+    family = third_party(arm, plane, change)
+    candidate = find(arm, plane, ["j3"], families=[family])
+    assert candidate.family == "planar"
+    assert reason in candidate.reasons["third_party"]
+    with pytest.raises(NotApplicableError, match=reason):
+        check_answers(arm, plane, (2,), Wrapped(find(arm, plane, ["j3"]).solver, change))
+
+
+def test_lifted_angles_are_right_answers(arm, plane):
+    family = third_party(arm, plane, lambda answers: answers + 2.0 * np.pi)
+    assert find(arm, plane, ["j3"], families=[family]).family == "third_party"

@@ -1,0 +1,135 @@
+"""The decomposition's motion against differences in time, and its derivatives against central differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brachis.errors import UnreachableError
+from brachis.robot import Robot
+from support.chains import planar_robot
+from support.motions import Sway, decomposition
+
+CASES = {
+    "r = 0, 2R": ("RR", "xz", ["x", "z"], [0.4, 1.2], []),
+    "r = 0, 3R with yaw": ("RRR", "xy", ["x", "y", "yaw"], [0.4, 1.8, 0.5], []),
+    "r = 1, 3R": ("RRR", "xy", ["x", "y"], [0.4, 1.0, 0.5], ["j2"]),
+    "r = 1, RPR": ("RPR", "tilted", ["x", "y"], [0.4, 0.2, 0.9], ["j1"]),
+    "r = 1, 4R with yaw": ("RRRR", "xz", ["x", "z", "yaw"], [0.4, -0.6, 1.4, 0.8], ["j1"]),
+    "r = 2, 4R": ("RRRR", "xz", ["x", "z"], [0.4, 0.8, 0.7, 0.5], ["j1", "j4"]),
+    "r = 2, PPRR": ("PPRR", "xy", ["x", "y"], [0.1, 0.2, 0.7, -0.1], ["j1", "j3"]),
+}
+
+
+def curved(robot, rows, start):
+    """An arc about a point near the tool, with yaw along the tangent: all derivatives of the path differ from zero."""
+    tool = robot.tool_placement(np.array(start, dtype=float)).translation[["xyz".index(row) for row in rows[:2]]]
+    arc = {"center": (tool + np.array([0.12, -0.1])).tolist(), "angle_deg": 25.0}
+    return [{"arc": {**arc, "yaw": "tangent"} if "yaw" in rows else arc}]
+
+
+@pytest.fixture(params=CASES, ids=str, scope="module")
+def motion(request):
+    pattern, plane, rows, start, redundant = CASES[request.param]
+    robot = planar_robot(pattern, plane)
+    return Sway(decomposition(robot, rows, curved(robot, rows, start), start, redundant), amplitude=0.1)
+
+
+T = np.linspace(0.02, 0.98, 25)
+
+
+def test_path_is_met_exactly(motion):
+    y, _, _ = motion(T)
+    chain = motion.decomposition
+    targets = chain.path.sample(y[:, 0]).target
+    np.testing.assert_allclose(chain.kinematics.position(chain.postures(y)), targets, atol=1e-12)
+
+
+def test_motion_is_the_time_derivative_of_the_postures(motion):
+    chain, h = motion.decomposition, 1e-4
+    state = chain.state(*motion(T))
+    before, here, after = (chain.postures(motion(T + step)[0]) for step in (-h, 0.0, h))
+    np.testing.assert_allclose(state.q, here, atol=1e-14)
+    speed, bend = (after - before) / (2.0 * h), (after - 2.0 * here + before) / h**2
+    assert np.abs(speed).max() > 0.1
+    assert np.abs(bend).max() > 0.1
+    np.testing.assert_allclose(state.qdot, speed, atol=1e-5 * np.abs(speed).max())
+    np.testing.assert_allclose(state.qddot, bend, atol=1e-5 * np.abs(bend).max())
+
+
+def test_derivatives(motion):
+    chain, h = motion.decomposition, 1e-5
+    parts = motion(T)
+    state = chain.state(*parts)
+    exact = chain.derivatives(state)
+
+    def difference(place, column):
+        """Central differences of q, qdot and qddot by one column of y, ydot or yddot."""
+        sides = []
+        for sign in (1.0, -1.0):
+            moved = [part.copy() for part in parts]
+            moved[place][:, column] += sign * h
+            sides.append(chain.state(*moved))
+        return [(getattr(sides[0], name) - getattr(sides[1], name)) / (2.0 * h) for name in ("q", "qdot", "qddot")]
+
+    for column in range(1 + chain.r):
+        by_y, by_ydot, by_yddot = (difference(place, column) for place in range(3))
+        gradient = state.gradient[:, :, column]
+        # Zeros: position does not hang on speed, nor speed on acceleration.
+        for value, expected in (
+            (gradient, by_y[0]),
+            (exact.qdot_y[:, :, column], by_y[1]),
+            (exact.qddot_y[:, :, column], by_y[2]),
+            (0.0 * gradient, by_ydot[0]),
+            (gradient, by_ydot[1]),
+            (exact.qddot_ydot[:, :, column], by_ydot[2]),
+            (0.0 * gradient, by_yddot[0]),
+            (0.0 * gradient, by_yddot[1]),
+            (gradient, by_yddot[2]),
+        ):
+            np.testing.assert_allclose(value, expected, atol=2e-7 * max(1.0, np.abs(expected).max()))
+    assert min(np.abs(part).max() for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot)) > 0.1
+
+
+def test_rows_of_redundant_joints_are_constant(motion):
+    chain = motion.decomposition
+    state = chain.state(*motion(T))
+    exact = chain.derivatives(state)
+    np.testing.assert_array_equal(state.q[:, chain.redundant], motion(T)[0][:, 1:])
+    for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot):
+        np.testing.assert_array_equal(part[:, chain.redundant], 0.0)
+
+
+@pytest.mark.parametrize("turns", [-3, 0, 2])
+def test_angles_are_lifted_from_the_start_posture_on_and_stay_continuous_over_many_turns(scara_urdf, turns):
+    # Joint 1 follows a circle about the base three times: it must reach 6 pi, not jump back.
+    robot = Robot.from_urdf(scara_urdf)
+    start = np.array([0.2 + 2.0 * np.pi * turns, 1.0, 0.6])
+    circle = [{"circle": {"center": [0.0, 0.0], "turns": 3}}]
+    chain = decomposition(robot, ["x", "y"], circle, start, ["j3"])
+    s = np.linspace(0.0, 1.0, 400)
+    q = chain.postures(np.stack([s, np.full(400, 0.6)], axis=1))
+    np.testing.assert_allclose(q[0], start, atol=1e-12)
+    np.testing.assert_allclose(q[:, 0], start[0] + 6.0 * np.pi * s, atol=1e-9)
+    np.testing.assert_allclose(q[:, 1:], np.broadcast_to(start[1:], (400, 2)), atol=1e-9)
+
+
+def test_slides_are_never_wrapped():
+    robot = planar_robot("PPR")
+    start = [20.0, -30.0, 0.4]
+    chain = decomposition(robot, ["x", "y"], [{"line": {"by": [40.0, 0.0]}}], start, ["j3"])
+    s = np.linspace(0.0, 1.0, 4)  # steps far beyond 2 pi
+    q = chain.postures(np.stack([s, np.full(4, 0.4)], axis=1))
+    np.testing.assert_allclose(q[0], start, atol=1e-9)
+    np.testing.assert_allclose(chain.kinematics.position(q), chain.path.sample(s).target, atol=1e-9)
+
+
+def test_target_out_of_reach(scara_urdf):
+    robot = Robot.from_urdf(scara_urdf)
+    chain = decomposition(robot, ["x", "y"], [{"line": {"by": [3.0, 0.0]}}], [0.2, 1.0, 0.6], ["j3"])
+    y = np.array([[0.0, 0.6], [1.0, 0.6]])
+    postures = chain.postures(y)
+    assert np.isfinite(postures[0]).all()
+    assert np.isnan(postures[1, :2]).all()
+    with pytest.raises(UnreachableError, match="out of the branch's reach"):
+        chain.state(y, 0.0 * y, 0.0 * y)

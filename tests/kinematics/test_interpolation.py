@@ -1,0 +1,63 @@
+"""Nodes and quintic pieces against the closed form at other times."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import BPoly
+
+from brachis.errors import UnreachableError
+from brachis.kinematics import interpolate
+from brachis.robot import Robot
+from support.chains import planar_robot
+from support.motions import Sway, decomposition
+
+
+def pieces(nodes) -> BPoly:
+    """SciPy's quintic pieces from the nodes' values and derivatives."""
+    return BPoly.from_derivatives(nodes.times, np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1))
+
+
+@pytest.mark.parametrize(
+    ("pattern", "start", "redundant"),
+    [("RRR", [0.4, 1.0, 0.5], ["j2"]), ("RPR", [0.4, 0.2, 0.9], ["j1"]), ("RRRR", [0.4, 0.8, 0.7, 0.5], ["j1", "j4"])],
+)
+def test_pieces_agree_with_the_closed_form_at_random_times(pattern, start, redundant):
+    chain = decomposition(planar_robot(pattern), ["x", "y"], [{"line": {"by": [-0.15, 0.1]}}], start, redundant)
+    motion = Sway(chain)
+    nodes = interpolate(chain, motion, np.linspace(0.0, 1.0, 6), jumps=False)
+    assert nodes.position_error <= 1e-11
+    t = np.sort(np.random.default_rng(0).uniform(0.0, 1.0, 500))
+    state, curve = chain.state(*motion(t)), pieces(nodes)
+    assert np.abs(curve(t) - state.q).max() < 1e-10
+    assert np.abs(curve(t, nu=1) - state.qdot).max() < 1e-8
+    assert np.abs(curve(t, nu=2) - state.qddot).max() < 1e-5 * np.abs(state.qddot).max()
+
+
+def test_nodes_contain_the_breaks_and_are_denser_where_the_motion_bends(scara_urdf):
+    robot = Robot.from_urdf(scara_urdf)
+    # A line that passes the base closely: joint 1 turns quickly in the middle of it.
+    start = [np.deg2rad(-40.0), np.deg2rad(100.0), np.deg2rad(65.0)]
+    tool = robot.tool_placement(np.array(start)).translation[:2]
+    chain = decomposition(robot, ["x", "y"], [{"line": {"to": [-tool[0], tool[1]]}}], start, ["j2"])
+    motion = Sway(chain, amplitude=0.0)
+    breaks = np.linspace(0.0, 1.0, 5)
+    nodes = interpolate(chain, motion, breaks, jumps=False)
+    assert np.isin(breaks, nodes.times).all()
+    assert np.all(np.diff(nodes.times) > 0.0)
+    steps = np.diff(nodes.times)
+    assert steps.max() > 1.9 * steps.min()
+    assert nodes.position_error <= 1e-11
+
+
+def test_motion_that_leaves_the_branch_between_the_breaks(scara_urdf):
+    robot = Robot.from_urdf(scara_urdf)
+    chain = decomposition(robot, ["x", "y"], [{"line": {"by": [0.0, 0.1]}}], [0.2, 1.0, 0.6], ["j3"])
+
+    def excursion(t):
+        s = np.sin(4.0 * np.pi * t) ** 2 * 60.0  # far off at all times but the quarters
+        y = np.stack([s, np.full_like(t, 0.6)], axis=1)
+        return y, 0.0 * y, 0.0 * y
+
+    with pytest.raises(UnreachableError):
+        interpolate(chain, excursion, np.array([0.0, 1.0]), jumps=False)

@@ -1,0 +1,181 @@
+"""Plans whose shortest time is known by hand: slides pushed by limited forces.
+
+A mass m, pushed over a distance L by a force of at most F, needs t* = 2 sqrt(m L / F): full force up to the middle,
+full force back from there (bang-bang). A cubic spline's acceleration is linear between knots. With N even intervals and
+free acceleration at the ends its best is a ramp over the two middle intervals, with rest: full two more ramps at the
+ends:
+
+    rest: velocity    t = t* / sqrt(1 - 4 / (3 N^2))
+    rest: full        t = t* / sqrt(1 - 2 / N)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import brachis
+from support.chains import INERTIAL, Joint, chain_urdf
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
+SLACK = 2e-4  # refinement may lengthen the time by its tolerance
+
+
+@pytest.fixture
+def slides(tmp_path):
+    """Write the URDF of slides, each with MASS, and return its path."""
+
+    def write(axes, forces) -> str:
+        limits = [{"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": force} for force in forces]
+        joints = [
+            Joint("prismatic", axis=axis, limit=limit, inertial=INERTIAL.format(mass=MASS))
+            for axis, limit in zip(axes, limits, strict=True)
+        ]
+        file = tmp_path / "slides.urdf"
+        file.write_text(chain_urdf(joints, tool=(0.1, 0.2, 0.3)), encoding="utf-8")
+        return str(file)
+
+    return write
+
+
+def plan(
+    urdf, rows, by, *, redundant=(), robot=None, joints=None, intervals=40, degree=3, rest="velocity", solver="auto"
+):
+    task = {
+        "brachis": 1,
+        "robot": {"gravity": [0, 0, 0], **(robot or {})},
+        "start": {"joints": joints or [0.0] * len(rows)},
+        "task_space": rows,
+        "path": [{"line": {"by": by}}],
+        "redundant_joints": list(redundant),
+        "spline": {"degree": degree, "intervals": intervals, "rest": rest},
+        "solver": {"name": solver},
+    }
+    return brachis.plan(urdf, task)
+
+
+def fastest(result) -> np.ndarray:
+    """Largest speed of every joint on a dense grid."""
+    return np.abs(result.trajectory.velocity(np.linspace(0.0, result.t_end, 4001))).max(axis=0)
+
+
+def bang_bang(mass: float) -> float:
+    return 2.0 * np.sqrt(mass * LENGTH / FORCE)
+
+
+# Fails today: robots of one joint break in ChainGeometry and TaskKinematics.
+def test_one_slide(slides):
+    result = plan(slides([X], [FORCE]), ["x"], [LENGTH])
+    assert result.verified
+    assert bang_bang(MASS) <= result.t_end < 1.01 * bang_bang(MASS)
+
+
+@pytest.mark.parametrize(("axis", "mass"), [(0, 2.0 * MASS), (1, MASS)], ids=["lower slide", "upper slide"])
+def test_gantry_approaches_bang_bang_from_above(slides, axis, mass):
+    # The lower slide carries the upper one.
+    urdf, by = slides([X, Y], [FORCE, FORCE]), [LENGTH * (axis == 0), LENGTH * (axis == 1)]
+    times = {}
+    for intervals in (10, 20, 40):
+        result = plan(urdf, ["x", "y"], by, intervals=intervals)
+        assert result.verified
+        times[intervals] = result.t_end
+        expected = bang_bang(mass) / np.sqrt(1.0 - 4.0 / (3.0 * intervals**2))
+        assert result.t_end == pytest.approx(expected, rel=SLACK)
+    assert times[10] > times[20] > times[40] > bang_bang(mass)
+    assert times[40] < 1.01 * bang_bang(mass)
+
+
+@pytest.mark.parametrize("intervals", [10, 20, 40])
+def test_rest_in_acceleration_costs_two_more_ramps(slides, intervals):
+    result = plan(slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, 0.0], intervals=intervals, rest="full")
+    assert result.verified
+    assert result.t_end == pytest.approx(bang_bang(2.0 * MASS) / np.sqrt(1.0 - 2.0 / intervals), rel=SLACK)
+    ends = result.trajectory.acceleration(np.array([0.0, result.t_end]))
+    np.testing.assert_allclose(ends, 0.0, atol=1e-9)
+
+
+# Fails today for 40 intervals: acceleration jumps at knots, and nodes are packed there until rounding spoils the
+# pieces (jumps of acceleration and torque of 1.5e-6 against 1e-6 allowed).
+@pytest.mark.parametrize("intervals", [10, 40])
+def test_parabolas_are_bang_bang_itself(slides, intervals):
+    result = plan(slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, 0.0], intervals=intervals, degree=2)
+    assert result.t_end == pytest.approx(bang_bang(2.0 * MASS), rel=SLACK)
+    assert result.verified, result.verification
+
+
+def test_diagonal_line_is_as_fast_as_its_slower_slide(slides):
+    # Along the diagonal each slide goes LENGTH; the lower one, which carries 2 MASS, sets the pace.
+    result = plan(slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, LENGTH])
+    assert result.verified
+    assert bang_bang(2.0 * MASS) < result.t_end < 1.01 * bang_bang(2.0 * MASS)
+
+
+def test_velocity_limit_gives_the_trapezoid(slides):
+    urdf, mass, limit = slides([X, Y], [FORCE, FORCE]), 2.0 * MASS, 2.0
+    free = plan(urdf, ["x", "y"], [LENGTH, 0.0])
+    assert fastest(free)[0] > 1.5 * limit, "without the limit the slide is faster than the limit"
+    result = plan(urdf, ["x", "y"], [LENGTH, 0.0], robot={"limits": {"velocity": limit}})
+    assert result.verified
+    assert fastest(result)[0] == pytest.approx(limit, rel=SLACK)
+    trapezoid = LENGTH / limit + limit * mass / FORCE
+    assert trapezoid <= result.t_end < 1.01 * trapezoid
+    assert result.t_end > 1.1 * free.t_end
+
+
+def test_acceleration_limit(slides):
+    urdf, limit = slides([X, Y], [FORCE, FORCE]), 6.0
+    t = np.linspace(0.0, 1.0, 2001)
+    free = plan(urdf, ["x", "y"], [LENGTH, 0.0])
+    assert np.abs(free.trajectory.acceleration(t * free.t_end)).max() > 2.0 * limit
+    result = plan(urdf, ["x", "y"], [LENGTH, 0.0], robot={"limits": {"acceleration": limit, "torque": None}})
+    assert result.verified
+    assert np.abs(result.trajectory.acceleration(t * result.t_end)).max() <= limit * (1.0 + SLACK)
+    best = 2.0 * np.sqrt(LENGTH / limit)
+    assert best <= result.t_end < 1.01 * best
+
+
+def test_armature_is_carried_like_mass(slides):
+    result = plan(
+        slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, 0.0], robot={"friction": {"armature": {"j1": 3.0}}}
+    )
+    best = bang_bang(2.0 * MASS + 3.0)
+    assert result.verified
+    assert best <= result.t_end < 1.01 * best
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0], ids=["up", "down"])
+def test_lifting_against_gravity(slides, way):
+    # Full force up gives F/m - g, full force down F/m + g; from rest to rest t^2 = 2 L (a + b) / (a b).
+    force = 30.0
+    up, down = force / MASS - 9.81, force / MASS + 9.81
+    best = np.sqrt(2.0 * LENGTH * (up + down) / (up * down))
+    # The slide along x carries the lift.
+    result = plan(slides([X, Z], [200.0, force]), ["x", "z"], [0.0, way * LENGTH], robot={"gravity": [0, 0, -9.81]})
+    assert result.verified
+    assert best <= result.t_end < 1.01 * best
+
+
+def test_two_slides_along_one_line_recoil_against_each_other(slides):
+    # The upper slide's force alone moves the tool: a = F / m. The lower slide is too weak to hold still (30 N against
+    # 50 N) and has to give way, which costs no time: the best is that of the upper slide alone.
+    weak = 30.0
+    urdf = slides([X, X], [weak, FORCE])
+    held = {"limits": {"position": {"j1": [-1e-4, 1e-4]}}}
+    # The interior-point method: an active-set method has to choose among rows that are all but equal.
+    stiff = plan(urdf, ["x"], [LENGTH], redundant=["j1"], joints=[0.0, 0.0], robot=held, solver="ipopt")
+    result = plan(urdf, ["x"], [LENGTH], redundant=["j1"], joints=[0.0, 0.0])
+    assert result.verified
+    assert bang_bang(MASS) <= result.t_end < 1.01 * bang_bang(MASS)
+    assert np.abs(result.trajectory.position(np.linspace(0.0, result.t_end, 99))[:, 0]).max() > 0.05
+    # Held in place, the lower slide passes on no more than its own force.
+    assert stiff.t_end == pytest.approx(2.0 * np.sqrt(MASS * LENGTH / weak), rel=0.02)
+
+
+@pytest.mark.parametrize("solver", ["uno", "ipopt", "slsqp"])
+def test_every_solver_finds_the_optimum(slides, solver):
+    urdf = slides([X, Y], [FORCE, FORCE])
+    result = plan(urdf, ["x", "y"], [LENGTH, 0.0], intervals=10, solver=solver)
+    assert result.verified
+    assert result.report.solver == solver
+    assert result.t_end == pytest.approx(bang_bang(2.0 * MASS) / np.sqrt(1.0 - 4.0 / 300.0), rel=5e-4)

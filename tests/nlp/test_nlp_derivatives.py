@@ -1,0 +1,128 @@
+"""The whole Jacobian of the nonlinear program against central differences, and its sparsity pattern."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brachis.nlp import constraints
+from support.transcriptions import CASES, problem_of, reachable_points
+
+KINDS = ["torque", "velocity", "acceleration", "position", "branch_margin"]
+
+
+def blocks(problem) -> dict[str, slice]:
+    """Rows of every kind of constraint, in the documented order."""
+    result, first = {}, 0
+    for constraint in problem.constraints:
+        size = len(constraint.lower) * len(problem.tau)
+        result[constraint.kind] = slice(first, first + size)
+        first += size
+    result["progress"] = slice(first, len(problem.lower))
+    return result
+
+
+def dense(problem, x) -> np.ndarray:
+    matrix = np.zeros((len(problem.lower), problem.variables))
+    np.add.at(matrix, (problem.jacobian_rows, problem.jacobian_columns), problem.jacobian(x))
+    return matrix
+
+
+def differences(problem, x, h=1e-4) -> np.ndarray:
+    """Central differences of fourth order, column by column."""
+    columns = []
+    for unit in np.eye(len(x)):
+        near = problem.rows(x + h * unit) - problem.rows(x - h * unit)
+        far = problem.rows(x + 2.0 * h * unit) - problem.rows(x - 2.0 * h * unit)
+        columns.append((8.0 * near - far) / (12.0 * h))
+    return np.stack(columns, axis=1)
+
+
+@pytest.fixture(params=[(case, degree) for case in CASES for degree in (3, 4, 5)], ids=str, scope="module")
+def problem(request):
+    case, degree = request.param
+    return problem_of(case, degree=degree)
+
+
+def test_jacobian_equals_differences(problem):
+    parts = blocks(problem)
+    assert list(parts) == [*KINDS, "progress"]
+    assert list(constraints.TABLE) == KINDS
+    for x in reachable_points(problem, 2):
+        exact, expected = dense(problem, x), differences(problem, x)
+        for kind, rows in parts.items():
+            assert np.count_nonzero(exact[rows]) > 0, f"{kind} has no entries"
+            scale = np.abs(expected[rows]).max()
+            error = np.abs(exact[rows] - expected[rows]).max() / scale
+            assert error <= 1e-6, f"{kind}: relative error {error:.1e}"
+            # Every kind but positions and margins sees the end time.
+            timed = kind in ("torque", "velocity", "acceleration")
+            assert bool(np.abs(exact[rows, 0]).max() > 1e-3) == timed
+
+
+def test_pattern_is_fixed_has_no_place_twice_and_covers_all(problem):
+    places = problem.jacobian_rows * problem.variables + problem.jacobian_columns
+    assert len(np.unique(places)) == len(places)
+    assert problem.jacobian_rows.max() < len(problem.lower)
+    assert problem.jacobian_columns.max() < problem.variables
+    pattern = np.zeros((len(problem.lower), problem.variables), dtype=bool)
+    pattern[problem.jacobian_rows, problem.jacobian_columns] = True
+    for x in reachable_points(problem, 2):
+        assert len(problem.jacobian(x)) == len(places)
+        wrong = np.abs(differences(problem, x)) > 1e-7
+        assert not np.any(wrong & ~pattern)
+    # Each row touches the end time and at most degree + 1 control points of every curve.
+    widest = np.bincount(problem.jacobian_rows).max()
+    assert widest <= 1 + (problem.degree + 1) * (1 + problem.decomposition.r)
+
+
+def test_gradient_of_the_objective(problem):
+    x = reachable_points(problem, 1)[0]
+    assert problem.objective(x) == x[0]
+    np.testing.assert_array_equal(problem.gradient(), np.eye(problem.variables)[0])
+
+
+def test_rows_are_ratios_to_the_limits(problem):
+    x = reachable_points(problem, 1)[0]
+    robot, state, parts = problem.decomposition.robot, problem.state(x), blocks(problem)
+    values = problem.rows(x)
+    n = robot.n
+    np.testing.assert_allclose(values[parts["velocity"]].reshape(-1, n), state.qdot / robot.limits.velocity)
+    np.testing.assert_allclose(values[parts["acceleration"]].reshape(-1, n), state.qddot / 20.0)
+    for kind in ("torque", "velocity", "acceleration"):
+        np.testing.assert_array_equal(problem.upper[parts[kind]], 1.0)
+        np.testing.assert_array_equal(problem.lower[parts[kind]], -1.0)
+    low, high = robot.limits.position_lower, robot.limits.position_upper
+    ratio = values[parts["position"]].reshape(-1, n)
+    np.testing.assert_allclose(low + (ratio + 1.0) * (high - low) / 2.0, state.q, atol=1e-12)
+    assert np.all(problem.lower[parts["branch_margin"]] > 0.0)
+    # Full rest ties three control points of s at each end to 0 and 1, which the bounds 0 <= s <= 1 take care of.
+    free = problem.motion(x).control_points[0, 3:-3]
+    np.testing.assert_allclose(values[parts["progress"]], np.diff(free), atol=1e-15)
+    np.testing.assert_array_equal(problem.lower[parts["progress"]], 0.0)
+
+
+def test_one_sided_ranges_are_gaps_in_the_joints_own_unit():
+    problem = problem_of("r1", position={"j1": [None, 2.9], "j2": [-3.0, None], "j3": None})
+    (constraint,) = (c for c in problem.constraints if c.kind == "position")
+    assert constraint.labels == ("j1", "j2")
+    x = reachable_points(problem_of("r1"), 1)[0]
+    state = problem.state(x)
+    values = constraint.values(state)
+    np.testing.assert_allclose(constraint.upper[0] - values[:, 0], 2.9 - state.q[:, 0], atol=1e-14)
+    np.testing.assert_allclose(values[:, 1] - constraint.lower[1], state.q[:, 1] + 3.0, atol=1e-14)
+    assert constraint.lower[0] == -np.inf
+    assert constraint.upper[1] == np.inf
+    rows = blocks(problem)["position"]
+    np.testing.assert_allclose(dense(problem, x)[rows], differences(problem, x)[rows], atol=1e-9)
+
+
+def test_state_is_computed_once_for_rows_and_jacobian():
+    problem = problem_of("r1")
+    first, second = reachable_points(problem, 2)
+    problem.evaluations.update(states=0, jacobians=0)
+    problem.rows(first)
+    problem.jacobian(first)
+    assert problem.evaluations == {"states": 1, "jacobians": 1}
+    problem.rows(second)
+    assert problem.evaluations["states"] == 2

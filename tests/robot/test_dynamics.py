@@ -1,0 +1,164 @@
+"""Torques and their derivatives: Lagrange's equations, the friction formula, central differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from brachis.errors import InputError, UnknownNameError
+from brachis.robot import Robot, dynamics
+from support.chains import Joint, chain_urdf, planar_robot
+
+FRICTION = {"armature": [0.3, 0.2, 0.1], "viscous": {"j1": 4.0, "j3": 2.0}, "coulomb": 5.0, "coulomb_velocity": 0.4}
+
+
+def states(n: int, count: int = 12, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return tuple(scale * rng.uniform(-1.0, 1.0, (count, n)) for scale in (3.0, 2.0, 5.0))
+
+
+class RodArm:
+    """Three uniform slender rods of 1 m and 10 kg in a plane, by hand: absolute angles, Lagrange's equations."""
+
+    mass, length = 10.0, 1.0
+
+    @classmethod
+    def mass_matrix(cls, q: np.ndarray) -> np.ndarray:
+        # In absolute angles theta_i: M_ij = c_ij l^2 cos(theta_i - theta_j), c from integrating along the rods.
+        share = np.array([[7.0 / 3.0, 1.5, 0.5], [1.5, 4.0 / 3.0, 0.5], [0.5, 0.5, 1.0 / 3.0]])
+        theta = np.cumsum(q)
+        absolute = cls.mass * cls.length**2 * share * np.cos(theta[:, None] - theta[None])
+        to_absolute = np.tril(np.ones((3, 3)))
+        return to_absolute.T @ absolute @ to_absolute
+
+    @classmethod
+    def potential(cls, q: np.ndarray, gravity: float) -> float:
+        theta = np.cumsum(q)
+        return cls.mass * gravity * cls.length * float(np.array([2.5, 1.5, 0.5]) @ np.sin(theta))
+
+    @classmethod
+    def torque(cls, q, qdot, qddot, gravity: float) -> np.ndarray:
+        """Return M qddot + Mdot qdot - d(kinetic)/dq + d(potential)/dq, with differences of closed formulas."""
+        h = 1e-6
+        slopes = [(cls.mass_matrix(q + h * e) - cls.mass_matrix(q - h * e)) / (2 * h) for e in np.eye(3)]
+        rate = sum(slope * speed for slope, speed in zip(slopes, qdot, strict=True))
+        kinetic = np.array([0.5 * qdot @ slope @ qdot for slope in slopes])
+        pull = [(cls.potential(q + h * e, gravity) - cls.potential(q - h * e, gravity)) / (2 * h) for e in np.eye(3)]
+        return cls.mass_matrix(q) @ qddot + rate @ qdot - kinetic + np.array(pull)
+
+
+def test_scara_joint_names_and_forward_kinematics(scara_urdf):
+    robot = Robot.from_urdf(scara_urdf)
+    assert robot.joint_names == ("j1", "j2", "j3")
+    assert robot.tool_frame == "tool"
+    assert np.all(np.isinf(robot.limits.position_upper))
+    np.testing.assert_array_equal(robot.limits.torque, [10.0] * 3)
+    for q in np.random.default_rng(0).uniform(-7.0, 7.0, (20, 3)):
+        theta = np.cumsum(q)
+        placement = robot.tool_placement(q)
+        np.testing.assert_allclose(placement.translation, [np.cos(theta).sum(), np.sin(theta).sum(), 0.0], atol=1e-14)
+        tool = placement.rotation[:, 0]
+        np.testing.assert_allclose(tool, [np.cos(theta[2]), np.sin(theta[2]), 0.0], atol=1e-14)
+
+
+@pytest.mark.parametrize("gravity", [0.0, 9.81])
+def test_scara_is_three_slender_rods(scara_urdf, gravity):
+    robot = Robot.from_urdf(scara_urdf, gravity=[0.0, -gravity, 0.0])
+    q, qdot, qddot = states(3)
+    exact = dynamics.torque_derivatives(robot, q, qdot, qddot)
+    expected = np.array([RodArm.torque(*state, gravity) for state in zip(q, qdot, qddot, strict=True)])
+    np.testing.assert_allclose(dynamics.torque(robot, q, qdot, qddot), expected, atol=1e-6)
+    matrices = np.array([RodArm.mass_matrix(posture) for posture in q])
+    np.testing.assert_allclose(exact.qddot, matrices, atol=1e-12)
+
+
+def test_friction_formula():
+    rigid = planar_robot("RPR", "xz")
+    robot = planar_robot("RPR", "xz", friction=FRICTION)
+    q, qdot, qddot = states(3)
+    armature, viscous = np.array([0.3, 0.2, 0.1]), np.array([4.0, 0.0, 2.0])
+    expected = armature * qddot + viscous * qdot + 5.0 * np.tanh(qdot / 0.4)
+    assert np.abs(expected).min() > 0.0
+    added = dynamics.torque(robot, q, qdot, qddot) - dynamics.torque(rigid, q, qdot, qddot)
+    np.testing.assert_allclose(added, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(("pattern", "plane"), [("RPR", "xz"), ("CRR", "tilted"), ("RRP", "xy")])
+def test_derivatives_against_central_differences(pattern, plane):
+    robot = planar_robot(pattern, plane, friction=FRICTION, gravity=[1.0, -2.0, -9.81])
+    state = states(3)
+    exact = dynamics.torque_derivatives(robot, *state)
+    h = 1e-5
+    for place, block in enumerate((exact.q, exact.qdot, exact.qddot)):
+        assert np.abs(block).max() > 0.1
+        for joint in range(3):
+            sides = []
+            for sign in (1.0, -1.0):
+                moved = list(state)
+                moved[place] = state[place] + sign * h * np.eye(3)[joint]
+                sides.append(dynamics.torque(robot, *moved))
+            difference = (sides[0] - sides[1]) / (2.0 * h)
+            np.testing.assert_allclose(block[:, :, joint], difference, atol=2e-8 * np.abs(block).max())
+
+
+def test_coulomb_derivative_is_finite_far_from_rest():
+    robot = planar_robot("RRR", friction={"coulomb": 5.0, "coulomb_velocity": 1e-3})
+    q, _, qddot = states(3)
+    fast = np.full_like(q, 50.0)
+    by_qdot = dynamics.torque_derivatives(robot, q, fast, qddot).qdot
+    without = dynamics.torque_derivatives(planar_robot("RRR"), q, fast, qddot).qdot
+    assert np.all(np.isfinite(by_qdot))
+    np.testing.assert_allclose(by_qdot, without, atol=1e-12)
+
+
+def test_one_joint_alone():
+    robot = Robot.from_urdf(
+        "one", urdf_text=chain_urdf([Joint("prismatic", axis=(1.0, 0.0, 0.0))], tool=(0.1, 0.0, 0.0))
+    )
+    q, qdot, qddot = states(1)
+    np.testing.assert_allclose(dynamics.torque(robot, q, qdot, qddot), 2.0 * qddot, atol=1e-12)
+    np.testing.assert_allclose(dynamics.torque_derivatives(robot, q, qdot, qddot).qddot, np.full((12, 1, 1), 2.0))
+
+
+def test_pinocchio_adds_the_armature_of_the_model_but_not_friction_and_damping_of_the_urdf():
+    plain = chain_urdf([Joint("revolute", xyz=(0.4, 0.0, 0.0))])
+    damped = plain.replace("</joint>", "<dynamics damping='7' friction='3'/></joint>", 2)
+    models = [pin.buildModelFromXML(text) for text in (plain, damped)]
+    assert models[1].damping[0] == 7.0
+    args = (np.array([0.3]), np.array([2.0]), np.array([5.0]))
+    tau = [pin.rnea(model, model.createData(), *args)[0] for model in models]
+    assert tau[1] == tau[0]
+    models[0].armature = np.array([0.6])
+    assert pin.rnea(models[0], models[0].createData(), *args)[0] == pytest.approx(tau[0] + 0.6 * 5.0)
+
+
+def test_brachis_counts_armature_once_and_leaves_the_damping_of_the_urdf_out():
+    plain = chain_urdf([Joint("revolute", xyz=(0.4, 0.0, 0.0))])
+    damped = plain.replace("</joint>", "<dynamics damping='7' friction='3'/></joint>", 2)
+    args = (np.array([[0.3]]), np.array([[2.0]]), np.array([[5.0]]))
+    tau = [
+        dynamics.torque(Robot.from_urdf("x", urdf_text=text, friction=friction), *args)[0, 0]
+        for text, friction in ((plain, None), (damped, None), (plain, {"armature": 0.6}))
+    ]
+    assert tau[1] == tau[0]
+    assert tau[2] == pytest.approx(tau[0] + 0.6 * 5.0)
+
+
+@pytest.mark.parametrize(
+    ("friction", "words"),
+    [
+        ({"viscous": -1.0}, r"robot\.friction\.viscous: is negative"),
+        ({"armature": [0.0, float("nan"), 0.0]}, r"robot\.friction\.armature: is negative or not a number"),
+        ({"coulomb_velocity": 0.0}, r"robot\.friction\.coulomb_velocity: is not positive"),
+        ({"coulomb": [1.0]}, r"robot\.friction\.coulomb: has the wrong number of values"),
+    ],
+)
+def test_friction_that_cannot_be(friction, words):
+    with pytest.raises(InputError, match=words):
+        planar_robot("RRR", friction=friction)
+
+
+def test_friction_of_an_unknown_joint():
+    with pytest.raises(UnknownNameError, match="Did you mean 'j1'"):
+        planar_robot("RRR", friction={"viscous": {"j11": 1.0}})

@@ -1,0 +1,163 @@
+"""Joint limits: where they come from, in which forms they are given, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brachis.errors import InputError, LimitError, UnknownNameError
+from brachis.robot import FROM_URDF, LimitSpec, Robot
+from support.chains import Joint, chain_urdf, planar_robot
+
+INF = np.inf
+
+
+def limits_of(**spec):
+    """Limits of a robot whose URDF says 80, 70, 60 Nm and 3.0, 3.1, 3.2 rad/s."""
+    return planar_robot("RRR", limits=LimitSpec(**spec)).limits
+
+
+def with_limit(**changes) -> Robot:
+    limit = {"lower": -1.0, "upper": 1.0, "velocity": 1.0, "effort": 1.0, **changes}
+    limit = {key: value for key, value in limit.items() if value is not None}
+    joints = [Joint("revolute"), Joint("revolute", limit=limit)]
+    return Robot.from_urdf("file.urdf", urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (FROM_URDF, [80.0, 70.0, 60.0]),
+        (12.5, [12.5, 12.5, 12.5]),
+        ([1.0, 2.0, 3.0], [1.0, 2.0, 3.0]),
+        ((1.0, None, FROM_URDF), [1.0, INF, 60.0]),
+        ({"j2": 5.0}, [80.0, 5.0, 60.0]),
+        ({"j3": None, "j1": 7}, [7.0, 70.0, INF]),
+        (None, [INF, INF, INF]),
+    ],
+    ids=str,
+)
+def test_forms_of_a_limit(value, expected):
+    np.testing.assert_array_equal(limits_of(torque=value, acceleration=9.0).torque, expected)
+
+
+def test_every_kind_goes_to_its_own_place():
+    limits = limits_of(torque=1.0, velocity=2.0, acceleration=3.0, position=[[-4.0, 5.0]] * 3)
+    for values, expected in (
+        (limits.torque, 1.0),
+        (limits.velocity, 2.0),
+        (limits.acceleration, 3.0),
+        (limits.position_lower, -4.0),
+        (limits.position_upper, 5.0),
+    ):
+        np.testing.assert_array_equal(values, np.full(3, expected))
+
+
+def test_urdf_has_no_acceleration():
+    np.testing.assert_array_equal(limits_of().acceleration, [INF] * 3)
+    np.testing.assert_array_equal(limits_of(acceleration={"j2": 4.0}).acceleration, [INF, 4.0, INF])
+
+
+@pytest.mark.parametrize(
+    ("value", "lower", "upper"),
+    [
+        (FROM_URDF, [-3.0] * 3, [2.9] * 3),
+        (None, [-INF] * 3, [INF] * 3),
+        ({"j1": [-1.0, 1.0], "j3": None}, [-1.0, -3.0, -INF], [1.0, 2.9, INF]),
+        ([[-1.0, 1.0], None, FROM_URDF], [-1.0, -INF, -3.0], [1.0, INF, 2.9]),
+    ],
+    ids=str,
+)
+def test_forms_of_a_range(value, lower, upper):
+    limits = limits_of(position=value)
+    np.testing.assert_array_equal(limits.position_lower, lower)
+    np.testing.assert_array_equal(limits.position_upper, upper)
+
+
+def test_scale_comes_last():
+    limits = limits_of(torque=10.0, acceleration=4.0, scale={"torque": 0.5, "velocity": 0.1, "acceleration": 0.25})
+    np.testing.assert_allclose(limits.torque, 5.0)
+    np.testing.assert_allclose(limits.velocity, [0.3, 0.31, 0.32])
+    np.testing.assert_allclose(limits.acceleration, 1.0)
+    np.testing.assert_array_equal(limits_of(torque=None, acceleration=1.0, scale={"torque": 0.5}).torque, [INF] * 3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind"), [({"effort": 0.0}, "torque"), ({"effort": -1.0}, "torque"), ({"velocity": 0.0}, "velocity")]
+)
+def test_limit_of_the_urdf_that_is_not_positive(changes, kind):
+    with pytest.raises(LimitError) as caught:
+        with_limit(**changes)
+    assert caught.value.joint == "j2"
+    assert caught.value.key == f"robot.limits.{kind}.j2"
+    assert f"{kind} limit in the URDF is not positive" in str(caught.value)
+    assert f"Set robot.limits.{kind}.j2 in the task file" in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [0.0, -3.0, float("nan")])
+@pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration"])
+def test_limit_of_the_task_that_is_not_positive(kind, value):
+    with pytest.raises(LimitError) as caught:
+        limits_of(**{kind: {"j3": value}})
+    assert caught.value.joint == "j3"
+    assert caught.value.key == f"robot.limits.{kind}.j3"
+    assert f"{kind} limit in the task is not positive; found {value:g}" in str(caught.value)
+
+
+# Fails today: a scale is multiplied on unchecked, so that a negative one gives negative limits.
+@pytest.mark.parametrize("factor", [0.0, -1.0, float("nan")])
+def test_scale_that_is_not_positive(factor):
+    with pytest.raises(InputError, match="scale"):
+        limits_of(scale={"torque": factor})
+
+
+# Fails today: an unknown key is passed over in silence.
+def test_unknown_scale():
+    with pytest.raises(InputError, match="torqe"):
+        limits_of(scale={"torqe": 0.5})
+
+
+def test_neither_torque_nor_acceleration():
+    with pytest.raises(LimitError) as caught:
+        limits_of(torque={"j2": None})
+    assert caught.value.joint == "j2"
+    assert caught.value.key == "robot.limits.torque.j2 or robot.limits.acceleration.j2"
+    assert "neither a torque nor an acceleration limit" in str(caught.value)
+    assert limits_of(torque={"j2": None}, acceleration={"j2": 5.0}).torque[1] == INF
+
+
+def test_urdf_without_effort():
+    with pytest.raises(LimitError, match="neither a torque nor an acceleration limit") as caught:
+        with_limit(effort=None)
+    assert caught.value.joint == "j2"
+
+
+def test_unknown_joint_with_suggestion():
+    with pytest.raises(UnknownNameError) as caught:
+        limits_of(velocity={"j22": 1.0})
+    assert caught.value.where == "robot.limits.velocity"
+    assert "Did you mean 'j2'?" in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration", "position"])
+def test_wrong_length(kind):
+    value = [[-1.0, 1.0]] * 2 if kind == "position" else [1.0, 2.0]
+    with pytest.raises(InputError) as caught:
+        limits_of(**{kind: value})
+    assert f"robot.limits.{kind}: has the wrong number of values; found 2; allowed: 3" in str(caught.value)
+
+
+def test_empty_range():
+    for low, high in ((1.0, 1.0), (2.0, -2.0)):
+        with pytest.raises(LimitError, match="position range is empty") as caught:
+            limits_of(position={"j1": [low, high]})
+        assert caught.value.key == "robot.limits.position.j1"
+    with pytest.raises(LimitError, match="position range is empty"):
+        with_limit(lower=1.0, upper=0.5)
+
+
+# Fails today: a TypeError or ValueError of Python's own comes out.
+@pytest.mark.parametrize("value", [[-1.0, 1.0, 2.0], {"j1": 1.0}, {"j1": [1.0]}], ids=str)
+def test_range_of_a_wrong_shape(value):
+    with pytest.raises(InputError, match="position"):
+        limits_of(position=value)

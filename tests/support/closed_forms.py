@@ -1,0 +1,102 @@
+"""What every closed form owes, checked against Pinocchio on random postures."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from brachis.ik import Candidate, Family, find, margin_gradient
+from brachis.kinematics import TaskKinematics
+from brachis.robot import Robot, TaskSpace
+
+
+def wrapped(delta: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Differences, modulo 2 pi where `angles`."""
+    return np.where(angles, np.remainder(delta + np.pi, 2.0 * np.pi) - np.pi, delta)
+
+
+class Bench:
+    """A robot and task space with random postures, their task coordinates and Jacobians by Pinocchio."""
+
+    def __init__(self, robot: Robot, rows: Sequence[str], postures: int, seed: int = 5) -> None:
+        self.robot = robot
+        self.space = TaskSpace.of(robot, rows)
+        self.kinematics = TaskKinematics(robot, self.space)
+        self.q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (postures, robot.n))
+        self.targets = self.kinematics.position(self.q)
+        self.jacobian = self.kinematics.jacobian(self.q)
+        self.turning = np.array([unit == "rad" for unit in robot.position_units])
+        self.angles = np.array([unit == "rad" for unit in self.space.units])
+
+    def decompositions(self) -> Iterator[tuple[tuple[int, ...], bool]]:
+        """Every choice of redundant joints, and whether its J_nr is regular anywhere."""
+        for redundant in itertools.combinations(range(self.robot.n), self.robot.n - self.space.m):
+            yield redundant, bool(np.abs(self.determinant(redundant)).max() > 1e-6)
+
+    def rest(self, redundant: Sequence[int]) -> list[int]:
+        return [i for i in range(self.robot.n) if i not in redundant]
+
+    def determinant(self, redundant: Sequence[int]) -> np.ndarray:
+        """Det J_nr at the postures, from Pinocchio."""
+        return np.linalg.det(self.jacobian[:, :, self.rest(redundant)])
+
+    def find(self, redundant: Sequence[int], families: Sequence[Family] = ()) -> Candidate:
+        return find(self.robot, self.space, [self.robot.joint_names[i] for i in redundant], families=families)
+
+    def miss(self, postures: np.ndarray, targets: np.ndarray) -> np.ndarray:
+        """Largest distance from the target of every posture, by Pinocchio's forward kinematics."""
+        return np.abs(wrapped(self.kinematics.position(postures) - targets, self.angles)).max(axis=1)
+
+    def check(self, redundant: Sequence[int], families: Sequence[Family] = (), *, distinct_roots: int) -> Candidate:
+        """Hold a closed form to its promises; `distinct_roots` is how many answers geometry allows."""
+        candidate = self.find(redundant, families)
+        solver, rest, q = candidate.solver, self.rest(redundant), self.q
+        assert solver is not None
+        assert solver.kind == "closed_form"
+        answers = solver.solve(self.targets, q[:, list(redundant)])
+        assert answers.shape == (len(q), len(solver.branches), self.space.m)
+        determinant = self.determinant(redundant)
+        scale = np.abs(determinant).max()
+        regular = np.abs(determinant) > 1e-6 * scale
+
+        finite = np.isfinite(answers).all(axis=2)
+        assert np.array_equal(finite, np.isfinite(answers).any(axis=2)), "an answer is NaN in part"
+        sample, branch = np.nonzero(finite)
+        assert len(sample) >= len(q) - 1
+        postures = q[sample].copy()
+        postures[:, rest] = answers[sample, branch]
+        # A slide that runs almost along the circle it has to meet goes far: positions are good to their own size.
+        size = 1.0 + np.abs(np.where(self.turning, 0.0, postures)).max(axis=1)
+        assert (self.miss(postures, self.targets[sample]) / size).max() < 1e-8
+        assert np.all(finite.sum(axis=1)[regular] == distinct_roots)
+
+        margins = np.stack([solver.branch_margins(q, b) for b in range(len(solver.branches))], axis=1)
+        if margins.shape[2] == 0:  # the closed form is linear with a constant matrix
+            assert np.ptp(determinant) < 1e-9 * scale
+            own = np.zeros(len(q), dtype=int)
+        else:
+            assert margins.shape == (len(q), 2, 1)
+            ratio = margins[:, 0, 0] / determinant
+            np.testing.assert_allclose(ratio[regular], ratio[regular][0], rtol=1e-6)
+            np.testing.assert_array_equal(margins[:, 1], -margins[:, 0])
+            assert 0.05 < np.abs(margins).max() < 20.0, "margins are of the order of one"
+            own = np.argmax(margins[:, :, 0], axis=1)
+        back = wrapped(answers[np.arange(len(q)), own] - q[:, rest], self.turning[rest])
+        slack = 1e-9 * scale / np.abs(determinant)
+        assert np.all(np.abs(back).max(axis=1)[regular] < slack[regular]), (
+            "the posture's own branch gives another posture"
+        )
+        return candidate
+
+    def check_margin_gradient(self, candidate: Candidate) -> None:
+        """Compare the margins' derivatives by complex steps with central differences."""
+        solver, q, h = candidate.solver, self.q[:40], 1e-6
+        assert solver is not None
+        for branch in range(len(solver.branches)):
+            exact = margin_gradient(solver, q, branch)
+            for joint in range(self.robot.n):
+                step = h * np.eye(self.robot.n)[joint]
+                upper, lower = solver.branch_margins(q + step, branch), solver.branch_margins(q - step, branch)
+                np.testing.assert_allclose(exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-7)

@@ -1,0 +1,48 @@
+"""Decompositions with smooth paths and motions y(t) that they can follow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from brachis.feasibility import start_branch
+from brachis.ik import find
+from brachis.kinematics import Decomposition
+from brachis.path import build_path
+from brachis.robot import Robot, TaskSpace
+from brachis.task import load_task
+
+
+def decomposition(
+    robot: Robot, rows: Sequence[str], path: Sequence[dict[str, Any]], start: Sequence[float], redundant: Sequence[str]
+) -> Decomposition:
+    """Decomposition on the branch of the start posture; the path's segments as a task file writes them."""
+    start = np.array(start, dtype=float)
+    space = TaskSpace.of(robot, rows)
+    task = load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": list(rows), "path": list(path)})
+    curve = build_path(task.path, space.value(robot.tool_placement(start)), space.rows)
+    candidate = find(robot, space, redundant)
+    branch = start_branch(robot, space, candidate, start, None)
+    indices = tuple(robot.joint_names.index(name) for name in candidate.redundant_joints)
+    assert candidate.solver is not None
+    return Decomposition(robot, space, curve, candidate.solver, indices, branch, start)
+
+
+@dataclass(frozen=True)
+class Sway:
+    """A smooth motion: s runs from 0 to 1, the redundant joints sway about the start posture."""
+
+    decomposition: Decomposition
+    amplitude: float = 0.25
+
+    def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return y, ydot and yddot at times t in [0, 1], each (K, 1 + r)."""
+        columns = [(0.5 - 0.5 * np.cos(np.pi * t), 0.5 * np.pi * np.sin(np.pi * t), 0.5 * np.pi**2 * np.cos(np.pi * t))]
+        for place, joint in enumerate(self.decomposition.redundant):
+            rate, a, q = 2.0 + place, self.amplitude, self.decomposition.start[joint]
+            columns.append((q + a * np.sin(rate * t), a * rate * np.cos(rate * t), -a * rate**2 * np.sin(rate * t)))
+        y, ydot, yddot = (np.stack(parts, axis=1) for parts in zip(*columns, strict=True))
+        return y, ydot, yddot

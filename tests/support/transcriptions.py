@@ -1,0 +1,38 @@
+"""Transcriptions with every kind of constraint at once, for tests of the nonlinear program."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from brachis.nlp import Transcription
+from brachis.nlp.guess import guesses
+from brachis.robot import FROM_URDF, LimitSpec
+from support.chains import planar_robot, transcription
+
+FRICTION = {"armature": 0.2, "viscous": [1.0], "coulomb": 2.0, "coulomb_velocity": 0.5}
+CASES: dict[str, tuple[str, list[str], list[float], list[str]]] = {
+    "r0": ("RR", ["x", "z"], [0.4, 1.2], []),
+    "r0_yaw": ("RRR", ["x", "z", "yaw"], [0.4, 1.8, 0.5], []),
+    "r1": ("RRP", ["x", "z"], [0.4, 1.2, 0.1], ["j3"]),
+    "r1_yaw": ("RRRR", ["x", "z", "yaw"], [0.4, -0.6, 1.4, 0.8], ["j1"]),
+    "r2": ("RRRR", ["x", "z"], [0.4, 0.8, 0.7, 0.5], ["j1", "j4"]),
+}
+
+
+def problem_of(case: str, *, end: list[float] | None = None, position: Any = FROM_URDF, **spline: Any) -> Transcription:
+    """A bent path in the vertical plane under gravity, friction, and limits of every kind."""
+    pattern, rows, start, redundant = CASES[case]
+    friction = {**FRICTION, "viscous": [1.0 + 0.1 * i for i in range(len(pattern))]}
+    robot = planar_robot(pattern, "xz", friction=friction, limits=LimitSpec(acceleration=20.0, position=position))
+    through = [[-0.05, 0.05, 0.1], [-0.1, 0.06, 0.15], [-0.13, 0.03, 0.2]]
+    path = [{"spline": {"through": [point[: len(rows)] for point in through], "relative": True}}]
+    settings = {"degree": 3, "intervals": 5, "points_per_interval": 2, **spline}
+    return transcription(robot, rows, path, start, redundant, end=end, **settings)
+
+
+def reachable_points(problem: Transcription, count: int, spread: float = 0.01) -> list[np.ndarray]:
+    """Points x near the first guess, moved at random in every variable."""
+    rng, first = np.random.default_rng(7), next(guesses(problem))
+    return [first + spread * rng.uniform(-1.0, 1.0, len(first)) for _ in range(count)]
