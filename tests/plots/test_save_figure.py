@@ -124,6 +124,6 @@ assert "matplotlib.pyplot" not in sys.modules, "pyplot was imported"
 def test_matplotlib_is_imported_late_and_pyplot_never(line_trajectory, tmp_path):
     line_trajectory.save(tmp_path / "result.npz")
     arguments = [sys.executable, "-W", "error", "-c", LAZY, str(tmp_path / "result.npz"), str(tmp_path)]
-    run = subprocess.run(arguments, capture_output=True, text=True, check=False)  # noqa: S603
+    run = subprocess.run(arguments, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     assert {path.stem for path in tmp_path.glob("*.p[nd][gf]")} == {*PLOTS, "comparison"}
