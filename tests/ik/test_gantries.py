@@ -38,7 +38,6 @@ def macro_mini(first, second, turn, plane_rows):
         ([Z, X, Y], ["z", "x", "y"]),
         ([X, Y, Z, SKEW], ["x", "y", "z"]),
         ([X, SKEW, Y], ["x", "y"]),
-        # Fails today: Pinocchio returns the Jacobian of one joint as (6,), on which TaskKinematics breaks.
         ([X], ["x"]),
     ],
     ids=str,

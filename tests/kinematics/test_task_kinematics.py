@@ -67,7 +67,7 @@ def test_derivatives(pattern, plane, rows):
     assert min(np.abs(part).max() for part in (exact.velocity_q, exact.acceleration_q, exact.acceleration_qdot)) > 0.1
 
 
-# Fails today: Pinocchio returns arrays of one joint without their last axis.
+# Pinocchio returns arrays of one joint without their last axis.
 def test_one_joint_alone():
     robot = gantry_robot([(0.6, 0.0, 0.8)])
     kinematics = TaskKinematics(robot, TaskSpace.of(robot, ["x"]))

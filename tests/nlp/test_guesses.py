@@ -46,7 +46,7 @@ def test_numeric_course_is_one_that_the_closed_form_can_follow(case):
     assert np.abs(np.diff(postures, axis=0)).max() < 0.5
 
 
-# Fails today for an open upper end: half the range is infinite then, and the push away from its ends not a number.
+# Half of an open range is infinite; a push away from its ends must not become so.
 @pytest.mark.parametrize("j2", [None, [None, 2.9], [-3.0, None]], ids=str)
 def test_open_ranges(j2):
     found = list(guesses(problem_of("r1", position={"j2": j2})))
@@ -71,7 +71,7 @@ def test_stretching_stops_at_the_limits():
     assert fast[0] == 0.05
 
 
-# Fails today for 2.9 rad: the numeric inverse kinematics takes the jump of the measured yaw at pi for a miss of 2 pi.
+# The measured yaw jumps at pi, the path's does not.
 @pytest.mark.parametrize("yaw", [0.5, 2.9])
 @pytest.mark.parametrize("redundant", [[], ["j1"]], ids=["r0", "r1"])
 def test_yaw_may_turn_past_half_a_turn(redundant, yaw):

@@ -64,7 +64,6 @@ def bang_bang(mass: float) -> float:
     return 2.0 * np.sqrt(mass * LENGTH / FORCE)
 
 
-# Fails today: robots of one joint break in ChainGeometry and TaskKinematics.
 def test_one_slide(slides):
     result = plan(slides([X], [FORCE]), ["x"], [LENGTH])
     assert result.verified
@@ -95,8 +94,7 @@ def test_rest_in_acceleration_costs_two_more_ramps(slides, intervals):
     np.testing.assert_allclose(ends, 0.0, atol=1e-9)
 
 
-# Fails today for 40 intervals: acceleration jumps at knots, and nodes are packed there until rounding spoils the
-# pieces (jumps of acceleration and torque of 1.5e-6 against 1e-6 allowed).
+# The acceleration jumps at knots: nodes packed closely around one would let rounding spoil the pieces.
 @pytest.mark.parametrize("intervals", [10, 40])
 def test_parabolas_are_bang_bang_itself(slides, intervals):
     result = plan(slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, 0.0], intervals=intervals, degree=2)

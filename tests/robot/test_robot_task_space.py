@@ -91,7 +91,6 @@ def test_rows_that_make_no_sense(scara, rows):
     assert caught.value.found == rows
 
 
-# Fails today: documented, yet the first axis that is 0.9 in the plane is taken, or axis 0 where there is none.
 def test_yaw_without_a_tool_axis_in_the_plane():
     # The tilted plane holds none of the tool's axes within the world's xy-plane.
     robot = planar_robot("RRR", "tilted")

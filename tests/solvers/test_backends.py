@@ -50,8 +50,7 @@ def test_known_optima(name, make, start, optimum, multipliers):
         np.testing.assert_array_equal(report.multipliers, np.zeros(len(problem.lower)))
 
 
-# Fails today for slsqp: SciPy stops at (2, 1), where the objective stood still while the row came true, and calls it
-# optimal; the report repeats that.
+# SciPy's SLSQP stops at (2, 1), where the objective stood still while the row came true, and calls it optimal.
 def test_optimal_means_that_first_order_conditions_hold(name):
     report = solve(name, bounded(), [1.0, 1.0])
     if report.status is SolveStatus.OPTIMAL:
@@ -139,7 +138,7 @@ def test_interrupt_during_an_evaluation(name, evaluation):
     assert len(problem.evaluations) == evaluation, "the backend went on after the interrupt"
 
 
-# Fails today for uno: it reports x[0], which is the objective of a transcription but not of any other problem.
+# The objective is not the first variable here, as it is in a transcription.
 def test_progress_tells_iteration_and_objective(name):
     problem, calls = bounded(), []
     report = solve(name, problem, [1.0, 3.0], progress=lambda *call: calls.append(call))
@@ -184,7 +183,7 @@ def test_residual_sees_bounds_of_variables():
     assert residual(problem, np.array([-2.0, -1.0])) == pytest.approx(2.0)
 
 
-# Fails today: Python's max passes over NaN, and an answer that is not a number counts as feasible.
+# Python's max passes over NaN.
 def test_residual_of_what_is_not_a_number():
     assert residual(disc(), np.array([np.nan, 1.0])) == np.inf
 
