@@ -16,21 +16,24 @@ from brachis.nlp.guess import guesses
 from brachis.refine import Refined, RefinementOptions, Solve, refine
 from brachis.result import Attempt
 from brachis.solvers import Solver, SolverOptions, SolverReport, solver_named
-from brachis.task import Task
+from brachis.task import SolverSettings, Task
 
 Listener = Callable[[str], None]
 """Told in plain words what the planner is doing, between iterations; may raise KeyboardInterrupt."""
 
 MARGINS = (0.1, 0.02, MARGIN)
 """Branch margins that are tried in turn; see `continued`."""
-_HELD_BACK = 1.01
+_HELD_BACK = 1e-4
+"""A margin that is nearer to its bound than this holds the motion back."""
 _MANY_VARIABLES = 150
 """Above this an active-set method spends its time in linear algebra, and ``auto`` begins with the interior point."""
 _PATIENCE = 100
-"""Iterations that ``auto`` grants a solver on one guess: an active-set method that needs more is grinding."""
+"""Iterations that ``auto`` grants a solver on one guess, unless the task says otherwise: one that needs more grinds."""
+_LEAST_TIME = 0.1
+"""Seconds left to a solve that is begun."""
 
 
-def search(problem: Transcription, task: Task, listener: Listener) -> tuple[tuple[Attempt, ...], Refined]:
+def search(problem: Transcription, task: Task, listener: Listener) -> tuple[tuple[Attempt, ...], int, Refined]:
     """Try guesses and solvers until one gives a motion within the limits everywhere.
 
     Parameters
@@ -42,8 +45,9 @@ def search(problem: Transcription, task: Task, listener: Listener) -> tuple[tupl
     Returns
     -------
     attempts : tuple of Attempt
+    chosen : int
+        Index of the attempt that gave the motion: one within the limits, or the one that came nearest to them.
     refined : Refined
-        Of the last attempt, or of the one that came nearest to the limits.
 
     Raises
     ------
@@ -54,22 +58,28 @@ def search(problem: Transcription, task: Task, listener: Listener) -> tuple[tupl
     """
     settings = task.refinement
     options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds)
-    began = time.perf_counter()
+    deadline = time.perf_counter() + task.solver.time_limit
     attempts: list[Attempt] = []
-    best: Refined | None = None
+    best: tuple[int, Refined] | None = None
     for x, number, solver in _ways(problem, task):
-        solve = _solve_with(solver, task, listener)
-        refined = refine(*continued(problem, x, solve, MARGINS), solve, options)
-        attempts.append(_attempt(refined, number, settings.tolerance))
+        solve = _solve_with(solver, task, deadline, listener)
+        try:
+            continued_problem, reports = continued(problem, x, solve, MARGINS)
+        except ImportError as error:
+            attempts.append(
+                Attempt(solver.name, number, (), 0, np.inf, 1.0, 0, f"{solver.name}: not installed ({error})")
+            )
+            continue
+        refined = refine(continued_problem, reports[-1], solve, options)
+        attempts.append(_attempt(refined, reports[:-1], number, settings.tolerance))
         listener(attempts[-1].outcome)
-        if refined.converged and refined.excess <= settings.tolerance:
-            return tuple(attempts), refined
-        if refined.converged and (best is None or refined.excess < best.excess):
-            best = refined
-        if time.perf_counter() - began > task.solver.time_limit:
+        if refined.converged and (best is None or refined.excess < best[1].excess):
+            best = len(attempts) - 1, refined
+        content = refined.excess <= settings.tolerance or settings.max_rounds == 0
+        if (refined.converged and content) or time.perf_counter() > deadline:
             break
-    if best is not None and np.isfinite(best.excess):
-        return tuple(attempts), best
+    if best is not None and np.isfinite(best[1].excess):
+        return tuple(attempts), *best
     reason = explain_failure(problem.decomposition)
     if isinstance(reason, BrachisError):
         raise reason
@@ -79,7 +89,7 @@ def search(problem: Transcription, task: Task, listener: Listener) -> tuple[tupl
 
 def continued(
     problem: Transcription, x: np.ndarray, solve: Solve, margins: Sequence[float]
-) -> tuple[Transcription, SolverReport]:
+) -> tuple[Transcription, tuple[SolverReport, ...]]:
     """Solve with ever smaller branch margins, each from the last answer.
 
     Near a branch boundary the problem is badly conditioned, and a solver that meets the boundary early creeps along it.
@@ -99,20 +109,29 @@ def continued(
     -------
     problem : Transcription
         With the last margin for which the solve ended well; with the last one tried if none did.
-    report : SolverReport
+    reports : tuple of SolverReport
+        Of all solves; the last one belongs to `problem`.
     """
-    best: tuple[Transcription, SolverReport] | None = None
-    last: tuple[Transcription, SolverReport] | None = None
+    solved: list[tuple[Transcription, SolverReport]] = []
+    failed: list[tuple[Transcription, SolverReport]] = []
+    bounds: set[tuple[float, ...]] = set()
     for margin in margins:
         tried = problem.with_margin(margin)
-        last = tried, solve(tried, x)
-        if last[1].status.usable:
-            best, x = last, last[1].x
-            if tried.least_margin(x) > _HELD_BACK * margin:
+        if tried.guards in bounds:  # the closed form has no margins, or the start posture caps them
+            continue
+        bounds.add(tried.guards)
+        outcome = tried, solve(tried, x)
+        if outcome[1].status.usable:
+            solved.append(outcome)
+            x = outcome[1].x
+            if tried.guard_slack(x) > _HELD_BACK:
                 break
-        elif best is not None:
-            break
-    return best or last  # type: ignore[return-value]
+        else:
+            failed.append(outcome)
+            if solved:
+                break
+    order = [*failed, *solved]
+    return order[-1][0], tuple(report for _, report in order)
 
 
 def _ways(problem: Transcription, task: Task) -> Iterator[tuple[np.ndarray, int, Solver]]:
@@ -130,30 +149,37 @@ def _ways(problem: Transcription, task: Task) -> Iterator[tuple[np.ndarray, int,
             yield x, number, solver
 
 
-def _solve_with(solver: Solver, task: Task, listener: Listener) -> Solve:
+def _solve_with(solver: Solver, task: Task, deadline: float, listener: Listener) -> Solve:
     """Make a function that runs one backend under the task's bounds."""
     settings = task.solver
-    patience = min(settings.max_iterations, _PATIENCE) if settings.name == "auto" else settings.max_iterations
-    options = SolverOptions(settings.tolerance, patience, settings.time_limit)
+    patience = settings.max_iterations
+    if settings.name == "auto" and patience == SolverSettings.model_fields["max_iterations"].default:
+        patience = _PATIENCE
 
     def progress(iteration: int, objective: float) -> None:
         listener(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s")
 
-    return lambda problem, x: solver.solve(problem, x, options, progress)
+    def solve(problem: Transcription, x: np.ndarray) -> SolverReport:
+        remaining = max(deadline - time.perf_counter(), _LEAST_TIME)
+        return solver.solve(problem, x, SolverOptions(settings.tolerance, patience, remaining), progress)
+
+    return solve
 
 
-def _attempt(refined: Refined, number: int, tolerance: float) -> Attempt:
+def _attempt(refined: Refined, before: Sequence[SolverReport], number: int, tolerance: float) -> Attempt:
     """Put the outcome of an attempt into words."""
     last = refined.reports[-1]
     rounds = len(refined.reports) - 1
     if not refined.converged:
         outcome = f"{last.solver}: {last.status.value}"
+    elif not np.isfinite(refined.excess):
+        outcome = f"{last.solver}: the motion leaves the branch between collocation points"
     else:
         inside = "limits hold" if refined.excess <= tolerance else f"limits exceeded by {100.0 * refined.excess:.2g} %"
         outcome = f"{last.solver}: t_E = {refined.x[0]:.4f} s after {rounds} refinement rounds, {inside}"
-    return Attempt(
-        last.solver, number, refined.reports, refined.excess, refined.stretched, len(refined.problem.tau), outcome
-    )
+    reports = (*before, *refined.reports)
+    points = len(refined.problem.tau)
+    return Attempt(last.solver, number, reports, rounds, refined.excess, refined.stretched, points, outcome)
 
 
 def _summary(attempts: Sequence[Attempt]) -> str:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from brachis.errors import BrachisError, PathError, StartError, UnknownNameError
+from brachis.errors import BrachisError, InputError, PathError, StartError, UnknownNameError
 from brachis.ik import Match
 from brachis.kinematics import Decomposition
 from brachis.path import Path
@@ -12,33 +14,65 @@ from brachis.robot import Robot, TaskSpace, dynamics
 
 _RANGE_SLACK = 1e-9
 _ON_PATH = 1e-6
+_SAME_POSTURE = 1e-5
 _SEARCHED = 400
 _STATIONS = 101
 
 
-def check_start(robot: Robot, start: np.ndarray, end: np.ndarray | None, path: Path, task_space: TaskSpace) -> None:
+def check_start(
+    robot: Robot,
+    start: np.ndarray,
+    end: np.ndarray | None,
+    path: Path,
+    task_space: TaskSpace,
+    path_start: Sequence[float] | None = None,
+) -> None:
     """Refuse start and end postures out of range, off the path, or too heavy to hold.
+
+    Parameters
+    ----------
+    robot : Robot
+    start : (n,) ndarray
+    end : (n,) ndarray or None
+    path : Path
+        From where the start posture's tool is.
+    task_space : TaskSpace
+    path_start : (m,) sequence of float, optional
+        Where the task says that the path begins.
 
     Raises
     ------
-    StartError
+    StartError, InputError
     """
-    for name, posture, s in (("start", start, 0.0), ("end", end, 1.0)):
-        if posture is None:
-            continue
-        _check_range(robot, posture, name)
-        _check_holding(robot, posture, name)
-        target = path.sample(np.array([s])).target[0]
-        miss = task_space.difference(task_space.value(robot.tool_placement(posture)), target)
-        if np.abs(miss).max() > _ON_PATH:
-            worst = int(np.argmax(np.abs(miss)))
-            raise StartError(
-                f"the {name} posture is off the path",
-                where=f"{name}.joints",
-                found=f"{abs(miss[worst]):.3g} {task_space.units[worst]} off in {task_space.rows[worst]}",
-                allowed=f"at most {_ON_PATH:g}",
-                hint="Choose a posture whose tool is on the path, or leave end: free",
+    _check_range(robot, start, "start")
+    _check_holding(robot, start, "start")
+    if path_start is not None:
+        if len(path_start) != task_space.m:
+            raise InputError(
+                "has the wrong number of coordinates",
+                where="path_start",
+                found=len(path_start),
+                allowed=f"{task_space.m}: {', '.join(task_space.rows)}",
             )
+        _check_on_path(robot, task_space, start, np.array(path_start), "start")
+    if end is not None:
+        _check_range(robot, end, "end")
+        _check_holding(robot, end, "end")
+        _check_on_path(robot, task_space, end, path.sample(np.array([1.0])).target[0], "end")
+
+
+def _check_on_path(robot: Robot, task_space: TaskSpace, posture: np.ndarray, target: np.ndarray, name: str) -> None:
+    """Refuse a posture whose tool is not at the path's beginning or end."""
+    miss = np.abs(task_space.difference(task_space.value(robot.tool_placement(posture)), target))
+    worst = int(np.argmax(miss))
+    if miss[worst] > _ON_PATH:
+        raise StartError(
+            f"the {name} posture is off the path",
+            where=f"{name}.joints",
+            found=f"{miss[worst]:.3g} {task_space.units[worst]} off in {task_space.rows[worst]}",
+            allowed=f"at most {_ON_PATH:g} {task_space.units[worst]}",
+            hint=f"Choose a posture whose tool is at the path's {'beginning' if name == 'start' else 'end'}",
+        )
 
 
 def _check_range(robot: Robot, posture: np.ndarray, name: str) -> None:
@@ -73,7 +107,7 @@ def _check_holding(robot: Robot, posture: np.ndarray, name: str) -> None:
             )
 
 
-def start_branch(robot: Robot, task_space: TaskSpace, candidate: Match, start: np.ndarray, wanted: str | None) -> int:
+def start_branch(robot: Robot, task_space: TaskSpace, match: Match, start: np.ndarray, wanted: str | None) -> int:
     """Index of the closed form's branch on which the start posture lies.
 
     Raises
@@ -83,34 +117,59 @@ def start_branch(robot: Robot, task_space: TaskSpace, candidate: Match, start: n
     UnknownNameError
         There is no branch of the wanted name.
     """
-    solver = candidate.solver
-    if wanted is not None and wanted not in solver.branches:
-        raise UnknownNameError("branch", wanted, solver.branches, where="branch")
-    redundant = [robot.joint_names.index(name) for name in candidate.redundant_joints]
-    rest = [i for i in range(robot.n) if i not in redundant]
-    target = task_space.value(robot.tool_placement(start))
-    answers = solver.solve(target[None], start[None, redundant])[0]
-    units = np.array(robot.position_units)[rest]
-    gap = answers - start[rest]
-    gap = np.where(units == "rad", np.remainder(gap + np.pi, 2.0 * np.pi) - np.pi, gap)
-    gaps = np.where(np.isfinite(gap).all(axis=1), np.abs(gap).max(axis=1), np.inf)
-    branch = int(np.argmin(gaps))
-    margins = solver.branch_margins(start[None], branch)[0]
-    if gaps[branch] > 1e-5 or np.any(margins <= 0.0):  # noqa: PLR2004
-        raise StartError(
-            f"the start posture is singular for redundant joints [{', '.join(candidate.redundant_joints)}]",
-            where="start.joints",
-            found="a posture where branches of the closed form meet",
-            allowed="a posture inside a branch",
-            hint="Bend the arm a little, or choose other redundant joints",
-        )
-    if wanted is not None and solver.branches[branch] != wanted:
+    branches = match.solver.branches
+    if wanted is not None and wanted not in branches:
+        raise UnknownNameError("branch", wanted, branches, where="branch")
+    branch = _branch_of(robot, task_space, match, start, "start")
+    if wanted is not None and branches[branch] != wanted:
         raise StartError(
             "the start posture is on another branch",
             where="branch",
-            found=solver.branches[branch],
+            found=branches[branch],
             allowed=wanted,
             hint="Leave branch out, or start in a posture of that branch",
+        )
+    return branch
+
+
+def check_end_branch(robot: Robot, task_space: TaskSpace, match: Match, end: np.ndarray, branch: int) -> None:
+    """Refuse an end posture on another branch than the start posture's.
+
+    Raises
+    ------
+    StartError
+    """
+    found = _branch_of(robot, task_space, match, end, "end")
+    if found != branch:
+        raise StartError(
+            "the end posture is on another branch than the start posture",
+            where="end.joints",
+            found=match.solver.branches[found],
+            allowed=match.solver.branches[branch],
+            hint="Choose an end posture of the same branch, or leave end: free",
+        )
+
+
+def _branch_of(robot: Robot, task_space: TaskSpace, match: Match, posture: np.ndarray, name: str) -> int:
+    """Index of the branch in whose inside a posture lies."""
+    solver = match.solver
+    redundant = [robot.joint_names.index(joint) for joint in match.redundant_joints]
+    rest = [i for i in range(robot.n) if i not in redundant]
+    target = task_space.value(robot.tool_placement(posture))
+    answers = solver.solve(target[None], posture[None, redundant])[0]
+    units = np.array(robot.position_units)[rest]
+    gap = answers - posture[rest]
+    gap = np.where(units == "rad", np.remainder(gap + np.pi, 2.0 * np.pi) - np.pi, gap)
+    gaps = np.where(np.isfinite(gap).all(axis=1), np.abs(gap).max(axis=1), np.inf)
+    branch = int(np.argmin(gaps))
+    margins = solver.branch_margins(posture[None], branch)[0]
+    if gaps[branch] > _SAME_POSTURE or np.any(margins <= 0.0):
+        raise StartError(
+            f"the {name} posture is singular for redundant joints [{', '.join(match.redundant_joints)}]",
+            where=f"{name}.joints",
+            found="a posture where branches of the closed form meet",
+            allowed="a posture inside a branch",
+            hint="Bend the arm a little, or choose other redundant joints",
         )
     return branch
 
@@ -128,7 +187,7 @@ def explain_failure(decomposition: Decomposition) -> BrachisError | str:
     if not anyhow.all():
         first = float(s[int(np.argmin(anyhow))])
         return PathError(
-            f"the path is out of reach from s = {first:.3g} on",
+            f"the path is out of reach from s = {first:.3g} on (no posture was found)",
             s_interval=(first, float(s[np.flatnonzero(~anyhow)[-1]])),
             hint="Shorten or move the path, or widen the joint ranges",
         )
@@ -149,10 +208,8 @@ def explain_failure(decomposition: Decomposition) -> BrachisError | str:
             s_interval=(first, float(s[np.flatnonzero(~held)[-1]])),
             hint="Raise robot.limits.torque, or choose other redundant joints",
         )
-    return (
-        "Every point of the path is within reach of this branch, but no course along it was found; "
-        "try other redundant joints, another start posture, or more intervals"
-    )
+    others = "try other redundant joints, another start posture" if decomposition.r else "try another start posture"
+    return f"Every point of the path is within reach of this branch, but no course along it was found; {others}"
 
 
 def _postures_along(decomposition: Decomposition, s: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from brachis import ik
 from brachis.attempts import Listener, search
 from brachis.errors import PlanningError, UnreachableError
-from brachis.feasibility import check_start, start_branch
+from brachis.feasibility import check_end_branch, check_start, start_branch
 from brachis.kinematics import Decomposition, interpolate
 from brachis.nlp import Transcription
 from brachis.path import build_path
@@ -66,16 +66,17 @@ def plan(
     clock = _Clock()
     task = load_task(task)
     robot = robot if isinstance(robot, Robot) else robot_from_settings(task.robot, urdf=robot)
+    task = task.model_copy(update={"robot": robot.settings})
     clock.stage("load")
     problem, family = transcribe(robot, task, families=families)
     clock.stage("transcribe")
-    attempts, refined = search(problem, task, listener or (lambda _text: None))
+    attempts, chosen, refined = search(problem, task, listener or (lambda _text: None))
     clock.stage("solve")
     trajectory = _trajectory(problem.decomposition, refined, task)
     clock.stage("trajectory")
     verification = verify_trajectory(trajectory, VerifyOptions(ratio_tolerance=task.refinement.tolerance))
     clock.stage("verify")
-    return Result(task, trajectory, verification, family, attempts, clock.total())
+    return Result(task, trajectory, verification, family, attempts, chosen, clock.total())
 
 
 def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) -> tuple[Transcription, str]:
@@ -105,8 +106,10 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
     path = build_path(task.path, task_space.value(robot.tool_placement(start)), task_space.rows)
     candidate = ik.find(robot, task_space, task.redundant_joints, families=families)
     redundant = tuple(robot.joint_names.index(name) for name in candidate.redundant_joints)
-    check_start(robot, start, end, path, task_space)
+    check_start(robot, start, end, path, task_space, task.path_start)
     branch = start_branch(robot, task_space, candidate, start, task.branch)
+    if end is not None:
+        check_end_branch(robot, task_space, candidate, end, branch)
     decomposition = Decomposition(robot, task_space, path, candidate.solver, redundant, branch, start)
     spline = task.spline
     problem = Transcription(

@@ -1,8 +1,9 @@
 """Refinement to truth: from limits at collocation points to limits everywhere.
 
-After a solve the limits are evaluated on a grid many times denser. Where one is exceeded between collocation points, a
+After a solve the limits are evaluated on a grid many times denser. Where one is exceeded between collocation points,
 points are added around the worst place of each stretch and the problem is solved again from where it stands, until the
-worst ratio is within the tolerance. A last excess of the tolerance's own size is met by lengthening t_E by as little.
+worst ratio is within the tolerance. A last excess of the tolerance's own size is met by lengthening t_E by as little,
+and by up to one per cent once the rounds are used up.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class RefinementOptions:
     density : int
         Grid points per collocation point of the first solve.
     max_rounds : int
-        Solves after the first one.
+        Solves after the first one; with 0 the first answer is left as it is.
     """
 
     tolerance: float = 1e-4
@@ -104,14 +105,18 @@ def refine(problem: Transcription, first: SolverReport, solve: Solve, options: R
         x, remaining = _stretched(dense, answer, excess, goal, options.tolerance)
         if remaining <= goal:
             return Refined(problem, tuple(reports), x, remaining, float(x[0] / answer[0]))
-        finer = problem.resampled(_merged(problem.tau, places))
+        tau = _merged(problem.tau, places)
+        if len(tau) == len(problem.tau):
+            break
+        finer = problem.resampled(tau)
         report = solve(finer, answer)
         if not report.status.usable and not _still_good(report, reports[-1]):
             break
         problem = finer
         reports.append(report)
     answer = reports[-1].x
-    x, remaining = _stretched(dense, answer, _violations(dense, answer, goal)[0], goal, _LARGEST_STRETCH)
+    excess, _ = _violations(dense, answer, goal)
+    x, remaining = _stretched(dense, answer, excess, goal, _LARGEST_STRETCH if options.max_rounds else 0.0)
     return Refined(problem, tuple(reports), x, remaining, float(x[0] / answer[0]))
 
 
@@ -141,13 +146,23 @@ def _violations(dense: Transcription, x: np.ndarray, goal: float) -> tuple[float
             kept = heights > goal - 0.1 * _NEAR
             centres, heights = centres[kept], heights[kept]
     except UnreachableError:
-        return np.inf, 0.5 * (tau[1::10] + tau[:-1:10])
+        return np.inf, _unreachable(dense, x)
     return float(max(table.max(), heights.max(initial=-np.inf))), _around(centres[heights > goal], tau[1] - tau[0])
 
 
-def _around(centres: np.ndarray, step: np.ndarray) -> np.ndarray:
+def _around(centres: np.ndarray, step: float) -> np.ndarray:
     """List times at and beside the centres: a peak moves when it is held down."""
     return np.unique(np.clip(centres[:, None] + step * np.array([-1.0, 0.0, 1.0]), 0.0, 1.0))
+
+
+def _unreachable(dense: Transcription, x: np.ndarray) -> np.ndarray:
+    """List the middle of every stretch of the dense grid on which the branch has no answer."""
+    motion = dense.motion(x)
+    lost = ~np.all(np.isfinite(dense.decomposition.postures(motion.at(dense.tau * motion.t_end)[0])), axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]).astype(int)))
+    if not len(edges):  # reachable, but singular or too far apart to count turns: more points everywhere
+        return dense.tau[5::10]
+    return dense.tau[(edges[::2] + edges[1::2] - 1) // 2]
 
 
 def _suspects(tau: np.ndarray, table: np.ndarray, knots: np.ndarray, near: float) -> np.ndarray:

@@ -21,7 +21,9 @@ class Attempt:
     guess : int
         Number of the initial guess.
     reports : tuple of SolverReport
-        Of the first solve and every refinement round.
+        Of all solves: with ever smaller branch margins, then of the refinement rounds.
+    refinement_rounds : int
+        How many of them were refinement rounds.
     excess : float
         Largest excess over a limit on the dense grid, as a fraction.
     stretched : float
@@ -34,6 +36,7 @@ class Attempt:
     solver: str
     guess: int
     reports: tuple[SolverReport, ...]
+    refinement_rounds: int
     excess: float
     stretched: float
     collocation_points: int
@@ -47,13 +50,15 @@ class Result:
     Attributes
     ----------
     task : Task
-        All that was asked, defaults spelled out; ``plan(result.task)`` repeats the plan.
+        All that was asked, with the robot's settings and all defaults; ``plan(None, result.task)`` repeats the plan.
     trajectory : Trajectory
     verification : Verification
     family : str
         Family of the closed form.
     attempts : tuple of Attempt
-        The last one gave the trajectory.
+        In the order in which they were made.
+    chosen : int
+        Index of the attempt that gave the trajectory.
     timing : dict of str to float
         Wall time of every stage, s.
     """
@@ -63,6 +68,7 @@ class Result:
     verification: Verification
     family: str
     attempts: tuple[Attempt, ...]
+    chosen: int
     timing: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -76,13 +82,18 @@ class Result:
         return self.verification.passed
 
     @property
+    def attempt(self) -> Attempt:
+        """The attempt that gave the trajectory."""
+        return self.attempts[self.chosen]
+
+    @property
     def report(self) -> SolverReport:
-        """The last solve's report."""
-        return self.attempts[-1].reports[-1]
+        """Report of the solve that gave the trajectory."""
+        return self.attempt.reports[-1]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures of the plan as plain data for JSON."""
-        last = self.attempts[-1]
+        last = self.attempt
         return {
             "t_end": self.t_end,
             "redundant_joints": list(self.trajectory.redundant_joints),
@@ -92,7 +103,7 @@ class Result:
             "advice": self.report.status.value,
             "solver": self.report.solver,
             "iterations": sum(report.iterations for report in last.reports),
-            "refinement_rounds": len(last.reports) - 1,
+            "refinement_rounds": last.refinement_rounds,
             "collocation_points": last.collocation_points,
             "stretched": last.stretched,
             "attempts": [attempt.outcome for attempt in self.attempts],

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import builtins
 import csv
 import json
+import math
+import subprocess
 import sys
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from brachis import attempts, planner
+from brachis import attempts, planner, plots
+from brachis.errors import InputError
 from brachis.verify import VerifyOptions
 
 from .conftest import SCARA
@@ -59,16 +65,96 @@ def test_plan_for_people(run, task, write):
     assert outcome.err == ""  # no progress display in a pipe
 
 
-def test_unverified_plan_says_so(run, task, write, tmp_path, monkeypatch):
+@pytest.fixture
+def too_strict(monkeypatch):
     honest = planner.verify_trajectory
     strict = VerifyOptions(ratio_tolerance=-0.5)
     monkeypatch.setattr(planner, "verify_trajectory", lambda trajectory, _options: honest(trajectory, strict))
+
+
+def test_unverified_plan_says_so(run, task, write, tmp_path, too_strict):  # noqa: ARG001
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
     assert outcome.code == 1
     assert json.loads(outcome.out)["verified"] is False
     assert "unverified" in outcome.err
-    assert (tmp_path / "out/unverified.npz").exists()
-    assert not (tmp_path / "out/result.npz").exists()
+    names = ["unverified.json", "unverified.npz", "unverified.png"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names
+
+
+def test_two_motions_do_not_mix_in_one_folder(run, task, write, planned, request):
+    _, out = planned
+    (out / "notes.txt").write_text("mine")
+    request.getfixturevalue("too_strict")
+    assert run("plan", write(task), "--out", out).code == 1
+    assert {path.name for path in out.iterdir()} == {"unverified.npz", "unverified.json", "unverified.png", "notes.txt"}
+    request.getfixturevalue("monkeypatch").undo()
+    assert run("plan", write(task), "--out", out).code == 0
+    assert {path.name for path in out.iterdir()} == {"result.npz", "result.json", "overview.png", "notes.txt"}
+
+
+def test_failure_while_writing_leaves_the_earlier_result(run, task, write, planned, monkeypatch):
+    _, out = planned
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+
+    def full(_figure, path):
+        raise InputError("cannot be written", where=str(path), found="No space left on device")
+
+    monkeypatch.setattr(plots, "save_figure", full)
+    outcome = run("plan", write(task), "--out", out)
+    assert outcome.code == 2
+    assert f"{out / 'overview.png'}: cannot be written; found No space left on device" in outcome.err
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+def test_folder_in_the_place_of_a_result(run, task, write, tmp_path):
+    (tmp_path / "out/result.json").mkdir(parents=True)
+    outcome = run("plan", write(task), "--out", tmp_path / "out")
+    assert outcome.code == 2
+    assert "result.json: cannot be written; found a folder" in outcome.err
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["result.json"]
+
+
+def test_json_knows_no_nan(run, task, write, tmp_path, monkeypatch):
+    honest = planner.verify_trajectory
+
+    def endless(trajectory, options):
+        return replace(honest(trajectory, options), worst_ratio=math.inf, path_error=math.nan)
+
+    monkeypatch.setattr(planner, "verify_trajectory", endless)
+    outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
+    for text in (outcome.out, (tmp_path / "out/result.json").read_text()):
+        data = json.loads(text, parse_constant=pytest.fail)
+        assert data["worst_ratio"] is None
+        assert data["verification"]["path_error"] is None
+
+
+def test_lengthened_end_time_is_said(run, task, write, monkeypatch):
+    honest = planner.plan
+
+    def lengthened(*arguments, stretched, **options):
+        result = honest(*arguments, **options)
+        attempts = tuple(replace(attempt, stretched=stretched) for attempt in result.attempts)
+        return replace(result, attempts=attempts)
+
+    for stretched, expected in ((1.0, False), (1.00004, True)):
+        monkeypatch.setattr(planner, "plan", partial(lengthened, stretched=stretched))
+        text = run("plan", write(task)).out
+        assert ("end time lengthened by" in text) is expected
+        assert ("0.004 % to meet the limits between collocation points" in text) is expected
+
+
+def test_attempts_that_were_given_up(run, task, write, monkeypatch):
+    honest = planner.plan
+
+    def chosen_first(*arguments, **options):
+        result = honest(*arguments, **options)
+        other = replace(result.attempt, outcome="slower than the first")
+        return replace(result, attempts=(result.attempt, other), chosen=0)
+
+    monkeypatch.setattr(planner, "plan", chosen_first)
+    outcome = run("plan", write(task))
+    assert "attempt 2 was given up: slower than the first" in outcome.out
+    assert "attempt 1" not in outcome.out
 
 
 def test_interrupt(run, task, write, tmp_path, monkeypatch):
@@ -80,6 +166,26 @@ def test_interrupt(run, task, write, tmp_path, monkeypatch):
     assert outcome.code == 130
     assert "interrupted" in outcome.err
     assert not list((tmp_path / "out").iterdir())
+
+
+@pytest.mark.parametrize("command", [("verify", "gone.npz"), ("plan", "gone.yaml"), ("inspect", "gone.urdf")])
+def test_interrupt_while_importing(command, run, monkeypatch):
+    def interrupt(name, *_arguments):
+        if name == "brachis.cli":
+            raise KeyboardInterrupt
+        return honest(name, *_arguments)
+
+    honest = builtins.__import__
+    monkeypatch.setattr(builtins, "__import__", interrupt)
+    outcome = run(*command)
+    assert outcome.code == 130
+    assert outcome.err == "brachis: interrupted\n"
+
+
+def test_help_loads_neither_pinocchio_nor_numpy():
+    code = "import sys, brachis.cli.main\nprint(sorted({'pinocchio', 'numpy', 'scipy'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
 
 
 def test_verify(run, planned):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import pytest
 
-from brachis.errors import nearest
+from brachis.errors import PlanningError, nearest
 
 
 def set_key(task: dict, dotted: str, value: object) -> None:
@@ -138,6 +139,25 @@ def test_unusable_output_folder(run, task, write, tmp_path):
     assert outcome.code == 2
     assert "cannot be made" in outcome.err
     assert occupied.read_text() == ""
+
+
+def test_error_as_json(run, task, write, tmp_path, monkeypatch):
+    task["robot"]["limits"]["torque"] = -1
+    cases = [("plan", write(task)), ("verify", tmp_path / "gone.npz"), ("inspect", tmp_path / "gone.urdf")]
+    for arguments in cases:
+        outcome = run(*arguments, "--json")
+        assert outcome.code == 2
+        data = json.loads(outcome.out)
+        assert outcome.err == f"brachis: {data['error']}\n"
+        del data["error"]
+        assert data == {"verified": False, "status": "error", "t_end": None, "exit_code": 2}
+
+    def no_plan(*_arguments, **_options):
+        raise PlanningError("no motion")
+
+    monkeypatch.setattr("brachis.planner.plan", no_plan)
+    outcome = run("plan", write(task), "--json")
+    assert (outcome.code, json.loads(outcome.out)["exit_code"], json.loads(outcome.out)["error"]) == (1, 1, "no motion")
 
 
 def test_fault_of_our_own_is_not_a_traceback(run, task, write, monkeypatch):

@@ -1,5 +1,6 @@
 import os
 import stat
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -42,7 +43,7 @@ def test_whoever_reads_the_old_file_keeps_it(tmp_path):
         assert reader.read() == b"old"
 
 
-@pytest.mark.parametrize("error", [ValueError("bug"), KeyboardInterrupt()])
+@pytest.mark.parametrize("error", [ValueError("bug"), KeyboardInterrupt(), FileNotFoundError("of another file")])
 def test_an_error_in_the_block_keeps_the_old_file_and_is_passed_on(tmp_path, error):
     path = tmp_path / "file"
     path.write_bytes(b"old")
@@ -89,6 +90,15 @@ def test_what_cannot_be_written_is_named(tmp_path, name):
         pytest.fail("the block must not run")
     assert caught.value.where == str(path)
     assert caught.value.found
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has /dev/full")
+def test_a_full_disk_is_named():
+    with (
+        pytest.raises(InputError, match="/dev/full: cannot be written; found No space left"),
+        atomic_write("/dev/full") as stream,
+    ):
+        stream.write(b"content")
 
 
 def test_a_trajectory_is_saved_through_it(line_trajectory, tmp_path):

@@ -1,10 +1,12 @@
 import csv
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from brachis.errors import InputError
-from brachis.export import FORMATS, csv_table, export_csv
+from brachis.export import FORMATS, export_csv
 
 HEADER = "t,q_j1,q_j2,q_j3,qd_j1,qd_j2,qd_j3,qdd_j1,qdd_j2,qdd_j3,tau_j1,tau_j2,tau_j3"
 DT = 0.004
@@ -71,22 +73,27 @@ def test_an_unusable_period_leaves_the_old_file(line_trajectory, tmp_path, dt):
     assert path.read_text() == "old"
 
 
-def test_a_full_disk_leaves_the_old_file_and_nothing_else(line_trajectory, tmp_path, monkeypatch):
-    path = tmp_path / "motion.csv"
+TOO_LARGE = """
+import resource, sys
+from brachis import InputError, Trajectory
+from brachis.export import export_csv
+trajectory = Trajectory.load(sys.argv[1])
+resource.setrlimit(resource.RLIMIT_FSIZE, (20000, resource.RLIM_INFINITY))
+try:
+    export_csv(trajectory, sys.argv[2], 0.004)
+except InputError as error:
+    print(error)
+"""
+
+
+def test_a_file_that_cannot_be_written_whole_leaves_the_old_one_and_nothing_else(line_trajectory, tmp_path):
+    path, saved = tmp_path / "motion.csv", tmp_path / "result.npz"
     path.write_text("old")
-
-    class FullDisk:
-        def writerow(self, row):
-            pass
-
-        def writerows(self, _rows):
-            raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(csv_table.csv, "writer", lambda *_, **__: FullDisk())
-    with pytest.raises(InputError, match="No space left on device"):
-        export_csv(line_trajectory, path, DT)
+    line_trajectory.save(saved)
+    done = subprocess.run([sys.executable, "-c", TOO_LARGE, saved, path], capture_output=True, text=True, check=True)
+    assert done.stdout == f"{path}: cannot be written; found File too large\n"
     assert path.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [path]
+    assert sorted(tmp_path.iterdir()) == [path, saved]
 
 
 @pytest.mark.parametrize("suffix", sorted(FORMATS))

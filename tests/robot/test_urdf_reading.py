@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from brachis.errors import InputError, UnknownNameError, UrdfError
-from brachis.robot import Robot
+from brachis.errors import InputError, LimitError, UnknownNameError, UrdfError
+from brachis.robot import LimitSpec, Robot
 from support.chains import INERTIAL, Joint, chain_urdf, planar_robot, planar_urdf
 
 TURN = Joint("revolute", xyz=(0.4, 0.0, 0.0))
@@ -95,12 +97,22 @@ def test_joints_of_more_coordinates_are_refused_on_the_chain_alone(kind):
     assert robot.joint_names == ("j2",)
 
 
-def test_missing_range_is_refused_for_all_but_continuous_joints():
-    with pytest.raises(UrdfError, match="joint 'j1' has no position range"):
-        load([Joint("revolute", limit={"effort": 1.0, "velocity": 1.0})])
-    with pytest.raises(UrdfError, match=r"joint 'j1' has no position range; found no <limit>"):
-        load([Joint("prismatic", limit=None)])
+def test_missing_range_comes_from_the_task_or_is_refused():
+    for joint in (Joint("revolute", limit={"effort": 1.0, "velocity": 1.0}), Joint("prismatic", limit=None)):
+        with pytest.raises(LimitError, match=r"joint 'j1'.*Set robot.limits.position.j1") as caught:
+            load([joint], limits=LimitSpec(torque=1.0))
+        assert caught.value.key == "robot.limits.position.j1"
+        ranged = load([joint], limits=LimitSpec(torque=1.0, position={"j1": [-3.0, 2.0]}))
+        assert (ranged.limits.position_lower[0], ranged.limits.position_upper[0]) == (-3.0, 2.0)
     assert load([Joint("continuous", limit={"effort": 1.0, "velocity": 1.0})]).n == 1
+
+
+def test_mass_without_inertia_is_refused():
+    text = chain_urdf([Joint("revolute")])
+    without = re.sub(r"<inertia [^>]*/>", "", text)
+    assert without != text
+    with pytest.raises(UrdfError, match="has a mass but no <inertia>"):
+        Robot.from_urdf("memory", urdf_text=without)
 
 
 def inertial(mass: float, moments: tuple[float, float, float]) -> str:

@@ -1,7 +1,7 @@
 """The command line: ``brachis plan | verify | export | plot | inspect | schema``.
 
 Exit codes: 0 planned and verified, 1 no verified plan, 2 wrong input. Results go to standard output, everything else to
-standard error.
+standard error. With ``--json`` standard output gets one JSON object, also for an error.
 """
 
 from __future__ import annotations
@@ -12,12 +12,32 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer.core import TyperGroup
 
-from brachis.cli.output import print_error
+from brachis.cli.output import print_failure
 from brachis.errors import BrachisError
+
+
+class InterruptedByUserError(BrachisError):
+    """The user pressed Ctrl-C."""
+
+    exit_code = 130
+
+
+class _Commands(TyperGroup):
+    """Commands that the user may interrupt."""
+
+    def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override]
+        """Run a command, its imports included."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as interrupt:
+            raise InterruptedByUserError("interrupted") from interrupt
+
 
 app = typer.Typer(
     name="brachis",
+    cls=_Commands,
     help="Plan minimum-time motions of redundant robots along prescribed paths.",
     no_args_is_help=True,
     add_completion=False,
@@ -35,7 +55,13 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on sta
 @app.command()
 def plan(
     task: TaskFile,
-    out: Annotated[Path | None, typer.Option(help="Folder for result.npz, result.json and overview.png.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for result.npz, result.json and overview.png; a motion that fails the verification is named "
+            "unverified.npz, unverified.json and unverified.png."
+        ),
+    ] = None,
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
     json: Json = False,
 ) -> None:
@@ -66,7 +92,7 @@ def export(
     """Sample a saved motion at a controller's rate."""
     from brachis.cli import results  # noqa: PLC0415
 
-    results.export_command(result, csv=csv, dt=dt)
+    results.export_command(result, csv, form="csv", dt=dt)
 
 
 @app.command()
@@ -110,19 +136,24 @@ def schema(
 
 def main() -> None:
     """Run the command line; no exception leaves it as a traceback."""
+    as_json = "--json" in sys.argv[1:]
     try:
-        app()
-    except BrachisError as error:
-        print_error(str(error))
-        sys.exit(error.exit_code)
+        try:
+            app()
+        except BrachisError as error:
+            print_failure(str(error), error.exit_code, as_json=as_json)
+            sys.exit(error.exit_code)
+        except BrokenPipeError:
+            raise
+        except Exception as error:
+            if os.environ.get("BRACHIS_DEBUG"):
+                raise
+            message = (
+                f"internal error: {type(error).__name__}: {error}. This is a fault of brachis; "
+                "run again with BRACHIS_DEBUG=1 for the traceback and report it"
+            )
+            print_failure(message, 1, as_json=as_json)
+            sys.exit(1)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
-    except Exception as error:
-        if os.environ.get("BRACHIS_DEBUG"):
-            raise
-        print_error(
-            f"internal error: {type(error).__name__}: {error}. This is a fault of brachis; "
-            "run again with BRACHIS_DEBUG=1 for the traceback and report it"
-        )
         sys.exit(1)

@@ -7,11 +7,13 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
-from brachis.verify import Verification
+if TYPE_CHECKING:  # loads Pinocchio, which no error message and no help needs
+    from brachis.verify import Verification
 
 
 def print_error(message: str) -> None:
@@ -19,9 +21,21 @@ def print_error(message: str) -> None:
     Console(stderr=True, soft_wrap=True, highlight=False, markup=False).print(f"brachis: {message}")
 
 
+def json_text(data: Mapping[str, object]) -> str:
+    """One JSON object as text for files and streams; numbers that JSON does not know become null."""
+    return json.dumps(_plain(data), indent=2, allow_nan=False) + "\n"
+
+
 def print_json(data: Mapping[str, object]) -> None:
-    """One JSON object on standard output; numbers that JSON does not know become null."""
-    sys.stdout.write(json.dumps(_plain(data), indent=2) + "\n")
+    """One JSON object on standard output."""
+    sys.stdout.write(json_text(data))
+
+
+def print_failure(message: str, exit_code: int, *, as_json: bool) -> None:
+    """Say on standard error what went wrong; with `as_json` also as one JSON object on standard output."""
+    if as_json:
+        print_json({"verified": False, "status": "error", "error": message, "t_end": None, "exit_code": exit_code})
+    print_error(message)
 
 
 def _plain(value: object) -> object:

@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
-import json
+import secrets
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 from rich.table import Table
 
 from brachis import planner
-from brachis.cli.output import print_error, print_json, progress, result_console, verification_table
-from brachis.errors import BrachisError, InputError
-from brachis.files import atomic_write
+from brachis.cli.output import json_text, print_error, print_json, progress, result_console, verification_table
+from brachis.errors import InputError
+from brachis.files import atomic_write, writing_errors
 from brachis.result import Result
 
-
-class InterruptedByUserError(BrachisError):
-    """The user pressed Ctrl-C."""
-
-    exit_code = 130
+_FILES = {
+    True: ("result.npz", "result.json", "overview.png"),
+    False: ("unverified.npz", "unverified.json", "unverified.png"),
+}
+"""Names of the trajectory, the figures of merit and the drawing, by whether the motion passed the verification."""
 
 
 def plan_command(task: Path, *, urdf: Path | None, out: Path | None, as_json: bool) -> int:
     """Plan, show, write; returns the exit code."""
     if out is not None:
         _make_folder(out)
-    try:
-        with progress() as listener:
-            result = planner.plan(urdf, task, listener=listener)
-    except KeyboardInterrupt as interrupt:
-        raise InterruptedByUserError("interrupted; nothing was written") from interrupt
+    with progress() as listener:
+        result = planner.plan(urdf, task, listener=listener)
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
     if out is not None:
         data["files"] = _write(result, data, out)
@@ -49,40 +48,73 @@ def _make_folder(out: Path) -> None:
 
 
 def _write(result: Result, data: dict[str, object], out: Path) -> list[str]:
-    """Write result, figures and figures of merit; an unverified motion gets a name that says so."""
+    """Write trajectory, figures of merit and drawing; an unverified motion gets names that say so.
+
+    All are written into a temporary folder and then moved, so that a failure leaves the folder as it was. Files of an
+    earlier plan with the other names are removed: they would be another motion's.
+    """
     from brachis.plots import plot_overview, save_figure  # noqa: PLC0415  (matplotlib takes 0.7 s)
 
-    stem = "result" if result.verified else "unverified"
-    names = [out / f"{stem}.npz", out / f"{stem}.json", out / "overview.png"]
-    result.trajectory.save(names[0])
-    with atomic_write(names[1]) as stream:
-        stream.write((json.dumps(data, indent=2) + "\n").encode())
-    save_figure(plot_overview(result.trajectory), names[2])
-    return [str(name) for name in names]
+    names = _FILES[result.verified]
+    writers: tuple[Callable[[Path], object], ...] = (
+        result.trajectory.save,
+        lambda path: _write_text(json_text(data), path),
+        lambda path: save_figure(plot_overview(result.trajectory), path),
+    )
+    for name in names:
+        if (out / name).is_dir():
+            raise InputError("cannot be written", where=str(out / name), found="a folder of this name")
+    temporary = out / f".{secrets.token_hex(8)}.part"
+    with writing_errors(out):
+        temporary.mkdir()
+    try:
+        for name, write in zip(names, writers, strict=True):
+            try:
+                write(temporary / name)
+            except InputError as error:  # it names the temporary file
+                raise InputError(error.problem, where=str(out / name), found=error.found) from error
+        for name in names:
+            with writing_errors(out / name):
+                (temporary / name).replace(out / name)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    for name in _FILES[not result.verified]:
+        with writing_errors(out / name):
+            (out / name).unlink(missing_ok=True)
+    return [str(out / name) for name in names]
+
+
+def _write_text(text: str, path: Path) -> None:
+    with atomic_write(path) as stream:
+        stream.write(text.encode())
 
 
 def _show(result: Result, data: dict[str, object]) -> None:
     """Print the plan for a person."""
     console = result_console()
-    last = result.attempts[-1]
+    attempt = result.attempt
     table = Table(show_header=False, title="plan", title_justify="left")
     rows = {
         "end time t_E": f"{result.t_end:.4f} s",
         "redundant joints": ", ".join(result.trajectory.redundant_joints) or "none",
         "branch": f"{result.trajectory.branch} ({result.family})",
         "solver": f"{result.report.solver}, {result.report.status.value}",
-        "iterations": f"{sum(r.iterations for r in last.reports)} in {len(last.reports)} solves (refined to "
-        f"{last.collocation_points} collocation points)",
+        "iterations": f"{sum(r.iterations for r in attempt.reports)} in {len(attempt.reports)} solves (refined to "
+        f"{attempt.collocation_points} collocation points)",
         "wall time": f"{1e3 * result.timing['total']:.0f} ms",
         "worst ratio to a limit": f"{result.verification.worst_ratio:.6f}",
         "path error": f"{result.verification.path_error:.1e} m or rad",
         "verified": "yes" if result.verified else "NO",
     }
+    if attempt.stretched > 1.0:
+        lengthened = f"{100.0 * (attempt.stretched - 1.0):.2g} % to meet the limits between collocation points"
+        rows["end time lengthened by"] = lengthened
     for name, value in rows.items():
         table.add_row(name, value)
     console.print(table)
-    for number, attempt in enumerate(result.attempts[:-1], start=1):
-        console.print(f"attempt {number} was given up: {attempt.outcome}")
+    for number, other in enumerate(result.attempts):
+        if number != result.chosen:
+            console.print(f"attempt {number + 1} was given up: {other.outcome}")
     console.print(verification_table(result.verification))
     for name in data.get("files", []):  # type: ignore[attr-defined]
         console.print(f"wrote {name}")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 
-from brachis.cli.output import print_json, result_console, verification_table
+from brachis.cli.output import json_text, print_json, result_console, verification_table
 from brachis.errors import UnknownNameError
 from brachis.files import atomic_write
 from brachis.robot.from_task import robot_from_settings
@@ -28,12 +27,12 @@ def verify_command(result: Path, *, urdf: Path | None, as_json: bool) -> int:
     return 0 if verification.passed else 1
 
 
-def export_command(result: Path, *, csv: Path, dt: float) -> None:
-    """Write a saved motion as CSV."""
-    from brachis.export import export_csv  # noqa: PLC0415
+def export_command(result: Path, out: Path, *, form: str, dt: float) -> None:
+    """Write a saved motion in one of the formats of `brachis.export.FORMATS`."""
+    from brachis.export import FORMATS  # noqa: PLC0415
 
-    export_csv(Trajectory.load(result), csv, dt)
-    result_console().print(f"wrote {csv}")
+    FORMATS[form](Trajectory.load(result), out, dt)
+    result_console().print(f"wrote {out}")
 
 
 def plot_command(result: Path, *, out: Path, kind: str) -> None:
@@ -48,7 +47,7 @@ def plot_command(result: Path, *, out: Path, kind: str) -> None:
 
 def schema_command(out: Path | None) -> None:
     """Print or write the JSON schema of task files."""
-    text = json.dumps(json_schema(), indent=2) + "\n"
+    text = json_text(json_schema())
     if out is None:
         sys.stdout.write(text)
         return

@@ -58,8 +58,24 @@ class Match(Candidate):
 
 @cache
 def plugin_families() -> tuple[Family, ...]:
-    """Families of other packages, from the entry-point group ``brachis.ik``."""
-    return tuple(entry.load() for entry in importlib.metadata.entry_points(group="brachis.ik"))
+    """Families of other packages, from the entry-point group ``brachis.ik``; a broken one says so when it is tried."""
+    return tuple(_loaded(entry) for entry in importlib.metadata.entry_points(group="brachis.ik"))
+
+
+def _loaded(entry: importlib.metadata.EntryPoint) -> Family:
+    try:
+        family = entry.load()
+    except Exception as error:  # noqa: BLE001  (whatever another package's import raises)
+        reason = f"the plug-in cannot be loaded: {type(error).__name__}: {error}"
+    else:
+        if isinstance(family, Family):
+            return family
+        reason = f"the plug-in's entry point is no Family but {type(family).__name__}"
+
+    def refuse(*_arguments: object) -> IKSolver:
+        raise NotApplicableError(reason)
+
+    return Family(entry.name, refuse, entry.value)
 
 
 def find(

@@ -29,6 +29,10 @@ from brachis.kinematics.task_kinematics import TaskKinematics
 from brachis.path import Path, PathSample
 from brachis.robot import Robot, TaskSpace
 
+_TURN = 2.0 * np.pi
+_SURE = 0.25
+"""A step that differs from its prediction by more than this part of a turn is not counted."""
+
 
 @dataclass(frozen=True)
 class JointState:
@@ -108,6 +112,10 @@ class Decomposition:
         self.start = start
         self.kinematics = TaskKinematics(robot, task_space)
         self._turning = ChainGeometry.of(robot).revolute[self.rest]
+        self._turns = [joint for joint, turning in zip(self.rest, self._turning, strict=True) if turning]
+        limits = robot.limits
+        ranged = np.isfinite(limits.position_lower) | np.isfinite(limits.position_upper)
+        self._ranged = ranged[self._turns]
 
     @property
     def r(self) -> int:
@@ -140,13 +148,33 @@ class Decomposition:
         q[:, self.rest] = answers
         return q
 
-    def state(self, y: np.ndarray, ydot: np.ndarray, yddot: np.ndarray) -> JointState:
-        """Joint motion at K successive times from y and its time derivatives, each (K, 1 + r).
+    def state(
+        self,
+        y: np.ndarray,
+        ydot: np.ndarray,
+        yddot: np.ndarray,
+        *,
+        t: np.ndarray | None = None,
+        near: np.ndarray | None = None,
+    ) -> JointState:
+        """Joint motion at K times.
+
+        Parameters
+        ----------
+        y, ydot, yddot : (K, 1 + r) ndarray
+            Path coordinate and redundant joints, and their time derivatives.
+        t : (K,) ndarray, optional
+            The times, ascending from the start on, s. Angles are then lifted by 2 pi so that they follow their own
+            velocities from the start posture on. Without `t` and `near`, successive times must be so close that no
+            joint turns by pi in between.
+        near : (K, n) ndarray, optional
+            Postures known to be near; angles are lifted to these, and the times may be any.
 
         Raises
         ------
         UnreachableError
-            The branch has no answer at one of the times, or J_nr is singular there.
+            The branch has no answer at one of the times, J_nr is singular there, or the times are so far apart that
+            the turns of a joint with a range cannot be counted.
         """
         sample = self.path.sample(y[:, 0])
         q = self.postures(y, sample)
@@ -163,7 +191,24 @@ class Decomposition:
         wanted = sample.xi_ds * ydot[:, :1] ** 2 - self.kinematics.bias(q, qdot)
         qddot = np.einsum("kij,kj->ki", gradient, yddot)
         qddot[:, self.rest] += np.einsum("kij,kj->ki", inverse, wanted)
+        if near is not None:
+            q[:, self._turns] += _TURN * np.round((near - q)[:, self._turns] / _TURN)
+        elif t is not None:
+            self._follow(q, qdot, qddot, t)
         return JointState(y, ydot, yddot, q, qdot, qddot, sample, gradient, inverse)
+
+    def _follow(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, t: np.ndarray) -> None:
+        """Lift angles in place so that they follow their velocities; the quintic's rule predicts each step."""
+        turns, h = self._turns, np.diff(t)[:, None]
+        v, a = qdot[:, turns], qddot[:, turns]
+        predicted = 0.5 * h * (v[1:] + v[:-1]) - h**2 / 12.0 * np.diff(a, axis=0)
+        gap = (predicted - np.diff(q[:, turns], axis=0)) / _TURN
+        counted = np.round(gap)
+        unsure = np.abs(gap - counted) > _SURE
+        if np.any(unsure & self._ranged):
+            raise UnreachableError("a joint turns too far between collocation points to count its turns")
+        first = np.round((self.start[turns] - q[0, turns]) / _TURN)
+        q[:, turns] += _TURN * (first + np.vstack([np.zeros(len(turns)), np.cumsum(counted, axis=0)]))
 
     def _gradient(self, sample: PathSample, jacobian: np.ndarray, inverse: np.ndarray) -> np.ndarray:
         """G = dq/dy, (K, n, 1 + r)."""

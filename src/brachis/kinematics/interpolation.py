@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.errors import UnreachableError
 from brachis.kinematics.decomposition import Decomposition, JointState
 
 Curves = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -20,6 +21,7 @@ Curves = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 _PIECES_PER_INTERVAL = 4
 _POSITION_TOLERANCE = 1e-11
 _ACCELERATION_TOLERANCE = 1e-6
+_LARGEST_ERROR = 1e-9
 _ROUNDS = 8
 _JUST_BEFORE = 1e-11
 
@@ -75,17 +77,19 @@ def interpolate(decomposition: Decomposition, curves: Curves, breaks: np.ndarray
     for _ in range(_ROUNDS):
         middle = 0.5 * (times[1:] + times[:-1])
         merged = np.sort(np.concatenate([times, middle]))
-        state = decomposition.state(*curves(merged))
+        state = decomposition.state(*curves(merged), t=merged)
         before = state.qddot
         if jumps:
             shift = _JUST_BEFORE * breaks[-1] * (np.arange(len(merged)) > 0)
-            before = decomposition.state(*curves(merged - shift)).qddot
+            before = decomposition.state(*curves(merged - shift), near=state.q).qddot
         gap_q, gap_qddot = _middle_gaps(times, state, before)
         error = float(gap_q.max())
         bad = (gap_q > _POSITION_TOLERANCE) | (gap_qddot > _ACCELERATION_TOLERANCE * (1.0 + np.abs(state.qddot).max()))
         if not bad.any():
             break
         times = np.union1d(times, middle[bad])
+    if error > _LARGEST_ERROR:
+        raise UnreachableError("the motion is too sharp for polynomial pieces")
     # The middles are known exactly as well; as nodes they make the error 64 times smaller still.
     return Nodes(merged, state.q, state.qdot, state.qddot, before, error)
 

@@ -17,7 +17,7 @@ from brachis.ik import margin_gradient
 from brachis.kinematics import Decomposition
 from brachis.nlp.transcription import Motion, Transcription
 
-_STEPS = 40
+_FEWEST_STEPS, _MOST_STEPS, _STEP_LENGTH = 40, 1000, 0.05  # metres a step
 _DAMPING = 1e-6
 _STRETCH = 1.1
 _CORRECTIONS = 5
@@ -94,24 +94,27 @@ def numeric_course(decomposition: Decomposition, strategy: Strategy) -> np.ndarr
     (steps, 1 + r) ndarray or None
         Successive values of s and the redundant joints; None where the target cannot be followed.
     """
-    s = np.linspace(0.0, 1.0, _STEPS + 1)
+    if decomposition.r == 0:
+        return np.array([[0.0], [1.0]])
+    steps = int(np.clip(np.ceil(decomposition.path.length / _STEP_LENGTH), _FEWEST_STEPS, _MOST_STEPS))
+    s = np.linspace(0.0, 1.0, steps + 1)
     targets = decomposition.path.sample(s).target
     q = decomposition.start.astype(float)
     previous = np.zeros_like(q)
     course = [np.append(0.0, q[decomposition.redundant])]
-    for _ in range(_UNFOLDING_STEPS if decomposition.r else 0):
+    for _ in range(_UNFOLDING_STEPS):
         if (
             decomposition.solver.branch_margins(q[None], decomposition.branch).min(initial=1.0)
             > 0.5 * strategy.threshold
         ):
             break
-        moved = _follow(decomposition, strategy, q, previous, targets[0], unfolding=True)
+        moved = _follow(decomposition, strategy, q, previous, targets[0], step_s=None)
         if moved is None:
             break
         q, previous = moved
         course.append(np.append(0.0, q[decomposition.redundant]))
     for station, target in zip(s[1:], targets[1:], strict=True):
-        moved = _follow(decomposition, strategy, q, previous, target, unfolding=False)
+        moved = _follow(decomposition, strategy, q, previous, target, step_s=1.0 / steps)
         if moved is None:
             return None
         q, previous = moved
@@ -126,9 +129,12 @@ def _follow(
     previous: np.ndarray,
     target: np.ndarray,
     *,
-    unfolding: bool,
+    step_s: float | None,
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """One step to the next target: the new posture and the null-space motion made; None if it is not met."""
+    """One step to the next target: the new posture and the null-space motion made; None if it is not met.
+
+    `step_s` is the step in s, None for unfolding on the spot.
+    """
     kinematics = decomposition.kinematics
     for correction in range(_CORRECTIONS):
         miss = decomposition.task_space.difference(target, kinematics.position(q[None])[0])
@@ -137,12 +143,13 @@ def _follow(
         jacobian = kinematics.jacobian(q[None])[0]
         square = jacobian @ jacobian.T + _DAMPING * np.eye(len(miss))
         step = jacobian.T @ np.linalg.solve(square, miss)
-        if correction == 0 and decomposition.r:
+        if correction == 0:
             wish = _wish(decomposition, strategy, q, previous)
             free = wish - jacobian.T @ np.linalg.solve(square, jacobian @ wish)
             size = float(np.abs(free).max())
-            largest = _UNFOLDING_STEP if unfolding else _LARGEST_STEP
-            previous = free * (largest / max(size, 1e-9) if unfolding else min(1.0 / _STEPS, largest / max(size, 1e-9)))
+            largest = _UNFOLDING_STEP if step_s is None else _LARGEST_STEP
+            factor = largest / max(size, 1e-9)
+            previous = free * (factor if step_s is None else min(step_s, factor))
             step = step + previous
         q = q + step
     return None
@@ -202,5 +209,5 @@ def stretched(problem: Transcription, x: np.ndarray) -> np.ndarray:
 def worst_timed_ratio(problem: Transcription, x: np.ndarray) -> float:
     """Largest ratio to a limit that a longer time relieves: velocity, acceleration, torque."""
     state = problem.state(x)
-    timed = [c.values(state) for c in problem.constraints if c.kind in ("torque", "velocity", "acceleration")]
+    timed = [c.values(state) for c in problem.constraints if c.timed]
     return float(max(np.abs(values).max() for values in timed))

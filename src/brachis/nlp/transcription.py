@@ -32,7 +32,7 @@ from brachis.bspline import clamped_uniform_knots
 from brachis.kinematics import Decomposition, JointDerivatives, JointState
 from brachis.nlp import constraints
 from brachis.nlp.constraints import Constraint, Partials
-from brachis.nlp.constraints.branch_margin import BranchMarginConstraint
+from brachis.nlp.constraints.branch_margin import MARGIN
 from brachis.nlp.curves import TiedSpline, Windows
 
 _SHORTEST_TIME = 1e-4
@@ -109,8 +109,7 @@ class Transcription:
         self.knots = clamped_uniform_knots(degree, intervals)
         self.degree = degree
         self.splines = self._make_splines(derivatives_at_rest, end)
-        built = (build(decomposition) for build in constraints.TABLE.values())
-        self.constraints: tuple[Constraint, ...] = tuple(c for c in built if c is not None)
+        self.constraints = self._build_constraints(MARGIN)
         self._lay_out_variables()
         self._collocate(tau)
 
@@ -175,14 +174,21 @@ class Transcription:
     def with_margin(self, margin: float) -> Transcription:
         """Return the same problem with another least branch margin; x keeps its meaning."""
         other = copy.copy(self)
-        other.constraints = tuple(
-            c.with_margin(margin) if isinstance(c, BranchMarginConstraint) else c for c in self.constraints
-        )
-        other._lay_out_rows()  # noqa: SLF001  (its own class)
+        other.constraints = self._build_constraints(margin)
+        other._collocate(self.tau)  # noqa: SLF001  (its own class)
         return other
 
-    def least_margin(self, x: np.ndarray) -> float:
-        """Smallest branch margin at the collocation points; infinite where the closed form has none.
+    def _build_constraints(self, margin: float) -> tuple[Constraint, ...]:
+        built = (build(self.decomposition, margin) for build in constraints.TABLE.values())
+        return tuple(c for c in built if c is not None)
+
+    @property
+    def guards(self) -> tuple[float, ...]:
+        """Lower bounds of the constraints that guard the computation: the branch margins in force."""
+        return tuple(float(bound) for c in self.constraints if not c.physical for bound in c.lower)
+
+    def guard_slack(self, x: np.ndarray) -> float:
+        """Smallest distance of a guard from its bound; infinite where there is none.
 
         Raises
         ------
@@ -190,8 +196,8 @@ class Transcription:
             See `state`.
         """
         state = self.state(x)
-        margins = [c.values(state).min() for c in self.constraints if isinstance(c, BranchMarginConstraint)]
-        return float(min(margins, default=np.inf))
+        slacks = [(c.values(state) - c.lower).min() for c in self.constraints if not c.physical]
+        return float(min(slacks, default=np.inf))
 
     @property
     def variables(self) -> int:
@@ -235,7 +241,7 @@ class Transcription:
             self.evaluations["states"] += 1
             y, ydot, yddot = self._windows.curves(self._control_points(x))
             ydot, yddot = ydot / x[0], yddot / x[0] ** 2
-            self._last = (key, self.decomposition.state(y, ydot, yddot))
+            self._last = (key, self.decomposition.state(y, ydot, yddot, t=self.tau * x[0]))
         return self._last[1]
 
     def rows(self, x: np.ndarray) -> np.ndarray:
@@ -263,12 +269,14 @@ class Transcription:
         return self._excess(self.state(x))
 
     def excess_at(self, x: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """As `excess`, at other normalised times `tau`, (K,), ascending."""
-        motion = self.motion(x)
-        return self._excess(self.decomposition.state(*motion.at(tau * motion.t_end)))
+        """As `excess`, at other normalised times `tau`, (K,); 2 pi lifts follow the nearest collocation point."""
+        motion, known = self.motion(x), self.state(x)
+        place = np.clip(np.searchsorted(self.tau, tau), 0, len(self.tau) - 1)
+        near = known.q[place] + known.qdot[place] * ((tau - self.tau[place]) * motion.t_end)[:, None]
+        return self._excess(self.decomposition.state(*motion.at(tau * motion.t_end), near=near))
 
     def _excess(self, state: JointState) -> np.ndarray:
-        limits = [c for c in self.constraints if c.kind != "branch_margin"]
+        limits = [c for c in self.constraints if c.physical]
         values = [(constraint.values(state), constraint) for constraint in limits]
         return np.concatenate([np.maximum(v - c.upper, c.lower - v) for v, c in values], axis=1)
 

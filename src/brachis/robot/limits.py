@@ -14,7 +14,8 @@ FROM_URDF = "urdf"
 """Marks a limit that is taken from the URDF (the default of every `LimitSpec` entry)."""
 
 PerJoint = float | Sequence[float | None] | Mapping[str, float | None] | None | str
-PerJointRange = Sequence[Sequence[float] | None] | Mapping[str, Sequence[float] | None] | None | str
+Range = Sequence[float | None] | None
+PerJointRange = Sequence[Range] | Mapping[str, Range] | None | str
 
 
 @dataclass(frozen=True)
@@ -22,13 +23,14 @@ class LimitSpec:
     """What the user says about limits; the URDF fills the rest.
 
     Each entry is ``FROM_URDF``, None (not limited), one number for all joints, a list in chain order, or a mapping
-    from joint name to number or None. Units: torque Nm or N, velocity rad/s or m/s, acceleration rad/s^2 or m/s^2,
-    position rad or m. ``scale`` multiplies torque, velocity and acceleration limits after all else.
+    from joint name to number or None. A URDF has no acceleration limits. Units: torque Nm or N, velocity rad/s or m/s,
+    acceleration rad/s^2 or m/s^2, position rad or m. ``scale`` multiplies torque, velocity and acceleration limits
+    after all else.
     """
 
     torque: PerJoint = FROM_URDF
     velocity: PerJoint = FROM_URDF
-    acceleration: PerJoint = FROM_URDF
+    acceleration: PerJoint = None
     position: PerJointRange = FROM_URDF
     scale: Mapping[str, float] = field(default_factory=dict)
 
@@ -64,6 +66,8 @@ class UrdfLimit:
     upper: float | None
     velocity: float | None
     effort: float | None
+    needs_range: bool = False
+    """True where a revolute or prismatic joint states no range, so that the task has to."""
 
 
 def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[UrdfLimit]) -> Limits:
@@ -177,6 +181,13 @@ def _ranges(value: PerJointRange, names: list[str], urdf: Sequence[UrdfLimit]) -
     lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
     for i, (name, entry, stated) in enumerate(zip(names, listed, urdf, strict=True)):
         chosen = (stated.lower, stated.upper) if entry == FROM_URDF else entry
+        if entry == FROM_URDF and stated.needs_range:
+            raise LimitError(
+                "has no position range in the URDF",
+                joint=name,
+                key=f"robot.limits.position.{name}",
+                allowed='<limit lower="..." upper="..." .../>, type="continuous", or a range in the task',
+            )
         if chosen is None:
             continue
         ends = chosen if isinstance(chosen, Sequence) else ()

@@ -12,8 +12,9 @@ import pinocchio as pin
 
 from brachis.errors import InputError, UrdfError
 from brachis.robot.friction import Friction
-from brachis.robot.limits import Limits, LimitSpec, UrdfLimit, per_joint_values, resolve_limits
+from brachis.robot.limits import FROM_URDF, Limits, LimitSpec, UrdfLimit, per_joint_values, resolve_limits
 from brachis.robot.urdf import read_chain, read_file
+from brachis.task import RobotSettings, check_robot_settings
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 
@@ -36,6 +37,8 @@ class Robot:
         Limits as the URDF states them.
     friction : Friction
         Torque terms beside the rigid-body model's.
+    settings : RobotSettings
+        What the robot was made with, as the ``robot`` part of a task.
     source : str
         The URDF file that the robot was read from.
     urdf : str
@@ -49,6 +52,7 @@ class Robot:
     limits: Limits
     stated_limits: tuple[UrdfLimit, ...]
     friction: Friction
+    settings: RobotSettings
     source: str
     urdf: str
 
@@ -95,15 +99,12 @@ class Robot:
         ------
         UrdfError, UnknownNameError, LimitError, InputError
         """
+        spec = limits or LimitSpec()
+        vector = _vector(gravity)
         text = read_file(Path(path)) if urdf_text is None else urdf_text
         chain = read_chain(
             text, str(path), tool_frame=tool_frame, base_frame=base_frame, locked_joints=dict(locked_joints or {})
         )
-        vector = np.asarray(gravity, dtype=float)
-        if vector.shape != (3,) or not np.all(np.isfinite(vector)):
-            raise InputError(
-                "is not a vector", where="robot.gravity", found=list(gravity), allowed="[x, y, z] in m/s^2"
-            )
         model = _build_model(chain.xml, chain.locked, str(path))
         model.gravity.linear = vector
         model.armature = np.zeros(model.nv)
@@ -117,9 +118,10 @@ class Robot:
             joint_names=names,
             tool_frame=chain.tool_frame,
             base_frame=chain.base_frame,
-            limits=resolve_limits(limits or LimitSpec(), names, chain.limits),
+            limits=resolve_limits(spec, names, chain.limits),
             stated_limits=chain.limits,
             friction=Friction.of(names, **dict(friction or {})),
+            settings=_settings(path, names, tool_frame, base_frame, vector, locked_joints, spec, friction),
             source=str(path),
             urdf=text,
         )
@@ -161,6 +163,56 @@ class Robot:
         data = self.model.createData()
         pin.framesForwardKinematics(self.model, data, np.asarray(q, dtype=float))
         return data.oMf[self.frame_id].copy()
+
+
+def _vector(gravity: Sequence[float]) -> np.ndarray:
+    """Gravity as (3,), m/s^2."""
+    try:
+        vector = np.asarray(gravity, dtype=float)
+    except (TypeError, ValueError):
+        vector = np.empty(0)
+    if vector.shape != (3,) or not np.all(np.isfinite(vector)):
+        raise InputError("is not a vector", where="robot.gravity", found=gravity, allowed="[x, y, z] in m/s^2")
+    return vector
+
+
+def _settings(
+    path: str | os.PathLike[str],
+    names: Sequence[str],
+    tool_frame: str | None,
+    base_frame: str | None,
+    gravity: np.ndarray,
+    locked_joints: Mapping[str, float] | None,
+    limits: LimitSpec,
+    friction: Mapping[str, object] | None,
+) -> RobotSettings:
+    """Keep the arguments as the ``robot`` part of a task."""
+    return check_robot_settings(
+        {
+            "urdf": str(Path(path).absolute()),
+            "tool_frame": tool_frame,
+            "base_frame": base_frame,
+            "gravity": gravity,
+            "locked_joints": dict(locked_joints or {}),
+            "limits": {
+                "torque": _by_name(limits.torque, names, FROM_URDF),
+                "velocity": _by_name(limits.velocity, names, FROM_URDF),
+                "acceleration": _by_name(limits.acceleration, names, None),
+                "position": _by_name(limits.position, names, FROM_URDF),
+                "scale": dict(limits.scale),
+            },
+            "friction": dict(friction or {}),
+        }
+    )
+
+
+def _by_name(value: object, names: Sequence[str], absent: object) -> object:
+    """Return a limit that is given joint by joint as a mapping, without the joints that take the URDF's."""
+    if value is None or isinstance(value, (str, float, int)):
+        return value
+    listed = per_joint_values("limits", value, names, FROM_URDF)
+    kept = {name: entry for name, entry in zip(names, listed, strict=True) if not isinstance(entry, str)}
+    return kept or absent
 
 
 def _build_model(xml: str, locked: Mapping[str, float], where: str) -> pin.Model:

@@ -88,6 +88,8 @@ def read_chain(
     for name in locked_joints:
         if name not in by_name:
             raise UnknownNameError("moving joint", name, by_name, where=f"{where}: locked_joints")
+        if not np.isfinite(locked_joints[name]):
+            raise UrdfError("the position of a locked joint is not finite", where=f"locked_joints.{name}")
     chain = [joint for joint in path_joints if joint.type != "fixed" and joint.name not in locked_joints]
     check_joints(chain, {joint.name for joint in chain}, by_name, where)
     if not chain:
@@ -96,7 +98,7 @@ def read_chain(
         name: _lock_position(by_name[name], locked_joints) for name in by_name if name not in {j.name for j in chain}
     }
     check_inertias(urdf, chain, parents, where)
-    limits = tuple(_limit_of(joint, where) for joint in chain)
+    limits = tuple(_limit_of(joint) for joint in chain)
     return UrdfChain(tuple(j.name for j in chain), limits, locked, tool, base, _plain_xml(urdf))
 
 
@@ -198,20 +200,15 @@ def _lock_position(joint: Any, locked_joints: Mapping[str, float]) -> float:  # 
     return float(np.clip(0.0, low, high)) if low <= high else 0.0
 
 
-def _limit_of(joint: Any, where: str) -> UrdfLimit:  # noqa: ANN401
-    """Read the limits of one joint; a prismatic or revolute joint must state its range."""
+def _limit_of(joint: Any) -> UrdfLimit:  # noqa: ANN401
+    """Read the limits of one joint; the range of a revolute or prismatic joint may have to come from the task."""
     limit = joint.limit
+    velocity, effort = (limit.velocity, limit.effort) if limit else (None, None)
     if joint.type == "continuous":
-        return UrdfLimit(None, None, limit.velocity if limit else None, limit.effort if limit else None)
+        return UrdfLimit(None, None, velocity, effort)
     if limit is None or limit.lower is None or limit.upper is None:
-        missing = "no <limit>" if limit is None else "a <limit> without lower and upper"
-        raise UrdfError(
-            f"joint {joint.name!r} has no position range",
-            where=where,
-            found=missing,
-            allowed='<limit lower="..." upper="..." .../>, or type="continuous"',
-        )
-    return UrdfLimit(limit.lower, limit.upper, limit.velocity, limit.effort)
+        return UrdfLimit(None, None, velocity, effort, needs_range=True)
+    return UrdfLimit(limit.lower, limit.upper, velocity, effort)
 
 
 def _plain_xml(urdf: yourdfpy.URDF) -> str:

@@ -73,8 +73,15 @@ def _check_inertia(link: Any, where: str) -> None:  # noqa: ANN401
         raise UrdfError(
             f"link {link.name!r} has a non-physical mass", where=where, found=f"{mass:g} kg", allowed=">= 0 kg"
         )
-    if matrix is None:
+    if matrix is None and mass == 0.0:
         return
+    if matrix is None:
+        raise UrdfError(
+            f"link {link.name!r} has a mass but no <inertia>",
+            where=where,
+            found=f"{mass:g} kg",
+            allowed="<inertia> with the moments about the centre of mass",
+        )
     moments = np.linalg.eigvalsh(np.asarray(matrix, dtype=float)) if np.all(np.isfinite(matrix)) else np.array([np.nan])
     slack = 1e-3 * max(abs(moments).max(), 1e-12)  # figures from CAD are rounded
     physical = moments[0] >= -slack and (len(moments) < 3 or moments[0] + moments[1] >= moments[2] - slack)  # noqa: PLR2004

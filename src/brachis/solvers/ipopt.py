@@ -77,6 +77,7 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
         },
     )
     multipliers = np.zeros(len(problem.lower))
-    answer, _, code = backend.solve(x.copy(), mult_g=multipliers)
+    with watch:
+        answer, _, code = backend.solve(x.copy(), mult_g=multipliers)
     status = _STATUS.get(int(code), SolveStatus.FAILED)
     return watch.report(name, status, np.array(answer), -multipliers, f"return code {code}")

@@ -16,6 +16,7 @@ class SolveStatus(enum.Enum):
     OPTIMAL = "optimal: first-order conditions hold"
     ACCEPTABLE = "acceptable: feasible, but the solver could not confirm optimality; another start may be better"
     ITERATION_LIMIT = "iteration limit reached; raise solver.max_iterations"
+    STALLED = "the solver crept on without progress; another start or solver may do better"
     TIME_LIMIT = "time limit reached; raise solver.time_limit"
     INFEASIBLE = "no feasible point near this start; check limits, choose another redundant joint or start posture"
     EVALUATION_ERROR = "the motion could not be evaluated near this start; choose another redundant joint"

@@ -52,16 +52,17 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
             raise _StopSolveError
 
     try:
-        result = minimize(  # type: ignore[call-overload]  # the stubs know neither Bounds nor this callback
-            problem.objective,
-            x,
-            method="SLSQP",
-            jac=lambda _x: problem.gradient(),
-            bounds=Bounds(problem.x_lower, problem.x_upper),
-            constraints=[{"type": "ineq", "fun": rows, "jac": jacobian}],
-            callback=callback,
-            options={"maxiter": options.max_iterations, "ftol": options.tolerance},
-        )
+        with watch:
+            result = minimize(  # type: ignore[call-overload]  # the stubs know neither Bounds nor this callback
+                problem.objective,
+                x,
+                method="SLSQP",
+                jac=lambda _x: problem.gradient(),
+                bounds=Bounds(problem.x_lower, problem.x_upper),
+                constraints=[{"type": "ineq", "fun": rows, "jac": jacobian}],
+                callback=callback,
+                options={"maxiter": options.max_iterations, "ftol": options.tolerance},
+            )
     except (_StopSolveError, UnreachableError):
         status = SolveStatus.TIME_LIMIT if watch.timed_out else SolveStatus.EVALUATION_ERROR
         return watch.report(name, status, last, None, "stopped")

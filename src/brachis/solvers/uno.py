@@ -37,16 +37,20 @@ _STOPPED = {
 
 def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
     """See `brachis.solvers.protocol.Solver`."""
-    watch = Watch(problem, options, progress)
-    for radius in _TRUST_RADII:
-        stall = _Stall(watch)
-        result = _run(watch, x, radius, stall)
-        x = np.array(result.primal_solution)
-        if not stall.seen or watch.must_stop():
-            break
+    with Watch(problem, options, progress) as watch:
+        for radius in _TRUST_RADII:
+            stall = _Stall(watch)
+            result = _run(watch, x, radius, stall)
+            x = np.array(result.primal_solution)
+            if result.optimization_status.name == "USER_INTERRUPTION":  # Uno has a SIGINT handler of its own
+                watch.interrupt = KeyboardInterrupt()
+            if not stall.seen or watch.must_stop():
+                break
     ending = result.optimization_status.name
     status = _STOPPED.get(ending) or _STATUS.get(result.solution_status.name, SolveStatus.FAILED)
-    if stall.seen or watch.iterations >= options.max_iterations:
+    if stall.seen:
+        status = SolveStatus.STALLED
+    elif ending == "USER_TERMINATION":
         status = SolveStatus.ITERATION_LIMIT
     message = f"{ending.lower()}, {result.solution_status.name.lower()}"
     return watch.report(name, status, x, np.array(result.constraint_dual_solution), message)

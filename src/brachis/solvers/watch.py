@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
+from typing import Any, Self
 
 import numpy as np
 
@@ -16,8 +19,9 @@ _FEASIBLE = 10.0
 class Watch:
     """Watches one solve.
 
-    A backend written in another language must not see a KeyboardInterrupt: it is kept here, the backend is told to
-    stop, and `report` raises it again.
+    A backend written in another language must not see a KeyboardInterrupt, which Python would raise at the first line
+    of any callback. Used as a context manager around the backend, the watch turns SIGINT into a flag; the backend is
+    told to stop, and `report` raises the interrupt.
 
     Parameters
     ----------
@@ -33,7 +37,22 @@ class Watch:
         self.interrupt: KeyboardInterrupt | None = None
         self.timed_out = False
         self._progress = progress
+        self._handler: Any = None
         self._began = time.perf_counter()
+
+    def __enter__(self) -> Self:
+        """Take over SIGINT where this thread may."""
+        if threading.current_thread() is threading.main_thread():
+            self._handler = signal.signal(signal.SIGINT, self._keep_interrupt)
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        """Give SIGINT back."""
+        if self._handler is not None:
+            signal.signal(signal.SIGINT, self._handler)
+
+    def _keep_interrupt(self, _signal: int, _frame: object) -> None:
+        self.interrupt = KeyboardInterrupt()
 
     @property
     def elapsed(self) -> float:

@@ -1,6 +1,6 @@
 """What is asked: the task file as frozen models, its loader and its schema. No numerics."""
 
-from brachis.task.load import load_task
+from brachis.task.load import check_robot_settings, load_task
 from brachis.task.models import (
     Posture,
     RefinementSettings,
@@ -52,6 +52,7 @@ __all__ = [
     "SplineSettings",
     "SplineThrough",
     "Task",
+    "check_robot_settings",
     "json_schema",
     "load_task",
 ]

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from brachis.errors import TaskError
 from brachis.task.messages import show, task_error
 from brachis.task.models import Task
+from brachis.task.robot_models import RobotSettings
 from brachis.task.yaml_reader import read_yaml
 
 
@@ -60,6 +61,20 @@ def load_task(source: str | os.PathLike[str] | Mapping[str, object] | Task) -> T
         problem = "this key is required in a task file, and missing"
         raise TaskError(problem, where=f"{path}: robot.urdf", hint="Give the URDF's path, relative to the task file")
     return task
+
+
+def check_robot_settings(content: Mapping[str, object]) -> RobotSettings:
+    """Return the ``robot`` part of a task that a mapping describes.
+
+    Raises
+    ------
+    TaskError
+        The mapping is wrong.
+    """
+    try:
+        return RobotSettings.model_validate(_plain(content))
+    except ValidationError as error:
+        raise task_error(error, "robot", RobotSettings) from None
 
 
 def _read(path: Path) -> str:

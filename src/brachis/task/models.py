@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, Tag, field_validator, model_validator
 
-from brachis.task.fields import Count, Model, Name, Positive, by_form, refuse
+from brachis.task.fields import Count, Model, Name, Number, Positive, by_form, refuse
 from brachis.task.robot_models import JointValues, RobotSettings
 from brachis.task.segments import Segment
 
@@ -104,6 +104,12 @@ class Task(Model):
     brachis: Literal[1] = Field(description="Version of the task format.")
     robot: RobotSettings = Field(default_factory=RobotSettings, description="The robot.")
     start: Posture = Field(description="Configuration at the start of the path.")
+    path_start: tuple[Number, ...] | None = Field(
+        default=None,
+        description="Where the path begins: all rows of the task space (m, yaw in rad). Null: where the start "
+        "posture's "
+        "tool is; otherwise a start posture whose tool is elsewhere is refused.",
+    )
     end: End = Field(default="free", description="Configuration at the end of the path: free, or {joints: ...}.")
     task_space: TaskSpace = Field(
         description="What the path prescribes: rows out of x, y, z, yaw (yaw last, with two others), or a word."

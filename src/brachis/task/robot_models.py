@@ -24,14 +24,14 @@ _LIMIT_FORMS = (
 )
 
 
-def _increasing(pair: tuple[float, float]) -> tuple[float, float]:
-    if not pair[0] < pair[1]:
+def _increasing(pair: tuple[float | None, float | None]) -> tuple[float | None, float | None]:
+    if None not in pair and not pair[0] < pair[1]:  # type: ignore[operator]
         problem = "the lower limit must be below the upper one"
         raise refuse(problem, found=list(pair), allowed="[low, high] with low < high")
     return pair
 
 
-Interval = Annotated[tuple[Number, Number], AfterValidator(_increasing)]
+Interval = Annotated[tuple[Number | None, Number | None], AfterValidator(_increasing)]
 
 _Number = Annotated[Positive, Tag("<number>")]
 _List = Annotated[Annotated[tuple[Positive, ...], Field(min_length=1)], Tag("<list>")]
@@ -88,7 +88,9 @@ class LimitSettings(Model):
     acceleration: OwnLimit = Field(
         default=None, description="Largest acceleration, rad/s^2 (m/s^2). Absent or null: none."
     )
-    position: PositionLimit = Field(default=FROM_URDF, description="[low, high], rad (m). Absent: URDF. Null: none.")
+    position: PositionLimit = Field(
+        default=FROM_URDF, description="[low, high], rad (m); null for an open end. Absent: URDF. Null: none."
+    )
     scale: LimitScale = Field(default_factory=LimitScale, description="Factors on the limits.")
 
 

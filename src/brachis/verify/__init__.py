@@ -1,6 +1,7 @@
 """Independent verification of a trajectory from URDF, path and limits alone."""
 
+from brachis.verify.options import VerifyOptions
 from brachis.verify.report import Check, Verification
-from brachis.verify.verify import VerifyOptions, verify_trajectory
+from brachis.verify.verify import verify_trajectory
 
 __all__ = ["Check", "Verification", "VerifyOptions", "verify_trajectory"]

@@ -17,19 +17,16 @@ class BranchMarginConstraint:
     """Margins of the chosen branch."""
 
     kind = "branch_margin"
+    timed = False
+    physical = False
 
-    def __init__(self, decomposition: Decomposition, at_start: np.ndarray, margin: float = MARGIN) -> None:
+    def __init__(self, decomposition: Decomposition, at_start: np.ndarray, margin: float) -> None:
         self._solver = decomposition.solver
         self._branch = decomposition.branch
         label = decomposition.solver.branches[decomposition.branch]
         count = len(at_start)
         self.labels = tuple(f"{label} {i}" for i in range(count)) if count > 1 else (label,)
-        self._decomposition, self._at_start = decomposition, at_start
         self.lower, self.upper = np.minimum(margin, 0.5 * at_start), np.full(count, np.inf)
-
-    def with_margin(self, margin: float) -> BranchMarginConstraint:
-        """Return the same constraint with another least margin."""
-        return BranchMarginConstraint(self._decomposition, self._at_start, margin)
 
     def values(self, state: JointState) -> np.ndarray:
         """See `Constraint.values`."""
@@ -40,7 +37,7 @@ class BranchMarginConstraint:
         return Partials(q=margin_gradient(self._solver, state.q, self._branch))
 
 
-def build(decomposition: Decomposition) -> BranchMarginConstraint | None:
+def build(decomposition: Decomposition, margin: float) -> BranchMarginConstraint | None:
     """Build the constraint where the closed form has margins."""
     at_start = decomposition.solver.branch_margins(decomposition.start[None], decomposition.branch)[0]
-    return BranchMarginConstraint(decomposition, at_start) if len(at_start) else None
+    return BranchMarginConstraint(decomposition, at_start, margin) if len(at_start) else None

@@ -20,6 +20,9 @@ class JointRateConstraint:
     limits : (c,) ndarray
     """
 
+    timed = True
+    physical = True
+
     def __init__(self, kind: str, decomposition: Decomposition, joints: np.ndarray, limits: np.ndarray) -> None:
         robot = decomposition.robot
         self.kind = kind
@@ -40,12 +43,12 @@ class JointRateConstraint:
         return Partials(qdot=constant) if self.kind == "velocity" else Partials(qddot=constant)
 
 
-def build_velocity(decomposition: Decomposition) -> JointRateConstraint | None:
+def build_velocity(decomposition: Decomposition, _margin: float) -> JointRateConstraint | None:
     """Build the constraint for the joints with a finite velocity limit."""
     return _build("velocity", decomposition, decomposition.robot.limits.velocity)
 
 
-def build_acceleration(decomposition: Decomposition) -> JointRateConstraint | None:
+def build_acceleration(decomposition: Decomposition, _margin: float) -> JointRateConstraint | None:
     """Build the constraint for the joints with a finite acceleration limit."""
     return _build("acceleration", decomposition, decomposition.robot.limits.acceleration)
 

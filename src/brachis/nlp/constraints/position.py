@@ -12,6 +12,8 @@ class PositionConstraint:
     """Joint positions within their ranges."""
 
     kind = "position"
+    timed = False
+    physical = True
 
     def __init__(self, decomposition: Decomposition, joints: np.ndarray) -> None:
         robot = decomposition.robot
@@ -34,7 +36,7 @@ class PositionConstraint:
         return Partials(q=np.broadcast_to(self._selection, (len(state.q), *self._selection.shape)))
 
 
-def build(decomposition: Decomposition) -> PositionConstraint | None:
+def build(decomposition: Decomposition, _margin: float) -> PositionConstraint | None:
     """Build the constraint for the joints with a finite end of range."""
     limits = decomposition.robot.limits
     joints = np.flatnonzero(np.isfinite(limits.position_lower) | np.isfinite(limits.position_upper))

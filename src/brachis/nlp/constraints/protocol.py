@@ -28,12 +28,18 @@ class Constraint(Protocol):
         Key in the table of constraints.
     labels : tuple of str
         What each of the c values belongs to, for example a joint name.
+    timed : bool
+        True where a longer end time relieves it: velocity, acceleration, torque.
+    physical : bool
+        True for a limit of the robot; False for one that only guards the computation.
     lower, upper : (c,) ndarray
         Bounds, dimensionless: values are divided by their limits.
     """
 
     kind: str
     labels: tuple[str, ...]
+    timed: bool
+    physical: bool
     lower: np.ndarray
     upper: np.ndarray
 
@@ -49,6 +55,6 @@ class Constraint(Protocol):
 class Build(Protocol):
     """Makes a constraint for a decomposition, or None where nothing is limited."""
 
-    def __call__(self, decomposition: Decomposition) -> Constraint | None:
-        """Build the constraint."""
+    def __call__(self, decomposition: Decomposition, margin: float, /) -> Constraint | None:
+        """Build the constraint; `margin` is the least branch margin, which most do not need."""
         ...

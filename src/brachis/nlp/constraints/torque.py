@@ -13,6 +13,8 @@ class TorqueConstraint:
     """Joint torques over their limits."""
 
     kind = "torque"
+    timed = True
+    physical = True
 
     def __init__(self, decomposition: Decomposition, joints: np.ndarray) -> None:
         self._robot = decomposition.robot
@@ -32,7 +34,7 @@ class TorqueConstraint:
         return Partials(*parts)
 
 
-def build(decomposition: Decomposition) -> TorqueConstraint | None:
+def build(decomposition: Decomposition, _margin: float) -> TorqueConstraint | None:
     """Build the constraint for the joints with a finite torque limit."""
     joints = np.flatnonzero(np.isfinite(decomposition.robot.limits.torque))
     return TorqueConstraint(decomposition, joints) if len(joints) else None

@@ -1,52 +1,27 @@
-"""The trajectory: immutable, evaluated at any time, saved and loaded with all that is needed to verify it again."""
+"""Joint motion along a path, evaluated at any time."""
 
 from __future__ import annotations
 
-import json
 import os
-import zipfile
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.errors import InputError, ResultFileError
-from brachis.files import atomic_write
+from brachis.errors import InputError
 from brachis.robot import Robot, dynamics
-from brachis.robot.from_task import robot_from_settings
-from brachis.task import Task, load_task
+from brachis.task import Task
+from brachis.trajectory.pieces import relative_coefficients
+from brachis.trajectory.result_file import ARRAYS, read_result, write_result
+from brachis.trajectory.samples import Samples, freeze
 
 if TYPE_CHECKING:
     from scipy.interpolate import BPoly, BSpline
 
-SCHEMA = 1
 CONTINUOUS_TORQUE = 3
 """Least B-spline degree that gives continuous acceleration, and so torque."""
-_ARRAYS = ("times", "q", "qdot", "qddot", "qddot_before", "knots", "control_points")
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """A trajectory at K times; joints in chain order.
-
-    Attributes
-    ----------
-    t : (K,) ndarray
-        s.
-    s : (K,) ndarray
-        Path coordinate, dimensionless.
-    q, qdot, qddot, tau : (K, n) ndarray
-        Position (rad or m), velocity, acceleration, torque (Nm or N).
-    """
-
-    t: np.ndarray
-    s: np.ndarray
-    q: np.ndarray
-    qdot: np.ndarray
-    qddot: np.ndarray
-    tau: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +69,10 @@ class Trajectory:
     degree: int
     control_points: np.ndarray
 
+    def __post_init__(self) -> None:
+        """Take copies of the arrays that nobody can write to."""
+        freeze(self, *ARRAYS)
+
     @property
     def t_end(self) -> float:
         """End time, s."""
@@ -106,10 +85,13 @@ class Trajectory:
 
     @cached_property
     def pieces(self) -> BPoly:
-        """Joint positions as SciPy's piecewise polynomial over time."""
+        """Joint positions less those of the node before, as SciPy's piecewise polynomial over time; see `position`."""
         from scipy.interpolate import BPoly  # noqa: PLC0415  (imports in 0.3 s)
 
-        return BPoly(_bernstein(self.times, self.q, self.qdot, self.qddot, self.qddot_before), self.times)
+        coefficients = relative_coefficients(self.times, self.q, self.qdot, self.qddot, self.qddot_before)
+        pieces = BPoly(coefficients, self.times)
+        pieces.c.setflags(write=False)
+        return pieces
 
     @cached_property
     def path_spline(self) -> BSpline:
@@ -117,6 +99,13 @@ class Trajectory:
         from scipy.interpolate import BSpline  # noqa: PLC0415
 
         return BSpline(self.knots * self.t_end, self.control_points[0], self.degree)
+
+    @cached_property
+    def redundant_spline(self) -> BSpline:
+        """Positions of the r redundant joints as SciPy's B-spline over time in seconds, rad or m."""
+        from scipy.interpolate import BSpline  # noqa: PLC0415
+
+        return BSpline(self.knots * self.t_end, self.control_points[1:].T, self.degree)
 
     def path_coordinate(self, t: np.ndarray | float) -> np.ndarray:
         """Path coordinate s at times `t`, same shape."""
@@ -130,7 +119,9 @@ class Trajectory:
         InputError
             A time lies outside [0, t_end].
         """
-        return np.asarray(self.pieces(self._checked(t)))
+        times = self._checked(t)
+        node = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
+        return self.q[node] + np.asarray(self.pieces(times))
 
     def velocity(self, t: np.ndarray | float) -> np.ndarray:
         """Joint velocities, as `position`; rad/s or m/s."""
@@ -188,7 +179,6 @@ class Trajectory:
             The folder does not exist or cannot be written.
         """
         meta = {
-            "schema": SCHEMA,
             "task": self.task.to_dict(),
             "urdf": self.urdf,
             "redundant_joints": list(self.redundant_joints),
@@ -196,9 +186,7 @@ class Trajectory:
             "degree": self.degree,
             "joint_names": list(self.joint_names),
         }
-        arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
-        with atomic_write(path) as stream:
-            np.savez(stream, meta=np.array(json.dumps(meta)), **arrays)
+        write_result(path, meta, {name: getattr(self, name) for name in ARRAYS})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Trajectory:
@@ -207,28 +195,18 @@ class Trajectory:
         Raises
         ------
         ResultFileError
-            The file is missing, broken or of another schema version.
+            The file is missing, broken or of another schema version, or its parts do not fit each other.
         """
-        meta, arrays = _read(Path(path))
-        try:
-            task = load_task(meta["task"])
-            robot = robot_from_settings(task.robot, urdf_text=meta["urdf"])
-            trajectory = cls(
-                task=task,
-                urdf=meta["urdf"],
-                robot=robot,
-                redundant_joints=tuple(meta["redundant_joints"]),
-                branch=meta["branch"],
-                degree=int(meta["degree"]),
-                **arrays,
-            )
-        except (KeyError, TypeError) as error:
-            raise ResultFileError("the result file lacks a part", where=str(path), found=str(error)) from error
-        shape = (len(trajectory.times), robot.n)
-        parts = (trajectory.q, trajectory.qdot, trajectory.qddot, trajectory.qddot_before)
-        if any(part.shape != shape for part in parts):
-            raise ResultFileError("the result file does not fit its robot", where=str(path), allowed=f"{shape} values")
-        return trajectory
+        content = read_result(Path(path))
+        return cls(
+            task=content.task,
+            urdf=content.urdf,
+            robot=content.robot,
+            redundant_joints=content.redundant_joints,
+            branch=content.branch,
+            degree=content.degree,
+            **content.arrays,
+        )
 
     def _checked(self, t: np.ndarray | float) -> np.ndarray:
         """Refuse times outside the trajectory; rounding at the ends is forgiven."""
@@ -241,36 +219,3 @@ class Trajectory:
                 allowed=f"0 s to {self.t_end:.6g} s",
             )
         return np.clip(times, 0.0, self.t_end)
-
-
-def _bernstein(times: np.ndarray, q: np.ndarray, qdot: np.ndarray, after: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Bernstein coefficients (6, L, n) of the quintic Hermite pieces between nodes.
-
-    A Bezier curve of degree 5 and length h begins with q = c0, qdot = 5 (c1 - c0) / h and
-    qddot = 20 (c2 - 2 c1 + c0) / h^2, and ends likewise.
-    """
-    h = np.diff(times)[:, None]
-    slope, bend = h / 5.0, h**2 / 20.0
-    left = [q[:-1], q[:-1] + slope * qdot[:-1], q[:-1] + 2.0 * slope * qdot[:-1] + bend * after[:-1]]
-    right = [q[1:] - 2.0 * slope * qdot[1:] + bend * before[1:], q[1:] - slope * qdot[1:], q[1:]]
-    return np.stack([*left, *right])
-
-
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Read the metadata and arrays of a result file."""
-    if not path.is_file():
-        raise ResultFileError("the result file does not exist", where=str(path))
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            meta = json.loads(str(archive["meta"]))
-            arrays = {name: archive[name] for name in _ARRAYS}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise ResultFileError(
-            "the file is not a brachis result",
-            where=str(path),
-            found=str(error),
-            allowed="a file written by brachis plan",
-        ) from error
-    if meta.get("schema") != SCHEMA:
-        raise ResultFileError("unknown schema version", where=str(path), found=meta.get("schema"), allowed=SCHEMA)
-    return meta, arrays

@@ -1,0 +1,177 @@
+"""The result file: one npz archive with a trajectory's arrays, its task and its URDF."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from brachis.errors import InputError, ResultFileError
+from brachis.files import atomic_write
+from brachis.robot import Robot, TaskSpace
+from brachis.robot.from_task import robot_from_settings
+from brachis.task import Task, load_task
+
+SCHEMA = 1
+ARRAYS = ("times", "q", "qdot", "qddot", "qddot_before", "knots", "control_points")
+"""Names of the arrays in the file; as in `Trajectory`."""
+
+_UNREADABLE = (
+    OSError,
+    ValueError,  # among them those of JSON and of text encodings
+    KeyError,
+    EOFError,
+    RecursionError,
+    MemoryError,  # an array header that asks for more than there is
+    NotImplementedError,  # a compression that Python does not know
+    RuntimeError,  # an encrypted archive
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What reading something else than an npz archive with these parts may raise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """What a result file says; the parts fit each other.
+
+    Attributes
+    ----------
+    task : Task
+    urdf : str
+    robot : Robot
+    redundant_joints : tuple of str
+    branch : str
+    degree : int
+    arrays : dict of str to ndarray
+        See `Trajectory` for their shapes.
+    """
+
+    task: Task
+    urdf: str
+    robot: Robot
+    redundant_joints: tuple[str, ...]
+    branch: str
+    degree: int
+    arrays: dict[str, np.ndarray]
+
+
+def write_result(path: str | os.PathLike[str], meta: Mapping[str, object], arrays: Mapping[str, np.ndarray]) -> None:
+    """Write a result file whole or not at all.
+
+    Raises
+    ------
+    InputError
+        The folder does not exist or cannot be written.
+    """
+    contents: dict[str, Any] = {"meta": np.array(json.dumps({"schema": SCHEMA, **meta})), **arrays}
+    with atomic_write(path) as stream:
+        np.savez(stream, **contents)
+
+
+def read_result(path: Path) -> Content:
+    """Read and check a result file.
+
+    Raises
+    ------
+    ResultFileError
+        The file is missing, broken or of another schema version, or its parts do not fit each other.
+    """
+    if not path.is_file():
+        problem = "the result file is not a file" if path.exists() else "the result file does not exist"
+        raise ResultFileError(problem, where=str(path))
+    try:
+        meta, arrays = _parts(path)
+    except _UNREADABLE as error:
+        raise ResultFileError(
+            "the file is not a brachis result",
+            where=str(path),
+            found=str(error) or type(error).__name__,
+            allowed="a file written by brachis plan",
+        ) from error
+    if meta.get("schema") != SCHEMA:
+        raise ResultFileError("unknown schema version", where=str(path), found=meta.get("schema"), allowed=SCHEMA)
+    try:
+        return _content(meta, arrays)
+    except InputError as error:
+        raise ResultFileError("the result file is broken", where=str(path), found=str(error)) from error
+
+
+def _parts(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Read the metadata and the arrays, unchecked but for their types."""
+    archive = np.load(path, allow_pickle=False)
+    if not isinstance(archive, np.lib.npyio.NpzFile):
+        raise ValueError("a single array")  # noqa: TRY004  (a wrong file, not a wrong call)
+    with archive:
+        meta = json.loads(str(archive["meta"]))
+        arrays = {name: archive[name] for name in ARRAYS}
+    if not isinstance(meta, dict):
+        raise ValueError("metadata that are no mapping")  # noqa: TRY004
+    return meta, arrays
+
+
+def _content(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Content:
+    """Check every part, and that they fit each other."""
+    kinds = {"task": dict, "urdf": str, "redundant_joints": list, "branch": str, "degree": int, "joint_names": list}
+    for key, kind in kinds.items():
+        if not isinstance(meta.get(key), kind) or isinstance(meta[key], bool):
+            found = type(meta[key]).__name__ if key in meta else "nothing"
+            raise InputError("wrong type", where=key, found=found, allowed=kind.__name__)
+    task = load_task(meta["task"])
+    robot = robot_from_settings(task.robot, urdf_text=meta["urdf"])
+    if meta["joint_names"] != list(robot.joint_names):
+        raise InputError(
+            "other joints than the URDF's", where="joint_names", found=meta["joint_names"], allowed=robot.joint_names
+        )
+    TaskSpace.of(robot, task.task_space)
+    robot.posture(task.start.joints, "task.start.joints")
+    if task.end != "free":
+        robot.posture(task.end.joints, "task.end.joints")
+    redundant = [name for name in robot.joint_names if name in meta["redundant_joints"]]
+    if meta["redundant_joints"] != redundant:
+        allowed = f"some of {', '.join(robot.joint_names)}, in this order"
+        raise InputError("unknown joints", where="redundant_joints", found=meta["redundant_joints"], allowed=allowed)
+    _check_arrays(arrays, robot.n, len(redundant), meta["degree"])
+    return Content(task, meta["urdf"], robot, tuple(redundant), meta["branch"], meta["degree"], arrays)
+
+
+def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) -> None:
+    """Check shapes, finiteness and order."""
+    for name, array in arrays.items():
+        if array.dtype.kind not in "fiu" or not np.isfinite(array).all():
+            raise InputError("not all are finite numbers", where=name)
+    times, knots = arrays["times"], arrays["knots"]
+    if times.ndim != 1 or len(times) < 2 or times[0] != 0.0 or not (np.diff(times) > 0.0).all():  # noqa: PLR2004
+        raise InputError("not times", where="times", found=_extent(times), allowed="ascending numbers from 0")
+    outer = degree + 1
+    if (
+        degree < 1
+        or knots.ndim != 1
+        or len(knots) < 2 * outer
+        or (np.diff(knots) < 0.0).any()
+        or knots[:outer].any()
+        or (knots[-outer:] != 1.0).any()
+    ):
+        allowed = "ascending numbers from 0 to 1, either degree + 1 times"
+        raise InputError(
+            f"not the knots of a spline of degree {degree}", where="knots", found=_extent(knots), allowed=allowed
+        )
+    shapes = dict.fromkeys(("q", "qdot", "qddot", "qddot_before"), (len(times), n))
+    shapes["control_points"] = (1 + r, len(knots) - outer)
+    for name, shape in shapes.items():
+        if arrays[name].shape != shape:
+            raise InputError("wrong shape", where=name, found=arrays[name].shape, allowed=shape)
+
+
+def _extent(array: np.ndarray) -> str:
+    """Say briefly what an array is."""
+    if array.ndim != 1 or not len(array):
+        return f"an array of shape {array.shape}"
+    return f"{len(array)} numbers from {array[0]:g} to {array[-1]:g}"

@@ -1,0 +1,85 @@
+"""What is checked besides the path and the limits: progress, ends, splines and continuity."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.robot import Robot
+from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory, one_sided_derivatives
+from brachis.verify.mechanics import torques
+from brachis.verify.options import VerifyOptions
+from brachis.verify.report import Check
+
+
+def progress_checks(trajectory: Trajectory, t: np.ndarray, options: VerifyOptions) -> list[Check]:
+    """Check that the path is travelled once, forwards, from its beginning to its end."""
+    spline, allowed = trajectory.path_spline, options.progress_tolerance
+    velocity = spline(t, nu=1)
+    backwards = float(np.maximum(0.0, -velocity).max())
+    ends = float(np.abs([spline(0.0), spline(trajectory.t_end) - 1.0]).max())
+    time = float(t[int(np.argmin(velocity))]) if backwards else None
+    return [
+        Check("ds/dt below zero", backwards, allowed, "1/s", backwards <= allowed, time=time),
+        Check("s at the ends", ends, allowed, "-", ends <= allowed),
+    ]
+
+
+def end_checks(trajectory: Trajectory, robot: Robot, options: VerifyOptions) -> list[Check]:
+    """Check that the motion begins and ends as the task says."""
+    task = trajectory.task
+    checks = []
+    wanted = {"start": (0.0, task.start), "end": (trajectory.t_end, None if task.end == "free" else task.end)}
+    for name, (time, posture) in wanted.items():
+        if posture is not None:
+            miss = np.abs(trajectory.position(time) - robot.posture(posture.joints, f"{name}.joints"))
+            checks.append(_worst_joint(f"{name} posture", miss, options.posture_tolerance, "rad, m", robot, time))
+        speed, allowed = np.abs(trajectory.velocity(time)), options.rest_velocity_tolerance
+        checks.append(_worst_joint(f"{name} velocity", speed, allowed, "rad/s, m/s", robot, time))
+        if task.spline.rest == "full":
+            bend, allowed = np.abs(trajectory.acceleration(time)), options.rest_acceleration_tolerance
+            checks.append(_worst_joint(f"{name} acceleration", bend, allowed, "rad/s2, m/s2", robot, time))
+    return checks
+
+
+def spline_checks(trajectory: Trajectory, robot: Robot, options: VerifyOptions) -> list[Check]:
+    """Check at the nodes that the splines of the redundant joints are their motion."""
+    if not trajectory.redundant_joints:
+        return []
+    joints = [robot.joint_names.index(name) for name in trajectory.redundant_joints]
+    misses = np.zeros((len(trajectory.times), robot.n))
+    misses[:, joints] = np.abs(trajectory.redundant_spline(trajectory.times) - trajectory.q[:, joints])
+    node = int(np.argmax(misses.max(axis=1)))
+    time = float(trajectory.times[node])
+    allowed = options.spline_tolerance
+    return [_worst_joint("redundant joints' splines", misses[node], allowed, "rad, m", robot, time)]
+
+
+def continuity_checks(trajectory: Trajectory, robot: Robot, options: VerifyOptions) -> list[Check]:
+    """Jumps of position, velocity, acceleration and torque where polynomial pieces join, relative to their size."""
+    inner, lengths, coefficients = trajectory.times[1:-1], np.diff(trajectory.times), trajectory.pieces.c
+    left = [one_sided_derivatives(coefficients, lengths, order, at_end=True)[:-1] for order in range(3)]
+    right = [one_sided_derivatives(coefficients, lengths, order, at_end=False)[1:] for order in range(3)]
+    left[0] = trajectory.q[:-2] + left[0]  # coefficients are relative to the node before
+    right[0] = trajectory.q[1:-1] + right[0]
+    sides = {
+        name: (before, after)
+        for name, before, after in zip(("position", "velocity", "acceleration"), left, right, strict=True)
+    }
+    sides["torque"] = (torques(robot, *left), torques(robot, *right))
+    if trajectory.degree < CONTINUOUS_TORQUE:  # the asked degree has them jump
+        del sides["acceleration"], sides["torque"]
+    checks, allowed = [], options.jump_tolerance
+    for name, (before, after) in sides.items():
+        scale = 1.0 + np.abs(before).max(initial=0.0)
+        jumps = np.abs(after - before).max(axis=1, initial=0.0) / scale
+        value = float(jumps.max(initial=0.0))
+        time = float(inner[int(np.argmax(jumps))]) if len(jumps) else None
+        checks.append(Check(f"{name} jump", value, allowed, "relative", value <= allowed, time=time))
+    return checks
+
+
+def _worst_joint(name: str, misses: np.ndarray, allowed: float, unit: str, robot: Robot, time: float) -> Check:
+    """Make a check of the joint that misses most."""
+    joint = int(np.argmax(misses))
+    value = float(misses[joint])
+    return Check(name, value, allowed, unit, value <= allowed, robot.joint_names[joint], time)

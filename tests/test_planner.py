@@ -1,0 +1,196 @@
+"""The pipeline as a whole: what is kept, what is refused, how it is interrupted."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis import attempts
+from brachis.errors import StartError
+from brachis.nlp.guess import guesses
+from brachis.refine import RefinementOptions, refine
+from brachis.solvers import SolverOptions, SolveStatus, solver_named
+
+ROOT = Path(__file__).parents[1]
+SCARA = ROOT / "robots/scara3/robot.urdf"
+START = [np.pi / 6, -2 * np.pi / 3, 2 * np.pi / 3]
+
+
+def task(**changes) -> dict:
+    base = {
+        "brachis": 1,
+        "start": {"joints": START},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
+        "redundant_joints": ["j3"],
+    }
+    return {**base, **changes}
+
+
+def robot(torque: float = 10.0, **options) -> brachis.Robot:
+    limits = brachis.LimitSpec(torque=torque, velocity=None)
+    return brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=limits, **options)
+
+
+def solve_with_uno(problem, x):
+    return solver_named("uno")[0].solve(problem, x, SolverOptions(), None)
+
+
+def test_saved_result_keeps_the_robot_that_was_planned_for(tmp_path):
+    for torque in (20.0, 5.0):
+        result = brachis.plan(robot(torque), task())
+        assert result.verified
+        result.trajectory.save(tmp_path / "result.npz")
+        again = brachis.Trajectory.load(tmp_path / "result.npz")
+        np.testing.assert_array_equal(again.robot.limits.torque, torque)
+        assert np.isinf(again.robot.limits.velocity).all()
+        assert brachis.verify_trajectory(again).worst_ratio == result.verification.worst_ratio
+
+
+def test_task_of_the_result_repeats_the_plan():
+    result = brachis.plan(robot(12.0), task())
+    assert brachis.plan(None, result.task).t_end == pytest.approx(result.t_end, rel=1e-9)
+
+
+def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_refined_one_does_not():
+    problem, _ = brachis.transcribe(robot(), brachis.load_task(task(redundant_joints=["j1"])))
+    first = solve_with_uno(problem, next(guesses(problem)))
+    dense = problem.resampled(np.linspace(0.0, 1.0, 2001))
+    assert problem.excess(first.x).max() < 1e-6
+    assert dense.excess(first.x).max() > 0.01
+    refined = refine(problem, first, solve_with_uno, RefinementOptions())
+    assert dense.excess(refined.x).max() <= 1e-4
+    assert refined.x[0] > first.x[0]
+
+
+def test_without_refinement_the_answer_is_left_as_it_is():
+    result = brachis.plan(robot(), task(redundant_joints=["j1"], refinement={"max_rounds": 0}))
+    assert not result.verified
+    assert result.verification.worst_ratio > 1.01
+    assert result.attempt.stretched == 1.0
+    assert len(result.attempts) == 1
+
+
+def test_margins_that_change_nothing_are_not_solved_again():
+    gantry = brachis.Robot.from_urdf(ROOT / "robots/gantry2/robot.urdf")
+    line = {"path": [{"line": {"by": [0.5, 0.2]}}], "start": {"joints": [0.0, 0.0]}, "redundant_joints": []}
+    problem, _ = brachis.transcribe(gantry, brachis.load_task(task(**line)))
+    solves = []
+
+    def fail(tried, x):
+        solves.append(tried)
+        return solver_named("uno")[0].solve(tried, x, SolverOptions(max_iterations=1), None)
+
+    attempts.continued(problem, next(guesses(problem)), fail, attempts.MARGINS)
+    assert len(solves) == 1
+
+
+def test_every_solve_is_reported():
+    result = brachis.plan(robot(), task(path=[{"line": {"length": 1.0, "angle_deg": 0}}]))
+    reports = result.attempt.reports
+    assert len(reports) > 1 + result.attempt.refinement_rounds, "the branch margin holds this motion back"
+    assert result.to_dict()["iterations"] == sum(report.iterations for report in reports)
+
+
+def test_missing_solver_is_said_and_the_next_one_taken(monkeypatch):
+    monkeypatch.setitem(sys.modules, "unopy", None)
+    result = brachis.plan(robot(), task())
+    assert result.verified
+    assert result.report.solver == "ipopt"
+    assert "uno: not installed" in result.attempts[0].outcome
+    assert result.chosen == 1
+
+
+def test_path_start_is_checked():
+    assert brachis.plan(robot(), task(path_start=[np.sqrt(3.0), 0.0])).verified
+    with pytest.raises(StartError, match=r"the start posture is off the path; found 0.01 m off in y"):
+        brachis.plan(robot(), task(path_start=[np.sqrt(3.0), 0.01]))
+    with pytest.raises(brachis.InputError, match="path_start: has the wrong number of coordinates"):
+        brachis.plan(robot(), task(path_start=[1.0, 0.0, 0.0]))
+
+
+def test_end_posture_on_another_branch_is_refused():
+    free = brachis.plan(robot(), task())
+    end = free.trajectory.position(free.t_end)
+    assert brachis.plan(robot(), task(end={"joints": end})).verified
+    # The mirror image of the first two links about the line to the third joint reaches the same point.
+    elbow = np.array([np.cos(end[0]), np.sin(end[0])])
+    wrist = elbow + np.array([np.cos(end[0] + end[1]), np.sin(end[0] + end[1])])
+    bearing = np.arctan2(wrist[1], wrist[0])
+    mirrored = np.array([2 * bearing - end[0], -end[1], end[2] + 2 * (end[0] + end[1] - bearing)])
+    with pytest.raises(StartError, match="the end posture is on another branch"):
+        brachis.plan(robot(), task(end={"joints": mirrored}))
+
+
+@pytest.mark.parametrize("lower", [None, -50.0, -1.0])
+def test_full_turns_are_counted_even_between_few_points(lower):
+    """A limit that is never reached changes nothing, whatever the angles' lifts."""
+    arm = robot(100.0, locked_joints={"j3": 0.4})
+    if lower is not None:
+        limits = brachis.LimitSpec(torque=100.0, velocity=None, position={"j1": [lower, 50.0]})
+        arm = brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=limits, locked_joints={"j3": 0.4})
+    circles = task(
+        start={"joints": [0.3, 0.9]},
+        path=[{"circle": {"center": [0.0, 0.0], "turns": 3}}],
+        redundant_joints=[],
+        spline={"intervals": 12},
+    )
+    result = brachis.plan(arm, circles)
+    assert result.verified
+    turned = result.trajectory.position(result.t_end) - result.trajectory.position(0.0)
+    assert turned[0] == pytest.approx(6 * np.pi, abs=1e-6)
+    if lower is None:
+        return
+    unlimited = brachis.plan(robot(100.0, locked_joints={"j3": 0.4}), circles)
+    assert result.t_end == pytest.approx(unlimited.t_end, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["uno", "ipopt", "slsqp"])
+def test_ctrl_c_reaches_the_user(name):
+    """A real signal while the solver works."""
+    problem, _ = brachis.transcribe(robot(), brachis.load_task(task(spline={"intervals": 60})))
+    x = next(guesses(problem))
+    solver = solver_named(name)[0]
+    handler = signal.getsignal(signal.SIGINT)
+    timer = threading.Timer(0.15, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    began = time.perf_counter()
+
+    def solve_again_and_again():
+        for _ in range(1000):
+            solver.solve(problem, x, SolverOptions(), None)
+
+    with pytest.raises(KeyboardInterrupt):
+        solve_again_and_again()
+    assert time.perf_counter() - began < 10.0
+    assert signal.getsignal(signal.SIGINT) is handler
+
+
+def test_ctrl_c_on_the_command_line(tmp_path):
+    text = (ROOT / "examples/01_scara_line.yaml").read_text()
+    text = text.replace("../robots", str(ROOT / "robots")).replace("intervals: 20", "intervals: 300")
+    (tmp_path / "task.yaml").write_text(text)
+    command = [sys.executable, "-m", "brachis", "plan", str(tmp_path / "task.yaml"), "--out", str(tmp_path / "out")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(4.0)
+    assert process.poll() is None, "the plan ended before it could be interrupted"
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "interrupted" in err
+    assert "Traceback" not in err
+    assert out == ""
+    assert not list((tmp_path / "out").iterdir())
+
+
+def test_statuses_carry_advice():
+    assert all(len(status.value) > 10 for status in SolveStatus)

@@ -1,0 +1,292 @@
+"""The trajectory: evaluation, immutability, precision, and the file."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from brachis.errors import InputError, ResultFileError
+from brachis.planner import plan
+from brachis.trajectory import Trajectory
+from brachis.trajectory.pieces import one_sided_derivatives, relative_coefficients
+
+ROOT = Path(__file__).parents[1]
+
+
+def task_of_length(length):
+    task = yaml.safe_load((ROOT / "examples/01_scara_line.yaml").read_text())
+    task["robot"]["urdf"] = str(ROOT / "robots/scara3/robot.urdf")
+    task["path"] = [{"line": {"length": length, "angle_deg": 90}}]
+    return task
+
+
+@pytest.fixture(scope="module")
+def trajectory():
+    return plan(None, task_of_length(0.3)).trajectory
+
+
+def test_nodes_are_met(trajectory):
+    t = trajectory.times
+    scale = np.abs(trajectory.qddot).max()
+    np.testing.assert_array_equal(trajectory.position(t[:-1]), trajectory.q[:-1])
+    np.testing.assert_allclose(trajectory.position(t), trajectory.q, rtol=0.0, atol=1e-15)
+    np.testing.assert_allclose(trajectory.velocity(t), trajectory.qdot, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(trajectory.acceleration(t), trajectory.qddot, rtol=0.0, atol=1e-11 * scale)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_derivatives_against_differences(order, trajectory):
+    curves = [trajectory.position, trajectory.velocity, trajectory.acceleration]
+    h = 1e-6
+    t = np.random.default_rng(1).uniform(h, trajectory.t_end - h, 200)
+    difference = (curves[order](t + h) - curves[order](t - h)) / (2.0 * h)
+    np.testing.assert_allclose(difference, curves[order + 1](t), rtol=0.0, atol=2e-8 * np.abs(trajectory.qddot).max())
+
+
+def test_accelerations_of_a_very_short_motion_are_precise():
+    # Position 2 rad, pieces of 1e-5 s: coefficients that held 2 rad would give accelerations to 1e-4 only.
+    times = np.linspace(0.0, 1e-3, 101)
+    q = (2.0 + 0.5 * 3.0 * times**2)[:, None]
+    qdot, qddot = (3.0 * times)[:, None], np.full((101, 1), 3.0)
+    c, lengths = relative_coefficients(times, q, qdot, qddot, qddot), np.diff(times)
+    for at_end in (False, True):
+        np.testing.assert_allclose(one_sided_derivatives(c, lengths, 2, at_end=at_end), 3.0, rtol=1e-11)
+    np.testing.assert_allclose(one_sided_derivatives(c, lengths, 1, at_end=True), qdot[1:], rtol=1e-11)
+    np.testing.assert_allclose(q[:-1] + one_sided_derivatives(c, lengths, 0, at_end=True), q[1:], rtol=1e-15)
+
+
+@pytest.mark.parametrize("length", [1e-3, 1e-4])
+def test_very_short_lines_are_verified(length):
+    result = plan(None, task_of_length(length))
+    assert result.t_end < 0.06
+    assert result.verified, [check for check in result.verification.checks if not check.passed]
+    torque_jump = next(check for check in result.verification.checks if check.name == "torque jump")
+    assert torque_jump.value < 1e-10
+
+
+def test_numbers_and_arrays_of_times(trajectory):
+    t = np.linspace(0.0, trajectory.t_end, 7)
+    for curve in (trajectory.position, trajectory.velocity, trajectory.acceleration, trajectory.torque):
+        assert curve(t).shape == (7, 3)
+        assert curve(float(t[3])).shape == (3,)
+        np.testing.assert_array_equal(curve(t)[3], curve(float(t[3])))
+    assert trajectory.path_coordinate(t).shape == (7,)
+
+
+def test_samples(trajectory):
+    samples = trajectory.sample(0.01)
+    assert samples.t[-1] == trajectory.t_end
+    np.testing.assert_array_equal(samples.t[:-1], 0.01 * np.arange(len(samples.t) - 1))
+    np.testing.assert_array_equal(samples.q, trajectory.position(samples.t))
+    np.testing.assert_array_equal(samples.tau, trajectory.torque(samples.t))
+    assert samples.s[0] == 0.0
+    assert samples.s[-1] == pytest.approx(1.0, abs=1e-12)
+    assert np.abs(samples.tau).max() == pytest.approx(10.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("divisor", [1, 3, 1000])
+def test_periods_that_divide_the_end_time(divisor, trajectory):
+    samples = trajectory.sample(trajectory.t_end / divisor)
+    assert len(samples.t) == divisor + 1
+    assert (np.diff(samples.t) > 0.0).all()
+
+
+@pytest.mark.parametrize("dt", [0.0, -1.0, np.nan, np.inf, 1e-9])
+def test_unusable_period(dt, trajectory):
+    with pytest.raises(InputError, match="not a usable period"):
+        trajectory.sample(dt)
+
+
+@pytest.mark.parametrize("beyond", [-1e-3, 1e-3, np.nan])
+@pytest.mark.parametrize("curve", ["position", "velocity", "acceleration", "torque", "path_coordinate", "at"])
+def test_times_outside_are_refused(curve, beyond, trajectory):
+    t = np.array([0.1, beyond if beyond < 0.0 else trajectory.t_end + beyond])
+    with pytest.raises(InputError, match="time outside the trajectory") as caught:
+        getattr(trajectory, curve)(t)
+    assert f"{trajectory.t_end:.6g} s" in caught.value.allowed
+
+
+def test_rounding_at_the_ends_is_forgiven(trajectory):
+    t = np.array([-1e-13, trajectory.t_end * (1.0 + 1e-13)])
+    np.testing.assert_array_equal(trajectory.position(t), trajectory.position(np.array([0.0, trajectory.t_end])))
+
+
+def test_arrays_are_frozen_copies(trajectory):
+    own = np.array(trajectory.q)
+    copy = replace(trajectory, q=own)
+    own += 1.0
+    np.testing.assert_array_equal(copy.q, trajectory.q)
+    assert own.flags.writeable
+    arrays = [getattr(copy, field.name) for field in fields(copy)]
+    arrays = [array for array in arrays if isinstance(array, np.ndarray)]
+    assert len(arrays) == 7
+    for array in [*arrays, copy.pieces.c, copy.pieces.x]:
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0
+
+
+def test_samples_are_frozen_copies(trajectory):
+    t = np.linspace(0.0, 0.1, 5)
+    samples = trajectory.at(t)
+    t[:] = 7.0
+    assert samples.t[-1] == 0.1
+    for field in fields(samples):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(samples, field.name)[...] = 0.0
+
+
+def test_round_trip(trajectory, tmp_path):
+    trajectory.save(tmp_path / "result.npz")
+    again = Trajectory.load(tmp_path / "result.npz")
+    for field in fields(trajectory):
+        one, other = getattr(trajectory, field.name), getattr(again, field.name)
+        if isinstance(one, np.ndarray):
+            np.testing.assert_array_equal(one, other)
+        elif field.name != "robot":
+            assert one == other, field.name
+    assert again.joint_names == trajectory.joint_names
+    t = np.linspace(0.0, trajectory.t_end, 50)
+    np.testing.assert_array_equal(trajectory.at(t).tau, again.at(t).tau)
+
+
+def test_file_does_not_need_the_urdf_file(trajectory, tmp_path):
+    trajectory.save(tmp_path / "result.npz")
+    moved = with_parts(tmp_path / "result.npz", task__robot__urdf="/nowhere/robot.urdf")
+    assert Trajectory.load(moved).joint_names == trajectory.joint_names
+
+
+def with_parts(path, **parts):
+    """Rewrite a result file with other parts; ``task__robot__urdf`` is meta["task"]["robot"]["urdf"]."""
+    with np.load(path) as archive:
+        contents = dict(archive)
+    meta = json.loads(str(contents["meta"]))
+    for name, value in parts.items():
+        change = value if callable(value) else (lambda _old, value=value: value)
+        if name in contents:
+            contents[name] = change(contents[name])
+            continue
+        place = meta
+        *parents, last = name.split("__")
+        for parent in parents:
+            place = place[parent]
+        place[last] = change(place.get(last))
+    if "meta" not in parts:
+        contents["meta"] = np.array(json.dumps(meta))
+    np.savez(path, **{name: value for name, value in contents.items() if value is not None})
+    return path
+
+
+def put(place, value):
+    def change(array):
+        array[place] = value
+        return array
+
+    return change
+
+
+BROKEN = {
+    "meta missing": ({"meta": None}, "meta"),
+    "meta not JSON": ({"meta": np.array("{")}, "not a brachis result"),
+    "meta a list": ({"meta": np.array("[1]")}, "no mapping"),
+    "meta an array": ({"meta": np.zeros(3)}, "not a brachis result"),
+    "other schema": ({"schema": 99}, "unknown schema version; found 99; allowed: 1"),
+    "no schema": ({"schema": None}, "unknown schema version"),
+    "array missing": ({"qddot": None}, "qddot"),
+    "degree a string": ({"degree": "3"}, "degree: wrong type; found str; allowed: int"),
+    "degree a fraction": ({"degree": 3.5}, "degree: wrong type; found float"),
+    "degree a truth value": ({"degree": True}, "degree: wrong type; found bool"),
+    "degree zero": ({"degree": 0}, "knots of a spline of degree 0"),
+    "degree negative": ({"degree": -2}, "knots of a spline of degree -2"),
+    "degree of other knots": ({"degree": 4}, "knots of a spline of degree 4"),
+    "degree huge": ({"degree": 10**9}, "knots of a spline"),
+    "urdf missing": ({"urdf": None}, "urdf: wrong type"),
+    "urdf broken": ({"urdf": "<robot"}, "not well-formed XML"),
+    "urdf of another robot": ({"urdf": lambda text: text.replace('"j2"', '"elbow"')}, "joint_names: other joints"),
+    "task missing": ({"task": None}, "task: wrong type"),
+    "task the name of a file": ({"task": "task.yaml"}, "task: wrong type; found str"),
+    "task wrong": ({"task__spline__degree": "three"}, "spline.degree"),
+    "task of another robot": ({"task__start__joints": [0.1, 0.2]}, "task.start.joints"),
+    "task space that there is not": ({"task__task_space": ["x", "w"]}, "task_space"),
+    "limit unusable": ({"task__robot__limits__torque": -1}, "torque"),
+    "redundant joint unknown": ({"redundant_joints": ["j9"]}, "redundant_joints: unknown joints"),
+    "redundant joint a number": ({"redundant_joints": [3]}, "redundant_joints: unknown joints"),
+    "more redundant joints": ({"redundant_joints": ["j1", "j3"]}, "control_points: wrong shape"),
+    "branch a number": ({"branch": 1}, "branch: wrong type"),
+    "times descending": ({"times": lambda a: a[::-1]}, "times: not times"),
+    "times equal": ({"times": put(3, 0.0)}, "times: not times"),
+    "times from elsewhere": ({"times": lambda a: a + 1.0}, "times: not times"),
+    "times NaN": ({"times": put(3, np.nan)}, "times: not all are finite"),
+    "times a matrix": ({"times": lambda a: a[None]}, "times: not times"),
+    "times a number": ({"times": np.array(1.0)}, "times: not times"),
+    "one time": ({"times": np.zeros(1)}, "times: not times"),
+    "times words": ({"times": np.array(["a", "b"])}, "times: not all are finite"),
+    "times objects": ({"times": np.array([None, {}], dtype=object)}, "not a brachis result"),
+    "knots descending": ({"knots": lambda a: a[::-1]}, "knots: not the knots"),
+    "knots infinite": ({"knots": put(5, np.inf)}, "knots: not all are finite"),
+    "knots beyond one": ({"knots": lambda a: 2.0 * a}, "knots: not the knots"),
+    "no knots": ({"knots": np.zeros(0)}, "knots: not the knots"),
+    "q of fewer nodes": ({"q": lambda a: a[1:]}, "q: wrong shape"),
+    "q of fewer joints": ({"qdot": lambda a: a[:, 1:]}, "qdot: wrong shape"),
+    "q flat": ({"qddot_before": lambda a: a.ravel()}, "qddot_before: wrong shape"),
+    "q complex": ({"q": lambda a: a + 1j}, "q: not all are finite"),
+    "q NaN": ({"q": put((3, 1), np.nan)}, "q: not all are finite"),
+    "fewer control points": ({"control_points": lambda a: a[:, 1:]}, "control_points: wrong shape"),
+    "fewer splines": ({"control_points": lambda a: a[:1]}, "control_points: wrong shape"),
+    "control points infinite": ({"control_points": put((0, 0), -np.inf)}, "control_points: not all are finite"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_broken_file(case, trajectory, tmp_path):
+    parts, expected = BROKEN[case]
+    path = tmp_path / "result.npz"
+    trajectory.save(path)
+    with_parts(path, **parts)
+    with pytest.raises(ResultFileError) as caught:
+        Trajectory.load(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert expected in str(caught.value)
+    assert caught.value.exit_code == 2
+
+
+def cut(path):
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def flipped(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(bytes(content))
+
+
+def single_array(path):
+    with path.open("wb") as stream:
+        np.save(stream, np.zeros(3))
+
+
+def zip_of_text(path):
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("meta", "{}")
+
+
+@pytest.mark.parametrize("spoil", [cut, flipped, single_array, zip_of_text, lambda p: p.write_bytes(b"")])
+def test_file_of_another_kind(spoil, trajectory, tmp_path):
+    path = tmp_path / "result.npz"
+    trajectory.save(path)
+    spoil(path)
+    with pytest.raises(ResultFileError, match="not a brachis result") as caught:
+        Trajectory.load(path)
+    assert caught.value.where == str(path)
+
+
+def test_missing_file_and_folder(tmp_path):
+    with pytest.raises(ResultFileError, match="does not exist"):
+        Trajectory.load(tmp_path / "gone.npz")
+    with pytest.raises(ResultFileError, match="is not a file"):
+        Trajectory.load(tmp_path)

@@ -1,0 +1,209 @@
+"""Every check lets the planned motion pass and finds the fault that it is there for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from brachis.errors import InputError
+from brachis.robot import Robot
+from brachis.task import Posture
+from brachis.trajectory import Trajectory
+from brachis.verify import VerifyOptions, verify_trajectory
+
+MIDDLE = 60
+
+
+def shifted(trajectory, name, place, by):
+    """The trajectory with one entry of an array moved."""
+    array = np.array(getattr(trajectory, name))
+    array[place] += by
+    return replace(trajectory, **{name: array})
+
+
+def faster(trajectory, factor):
+    t = trajectory
+    return replace(
+        t,
+        times=t.times / factor,
+        qdot=t.qdot * factor,
+        qddot=t.qddot * factor**2,
+        qddot_before=t.qddot_before * factor**2,
+    )
+
+
+def with_limits(trajectory, **limits):
+    robot = trajectory.robot
+    return replace(trajectory, robot=replace(robot, limits=replace(robot.limits, **limits)))
+
+
+def with_task(trajectory, **parts):
+    return replace(trajectory, task=trajectory.task.model_copy(update=parts))
+
+
+def started_elsewhere(trajectory):
+    joints = np.add(trajectory.task.start.joints, [0.0, 0.0, 1e-6])
+    return with_task(trajectory, start=Posture(joints=tuple(joints)))
+
+
+def ended_elsewhere(trajectory):
+    return with_task(trajectory, end=Posture(joints=tuple(trajectory.q[-1] + [0.0, 1e-6, 0.0])))
+
+
+def backwards(trajectory):
+    points = np.array(trajectory.control_points)
+    points[0, 10], points[0, 11] = points[0, 11] + 0.05, points[0, 10] - 0.05
+    return replace(trajectory, control_points=points)
+
+
+def torn(trajectory, row, by):
+    """The trajectory with one Bernstein coefficient of one piece moved, which its nodes cannot express."""
+    torn = replace(trajectory)
+    c = torn.pieces.c.copy()
+    c[row, MIDDLE, 0] += by
+    torn.pieces.c = c
+    return torn
+
+
+FAULTS = {
+    "off the path": ("path error", lambda t: shifted(t, "q", (MIDDLE, 0), 1e-8)),
+    "too fast": ("torque ratio", lambda t: faster(t, 1.001)),
+    "backwards": ("ds/dt below zero", backwards),
+    "short of the path's end": ("s at the ends", lambda t: shifted(t, "control_points", (0, -1), -1e-6)),
+    "not from the path's beginning": ("s at the ends", lambda t: shifted(t, "control_points", (0, 0), 1e-6)),
+    "starts elsewhere": ("start posture", started_elsewhere),
+    "ends elsewhere": ("end posture", ended_elsewhere),
+    "moving at the start": ("start velocity", lambda t: shifted(t, "qdot", (0, 1), 1e-7)),
+    "moving at the end": ("end velocity", lambda t: shifted(t, "qdot", (-1, 1), 1e-7)),
+    "accelerating at the start": ("start acceleration", lambda t: shifted(t, "qddot", (0, 1), 1e-5)),
+    "accelerating at the end": ("end acceleration", lambda t: shifted(t, "qddot_before", (-1, 1), 1e-5)),
+    "another spline": ("redundant joints' splines", lambda t: shifted(t, "control_points", 1, 0.3)),
+    "one control point": ("redundant joints' splines", lambda t: shifted(t, "control_points", (1, 9), 1e-6)),
+    "position jumps": ("position jump", lambda t: torn(t, 5, 1e-4)),
+    "velocity jumps": ("velocity jump", lambda t: torn(t, 4, 1e-6)),
+    "acceleration jumps": ("acceleration jump", lambda t: shifted(t, "qddot_before", (MIDDLE, 0), 1e-3)),
+    "torque jumps": ("torque jump", lambda t: shifted(t, "qddot_before", (MIDDLE, 0), 1e-6)),
+}
+ALONE = {
+    "off the path",
+    "too fast",
+    "ends elsewhere",
+    "accelerating at the end",
+    "another spline",
+    "one control point",
+    "torque jumps",
+}
+"""Faults that no other check may report."""
+
+
+def failed(verification):
+    return {check.name for check in verification.checks if not check.passed}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_fault_is_found(fault, planned):
+    name, tamper = FAULTS[fault]
+    assert failed(verify_trajectory(planned)) == set()
+    verification = verify_trajectory(tamper(planned))
+    assert name in failed(verification)
+    assert not verification.passed
+    if fault in ALONE:
+        assert failed(verification) == {name}
+
+
+def test_every_check_has_its_fault(planned):
+    limits = {f"{kind} ratio" for kind in ("velocity", "acceleration", "position")}  # see below
+    names = [check.name for check in verify_trajectory(ended_elsewhere(planned)).checks]
+    assert sorted(names) == sorted({name for name, _ in FAULTS.values()} | limits)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("kind", "quantity"), [("velocity", "qdot"), ("acceleration", "qddot"), ("torque", "tau")])
+def test_limit(kind, quantity, sign, planned):
+    joint = 1
+    values = np.abs(getattr(planned.sample(planned.t_end / 5000), quantity)[:, joint])
+    limit = np.array(getattr(planned.robot.limits, kind))
+    limit[joint] = values.max() / 1.001
+    mirrored = mirror(planned) if sign < 0 else planned
+    verification = verify_trajectory(with_limits(mirrored, **{kind: limit}))
+    check = next(check for check in verification.checks if check.name == f"{kind} ratio")
+    assert not check.passed
+    assert check.joint == "j2"
+    assert check.value == pytest.approx(1.001, abs=1e-4)
+    assert verification.worst_ratio == check.value
+    assert check.time == pytest.approx(np.argmax(values) / 5000 * planned.t_end, abs=0.02)
+
+
+def mirror(trajectory):
+    """The motion backwards in space; it leaves the path, and its torques change sign without gravity."""
+    t = trajectory
+    return replace(t, q=-t.q, qdot=-t.qdot, qddot=-t.qddot, qddot_before=-t.qddot_before)
+
+
+@pytest.mark.parametrize("one_sided", [False, True])
+@pytest.mark.parametrize("side", ["position_lower", "position_upper"])
+def test_position_limit(side, one_sided, planned):
+    joint, upper = 2, side == "position_upper"
+    q = planned.sample(planned.t_end / 5000).q[:, joint]
+    beyond = 0.01
+    limits = {name: np.array(getattr(planned.robot.limits, name)) for name in ("position_lower", "position_upper")}
+    if one_sided:
+        limits["position_lower"][joint], limits["position_upper"][joint] = -np.inf, np.inf
+    limits[side][joint] = q.max() - beyond if upper else q.min() + beyond
+    verification = verify_trajectory(with_limits(planned, **limits))
+    assert failed(verification) == {"position ratio"}
+    check = next(check for check in verification.checks if check.name == "position ratio")
+    half = 1.0 if one_sided else 0.5 * (limits["position_upper"][joint] - limits["position_lower"][joint])
+    assert check.joint == "j3"
+    assert check.value == pytest.approx(1.0 + beyond / half, abs=1e-5)
+
+
+def test_nothing_passes_that_is_no_number(planned):
+    verification = verify_trajectory(shifted(planned, "control_points", (0, 8), np.nan))
+    assert "ds/dt below zero" in failed(verification)
+    assert "path error" in failed(verification)
+    verification = verify_trajectory(shifted(planned, "q", (MIDDLE, 0), np.nan))
+    assert {"path error", "torque ratio", "position ratio", "position jump"} <= failed(verification)
+
+
+def test_tolerances_are_options(planned):
+    lenient = VerifyOptions(spline_tolerance=0.31)
+    assert verify_trajectory(shifted(planned, "control_points", 1, 0.3), lenient).passed
+    strict = VerifyOptions(ratio_tolerance=-0.5)
+    assert failed(verify_trajectory(planned, strict)) == {"torque ratio"}
+
+
+def test_saved_and_loaded_trajectory_has_the_same_verification(planned, tmp_path):
+    planned.save(tmp_path / "result.npz")
+    assert verify_trajectory(Trajectory.load(tmp_path / "result.npz")) == verify_trajectory(planned)
+
+
+def test_another_robot_of_the_same_joints(planned, tmp_path):
+    heavier = tmp_path / "heavier.urdf"
+    text = planned.urdf.replace('mass value="', 'mass value="1')  # 10 kg becomes 110 kg
+    assert text != planned.urdf
+    heavier.write_text(text)
+    robot = Robot.from_urdf(heavier, tool_frame=planned.robot.tool_frame, gravity=(0.0, 0.0, 0.0))
+    verification = verify_trajectory(planned, robot=robot)
+    assert "torque ratio" in failed(verification)
+    assert "path error" not in failed(verification)
+
+
+@pytest.mark.parametrize(("old", "new"), [('"j2"', '"elbow"'), ('type="continuous"', 'type="fixed"')])
+def test_robot_of_other_joints_is_refused(old, new, planned):
+    place = planned.urdf.index(old)
+    text = planned.urdf[:place] + planned.urdf[place:].replace(old, new, 1)
+    robot = Robot.from_urdf("other", urdf_text=text)
+    with pytest.raises(InputError, match="other joints than the trajectory") as caught:
+        verify_trajectory(planned, robot=robot)
+    assert caught.value.found == ", ".join(robot.joint_names)
+    assert caught.value.allowed == "j1, j2, j3"
+
+
+def test_robot_without_redundancy_has_no_spline_check(planned):
+    plain = replace(planned, redundant_joints=(), control_points=planned.control_points[:1])
+    verification = verify_trajectory(plain)
+    assert verification.passed
+    assert "redundant joints' splines" not in {check.name for check in verification.checks}
