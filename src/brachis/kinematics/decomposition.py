@@ -193,7 +193,7 @@ class Decomposition:
         qddot[:, self.rest] += np.einsum("kij,kj->ki", inverse, wanted)
         if near is not None:
             q[:, self._turns] += _TURN * np.round((near - q)[:, self._turns] / _TURN)
-        elif t is not None:
+        elif t is not None and self._ranged.any():  # otherwise no limit asks which turn an angle is in
             self._follow(q, qdot, qddot, t)
         return JointState(y, ydot, yddot, q, qdot, qddot, sample, gradient, inverse)
 

@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -84,11 +84,11 @@ def read_result(path: Path) -> Content:
     ResultFileError
         The file is missing, broken or of another schema version, or its parts do not fit each other.
     """
-    if not path.is_file():
-        problem = "the result file is not a file" if path.exists() else "the result file does not exist"
-        raise ResultFileError(problem, where=str(path))
     try:
-        meta, arrays = _parts(path)
+        with path.open("rb") as stream:
+            meta, arrays = _parts(stream)
+    except FileNotFoundError as error:
+        raise ResultFileError("the result file does not exist", where=str(path)) from error
     except _UNREADABLE as error:
         raise ResultFileError(
             "the file is not a brachis result",
@@ -104,9 +104,9 @@ def read_result(path: Path) -> Content:
         raise ResultFileError("the result file is broken", where=str(path), found=str(error)) from error
 
 
-def _parts(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+def _parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Read the metadata and the arrays, unchecked but for their types."""
-    archive = np.load(path, allow_pickle=False)
+    archive = np.load(stream, allow_pickle=False)
     if not isinstance(archive, np.lib.npyio.NpzFile):
         raise ValueError("a single array")  # noqa: TRY004  (a wrong file, not a wrong call)
     with archive:
