@@ -83,6 +83,8 @@ class Watch:
         return self._evaluate(self.problem.jacobian, x)
 
     def _evaluate(self, function: object, x: np.ndarray) -> np.ndarray:
+        if self._handler is not None:  # a backend may have put a handler of its own in place since
+            signal.signal(signal.SIGINT, self._keep_interrupt)
         if self.must_stop():
             raise UnreachableError("the solve has to stop")
         try:

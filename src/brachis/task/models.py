@@ -90,7 +90,7 @@ class SolverSettings(Model):
 class RefinementSettings(Model):
     """Adding collocation points until the limits hold in between them as well."""
 
-    tolerance: Positive = Field(default=1.0e-4, description="Largest relative excess over a limit, anywhere.")
+    tolerance: Positive = Field(default=1.0e-4, le=0.01, description="Largest relative excess over a limit, anywhere.")
     density: Count = Field(default=10, ge=10, description="Grid points for checking limits, per collocation point.")
     max_rounds: Count = Field(default=10, ge=0, description="Largest number of rounds; 0 switches refinement off.")
 

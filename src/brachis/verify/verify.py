@@ -10,13 +10,15 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.errors import InputError
-from brachis.path import build_path
+from brachis.path import Path, build_path
 from brachis.robot import Robot, TaskSpace
 from brachis.trajectory import Trajectory
 from brachis.verify.checks import continuity_checks, end_checks, progress_checks, spline_checks
 from brachis.verify.mechanics import tool_placements, torques
 from brachis.verify.options import VerifyOptions
 from brachis.verify.report import Check, Verification
+
+_BISECTIONS = 50
 
 
 def verify_trajectory(
@@ -55,10 +57,13 @@ def verify_trajectory(
     breaks = np.unique(trajectory.knots) * trajectory.t_end
     steps = (np.arange(options.points_per_interval) + 0.5) / options.points_per_interval  # between the nodes
     grid = (breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel()
-    t = np.union1d(grid, trajectory.times)
+    task_space = TaskSpace.of(robot, trajectory.task.task_space)
+    start = robot.posture(trajectory.task.start.joints, "start.joints")
+    path = build_path(trajectory.task.path, task_space.value(robot.tool_placement(start)), task_space.rows)
+    t = np.unique(np.concatenate([grid, trajectory.times, _times_within_pieces(trajectory, path.breaks, options)]))
     q, qdot, qddot = trajectory.position(t), trajectory.velocity(t), trajectory.acceleration(t)
     tau = torques(robot, q, qdot, qddot)
-    path_check = _path_error(trajectory, robot, t, q, options)
+    path_check = _path_error(trajectory, robot, path, task_space, t, q, options)
     limits = _limit_checks(robot, t, q, qdot, qddot, tau, options)
     checks = [
         path_check,
@@ -72,11 +77,28 @@ def verify_trajectory(
     return Verification(tuple(checks), len(t), worst, path_check.value)
 
 
-def _path_error(trajectory: Trajectory, robot: Robot, t: np.ndarray, q: np.ndarray, options: VerifyOptions) -> Check:
+def _times_within_pieces(trajectory: Trajectory, breaks: np.ndarray, options: VerifyOptions) -> np.ndarray:
+    """Spread times over every piece of the path, however short: a small blend is not stepped over."""
+    parts = np.linspace(0.0, 1.0, options.points_per_interval)
+    wanted = (breaks[:-1, None] + np.diff(breaks)[:, None] * parts).ravel()
+    low, high = np.zeros_like(wanted), np.full_like(wanted, trajectory.t_end)
+    for _ in range(_BISECTIONS):  # s(t) does not decrease
+        middle = 0.5 * (low + high)
+        before = trajectory.path_spline(middle) < wanted
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    return 0.5 * (low + high)
+
+
+def _path_error(
+    trajectory: Trajectory,
+    robot: Robot,
+    path: Path,
+    task_space: TaskSpace,
+    t: np.ndarray,
+    q: np.ndarray,
+    options: VerifyOptions,
+) -> Check:
     """Largest distance of the tool from the path at the saved s(t)."""
-    task_space = TaskSpace.of(robot, trajectory.task.task_space)
-    start = robot.posture(trajectory.task.start.joints, "start.joints")
-    path = build_path(trajectory.task.path, task_space.value(robot.tool_placement(start)), task_space.rows)
     targets = path.sample(np.clip(trajectory.path_spline(t), 0.0, 1.0)).target
     miss = task_space.values(*tool_placements(robot, q)) - targets
     positions = len(task_space.axes)
