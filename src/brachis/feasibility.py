@@ -184,6 +184,8 @@ def explain_failure(decomposition: Decomposition) -> BrachisError | str:
     answers = _postures_along(decomposition, s)
     reached = np.isfinite(answers).all(axis=3)
     anyhow = reached.any(axis=(1, 2))
+    if not anyhow[0]:  # the start posture itself was not hit: the ranges are too narrow for a random search to tell
+        return "Why not could not be told; widen narrow joint ranges, or raise solver.max_iterations and time_limit"
     if not anyhow.all():
         first = float(s[int(np.argmin(anyhow))])
         return PathError(
