@@ -17,7 +17,7 @@ from brachis.nlp import Transcription
 from brachis.path import build_path
 from brachis.refine import Refined
 from brachis.result import Result
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, bind
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import Task, load_task
 from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
@@ -100,7 +100,7 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
     InputError
         See `plan`.
     """
-    task_space = TaskSpace.of(robot, task.task_space)
+    robot, task_space = bind(robot, task.task_space)
     start = robot.posture(task.start.joints, "start.joints")
     end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
     path = build_path(task.path, task_space.value(robot.tool_placement(start)), task_space.rows)

@@ -21,7 +21,8 @@ class IKSolver(Protocol):
     ----------
     branches : tuple of str
         Labels of the B branches. A label names a geometric choice (elbow to one side or the other), so that a
-        continuous joint curve keeps its label until a branch margin reaches zero.
+        continuous joint curve keeps its label until a branch margin reaches zero. A label that occurs several times
+        names answers that no geometric choice tells apart; along a curve they are told apart by continuity.
     kind : str
         ``closed_form``, or ``polynomial`` where the roots of a polynomial are found numerically.
     """
@@ -34,8 +35,8 @@ class IKSolver(Protocol):
 
         Parameters
         ----------
-        targets : (K, m) ndarray
-            Task coordinates.
+        targets : (K, c) ndarray
+            Task coordinates; see `TaskSpace` (for poses c = 12: position, then the rotation matrix row by row).
         q_r : (K, r) ndarray
             Redundant joints, chain order.
 

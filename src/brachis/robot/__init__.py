@@ -1,8 +1,9 @@
 """URDF to Pinocchio model, limits and friction."""
 
+from brachis.robot.free_roll import bind
 from brachis.robot.friction import Friction
 from brachis.robot.limits import FROM_URDF, Limits, LimitSpec
 from brachis.robot.robot import Robot
 from brachis.robot.task_space import TaskSpace
 
-__all__ = ["FROM_URDF", "Friction", "LimitSpec", "Limits", "Robot", "TaskSpace"]
+__all__ = ["FROM_URDF", "Friction", "LimitSpec", "Limits", "Robot", "TaskSpace", "bind"]

@@ -17,6 +17,8 @@ from brachis.robot.urdf import read_chain, read_file
 from brachis.task import RobotSettings, check_robot_settings
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+ROLL_JOINT = "tool_roll"
+"""The virtual joint by which a tool rolls freely about its z axis; see `free_roll`."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +134,11 @@ class Robot:
         return len(self.joint_names)
 
     @property
+    def rolls_freely(self) -> bool:
+        """Whether the last joint is the virtual one by which the tool rolls freely."""
+        return self.joint_names[-1] == ROLL_JOINT
+
+    @property
     def frame_id(self) -> int:
         """Pinocchio's index of the tool frame."""
         return int(self.model.getFrameId(self.tool_frame))
@@ -144,11 +151,15 @@ class Robot:
     def posture(self, joints: object, where: str) -> np.ndarray:
         """Check a list or mapping of joint positions and return it as (n,) in chain order, rad or m.
 
+        The position of the virtual joint of a freely rolling tool may be left out; it is zero then.
+
         Raises
         ------
         InputError, UnknownNameError
             A joint is missing, unknown or not finite, or the list has another length than the chain.
         """
+        if self.rolls_freely:
+            joints = _with_roll(joints, self.n)
         values = per_joint_values(where, joints, list(self.joint_names), None)
         missing = [name for name, value in zip(self.joint_names, values, strict=True) if value is None]
         if missing:
@@ -163,6 +174,15 @@ class Robot:
         data = self.model.createData()
         pin.framesForwardKinematics(self.model, data, np.asarray(q, dtype=float))
         return data.oMf[self.frame_id].copy()
+
+
+def _with_roll(joints: object, n: int) -> object:
+    """Add the virtual joint's position, zero, to a posture that leaves it out."""
+    if isinstance(joints, Mapping):
+        return {ROLL_JOINT: 0.0, **joints}
+    if isinstance(joints, Sequence) and len(joints) == n - 1:
+        return [*joints, 0.0]
+    return joints
 
 
 def _vector(gravity: Sequence[float]) -> np.ndarray:

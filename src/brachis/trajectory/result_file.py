@@ -15,7 +15,7 @@ import numpy as np
 
 from brachis.errors import InputError, ResultFileError
 from brachis.files import atomic_write
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, bind
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import Task, load_task
 
@@ -125,12 +125,11 @@ def _content(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Content:
             found = type(meta[key]).__name__ if key in meta else "nothing"
             raise InputError("wrong type", where=key, found=found, allowed=kind.__name__)
     task = load_task(meta["task"])
-    robot = robot_from_settings(task.robot, urdf_text=meta["urdf"])
+    robot, _ = bind(robot_from_settings(task.robot, urdf_text=meta["urdf"]), task.task_space)
     if meta["joint_names"] != list(robot.joint_names):
         raise InputError(
             "other joints than the URDF's", where="joint_names", found=meta["joint_names"], allowed=robot.joint_names
         )
-    TaskSpace.of(robot, task.task_space)
     robot.posture(task.start.joints, "task.start.joints")
     if task.end != "free":
         robot.posture(task.end.joints, "task.end.joints")

@@ -11,7 +11,7 @@ import numpy as np
 
 from brachis.errors import InputError
 from brachis.path import Path, build_path
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, TaskSpace, bind
 from brachis.trajectory import Trajectory
 from brachis.verify.checks import continuity_checks, end_checks, progress_checks, spline_checks
 from brachis.verify.mechanics import tool_placements, torques
@@ -46,7 +46,7 @@ def verify_trajectory(
         (`InputError`), task space (`InputError`) or path (`PathError`).
     """
     options = options or VerifyOptions()
-    robot = trajectory.robot if robot is None else robot
+    robot, task_space = bind(trajectory.robot if robot is None else robot, trajectory.task.task_space)
     if robot.joint_names != trajectory.joint_names:
         raise InputError(
             "the robot has other joints than the trajectory",
@@ -57,7 +57,6 @@ def verify_trajectory(
     breaks = np.unique(trajectory.knots) * trajectory.t_end
     steps = (np.arange(options.points_per_interval) + 0.5) / options.points_per_interval  # between the nodes
     grid = (breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel()
-    task_space = TaskSpace.of(robot, trajectory.task.task_space)
     start = robot.posture(trajectory.task.start.joints, "start.joints")
     path = build_path(trajectory.task.path, task_space.value(robot.tool_placement(start)), task_space.rows)
     t = np.unique(np.concatenate([grid, trajectory.times, _times_within_pieces(trajectory, path.breaks, options)]))
@@ -100,10 +99,9 @@ def _path_error(
 ) -> Check:
     """Largest distance of the tool from the path at the saved s(t)."""
     targets = path.sample(np.clip(trajectory.path_spline(t), 0.0, 1.0)).target
-    miss = task_space.values(*tool_placements(robot, q)) - targets
+    miss = task_space.difference(task_space.values(*tool_placements(robot, q)), targets)
     positions = len(task_space.axes)
-    angles = np.abs(np.remainder(miss[:, positions:] + np.pi, 2.0 * np.pi) - np.pi)
-    errors = np.maximum(np.linalg.norm(miss[:, :positions], axis=1), angles.max(axis=1, initial=0.0))
+    errors = np.maximum(np.linalg.norm(miss[:, :positions], axis=1), np.linalg.norm(miss[:, positions:], axis=1))
     worst = int(np.argmax(errors))
     tolerance = options.path_tolerance
     return Check(
