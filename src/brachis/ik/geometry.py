@@ -2,12 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
+from brachis.ik.vectors import apply, cross
 from brachis.robot import Robot
+
+
+@dataclass(frozen=True)
+class PosedScrews:
+    """Screw axes of a chain at K postures, in the world frame; components along the first axis (see `vectors`).
+
+    Attributes
+    ----------
+    axes : (3, n, K) ndarray
+        Unit directions of rotation or translation.
+    points : (3, n, K) ndarray
+        A point on each axis of rotation, m; without meaning for prismatic joints.
+    tool_position : (3, K) ndarray
+        m.
+    tool_rotation : (3, 3, K) ndarray
+    revolute : (n,) bool ndarray
+    """
+
+    axes: np.ndarray
+    points: np.ndarray
+    tool_position: np.ndarray
+    tool_rotation: np.ndarray
+    revolute: np.ndarray
+
+    def jacobian_columns(self, joints: Sequence[int]) -> np.ndarray:
+        """Columns (6, len(joints), K) of the tool's Jacobian: linear, then angular velocity, in world axes."""
+        columns = np.zeros((6, len(joints), self.axes.shape[2]), dtype=self.axes.dtype)
+        for place, i in enumerate(joints):
+            if self.revolute[i]:
+                columns[:3, place] = cross(self.axes[:, i], self.tool_position - self.points[:, i])
+                columns[3:, place] = self.axes[:, i]
+            else:
+                columns[:3, place] = self.axes[:, i]
+        return columns
 
 
 @dataclass(frozen=True)
@@ -60,7 +96,7 @@ class ChainGeometry:
         return len(self.joint_names)
 
     def forward(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Tool position and world directions of all joint axes, by the product of exponentials.
+        """Tool position and world directions of all joint axes.
 
         Parameters
         ----------
@@ -74,22 +110,66 @@ class ChainGeometry:
         directions : (K, n, 3) ndarray
             World direction of every joint's axis.
         """
-        count = len(q)
-        rotation = np.broadcast_to(np.eye(3, dtype=q.dtype), (count, 3, 3))
-        offset = np.zeros((count, 3), dtype=q.dtype)
-        directions = np.empty((count, self.n, 3), dtype=q.dtype)
+        posed = self.posed(q)
+        return posed.tool_position.T, np.moveaxis(posed.axes, (0, 1, 2), (2, 1, 0))
+
+    def posed(self, q: np.ndarray) -> PosedScrews:
+        """Screw axes and tool placement at K postures, by the product of exponentials.
+
+        Parameters
+        ----------
+        q : (K, n) ndarray
+            Real, or complex for complex-step derivatives.
+        """
+        return self._moved(q.T, np.ones(self.n, dtype=bool))
+
+    def held(self, joints: Sequence[int], q_held: np.ndarray) -> PosedScrews:
+        """Screw axes and tool placement where some joints are held at given positions and all others are zero.
+
+        Parameters
+        ----------
+        joints : sequence of int
+            The joints that are held, ascending.
+        q_held : (K, h) ndarray
+            Their positions, rad or m.
+        """
+        moving = np.zeros(self.n, dtype=bool)
+        moving[list(joints)] = True
+        q = np.zeros((self.n, len(q_held)))
+        q[moving] = q_held.T
+        return self._moved(q, moving)
+
+    def _moved(self, q: np.ndarray, moving: np.ndarray) -> PosedScrews:
+        """Move joints one after the other; q is (n, K), and `moving` says which of them move at all."""
+        count = q.shape[1]
+        axes, points = (np.empty((3, self.n, count), dtype=q.dtype) for _ in range(2))
+        rotation = np.eye(3, dtype=q.dtype)[:, :, None]
+        offset = np.zeros((3, 1), dtype=q.dtype)
         for i in range(self.n):
-            directions[:, i] = rotation @ self.axes[i]
+            axis, point = self.axes[i][:, None], self.points[i][:, None]
+            axes[:, i] = apply(rotation, axis)
+            points[:, i] = apply(rotation, point) + offset
+            if not moving[i]:
+                continue
             if self.revolute[i]:
-                turn = _rotations(self.axes[i], q[:, i])
-                offset = offset + np.einsum("kij,kj->ki", rotation, self.points[i] - turn @ self.points[i])
-                rotation = rotation @ turn
+                rotation = _matrix_product(rotation, _rotations(self.axes[i], q[i]))
+                offset = points[:, i] - apply(rotation, point)
             else:
-                offset = offset + directions[:, i] * q[:, i, None]
-        return offset + rotation @ self.tool_position, directions
+                offset = offset + axes[:, i] * q[i]
+        position = apply(rotation, self.tool_position[:, None]) + offset
+        tool = _matrix_product(rotation, self.tool_rotation[:, :, None])
+        return PosedScrews(
+            axes, points, np.broadcast_to(position, (3, count)), np.broadcast_to(tool, (3, 3, count)), self.revolute
+        )
+
+
+def _matrix_product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Products of matrices (3, 3, K or 1)."""
+    return np.stack([apply(first, second[:, column]) for column in range(3)], axis=1)
 
 
 def _rotations(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Rotation matrices (K, 3, 3) about one unit axis (Rodrigues' formula)."""
-    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    return np.eye(3) + np.sin(angle)[:, None, None] * cross + (1.0 - np.cos(angle))[:, None, None] * (cross @ cross)
+    """Rotation matrices (3, 3, K) about one unit axis (Rodrigues' formula)."""
+    skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.eye(3)[:, :, None] + skew[:, :, None] * sin + (skew @ skew)[:, :, None] * (1.0 - cos)

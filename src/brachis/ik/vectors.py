@@ -1,0 +1,102 @@
+"""Vectors with their three components along the FIRST axis, and the subproblems that closed forms are made of.
+
+Arrays have shape (3, ...); the other axes broadcast (samples, then branches). Components are written out, which is
+faster than einsum for so small a dimension and keeps complex numbers analytic (no conjugates, no absolute values).
+
+Subproblems as in B. Paden, Kinematics and control of robot manipulators, PhD thesis, Berkeley 1985, and A. J. Elias,
+J. T. Wen, "IK-Geo: unified robot inverse kinematics using subproblem decomposition", 2022.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Scalar product, shape (...)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Vector product, shape (3, ...)."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def across(axis: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Part of a vector that is perpendicular to a unit axis, shape (3, ...)."""
+    return vector - axis * dot(axis, vector)
+
+
+def rotate(axis: np.ndarray, angle: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Turn a vector about a unit axis (Rodrigues' formula), shape (3, ...)."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    return vector * cos + cross(axis, vector) * sin + axis * (dot(axis, vector) * (1.0 - cos))
+
+
+def turn_about(axis: np.ndarray, point: np.ndarray, angle: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Turn a position about the line through `point` along a unit axis, shape (3, ...)."""
+    return point + rotate(axis, angle, position - point)
+
+
+def apply(rotation: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Apply rotation matrices (3, 3, ...) to vectors (3, ...)."""
+    return rotation[:, 0] * vector[0] + rotation[:, 1] * vector[1] + rotation[:, 2] * vector[2]
+
+
+def apply_inverse(rotation: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Apply the inverses of rotation matrices (3, 3, ...) to vectors (3, ...)."""
+    return rotation[0] * vector[0] + rotation[1] * vector[1] + rotation[2] * vector[2]
+
+
+def angle_about(axis: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Angle in (-pi, pi] that turns `start` towards `end` about a unit axis, whatever their parts along it, (...)."""
+    return np.arctan2(dot(axis, cross(start, end)), dot(start, end) - dot(axis, start) * dot(axis, end))
+
+
+def cosine_roots(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Angles at which ``a cos + b sin = c``.
+
+    Returns
+    -------
+    rising, falling : (...) ndarray
+        In [-2 pi, 2 pi]; the left side's derivative ``b cos - a sin`` is positive at the first one, negative at the
+        second. NaN where there is none.
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        half = np.arccos(c / np.sqrt(a * a + b * b))
+    middle = np.arctan2(b, a)
+    return middle - half, middle + half
+
+
+def turned_component(
+    axis: np.ndarray, point: np.ndarray, position: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Coefficients of the component of a turned position along a direction.
+
+    With E the turn by an angle about the line through `point` along `axis`:
+    ``direction . E position = a cos + b sin + rest``.
+
+    Returns
+    -------
+    a, b, rest : (...) ndarray
+    """
+    arm = position - point
+    lever = across(axis, arm)
+    return dot(direction, lever), dot(direction, cross(axis, lever)), dot(direction, position - lever)
+
+
+def turned_distance(
+    axis: np.ndarray, point: np.ndarray, position: np.ndarray, other: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Coefficients of the squared distance of a turned position from another one.
+
+    ``|E position - other|^2 = rest - 2 (a cos + b sin)``, with E as in `turned_component`.
+
+    Returns
+    -------
+    a, b, rest : (...) ndarray
+    """
+    arm, away = position - point, other - point
+    lever = across(axis, arm)
+    rest = dot(arm, arm) + dot(away, away) - 2.0 * dot(axis, arm) * dot(axis, away)
+    return dot(away, lever), dot(away, cross(axis, lever)), rest
