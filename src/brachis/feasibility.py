@@ -119,7 +119,7 @@ def start_branch(robot: Robot, task_space: TaskSpace, match: Match, start: np.nd
     """
     branches = match.solver.branches
     if wanted is not None and wanted not in branches:
-        raise UnknownNameError("branch", wanted, branches, where="branch")
+        raise UnknownNameError("branch", wanted, dict.fromkeys(branches), where="branch")
     branch = _branch_of(robot, task_space, match, start, "start")
     if wanted is not None and branches[branch] != wanted:
         raise StartError(
@@ -140,7 +140,7 @@ def check_end_branch(robot: Robot, task_space: TaskSpace, match: Match, end: np.
     StartError
     """
     found = _branch_of(robot, task_space, match, end, "end")
-    if found != branch:
+    if match.solver.branches[found] != match.solver.branches[branch]:
         raise StartError(
             "the end posture is on another branch than the start posture",
             where="end.joints",
@@ -193,7 +193,7 @@ def explain_failure(decomposition: Decomposition) -> BrachisError | str:
             s_interval=(first, float(s[np.flatnonzero(~anyhow)[-1]])),
             hint="Shorten or move the path, or widen the joint ranges",
         )
-    own = reached[:, :, decomposition.branch].any(axis=1)
+    own = reached[:, :, decomposition.slots].any(axis=(1, 2))
     if not own.all():
         first = float(s[int(np.argmin(own))])
         label = decomposition.solver.branches[decomposition.branch]
@@ -202,7 +202,7 @@ def explain_failure(decomposition: Decomposition) -> BrachisError | str:
             s_interval=(first, float(s[np.flatnonzero(~own)[-1]])),
             hint="Start in a posture of another branch, or choose other redundant joints",
         )
-    held = _held(decomposition, answers[:, :, decomposition.branch], reached[:, :, decomposition.branch])
+    held = _held(decomposition, answers[:, :, decomposition.slots], reached[:, :, decomposition.slots])
     if not held.all():
         first = float(s[int(np.argmin(held))])
         return PathError(

@@ -17,7 +17,7 @@ from brachis.nlp import Transcription
 from brachis.path import build_path
 from brachis.refine import Refined
 from brachis.result import Result
-from brachis.robot import Robot, bind
+from brachis.robot import ROLL_JOINT, Robot, TaskSpace, bind
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import Task, load_task
 from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
@@ -104,7 +104,7 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
     start = robot.posture(task.start.joints, "start.joints")
     end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
     path = build_path(task.path, task_space.value(robot.tool_placement(start)), task_space.rows)
-    candidate = ik.find(robot, task_space, task.redundant_joints, families=families)
+    candidate = ik.find(robot, task_space, _redundant_joints(robot, task_space, task), families=families)
     redundant = tuple(robot.joint_names.index(name) for name in candidate.redundant_joints)
     check_start(robot, start, end, path, task_space, task.path_start)
     branch = start_branch(robot, task_space, candidate, start, task.branch)
@@ -121,6 +121,13 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
         end=end,
     )
     return problem, str(candidate.family)
+
+
+def _redundant_joints(robot: Robot, task_space: TaskSpace, task: Task) -> tuple[str, ...]:
+    """Return the task's redundant joints, and the free roll where it is the one that is left out."""
+    names = task.redundant_joints
+    missing = robot.n - task_space.m - len(names)
+    return (*names, ROLL_JOINT) if robot.rolls_freely and missing == 1 and ROLL_JOINT not in names else names
 
 
 def _trajectory(decomposition: Decomposition, refined: Refined, task: Task) -> Trajectory:

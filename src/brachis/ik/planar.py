@@ -214,6 +214,8 @@ def _wrap(angle: np.ndarray) -> np.ndarray:
 @ik_family("planar", source="two circles, circle and line, two lines: elementary plane geometry")
 def planar(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> PlanarSolver:
     """Fit the family: all joints move in one plane that the prescribed rows can see."""
+    if task_space.oriented:
+        raise NotApplicableError("a whole pose is prescribed")
     chain = PlanarChain.of(geometry, task_space)
     yaw = task_space.yaw_axis is not None
     rest = [i for i in range(geometry.n) if i not in redundant]

@@ -64,6 +64,8 @@ class PrismaticSolver:
 @ik_family("prismatic", source="linear in the slides; this module's docstring")
 def prismatic(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> PrismaticSolver:
     """Fit the family: every non-redundant joint is prismatic and no angle is prescribed."""
+    if task_space.oriented:
+        raise NotApplicableError("a whole pose is prescribed")
     turning = [geometry.joint_names[i] for i in range(geometry.n) if i not in redundant and geometry.revolute[i]]
     if turning:
         raise NotApplicableError(f"{', '.join(turning)} would be left over and not prismatic")

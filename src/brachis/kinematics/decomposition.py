@@ -87,7 +87,7 @@ class Decomposition:
     redundant : tuple of int
         Indices of the redundant joints, ascending.
     branch : int
-        Index into ``solver.branches``.
+        Index into ``solver.branches``, the first one of its label.
     start : (n,) ndarray
         Start posture; angles are lifted (by multiples of 2 pi) to begin nearest to it.
     """
@@ -109,6 +109,7 @@ class Decomposition:
         self.redundant = list(redundant)
         self.rest = [i for i in range(robot.n) if i not in redundant]
         self.branch = branch
+        self.slots = [i for i, label in enumerate(solver.branches) if label == solver.branches[branch]]
         self.start = start
         self.kinematics = TaskKinematics(robot, task_space)
         self._turning = ChainGeometry.of(robot).revolute[self.rest]
@@ -122,8 +123,12 @@ class Decomposition:
         """Degree of redundancy."""
         return len(self.redundant)
 
-    def postures(self, y: np.ndarray, sample: PathSample | None = None) -> np.ndarray:
+    def postures(
+        self, y: np.ndarray, sample: PathSample | None = None, *, near: np.ndarray | None = None
+    ) -> np.ndarray:
         """Joint positions at K successive times, continuous from the start posture on.
+
+        Where several answers share the branch's label, the one nearest to its predecessor is taken.
 
         Parameters
         ----------
@@ -131,6 +136,8 @@ class Decomposition:
             In the order of time, beginning at the start.
         sample : PathSample, optional
             The path at ``y[:, 0]`` if already known.
+        near : (K, n) ndarray, optional
+            Postures known to be near; they choose among answers of the same label, and the times may be any.
 
         Returns
         -------
@@ -138,7 +145,11 @@ class Decomposition:
             NaN in the non-redundant joints where the branch has no answer.
         """
         sample = sample or self.path.sample(y[:, 0])
-        answers = self.solver.solve(sample.target, y[:, 1:])[:, self.branch]
+        answers = self.solver.solve(sample.target, y[:, 1:])[:, self.slots]
+        if len(self.slots) == 1:
+            answers = answers[:, 0]
+        else:
+            answers = self._tracked(answers) if near is None else self._nearest(answers, near[:, self.rest])
         turning = self._turning
         if turning.any() and np.all(np.isfinite(answers)):
             turns = np.vstack([self.start[self.rest][None, turning], answers[:, turning]])
@@ -147,6 +158,24 @@ class Decomposition:
         q[:, self.redundant] = y[:, 1:]
         q[:, self.rest] = answers
         return q
+
+    def _nearest(self, answers: np.ndarray, near: np.ndarray) -> np.ndarray:
+        """Choose from answers (K, c, m) those nearest to postures (K, m), modulo 2 pi."""
+        gap = answers - near[:, None]
+        gap = np.where(self._turning, np.remainder(gap + np.pi, _TURN) - np.pi, gap)
+        distance = np.linalg.norm(gap, axis=2)
+        choice = np.argmin(np.where(np.isfinite(distance), distance, np.inf), axis=1)
+        return answers[np.arange(len(answers)), choice]
+
+    def _tracked(self, answers: np.ndarray) -> np.ndarray:
+        """Choose from answers (K, c, m) at successive times a course, each nearest to its predecessor."""
+        course = np.empty((len(answers), len(self.rest)))
+        previous = self.start[self.rest]
+        for k in range(len(answers)):
+            course[k] = self._nearest(answers[k : k + 1], previous[None])[0]
+            if np.isfinite(course[k]).all():
+                previous = course[k]
+        return course
 
     def state(
         self,
@@ -177,7 +206,7 @@ class Decomposition:
             the turns of a joint with a range cannot be counted.
         """
         sample = self.path.sample(y[:, 0])
-        q = self.postures(y, sample)
+        q = self.postures(y, sample, near=near)
         if not np.all(np.isfinite(q)):
             raise UnreachableError("the target is out of the branch's reach")
         jacobian = self.kinematics.jacobian(q)

@@ -175,6 +175,16 @@ class Robot:
         pin.framesForwardKinematics(self.model, data, np.asarray(q, dtype=float))
         return data.oMf[self.frame_id].copy()
 
+    def tool_placements(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame in the world frame, from postures (K, n)."""
+        data, frame = self.model.createData(), self.frame_id
+        positions, rotations = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
+        for k, posture in enumerate(q):
+            pin.forwardKinematics(self.model, data, posture)
+            placement = pin.updateFramePlacement(self.model, data, frame)
+            positions[k], rotations[k] = placement.translation, placement.rotation
+        return positions, rotations
+
 
 def _with_roll(joints: object, n: int) -> object:
     """Add the virtual joint's position, zero, to a posture that leaves it out."""

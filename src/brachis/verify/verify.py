@@ -14,7 +14,7 @@ from brachis.path import Path, build_path
 from brachis.robot import Robot, TaskSpace, bind
 from brachis.trajectory import Trajectory
 from brachis.verify.checks import continuity_checks, end_checks, progress_checks, spline_checks
-from brachis.verify.mechanics import tool_placements, torques
+from brachis.verify.mechanics import torques
 from brachis.verify.options import VerifyOptions
 from brachis.verify.report import Check, Verification
 
@@ -99,7 +99,7 @@ def _path_error(
 ) -> Check:
     """Largest distance of the tool from the path at the saved s(t)."""
     targets = path.sample(np.clip(trajectory.path_spline(t), 0.0, 1.0)).target
-    miss = task_space.difference(task_space.values(*tool_placements(robot, q)), targets)
+    miss = task_space.difference(task_space.values(*robot.tool_placements(q)), targets)
     positions = len(task_space.axes)
     errors = np.maximum(np.linalg.norm(miss[:, :positions], axis=1), np.linalg.norm(miss[:, positions:], axis=1))
     worst = int(np.argmax(errors))
