@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from brachis.kinematics import TaskKinematics
-from brachis.robot import TaskSpace
+from brachis.robot import TaskSpace, bind
 from support.chains import gantry_robot, planar_robot
+from support.spatial import rail_arm
 
 CASES = [
     ("RPRC", "xy", ["x", "y", "yaw"]),
@@ -76,3 +77,55 @@ def test_one_joint_alone():
     np.testing.assert_allclose(kinematics.bias(q, q), np.zeros((2, 1)), atol=1e-15)
     for part in vars(kinematics.derivatives(q, q, q)).values():
         np.testing.assert_allclose(part, np.zeros((2, 1, 1)), atol=1e-15)
+
+
+def pose_case(space):
+    robot, task_space = bind(rail_arm(), space)
+    rng = np.random.default_rng(5)
+    return TaskKinematics(robot, task_space), *(
+        scale * rng.uniform(-1.0, 1.0, (7, robot.n)) for scale in (2.0, 2.0, 3.0)
+    )
+
+
+def twist(kinematics, q, direction, h=1e-4):
+    """Body twist (K, 6) of the motion q + t * direction at t = 0, from poses."""
+    ahead, here, behind = (kinematics.position(q + t * direction) for t in (h, 0.0, -h))
+    difference = kinematics.task_space.difference
+    return (difference(ahead, here) - difference(behind, here)) / (2.0 * h)
+
+
+@pytest.mark.parametrize("space", ["pose", "pose_free_roll"])
+def test_jacobian_of_a_pose_gives_the_body_twist(space):
+    kinematics, q, qdot, _ = pose_case(space)
+    jacobian = kinematics.jacobian(q)
+    assert jacobian.shape == (len(q), 6, q.shape[1])
+    np.testing.assert_allclose(np.einsum("kmn,kn->km", jacobian, qdot), twist(kinematics, q, qdot), atol=1e-6)
+
+
+@pytest.mark.parametrize("space", ["pose", "pose_free_roll"])
+def test_acceleration_of_a_pose_is_the_derivative_of_the_body_twist(space):
+    kinematics, q, qdot, qddot = pose_case(space)
+    h = 1e-5
+
+    def velocity(t):
+        return np.einsum("kmn,kn->km", kinematics.jacobian(q + t * qdot + 0.5 * t**2 * qddot), qdot + t * qddot)
+
+    exact = np.einsum("kmn,kn->km", kinematics.jacobian(q), qddot) + kinematics.bias(q, qdot)
+    np.testing.assert_allclose(exact, (velocity(h) - velocity(-h)) / (2.0 * h), atol=1e-7)
+
+
+@pytest.mark.parametrize("space", ["pose", "pose_free_roll"])
+def test_derivatives_of_a_pose(space):
+    kinematics, q, qdot, qddot = pose_case(space)
+
+    def velocity(posture):
+        return np.einsum("kmn,kn->km", kinematics.jacobian(posture), qdot)
+
+    def acceleration(posture, speed):
+        return np.einsum("kmn,kn->km", kinematics.jacobian(posture), qddot) + kinematics.bias(posture, speed)
+
+    exact = kinematics.derivatives(q, qdot, qddot)
+    np.testing.assert_allclose(exact.velocity_q, by_joint(velocity, q), atol=1e-8)
+    np.testing.assert_allclose(exact.acceleration_q, by_joint(lambda p: acceleration(p, qdot), q), atol=1e-7)
+    np.testing.assert_allclose(exact.acceleration_qdot, by_joint(lambda v: acceleration(q, v), qdot), atol=1e-7)
+    assert min(np.abs(part).max() for part in (exact.velocity_q, exact.acceleration_q, exact.acceleration_qdot)) > 0.1

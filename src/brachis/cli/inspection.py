@@ -2,28 +2,40 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.table import Table
 
 from brachis import ik
 from brachis.cli.output import print_json, result_console
 from brachis.errors import InputError
-from brachis.robot import LimitSpec, Robot, TaskSpace
+from brachis.robot import LimitSpec, Robot, TaskSpace, bind
 from brachis.robot.limits import UrdfLimit
+from brachis.robot.task_space import AXES, POSE_ROWS, WORDS
+from brachis.robot.urdf import last_common_link, read_file
+
+_PARALLEL = 1e-9
 
 
 def inspect_command(
-    urdf: Path, *, task_space: str, tool_frame: str | None, base_frame: str | None, lock: list[str], as_json: bool
+    urdf: Path,
+    *,
+    task_space: str | None,
+    tool_frame: str | None,
+    base_frame: str | None,
+    lock: list[str],
+    as_json: bool,
 ) -> None:
     """Print a robot's joints and its decompositions."""
     # Which limits are missing is for the plan to say; here any robot is shown.
     unlimited = LimitSpec(torque=None, velocity=None, acceleration=1.0)
-    robot = Robot.from_urdf(
-        urdf, tool_frame=tool_frame, base_frame=base_frame, locked_joints=_locks(lock), limits=unlimited
-    )
-    rows = TaskSpace.of(robot, [row.strip() for row in task_space.split(",") if row.strip()])
+    remarks: list[str] = []
+    tool = tool_frame or _tool(urdf, remarks)
+    robot = Robot.from_urdf(urdf, tool_frame=tool, base_frame=base_frame, locked_joints=_locks(lock), limits=unlimited)
+    robot, rows = bind(robot, _space(task_space) if task_space else _natural_space(robot, remarks))
     joints = _joints(robot)
     decompositions = _decompositions(robot, rows)
     if as_json:
@@ -34,6 +46,7 @@ def inspect_command(
                 "base_frame": robot.base_frame,
                 "task_space": list(rows.rows),
                 "degree_of_redundancy": robot.n - rows.m,
+                "remarks": remarks,
                 "joints": joints,
                 "decompositions": decompositions,
             }
@@ -41,6 +54,8 @@ def inspect_command(
         return
     console = result_console()
     console.print(f"{urdf}: {robot.base_frame} -> {robot.tool_frame}, {robot.n} joints")
+    for remark in remarks:
+        console.print(remark)
     console.print(_table("joints", joints))
     r = robot.n - rows.m
     console.print(f"task space [{', '.join(rows.rows)}]: degree of redundancy {r}")
@@ -48,6 +63,37 @@ def inspect_command(
         console.print("The robot has fewer joints than the task space has rows; prescribe fewer rows.")
         return
     console.print(_table("choices of redundant joints", decompositions))
+
+
+def _tool(urdf: Path, remarks: list[str]) -> str:
+    """Take the last link before the URDF's chains part, and say so where they do."""
+    link, leaves = last_common_link(read_file(urdf), str(urdf))
+    if len(leaves) > 1:
+        remarks.append(
+            f"tool frame: {link}, the last link before the chains to {', '.join(leaves)} part; "
+            "--tool-frame names another one"
+        )
+    return link
+
+
+def _space(text: str) -> str | list[str]:
+    """Read a word or a list of rows."""
+    rows = [row.strip() for row in text.split(",") if row.strip()]
+    return rows[0] if len(rows) == 1 and rows[0] in WORDS else rows
+
+
+def _natural_space(robot: Robot, remarks: list[str]) -> str | list[str]:
+    """Choose what the robot can prescribe at most: a pose, three rows, or those of the plane in which it moves."""
+    geometry = ik.ChainGeometry.of(robot)
+    along = np.abs(np.where(geometry.revolute[:, None], 1.0 - np.abs(geometry.axes), np.abs(geometry.axes)))
+    normals = np.flatnonzero(np.all(along < _PARALLEL, axis=0))
+    space: str | list[str] = "pose" if robot.n >= len(POSE_ROWS) else list(AXES[: robot.n])
+    if len(normals):
+        space = [row for i, row in enumerate(AXES) if i != normals[0]][: robot.n]
+    remarks.append(
+        f"task space: {space if isinstance(space, str) else ','.join(space)}; --task-space names another one"
+    )
+    return space
 
 
 def _locks(lock: list[str]) -> dict[str, float]:
@@ -101,11 +147,16 @@ def _decompositions(robot: Robot, task_space: TaskSpace) -> list[dict[str, Any]]
                 "solver": candidate.family or "-",
                 "kind": solver.kind if solver else "-",
                 "branches": len(solver.branches) if solver else 0,
-                "labels": ", ".join(solver.branches) if solver else "",
+                "labels": ", ".join(_counted(solver.branches)) if solver else "",
                 "why not": "" if solver else why,
             }
         )
     return rows
+
+
+def _counted(labels: tuple[str, ...]) -> list[str]:
+    """List labels once each, with their number where several answers share one."""
+    return [label if n == 1 else f"{label} (up to {n})" for label, n in Counter(labels).items()]
 
 
 def _table(title: str, rows: list[dict[str, Any]]) -> Table:

@@ -1,6 +1,6 @@
 """Closed-form inverse kinematics: protocol, families, and the registry that finds them by geometry."""
 
-from brachis.ik.geometry import ChainGeometry
+from brachis.ik.geometry import ChainGeometry, PosedScrews
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError, ik_family, margin_gradient
 from brachis.ik.registry import BUILTIN, Candidate, Match, check_answers, find, find_all
 
@@ -12,6 +12,7 @@ __all__ = [
     "IKSolver",
     "Match",
     "NotApplicableError",
+    "PosedScrews",
     "check_answers",
     "find",
     "find_all",

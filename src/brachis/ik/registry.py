@@ -178,8 +178,8 @@ def check_answers(
     NotApplicableError
         An answer misses its target by more than 1e-8 m or rad, or none of the answers is the posture itself.
     """
-    rng = np.random.default_rng(1)
-    q = rng.uniform(-np.pi, np.pi, (postures, robot.n))
+    low, high = _checked_ranges(robot)
+    q = np.random.default_rng(1).uniform(low, high, (postures, robot.n))
     rest = [i for i in range(robot.n) if i not in redundant]
     targets = task_space.values(*robot.tool_placements(q))
     answers = solver.solve(targets, q[:, list(redundant)])
@@ -193,6 +193,13 @@ def check_answers(
     miss = np.abs(task_space.difference(task_space.values(*robot.tool_placements(reached)), targets[sample])).max()
     if not miss < _POSE_TOLERANCE:
         raise NotApplicableError(f"its answers miss the target by {miss:.1e}")
+
+
+def _checked_ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Whole turns of angles, and what prismatic joints can reach: a boom need not know what a negative length is."""
+    lower, upper = robot.limits.position_lower, robot.limits.position_upper
+    ranged = (np.array(robot.position_units) == "m") & np.isfinite(lower) & np.isfinite(upper)
+    return np.where(ranged, lower, -np.pi), np.where(ranged, upper, np.pi)
 
 
 def _difference(first: np.ndarray, second: np.ndarray, angles: np.ndarray) -> np.ndarray:

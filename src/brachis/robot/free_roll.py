@@ -60,6 +60,7 @@ def with_free_roll(robot: Robot) -> Robot:
     old, friction = robot.limits, robot.friction
     return replace(
         robot,
+        rolls_freely=True,
         model=model,
         joint_names=(*robot.joint_names, ROLL_JOINT),
         tool_frame=frame,

@@ -45,6 +45,8 @@ class Robot:
         The URDF file that the robot was read from.
     urdf : str
         Text of that file.
+    rolls_freely : bool
+        Whether the last joint is the virtual one by which the tool rolls freely; see `bind`.
     """
 
     model: pin.Model
@@ -57,6 +59,7 @@ class Robot:
     settings: RobotSettings
     source: str
     urdf: str
+    rolls_freely: bool = False
 
     @classmethod
     def from_urdf(
@@ -132,11 +135,6 @@ class Robot:
     def n(self) -> int:
         """Number of joints."""
         return len(self.joint_names)
-
-    @property
-    def rolls_freely(self) -> bool:
-        """Whether the last joint is the virtual one by which the tool rolls freely."""
-        return self.joint_names[-1] == ROLL_JOINT
 
     @property
     def frame_id(self) -> int:

@@ -102,6 +102,31 @@ def read_chain(
     return UrdfChain(tuple(j.name for j in chain), limits, locked, tool, base, _plain_xml(urdf))
 
 
+def last_common_link(text: str | bytes, where: str) -> tuple[str, tuple[str, ...]]:
+    """Return the last link before a URDF's tree divides into chains, and the leaf links beyond it.
+
+    For an arm with a gripper that is the link to which the fingers are attached; for a single chain its end.
+
+    Raises
+    ------
+    UrdfError
+        The text is broken.
+    """
+    urdf = _parse(text, where)
+    parents = {joint.child: joint for joint in urdf.robot.joints}
+    links = [link.name for link in urdf.robot.links]
+    root = _root(links, parents, where)
+    inner = {joint.parent for joint in urdf.robot.joints}
+    leaves = tuple(name for name in links if name not in inner)
+    chains = [[joint.child for joint in _joints_between(root, leaf, parents, where)] for leaf in leaves]
+    common = root
+    for step in zip(*chains, strict=False):
+        if len(set(step)) > 1:
+            break
+        common = step[0]
+    return common, leaves
+
+
 def read_file(path: Path) -> str:
     """Text of a URDF file.
 

@@ -1,0 +1,95 @@
+"""Task spaces of poses, and tools that roll freely."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from brachis.errors import InputError
+from brachis.robot import ROLL_JOINT, Robot, TaskSpace, bind, dynamics
+from support.chains import chain_urdf
+from support.spatial import START, rail_arm, rail_arm_joints
+
+
+def test_a_pose_has_six_rows_and_twelve_coordinates():
+    robot = rail_arm()
+    space = TaskSpace.of(robot, "pose")
+    assert (space.m, space.coordinates, space.oriented) == (6, 12, True)
+    assert space.units == ("m", "m", "m", "rad", "rad", "rad")
+    placement = robot.tool_placement(np.array(START))
+    value = space.value(placement)
+    np.testing.assert_array_equal(value[:3], placement.translation)
+    np.testing.assert_array_equal(value[3:].reshape(3, 3), placement.rotation)
+    assert TaskSpace.of(robot, space.rows) == space
+
+
+def test_position_is_the_three_rows():
+    robot = rail_arm()
+    assert TaskSpace.of(robot, "position") == TaskSpace.of(robot, ["x", "y", "z"])
+
+
+def test_difference_of_poses_is_the_displacement_in_the_second_ones_frame():
+    space = TaskSpace.of(rail_arm(), "pose")
+    rng = np.random.default_rng(2)
+    pose = pin.SE3.Random()
+    for size in (1e-9, 1e-3, 2.0):
+        shift, turn = size * rng.normal(size=3), size * rng.normal(size=3) / 2.0
+        moved = pose * pin.SE3(pin.exp3(turn), shift)
+        found = space.difference(space.value(moved), space.value(pose))
+        np.testing.assert_allclose(found, np.append(shift, turn), atol=1e-14 if size < 1.0 else 1e-12)
+
+
+def test_batches_of_differences():
+    space = TaskSpace.of(rail_arm(), "pose")
+    poses = np.array([space.value(pin.SE3.Random()) for _ in range(5)])
+    found = space.difference(poses[:, None], poses[None])
+    assert found.shape == (5, 5, 6)
+    np.testing.assert_allclose(found[np.arange(5), np.arange(5)], 0.0, atol=1e-12)
+
+
+def test_words_that_do_not_exist():
+    with pytest.raises(InputError, match="pose_free_roll"):
+        TaskSpace.of(rail_arm(), "posse")
+    with pytest.raises(InputError, match="does not roll freely"):
+        TaskSpace.of(rail_arm(), "pose_free_roll")
+
+
+def test_the_virtual_joint_turns_the_tool_about_its_own_z_axis():
+    fixed = rail_arm()
+    robot, space = bind(fixed, "pose_free_roll")
+    assert robot.joint_names == (*fixed.joint_names, ROLL_JOINT)
+    assert robot.n == fixed.n + 1
+    assert space.m == 6
+    assert bind(robot, "pose_free_roll")[0] is robot
+    expected = fixed.tool_placement(np.array(START)) * pin.SE3(pin.exp3(np.array([0.0, 0.0, 0.7])), np.zeros(3))
+    assert robot.tool_placement(np.array([*START, 0.7])).isApprox(expected, 1e-14)
+
+
+def test_the_virtual_joint_has_no_inertia_and_no_limits():
+    fixed = rail_arm(friction={"viscous": 1.0, "coulomb": 2.0, "armature": 0.1})
+    robot = bind(fixed, "pose_free_roll")[0]
+    rng = np.random.default_rng(3)
+    q, qdot, qddot = rng.normal(size=(3, 5, robot.n))
+    tau = dynamics.torque(robot, q, qdot, qddot)
+    np.testing.assert_allclose(tau[:, -1], 0.0, atol=1e-12)
+    np.testing.assert_allclose(tau[:, :-1], dynamics.torque(fixed, q[:, :-1], qdot[:, :-1], qddot[:, :-1]), rtol=1e-12)
+    limits = robot.limits
+    assert np.isinf([limits.torque[-1], limits.velocity[-1], limits.acceleration[-1], limits.position_upper[-1]]).all()
+
+
+def test_a_posture_may_leave_the_virtual_joint_out():
+    robot = bind(rail_arm(), "pose_free_roll")[0]
+    np.testing.assert_array_equal(robot.posture(list(START), "start"), [*START, 0.0])
+    named = dict(zip(robot.joint_names, START, strict=False))
+    np.testing.assert_array_equal(robot.posture(named, "start"), [*START, 0.0])
+    np.testing.assert_array_equal(robot.posture([*START, 0.4], "start"), [*START, 0.4])
+    with pytest.raises(InputError):
+        robot.posture(list(START[:-1]), "start")
+
+
+def test_a_joint_of_the_virtual_ones_name_is_refused():
+    text = chain_urdf(rail_arm_joints()).replace("'j7'", f"'{ROLL_JOINT}'")
+    robot = Robot.from_urdf("named", urdf_text=text)
+    with pytest.raises(InputError, match="name of the virtual one"):
+        bind(robot, "pose_free_roll")
