@@ -194,3 +194,20 @@ def test_ctrl_c_on_the_command_line(tmp_path):
 
 def test_statuses_carry_advice():
     assert all(len(status.value) > 10 for status in SolveStatus)
+
+
+@pytest.mark.parametrize("size", [0.01, 0.001])
+def test_a_blend_of_millimetres_is_not_stepped_over(scara_urdf, size):
+    """The torque peak inside a blend lies between the points of any even grid."""
+    corner = [{"line": {"by": [-0.3, 0.3]}, "blend": size}, {"line": {"by": [-0.3, -0.2]}}]
+    task = {
+        "brachis": 1,
+        "start": {"joints": [0.3, 0.8, -0.9]},
+        "task_space": ["x", "y"],
+        "path": corner,
+        "redundant_joints": ["j1"],
+    }
+    result = brachis.plan(scara_urdf, task)
+    assert result.verified
+    breaks = brachis.transcribe(result.trajectory.robot, result.task)[0].decomposition.path.breaks
+    assert np.diff(breaks).min() < size / 0.3

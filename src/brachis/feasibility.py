@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import pinocchio as pin
 
 from brachis.errors import BrachisError, InputError, PathError, StartError, UnknownNameError
 from brachis.ik import Match
 from brachis.kinematics import Decomposition
 from brachis.path import Path
 from brachis.robot import Robot, TaskSpace, dynamics
+from brachis.robot.task_space import AXES
 
 _RANGE_SLACK = 1e-9
 _ON_PATH = 1e-6
+_UNIT = 1e-4
 _SAME_POSTURE = 1e-5
 _SEARCHED = 400
 _STATIONS = 101
@@ -37,8 +40,8 @@ def check_start(
     path : Path
         From where the start posture's tool is.
     task_space : TaskSpace
-    path_start : (m,) sequence of float, optional
-        Where the task says that the path begins.
+    path_start : sequence of float, optional
+        Where the task says that the path begins: the rows of the task space, or position and quaternion (w x y z).
 
     Raises
     ------
@@ -47,18 +50,31 @@ def check_start(
     _check_range(robot, start, "start")
     _check_holding(robot, start, "start")
     if path_start is not None:
-        if len(path_start) != task_space.m:
-            raise InputError(
-                "has the wrong number of coordinates",
-                where="path_start",
-                found=len(path_start),
-                allowed=f"{task_space.m}: {', '.join(task_space.rows)}",
-            )
-        _check_on_path(robot, task_space, start, np.array(path_start), "start")
+        _check_on_path(robot, task_space, start, _path_start(task_space, path_start), "start")
     if end is not None:
         _check_range(robot, end, "end")
         _check_holding(robot, end, "end")
         _check_on_path(robot, task_space, end, path.sample(np.array([1.0])).target[0], "end")
+
+
+def _path_start(task_space: TaskSpace, given: Sequence[float]) -> np.ndarray:
+    """Task coordinates, (c,), of what the task says; a pose is given as a position and a quaternion."""
+    rows = (*AXES, "qw", "qx", "qy", "qz") if task_space.oriented else task_space.rows
+    if len(given) != len(rows):
+        raise InputError(
+            "has the wrong number of coordinates",
+            where="path_start",
+            found=len(given),
+            allowed=f"{len(rows)}: {', '.join(rows)}",
+        )
+    values = np.array(given, dtype=float)
+    if not task_space.oriented:
+        return values
+    size = float(np.linalg.norm(values[3:]))
+    if abs(size - 1.0) > _UNIT:
+        raise InputError("has no unit quaternion", where="path_start", found=f"a norm of {size:.6g}", allowed="1")
+    w, x, y, z = values[3:] / size
+    return task_space.value(pin.SE3(pin.Quaternion(w, x, y, z).matrix(), values[:3]))
 
 
 def _check_on_path(robot: Robot, task_space: TaskSpace, posture: np.ndarray, target: np.ndarray, name: str) -> None:

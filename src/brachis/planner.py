@@ -23,6 +23,8 @@ from brachis.task import Task, load_task
 from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
 from brachis.verify import VerifyOptions, verify_trajectory
 
+_SAME_TIME = 1e-7
+
 
 def plan(
     robot: str | os.PathLike[str] | Robot | None,
@@ -133,8 +135,11 @@ def _redundant_joints(robot: Robot, task_space: TaskSpace, task: Task) -> tuple[
 def _trajectory(decomposition: Decomposition, refined: Refined, task: Task) -> Trajectory:
     """Turn the answer into a trajectory that can be evaluated without the closed form."""
     motion = refined.problem.motion(refined.x)
+    joins = motion.times_of(decomposition.path.breaks[1:-1])
+    gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
+    breaks = np.union1d(motion.breaks, joins[gaps > _SAME_TIME * motion.t_end])
     try:
-        nodes = interpolate(decomposition, motion.at, motion.breaks, jumps=motion.degree < CONTINUOUS_TORQUE)
+        nodes = interpolate(decomposition, motion.at, breaks, jumps=motion.degree < CONTINUOUS_TORQUE)
     except UnreachableError as error:
         raise PlanningError("the motion found leaves the branch between collocation points") from error
     robot = decomposition.robot

@@ -26,6 +26,7 @@ _NEAR = 0.005
 _COARSE = 20.0
 _FINE = 9
 _ZOOMS = 2
+_PIECE_POINTS = 9
 _CLOSEST = 1e-5
 
 
@@ -145,9 +146,21 @@ def _violations(dense: Transcription, x: np.ndarray, goal: float) -> tuple[float
             reach *= 2.0 / (_FINE - 1)
             kept = heights > goal - 0.1 * _NEAR
             centres, heights = centres[kept], heights[kept]
+        places = _within_pieces(dense, x)
+        worst = dense.excess_at(x, places).max(axis=1) if len(places) else places
     except UnreachableError:
         return np.inf, _unreachable(dense, x)
-    return float(max(table.max(), heights.max(initial=-np.inf))), _around(centres[heights > goal], tau[1] - tau[0])
+    largest = max(table.max(), heights.max(initial=-np.inf), worst.max(initial=-np.inf))
+    return float(largest), np.union1d(_around(centres[heights > goal], tau[1] - tau[0]), places[worst > goal])
+
+
+def _within_pieces(dense: Transcription, x: np.ndarray) -> np.ndarray:
+    """Spread times tau over every piece of a path of several: a blend of millimetres lies between grid points."""
+    breaks, motion = dense.decomposition.path.breaks, dense.motion(x)
+    if len(breaks) == 2:  # noqa: PLR2004  (a single piece, which the grid sees)
+        return np.empty(0)
+    spread = breaks[:-1, None] + np.diff(breaks)[:, None] * np.linspace(0.0, 1.0, _PIECE_POINTS)
+    return np.unique(motion.times_of(spread.ravel()) / motion.t_end)
 
 
 def _around(centres: np.ndarray, step: float) -> np.ndarray:

@@ -36,6 +36,7 @@ from brachis.nlp.constraints.branch_margin import MARGIN
 from brachis.nlp.curves import TiedSpline, Windows
 
 _SHORTEST_TIME = 1e-4
+_BISECTIONS = 45
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,17 @@ class Motion:
         windows = Windows.of(self.knots, self.degree, t / self.t_end)
         y, ydot, yddot = windows.curves(self.control_points)
         return y, ydot / self.t_end, yddot / self.t_end**2
+
+    def times_of(self, s: np.ndarray) -> np.ndarray:
+        """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
+        low, high = np.zeros(len(s)), np.full(len(s), self.t_end)
+        for _ in range(_BISECTIONS if len(s) else 0):
+            middle = 0.5 * (low + high)
+            order = np.argsort(middle, kind="stable")
+            before = np.empty(len(s), dtype=bool)
+            before[order] = self.at(middle[order])[0][:, 0] < s[order]
+            low, high = np.where(before, middle, low), np.where(before, high, middle)
+        return 0.5 * (low + high)
 
 
 class Transcription:
