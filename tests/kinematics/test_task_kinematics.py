@@ -48,7 +48,7 @@ def test_bias_is_the_acceleration_at_constant_joint_velocity(pattern, plane, row
     values = [kinematics.position(q + t * qdot) for t in (-h, 0.0, h)]
     expected = (values[0] - 2.0 * values[1] + values[2]) / h**2
     assert np.abs(expected).max() > 0.1
-    np.testing.assert_allclose(kinematics.bias(q, qdot), expected, atol=1e-5)
+    np.testing.assert_allclose(kinematics.bias(kinematics.twists(q), qdot), expected, atol=1e-5)
 
 
 @pytest.mark.parametrize(("pattern", "plane", "rows"), CASES, ids=str)
@@ -59,9 +59,11 @@ def test_derivatives(pattern, plane, rows):
         return np.einsum("kmn,kn->km", kinematics.jacobian(posture), qdot)
 
     def acceleration(posture, speed):
-        return np.einsum("kmn,kn->km", kinematics.jacobian(posture), qddot) + kinematics.bias(posture, speed)
+        return np.einsum("kmn,kn->km", kinematics.jacobian(posture), qddot) + kinematics.bias(
+            kinematics.twists(posture), speed
+        )
 
-    exact = kinematics.derivatives(q, qdot, qddot)
+    exact = kinematics.derivatives(kinematics.twists(q), qdot, qddot)
     np.testing.assert_allclose(exact.velocity_q, by_joint(velocity, q), atol=1e-8)
     np.testing.assert_allclose(exact.acceleration_q, by_joint(lambda p: acceleration(p, qdot), q), atol=1e-7)
     np.testing.assert_allclose(exact.acceleration_qdot, by_joint(lambda v: acceleration(q, v), qdot), atol=1e-8)
@@ -74,8 +76,8 @@ def test_one_joint_alone():
     kinematics = TaskKinematics(robot, TaskSpace.of(robot, ["x"]))
     q = np.array([[0.3], [0.4]])
     np.testing.assert_allclose(kinematics.jacobian(q), np.full((2, 1, 1), 0.6))
-    np.testing.assert_allclose(kinematics.bias(q, q), np.zeros((2, 1)), atol=1e-15)
-    for part in vars(kinematics.derivatives(q, q, q)).values():
+    np.testing.assert_allclose(kinematics.bias(kinematics.twists(q), q), np.zeros((2, 1)), atol=1e-15)
+    for part in vars(kinematics.derivatives(kinematics.twists(q), q, q)).values():
         np.testing.assert_allclose(part, np.zeros((2, 1, 1)), atol=1e-15)
 
 
@@ -110,7 +112,7 @@ def test_acceleration_of_a_pose_is_the_derivative_of_the_body_twist(space):
     def velocity(t):
         return np.einsum("kmn,kn->km", kinematics.jacobian(q + t * qdot + 0.5 * t**2 * qddot), qdot + t * qddot)
 
-    exact = np.einsum("kmn,kn->km", kinematics.jacobian(q), qddot) + kinematics.bias(q, qdot)
+    exact = np.einsum("kmn,kn->km", kinematics.jacobian(q), qddot) + kinematics.bias(kinematics.twists(q), qdot)
     np.testing.assert_allclose(exact, (velocity(h) - velocity(-h)) / (2.0 * h), atol=1e-7)
 
 
@@ -122,9 +124,11 @@ def test_derivatives_of_a_pose(space):
         return np.einsum("kmn,kn->km", kinematics.jacobian(posture), qdot)
 
     def acceleration(posture, speed):
-        return np.einsum("kmn,kn->km", kinematics.jacobian(posture), qddot) + kinematics.bias(posture, speed)
+        return np.einsum("kmn,kn->km", kinematics.jacobian(posture), qddot) + kinematics.bias(
+            kinematics.twists(posture), speed
+        )
 
-    exact = kinematics.derivatives(q, qdot, qddot)
+    exact = kinematics.derivatives(kinematics.twists(q), qdot, qddot)
     np.testing.assert_allclose(exact.velocity_q, by_joint(velocity, q), atol=1e-8)
     np.testing.assert_allclose(exact.acceleration_q, by_joint(lambda p: acceleration(p, qdot), q), atol=1e-7)
     np.testing.assert_allclose(exact.acceleration_qdot, by_joint(lambda v: acceleration(q, v), qdot), atol=1e-7)

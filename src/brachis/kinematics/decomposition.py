@@ -44,6 +44,8 @@ class JointState:
         Path coordinate and redundant joints, and their time derivatives.
     q, qdot, qddot : (K, n) ndarray
     path : PathSample
+    twists : (6, K, n) ndarray
+        Columns of the tool frame's Jacobian; see `TaskKinematics.twists`.
     gradient : (K, n, 1 + r) ndarray
         G = dq/dy.
     inverse : (K, m, m) ndarray
@@ -57,6 +59,7 @@ class JointState:
     qdot: np.ndarray
     qddot: np.ndarray
     path: PathSample
+    twists: np.ndarray
     gradient: np.ndarray
     inverse: np.ndarray
 
@@ -209,7 +212,8 @@ class Decomposition:
         q = self.postures(y, sample, near=near)
         if not np.all(np.isfinite(q)):
             raise UnreachableError("the target is out of the branch's reach")
-        jacobian = self.kinematics.jacobian(q)
+        twists = self.kinematics.twists(q)
+        jacobian = self.kinematics.rows(twists)
         try:
             inverse = np.linalg.inv(jacobian[:, :, self.rest])
         except np.linalg.LinAlgError as error:
@@ -217,14 +221,14 @@ class Decomposition:
         gradient = self._gradient(sample, jacobian, inverse)
         qdot = np.einsum("kij,kj->ki", gradient, ydot)
         # What the redundant joints and the path leave to the non-redundant ones.
-        wanted = sample.xi_ds * ydot[:, :1] ** 2 - self.kinematics.bias(q, qdot)
+        wanted = sample.xi_ds * ydot[:, :1] ** 2 - self.kinematics.bias(twists, qdot)
         qddot = np.einsum("kij,kj->ki", gradient, yddot)
         qddot[:, self.rest] += np.einsum("kij,kj->ki", inverse, wanted)
         if near is not None:
             q[:, self._turns] += _TURN * np.round((near - q)[:, self._turns] / _TURN)
         elif t is not None and self._ranged.any():  # otherwise no limit asks which turn an angle is in
             self._follow(q, qdot, qddot, t)
-        return JointState(y, ydot, yddot, q, qdot, qddot, sample, gradient, inverse)
+        return JointState(y, ydot, yddot, q, qdot, qddot, sample, twists, gradient, inverse)
 
     def _follow(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, t: np.ndarray) -> None:
         """Lift angles in place so that they follow their velocities; the quintic's rule predicts each step."""
@@ -249,7 +253,7 @@ class Decomposition:
 
     def derivatives(self, state: JointState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""
-        task = self.kinematics.derivatives(state.q, state.qdot, state.qddot)
+        task = self.kinematics.derivatives(state.twists, state.qdot, state.qddot)
         sdot, sddot = state.ydot[:, :1], state.yddot[:, :1]
         sample, zeros = state.path, np.zeros_like(state.gradient)
         qdot_y, qddot_y, qddot_ydot = zeros, zeros.copy(), zeros.copy()

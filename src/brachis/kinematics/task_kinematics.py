@@ -1,9 +1,21 @@
-"""Task velocity and acceleration of a batch of states and their derivatives, through Pinocchio.
+"""Task velocity and acceleration of a batch of states and their derivatives.
 
-For a task space of rows these are the tool frame origin's velocity and classical acceleration in world axes
-(LOCAL_WORLD_ALIGNED), and for yaw the angular velocity and acceleration about the plane's normal. For poses they are
-the tool frame's spatial velocity and acceleration in its own axes (LOCAL), where the acceleration is the plain time
-derivative of the velocity, the body twist.
+Pinocchio gives the tool frame's Jacobian; all else follows from its columns J_i, twists (v, w) at the tool frame's
+origin. Joints after joint i carry its axis relative to the tool, so that in the tool frame's own axes
+
+    dJ_i/dq_k = [J_i, J_k] for i < k, else 0,        [X, Y] = (w_X x v_Y + v_X x w_Y, w_X x w_Y).
+
+With V = J qdot, S_k the part of it that comes from the joints before joint k, a = J qddot + Jdot qdot and s_k its part:
+
+    Jdot qdot = sum_k [S_k, J_k] qdot_k,             s_k = sum_{i<k} (J_i qddot_i + [S_i, J_i] qdot_i)
+    dV/dq_k    = [S_k, J_k]
+    da/dqdot_k = 2 [S_k, J_k] + [J_k, V]
+    da/dq_k    = [s_k, J_k] + [[S_k, J_k], V - S_k]
+
+(R. M. Murray, Z. Li, S. S. Sastry, A Mathematical Introduction to Robotic Manipulation, 1994, chapter 3). For poses
+these are the rows. Rows of a task space of positions, and yaw, are in world axes: the tool frame turns with w_k for
+each joint k, and the classical acceleration of its origin is a_v + w x v. The formulas above hold in any axes that
+stand still while the derivative is taken, so all is computed in the world's directions at once.
 """
 
 from __future__ import annotations
@@ -14,9 +26,6 @@ import numpy as np
 import pinocchio as pin
 
 from brachis.robot import Robot, TaskSpace
-
-_LOCAL = pin.ReferenceFrame.LOCAL
-_WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 @dataclass(frozen=True)
@@ -50,71 +59,83 @@ class TaskKinematics:
         self.task_space = task_space
         self._data = robot.model.createData()
         self._frame = robot.frame_id
-        frame = robot.model.frames[self._frame]
-        self._joint, self._placement = frame.parentJoint, frame.placement
         self._oriented = task_space.oriented
         self._axes = list(task_space.axes)
         self._yaw = None if task_space.yaw_axis is None else (task_space.yaw_world_axis, task_space.yaw_sign)
 
     def position(self, q: np.ndarray) -> np.ndarray:
-        """Task coordinates (K, m) of K postures (K, n)."""
+        """Task coordinates (K, c) of K postures (K, n)."""
         return self.task_space.values(*self.robot.tool_placements(q))
+
+    def twists(self, q: np.ndarray) -> np.ndarray:
+        """Columns (6, K, n) of the tool frame's Jacobian: linear, then angular velocity.
+
+        In the tool frame's axes for poses, in the world's for rows.
+        """
+        model, data, frame = self.robot.model, self._data, self._frame
+        axes = pin.ReferenceFrame.LOCAL if self._oriented else pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        columns = np.empty((len(q), 6, self.robot.n))
+        for k in range(len(q)):
+            columns[k].flat = pin.computeFrameJacobian(model, data, q[k], frame, axes)  # (6,) for one joint
+        return np.moveaxis(columns, 1, 0)
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:
         """Task Jacobian J (K, m, n) of K postures (K, n)."""
-        model, data, frame = self.robot.model, self._data, self._frame
-        axes = _LOCAL if self._oriented else _WORLD_ALIGNED
-        full = np.empty((len(q), 6, self.robot.n))
-        for k in range(len(q)):
-            full[k].flat = pin.computeFrameJacobian(model, data, q[k], frame, axes)  # (6,) for one joint
-        return self._rows(full[:, :3], full[:, 3:])
+        return self.rows(self.twists(q))
 
-    def bias(self, q: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-        """Velocity-dependent task acceleration Jdot qdot (K, m)."""
-        model, data, frame, zero = self.robot.model, self._data, self._frame, np.zeros(self.robot.n)
-        acceleration = pin.getFrameAcceleration if self._oriented else pin.getFrameClassicalAcceleration
-        axes = _LOCAL if self._oriented else _WORLD_ALIGNED
-        full = np.empty((len(q), 6, 1))
-        for k in range(len(q)):
-            pin.forwardKinematics(model, data, q[k], qdot[k], zero)
-            full[k, :, 0] = acceleration(model, data, frame, axes).vector
-        return self._rows(full[:, :3], full[:, 3:])[:, :, 0]
-
-    def derivatives(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:
-        """V_q, A_q and A_v of K states (K, n)."""
+    def rows(self, twists: np.ndarray) -> np.ndarray:
+        """Select the task space's rows, (K, m, n), from twists (6, K, n)."""
         if self._oriented:
-            return self._pose_derivatives(q, qdot, qddot)
-        model, data = self.robot.model, self._data
-        linear = np.empty((3, len(q), 3, self.robot.n))
-        angular = np.zeros((3, len(q), 3, self.robot.n))
-        shape = linear.shape[2:]
-        for k in range(len(q)):
-            pin.computeForwardKinematicsDerivatives(model, data, q[k], qdot[k], qddot[k])
-            parts = pin.getPointClassicAccelerationDerivatives(
-                model, data, self._joint, self._placement, _WORLD_ALIGNED
-            )
-            linear[0, k], linear[1, k], linear[2, k] = (part.reshape(shape) for part in parts[:3])
-            if self._yaw is not None:
-                spatial = pin.getFrameAccelerationDerivatives(model, data, self._frame, _WORLD_ALIGNED)
-                angular[0, k], angular[1, k], angular[2, k] = (part[3:].reshape(shape) for part in spatial[:3])
-        return TaskDerivatives(*(self._rows(linear[i], angular[i]) for i in range(3)))
+            return np.moveaxis(twists, 0, 1)
+        chosen = twists[self._axes]
+        if self._yaw is not None:
+            axis, sign = self._yaw
+            chosen = np.concatenate([chosen, sign * twists[3 + axis][None]])
+        return np.moveaxis(chosen, 0, 1)
 
-    def _pose_derivatives(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:
-        """V_q, A_q and A_v of the tool frame's body twist."""
-        model, data, frame = self.robot.model, self._data, self._frame
-        full = np.empty((3, len(q), 6, self.robot.n))
-        for k in range(len(q)):
-            pin.computeForwardKinematicsDerivatives(model, data, q[k], qdot[k], qddot[k])
-            parts = pin.getFrameAccelerationDerivatives(model, data, frame, _LOCAL)
-            full[0, k], full[1, k], full[2, k] = parts[:3]
-        return TaskDerivatives(*full)
+    def bias(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
+        """Velocity-dependent task acceleration Jdot qdot, (K, m), from the `twists` at K postures."""
+        before, _ = _sums(twists * qdot)
+        acceleration = (_bracket(before, twists) * qdot).sum(axis=2, keepdims=True)
+        if not self._oriented:
+            velocity = (twists * qdot).sum(axis=2, keepdims=True)
+            acceleration[:3] += _cross(velocity[3:], velocity[:3])
+        return self.rows(acceleration)[:, :, 0]
 
-    def _rows(self, linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
-        """Select the task space's rows from (K, 3, n) linear and angular parts."""
-        if self._oriented:
-            return np.concatenate([linear, angular], axis=1)
-        rows = linear[:, self._axes]
-        if self._yaw is None:
-            return rows
-        axis, sign = self._yaw
-        return np.concatenate([rows, sign * angular[:, [axis]]], axis=1)
+    def derivatives(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:
+        """V_q, A_q and A_v of K states from the `twists` at their postures; see the module's formulas."""
+        before, velocity = _sums(twists * qdot)
+        velocity_q = _bracket(before, twists)
+        parts, acceleration = _sums(twists * qddot + velocity_q * qdot)
+        acceleration_q = _bracket(parts, twists) + _bracket(velocity_q, velocity - before)
+        acceleration_qdot = 2.0 * velocity_q + _bracket(twists, velocity)
+        if not self._oriented:
+            turning, v, w = twists[3:], velocity[:3], velocity[3:]
+            acceleration_qdot[:3] += _cross(turning, v) + _cross(w, twists[:3])
+            acceleration_q[:3] += _cross(velocity_q[3:], v) + _cross(w, velocity_q[:3])
+            classical = np.concatenate([acceleration[:3] + _cross(w, v), acceleration[3:]])
+            velocity_q = velocity_q + _turned(turning, velocity)
+            acceleration_q += _turned(turning, classical)
+        return TaskDerivatives(self.rows(velocity_q), self.rows(acceleration_q), self.rows(acceleration_qdot))
+
+
+def _sums(parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Add parts (6, K, n) over the joints before each one, (6, K, n), and over all, (6, K, 1)."""
+    upto = np.cumsum(parts, axis=2)
+    return upto - parts, upto[:, :, -1:]
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Vector product with components along the first axis."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def _bracket(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Lie bracket of twists (6, K, n or 1)."""
+    v, w = first[:3], first[3:]
+    return np.concatenate([_cross(w, second[:3]) + _cross(v, second[3:]), _cross(w, second[3:])])
+
+
+def _turned(turning: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Rates (6, K, n) at which linear and angular parts (6, K, 1) change as their axes turn."""
+    return np.concatenate([_cross(turning, vectors[:3]), _cross(turning, vectors[3:])])
