@@ -17,6 +17,7 @@ ORDER = (
     "files",
     "task",
     "robot",
+    "compose",
     "path",
     "ik",
     "kinematics",

@@ -9,6 +9,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from brachis import compose as compose
     from brachis.errors import BrachisError as BrachisError
     from brachis.errors import InputError as InputError
     from brachis.errors import PlanningError as PlanningError
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
+_STAGES = ("compose",)
 _HOME = {
     "BrachisError": "brachis.errors",
     "InputError": "brachis.errors",
@@ -55,6 +57,7 @@ __all__ = [
     "Trajectory",
     "Verification",
     "__version__",
+    "compose",
     "load_task",
     "plan",
     "transcribe",
@@ -64,6 +67,8 @@ __all__ = [
 
 def __getattr__(name: str) -> object:
     """Import a public name when it is first used."""
+    if name in _STAGES:
+        return importlib.import_module(f"brachis.{name}")
     if name not in _HOME:
         message = f"module 'brachis' has no attribute {name!r}"
         raise AttributeError(message)

@@ -10,6 +10,7 @@ import pytest
 
 from brachis.errors import InputError, LimitError, UnknownNameError, UrdfError
 from brachis.robot import LimitSpec, Robot
+from brachis.robot.urdf import last_common_link
 from support.chains import INERTIAL, Joint, chain_urdf, planar_robot, planar_urdf
 
 TURN = Joint("revolute", xyz=(0.4, 0.0, 0.0))
@@ -76,6 +77,22 @@ def test_branching_urdf_needs_a_tool_frame():
     with pytest.raises(UrdfError, match="2 links without children: finger1, finger2") as caught:
         load([TURN, TURN], more=GRIPPER)
     assert "robot.tool_frame" in str(caught.value)
+
+
+def test_a_loop_of_links_beside_the_tree_is_refused():
+    loop = "<link name='a'/><link name='b'/>" + "".join(
+        f"<joint name='{parent}{child}' type='fixed'><parent link='{parent}'/><child link='{child}'/></joint>"
+        for parent, child in ("ab", "ba")
+    )
+    with pytest.raises(UrdfError, match="a loop of links: a, b"):
+        load([TURN], more=loop)
+
+
+def test_the_last_link_before_the_chains_part():
+    text = chain_urdf([TURN, TURN])
+    assert last_common_link(text, "file.urdf") == ("tool", ("tool",))
+    branching = text.replace("</robot>", GRIPPER + "</robot>")
+    assert last_common_link(branching, "file.urdf") == ("palm", ("finger1", "finger2"))
 
 
 def test_mimic_on_the_chain_is_refused_by_name():

@@ -1,4 +1,4 @@
-"""The command line: ``brachis plan | verify | export | plot | inspect | schema``.
+"""The command line: ``brachis plan | verify | export | plot | inspect | compose | schema``.
 
 Exit codes: 0 planned and verified, 1 no verified plan, 2 wrong input. Results go to standard output, everything else to
 standard error. With ``--json`` standard output gets one JSON object, also for an error.
@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 from typer.core import TyperGroup
 
+from brachis.cli.composition import VectorCommand, compose_command
 from brachis.cli.output import print_failure
 from brachis.errors import BrachisError
 
@@ -110,7 +111,13 @@ def plot(
 @app.command()
 def inspect(
     urdf: Annotated[Path, typer.Argument(help="URDF file.", metavar="URDF")],
-    task_space: Annotated[str, typer.Option(help="Rows that the path prescribes, for example x,y or x,z,yaw.")] = "x,y",
+    task_space: Annotated[
+        str | None,
+        typer.Option(
+            help="What the path prescribes: rows such as x,y or x,z,yaw, or position, pose or pose_free_roll. "
+            "Default: all that the robot can."
+        ),
+    ] = None,
     tool_frame: Annotated[str | None, typer.Option(help="Link at the chain's end.")] = None,
     base_frame: Annotated[str | None, typer.Option(help="Link at the chain's beginning.")] = None,
     lock: Annotated[list[str] | None, typer.Option(help="Joint held at a position: name=value, repeatable.")] = None,
@@ -121,6 +128,47 @@ def inspect(
 
     inspection.inspect_command(
         urdf, task_space=task_space, tool_frame=tool_frame, base_frame=base_frame, lock=lock or [], as_json=json
+    )
+
+
+@app.command(cls=VectorCommand)
+def compose(
+    arm: Annotated[Path, typer.Argument(help="URDF file of the arm.", metavar="ARM")],
+    travel: Annotated[tuple[float, float], typer.Option("--range", help="Lowest and highest position on the rail, m.")],
+    velocity: Annotated[float, typer.Option(help="Limit of the rail's speed, m/s.")],
+    force: Annotated[float, typer.Option(help="Limit of the rail's drive force, N.")],
+    mass: Annotated[float, typer.Option(help="Mass of the carriage, kg.")],
+    out: Annotated[Path, typer.Option(help="URDF file to write.")],
+    axis: Annotated[
+        tuple[float, float, float], typer.Option(help="Direction of the rail in the world frame: 0 1 0 or 0,1,0.")
+    ] = (0.0, 1.0, 0.0),
+    mount_xyz: Annotated[
+        tuple[float, float, float], typer.Option(help="Where the arm's root link lies on the carriage, m.")
+    ] = (0.0, 0.0, 0.0),
+    mount_rpy_deg: Annotated[
+        tuple[float, float, float],
+        typer.Option(help="Its roll, pitch and yaw, degrees; 180 0 0 hangs the arm upside down."),
+    ] = (0.0, 0.0, 0.0),
+    name: Annotated[str, typer.Option(help="Name of the rail's joint.")] = "rail",
+    root: Annotated[str, typer.Option(help="Name of the root link, the world frame.")] = "world",
+    meshes: Annotated[bool, typer.Option(help="Keep the arm's meshes, or drop them.")] = True,
+    json: Json = False,
+) -> None:
+    """Mount an arm on a linear axis and write the URDF of both. No figure of the axis is guessed."""
+    compose_command(
+        arm,
+        axis=axis,
+        travel=travel,
+        velocity=velocity,
+        force=force,
+        mass=mass,
+        mount_xyz=mount_xyz,
+        mount_rpy_deg=mount_rpy_deg,
+        name=name,
+        root=root,
+        meshes=meshes,
+        out=out,
+        as_json=json,
     )
 
 

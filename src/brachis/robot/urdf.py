@@ -198,6 +198,12 @@ def _root(links: Sequence[str], parents: Mapping[str, Any], where: str) -> str:
         raise UrdfError(
             "the links do not form one tree", where=where, found=f"root links: {', '.join(roots) or 'none'}"
         )
+    reached = {roots[0]}
+    while more := {name for name, joint in parents.items() if joint.parent in reached} - reached:
+        reached |= more
+    if len(reached) < len(links):
+        looped = ", ".join(name for name in links if name not in reached)
+        raise UrdfError("the links do not form one tree", where=where, found=f"a loop of links: {looped}")
     return roots[0]
 
 

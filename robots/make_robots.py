@@ -1,0 +1,173 @@
+"""Write the URDFs of tx90l_rail, ur10_rail and iiwa14 from their figures with ``python robots/make_robots.py``.
+
+ur10_rail needs the arm of example-robot-data (``pip install ".[robots]"``) and is left as it is without.
+"""
+# ruff: noqa: INP001 (a script)
+
+from __future__ import annotations
+
+import math
+import sys
+import sysconfig
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+from lxml import etree
+
+from brachis.compose import elements, on_rail
+from brachis.compose.elements import Element
+
+ROBOTS = Path(__file__).parent
+COLOURS = {
+    "grey": elements.GREY,
+    "yellow": (0.93, 0.78, 0.25, 1.0),
+    "blue": (0.16, 0.42, 0.68, 1.0),
+    "orange": (0.90, 0.55, 0.15, 1.0),
+}
+SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
+COMMENT = " Made by robots/make_robots.py; every figure's origin is in README.md beside this file. "
+
+
+def main() -> None:
+    """Write every URDF that can be made here."""
+    for path, make in MAKERS.items():
+        if make is ur10_rail and example_robot_data() is None:
+            sys.stdout.write(f"{path}: left as it is, example-robot-data is not installed\n")
+            continue
+        (ROBOTS / path).write_text(make(), encoding="utf-8")
+        sys.stdout.write(f"{path}: written\n")
+
+
+def tx90l_rail() -> str:
+    """Staubli TX90L whose base is the carriage of a rail."""
+    figures = read_figures("tx90l_rail")
+    return robot(figures, figures["robot"], [figures["rail"], *figures["joints"]])
+
+
+def tx90l() -> str:
+    """Build the same arm without the rail."""
+    figures = read_figures("tx90l_rail")
+    del figures["links"]["world"]
+    return robot(figures, "tx90l", figures["joints"])
+
+
+def iiwa14() -> str:
+    """KUKA LBR iiwa 14 R820."""
+    figures = read_figures("iiwa14")
+    return robot(figures, figures["robot"], figures["joints"])
+
+
+def ur10_rail() -> str:
+    """Universal Robots UR10 of example-robot-data on a rail, without meshes and simulator settings."""
+    figures, folder = read_figures("ur10_rail"), example_robot_data()
+    if folder is None:
+        message = "example-robot-data is not installed"
+        raise FileNotFoundError(message)
+    rail = figures["rail"]
+    text = on_rail(
+        folder / figures["arm"],
+        axis=rail["axis"],
+        range=rail["range_m"],
+        velocity=rail["max_speed_m_s"],
+        force=rail["max_force_n"],
+        mass=rail["carriage_mass"],
+        meshes=False,
+    )
+    element = etree.fromstring(text, etree.XMLParser(remove_blank_text=True, remove_comments=True))
+    element.set("name", figures["robot"])
+    for tag in ("gazebo", "transmission"):
+        for each in element.findall(tag):
+            element.remove(each)
+    for name in figures["drop"]:
+        joint = next(each for each in element.findall("joint") if each.find("child").get("link") == name)
+        element.remove(joint)
+        element.remove(element.find(f"link[@name='{name}']"))
+    for name, visuals in figures["visuals"].items():
+        element.find(f"link[@name='{name}']").extend(visual_of(each) for each in visuals)
+    return commented(element)
+
+
+MAKERS: dict[str, Callable[[], str]] = {
+    "tx90l_rail/robot.urdf": tx90l_rail,
+    "tx90l_rail/arm.urdf": tx90l,
+    "iiwa14/robot.urdf": iiwa14,
+    "ur10_rail/robot.urdf": ur10_rail,
+}
+
+
+def example_robot_data() -> Path | None:
+    """Folder of the robots of example-robot-data, or None where it is not installed."""
+    places = (Path(sysconfig.get_path("purelib")) / "cmeel.prefix", Path(sys.prefix))
+    folders = (place / "share/example-robot-data/robots" for place in places)
+    return next((folder for folder in folders if folder.is_dir()), None)
+
+
+def read_figures(name: str) -> dict[str, Any]:
+    """Figures of one robot."""
+    content: dict[str, Any] = yaml.safe_load((ROBOTS / name / "figures.yaml").read_text(encoding="utf-8"))
+    return content
+
+
+def robot(figures: Mapping[str, Any], name: str, joints: Sequence[Mapping[str, Any]]) -> str:
+    """Text of the URDF with the links and visuals of `figures` and the given joints."""
+    element = etree.Element("robot", name=name)
+    for link, inertial in figures["links"].items():
+        parts = [visual_of(each) for each in figures["visuals"].get(link, [])]
+        if inertial:
+            parts.insert(0, elements.inertial(inertial["mass"], inertial["com"], inertial["inertia"]))
+        element.append(elements.link(link, *parts))
+    element.extend(joint_of(each) for each in joints)
+    return commented(element)
+
+
+def commented(element: Element) -> str:
+    """Text of the URDF below a comment that says where it comes from."""
+    element.addprevious(etree.Comment(COMMENT))
+    return elements.robot_text(element)
+
+
+def joint_of(figures: Mapping[str, Any]) -> Element:
+    """Joint from its figures; degrees become radians in full precision."""
+    kind = figures["type"]
+    limit = None
+    if kind == "revolute":
+        low, high = (math.radians(angle) for angle in figures["range_deg"])
+        speed = math.radians(figures["max_speed_deg_s"])
+        limit = {"lower": low, "upper": high, "velocity": speed, "effort": figures["torque_nm"]}
+    elif kind == "prismatic":
+        low, high = figures["range_m"]
+        limit = {"lower": low, "upper": high, "velocity": figures["max_speed_m_s"], "effort": figures["max_force_n"]}
+    return elements.joint(
+        figures["name"],
+        kind,
+        figures["parent"],
+        figures["child"],
+        xyz=figures.get("origin", elements.ZERO),
+        rpy=radians(figures.get("rpy_deg", elements.ZERO)),
+        axis=figures.get("axis"),
+        limit=limit,
+    )
+
+
+def visual_of(figures: Mapping[str, Any]) -> Element:
+    """Primitive from its figures: ``box``, ``cylinder`` (radius, length) or ``sphere`` (radius)."""
+    shape = next(kind for kind in SIZES if kind in figures)
+    size = {"size": figures[shape]} if shape == "box" else dict(zip(SIZES[shape], figures[shape], strict=True))
+    return elements.visual(
+        shape,
+        size,
+        (figures["colour"], COLOURS[figures["colour"]]),
+        xyz=figures.get("xyz", elements.ZERO),
+        rpy=radians(figures.get("rpy_deg", elements.ZERO)),
+    )
+
+
+def radians(angles: Sequence[float]) -> list[float]:
+    """Turn degrees into radians."""
+    return [math.radians(angle) for angle in angles]
+
+
+if __name__ == "__main__":
+    main()

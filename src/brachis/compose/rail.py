@@ -1,0 +1,201 @@
+"""An arm on a linear axis."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from brachis.compose import checks, elements
+from brachis.compose.arm import Arm, check_composed, drop_meshes, read_arm, relocate_meshes, rename_link
+from brachis.compose.elements import Element
+from brachis.errors import InputError
+from brachis.files import atomic_write
+
+CARRIAGE_SIZE = (0.4, 0.4, 0.1)
+"""Sides of the carriage, m. It only shifts, so its mass matters to the motion and its inertia does not."""
+
+
+def on_rail(
+    arm_urdf: str | os.PathLike[str],
+    *,
+    axis: Sequence[float] = (0.0, 1.0, 0.0),
+    range: Sequence[float],  # noqa: A002 (the word of every data sheet)
+    velocity: float,
+    force: float,
+    mass: float,
+    mount_xyz: Sequence[float] = elements.ZERO,
+    mount_rpy: Sequence[float] = elements.ZERO,
+    carriage_size: Sequence[float] = CARRIAGE_SIZE,
+    name: str = "rail",
+    root: str = "world",
+    meshes: bool = True,
+    output: str | os.PathLike[str] | None = None,
+) -> str:
+    """Mount an arm on a linear axis and return the URDF of both.
+
+    The chain is: link `root` (the world frame), prismatic joint `name`, link ``<name>_carriage``, fixed joint
+    ``<name>_mount``, and the arm's own root link, below which nothing of the arm changes. An arm's root link that is
+    itself called `root` becomes ``<name>_base``. At rail position p, m, the arm's root link lies at
+    ``p * axis + mount_xyz``, turned by `mount_rpy`.
+
+    Figures of the axis are never guessed: `range`, `velocity`, `force` and `mass` have to be given.
+
+    Parameters
+    ----------
+    arm_urdf : path
+        URDF of the arm, without xacro macros.
+    axis : (3,) sequence of float, optional
+        Direction of the rail in the world frame, any length but zero; horizontal, vertical or tilted.
+    range : (2,) sequence of float
+        Lowest and highest position on the rail, m.
+    velocity : float
+        Limit of the rail's speed, m/s.
+    force : float
+        Limit of the rail's drive force, N. It accelerates carriage and arm, and carries them on a rail that is not
+        horizontal.
+    mass : float
+        Mass of the carriage, kg: a solid box.
+    mount_xyz, mount_rpy : (3,) sequence of float, optional
+        Placement of the arm's root link on the carriage, m and rad (roll, pitch and yaw about the fixed axes x, y, z
+        of the world frame). ``(pi, 0, 0)`` hangs the arm upside down, ``(0, pi / 2, 0)`` mounts it on a wall.
+    carriage_size : (3,) sequence of float, optional
+        Sides of the carriage, m, along the axes of the mounted arm's root link, whose origin is the middle of the
+        box's top. For the drawing; the carriage only shifts, so that its inertia never enters the motion.
+    name : str, optional
+        Name of the joint, and the beginning of the other new names.
+    root : str, optional
+        Name of the root link.
+    meshes : bool, optional
+        False drops all visuals and collisions of the arm that are meshes.
+    output : path, optional
+        File to write. Relative mesh files are then kept valid relative to its folder; without `output` they become
+        absolute. ``package://`` and other schemes stay as they are.
+
+    Returns
+    -------
+    str
+        The URDF.
+
+    Raises
+    ------
+    InputError
+        A figure cannot be, a name is taken, or `output` cannot be written or is the arm's own file.
+    UrdfError
+        The arm's URDF is missing, broken, not one tree, or has bodies that cannot be.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> text = brachis.compose.on_rail(
+    ...     "robots/iiwa14/robot.urdf", axis=(0, 1, 0), range=(-2, 2), velocity=2, force=1500, mass=80
+    ... )
+    >>> brachis.Robot.from_urdf("iiwa14 on a rail", urdf_text=text).joint_names[:2]
+    ('rail', 'joint_1')
+    """
+    low, high = checks.interval(range, "range", "m")
+    rail = Rail(
+        name=checks.identifier(name, "name"),
+        root=checks.identifier(root, "root"),
+        axis=checks.direction(axis, "axis"),
+        low=low,
+        high=high,
+        velocity=checks.positive(velocity, "velocity", "m/s"),
+        force=checks.positive(force, "force", "N"),
+        mass=checks.positive(mass, "mass", "kg"),
+        mount_xyz=checks.vector(mount_xyz, "mount_xyz", "[x, y, z] in m"),
+        mount_rpy=checks.vector(mount_rpy, "mount_rpy", "[roll, pitch, yaw] in rad"),
+        carriage_size=checks.vector(carriage_size, "carriage_size", "three lengths > 0 m", above=0.0),
+    )
+    source, target = Path(arm_urdf), None if output is None else Path(output)
+    arm = read_arm(source)
+    if target is not None and target.exists() and target.samefile(source):
+        raise InputError("is the arm's own file", where=f"output {target}", allowed="another file")
+    text = rail.mount(arm, target, meshes=meshes)
+    check_composed(text, rail.name, str(source))
+    if target is not None:
+        with atomic_write(target) as stream:
+            stream.write(text.encode())
+    return text
+
+
+@dataclass(frozen=True)
+class Rail:
+    """A linear axis with its carriage; see `on_rail` for the figures."""
+
+    name: str
+    root: str
+    axis: tuple[float, ...]
+    low: float
+    high: float
+    velocity: float
+    force: float
+    mass: float
+    mount_xyz: tuple[float, ...]
+    mount_rpy: tuple[float, ...]
+    carriage_size: tuple[float, ...]
+
+    def mount(self, arm: Arm, target: Path | None, *, meshes: bool) -> str:
+        """Put the arm, whose XML is changed, on the carriage, and return the URDF's text."""
+        arm_root = f"{self.name}_base" if arm.root_link == self.root else arm.root_link
+        self._check_names(arm, arm_root)
+        rename_link(arm.robot, arm.root_link, arm_root)
+        if not meshes:
+            drop_meshes(arm.robot)
+        relocate_meshes(arm.robot, arm.source, target)
+        arm.robot.set("name", f"{arm.robot.get('name') or arm.source.stem}_{self.name}")
+        for place, element in enumerate(self._elements(arm_root)):
+            arm.robot.insert(place, element)
+        return elements.robot_text(arm.robot)
+
+    def _check_names(self, arm: Arm, arm_root: str) -> None:
+        """Refuse new names that the arm has already, be it for links or joints: frames are looked up by name."""
+        taken = dict.fromkeys(arm.joint_names, "joint") | dict.fromkeys(arm.link_names, "link")
+        taken.pop(arm.root_link)
+        new = {self.root: "root", arm_root: "name" if arm_root != arm.root_link else "root"}
+        new |= dict.fromkeys((self.name, f"{self.name}_carriage", f"{self.name}_mount"), "name")
+        for candidate, parameter in new.items():
+            if candidate in taken:
+                raise InputError(
+                    f"the name {candidate!r} is taken",
+                    where=parameter,
+                    found=f"{taken[candidate]} {candidate!r} in {arm.source}",
+                    hint=f"Choose another {parameter}",
+                )
+        if len(new) < 5:  # noqa: PLR2004
+            raise InputError(
+                "two of the new names are the same",
+                where="name",
+                found=f"name {self.name!r}, root {self.root!r}, the arm's root link {arm_root!r}",
+                hint="Choose another name or root",
+            )
+
+    def _elements(self, arm_root: str) -> list[Element]:
+        """World, rail, carriage and mount."""
+        carriage = f"{self.name}_carriage"
+        height = self.carriage_size[2]
+        down = (pin.rpy.rpyToMatrix(*self.mount_rpy) @ np.array([0.0, 0.0, -1.0])).round(15)  # cos(pi / 2) is not 0
+        centre = np.array(self.mount_xyz) + 0.5 * height * down
+        beam = (centre + height * down + 0.5 * (self.low + self.high) * np.array(self.axis)).round(12)
+        length = self.high - self.low + max(self.carriage_size[:2])
+        heading = (0.0, -math.asin(self.axis[2]), math.atan2(self.axis[1], self.axis[0]))
+        limit = {"lower": self.low, "upper": self.high, "velocity": self.velocity, "effort": self.force}
+        colour = (f"{self.name}_grey", elements.GREY)  # a name of its own: the arm may have another grey
+        inertia = elements.box_inertia(self.mass, self.carriage_size)
+        return [
+            elements.link(
+                self.root, elements.visual("box", {"size": (length, height, height)}, colour, xyz=beam, rpy=heading)
+            ),
+            elements.joint(self.name, "prismatic", self.root, carriage, axis=self.axis, limit=limit),
+            elements.link(
+                carriage,
+                elements.inertial(self.mass, centre, inertia, self.mount_rpy),
+                elements.visual("box", {"size": self.carriage_size}, colour, xyz=centre, rpy=self.mount_rpy),
+            ),
+            elements.joint(f"{self.name}_mount", "fixed", carriage, arm_root, xyz=self.mount_xyz, rpy=self.mount_rpy),
+        ]

@@ -1,0 +1,139 @@
+"""``brachis compose``: what it writes and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from math import radians
+
+import numpy as np
+import pytest
+
+from brachis import Robot
+from brachis.cli.composition import split_vectors
+from brachis.compose import on_rail
+
+from .conftest import ROOT, SCARA
+
+FIGURES = ("--range", "-2", "2", "--velocity", "2", "--force", "1500", "--mass", "80")
+READMES = [ROOT / "robots" / name / "README.md" for name in ("tx90l_rail", "ur10_rail", "iiwa14")]
+
+
+def test_writes_what_the_library_makes(run, tmp_path):
+    out = tmp_path / "on_rail.urdf"
+    options = ("--axis", "0", "0", "1", "--mount-xyz", "0.1", "-0.2", "0.3", "--mount-rpy-deg", "180", "0", "-90")
+    outcome = run("compose", SCARA, *FIGURES, *options, "--name", "lift", "--root", "floor", "--out", out)
+    assert (outcome.code, outcome.out, outcome.err) == (0, f"wrote {out}\n", "")
+    expected = on_rail(
+        SCARA,
+        axis=(0, 0, 1),
+        range=(-2, 2),
+        velocity=2,
+        force=1500,
+        mass=80,
+        mount_xyz=(0.1, -0.2, 0.3),
+        mount_rpy=(radians(180), 0, radians(-90)),
+        name="lift",
+        root="floor",
+    )
+    assert out.read_text() == expected
+    robot = Robot.from_urdf(out)
+    assert robot.joint_names == ("lift", "j1", "j2", "j3")
+    np.testing.assert_array_equal(robot.limits.position_lower[0], -2.0)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--axis", "0", "3", "-4", "--range", "-2", "2"),
+        ("--axis", "0,3,-4", "--range", "-2,2"),
+        ("--axis=0,3,-4", "--range=-2,2"),
+        ("--axis", "0, 3, -4", "--range", "-2 2"),
+        ("--axis", "0,3,-4", "--range", "-2", "2"),
+    ],
+    ids=" ".join,
+)
+def test_vectors_are_read_in_every_usual_form(run, tmp_path, words):
+    out = tmp_path / "on_rail.urdf"
+    outcome = run("compose", SCARA, *words, *FIGURES[3:], "--out", out)
+    assert outcome.code == 0, outcome.err
+    assert '<axis xyz="0 0.6 -0.8"/>' in out.read_text()
+    assert '<limit lower="-2" upper="2" velocity="2" effort="1500"/>' in out.read_text()
+
+
+def test_only_vectors_are_split():
+    words = ["arm,1.urdf", "--out", "a,b c.urdf", "--axis", "0,1,0", "--name=x,y"]
+    assert split_vectors(words, {"--axis"}) == [*words[:4], "0", "1", "0", words[-1]]
+
+
+def test_json(run, tmp_path):
+    out = tmp_path / "on_rail.urdf"
+    outcome = run("compose", SCARA, *FIGURES, "--out", out, "--json")
+    assert outcome.code == 0
+    assert json.loads(outcome.out) == {"urdf": str(out), "arm": str(SCARA), "joint": "rail", "root": "world"}
+
+
+@pytest.mark.parametrize("missing", ["--range", "--velocity", "--force", "--mass", "--out"])
+def test_no_figure_is_guessed(run, tmp_path, missing):
+    words = [*FIGURES, "--out", str(tmp_path / "on_rail.urdf")]
+    place = words.index(missing)
+    del words[place : place + (3 if missing == "--range" else 2)]
+    outcome = run("compose", SCARA, *words)
+    assert outcome.code == 2
+    assert "Missing option" in outcome.err
+    assert missing in outcome.err
+    assert not list(tmp_path.iterdir())
+
+
+WRONG = {
+    "zero axis": (("--axis", "0,0,0"), ["axis: has no direction"]),
+    "range upside down": (("--range", "2", "-2"), ["range: is empty; found [2, -2] m; allowed: low < high"]),
+    "negative mass": (("--mass", "-1"), ["mass: is not positive; found -1.0 kg"]),
+    "angle not a number": (("--mount-rpy-deg", "nan", "0", "0"), ["mount_rpy: is wrong"]),
+    "taken name": (("--name", "j1"), ["name: the name 'j1' is taken", "Choose another name"]),
+    "two numbers": (("--axis", "0,1"), ["'--axis'"]),
+    "words": (("--axis", "up"), ["'--axis'"]),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_figure(run, tmp_path, case):
+    options, words = WRONG[case]
+    outcome = run("compose", SCARA, *FIGURES, "--out", tmp_path / "on_rail.urdf", *options)
+    assert outcome.code == 2
+    assert outcome.out == ""
+    for word in words:
+        assert word in outcome.err
+    assert "Traceback" not in outcome.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_wrong_files(run, tmp_path):
+    gone, broken = tmp_path / "gone.urdf", tmp_path / "broken.urdf"
+    broken.write_text("<robot name='x'><link")
+    for arm, out, words in (
+        (gone, tmp_path / "new.urdf", "gone.urdf: the URDF file does not exist"),
+        (broken, tmp_path / "new.urdf", "not well-formed XML"),
+        (SCARA, tmp_path / "no/new.urdf", "new.urdf: cannot be written"),
+        (SCARA, SCARA, "is the arm's own file"),
+    ):
+        outcome = run("compose", arm, *FIGURES, "--out", out)
+        assert outcome.code == 2
+        assert outcome.err.startswith("brachis: ")
+        assert words in outcome.err
+    outcome = run("compose", gone, *FIGURES, "--out", tmp_path / "new.urdf", "--json")
+    assert json.loads(outcome.out)["exit_code"] == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["broken.urdf"]
+
+
+@pytest.mark.parametrize("readme", READMES, ids=lambda path: path.parent.name)
+def test_command_of_the_readme(run, readme, tmp_path, monkeypatch):
+    (line,) = re.findall(r"^brachis compose .*", readme.read_text(), flags=re.MULTILINE)
+    (tmp_path / "robots").symlink_to(ROOT / "robots")
+    (tmp_path / "ur10_robot.urdf").symlink_to(ROOT / "robots/tx90l_rail/arm.urdf")  # stands for the UR10
+    monkeypatch.chdir(tmp_path)
+    words = shlex.split(line)
+    outcome = run(*words[1:])
+    assert outcome.code == 0, outcome.err
+    assert Robot.from_urdf(tmp_path / words[-1]).joint_names[:2] == ("rail", "joint_1")

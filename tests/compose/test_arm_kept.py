@@ -1,0 +1,144 @@
+"""What happens to the arm's own URDF: names, mesh files, and what yourdfpy does not know."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from brachis import InputError, Robot
+from brachis.compose import on_rail
+
+from .conftest import RAIL, arm_text
+
+MESHES = """
+<link name='cover'>
+  <visual><geometry><mesh filename='meshes/a.stl' scale='0.001 0.001 0.001'/></geometry>
+    <material name='wood'><texture filename='../wood.png'/></material></visual>
+  <visual><geometry><mesh filename='package://arm_description/b.dae'/></geometry></visual>
+  <visual><geometry><mesh filename='/opt/c.dae'/></geometry></visual>
+  <visual><geometry><box size='1 2 3'/></geometry></visual>
+  <collision><geometry><mesh filename='./meshes/../d.stl'/></geometry></collision>
+  <collision><geometry><sphere radius='0.1'/></geometry></collision>
+</link>
+<joint name='cover_mount' type='fixed'><parent link='tool'/><child link='cover'/></joint>
+"""
+OTHER = """
+<!-- a remark -->
+<material name='grey'><color rgba='1 0 0 1'/></material>
+<link name='finger'/>
+<joint name='grip' type='revolute'><parent link='tool'/><child link='finger'/><axis xyz='0 0 1'/>
+  <limit lower='0' upper='1.23456789012345678' effort='1' velocity='1'/><mimic joint='j3' multiplier='2'/>
+  <safety_controller k_velocity='3'/><dynamics damping='0.5'/></joint>
+<transmission name='t1'><type>transmission_interface/SimpleTransmission</type><joint name='j1'/></transmission>
+<gazebo reference='world'><static>true</static></gazebo>
+<gazebo reference='link1'><mu1>0.2</mu1></gazebo>
+<ros2_control name='arm' type='system'><joint name='j1'/></ros2_control>
+"""
+
+
+def parsed(text: str) -> etree._Element:
+    return etree.fromstring(text.encode())
+
+
+def files(text: str) -> list[str]:
+    return [each.get("filename") for each in parsed(text).iter("mesh", "texture")]
+
+
+@pytest.fixture
+def meshed(arm) -> Path:
+    arm.write_text(arm_text(more=MESHES))
+    return arm
+
+
+@pytest.mark.parametrize("folder", [".", "arm", "elsewhere/deep", "link"])
+def test_relative_meshes_are_found_from_the_new_file(meshed, tmp_path, folder):
+    (tmp_path / "elsewhere/deep").mkdir(parents=True)
+    (tmp_path / "link").symlink_to("elsewhere/deep")
+    output = tmp_path / folder / "new.urdf"
+    text = on_rail(meshed, **RAIL, output=output)
+    assert output.read_text() == text
+    a, wood, package, absolute, d = files(text)
+    assert (package, absolute) == ("package://arm_description/b.dae", "/opt/c.dae")
+    for name, expected in ((a, "arm/meshes/a.stl"), (wood, "wood.png"), (d, "arm/d.stl")):
+        assert not Path(name).is_absolute()
+        assert (output.parent.resolve() / name).resolve() == (tmp_path / expected).resolve()
+
+
+def test_relative_meshes_become_absolute_without_a_file(meshed, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    a, wood, *_, d = files(on_rail(meshed.relative_to(tmp_path), **RAIL))
+    assert [a, wood, d] == [str(tmp_path.resolve() / name) for name in ("arm/meshes/a.stl", "wood.png", "arm/d.stl")]
+
+
+def test_meshes_can_be_dropped(meshed):
+    text = on_rail(meshed, **RAIL, meshes=False)
+    assert files(text) == []
+    cover = parsed(text).find("link[@name='cover']")
+    shapes = [each.find("geometry")[0].tag for each in cover]
+    assert shapes == ["box", "sphere"]
+    assert files(on_rail(meshed, **RAIL)) != []
+
+
+def test_the_rest_of_the_arm_is_kept_as_written(arm):
+    arm.write_text(arm_text(more=OTHER))
+    robot = parsed(on_rail(arm, **RAIL))
+    before = parsed(arm.read_text())
+    assert robot.get("name") == "chain_rail"
+    for place in ("transmission", "ros2_control", "material", "gazebo[@reference='link1']", "joint[@name='grip']"):
+        kept, written = (etree.tostring(each.find(place), method="c14n").split() for each in (robot, before))
+        assert b"".join(kept) == b"".join(written)
+    assert [each.text for each in robot.iter(etree.Comment)] == [" a remark "]
+    # The arm's own world has become the frame that stands on the carriage.
+    assert [each.get("reference") for each in robot.findall("gazebo")] == ["rail_base", "link1"]
+    assert robot.find("joint[@name='mount']/parent").get("link") == "rail_base"
+    assert robot.find("joint[@name='rail_mount']/child").get("link") == "rail_base"
+
+
+def test_root_link_with_a_name_of_its_own_keeps_it(arm):
+    arm.write_text(arm_text().replace("'world'", "'stand'"))
+    robot = parsed(on_rail(arm, **RAIL))
+    links = {each.get("name") for each in robot.findall("link")}
+    assert {"world", "rail_carriage", "stand"} <= links
+    assert robot.find("joint[@name='rail_mount']/child").get("link") == "stand"
+
+
+def test_robot_without_a_name_gets_that_of_its_file(arm):
+    arm.write_text(arm_text().replace("<robot name='chain'>", "<robot>"))
+    assert parsed(on_rail(arm, **RAIL)).get("name") == "arm_rail"
+
+
+def test_text_in_other_scripts(arm):
+    declared = '<?xml version="1.0" encoding="utf-8"?>\n<!-- Größe, 大きさ -->\n'
+    arm.write_text(declared + arm_text(), encoding="utf-8")
+    output = arm.with_name("new.urdf")
+    on_rail(arm, **RAIL, output=output)
+    assert "<!-- Größe, 大きさ -->\n<robot" in output.read_text(encoding="utf-8")
+    assert Robot.from_urdf(output).n == 4
+
+
+CLASHES = {
+    "joint": ("'j2'", "'rail'", {}, "name", {"name": "slide"}),
+    "joint called as a link": ("'j2'", "'rail_carriage'", {}, "name", {"name": "slide"}),
+    "link": ("'link2'", "'rail_mount'", {}, "name", {"name": "slide"}),
+    "new name of the root link": ("'link2'", "'rail_base'", {}, "name", {"name": "slide"}),
+    "root": ("'base'", "'floor'", {"root": "floor"}, "root", {"root": "ground"}),
+    "name taken from the arm": ("'j2'", "'j2'", {"name": "j3"}, "name", {"name": "rail"}),
+    "both new names": ("'j2'", "'j2'", {"name": "slide", "root": "slide"}, "name", {"name": "rail", "root": "world"}),
+}
+
+
+@pytest.mark.parametrize("case", CLASHES)
+def test_name_clash_names_its_cure(arm, case):
+    old, new, options, parameter, cure = CLASHES[case]
+    arm.write_text(arm_text().replace(old, new))
+    with pytest.raises(InputError) as caught:
+        on_rail(arm, **RAIL, **options)
+    assert caught.value.where == parameter
+    assert f"Choose another {parameter}" in str(caught.value)
+    if old != new:
+        assert new in str(caught.value)
+        assert str(arm) in str(caught.value)
+    text = on_rail(arm, **RAIL, **(options | cure))
+    assert Robot.from_urdf("cured", urdf_text=text).n == 4

@@ -1,0 +1,155 @@
+"""What a rail does to an arm: where its tool is, what moves, what gravity asks, by Pinocchio."""
+
+from __future__ import annotations
+
+import doctest
+import subprocess
+import sys
+from math import pi
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lxml import etree
+
+import brachis
+from brachis import Robot
+from brachis.compose import on_rail, rail
+from brachis.robot import dynamics
+
+from .conftest import RAIL, ROOT, arm_text
+
+ARM_MASS = 7.0 + 3 * 2.0
+MOUNTS = {
+    "upright": ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+    "inverted": ((0.1, 0.2, -0.3), (pi, 0.0, 0.0)),
+    "on a wall": ((0.0, 0.0, 0.5), (0.0, pi / 2, 0.0)),
+    "anyhow": ((0.3, -0.1, 0.2), (0.4, -0.7, 2.1)),
+}
+AXES = {"y": (0, 1, 0), "against x": (-1, 0, 0), "vertical": (0, 0, 2), "tilted": (0.5, -1.0, 0.3)}
+
+
+def robots(path, **options) -> tuple[Robot, Robot]:
+    """The arm, and the arm on the rail."""
+    text = on_rail(path, **(RAIL | options))
+    return Robot.from_urdf(path), Robot.from_urdf("composed", urdf_text=text)
+
+
+def rotation(rpy) -> np.ndarray:
+    """Roll, pitch and yaw about fixed axes, by the exponential map."""
+    turns = [pin.exp3(angle * axis) for angle, axis in zip(rpy, np.eye(3), strict=True)]
+    return turns[2] @ turns[1] @ turns[0]
+
+
+def check_kinematics(path, axis, xyz, rpy) -> None:
+    arm, composed = robots(path, axis=axis, mount_xyz=xyz, mount_rpy=rpy)
+    assert composed.joint_names == ("rail", *arm.joint_names)
+    direction = np.array(axis) / np.linalg.norm(axis)
+    for q in np.random.default_rng(0).uniform(-2.0, 2.0, (5, 4)):
+        mounted = pin.SE3(rotation(rpy), np.array(xyz) + q[0] * direction)
+        expected = mounted * arm.tool_placement(q[1:])
+        np.testing.assert_allclose(composed.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-14)
+
+
+@pytest.mark.parametrize("mount", MOUNTS)
+@pytest.mark.parametrize("axis", AXES)
+def test_tool_is_shifted_along_the_rail(arm, axis, mount):
+    check_kinematics(arm, AXES[axis], *MOUNTS[mount])
+
+
+component = st.floats(-1.0, 1.0)
+vector = st.tuples(component, component, component)
+
+
+@settings(max_examples=20, deadline=None)
+@given(axis=vector.filter(lambda v: np.linalg.norm(v) > 1e-3), xyz=vector, rpy=vector)
+def test_tool_is_shifted_along_any_rail(tmp_path_factory, axis, xyz, rpy):
+    path = tmp_path_factory.getbasetemp() / "any.urdf"
+    path.write_text(arm_text())
+    check_kinematics(path, axis, xyz, rpy)
+
+
+def test_limits_are_those_given(arm):
+    lonely, composed = robots(arm)
+    assert composed.position_units == ("m", "rad", "rad", "rad")
+    for name, figure in (("position_lower", -2.0), ("position_upper", 1.5), ("velocity", 2.0), ("torque", 1500.0)):
+        expected = [figure, *getattr(lonely.limits, name)]
+        np.testing.assert_array_equal(getattr(composed.limits, name), expected)
+
+
+def test_everything_moves_with_the_rail(arm):
+    """Also the base of the arm, which no joint of its own moves."""
+    _, composed = robots(arm)
+    assert sum(inertia.mass for inertia in composed.model.inertias) == pytest.approx(80.0 + ARM_MASS)
+    zero = np.zeros((1, 4))
+    accelerated = dynamics.torque(composed, zero, zero, np.array([[3.0, 0.0, 0.0, 0.0]]))
+    assert accelerated[0, 0] == pytest.approx(3.0 * (80.0 + ARM_MASS))
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_rail_carries_its_share_of_the_weight(arm, axis):
+    _, composed = robots(arm, axis=AXES[axis])
+    still = np.zeros((1, 4))
+    share = np.array(AXES[axis])[2] / np.linalg.norm(AXES[axis])
+    assert dynamics.torque(composed, still, still, still)[0, 0] == pytest.approx((80.0 + ARM_MASS) * 9.81 * share)
+
+
+@pytest.mark.parametrize(("mount", "up"), [("upright", 1.0), ("inverted", -1.0)])
+def test_gravity_asks_the_same_of_an_upright_arm_and_the_contrary_of_an_inverted_one(arm, mount, up):
+    xyz, rpy = MOUNTS[mount]
+    _, composed = robots(arm, mount_xyz=xyz, mount_rpy=rpy)
+    alone = Robot.from_urdf(arm, gravity=(0.0, 0.0, -9.81 * up))
+    q = np.random.default_rng(1).uniform(-2.0, 2.0, (10, 4))
+    still = np.zeros_like(q)
+    expected = dynamics.torque(alone, q[:, 1:], still[:, 1:], still[:, 1:])
+    assert np.abs(expected).max() > 5.0
+    np.testing.assert_allclose(dynamics.torque(composed, q, still, still)[:, 1:], expected, atol=1e-13)
+
+
+def test_carriage_is_a_solid_box_below_the_arm(arm):
+    text = on_rail(arm, **RAIL, mount_xyz=(1.0, 0.0, 0.5), mount_rpy=(pi, 0.0, 0.0), carriage_size=(0.6, 0.2, 0.1))
+    model = pin.buildModelFromXML(text)
+    # Pinocchio joins the base to the carriage; taken away, the box is left.
+    base = pin.Inertia(7.0, np.array([0.01, 0.02, 0.1]), np.diag([0.1, 0.1, 0.05]))
+    placed = pin.SE3(rotation((pi, 0.0, 0.0)), np.array([1.0, 0.0, 0.5])).act(base)
+    box = model.inertias[1] - placed
+    assert box.mass == pytest.approx(80.0)
+    np.testing.assert_allclose(box.lever, [1.0, 0.0, 0.55], atol=1e-12)
+    expected = np.diag([0.2**2 + 0.1**2, 0.6**2 + 0.1**2, 0.6**2 + 0.2**2]) * 80.0 / 12.0
+    np.testing.assert_allclose(box.inertia, expected, atol=1e-10)
+
+
+@pytest.mark.parametrize("length", [5.0, 5e-200, 5e200])
+def test_axis_may_have_any_length(arm, length):
+    text = on_rail(arm, **RAIL, axis=(0.0, 0.6 * length, -0.8 * length))
+    axis = etree.fromstring(text.encode()).find("joint[@name='rail']/axis").get("xyz")
+    np.testing.assert_allclose([float(word) for word in axis.split()], [0.0, 0.6, -0.8], rtol=1e-15)
+
+
+def test_rail_on_a_rail(arm, tmp_path):
+    first = tmp_path / "one.urdf"
+    on_rail(arm, **RAIL, axis=(1, 0, 0), name="x_axis", output=first)
+    text = on_rail(first, **RAIL, axis=(0, 1, 0), name="y_axis")
+    robot, alone = Robot.from_urdf("two", urdf_text=text), Robot.from_urdf(arm)
+    assert robot.joint_names == ("y_axis", "x_axis", "j1", "j2", "j3")
+    placement = robot.tool_placement(np.array([0.3, 0.7, 0.1, 0.2, 0.3])).translation
+    expected = alone.tool_placement(np.array([0.1, 0.2, 0.3])).translation + np.array([0.7, 0.3, 0.0])
+    np.testing.assert_allclose(placement, expected, atol=1e-14)
+
+
+def test_example_of_the_docstring(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    (example,) = doctest.DocTestFinder(recurse=False).find(rail.on_rail, globs={})
+    assert len(example.examples) == 3
+    assert doctest.DocTestRunner().run(example).failed == 0
+
+
+def test_compose_is_public_and_loaded_when_used():
+    assert brachis.compose.on_rail is on_rail
+    code = (
+        "import sys, brachis; assert 'brachis.compose' not in sys.modules; "
+        "brachis.compose.on_rail; assert 'yourdfpy' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
