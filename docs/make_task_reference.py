@@ -19,7 +19,18 @@ from brachis.task import (
     SplineSettings,
     Task,
 )
-from brachis.task.segments import ArcCenter, ArcVia, Circle, LineBy, LineHeading, LineTo, SegmentModel, SplineThrough
+from brachis.task.orientation import Quaternion, RollPitchYaw, Rotation, RotationVector, Tangent, ToQuaternion
+from brachis.task.segments import (
+    ArcCenter,
+    ArcVia,
+    Circle,
+    CsvFile,
+    LineBy,
+    LineHeading,
+    LineTo,
+    MovingSegment,
+    SplineThrough,
+)
 
 PAGE = Path(__file__).parent / "task_files.md"
 
@@ -37,7 +48,9 @@ SEGMENTS: dict[str, tuple[type[BaseModel], ...]] = {
     "arc": (ArcCenter, ArcVia),
     "circle": (Circle,),
     "spline": (SplineThrough,),
+    "csv": (CsvFile,),
 }
+TABLE_HEAD = ("| key | default | meaning |", "|---|---|---|")
 INTRODUCTION = """# Task files
 
 <!-- Made by docs/make_task_reference.py. -->
@@ -50,13 +63,106 @@ Limits: an absent key takes the URDF's limit, `null` removes it, a number holds 
 of the chain, a mapping names joints (others keep the URDF's).
 """
 
+PATH = """
+## `path`
+
+A list of segments. Each is a mapping with one of the kinds below (`line`, `arc`, `circle`, `spline`, `csv`, `turn`)
+and, beside it, the keys of this table. A segment starts where its predecessor ends, the first one where the tool is at
+the start posture. The path must be smooth to the third derivative: segments that do not continue each other need a
+`blend`.
+
+Coordinates are those of the rows of the task space, m, and rad for yaw. In task spaces of poses (`pose`,
+`pose_free_roll`) they are x, y, z, and `orientation` says how the tool turns.
+"""
+TURN = """
+### `turn: {...}`
+
+In task spaces of poses: the tool turns on the spot, by `rotate: {...}` or `to: {...}` as described below. A turn joins
+other turns about the same axis, or, with `profile: smooth`, about any axis; it does not join a segment whose position
+moves.
+"""
+ORIENTATION = """## `orientation`
+
+In task spaces of poses every segment but `turn` may say how the tool turns along it. The tool's orientation at the
+start of a segment is the one at the end of its predecessor. Orientations are those of the tool frame in the world
+frame.
+
+```yaml
+task_space: pose
+path:
+  - line: {by: [0.3, 0, 0]}               # the tool keeps its orientation
+    blend: 0.05
+  - line: {by: [0, 0.4, 0]}               # turns by 90 degrees about the world's z axis, at rest at both ends
+    orientation: {rotate: {axis: [0, 0, 1], angle_deg: 90, profile: smooth}}
+  - line: {by: [0, 0.3, 0]}               # turns, the shortest way, to an orientation
+    orientation: {to: {rpy_deg: [0, 0, 45], profile: smooth}}
+```
+
+| form | meaning |
+|---|---|
+| `fixed` | The tool keeps its orientation. This is the default. |
+| `{rotate: {axis: ..., angle_deg: ...}}` | It turns about an axis that stands still. |
+| `{to: {...}}` | It turns to an orientation, about one axis and the shortest way; less than 180 degrees. |
+| `tangent` or `{tangent: {up: ...}}` | It turns with the tangent of the path, see below. |
+
+Position and orientation advance together: with `profile: uniform` the tool turns by the same angle for every metre of
+the path. Then its turning rate jumps where the next segment turns otherwise, which is refused like a corner. Either
+give `profile: smooth`, with which the rate and its first two derivatives start and end at zero, or a `blend`, which
+rounds position and orientation alike.
+
+With `tangent` the tool stays at rest in a frame that moves along the path: x along the tangent, y along up x tangent.
+So it turns about `up` as the path turns, and pitches as the path rises, while up stays up; how it is oriented at the
+start of the segment is kept. Where the tangent is parallel to `up` (within 1 degree) the frame is not defined; then
+give another `up`.
+
+A spline passes its waypoints in given orientations with `orientations`, one for each waypoint. Between them the
+orientation is smooth, to the third derivative, and does not depend on the choice of the world frame or the tool frame.
+The orientation at the segment's start is not listed. Successive orientations must be less than 180 degrees apart.
+
+```yaml
+task_space: pose
+path:
+  - spline:
+      relative: true                      # displacements along the world axes, rotations in the tool frame
+      through: [[0.1, 0, 0], [0.2, 0.1, 0], [0.2, 0.2, 0.1]]
+      orientations: [{rpy_deg: [0, 0, 20]}, {rpy_deg: [0, 10, 60]}, {quaternion: [0.707, 0, 0, 0.707]}]
+```
+
+An orientation is written in one of three forms:
+
+| key | meaning |
+|---|---|
+"""
+CSV = """
+## CSV files
+
+`csv: {file: poses.csv}` is a spline through the rows of a file. Its first line names the columns, in any order;
+lengths are in metres, angles in radians; lines that are empty or begin with `#` are skipped. In task spaces of rows the
+columns are the rows (`x,y`, `x,z,yaw`, ...). In task spaces of poses they are
+
+- `x,y,z`: positions; the segment's `orientation` says how the tool turns;
+- `x,y,z,qw,qx,qy,qz`: positions and unit quaternions;
+- `x,y,z,rx,ry,rz`: positions and rotation vectors, rad.
+
+The first row is where the segment starts. A segment that starts elsewhere, by more than 1e-4 m or rad, is refused;
+with `relative: true` the rows are moved so that the first one is at the segment's start: displacements keep their
+direction in the world, rotations are those in the tool frame. Where successive rows have the same position, the curve
+would have to stop, and the file is refused, unless the position stands still in the whole file.
+
+The file is read with the task, and becomes a `spline` with `through`, `orientations`, `starts_at` and
+`starts_oriented`: a saved task does not need it any more.
+"""
+
 
 def rows(model: type[BaseModel]) -> Iterator[str]:
     """Yield one line a key: name, default, description."""
-    yield "| key | default | meaning |"
-    yield "|---|---|---|"
+    yield from TABLE_HEAD
     for name, field in model.model_fields.items():
-        yield f"| `{name}` | {_default(field)} | {(field.description or '').replace('|', ' or ')} |"
+        yield _row(name, field)
+
+
+def _row(name: str, field: FieldInfo) -> str:
+    return f"| `{name}` | {_default(field)} | {(field.description or '').replace('|', ' or ')} |"
 
 
 def _default(field: FieldInfo) -> str:
@@ -73,18 +179,18 @@ def page() -> str:
     parts = [INTRODUCTION, "## The file\n", *rows(Task)]
     for key, model in PARTS.items():
         parts += [f"\n## `{key}`\n", *rows(model)]
-    parts += [
-        "\n## `path`\n",
-        "A list of segments, each a mapping with one of the keys below.\n",
-        "| key | default | meaning |",
-        "|---|---|---|",
-    ]
-    blend = SegmentModel.model_fields["blend"]
-    parts.append(f"| `blend` | `null` | {blend.description} |")
+    parts += [PATH, *rows(MovingSegment)]
     for kind, shapes in SEGMENTS.items():
         for shape in shapes:
             keys = ", ".join(f"{name}: ..." for name, field in shape.model_fields.items() if field.is_required())
             parts += [f"\n### `{kind}: {{{keys}}}`\n", *rows(shape)]
+    parts += [TURN, ORIENTATION.rstrip()]
+    for form in (Quaternion, RotationVector, RollPitchYaw):
+        parts += [f"| `{name}` | {field.description} |" for name, field in form.model_fields.items()]
+    parts += ["\n### `rotate: {axis: ..., angle_deg: ...}`\n", *rows(Rotation)]
+    profile = ToQuaternion.model_fields["profile"]
+    parts += ["\n### `to: {...}`\n", "One of the three forms of an orientation, and\n", *TABLE_HEAD]
+    parts += [_row("profile", profile), "\n### `tangent: {...}`\n", *rows(Tangent), CSV.rstrip()]
     return "\n".join(parts) + "\n"
 
 

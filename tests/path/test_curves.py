@@ -191,6 +191,16 @@ def test_a_relative_spline() -> None:
     np.testing.assert_allclose(relative.derivatives(sigma), absolute.derivatives(sigma), atol=1e-12)
 
 
+def test_a_spline_whose_start_is_stated() -> None:
+    waypoints = [[1.5, 0], [2, 1]]
+    plain = curve_of({"spline": {"through": waypoints}}, [1, -1], XY)
+    stated = curve_of({"spline": {"through": waypoints, "starts_at": [1, -1.00009]}}, [1, -1], XY)
+    moved = {"through": [[4.5, 4], [5, 5]], "starts_at": [4, 3], "relative": True}
+    sigma = np.linspace(0, plain.length, 9)
+    for curve in (stated, curve_of({"spline": moved}, [1, -1], XY)):
+        np.testing.assert_allclose(curve.derivatives(sigma), plain.derivatives(sigma), atol=1e-12)
+
+
 def test_a_site_knows_its_position_rows() -> None:
     site = Site("path[0].line", np.array([1.0, 2.0, 3.0]), ("x", "z", "yaw"))
     assert site.positions == ("x", "z")

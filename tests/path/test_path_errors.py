@@ -10,7 +10,7 @@ import pytest
 from brachis.errors import PathError, UnknownNameError
 from brachis.path import build_path
 from brachis.path.blend import septic
-from brachis.path.joins import mismatch
+from brachis.path.joins import Join, corner_at
 from brachis.task import LineBy, LineSegment, load_task
 
 X, XY, XYZ, XYW = ["x"], ["x", "y"], ["x", "y", "z"], ["x", "y", "yaw"]
@@ -59,6 +59,21 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
     ({"spline": {"through": [[0, 0], [1, 1]]}}, XY, ["spline.through[0]: the first waypoint is the segment's start"]),
     ({"spline": {"through": [[0, 0]]}}, XY, ["path[0].spline.through: the segment has zero length"]),
     ({"spline": {"through": [[1, 0, 0], [1, 0, 2]]}}, XYW, ["spline.through[1]: a waypoint repeats"]),
+    (
+        {"spline": {"through": [[1, 1]], "starts_at": [0, 2e-4]}},
+        XY,
+        ["path[0].spline.starts_at: the segment starts elsewhere", "x = 0, y = 0, 0.0002 m off", "relative: true"],
+    ),
+    ({"spline": {"through": [[1, 1, 1]], "starts_at": [0, 0, 6]}}, XYW, ["spline.starts_at: ", "yaw = 0, 6 rad off"]),
+    ({"spline": {"through": [[1, 1]], "starts_at": [0]}}, XY, ["path[0].spline.starts_at: wrong number of coord"]),
+    (
+        {"spline": {"through": [[1, 1]], "orientations": [{"rpy_deg": [0, 0, 0]}]}},
+        XY,
+        ["path[0].spline.orientations: orientations are for task spaces of poses", "[x, y]", "Set task_space: pose"],
+    ),
+    (RIGHT | {"orientation": "fixed"}, XY, ["path[0].orientation: an orientation along", "found task_space [x, y]"]),
+    ({"turn": {"to": {"rpy_deg": [0, 0, 9]}}}, XYZ, ["path[0].turn: a turn is for", "Set task_space: pose"]),
+    ({"turn": {"to": {"rpy_deg": [0, 0, 9]}}}, XYW, ["path[0].turn: a turn is for", "line: {by: [0, 0, ...]}"]),
 ]
 
 
@@ -125,7 +140,9 @@ def test_every_derivative_is_compared(order: int, jump: list[float], expected: s
     before[1] = after[1] = far[1] = [1.0, 0.0]
     far[0] = [2.0, 1.0]
     after[order] += jump
-    assert mismatch(septic(-far, before, 2.0), septic(after, far, 2.0), 2) == expected
+    join = Join(0, 0.5, np.zeros(2), ("x", "y"))
+    corner = corner_at(join, septic(-far, before, 2.0), septic(after, far, 2.0))
+    assert (corner and corner.found) == expected
 
 
 def test_a_blend_that_is_too_long_is_told_the_longest() -> None:

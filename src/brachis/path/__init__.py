@@ -1,7 +1,8 @@
 """The prescribed path and its derivatives by the path coordinate, up to the third."""
 
 from brachis.path.build import build_path
+from brachis.path.pose import PosePath
 from brachis.path.protocol import Array, Curve, Path, PathSample
 from brachis.path.sequence import SequencePath, join_curves
 
-__all__ = ["Array", "Curve", "Path", "PathSample", "SequencePath", "build_path", "join_curves"]
+__all__ = ["Array", "Curve", "Path", "PathSample", "PosePath", "SequencePath", "build_path", "join_curves"]

@@ -48,6 +48,12 @@ class ArcCurve:
         return float(np.linalg.norm(self.outward))
 
     @property
+    def normal(self) -> Array:
+        """Unit vector of the axis about which the arc turns, for three position rows."""
+        normal: Array = np.cross(self.outward, self.forward) / self.radius**2
+        return normal
+
+    @property
     def knots(self) -> Array:
         """Every quarter turn: the arc is analytic, but a quadrature needs several intervals on many turns."""
         quarters = int(np.ceil(self.length / self.radius / (np.pi / 2)))
@@ -173,7 +179,6 @@ def _with_yaw(arc: ArcCurve, turning: str, site: Site) -> ArcCurve:
         return replace(arc, yaw=(float(site.start[-1]), sense / arc.radius if turning == "tangent" else 0.0))
     if turning == "tangent":
         problem = "yaw is not a row of the task space"
-        raise PathError(
-            problem, found="tangent", allowed="fixed", where=f"{site.key}.yaw", hint="Add yaw to task_space"
-        )
+        hint = "Set orientation: tangent beside it" if site.oriented else "Add yaw to task_space"
+        raise PathError(problem, found="tangent", allowed="fixed", where=f"{site.key}.yaw", hint=hint)
     return arc

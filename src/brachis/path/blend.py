@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import PathError
-from brachis.path.site import ZERO_LENGTH
+from brachis.path.pose import LEAST_QUALITY, POSITIONS, QuaternionPoseCurve, rotations
+from brachis.path.rotations import quaternion_derivatives, quaternion_of, with_like_signs
+from brachis.path.sampling import smallest
+from brachis.path.site import stands_still
 
 if TYPE_CHECKING:
     from brachis.path.joins import Join
@@ -20,6 +23,7 @@ SLOWEST = 0.2
 _DEGREE = 7
 _CHECKED_POINTS = 201
 _ROUNDING = 1e-12
+_SIGN_POINTS = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +69,11 @@ def septic(start: Array, end: Array, length: float) -> BlendCurve:
     return BlendCurve(np.concatenate([low, high]), length)
 
 
-def blend(first: Curve, second: Curve, size: float, join: Join) -> BlendCurve:
+def blend(first: Curve, second: Curve, size: float, join: Join) -> BlendCurve | QuaternionPoseCurve:
     """Return the blend that replaces the last `size` of one curve and the first `size` of the next.
 
-    Its length is the mean of the chord and of the polygon over the corner, which keeps its speed near 1.
+    Its length is the mean of the chord and of the polygon over the corner, which keeps its speed near 1. For poses the
+    polynomial is that of the position and the quaternion, which is then divided by its length.
 
     Parameters
     ----------
@@ -82,34 +87,37 @@ def blend(first: Curve, second: Curve, size: float, join: Join) -> BlendCurve:
     Raises
     ------
     PathError
-        The blend is longer than half of a neighbour, or (nearly) stops or reverses; or a neighbour turns on the spot.
+        The blend is longer than half of a neighbour, or (nearly) stops or reverses; or a neighbour turns on the spot;
+        or the tool turns too much in the blend.
     """
-    where, at, positions = f"{join.blend_key}: {join.where}", (join.s, join.s), join.positions
+    positions = join.positions
+    _check_neighbours(first, second, size, join)
+    start = first.derivatives(np.array([first.length - size]))[:, 0]
+    corner = second.derivatives(np.zeros(1), 0)[0, 0]
+    end = second.derivatives(np.array([size]))[:, 0]
+    chord = _distance(start[0], end[0], positions)
+    polygon = _distance(start[0], corner, positions) + _distance(corner, end[0], positions)
+    if join.oriented:
+        start, end = _with_quaternion(start), _with_quaternion(end)
+        end[:, POSITIONS:] *= _sign(first, second, size)
+    curve = septic(start, end, (chord + polygon) / 2)
+    _check_speed(curve, join)
+    return _checked_turning(QuaternionPoseCurve(curve), join) if join.oriented else curve
+
+
+def _check_neighbours(first: Curve, second: Curve, size: float, join: Join) -> None:
+    where, at = f"{join.blend_key}: {join.where}", (join.s, join.s)
+    if stands_still(first, join.positions) or stands_still(second, join.positions):
+        turning = "the tool turns on the spot" if join.oriented else "yaw alone moves"
+        problem = f"a blend needs motion of the position on both sides, and {turning} on one"
+        hint = f"Turn {'the tool' if join.oriented else 'yaw'} along a line"
+        raise PathError(problem, s_interval=at, found=f"{size:g} m", allowed="no blend here", where=where, hint=hint)
     longest = min(first.length, second.length) / 2
-    for curve in (first, second):
-        ends = curve.derivatives(curve.knots, 0)[0, :, :positions]
-        if np.ptp(ends, axis=0).max() < ZERO_LENGTH:
-            problem = "a blend needs motion of the position on both sides, and yaw alone moves on one"
-            raise PathError(
-                problem,
-                s_interval=at,
-                found=f"{size:g} m",
-                allowed="no blend here",
-                where=where,
-                hint="Turn yaw along a line",
-            )
     if size > longest * (1 + _ROUNDING):
         problem = "the blend is longer than half of a neighbouring segment"
         # Rounded down, to whole nanometres, so that the blend that the message names is accepted.
         allowed = f"at most {floor(longest * 1e9) / 1e9:.10g} m"
         raise PathError(problem, s_interval=at, found=f"{size:g} m", allowed=allowed, where=where)
-    start = first.derivatives(np.array([first.length - size]))[:, 0]
-    corner = second.derivatives(np.zeros(1), 0)[0, 0]
-    end = second.derivatives(np.array([size]))[:, 0]
-    polygon = _distance(start[0], corner, positions) + _distance(corner, end[0], positions)
-    curve = septic(start, end, (_distance(start[0], end[0], positions) + polygon) / 2)
-    _check_speed(curve, join)
-    return curve
 
 
 def _check_speed(curve: BlendCurve, join: Join) -> None:
@@ -125,6 +133,34 @@ def _check_speed(curve: BlendCurve, join: Join) -> None:
             where=f"{join.blend_key}: {join.where}",
             hint="Turn in two corners, or by an arc",
         )
+
+
+def _with_quaternion(pose: Array) -> Array:
+    """Return the derivatives of position and quaternion, (4, 7), from those of a pose, (4, 12)."""
+    return np.concatenate([pose[:, :POSITIONS], quaternion_derivatives(rotations(pose))], axis=1)
+
+
+def _sign(first: Curve, second: Curve, size: float) -> float:
+    """Return the sign of the end's quaternion that continues the start's along both curves."""
+    steps = np.linspace(0.0, size, _SIGN_POINTS)
+    poses = [first.derivatives(first.length - size + steps, 0)[0], second.derivatives(steps, 0)[0]]
+    quaternions = np.stack([quaternion_of(one) for one in rotations(np.concatenate(poses))])
+    return float(np.sign(with_like_signs(quaternions)[-1] @ quaternions[-1]))
+
+
+def _checked_turning(curve: QuaternionPoseCurve, join: Join) -> QuaternionPoseCurve:
+    _, least = smallest(curve.quality, curve.knots)
+    if least < LEAST_QUALITY:
+        problem = "the tool turns too much in the blend"
+        raise PathError(
+            problem,
+            s_interval=(join.s, join.s),
+            found=f"quaternions interpolated with a quality of {least:.2g} out of 1",
+            allowed=f"{LEAST_QUALITY} or more",
+            where=f"{join.blend_key}: {join.where}",
+            hint="Shorten the blend, or turn the tool along longer segments",
+        )
+    return curve
 
 
 def _distance(one: Array, other: Array, positions: int) -> float:

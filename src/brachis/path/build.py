@@ -2,35 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.errors import PathError, UnknownNameError
-from brachis.path.arc import arc_center, arc_via, circle
-from brachis.path.line import line_by, line_heading, line_to
+from brachis.path.pose import POSITIONS, PosePath, rotations
+from brachis.path.pose_segment import pose_curve
+from brachis.path.rotations import matrix, quaternion_of
+from brachis.path.rows import POSE_COORDINATES, ROWS, is_pose
 from brachis.path.sequence import join_curves
+from brachis.path.shapes import curve_of
 from brachis.path.site import Site
-from brachis.path.spline import spline_through
-from brachis.task import ArcCenter, ArcVia, Circle, LineBy, LineHeading, LineTo, SplineThrough
+from brachis.task import TurnSegment
 
 if TYPE_CHECKING:
     from brachis.path.protocol import Array, Curve, Path
-    from brachis.task import Segment, Shape
+    from brachis.task import Segment
 
-ROWS: Final = ("x", "y", "z", "yaw")
-
-BUILDERS: Final[dict[type[Shape], Callable[[Any, Site], Curve]]] = {
-    LineTo: line_to,
-    LineBy: line_by,
-    LineHeading: line_heading,
-    ArcCenter: arc_center,
-    ArcVia: arc_via,
-    Circle: circle,
-    SplineThrough: spline_through,
-}
-"""For every form of segment, the function that makes its curve."""
+_ROTATION_TOLERANCE = 1e-6
 
 
 def build_path(segments: Sequence[Segment], start: Sequence[float] | Array, task_space_rows: Sequence[str]) -> Path:
@@ -40,15 +31,15 @@ def build_path(segments: Sequence[Segment], start: Sequence[float] | Array, task
     ----------
     segments : sequence of Segment
         The segments of a task, at least one.
-    start : array_like, shape (m,)
-        Task coordinates at the start posture, m and rad.
+    start : array_like, shape (m,) or (12,)
+        Task coordinates at the start posture, m and rad; of a pose the position and the rotation matrix row by row.
     task_space_rows : sequence of str
-        Rows of the task space, out of x, y, z and yaw; yaw comes last.
+        Rows of the task space, out of x, y, z and yaw, where yaw comes last; or x, y, z, rx, ry, rz for poses.
 
     Returns
     -------
     Path
-        The path, three times continuously differentiable in s.
+        The path, three times continuously differentiable in s. For poses `PosePath`, whose samples have the body twist.
 
     Raises
     ------
@@ -72,19 +63,49 @@ def build_path(segments: Sequence[Segment], start: Sequence[float] | Array, task
         raise PathError(problem, where="path")
     curves: list[Curve] = []
     for i, segment in enumerate(segments):
-        shape = segment.shape
-        curve = BUILDERS[type(shape)](shape, Site(f"path[{i}].{segment.kind}", point, rows))
+        curve = pose_curve(segment, i, point) if is_pose(rows) else _row_curve(segment, i, point, rows)
         curves.append(curve)
         point = curve.derivatives(np.array([curve.length]), 0)[0, 0]
-    return join_curves(curves, [segment.blend for segment in segments], rows)
+    path = join_curves(curves, [segment.blend for segment in segments], rows)
+    return PosePath(path) if is_pose(rows) else path
+
+
+def _row_curve(segment: Segment, index: int, start: Array, rows: tuple[str, ...]) -> Curve:
+    """Return the curve of a segment in a task space of rows, where the tool's orientation is not prescribed."""
+    found, hint = f"task_space [{', '.join(rows)}]", "Set task_space: pose"
+    if isinstance(segment, TurnSegment):
+        problem = "a turn is for task spaces of poses"
+        if "yaw" in rows:
+            hint = "Use line: {by: [0, 0, ...]} to turn yaw"
+        raise PathError(problem, found=found, where=f"path[{index}].turn", hint=hint)
+    if segment.orientation is not None:
+        problem = "an orientation along a segment is for task spaces of poses"
+        raise PathError(problem, found=found, where=f"path[{index}].orientation", hint=hint)
+    return curve_of(segment.shape, Site(f"path[{index}].{segment.kind}", start, rows))
 
 
 def _checked_start(start: Sequence[float] | Array, rows: tuple[str, ...]) -> Array:
+    point = np.array(start, dtype=float)
+    if is_pose(rows):
+        return _checked_pose(point)
     for row in rows:
         if row not in ROWS:
             raise UnknownNameError(kind="row of the task space", name=row, valid=ROWS, where="task_space")
-    point = np.array(start, dtype=float)
     if point.shape != (len(rows),) or not np.all(np.isfinite(point)):
         problem = "the start of the path needs one finite coordinate for each row of the task space"
         raise PathError(problem, found=point.tolist(), allowed=f"[{', '.join(rows)}]", where="start")
     return point
+
+
+def _checked_pose(point: Array) -> Array:
+    """Return the coordinates of a pose with the rotation matrix freed of rounding."""
+    allowed = "the position (3), then a rotation matrix row by row (9)"
+    if point.shape != (POSE_COORDINATES,) or not np.all(np.isfinite(point)):
+        problem = "the start of a path of poses needs 12 finite coordinates"
+        raise PathError(problem, found=point.tolist(), allowed=allowed, where="start")
+    rotation = rotations(point)
+    nearest = matrix(quaternion_of(rotation))
+    if np.abs(rotation - nearest).max() > _ROTATION_TOLERANCE:
+        problem = "the start of the path has no rotation matrix"
+        raise PathError(problem, found=rotation.tolist(), allowed=allowed, where="start")
+    return np.concatenate([point[:POSITIONS], nearest.ravel()])

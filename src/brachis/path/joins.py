@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import PathError
+from brachis.path.pose import POSITIONS, twist
+from brachis.path.rows import is_pose, position_rows
+from brachis.path.site import place, stands_still
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,7 +33,7 @@ class Join:
     s : float
         Path coordinate.
     point : ndarray, shape (m,)
-        Task coordinates.
+        Task coordinates; of a pose twelve.
     rows : tuple of str
         Rows of the task space.
     """
@@ -43,18 +46,42 @@ class Join:
     @property
     def positions(self) -> int:
         """Number of position rows."""
-        return len(self.rows) - ("yaw" in self.rows)
+        return len(position_rows(self.rows))
+
+    @property
+    def oriented(self) -> bool:
+        """Whether poses are joined."""
+        return is_pose(self.rows)
 
     @property
     def where(self) -> str:
         """Keys and place, for messages."""
-        place = ", ".join(f"{row} = {value:.6g}" for row, value in zip(self.rows, self.point, strict=True))
-        return f"path[{self.index}] to path[{self.index + 1}], at s = {self.s:.4g}, {place}"
+        rows = position_rows(self.rows) if self.oriented else self.rows
+        return f"path[{self.index}] to path[{self.index + 1}], at s = {self.s:.4g}, {place(rows, self.point)}"
 
     @property
     def blend_key(self) -> str:
         """The key that rounds the corner."""
         return f"path[{self.index}].blend"
+
+
+@dataclass(frozen=True, eq=False)
+class Corner:
+    """A join where curves do not continue each other.
+
+    Attributes
+    ----------
+    join : Join
+        Where.
+    found : str
+        What jumps, in words.
+    advice : str
+        What to try.
+    """
+
+    join: Join
+    found: str
+    advice: str
 
 
 def find_joins(curves: Sequence[Curve], rows: tuple[str, ...]) -> list[Join]:
@@ -64,14 +91,42 @@ def find_joins(curves: Sequence[Curve], rows: tuple[str, ...]) -> list[Join]:
     return [Join(i, float(ends[i] / ends[-1]), point, rows) for i, point in enumerate(points)]
 
 
-def mismatch(first: Curve, second: Curve, positions: int) -> str | None:
-    """Return in words what jumps from one curve to the next, or None where three derivatives continue."""
+def corner_at(join: Join, first: Curve, second: Curve) -> Corner | None:
+    """Return what jumps from one curve to the next, or None where three derivatives continue."""
+    rounding = f"{join.blend_key} (m) to round it"
     before = first.derivatives(np.array([first.length]))[:, 0]
     after = second.derivatives(np.zeros(1))[:, 0]
+    length = min(first.length, second.length)
+    if not join.oriented:
+        found = mismatch(before, after, length, join.positions)
+        return Corner(join, found, f"Set {rounding}") if found else None
+    on_the_spot = [stands_still(curve, POSITIONS) for curve in (first, second)]
+    if on_the_spot[0] != on_the_spot[1]:
+        found = "a stop: the position moves on one side, and the tool turns on the spot on the other"
+        return Corner(join, found, "Turn the tool along a segment, by its orientation, or in a task of its own")
+    found = mismatch(before[:, :POSITIONS], after[:, :POSITIONS], length, POSITIONS)
+    if found:
+        return Corner(join, found, f"Set {rounding}")
+    found = turning_mismatch(before, after, length, "rad" if on_the_spot[0] else "m")
+    smooth = "Set profile: smooth where the tool turns"
+    return Corner(join, found, smooth if on_the_spot[0] else f"{smooth}, or {rounding}") if found else None
+
+
+def mismatch(before: Array, after: Array, length: float, positions: int) -> str | None:
+    """Return in words what jumps, or None where three derivatives continue.
+
+    Parameters
+    ----------
+    before, after : ndarray, shape (4, m)
+        Derivatives of the coordinates by sigma, from the value on, at the join.
+    length : float
+        Length of the shorter curve, sigma.
+    positions : int
+        Number of position rows.
+    """
     # The k-th derivative times length^(k - 1) compares with the speed, which is about 1.
-    lengths = min(first.length, second.length) ** np.arange(-1.0, 3.0)
     size = max(float(np.linalg.norm(before[1])), 1.0)
-    jumps = np.linalg.norm(after - before, axis=1) * lengths / size
+    jumps = np.linalg.norm(after - before, axis=1) * length ** np.arange(-1.0, 3.0) / size
     if np.all(jumps <= TOLERANCE):
         return None
     if jumps[1] > TOLERANCE:
@@ -86,20 +141,47 @@ def mismatch(first: Curve, second: Curve, positions: int) -> str | None:
     return f"a jump of {np.linalg.norm(after[3] - before[3]):.4g} 1/m^2 in the third derivative"
 
 
-def refuse_corners(joins: Sequence[tuple[Join, str]]) -> None:
-    """Raise a `PathError` for the first of the joins that do not match, naming the others, if there are any."""
-    if not joins:
+def turning_mismatch(before: Array, after: Array, length: float, unit: str = "m") -> str | None:
+    """Return in words what jumps in the turning of the tool, or None where three derivatives continue.
+
+    Parameters
+    ----------
+    before, after : ndarray, shape (4, 12)
+        Derivatives of the coordinates of the pose by sigma at the join.
+    length : float
+        Length of the shorter curve, sigma.
+    unit : str, optional
+        Unit of sigma.
+    """
+    old, new = (twist(one[:, None])[:, 0, POSITIONS:] for one in (before, after))
+    rate, new_rate = (float(np.linalg.norm(one[0])) for one in (old, new))
+    jumps = np.linalg.norm(new - old, axis=1)
+    large = jumps * length ** np.arange(3.0) > TOLERANCE * max(rate, 1.0)
+    if not np.any(large):
+        return None
+    if not large[0]:
+        order, k = ("slope", 1) if large[1] else ("second derivative", 2)
+        return f"the {order} of the tool's turning rate jumps by {jumps[k]:.4g} rad/{unit}^{k + 1}"
+    if abs(new_rate - rate) > TOLERANCE * max(rate, 1.0):
+        return f"the tool's turning rate jumps: {rate:.4g} rad/{unit} before and {new_rate:.4g} after"
+    angle = np.rad2deg(_angle(old[0], new[0]))
+    return f"the axis about which the tool turns jumps by {angle:.4g} degrees"
+
+
+def refuse_corners(corners: Sequence[Corner]) -> None:
+    """Raise a `PathError` for the first of the corners, naming the others, if there are any."""
+    if not corners:
         return
-    join, found = joins[0]
-    others = ", ".join(other.blend_key for other, _ in joins[1:])
+    corner, join = corners[0], corners[0].join
+    others = ", ".join(other.join.blend_key for other in corners[1:])
     problem = "the path must be smooth to the third derivative"
     raise PathError(
         problem,
         s_interval=(join.s, join.s),
-        found=found,
+        found=corner.found,
         allowed="segments that continue each other, or a blend",
         where=join.where,
-        hint=f"Set {join.blend_key} (m) to round it" + (f"; likewise {others}" if others else ""),
+        hint=corner.advice + (f"; likewise {others}" if others else ""),
     )
 
 

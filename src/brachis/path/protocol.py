@@ -19,18 +19,21 @@ class PathSample:
     """A path at K values of the path coordinate s.
 
     `xi` is the task velocity per unit s: ``J qdot = xi sdot`` and ``J qddot + Jdot qdot = xi_ds sdot**2 + xi sddot``.
-    For task spaces of rows it is the plain derivative of the target.
+    For task spaces of rows it is the plain derivative of the target. For poses, of position p and rotation matrix R of
+    the tool frame in the world frame, it is the body twist [v; w]: the velocity ``v = R^T p'`` (m) and the angular
+    velocity w of ``R^T R'`` (rad), both along the axes of the tool frame; `xi_ds` and `xi_dds` are the plain
+    derivatives of these six numbers.
 
     Attributes
     ----------
-    target : ndarray, shape (K, m)
-        Task coordinates z(s): m for position rows, rad for yaw.
+    target : ndarray, shape (K, m) or (K, 12)
+        Task coordinates z(s): m for position rows, rad for yaw; of a pose p (m), then R row by row.
     xi : ndarray, shape (K, m)
-        dz/ds.
+        dz/ds, or the body twist.
     xi_ds : ndarray, shape (K, m)
-        d2z/ds2.
+        Its first derivative by s.
     xi_dds : ndarray, shape (K, m)
-        d3z/ds3.
+        Its second derivative by s.
     """
 
     target: Array
@@ -65,7 +68,7 @@ class Curve(Protocol):
     """One piece of a path over a parameter sigma in [0, length].
 
     Sigma is the arc length of the position rows, m; for a spline the cumulative chord length of its waypoints; for a
-    motion of yaw alone the angle, rad.
+    motion of yaw alone, or a turn on the spot, the angle, rad. A curve of poses has their twelve coordinates.
     """
 
     @property
@@ -79,5 +82,5 @@ class Curve(Protocol):
         ...
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
-        """Return the curve and its derivatives by sigma up to `order`, shape (order + 1, K, m)."""
+        """Return the curve and its derivatives by sigma up to `order`, shape (order + 1, K, m or 12)."""
         ...

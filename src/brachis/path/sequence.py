@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.path.blend import blend
-from brachis.path.joins import find_joins, mismatch, refuse_corners
+from brachis.path.joins import corner_at, find_joins, refuse_corners
 from brachis.path.protocol import PathSample
+from brachis.path.rows import position_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from brachis.path.joins import Join
+    from brachis.path.joins import Corner
     from brachis.path.protocol import Array, Curve
 
 _QUADRATURE_POINTS = 16
@@ -69,6 +70,10 @@ class SequencePath:
         s : array_like, shape (K,)
             Path coordinates.
         """
+        return PathSample(*self.derivatives(s))
+
+    def derivatives(self, s: Sequence[float] | Array) -> Array:
+        """Return the coordinates and their derivatives by s up to the third, shape (4, K, m)."""
         values = np.atleast_1d(np.asarray(s, dtype=float))
         which = np.clip(np.searchsorted(self.breaks, values, side="right") - 1, 0, len(self.pieces) - 1)
         total = self.total
@@ -80,7 +85,7 @@ class SequencePath:
                 sigma = piece.first + (values[here] - self.breaks[i]) * total
                 result[:, here] = piece.curve.derivatives(sigma)
         result *= total ** np.arange(4)[:, None, None]
-        return PathSample(*result)
+        return result
 
 
 def join_curves(curves: Sequence[Curve], blends: Sequence[float | None], rows: tuple[str, ...]) -> SequencePath:
@@ -93,21 +98,20 @@ def join_curves(curves: Sequence[Curve], blends: Sequence[float | None], rows: t
     blends : sequence of float or None
         For every curve, what its blend with the next one takes from either, m.
     rows : tuple of str
-        Rows of the task space; yaw, if it is one, comes last.
+        Rows of the task space; yaw, if it is one, comes last. Curves of poses have the twelve coordinates of a pose.
 
     Raises
     ------
     PathError
         Curves do not continue each other to the third derivative and are not blended; or a blend does not fit.
     """
-    positions = len(rows) - ("yaw" in rows)
-    corners: list[tuple[Join, str]] = []
+    positions = len(position_rows(rows))
+    corners: list[Corner | None] = []
     pieces: list[Piece] = []
     taken = 0.0
     for join, curve, following, size in zip(find_joins(curves, rows), curves, curves[1:], blends, strict=False):
         if size is None:
-            jump = mismatch(curve, following, positions)
-            corners += [(join, jump)] if jump else []
+            corners.append(corner_at(join, curve, following))
             pieces.append(Piece(curve, taken, curve.length))
             taken = 0.0
         else:
@@ -115,7 +119,7 @@ def join_curves(curves: Sequence[Curve], blends: Sequence[float | None], rows: t
             pieces += [Piece(curve, taken, curve.length - size), Piece(rounded, 0.0, rounded.length)]
             taken = size
     pieces.append(Piece(curves[-1], taken, curves[-1].length))
-    refuse_corners(corners)
+    refuse_corners([corner for corner in corners if corner is not None])
     # Two blends that meet in the middle of a segment leave nothing of it, but rounding.
     kept = tuple(piece for piece in pieces if piece.length > _NOTHING * piece.curve.length)
     ends = np.cumsum([0.0, *(piece.length for piece in kept)])

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import PathError
+from brachis.path.rows import position_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from brachis.path.protocol import Array
+    from brachis.path.protocol import Array, Curve
 
 ZERO_LENGTH = 1e-9
 """Lengths (m) and angles (rad) below are rounding of the start posture's coordinates, not a motion."""
@@ -29,17 +30,20 @@ class Site:
     start : ndarray, shape (m,)
         Task coordinates at which the segment starts.
     rows : tuple of str
-        Rows of the task space.
+        Rows of the task space; of a pose its position rows.
+    oriented : bool
+        Whether the task space is that of poses.
     """
 
     key: str
     start: Array
     rows: tuple[str, ...]
+    oriented: bool = False
 
     @property
     def positions(self) -> tuple[str, ...]:
         """The position rows."""
-        return tuple(row for row in self.rows if row != "yaw")
+        return position_rows(self.rows)
 
     @property
     def position(self) -> Array:
@@ -50,6 +54,10 @@ class Site:
     def has_yaw(self) -> bool:
         """Whether yaw is a row of the task space."""
         return "yaw" in self.rows
+
+    def describe(self) -> str:
+        """Return the start in words."""
+        return place(self.rows, self.start)
 
     def coordinates(self, values: Sequence[float], key: str, rows: Sequence[str]) -> Array:
         """Return values as an array, after a check that there is one for each of `rows`.
@@ -81,7 +89,7 @@ class Site:
             problem = f"{what} needs {' or '.join(map(str, counts))} position rows"
             raise PathError(
                 problem,
-                found=f"task_space [{', '.join(self.rows)}]",
+                found=f"the position rows [{', '.join(self.positions)}]",
                 where=self.key,
                 hint="Use line: {to: [...]}, line: {by: [...]} or a spline",
             )
@@ -90,5 +98,20 @@ class Site:
         """Return the error that the segment has zero length."""
         problem = "the segment has zero length"
         return PathError(
-            problem, found=found, allowed="a motion away from the segment's start", where=f"{self.key}{key}"
+            problem,
+            found=found,
+            allowed="a motion away from the segment's start",
+            where=f"{self.key}{key}",
+            hint="A segment turn: {...} turns the tool on the spot" if self.oriented else None,
         )
+
+
+def place(rows: Sequence[str], point: Array) -> str:
+    """Return coordinates in words; of a pose its position."""
+    return ", ".join(f"{row} = {value:.6g}" for row, value in zip(rows, point, strict=False))
+
+
+def stands_still(curve: Curve, positions: int) -> bool:
+    """Return whether the position rows, the first ones, do not move along a curve."""
+    ends = curve.derivatives(curve.knots, 0)[0, :, :positions]
+    return bool(np.ptp(ends, axis=0).max() < ZERO_LENGTH)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from brachis.path.protocol import Array
     from brachis.task import SplineThrough
 
+START_TOLERANCE = 1e-4
+"""How far a segment may start from where its waypoints expect, m and rad."""
 _DEGREE = 5
 _FEWEST_WAYPOINTS = 3
 
@@ -49,15 +51,72 @@ class SplineCurve:
 
 def spline_through(shape: SplineThrough, site: Site) -> SplineCurve | LineCurve:
     """Return the smooth curve from the segment's start through waypoints; a line where there is only one."""
-    points = [
-        site.coordinates(point, f"through[{i}]", site.rows) + (site.start if shape.relative else 0.0)
-        for i, point in enumerate(shape.through)
-    ]
-    waypoints = np.stack([site.start, *points])
+    if shape.orientations is not None:
+        problem = "orientations are for task spaces of poses"
+        where = f"{site.key}.orientations"
+        raise PathError(problem, found=f"task_space [{', '.join(site.rows)}]", where=where, hint="Set task_space: pose")
+    waypoints = waypoints_of(shape, site)
     steps = np.diff(waypoints, axis=0)
     chords = np.linalg.norm(steps[:, : len(site.positions)], axis=1)
+    return interpolate(chord_knots(chords, np.linalg.norm(steps, axis=1), shape, site), waypoints)
+
+
+def waypoints_of(shape: SplineThrough, site: Site) -> Array:
+    """Return the segment's start and the waypoints, shape (n, m).
+
+    Raises
+    ------
+    PathError
+        A waypoint has the wrong number of coordinates, or the segment does not start where the waypoints expect.
+    """
+    points = [site.coordinates(point, f"through[{i}]", site.rows) for i, point in enumerate(shape.through)]
+    expected = None if shape.starts_at is None else site.coordinates(shape.starts_at, "starts_at", site.rows)
+    if shape.relative:
+        points = [point + site.start - (0.0 if expected is None else expected) for point in points]
+    elif expected is not None:
+        off = site.start - expected
+        count = len(site.positions)
+        distance = float(np.linalg.norm(off[:count]))
+        if distance > START_TOLERANCE:
+            raise starts_elsewhere(f"{site.key}.starts_at", f"{site.describe()}, {distance:.4g} m off")
+        if np.any(np.abs(off[count:]) > START_TOLERANCE):
+            raise starts_elsewhere(f"{site.key}.starts_at", f"{site.describe()}, {abs(off[-1]):.4g} rad off")
+    return np.stack([site.start, *points])
+
+
+def starts_elsewhere(where: str, found: str) -> PathError:
+    """Return the error that a segment does not start where its waypoints expect."""
+    problem = "the segment starts elsewhere than its waypoints expect"
+    return PathError(
+        problem,
+        found=found,
+        allowed=f"at most {START_TOLERANCE:g} m and rad off",
+        where=where,
+        hint="Set relative: true to count from the segment's start, or begin the path there",
+    )
+
+
+def chord_knots(chords: Array, otherwise: Array, shape: SplineThrough, site: Site) -> Array:
+    """Return the cumulative chord lengths, shape (n,), of n waypoints.
+
+    Parameters
+    ----------
+    chords : ndarray, shape (n - 1,)
+        Distances of successive waypoints, m.
+    otherwise : ndarray, shape (n - 1,)
+        What to take where all positions are the same, rad.
+    shape : SplineThrough
+        The waypoints.
+    site : Site
+        Place of the segment.
+
+    Raises
+    ------
+    PathError
+        Nothing moves, or a waypoint repeats its predecessor.
+    """
     if np.all(chords < ZERO_LENGTH):
-        chords = np.linalg.norm(steps, axis=1)
+        chords = otherwise
     if np.all(chords < ZERO_LENGTH):
         raise site.zero_length(key=".through", found=[list(point) for point in shape.through])
     if np.any(chords < ZERO_LENGTH):
@@ -71,9 +130,13 @@ def spline_through(shape: SplineThrough, site: Site) -> SplineCurve | LineCurve:
             allowed="waypoints that differ from their predecessors in the position rows",
             where=f"{site.key}.through[{repeated}]",
         )
-    knots = np.concatenate([[0.0], np.cumsum(chords)])
+    return np.concatenate([[0.0], np.cumsum(chords)])
+
+
+def interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
+    """Return the natural quintic spline, or the line, through waypoints of shape (n, m) at knots of shape (n,)."""
     if len(waypoints) < _FEWEST_WAYPOINTS:
-        return LineCurve(site.start, steps[0] / chords[0], float(chords[0]))
+        return LineCurve(waypoints[0], (waypoints[1] - waypoints[0]) / knots[1], float(knots[1]))
     return SplineCurve(_natural(knots, waypoints), float(knots[-1]), knots)
 
 

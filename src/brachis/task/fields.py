@@ -58,6 +58,13 @@ def refuse(problem: str, *, key: str = "", found: object = None, allowed: str = 
     )
 
 
+class _Chooser(Discriminator):
+    """A discriminator that can be hashed, so that the union which it serves can be part of another union."""
+
+    def __hash__(self) -> int:
+        return hash(self.discriminator)
+
+
 def by_form(allowed: str, *words: str) -> Discriminator:
     """Choose a union's member by the form of the value: a word, a number, a list, a mapping or null.
 
@@ -80,7 +87,7 @@ def by_form(allowed: str, *words: str) -> Discriminator:
             return "<list>"
         return "<mapping>" if isinstance(value, Mapping | BaseModel) else None
 
-    return Discriminator(
+    return _Chooser(
         form,
         custom_error_type=WRONG_FORM,
         custom_error_message="must be {allowed}",
@@ -109,7 +116,7 @@ def by_key(problem: str, members: Mapping[str, tuple[str, ...]]) -> Discriminato
         chosen = [name for name, keys in members.items() if any(key in value for key in keys)]
         return f"<{chosen[0]}>" if len(chosen) == 1 else None
 
-    return Discriminator(
+    return _Chooser(
         member,
         custom_error_type=WRONG_KEYS,
         custom_error_message="{problem}",

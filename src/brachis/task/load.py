@@ -9,9 +9,11 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from brachis.errors import TaskError
+from brachis.task.csv_path import expand_csv_files
 from brachis.task.messages import show, task_error
 from brachis.task.models import Task
 from brachis.task.robot_models import RobotSettings
+from brachis.task.text_file import read_text
 from brachis.task.yaml_reader import read_yaml
 
 
@@ -28,13 +30,14 @@ def load_task(source: str | os.PathLike[str] | Mapping[str, object] | Task) -> T
     -------
     Task
         The validated task. The path of the URDF is absolute: it was relative to the file's folder, or to the current
-        folder for a mapping.
+        folder for a mapping. CSV files of waypoints, relative to the same folder, are read; what comes back has splines
+        in their place and needs the files no more.
 
     Raises
     ------
     TaskError
         The file cannot be read or is not YAML, or the task is wrong. All mistakes are in one message, a line each, with
-        file, key, what was found and what is allowed.
+        file, key, what was found and what is allowed. Or a CSV file is wrong; the message names its line.
 
     Examples
     --------
@@ -56,7 +59,8 @@ def load_task(source: str | os.PathLike[str] | Mapping[str, object] | Task) -> T
         problem = "a task is loaded from a file or a mapping"
         raise TaskError(problem, found=type(source).__name__, allowed="a file name, a mapping, or a Task")
     path = Path(source)
-    task = _task_from(read_yaml(_read(path), str(path)), str(path), path.absolute().parent)
+    text = read_text(path, where=str(path), folder=Path.cwd())
+    task = _task_from(read_yaml(text, str(path)), str(path), path.absolute().parent)
     if task.robot.urdf is None:
         problem = "this key is required in a task file, and missing"
         raise TaskError(problem, where=f"{path}: robot.urdf", hint="Give the URDF's path, relative to the task file")
@@ -77,20 +81,6 @@ def check_robot_settings(content: Mapping[str, object]) -> RobotSettings:
         raise task_error(error, "robot", RobotSettings) from None
 
 
-def _read(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        problem = "there is no such file"
-        raise TaskError(problem, where=str(path), hint=f"Paths are relative to {Path.cwd()}") from None
-    except UnicodeDecodeError as error:
-        problem = f"not a text file in UTF-8: {error.reason} at byte {error.start}"
-        raise TaskError(problem, where=str(path)) from None
-    except OSError as error:
-        problem = f"the file cannot be read: {error.strerror}"
-        raise TaskError(problem, where=str(path)) from None
-
-
 def _task_from(content: object, source: str, folder: Path) -> Task:
     if not isinstance(content, Mapping):
         problem = "a task is a mapping"
@@ -102,6 +92,7 @@ def _task_from(content: object, source: str, folder: Path) -> Task:
     except RecursionError:
         problem = "the task contains itself (a YAML alias inside its own anchor)"
         raise TaskError(problem, where=source) from None
+    task = expand_csv_files(task, source, folder)
     if task.robot.urdf is None:
         return task
     # Not Path.resolve: a linked folder keeps its name, beside which the URDF's meshes may be.

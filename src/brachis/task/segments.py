@@ -1,20 +1,22 @@
 """Segments of the prescribed path, as the task file writes them.
 
-A path is a list of single-key mappings, ``- line: {to: [0.5, 0]}``, each with an optional ``blend``. A segment begins
-where its predecessor ends, the first one at the task coordinates of the start posture. Lengths are in metres, angles
-in degrees except the yaw coordinate, which is a task coordinate and therefore in radians. Whether the number of
-coordinates fits the task space is for the path to say (`brachis.path.build_path`), which knows both.
+A path is a list of mappings, ``- line: {to: [0.5, 0]}``, each with an optional ``blend`` and, in task spaces of poses,
+an optional ``orientation``. A segment begins where its predecessor ends, the first one at the task coordinates of the
+start posture. Lengths are in metres, angles in degrees except the yaw coordinate, which is a task coordinate and
+therefore in radians. Coordinates are those of all rows of the task space; of a pose they are x, y, z. Whether their
+number fits the task space is for the path to say (`brachis.path.build_path`), which knows both.
 """
 
 from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, Tag, field_validator
+from pydantic import Field, Tag, field_validator, model_validator
 
-from brachis.task.fields import Flag, Model, NonNegative, Number, Positive, Vector, by_key, refuse
+from brachis.task.fields import Flag, Model, Name, NonNegative, Number, Positive, Vector, by_key, refuse
+from brachis.task.orientation import Attitude, OrientationMode, Turning
 
-Turning = Annotated[
+Yaw = Annotated[
     Literal["fixed", "tangent"],
     Field(description="Yaw along the segment: as at its start, or turning with the tangent (task spaces with yaw)."),
 ]
@@ -53,7 +55,7 @@ class ArcCenter(Model):
         "or about the normal."
     )
     normal: Normal = None
-    yaw: Turning = "fixed"
+    yaw: Yaw = "fixed"
 
 
 class ArcVia(Model):
@@ -61,7 +63,7 @@ class ArcVia(Model):
 
     via: Vector = Field(description="A point between start and end, m: the position rows, without yaw.")
     to: Vector = Field(description="End point, m: the position rows, without yaw.")
-    yaw: Turning = "fixed"
+    yaw: Yaw = "fixed"
 
 
 class Circle(Model):
@@ -70,7 +72,7 @@ class Circle(Model):
     center: Centre
     turns: Number = Field(default=1.0, description="Number of turns, signed as an arc's angle; not zero.")
     normal: Normal = None
-    yaw: Turning = "fixed"
+    yaw: Yaw = "fixed"
 
     @field_validator("turns")
     @classmethod
@@ -87,7 +89,49 @@ class SplineThrough(Model):
     through: Annotated[tuple[Vector, ...], Field(min_length=1)] = Field(
         description="Waypoints: all rows of the task space each (m, yaw in rad)."
     )
-    relative: Flag = Field(default=False, description="Whether the waypoints are relative to the segment's start.")
+    orientations: tuple[Attitude, ...] | None = Field(
+        default=None,
+        description="Orientation of the tool at each waypoint, world frame (task spaces of poses). Null: the segment's "
+        "`orientation` says how the tool turns.",
+    )
+    relative: Flag = Field(
+        default=False,
+        description="Whether the waypoints are relative to the segment's start: displacements along the world axes, "
+        "rotations in the tool frame.",
+    )
+    starts_at: Vector | None = Field(
+        default=None,
+        description="Where the waypoints expect the segment to start: all rows of the task space. A start that is "
+        "elsewhere (by more than 1e-4 m or rad) is refused; with `relative` it is what the waypoints are relative to.",
+    )
+    starts_oriented: Attitude | None = Field(
+        default=None, description="As `starts_at`, the orientation of the tool; beside `orientations`."
+    )
+
+    @model_validator(mode="after")
+    def _orientations_fit(self) -> SplineThrough:
+        if self.orientations is None:
+            if self.starts_oriented is not None:
+                problem = "the orientation at the start stands beside the orientations at the waypoints"
+                raise refuse(problem, key=".starts_oriented", allowed="orientations as well")
+        elif len(self.orientations) != len(self.through):
+            problem = "a spline needs an orientation for each of its waypoints, or none"
+            allowed = f"{len(self.through)}, as there are waypoints in through"
+            raise refuse(problem, key=".orientations", found=len(self.orientations), allowed=allowed)
+        return self
+
+
+class CsvFile(Model):
+    """A smooth curve through waypoints from a file; `brachis.task.load_task` reads it and makes a spline of it."""
+
+    file: Name = Field(
+        description="CSV file, relative to the task file's folder; its first row is where the segment starts."
+    )
+    relative: Flag = Field(
+        default=False,
+        description="Whether the rows count from the first one, so that the path may start anywhere: displacements "
+        "along the world axes, rotations in the tool frame.",
+    )
 
 
 Line = Annotated[
@@ -106,7 +150,7 @@ Arc = Annotated[
         {"ArcCenter": ("center", "angle_deg"), "ArcVia": ("via", "to")},
     ),
 ]
-Shape = LineTo | LineBy | LineHeading | ArcCenter | ArcVia | Circle | SplineThrough
+Shape = LineTo | LineBy | LineHeading | ArcCenter | ArcVia | Circle | SplineThrough | CsvFile
 
 
 class SegmentModel(Model):
@@ -119,45 +163,76 @@ class SegmentModel(Model):
 
     @property
     def kind(self) -> str:
-        """The key that names the segment in the task file: ``line``, ``arc``, ``circle`` or ``spline``."""
-        return next(name for name in type(self).model_fields if name != "blend")
+        """The key that names the segment in the task file: ``line``, ``arc``, ``circle``, ``spline``, ..."""
+        return next(name for name in type(self).model_fields if name not in {"blend", "orientation"})
+
+
+class MovingSegment(SegmentModel):
+    """What all segments share along which the position moves."""
+
+    orientation: OrientationMode = Field(
+        default=None,
+        description="How the tool turns along the segment (task spaces of poses): fixed, tangent, {rotate: ...}, "
+        "{to: ...} or {tangent: ...}. Null: fixed, or as a spline's `orientations` say.",
+    )
 
     @property
     def shape(self) -> Shape:
-        """What stands below that key."""
+        """What stands below the key that names the segment."""
         shape: Shape = getattr(self, self.kind)
         return shape
 
 
-class LineSegment(SegmentModel):
+class LineSegment(MovingSegment):
     """A straight line."""
 
     line: Line
 
 
-class ArcSegment(SegmentModel):
+class ArcSegment(MovingSegment):
     """A circular arc."""
 
     arc: Arc
 
 
-class CircleSegment(SegmentModel):
+class CircleSegment(MovingSegment):
     """A circle."""
 
     circle: Circle
 
 
-class SplineSegment(SegmentModel):
+class SplineSegment(MovingSegment):
     """A smooth curve through waypoints."""
 
     spline: SplineThrough
+
+    @model_validator(mode="after")
+    def _one_word_on_orientation(self) -> SplineSegment:
+        if self.orientation is not None and self.spline.orientations is not None:
+            problem = "the spline's orientations say already how the tool turns"
+            raise refuse(problem, key=".orientation", allowed="orientation or spline.orientations, not both")
+        return self
+
+
+class TurnSegment(SegmentModel):
+    """A turn of the tool on the spot, in task spaces of poses."""
+
+    turn: Turning
+
+
+class CsvSegment(MovingSegment):
+    """A smooth curve through waypoints from a file."""
+
+    csv: CsvFile
 
 
 Segment = Annotated[
     Annotated[LineSegment, Tag("<LineSegment>")]
     | Annotated[ArcSegment, Tag("<ArcSegment>")]
     | Annotated[CircleSegment, Tag("<CircleSegment>")]
-    | Annotated[SplineSegment, Tag("<SplineSegment>")],
+    | Annotated[SplineSegment, Tag("<SplineSegment>")]
+    | Annotated[TurnSegment, Tag("<TurnSegment>")]
+    | Annotated[CsvSegment, Tag("<CsvSegment>")],
     by_key(
         "a segment needs exactly one kind",
         {
@@ -165,6 +240,8 @@ Segment = Annotated[
             "ArcSegment": ("arc",),
             "CircleSegment": ("circle",),
             "SplineSegment": ("spline",),
+            "TurnSegment": ("turn",),
+            "CsvSegment": ("csv",),
         },
     ),
 ]

@@ -1,0 +1,41 @@
+"""The curve of the task coordinates, or of a pose's position, for every form of segment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final, NoReturn
+
+from brachis.errors import PathError
+from brachis.path.arc import arc_center, arc_via, circle
+from brachis.path.line import line_by, line_heading, line_to
+from brachis.path.spline import spline_through
+from brachis.task import ArcCenter, ArcVia, Circle, CsvFile, LineBy, LineHeading, LineTo, SplineThrough
+
+if TYPE_CHECKING:
+    from brachis.path.protocol import Curve
+    from brachis.path.site import Site
+    from brachis.task import Shape
+
+
+def _unread(shape: CsvFile, site: Site) -> NoReturn:
+    problem = "the CSV file has not been read"
+    hint = "brachis.load_task reads it and makes a spline of it"
+    raise PathError(problem, found=shape.file, allowed="a spline", where=f"{site.key}.file", hint=hint)
+
+
+BUILDERS: Final[dict[type[Shape], Callable[[Any, Site], Curve]]] = {
+    LineTo: line_to,
+    LineBy: line_by,
+    LineHeading: line_heading,
+    ArcCenter: arc_center,
+    ArcVia: arc_via,
+    Circle: circle,
+    SplineThrough: spline_through,
+    CsvFile: _unread,
+}
+"""For every form of segment, the function that makes its curve."""
+
+
+def curve_of(shape: Shape, site: Site) -> Curve:
+    """Return the curve of a segment in all rows of the site."""
+    return BUILDERS[type(shape)](shape, site)

@@ -1,0 +1,136 @@
+"""Derivatives of products, unit vectors and sines; rotations; and the search for the smallest value."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from brachis.path.leibniz import product, sine_cosine, unit
+from brachis.path.rotations import (
+    angular_velocity,
+    hat,
+    matrices,
+    matrix,
+    quaternion_about,
+    quaternion_derivatives,
+    quaternion_from,
+    quaternion_of,
+    rotation_vector,
+    with_like_signs,
+)
+from brachis.path.sampling import smallest
+from brachis.task import Quaternion, RollPitchYaw, RotationVector
+
+ORDER = 4
+SIGMA = np.linspace(-1, 1, 7)
+
+
+def polynomial(coefficients, sigma, order=ORDER):
+    """Derivatives of vector polynomials, shape (order + 1, K, n)."""
+    polynomials = [np.polynomial.Polynomial(row) for row in coefficients]
+    return np.stack(
+        [np.stack([p.deriv(k)(sigma) if k else p(sigma) for p in polynomials], -1) for k in range(order + 1)]
+    )
+
+
+def assert_derivatives(function):
+    """Each derivative of ``function(sigma)``, (order + 1, K, ...), is the slope of the one before."""
+    exact, h = function(SIGMA), 1e-3
+    slope = sum(w * (function(SIGMA + k * h) - function(SIGMA - k * h)) for k, w in ((1, 45.0), (2, -9.0), (3, 1.0)))
+    slope /= 60 * h
+    assert len(exact) == ORDER + 1
+    for k in range(ORDER):
+        assert np.abs(exact[k + 1]).max() > 1e-3
+        np.testing.assert_allclose(slope[k], exact[k + 1], atol=1e-8 * np.abs(exact[k + 1]).max())
+
+
+RANDOM = np.random.default_rng(5)
+ONE, OTHER, QUATERNION = (RANDOM.uniform(-1, 1, (n, 6)) for n in (3, 3, 4))
+ANGLE = RANDOM.uniform(-1, 1, (1, 6))
+QUATERNION[0, 0] = 4.0
+
+
+def rotation_at(sigma):
+    return matrices(unit(polynomial(QUATERNION, sigma)))
+
+
+FUNCTIONS = {
+    "scalar product": lambda s: product(polynomial(ONE, s), polynomial(OTHER, s), "...i,...i->..."),
+    "cross product": lambda s: product(hat(polynomial(ONE, s)), polynomial(OTHER, s), "...ij,...j->...i"),
+    "unit vector": lambda s: unit(polynomial(QUATERNION, s)),
+    "sine": lambda s: sine_cosine(polynomial(ANGLE, s))[0],
+    "cosine": lambda s: sine_cosine(polynomial(ANGLE, s))[1],
+    "matrix": rotation_at,
+}
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_derivatives(name):
+    assert_derivatives(FUNCTIONS[name])
+
+
+def test_values():
+    one, other = polynomial(ONE, SIGMA), polynomial(OTHER, SIGMA)
+    np.testing.assert_allclose(FUNCTIONS["cross product"](SIGMA)[0], np.cross(one[0], other[0]))
+    np.testing.assert_allclose(np.linalg.norm(FUNCTIONS["unit vector"](SIGMA)[0], axis=1), 1.0)
+    np.testing.assert_allclose(FUNCTIONS["sine"](SIGMA)[0], np.sin(polynomial(ANGLE, SIGMA)[0]))
+
+
+def test_a_product_has_the_derivatives_that_both_factors_have():
+    assert len(product(np.ones((4, 2)), np.ones((3, 2)), "...,...->...")) == 3
+
+
+def test_rotations_agree_with_scipy():
+    for one in Rotation.random(50, rng=6):
+        quaternion = np.roll(one.as_quat(), 1)
+        np.testing.assert_allclose(matrix(quaternion), one.as_matrix(), atol=1e-14)
+        np.testing.assert_allclose(rotation_vector(quaternion), one.as_rotvec(), atol=1e-14)
+        np.testing.assert_allclose(rotation_vector(-quaternion), one.as_rotvec(), atol=1e-14)
+        for same in (quaternion_of(one.as_matrix()), quaternion_about(one.as_rotvec())):
+            assert abs(same @ quaternion) == pytest.approx(1.0, abs=1e-14)
+
+
+@pytest.mark.parametrize("vector", [[0, 0, 0], [1e-12, 0, 0], [np.pi, 0, 0], [0, np.pi, 0], [0, 0, np.pi]])
+def test_rotations_at_both_ends(vector):
+    quaternion = quaternion_of(Rotation.from_rotvec(vector).as_matrix())
+    np.testing.assert_allclose(rotation_vector(quaternion), vector, atol=1e-15)
+    np.testing.assert_allclose(quaternion_about(np.array(vector)), quaternion, atol=1e-15)
+
+
+def test_orientations_of_a_task():
+    expected = np.roll(Rotation.from_euler("xyz", [10, 20, 30], degrees=True).as_quat(), 1)
+    np.testing.assert_allclose(quaternion_from(RollPitchYaw(rpy_deg=(10, 20, 30))), expected)
+    vector = Rotation.from_euler("xyz", [10, 20, 30], degrees=True).as_rotvec()
+    np.testing.assert_allclose(quaternion_from(RotationVector(rotation_vector=tuple(vector))), expected)
+    rounded = tuple(np.round(expected, 3))
+    np.testing.assert_allclose(quaternion_from(Quaternion(quaternion=rounded)), expected, atol=1e-3)
+    assert np.linalg.norm(quaternion_from(Quaternion(quaternion=rounded))) == pytest.approx(1.0, abs=1e-15)
+
+
+def test_quaternion_derivatives_give_the_matrix_back():
+    rotation = rotation_at(SIGMA[2:3])[:, 0]
+    quaternion = quaternion_derivatives(rotation)
+    np.testing.assert_allclose(matrices(quaternion), rotation, atol=1e-12 * np.abs(rotation).max())
+
+
+def test_angular_velocity_about_an_axis():
+    axis = np.array([1.0, 2.0, -2.0]) / 3.0
+    angle = polynomial(ANGLE, SIGMA)[..., 0]
+    sine, cosine = sine_cosine(angle)
+    rotation = sine[..., None, None] * hat(axis) - cosine[..., None, None] * hat(axis) @ hat(axis)
+    rotation[0] += np.eye(3) + hat(axis) @ hat(axis)
+    np.testing.assert_allclose(angular_velocity(rotation), angle[1:, :, None] * axis, atol=1e-12)
+
+
+def test_signs_of_neighbours():
+    quaternions = np.stack([quaternion_about(np.array([0, 0, angle])) for angle in np.linspace(0, 12, 13)])
+    flipped = quaternions * RANDOM.choice([-1.0, 1.0], 13)[:, None]
+    np.testing.assert_allclose(with_like_signs(flipped), quaternions * np.sign(flipped[0] @ quaternions[0]))
+
+
+def test_the_smallest_value_is_found_between_the_points_looked_at():
+    where, value = smallest(lambda sigma: np.abs(sigma - np.pi / 3), np.array([0.0, 1.0, 4.0]))
+    assert where == pytest.approx(np.pi / 3, abs=1e-3)
+    assert value < 1e-3
+    assert smallest(lambda sigma: sigma, np.array([0.5, 2.0])) == (0.5, 0.5)

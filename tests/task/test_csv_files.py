@@ -1,0 +1,217 @@
+"""Waypoints from CSV files: what a task makes of them, and what every mistake is told."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from brachis.errors import PathError, TaskError
+from brachis.path import Path as TaskPath
+from brachis.path import build_path
+from brachis.path.rows import POSE_ROWS
+from brachis.task import CsvSegment, Quaternion, RotationVector, SplineSegment, SplineThrough, Task, load_task
+from support.poses import pose
+
+TURNS = Rotation.from_rotvec([[0.1, 0.2, 0.3], [0.2, 0.2, 0.9], [0.5, 0.1, 1.2], [0.9, 0, 1.2]])
+POINTS = np.array([[0.5, 0.1, 0.3], [0.7, 0.2, 0.3], [0.8, 0.4, 0.5], [1.0, 0.4, 0.6]])
+QUATERNIONS = np.roll(TURNS.as_quat(), 1, axis=1)
+S = np.linspace(0, 1, 20)
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def write(header: str, rows: Any, name: str = "poses.csv") -> None:
+    lines = [header, *(",".join(repr(float(value)) for value in row) for row in rows)]
+    Path(name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def task(space: Any = "pose", **keys: Any) -> Task:
+    segment = {"csv": {"file": "poses.csv"} | keys}
+    return load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": space, "path": [segment]})
+
+
+def spline_of(one: Task) -> SplineThrough:
+    (segment,) = one.path
+    assert isinstance(segment, SplineSegment)
+    return segment.spline
+
+
+def path_of(one: Task, position: Any, turn: Rotation) -> TaskPath:
+    return build_path(one.path, pose(position, turn), POSE_ROWS)
+
+
+def test_quaternions() -> None:
+    write("x,y,z,qw,qx,qy,qz", np.hstack([POINTS, QUATERNIONS]))
+    spline = spline_of(task())
+    assert spline.through == tuple(map(tuple, POINTS[1:].tolist()))
+    assert spline.orientations == tuple(Quaternion(quaternion=tuple(one)) for one in QUATERNIONS[1:].tolist())
+    assert spline.starts_at == tuple(POINTS[0].tolist())
+    assert spline.starts_oriented == Quaternion(quaternion=tuple(QUATERNIONS[0].tolist()))
+    assert not spline.relative
+
+
+def test_rotation_vectors_in_any_order_of_columns() -> None:
+    write("rz,ry,rx,z,y,x", np.hstack([POINTS, TURNS.as_rotvec()])[:, ::-1])
+    spline = spline_of(task("pose_free_roll"))
+    assert spline.through == tuple(map(tuple, POINTS[1:].tolist()))
+    assert spline.starts_oriented == RotationVector(rotation_vector=tuple(TURNS.as_rotvec()[0].tolist()))
+
+
+def test_both_forms_give_the_same_path() -> None:
+    write("x,y,z,qw,qx,qy,qz", np.hstack([POINTS, -QUATERNIONS]))
+    one = path_of(task(), POINTS[0], TURNS[0])
+    write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
+    other = path_of(task(), POINTS[0], TURNS[0])
+    np.testing.assert_allclose(one.sample(S).target, other.sample(S).target, atol=1e-12)
+    np.testing.assert_allclose(one.sample([1.0]).target[0], pose(POINTS[-1], TURNS[-1]), atol=1e-12)
+
+
+def test_positions_alone_leave_the_orientation_to_the_segment() -> None:
+    write("x,y,z", POINTS)
+    segment = {"csv": {"file": "poses.csv"}, "orientation": "tangent", "blend": 0.01}
+    line = {"line": {"by": [0.1, 0, 0]}}
+    made = load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": "pose", "path": [segment, line]})
+    through = tuple(map(tuple, POINTS[1:].tolist()))
+    spline = SplineThrough(through=through, starts_at=tuple(POINTS[0].tolist()))
+    assert made.path[0] == SplineSegment(spline=spline, orientation="tangent", blend=0.01)
+    path_of(made, POINTS[0], TURNS[0])
+
+
+@pytest.mark.parametrize("rows", [["x", "y"], ["x", "z", "yaw"], "position", ["y"]])
+def test_rows(rows: Any) -> None:
+    names = ["x", "y", "z"] if rows == "position" else rows
+    write(",".join(names), POINTS[:, : len(names)])
+    made = task(rows)
+    path = build_path(made.path, POINTS[0, : len(names)], names)
+    np.testing.assert_allclose(path.sample([0.0, 1.0]).target, POINTS[[0, -1], : len(names)], atol=1e-12)
+
+
+def test_relative_rows_start_anywhere() -> None:
+    write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
+    recorded = path_of(task(), POINTS[0], TURNS[0]).sample(S).target
+    start, turn = np.array([3.0, 2.0, 1.0]), Rotation.from_rotvec([1.0, -0.4, 0.2])
+    moved = path_of(task(relative=True), start, turn).sample(S).target
+    np.testing.assert_allclose(moved[:, :3], recorded[:, :3] - POINTS[0] + start, atol=1e-12)
+    change = turn * TURNS[0].inv()
+    expected = change.as_matrix() @ recorded[:, 3:].reshape(-1, 3, 3)
+    np.testing.assert_allclose(moved[:, 3:].reshape(-1, 3, 3), expected, atol=1e-12)
+
+
+def test_a_start_elsewhere_is_told_by_how_much() -> None:
+    write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
+    with pytest.raises(PathError, match=r"starts_at: .*0.02 m off; allowed: at most 0.0001 m .*relative: true"):
+        path_of(task(), POINTS[0] + [0, 0.02, 0], TURNS[0])
+    with pytest.raises(PathError, match=r"starts_oriented: .* 0.3 rad off"):
+        path_of(task(), POINTS[0], TURNS[0] * Rotation.from_rotvec([0, 0.3, 0]))
+
+
+@pytest.mark.parametrize("relative", [True, False])
+def test_a_loaded_task_needs_the_file_no_more(relative: bool) -> None:  # noqa: FBT001
+    write("x,y,z,qw,qx,qy,qz", np.hstack([POINTS, QUATERNIONS]))
+    once = task(relative=relative)
+    Path("poses.csv").unlink()
+    assert load_task(json.loads(json.dumps(once.to_dict(), allow_nan=False))) == once
+
+
+def test_the_file_is_relative_to_the_task_file() -> None:
+    Path("tasks").mkdir()
+    write("x,y,z", POINTS, "tasks/poses.csv")
+    text = "{brachis: 1, robot: {urdf: a}, start: {joints: [0]}, task_space: pose, path: [{csv: {file: poses.csv}}]}"
+    Path("tasks/task.yaml").write_text(text, encoding="utf-8")
+    assert spline_of(load_task("tasks/task.yaml")).through == tuple(map(tuple, POINTS[1:].tolist()))
+    Path("tasks/poses.csv").unlink()
+    with pytest.raises(TaskError) as caught:
+        load_task("tasks/task.yaml")
+    assert str(caught.value) == (
+        "tasks/task.yaml: path[0].csv.file: there is no such file; found poses.csv. "
+        f"Paths are relative to {Path.cwd() / 'tasks'}"
+    )
+
+
+def test_what_spreadsheets_write_is_read() -> None:
+    content = '\ufeff# recorded by hand\r\n\r\n x, y ,z\r\n0,0,0\r\n 1, 0,\t0\r\n\r\n"2",1e-1,0\r\n'
+    Path("poses.csv").write_bytes(content.encode())
+    assert spline_of(task()).through == ((1.0, 0.0, 0.0), (2.0, 0.1, 0.0))
+
+
+def test_poses_on_the_spot() -> None:
+    write("x,y,z,rx,ry,rz", np.hstack([POINTS[[0, 0, 0, 0]], TURNS.as_rotvec()]))
+    sample = path_of(task(), POINTS[0], TURNS[0]).sample([0.0, 1.0])
+    np.testing.assert_allclose(sample.target[1], pose(POINTS[0], TURNS[-1]), atol=1e-12)
+
+
+def test_a_task_that_is_not_loaded_keeps_the_file() -> None:
+    made = Task.model_validate(
+        {"brachis": 1, "start": {"joints": [0]}, "task_space": "pose", "path": [{"csv": {"file": "poses.csv"}}]}
+    )
+    assert isinstance(made.path[0], CsvSegment)
+
+
+MISTAKES: list[tuple[str, list[str]]] = [
+    ("", ["poses.csv: the file is empty; allowed: x,y,z | x,y,z,qw,qx,qy,qz | x,y,z,rx,ry,rz"]),
+    ("# nothing\n\n", ["poses.csv: the file is empty"]),
+    ("x,y\n0,0\n1,1", ["poses.csv: line 1: wrong columns; found x, y; allowed: x,y,z | x,y,z,qw"]),
+    ("t,x,y,z\n0,0,0,0", ["line 1: wrong columns; found t, x, y, z", "The first line names the columns"]),
+    ("x,y,z,z\n0,0,0,0", ["line 1: wrong columns; found x, y, z, z"]),
+    ("x,y,z,qx,qy,qz\n0,0,0,0,0,0", ["line 1: wrong columns"]),
+    ("X,Y,Z\n0,0,0", ["line 1: wrong columns; found X, Y, Z"]),
+    ("x;y;z\n0;0;0", ["line 1: wrong columns; found x;y;z", "commas separate them"]),
+    ("0,0,0\n1,1,1", ["line 1: wrong columns; found 0, 0, 0"]),
+    ("x,y,z\n0,0,0", ["poses.csv: a path needs its start and at least one waypoint; found 1 rows"]),
+    ("x,y,z\n0,0,0\n1,2\n", ["poses.csv: line 3: wrong number of values; found 2; allowed: 3: x, y, z"]),
+    ("x,y,z\n\n0,0,0\n1,1,one\n", ["line 4: the value of column z is not a finite number; found 'one'"]),
+    ("x,y,z\n0,0,0\n1,,1\n", ["line 3: the value of column y is not a finite number; found ''"]),
+    ("x,y,z\n0,0,nan\n1,1,1\n", ["line 2: the value of column z is not a finite number; found 'nan'"]),
+    ("x,y,z\n0,0,0\n1,1,1\n1,1,1\n", ["line 4: the row repeats line 3; found x = 1, y = 1, z = 1"]),
+    ("x,y,z\n0,0,0\n0,0,0\n1,1,1\n", ["line 3: the row repeats line 2"]),
+    ("x,y,z,rx,ry,rz\n0,0,0,0,0,0\n1,1,1,0,0,0\n1,1,1,0,0,1\n", ["line 4: the row repeats line 3", "in x, y, z"]),
+    ("x,y,z,rx,ry,rz\n0,0,0,0,0,0\n0,0,0,0,0,0\n", ["line 3: the row repeats line 2", "differ", "rx, ry, rz"]),
+    (
+        "x,y,z,qw,qx,qy,qz\n0,0,0,1,0,0,0\n1,1,1,1,1,0,0\n",
+        ["line 3: the quaternion's length is 1.41421; found [1.0, 1.0, 0.0, 0.0]"],
+    ),
+    ("x,y,z\n0,0,0\n" + "1" * 200_000, ["line 3: not a CSV file: field larger than field limit"]),
+]
+
+
+@pytest.mark.parametrize(("content", "expected"), MISTAKES, ids=[content[:40] for content, _ in MISTAKES])
+def test_wrong_files(content: str, expected: list[str]) -> None:
+    Path("poses.csv").write_text(content, encoding="utf-8")
+    with pytest.raises(TaskError) as caught:
+        task()
+    assert str(caught.value).startswith(str(Path("poses.csv").absolute()))
+    for text in expected:
+        assert text in str(caught.value)
+
+
+def test_columns_of_the_wrong_task_space() -> None:
+    write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
+    with pytest.raises(TaskError, match=r"line 1: wrong columns; found x, y, z, rx, ry, rz; allowed: x,y,yaw"):
+        task(["x", "y", "yaw"])
+
+
+def test_unreadable_files() -> None:
+    with pytest.raises(TaskError, match=r"task: path\[0\].csv.file: there is no such file; found poses.csv"):
+        task()
+    Path("poses.csv").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(TaskError, match=r"path\[0\].csv.file: not a text file in UTF-8"):
+        task()
+    Path("poses.csv").unlink()
+    Path("poses.csv").mkdir()
+    with pytest.raises(TaskError, match=r"path\[0\].csv.file: the file cannot be read"):
+        task()
+
+
+def test_one_word_on_the_orientation() -> None:
+    write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
+    segment = {"csv": {"file": "poses.csv"}, "orientation": "fixed"}
+    with pytest.raises(TaskError, match=r"path\[0\].orientation: the CSV file's columns say already"):
+        load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": "pose", "path": [segment]})

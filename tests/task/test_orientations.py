@@ -1,0 +1,169 @@
+"""How a task file orients the tool: what is accepted, what comes back, and what every mistake is told."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brachis.errors import TaskError
+from brachis.task import (
+    AlongTangent,
+    LineSegment,
+    Quaternion,
+    Rotate,
+    Rotation,
+    SplineSegment,
+    Tangent,
+    Task,
+    ToRollPitchYaw,
+    TurnSegment,
+    TurnTo,
+    json_schema,
+    load_task,
+)
+
+LINE: dict[str, Any] = {"line": {"to": [1, 0, 0]}}
+ROTATE: dict[str, Any] = {"rotate": {"axis": [0, 0, 2], "angle_deg": 90}}
+QUATERNION: dict[str, Any] = {"quaternion": [0.6, 0, 0, -0.8]}
+SPLINE: dict[str, Any] = {"through": [[1, 0, 0], [1, 1, 0]], "orientations": [QUATERNION, {"rpy_deg": [1, 2, 3]}]}
+
+
+def written(*segments: dict[str, Any], space: Any = "pose") -> dict[str, Any]:
+    return {"brachis": 1, "start": {"joints": [0]}, "task_space": space, "path": list(segments)}
+
+
+def task(*segments: dict[str, Any]) -> Task:
+    return load_task(written(*segments))
+
+
+SEGMENTS: list[dict[str, Any]] = [
+    LINE,
+    LINE | {"orientation": None},
+    LINE | {"orientation": "fixed"},
+    LINE | {"orientation": "tangent"},
+    LINE | {"orientation": {"tangent": {}}},
+    LINE | {"orientation": {"tangent": {"up": [0, 1, 0]}}},
+    LINE | {"orientation": ROTATE},
+    LINE | {"orientation": {"rotate": ROTATE["rotate"] | {"frame": "tool", "profile": "smooth"}}},
+    LINE | {"orientation": {"to": QUATERNION | {"profile": "smooth"}}},
+    LINE | {"orientation": {"to": {"rotation_vector": [0, 0, 1]}}},
+    LINE | {"orientation": {"to": {"rpy_deg": [1, 2, 3]}}},
+    {"spline": SPLINE},
+    {"spline": SPLINE | {"starts_at": [0, 0, 0], "starts_oriented": {"rotation_vector": [0, 0, 1]}, "relative": True}},
+    {"turn": ROTATE},
+    {"turn": {"to": {"rpy_deg": [1, 2, 3], "profile": "smooth"}}},
+]
+
+
+@pytest.mark.parametrize("segment", SEGMENTS, ids=json.dumps)
+def test_round_trip(segment: dict[str, Any]) -> None:
+    once = task(segment)
+    assert load_task(json.loads(json.dumps(once.to_dict(), allow_nan=False))) == once
+    validators = pytest.importorskip("jsonschema").validators
+    validator = validators.validator_for(json_schema())(json_schema())
+    assert validator.is_valid(written(segment))
+    assert validator.is_valid(once.to_dict())
+
+
+def test_a_task_may_be_made_of_models() -> None:
+    rotate = Rotate(rotate=Rotation(axis=(0, 0, 2), angle_deg=90))
+    line = task(LINE | {"orientation": ROTATE}).path[0]
+    assert isinstance(line, LineSegment)
+    assert line == LineSegment(line=line.line, orientation=rotate)
+    assert task({"turn": ROTATE}).path[0] == TurnSegment(turn=rotate)
+    up = AlongTangent(tangent=Tangent(up=(0, 0, 1)))
+    made = load_task(written(LINE | {"orientation": {"tangent": {"up": np.array([0, 0, 1])}}}))
+    assert made.path[0] == LineSegment(line=line.line, orientation=up)
+    spline = task({"spline": SPLINE}).path[0]
+    assert isinstance(spline, SplineSegment)
+    assert spline.spline.orientations is not None
+    assert spline.spline.orientations[0] == Quaternion(quaternion=(0.6, 0, 0, -0.8))
+
+
+def test_defaults() -> None:
+    assert task(LINE).path[0] == LineSegment(line={"to": (1, 0, 0)}, orientation=None)  # type: ignore[arg-type]
+    rotation = Rotation(axis=(0, 0, 1), angle_deg=1)
+    assert (rotation.frame, rotation.profile) == ("world", "uniform")
+    assert TurnTo(to=ToRollPitchYaw(rpy_deg=(0, 0, 1))).to.profile == "uniform"
+    assert [segment.kind for segment in task(LINE | {"orientation": "fixed"}, {"turn": ROTATE}).path] == [
+        "line",
+        "turn",
+    ]
+
+
+MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
+    (
+        LINE | {"orientation": "tangnt"},
+        ["path[0].orientation: wrong form; found 'tangnt'", "fixed | tangent | {rotate"],
+    ),
+    (LINE | {"orientation": 90}, ["path[0].orientation: wrong form; found 90"]),
+    (
+        LINE | {"orientation": {}},
+        ["path[0].orientation: an orientation along a segment needs exactly one", "{tangent}"],
+    ),
+    (
+        LINE | {"orientation": ROTATE | {"to": QUATERNION}},
+        ["path[0].orientation: ", "found a mapping with the keys rotate"],
+    ),
+    (LINE | {"orientation": {"rotat": {}}}, ["path[0].orientation: ", "Did you mean 'rotate'?"]),
+    (LINE | {"orientation": {"rotate": {"axis": [0, 0, 1]}}}, ["rotate.angle_deg: this key is required, and missing"]),
+    (
+        LINE | {"orientation": {"rotate": {"axis": [0, 0, 0], "angle_deg": 9}}},
+        ["path[0].orientation.rotate.axis: a direction cannot have zero length; found [0.0, 0.0, 0.0]"],
+    ),
+    (LINE | {"orientation": {"rotate": {"axis": [1, 0], "angle_deg": 9}}}, ["rotate.axis[2]: the list is too short"]),
+    (
+        LINE | {"orientation": {"rotate": ROTATE["rotate"] | {"frame": "base"}}},
+        ["path[0].orientation.rotate.frame: not one of the allowed values; found 'base'", "'world' or 'tool'"],
+    ),
+    (
+        LINE | {"orientation": {"rotate": ROTATE["rotate"] | {"profile": "linear"}}},
+        ["path[0].orientation.rotate.profile: ", "'uniform' or 'smooth'"],
+    ),
+    (LINE | {"orientation": {"to": {"rpy": [0, 0, 0]}}}, ["path[0].orientation.to: ", "Did you mean 'rpy_deg'?"]),
+    (
+        LINE | {"orientation": {"to": [0, 0, 0]}},
+        ["path[0].orientation.to: an orientation needs exactly one", "(a list)"],
+    ),
+    (LINE | {"orientation": {"to": {"quaternion": [1, 0, 0]}}}, ["to.quaternion[3]: the list is too short"]),
+    (
+        LINE | {"orientation": {"to": {"quaternion": [1, 0, 0, 1]}}},
+        ["path[0].orientation.to.quaternion: the quaternion's length is 1.41421; found [1.0, 0.0, 0.0, 1.0]"],
+    ),
+    (LINE | {"orientation": {"to": QUATERNION | {"frame": "tool"}}}, ["orientation.to.frame: unknown key", "profile"]),
+    (LINE | {"orientation": {"tangent": {"up": [0, 0, 0]}}}, ["orientation.tangent.up: a direction cannot have zero"]),
+    (LINE | {"orientation": {"tangent": True}}, ["path[0].orientation.tangent: wrong type", "a mapping"]),
+    ({"turn": "fixed"}, ["path[0].turn: a turn needs exactly one of its forms", "{rotate} | {to}"]),
+    ({"turn": {"tangent": {}}}, ["path[0].turn: a turn needs exactly one of its forms"]),
+    ({"turn": ROTATE, "orientation": "fixed"}, ["path[0].orientation: unknown key", "allowed: blend, turn"]),
+    (
+        {"spline": SPLINE | {"orientations": [QUATERNION]}},
+        ["path[0].spline.orientations: a spline needs an orientation for each", "found 1; allowed: 2"],
+    ),
+    (
+        {"spline": SPLINE | {"orientations": [QUATERNION, {"quaternion": [2, 0, 0, 0]}]}},
+        ["path[0].spline.orientations[1].quaternion: the quaternion's length is 2"],
+    ),
+    (
+        {"spline": {"through": [[1, 0, 0]], "starts_oriented": QUATERNION}},
+        ["path[0].spline.starts_oriented: the orientation at the start stands beside"],
+    ),
+    (
+        {"spline": SPLINE, "orientation": "fixed"},
+        ["path[0].orientation: the spline's orientations say already", "found a mapping with the keys spline, orient"],
+    ),
+    ({"csv": {}}, ["path[0].csv.file: this key is required, and missing"]),
+]
+
+
+@pytest.mark.parametrize(("segment", "expected"), MISTAKES, ids=[json.dumps(segment) for segment, _ in MISTAKES])
+def test_every_mistake_is_named(segment: dict[str, Any], expected: list[str]) -> None:
+    with pytest.raises(TaskError) as caught:
+        task(segment)
+    message = str(caught.value)
+    assert "mistakes" not in message, "one mistake, one complaint"
+    for text in expected:
+        assert text in message
