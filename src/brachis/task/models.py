@@ -106,16 +106,21 @@ class Task(Model):
     start: Posture = Field(description="Configuration at the start of the path.")
     path_start: tuple[Number, ...] | None = Field(
         default=None,
-        description="Where the path begins: all rows of the task space (m, yaw in rad). Null: where the start "
-        "posture's "
-        "tool is; otherwise a start posture whose tool is elsewhere is refused.",
+        description="Where the path begins: all rows of the task space (m, yaw in rad); of a pose the position and a "
+        "quaternion w, x, y, z. Null: where the start posture's tool is; otherwise a start posture whose tool is "
+        "elsewhere is refused.",
     )
     end: End = Field(default="free", description="Configuration at the end of the path: free, or {joints: ...}.")
     task_space: TaskSpace = Field(
-        description="What the path prescribes: rows out of x, y, z, yaw (yaw last, with two others), or a word."
+        description="What the path prescribes: rows out of x, y, z, yaw (yaw last, with two others); position (all "
+        "of x, y, z); pose; or pose_free_roll, a pose that may roll about the tool frame's z axis."
     )
     path: Annotated[tuple[Segment, ...], Field(min_length=1)] = Field(description="Segments of the path, in order.")
-    redundant_joints: tuple[Name, ...] = Field(default=(), description="Joints that are free along the path.")
+    redundant_joints: tuple[Name, ...] = Field(
+        default=(),
+        description="Joints that are free along the path. With pose_free_roll the virtual joint tool_roll, which rolls "
+        "the tool, is one of the robot's; it may be left out here.",
+    )
     branch: Name | None = Field(default=None, description="Label of the branch of the closed form. Null: the start's.")
     spline: SplineSettings = Field(default_factory=SplineSettings, description="B-splines.")
     solver: SolverSettings = Field(default_factory=SolverSettings, description="Solver.")
