@@ -64,6 +64,16 @@ class Displacement:
             translation=-apply_inverse(self.rotation, self.translation),
         )
 
+    def __getitem__(self, samples: np.ndarray) -> Displacement:
+        """Return some of the equations, repeated where their indices are."""
+        return Displacement(
+            axes=np.take(self.axes, samples, axis=2),
+            points=np.take(self.points, samples, axis=2),
+            revolute=self.revolute,
+            rotation=np.take(self.rotation, samples, axis=2),
+            translation=np.take(self.translation, samples, axis=1),
+        )
+
     def moved(self, position: np.ndarray) -> np.ndarray:
         """Apply D to positions (3, K)."""
         return apply(self.rotation, position) + self.translation

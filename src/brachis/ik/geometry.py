@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from brachis.ik.vectors import apply, cross
+from brachis.ik.vectors import cross
 from brachis.robot import Robot
 
 
@@ -143,33 +143,31 @@ class ChainGeometry:
         """Move joints one after the other; q is (n, K), and `moving` says which of them move at all."""
         count = q.shape[1]
         axes, points = (np.empty((3, self.n, count), dtype=q.dtype) for _ in range(2))
-        rotation = np.eye(3, dtype=q.dtype)[:, :, None]
-        offset = np.zeros((3, 1), dtype=q.dtype)
-        for i in range(self.n):
-            axis, point = self.axes[i][:, None], self.points[i][:, None]
-            axes[:, i] = apply(rotation, axis)
-            points[:, i] = apply(rotation, point) + offset
-            if not moving[i]:
-                continue
+        rotation, offset = np.eye(3, dtype=q.dtype)[:, :, None], np.zeros((3, 1), dtype=q.dtype)
+        placed = 0
+        for i in np.flatnonzero(moving).tolist():
+            here = slice(placed, i + 1)
+            axes[:, here] = self.axes[here] @ rotation
+            points[:, here] = self.points[here] @ rotation + offset[:, None]
             if self.revolute[i]:
-                rotation = _matrix_product(rotation, _rotations(self.axes[i], q[i]))
-                offset = points[:, i] - apply(rotation, point)
+                rotation = _turned(rotation, self.axes[i], q[i])
+                offset = points[:, i] - (self.points[i, None] @ rotation)[:, 0]
             else:
                 offset = offset + axes[:, i] * q[i]
-        position = apply(rotation, self.tool_position[:, None]) + offset
-        tool = _matrix_product(rotation, self.tool_rotation[:, :, None])
+            placed = i + 1
+        axes[:, placed:] = self.axes[placed:] @ rotation
+        points[:, placed:] = self.points[placed:] @ rotation + offset[:, None]
+        position = (self.tool_position[None] @ rotation)[:, 0] + offset
+        tool = self.tool_rotation.T @ rotation
         return PosedScrews(
             axes, points, np.broadcast_to(position, (3, count)), np.broadcast_to(tool, (3, 3, count)), self.revolute
         )
 
 
-def _matrix_product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Products of matrices (3, 3, K or 1)."""
-    return np.stack([apply(first, second[:, column]) for column in range(3)], axis=1)
+def _turned(rotation: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Rotation matrices (3, 3, K or 1) times those about one unit axis (Rodrigues' formula), (3, 3, K).
 
-
-def _rotations(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Rotation matrices (3, 3, K) about one unit axis (Rodrigues' formula)."""
+    Matrices that are the same for all samples act from the left on the columns' index: one product for all samples.
+    """
     skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    cos, sin = np.cos(angle), np.sin(angle)
-    return np.eye(3)[:, :, None] + skew[:, :, None] * sin + (skew @ skew)[:, :, None] * (1.0 - cos)
+    return rotation + (skew.T @ rotation) * np.sin(angle) + (skew @ skew @ rotation) * (1.0 - np.cos(angle))

@@ -16,13 +16,17 @@ from functools import cache
 import numpy as np
 
 from brachis.errors import DecompositionError, UnknownNameError
+from brachis.ik.eaik import eaik
 from brachis.ik.geometry import ChainGeometry
+from brachis.ik.parallel_axes import parallel_axes
 from brachis.ik.planar import planar
+from brachis.ik.polynomial import polynomial
 from brachis.ik.prismatic import prismatic
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError
+from brachis.ik.spherical_wrist import spherical_wrist
 from brachis.robot import Robot, TaskSpace
 
-BUILTIN: tuple[Family, ...] = (prismatic, planar)
+BUILTIN: tuple[Family, ...] = (prismatic, planar, spherical_wrist, parallel_axes, eaik, polynomial)
 
 _CHECKED_POSTURES = 16
 _POSE_TOLERANCE = 1e-8

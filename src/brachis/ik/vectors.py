@@ -1,7 +1,7 @@
 """Vectors with their three components along the FIRST axis, and the subproblems that closed forms are made of.
 
-Arrays have shape (3, ...); the other axes broadcast (samples, then branches). Components are written out, which is
-faster than einsum for so small a dimension and keeps complex numbers analytic (no conjugates, no absolute values).
+Arrays have shape (3, ...); the other axes broadcast (samples, then branches). Complex numbers stay analytic: there are
+no conjugates and no absolute values.
 
 Subproblems as in B. Paden, Kinematics and control of robot manipulators, PhD thesis, Berkeley 1985, and A. J. Elias,
 J. T. Wen, "IK-Geo: unified robot inverse kinematics using subproblem decomposition", 2022.
@@ -14,12 +14,17 @@ import numpy as np
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Scalar product, shape (...)."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return np.einsum("i...,i...->...", a, b)
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Vector product, shape (3, ...)."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    first = a[1] * b[2]
+    product = np.empty((3, *first.shape), dtype=first.dtype)
+    np.subtract(first, a[2] * b[1], out=product[0, ...])
+    np.subtract(a[2] * b[0], a[0] * b[2], out=product[1, ...])
+    np.subtract(a[0] * b[1], a[1] * b[0], out=product[2, ...])
+    return product
 
 
 def across(axis: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -49,8 +54,12 @@ def apply_inverse(rotation: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 
 def angle_about(axis: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Angle in (-pi, pi] that turns `start` towards `end` about a unit axis, whatever their parts along it, (...)."""
-    return np.arctan2(dot(axis, cross(start, end)), dot(start, end) - dot(axis, start) * dot(axis, end))
+    """Angle in [-pi, pi] that turns `start` towards `end` about a unit axis, whatever their parts along it, (...).
+
+    These parts are taken off first: what is left may be small, and its direction is all that matters.
+    """
+    start, end = across(axis, start), across(axis, end)
+    return np.arctan2(dot(axis, cross(start, end)), dot(start, end))
 
 
 def cosine_roots(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -100,3 +109,27 @@ def turned_distance(
     lever = across(axis, arm)
     rest = dot(arm, arm) + dot(away, away) - 2.0 * dot(axis, arm) * dot(axis, away)
     return dot(away, lever), dot(away, cross(axis, lever)), rest
+
+
+def perpendiculars(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors that make a right-handed frame with a unit axis: ``first x second = axis``, each (3, ...).
+
+    T. Duff et al., "Building an orthonormal basis, revisited", Journal of Computer Graphics Techniques 6(1), 2017.
+    """
+    x, y, z = axis
+    sign = np.copysign(1.0, z)
+    scale = -1.0 / (sign + z)
+    mixed = x * y * scale
+    first = np.stack([1.0 + sign * x * x * scale, sign * mixed, -sign * x])
+    return first, np.stack([mixed, sign + y * y * scale, -y])
+
+
+def meeting_point(axis: np.ndarray, point: np.ndarray, other: np.ndarray, through: np.ndarray) -> np.ndarray:
+    """Position on the line through `point` along `axis` that is nearest to a second line, (3, ...)."""
+    normal = cross(axis, other)
+    return point + axis * (dot(cross(through - point, other), normal) / dot(normal, normal))
+
+
+def wrap(angle: np.ndarray) -> np.ndarray:
+    """Return the same angles in (-pi, pi]."""
+    return angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi))

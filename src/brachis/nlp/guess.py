@@ -25,6 +25,7 @@ _UNFOLDING_STEPS = 20
 _UNFOLDING_STEP = 0.06
 _LARGEST_STEP = 0.2
 _LONGEST_TIME = 200.0
+_RANGE_PUSH = 20.0
 
 
 @dataclass(frozen=True)
@@ -167,8 +168,8 @@ def _wish(decomposition: Decomposition, strategy: Strategy, q: np.ndarray, previ
     # A tenth of the range, or of a radian or metre where it is open, is kept clear at each end.
     stroke = limits.position_upper - limits.position_lower
     clear = 0.1 * np.where(np.isfinite(stroke), stroke, 1.0)
-    wish += strategy.push * np.maximum(limits.position_lower + clear - q, 0.0)
-    wish -= strategy.push * np.maximum(q - limits.position_upper + clear, 0.0)
+    wish += _RANGE_PUSH * np.maximum(limits.position_lower + clear - q, 0.0)
+    wish -= _RANGE_PUSH * np.maximum(q - limits.position_upper + clear, 0.0)
     if strategy.drift:
         direction = previous if previous.any() else np.eye(len(q))[decomposition.redundant[0]]
         wish += strategy.drift * direction / np.linalg.norm(direction)

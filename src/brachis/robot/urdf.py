@@ -103,7 +103,7 @@ def read_chain(
 
 
 def last_common_link(text: str | bytes, where: str) -> tuple[str, tuple[str, ...]]:
-    """Return the last link before a URDF's tree divides into chains, and the leaf links beyond it.
+    """Return the last link before a URDF's moving chains part, and the links at their ends.
 
     For an arm with a gripper that is the link to which the fingers are attached; for a single chain its end.
 
@@ -118,13 +118,14 @@ def last_common_link(text: str | bytes, where: str) -> tuple[str, tuple[str, ...
     root = _root(links, parents, where)
     inner = {joint.parent for joint in urdf.robot.joints}
     leaves = tuple(name for name in links if name not in inner)
-    chains = [[joint.child for joint in _joints_between(root, leaf, parents, where)] for leaf in leaves]
+    chains = {leaf: _joints_between(root, leaf, parents, where) for leaf in leaves}
+    moving = {leaf: chain for leaf, chain in chains.items() if any(joint.type in MOVING_TYPES for joint in chain)}
     common = root
-    for step in zip(*chains, strict=False):
-        if len(set(step)) > 1:
+    for step in zip(*moving.values(), strict=False):
+        if len({joint.child for joint in step}) > 1:
             break
-        common = step[0]
-    return common, leaves
+        common = step[0].child
+    return common, tuple(moving)
 
 
 def read_file(path: Path) -> str:

@@ -48,8 +48,9 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
         except UnreachableError:
             out[:] = np.nan
 
-    def intermediate(_mode: int, _iteration: int, objective: float, *_: float) -> bool:
-        return not watch.between_iterations(objective)
+    def intermediate(_mode: int, _iteration: int, objective: float, infeasibility: float, *_: float) -> bool:
+        stop = watch.between_iterations(objective)
+        return not (watch.has_settled(objective, infeasibility) or stop)
 
     backend = ipyopt.Problem(
         len(x),

@@ -74,6 +74,7 @@ class _Stall:
         objective = problem.objective(point[: len(problem.x_lower)])  # in restoration Uno appends elastic variables
         self._objectives.append(objective)
         stop = self._watch.between_iterations(objective) or self._watch.iterations >= self._watch.options.max_iterations
+        stop = self._watch.has_settled(objective, infeasibility) or stop  # type: ignore[arg-type]
         recent = self._objectives[-_STALL_ITERATIONS:]
         self.seen = (
             not stop

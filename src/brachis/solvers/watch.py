@@ -12,6 +12,8 @@ import numpy as np
 from brachis.errors import UnreachableError
 from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
 
+_SETTLED_ITERATIONS = 15
+_SETTLED_PROGRESS = 1e-6
 _FEASIBLE = 10.0
 """An answer counts as feasible up to this many times the solver's tolerance."""
 
@@ -36,6 +38,8 @@ class Watch:
         self.iterations = 0
         self.interrupt: KeyboardInterrupt | None = None
         self.timed_out = False
+        self.settled = False
+        self._feasible: list[float] = []
         self._progress = progress
         self._handler: Any = None
         self._began = time.perf_counter()
@@ -68,6 +72,18 @@ class Watch:
             except KeyboardInterrupt as interrupt:
                 self.interrupt = interrupt
         return self.must_stop()
+
+    def has_settled(self, objective: float, infeasibility: float) -> bool:
+        """Tell whether feasible iterates have the same objective for long; kept in `settled`.
+
+        A redundant joint that no limit touches, the roll of a tool for example, leaves a set of equally fast motions,
+        within which a solver wanders without ever seeing its conditions of optimality hold.
+        """
+        self._feasible = [*self._feasible, objective] if infeasibility <= self.options.tolerance else []
+        recent = self._feasible[-_SETTLED_ITERATIONS:]
+        spread = max(recent, default=0.0) - min(recent, default=0.0)
+        self.settled = len(recent) == _SETTLED_ITERATIONS and spread <= _SETTLED_PROGRESS * abs(objective)
+        return self.settled
 
     def must_stop(self) -> bool:
         """Tell whether the user has interrupted or the time is over."""
@@ -106,6 +122,8 @@ class Watch:
         if self.interrupt is not None:
             raise self.interrupt
         violation = residual(self.problem, x)
+        if self.settled and not status.usable:
+            status = SolveStatus.SETTLED
         feasible = violation <= _FEASIBLE * self.options.tolerance
         if status.usable and not feasible:
             status = SolveStatus.INFEASIBLE

@@ -1,0 +1,136 @@
+"""Six joints whose poses lead to a polynomial: a slide, a turn, two parallel axes, and two axes that meet.
+
+    p a | x y | u v        p slides along s and a turns, in this or the other order; the axes of x and y run along n
+                           through X and Y, and those of u and v meet at W
+
+This is an arm with a spherical wrist on a rail with one of its wrist joints held, and an arm with three parallel axes
+on a rail with one of those held. Chains that have this structure from the tool to the base are solved in the reverse
+order.
+
+With E_p E_a E_x E_y E_u E_v = D (`displacement`), theta = x + y and V = E_x E_y W = E_a^-1 (D W - s p),
+
+    orientation     u . (R_n(theta)^T R_a^T R_D v) = u . v
+    along n         n . (V - W) = 0
+    distance        |V - R_n(theta) (W - Y) - X| = |Y - X|,  seen along n
+
+are three equations for q_a, p and theta. Seen along n, vectors are complex numbers z(.), and with E = exp(i theta)
+
+    Re(alpha E) = level,        alpha = z(u) conj(z(R_a^T R_D v)),   level = u . v - (n . u) (n . R_a^T R_D v)
+    rate p = way,               rate = n . R_a^T s,                  way = n . (E_a^-1 D W - W)
+    Re(beta E) = right,         beta = 2 rate z(W - Y) conj(zeta),   zeta = rate z(V - X)
+                                right = |zeta|^2 + rate^2 (|W - Y|^2 - |Y - X|^2)
+
+the third one after p has been put in. Alpha, level, rate and way are trigonometric polynomials of degree one in q_a;
+so is zeta, because V - X = n_a x (d x s) / (n_a . s) and the like for the other terms, and beta and right are of degree
+two. Both equations for E are linear in its real and imaginary part; Cramer's rule and |E| = 1 leave
+
+    F(q_a) = |right alpha - level beta|^2 - Im(alpha conj(beta))^2 = 0,
+
+a trigonometric polynomial of degree six: at most twelve answers. Its real roots (`trigonometric`) are polished
+together with p and theta on the three equations, x and y follow in the plane perpendicular to n, u and v from what is
+left of the rotation, and every answer is put to the test: E_p ... E_v has to be D within 2e-9.
+
+No geometric choice tells the answers apart but the sign of det J_nr. A long slide takes the tool far away, so the map
+from joints to poses is proper; it does not reach all poses, so its degree is zero, and a regular pose has as many
+answers with a positive as with a negative determinant: at most six of each.
+
+The equations are ours; the resultant of two equations that are linear in a cosine and a sine is classical.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.ik.displacement import Displacement
+from brachis.ik.geometry import ChainGeometry
+from brachis.ik.polynomial_answers import distinct, in_slots, joints_of_roots, put_to_test
+from brachis.ik.polynomial_equations import Equations
+from brachis.ik.pose_joints import PoseJoints, determinant, largest_determinant, random_postures
+from brachis.ik.protocol import Kind, NotApplicableError, ik_family
+from brachis.ik.trigonometric import real_roots, sample_angles
+from brachis.ik.vectors import dot, wrap
+from brachis.robot import TaskSpace
+
+_DEGREE = 6
+_EACH = 6
+_MISS = 2e-9
+_ZERO = 1e-9
+
+
+class PolynomialSolver:
+    """Roots of a polynomial of degree twelve, found numerically; see the module's formulas."""
+
+    kind: Kind = "polynomial"
+    branches: tuple[str, ...] = ("determinant_positive",) * _EACH + ("determinant_negative",) * _EACH
+
+    def __init__(self, geometry: ChainGeometry, redundant: tuple[int, ...], six: PoseJoints) -> None:
+        self._geometry = geometry
+        self._redundant = redundant
+        self._mirrored = six.mirrored
+        self._turn = 0 if six.revolute[0] else 1
+        self._joints = tuple(sorted(six.joints))
+        posed = random_postures(geometry)
+        slide, parallel = six.joints[1 - self._turn], six.joints[2]
+        if np.abs(dot(posed.axes[:, slide], posed.axes[:, parallel])).max() < _ZERO:
+            raise NotApplicableError(f"{six.names[1 - self._turn]} never moves the arm along the parallel axes")
+        self._scale = largest_determinant(posed, self._joints)
+
+    def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
+        """See `IKSolver.branch_margins`: det J_nr, divided by its largest size."""
+        sign = 1.0 if branch < _EACH else -1.0
+        return sign * determinant(self._geometry.posed(q), self._joints)[:, None] / self._scale
+
+    def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
+        """See `IKSolver.solve`; answers of one sign are in the order of q_a."""
+        equation = Displacement.of(self._geometry, self._redundant, targets, q_r)
+        if self._mirrored:
+            equation = equation.reversed()
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            equations = Equations.of(equation, self._turn, 1 - self._turn)
+            angles = real_roots(equations.resultant(sample_angles(_DEGREE)), _DEGREE)
+            root, sample = np.nonzero(np.isfinite(angles))
+            which, roots = equations[sample].guesses(angles[root, sample])
+            sample = sample[which]
+            roots = equations[sample].polished(roots)
+            equation = equation[sample]
+            joints = joints_of_roots(equation, self._turn, roots)
+            miss, determinants = put_to_test(equation, joints)
+        # Six columns in the reverse order are three exchanges: the determinant changes its sign.
+        negative = (determinants < 0.0) != self._mirrored
+        sound = np.flatnonzero(miss < _MISS * (1.0 + np.abs(roots[1])))
+        sound = sound[distinct(sample[sound], roots[:, sound], negative[sound], miss[sound])]
+        joints = joints[:, sound]
+        joints[equation.revolute] = wrap(joints[equation.revolute])
+        angle = joints[self._turn]
+        if self._mirrored:
+            joints = joints[::-1]
+        return in_slots(len(q_r), _EACH, sample[sound], angle, negative[sound], joints)
+
+
+def _structure(six: PoseJoints) -> PoseJoints:
+    """Return the joints in the order in which they have the structure.
+
+    Raises
+    ------
+    NotApplicableError
+        They have it in neither order; says what is missing.
+    """
+    slides = [name for name, revolute in zip(six.names, six.revolute, strict=True) if not revolute]
+    if len(slides) != 1:
+        raise NotApplicableError(f"one slide is needed among the six joints, not {len(slides)}")
+    for order in (six, six.reversed()):
+        if order.revolute[:2].all() or not order.parallel(2, 3) or not order.meet(4, 5):
+            continue
+        if order.parallel(2, 3, 4) or (order.revolute[1] and order.parallel(1, 2, 3)):
+            raise NotApplicableError("three successive axes are parallel: that is closed form")
+        return order
+    raise NotApplicableError(
+        f"not {slides[0]} and a revolute joint before two with parallel axes and two whose axes meet, "
+        "in this or the reverse order"
+    )
+
+
+@ik_family("polynomial", source="resultant of two equations linear in a cosine and a sine; this module's docstring")
+def polynomial(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> PolynomialSolver:
+    """Fit the family: a pose, and six joints left over that have the module's structure."""
+    return PolynomialSolver(geometry, redundant, _structure(PoseJoints.of(geometry, task_space, redundant)))

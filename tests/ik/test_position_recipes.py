@@ -1,0 +1,45 @@
+"""Every recipe for the three joints beside a spherical wrist, forwards, backwards and with joints in between."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brachis.ik.position_recipes import RECIPES
+from support.screw_arms import BASES, extra, screw_robot, wrist
+from support.wrist_bench import Bench
+
+
+def slots(name):
+    """How many answers the three joints have: one where a step has nothing that turns."""
+    if "|" not in name:
+        return 4
+    alone, both = sorted(name.split("|"), key=len)
+    return (2 if alone == "R" else 1) * (2 if "R" in both else 1)
+
+
+@pytest.mark.parametrize("name", BASES)
+@pytest.mark.parametrize("arrangement", ["alone", "backwards", "carried"])
+def test_every_recipe(name, arrangement):
+    rng = np.random.default_rng(len(name))
+    axes, redundant = [*BASES[name], *wrist(rng)], ()
+    if arrangement == "backwards":
+        axes.reverse()
+    elif arrangement == "carried":  # redundant joints before, within and behind the six
+        axes, redundant = [extra(rng, "R"), *axes[:3], extra(rng, "P"), *axes[3:], extra(rng, "R")], (0, 4, 8)
+    bench = Bench(screw_robot(axes), redundant).check()
+    assert len(bench.solver.branches) == 2 * slots(name)
+    assert len(set(bench.solver.branches)) == len(bench.solver.branches)
+
+
+def test_every_recipe_is_tried_by_a_case_of_its_own():
+    used = {}
+    for name, base in BASES.items():
+        bench = Bench(screw_robot([*base, *wrist(np.random.default_rng(0))]), (), postures=1)
+        used.setdefault(RECIPES.index(bench.solver._structure.recipe), []).append(name)
+    # Two slides behind a third joint move in one plane as well.
+    assert set(used[0]) == {"R|RR", "P|RR", "R|RP", "RP|P", "P|RP", "R|PR", "P|PR", "R|PP", "PP|P", "P|PP"}
+    assert set(used[1]) == {"RR|R", "RR|P", "RP|R", "PR|R", "PR|P", "PP|R"}
+    assert used[2] == ["RxR R", "RxR P"]
+    assert used[3] == ["R RxR", "P RxR"]
+    assert used[4] == ["cylinder"]

@@ -1,0 +1,218 @@
+"""Arms with a spherical wrist or shoulder: which decompositions have a closed form, and why the others have none."""
+
+from __future__ import annotations
+
+import itertools
+import pickle
+
+import numpy as np
+import pytest
+
+from brachis.errors import DecompositionError
+from brachis.ik import ChainGeometry, NotApplicableError, find
+from brachis.ik.spherical_wrist import spherical_wrist
+from brachis.robot import Robot, TaskSpace, bind
+from support.chains import Joint, chain_urdf
+from support.screw_arms import BASES, Axis, extra, panda, screw_robot, seven_joints, unit, wrist
+from support.spatial import rail_arm, rail_arm_joints
+from support.wrist_bench import Bench
+
+X, Y, Z = np.eye(3)
+
+
+def ortho_parallel(rng):
+    """Industrial arm of random lengths, offsets, joint senses and zero posture, on a rail across axis 1 (j1 ... j7).
+
+    Lengths as in Brandstoetter et al. 2014: a1, b, c1 ... c4, a2.
+    """
+    a1, a2, b = rng.uniform(-0.2, 0.2, 3)
+    c1, c2, c3, c4 = rng.uniform(0.2, 0.7, 4)
+    places = [(0, 0, 0), (a1, 0, c1), (a1, 0, c1 + c2), (a1 + a2, b, c1 + c2), (a1 + a2, b, c1 + c2 + c3)]
+    places.append((a1 + a2, b, c1 + c2 + c3 + c4))
+    senses = rng.choice([-1.0, 1.0], 6)
+    directions = [axis * sense for axis, sense in zip((Z, Y, Y, Z, Y, Z), senses, strict=True)]
+    angle = rng.uniform(-np.pi, np.pi)
+    axes = [Axis("P", np.array([np.cos(angle), np.sin(angle), 0.0]), np.zeros(3))]
+    axes += [Axis("R", axis, np.array(place, dtype=float)) for axis, place in zip(directions, places, strict=True)]
+    posed = ChainGeometry.of(screw_robot(axes)).posed(rng.uniform(-2.0, 2.0, (1, 7)))
+    moved = [
+        Axis(a.letter, posed.axes[:, i, 0], posed.points[:, i, 0] if a.letter == "R" else np.zeros(3))
+        for i, a in enumerate(axes)
+    ]
+    return screw_robot(moved, tool=rng.uniform(-0.5, 1.5, 3))
+
+
+@pytest.mark.parametrize("redundant", range(4))
+def test_arms_with_ortho_parallel_base_on_a_rail(redundant):
+    rng = np.random.default_rng(redundant)
+    for _ in range(8):
+        bench = Bench(ortho_parallel(rng), (redundant,), postures=500).check()
+        first = "left" if redundant == 1 else "front"
+        assert bench.solver.branches[0] == f"{first}_up_noflip"
+        assert len(bench.solver.branches) == 8
+
+
+RAILS = {"across": (0.8, -0.6, 0.0), "along": (0.0, 0.0, 1.0), "at an angle to": (0.6, 0.0, 0.8)}
+
+
+@pytest.mark.parametrize(
+    ("rail", "exist"), [("across", {0, 1, 2, 3}), ("along", {0, 2, 3}), ("at an angle to", {0, 1})], ids=str
+)
+def test_which_joints_may_be_redundant_on_which_rail(rail, exist):
+    robot = rail_arm(RAILS[rail])
+    for redundant in range(7):
+        if redundant in exist:
+            Bench(robot, (redundant,)).check()
+            continue
+        with pytest.raises(NotApplicableError) as caught:
+            Bench(robot, (redundant,), postures=1)
+        reason = str(caught.value)
+        if redundant == 1:  # the rail and the links all move in one plane
+            assert reason.startswith("J_nr is singular everywhere: j1 does not move the point where the axes of j5, ")
+            assert reason.endswith("out of the plane in which j3 and j4 do")
+        elif redundant < 4:
+            assert "j1 slides at an angle to the axis of j2" in reason
+        else:
+            assert "do not meet in a point (they miss it by 0." in reason
+            assert "j1 among j3, j2, j1 slides" in reason
+
+
+def test_labels_say_where_the_arm_is():
+    bench = Bench(rail_arm(), (0,), postures=1)
+    bend_forwards = np.array([[0.2, 0.3, 0.4, 1.2, 0.5, 0.8, -0.3]])
+    labels = bench.solver.branches
+    assert labels[np.argmax((bench.margins(bend_forwards) > 0.0).all(axis=2))] == "front_up_noflip"
+    other = bend_forwards * np.array([1.0, 1.0, -4.0, -1.0, 1.0, -1.0, 1.0])
+    assert labels[np.argmax((bench.margins(other) > 0.0).all(axis=2))] == "back_down_flip"
+
+
+def test_a_rail_answers_on_the_side_to_which_it_moves_the_arm():
+    # With joint 1 of the arm held, the rail has to move the wrist across the plane of the links.
+    bench = Bench(rail_arm(), (1,), postures=400)
+    finite = np.isfinite(bench.answers(bench.q)).all(axis=2)
+    left = np.array([label.startswith("left") for label in bench.solver.branches])
+    facing = np.cos(bench.q[:, 1]) > 0.0
+    np.testing.assert_array_equal(finite[:, left].any(axis=1), facing)
+    np.testing.assert_array_equal(finite[:, ~left].any(axis=1), ~facing)
+
+
+@pytest.mark.parametrize("turntable", [1, 2])
+def test_gantry_of_three_slides_of_which_a_turntable_turns_the_last(turntable):
+    axes = [Axis("P", axis, np.zeros(3)) for axis in (X, Y, Z)]
+    axes.insert(turntable, Axis("R", unit(X + Y if turntable == 2 else Z), np.zeros(3)))
+    bench = Bench(screw_robot([*axes, *wrist(np.random.default_rng(3))]), (turntable,)).check()
+    assert bench.solver.branches == ("left_noflip", "left_flip", "right_noflip", "right_flip")
+
+
+@pytest.mark.parametrize("redundant", [0, 1, 2, 4, 5, 6])
+def test_spherical_shoulder_and_wrist(redundant):
+    bench = Bench(seven_joints(), (redundant,)).check()
+    assert len(bench.solver.branches) == 8
+    # Shoulder, wrist and elbow turn in right angles: whatever has one answer has all eight.
+    assert np.isfinite(bench.answers(bench.q)).all()
+
+
+def test_elbow_of_spherical_shoulder_and_wrist_is_not_redundant():
+    with pytest.raises(NotApplicableError) as caught:
+        Bench(seven_joints(), (3,), postures=1)
+    assert str(caught.value) == (
+        "J_nr is singular everywhere: j3 does not change the distance between the point where the axes of j5, j6, j7 "
+        "meet and the one where those of j1 and j2 do"
+    )
+
+
+def test_spherical_shoulder_and_wrist_on_a_rail():
+    robot, found = seven_joints(rail=Y), []
+    for redundant in itertools.combinations(range(8), 2):
+        try:
+            Bench(robot, redundant, postures=200).check()
+        except NotApplicableError:
+            continue
+        found.append(redundant)
+    elbow = 4
+    assert [pair for pair in found if 0 in pair] == [(0, j) for j in range(1, 8) if j != elbow]
+    # The rail changes the distance of the wrist from the shoulder; it has to move it across the axes that are left.
+    assert [pair for pair in found if 0 not in pair] == [(1, 2), (1, 4), (2, 3), (2, 4), (3, 4), (6, 7)]
+
+
+def test_panda():
+    robot = panda()
+    for redundant in range(7):
+        if redundant in {3, 6}:
+            Bench(robot, (redundant,)).check()
+            continue
+        with pytest.raises(NotApplicableError, match="do not meet in a point"):
+            Bench(robot, (redundant,), postures=1)
+
+
+@pytest.mark.parametrize("redundant", [(0, 7), (1, 7), (2, 7), (3, 7)], ids=str)
+def test_free_roll_is_one_more_redundant_joint(redundant):
+    robot, _ = bind(rail_arm(), "pose_free_roll")
+    assert len(Bench(robot, redundant).check().solver.branches) == 8
+
+
+def test_free_roll_takes_the_place_of_a_wrist_joint():
+    # The tool's z axis passes through the wrist's centre at an angle to the last joint's.
+    joints = rail_arm_joints()[1:]
+    arm = Robot.from_urdf(
+        "arm",
+        urdf_text=chain_urdf([*joints, Joint("fixed", xyz=(0.0, 0.0, -0.1), rpy=(0.5, 0.0, 0.0), limit=None)]),
+    )
+    robot, space = bind(arm, "pose_free_roll")
+    assert space.oriented
+    for name in ("j4", "j5", "j6", "tool_roll"):
+        Bench(robot, (robot.joint_names.index(name),)).check()
+
+
+def test_a_slide_that_moves_the_centre_along_one_axis_of_the_wrist():
+    arm = rail_arm_joints()
+    telescope = Joint("prismatic", axis=(0.0, 0.0, 1.0), limit=arm[0].limit)
+    robot = Robot.from_urdf("telescope", urdf_text=chain_urdf([*arm[:5], telescope, *arm[5:]], tool=(0.1, 0.0, 0.2)))
+    Bench(robot, (0, 5)).check()
+    askew = Joint("prismatic", axis=(1.0, 0.0, 0.0), limit=arm[0].limit)
+    robot = Robot.from_urdf("askew", urdf_text=chain_urdf([*arm[:5], askew, *arm[5:]], tool=(0.1, 0.0, 0.2)))
+    with pytest.raises(NotApplicableError, match="j5, j7, j8 do not meet in a point"):
+        Bench(robot, (0, 5), postures=1)
+
+
+def test_refusals():
+    with pytest.raises(NotApplicableError, match="only for poses"):
+        spherical_wrist.build(ChainGeometry.of(rail_arm()), TaskSpace.of(rail_arm(), ["x", "y", "z"]), (0, 1, 2, 3))
+    rng = np.random.default_rng(8)
+    general = [extra(rng, "R") for _ in range(3)]
+    with pytest.raises(NotApplicableError) as caught:
+        Bench(screw_robot([*general, *wrist(rng)]), (), postures=1)
+    assert "no closed form moves the point where the axes of j4, j5, j6 meet by j1, j2, j3" in str(caught.value)
+    assert "the axes of j1 and j2 are not parallel and do not meet in a fixed point of one of them" in str(caught.value)
+    skew = [Axis("P", Z, np.zeros(3)), Axis("R", Z, np.zeros(3)), Axis("R", unit(Y + Z), X)]
+    with pytest.raises(
+        NotApplicableError, match="j1 slides along the axis of j2, and the axes of j2 and j3 are not par"
+    ):
+        Bench(screw_robot([*skew, *wrist(rng)]), (), postures=1)
+    coaxial = [Axis("R", Z, np.zeros(3)), Axis("R", Z, Z), Axis("R", X, Y)]
+    with pytest.raises(NotApplicableError, match=r"everywhere: j1 and j2 move the point .* along one line"):
+        Bench(screw_robot([*coaxial, *wrist(rng)]), (), postures=1)
+    flat = [Axis("R", axis, np.array([0.3, 0.5, -0.2])) for axis in (X, Y, unit(X + Y))]
+    with pytest.raises(NotApplicableError, match=r"^J_nr is singular everywhere"):
+        Bench(screw_robot([*BASES["R|RR"], *flat[:1], *flat[:1], *flat[1:2]]), (), postures=1)
+
+
+def test_solvers_can_be_sent_to_other_processes():
+    bench = Bench(rail_arm(), (2,), postures=5)
+    solver = pickle.loads(pickle.dumps(bench.solver))  # noqa: S301
+    targets, q_r = bench.poses(bench.q), bench.q[:, [2]]
+    np.testing.assert_array_equal(solver.solve(targets, q_r), bench.solver.solve(targets, q_r))
+
+
+def test_no_targets_have_no_answers():
+    assert Bench(rail_arm(), (0,), 1).solver.solve(np.empty((0, 12)), np.empty((0, 1))).shape == (0, 8, 6)
+
+
+def test_it_is_found_by_geometry():
+    robot = rail_arm()
+    match = find(robot, TaskSpace.of(robot, "pose"), ["j1"], families=[spherical_wrist])
+    assert match.family == "spherical_wrist"
+    assert "positioning" in spherical_wrist.source
+    with pytest.raises(DecompositionError, match="j1 slides at an angle to the axis of j2") as caught:
+        find(rail_arm(RAILS["at an angle to"]), TaskSpace.of(robot, "pose"), ["j3"], families=[spherical_wrist])
+    assert ("j1",) in caught.value.available

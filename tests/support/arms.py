@@ -1,0 +1,234 @@
+"""Arms of six joints for poses, alone and on a rail, and what every solver for poses owes."""
+
+from __future__ import annotations
+
+import sysconfig
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from brachis.ik import ChainGeometry, Family, IKSolver, margin_gradient
+from brachis.kinematics import TaskKinematics
+from brachis.robot import Robot, TaskSpace, bind
+from support.chains import Joint, chain_urdf
+from support.closed_forms import wrapped
+
+X, Y, Z = np.eye(3)
+SLIDE = {"lower": -5.0, "upper": 5.0, "velocity": 1.0, "effort": 50.0}
+UR10_A = (0.0, -0.612, -0.5723, 0.0, 0.0, 0.0)
+UR10_D = (0.1273, 0.0, 0.0, 0.163941, 0.1157, 0.0922)
+UR10_ALPHA = (np.pi / 2, 0.0, 0.0, np.pi / 2, -np.pi / 2, 0.0)
+TX90L_STEPS = (
+    (0.0, 0.0, 0.478),
+    (0.05, 0.0, 0.0),
+    (0.0, 0.05, 0.5),
+    (0.0, 0.0, 0.0),
+    (0.0, 0.0, 0.55),
+    (0.0, 0.0, 0.1),
+)
+
+
+def placement(position: Sequence[float] = (0.0, 0.0, 0.0), rotation: Rotation | None = None) -> np.ndarray:
+    """Placement as a (4, 4) matrix."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = position
+    matrix[:3, :3] = np.eye(3) if rotation is None else rotation.as_matrix()
+    return matrix
+
+
+@dataclass(frozen=True)
+class Arm:
+    """Joints by their letters R and P, their axes, and the placement before each of them and, last, of the tool."""
+
+    letters: str
+    axes: tuple[np.ndarray, ...]
+    steps: tuple[np.ndarray, ...]
+
+    @property
+    def mirrored(self) -> Arm:
+        """The same arm held at its tool."""
+        steps = tuple(np.linalg.inv(step) for step in reversed(self.steps))
+        return Arm(self.letters[::-1], tuple(-axis for axis in reversed(self.axes)), steps)
+
+    def with_slide(self, place: int, axis: Sequence[float]) -> Arm:
+        """Put a slide before the joint at a place."""
+        direction = np.array(axis) / np.linalg.norm(axis)
+        letters = f"{self.letters[:place]}P{self.letters[place:]}"
+        axes = (*self.axes[:place], direction, *self.axes[place:])
+        return Arm(letters, axes, (*self.steps[:place], np.eye(4), *self.steps[place:]))
+
+    def with_tool(self, tool: np.ndarray) -> Arm:
+        """Exchange the tool."""
+        return replace(self, steps=(*self.steps[:-1], self.steps[-1] @ tool))
+
+    def changed(self, signs: Sequence[int], offsets: Sequence[float]) -> Arm:
+        """Change the senses of the joints, and turn or move what follows a joint by an offset."""
+        steps = list(self.steps)
+        for i, offset in enumerate(offsets):
+            turned = self.letters[i] == "R"
+            turn = placement(rotation=Rotation.from_rotvec(offset * self.axes[i])) if turned else np.eye(4)
+            shift = np.eye(4) if turned else placement(offset * self.axes[i])
+            steps[i + 1] = turn @ shift @ steps[i + 1]
+        return Arm(self.letters, tuple(s * axis for s, axis in zip(signs, self.axes, strict=True)), tuple(steps))
+
+    def robot(self, mount: np.ndarray | None = None) -> Robot:
+        """Robot with joints j1, j2, ..."""
+        joints = []
+        for letter, axis, step in zip(self.letters, self.axes, self.steps, strict=False):
+            kind, limit = ("revolute", Joint("revolute").limit) if letter == "R" else ("prismatic", SLIDE)
+            joints.append(Joint(kind, axis=tuple(axis.tolist()), limit=limit, **_origin(step)))
+        joints.append(Joint("fixed", limit=None, **_origin(self.steps[-1])))
+        base = None if mount is None else Joint("fixed", limit=None, **_origin(mount))
+        return Robot.from_urdf("arm", urdf_text=chain_urdf(joints, mount=base))
+
+
+def _origin(matrix: np.ndarray) -> dict[str, Any]:
+    rpy = Rotation.from_matrix(matrix[:3, :3]).as_euler("xyz")
+    return {"xyz": tuple(matrix[:3, 3].tolist()), "rpy": tuple(rpy.tolist())}
+
+
+def ur10() -> Arm:
+    """UR10 by its Denavit-Hartenberg table."""
+    after = [
+        placement((a, 0.0, d), Rotation.from_euler("x", alpha))
+        for a, d, alpha in zip(UR10_A, UR10_D, UR10_ALPHA, strict=True)
+    ]
+    return Arm("RRRRRR", (Z,) * 6, (np.eye(4), *after))
+
+
+def tx90l() -> Arm:
+    """TX90L by its axes at the zero posture."""
+    return Arm("RRRRRR", (Z, Y, Y, Z, Y, Z), (*(placement(step) for step in TX90L_STEPS), np.eye(4)))
+
+
+TOOL = placement((0.02, 0.05, 0.1), Rotation.from_rotvec((0.4, -0.3, 0.2)))
+MOUNT = placement((0.3, -0.2, 0.5), Rotation.from_rotvec((0.4, -0.7, 1.1)))
+SKEW = (0.3, 0.5, 0.81)
+
+
+def on_random_rail(arm: Arm, seed: int) -> Robot:
+    """An arm on a rail somewhere, whose joints have random senses and zeros."""
+    rng = np.random.default_rng(seed)
+    arm = arm.with_slide(0, rng.normal(size=3))
+    mount = placement(rng.uniform(-1.0, 1.0, 3), Rotation.random(random_state=seed))
+    return arm.changed(rng.choice([-1, 1], 7), rng.uniform(-3.0, 3.0, 7)).robot(mount)
+
+
+def rolling(arm: Arm) -> Robot:
+    """An arm whose tool rolls freely."""
+    return bind(arm.robot(MOUNT), "pose_free_roll")[0]
+
+
+def generic(letters: str = "RRRRRR", first: int = 1) -> Arm:
+    """Directions and lengths as they come, but for three parallel axes, and two that meet after them."""
+    rng = np.random.default_rng(3)
+    n = rng.normal(size=3)
+    axes = [n if i in range(first, first + 3) else rng.normal(size=3) for i in range(6)]
+    steps = [placement(rng.uniform(-0.4, 0.4, 3)) for _ in range(7)]
+    unit = tuple(axis / np.linalg.norm(axis) for axis in axes)
+    if first == 1:
+        steps[5] = placement(0.2 * unit[4] - 0.1 * unit[5])
+    return Arm(letters, unit, tuple(steps))
+
+
+def example_robot(name: str) -> Robot:
+    """A UR arm of example-robot-data, where that is installed."""
+    share = Path(sysconfig.get_path("purelib")) / "cmeel.prefix/share/example-robot-data/robots"
+    path = share / f"ur_description/urdf/{name}_robot.urdf"
+    if not path.exists():
+        pytest.skip("example-robot-data is not installed")
+    return Robot.from_urdf(path, tool_frame="tool0")
+
+
+def zero_crossing(function: Callable[[np.ndarray], np.ndarray], q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Posture of a curve (K, n) at which a function of postures first vanishes, and the curve's step there."""
+    crossings = np.flatnonzero(np.diff(np.sign(function(q))))
+    if len(crossings) == 0:
+        return None
+    start = q[crossings[0]]
+    step = q[crossings[0] + 1] - start
+    share = brentq(lambda x: function((start + x * step)[None])[0], 0.0, 1.0, xtol=1e-14)
+    return start + share * step, step
+
+
+class PoseBench:
+    """Random postures of a robot, their poses, and a family's solver for some redundant joints."""
+
+    def __init__(self, family: Family, robot: Robot, redundant: Sequence[int], postures: int = 2000, seed: int = 5):
+        self.robot, self.redundant = robot, list(redundant)
+        self.space = TaskSpace.of(robot, "pose")
+        self.geometry = ChainGeometry.of(robot)
+        self.rest = [i for i in range(robot.n) if i not in redundant]
+        self.turning = self.geometry.revolute[self.rest]
+        self.q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (postures, robot.n))
+        self.solver: IKSolver = family.build(self.geometry, self.space, tuple(redundant))
+
+    def poses(self, q: np.ndarray) -> np.ndarray:
+        """Task coordinates (K, 12) by the product of exponentials."""
+        posed = self.geometry.posed(q)
+        return np.concatenate(
+            [posed.tool_position.T, np.moveaxis(posed.tool_rotation, 2, 0).reshape(len(q), 9)], axis=1
+        )
+
+    def answers(self, q: np.ndarray) -> np.ndarray:
+        """Non-redundant joints (K, B, 6) that reach the poses of some postures."""
+        solved = self.solver.solve(self.poses(q), q[:, self.redundant])
+        assert solved.shape == (len(q), len(self.solver.branches), 6)
+        return solved
+
+    def distance(self, solved: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Largest difference (K, ...) of answers from the non-redundant joints of postures; infinite for NaN."""
+        delta = np.abs(wrapped(solved - q[:, *[None] * (solved.ndim - 2), self.rest], self.turning)).max(axis=-1)
+        return np.where(np.isnan(delta), np.inf, delta)
+
+    def difference(self, first: np.ndarray, second: np.ndarray) -> float:
+        """Largest difference of two answers."""
+        return float(np.abs(wrapped(first - second, self.turning)).max())
+
+    def margins(self, q: np.ndarray) -> np.ndarray:
+        """Margins (K, B, k) of all branches."""
+        return np.stack([self.solver.branch_margins(q, b) for b in range(len(self.solver.branches))], axis=1)
+
+    def determinant(self, q: np.ndarray) -> np.ndarray:
+        """Det J_nr by Pinocchio."""
+        return np.linalg.det(TaskKinematics(self.robot, self.space).jacobian(q)[:, :, self.rest])
+
+    def check_answers(self, solved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Put the answers for the random postures to the test; return their samples, branches and postures."""
+        sample, branch = np.nonzero(np.isfinite(solved).all(axis=2))
+        assert np.isfinite(solved).sum() == 6 * len(sample), "an answer is NaN in part"
+        angles = solved[sample, branch][:, self.turning]
+        assert np.all((angles > -np.pi) & (angles <= np.pi))
+        postures = self.q[sample]
+        postures[:, self.rest] = solved[sample, branch]
+        # A slide that runs almost across the way it has to go goes far: positions are good to their own size.
+        size = 1.0 + np.abs(np.where(self.geometry.revolute, 0.0, postures)).max(axis=1)
+        targets = self.poses(self.q)
+        miss = np.abs(self.space.difference(self.poses(postures), targets[sample])).max(axis=1)
+        assert (miss / size).max() < 1e-8
+        some = slice(0, 400)
+        pinocchio = self.space.values(*self.robot.tool_placements(postures[some]))
+        miss = np.abs(self.space.difference(pinocchio, targets[sample[some]])).max(axis=1)
+        assert (miss / size[some]).max() < 1e-8
+        return sample, branch, postures
+
+    def check_gradient(self) -> None:
+        """Compare the margins' derivatives by complex steps with central differences."""
+        q, h = self.q[:20], 1e-5
+        for branch in (0, len(self.solver.branches) - 1):
+            exact = margin_gradient(self.solver, q, branch)
+            for joint, step in enumerate(h * np.eye(self.robot.n)):
+                upper, lower = (self.solver.branch_margins(q + s, branch) for s in (step, -step))
+                np.testing.assert_allclose(exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-7)
+
+    def curve(self, seed: int, samples: int = 2001) -> np.ndarray:
+        """A smooth random motion of all joints, (samples, n)."""
+        rng, n, t = np.random.default_rng(seed), self.robot.n, np.linspace(0.0, 1.0, samples)[:, None]
+        sway = rng.uniform(0.5, 2.0, n) * np.sin(2.0 * np.pi * t * rng.uniform(0.3, 1.0, n))
+        return rng.uniform(-2.0, 2.0, n) + sway
