@@ -129,7 +129,7 @@ def test_postures_with_right_angles(name, noise):
     nearest, margin = own_class(bench, bench.answers(q), q)
     regular = margin > 1e-3
     assert np.count_nonzero(regular) > 1000
-    assert np.count_nonzero(nearest[regular] > 1e-6) <= 1
+    assert np.count_nonzero(nearest[regular] > 1e-6) <= 2  # yet more answers coincide there
 
 
 def test_resultant_is_of_degree_six_and_vanishes_at_the_posture():

@@ -20,9 +20,10 @@ are three equations for q_a, p and theta. Seen along n, vectors are complex numb
     Re(beta E) = right,         beta = 2 rate z(W - Y) conj(zeta),   zeta = rate z(V - X)
                                 right = |zeta|^2 + rate^2 (|W - Y|^2 - |Y - X|^2)
 
-the third one after p has been put in. Alpha, level, rate and way are trigonometric polynomials of degree one in q_a;
-so is zeta, because V - X = n_a x (d x s) / (n_a . s) and the like for the other terms, and beta and right are of degree
-two. Both equations for E are linear in its real and imaginary part; Cramer's rule and |E| = 1 leave
+the third one after p has been put in. Alpha, level, rate and way are trigonometric polynomials of degree one in q_a,
+and so is zeta: a position d less its slide is d - s (n_a . d) / (n_a . s) = n_a x (d x s) / (n_a . s), whose components
+in the turned plane are those of d x s, turned by a right angle. Beta and right are of degree two. The first and the
+third equation are linear in the real and the imaginary part of E; Cramer's rule and |E| = 1 leave
 
     F(q_a) = |right alpha - level beta|^2 - Im(alpha conj(beta))^2 = 0,
 
