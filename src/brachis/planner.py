@@ -7,6 +7,7 @@ import time
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from brachis import ik
 from brachis.attempts import Listener, search
@@ -65,14 +66,22 @@ def plan(
     >>> result.verified, round(result.t_end, 2)
     (True, 2.48)
     """
+    # Batches are small: a second BLAS thread costs up to twenty times what it gives where cores are busy.
+    with ThreadpoolController().limit(limits=1, user_api="blas"):
+        return _plan(robot, load_task(task), families, listener or (lambda _text: None))
+
+
+def _plan(
+    robot: str | os.PathLike[str] | Robot | None, task: Task, families: Sequence[ik.Family], listener: Listener
+) -> Result:
+    """Run the pipeline stage by stage."""
     clock = _Clock()
-    task = load_task(task)
     robot = robot if isinstance(robot, Robot) else robot_from_settings(task.robot, urdf=robot)
     task = task.model_copy(update={"robot": robot.settings})
     clock.stage("load")
     problem, family = transcribe(robot, task, families=families)
     clock.stage("transcribe")
-    attempts, chosen, refined = search(problem, task, listener or (lambda _text: None))
+    attempts, chosen, refined = search(problem, task, listener)
     clock.stage("solve")
     trajectory = _trajectory(problem.decomposition, refined, task)
     clock.stage("trajectory")

@@ -181,10 +181,12 @@ def _unreachable(dense: Transcription, x: np.ndarray) -> np.ndarray:
 def _suspects(tau: np.ndarray, table: np.ndarray, knots: np.ndarray, near: float) -> np.ndarray:
     """List times around which an excess may hide: the grid's peaks near a limit, and both sides of knots near one.
 
-    The motion's higher derivatives jump at knots, so that a peak beside a knot need not show on the grid.
+    A peak between grid points is higher than its neighbours by an eighth of their second difference; four times that
+    is allowed for. The motion's higher derivatives jump at knots: a peak beside a knot need not show on the grid.
     """
-    padded = np.pad(table, ((1, 1), (0, 0)), constant_values=-np.inf)
-    peaks = (table > near) & (table >= padded[:-2]) & (table > padded[2:])
+    padded = np.pad(table, ((1, 1), (0, 0)), mode="edge")
+    bend = np.abs(padded[:-2] - 2.0 * table + padded[2:])
+    peaks = (table + 0.5 * bend > near + _NEAR) & (table > near) & (table >= padded[:-2]) & (table >= padded[2:])
     at_knots = np.searchsorted(tau, np.unique(knots) - 1e-9)
     close = tau[at_knots[(table[at_knots] > near).any(axis=1)]]
     half = 0.5 * (tau[1] - tau[0])
@@ -213,11 +215,12 @@ def _stretched(
 ) -> tuple[np.ndarray, float]:
     """Lengthen the time by a fraction of up to `largest` where that brings the excess to the goal.
 
-    Without gravity and friction torques fall with the square of the time; with them this is tried, not trusted.
+    A longer time relieves torques that only accelerate by twice its own fraction, velocities by as much; those that
+    gravity or friction add to by less. So this is tried, not trusted.
     """
     x, first = x.copy(), x[0]
     while goal < excess:
-        t_end = x[0] * np.sqrt((1.0 + excess) / (1.0 + 0.9 * goal))
+        t_end = x[0] * (1.0 + excess - 0.5 * goal)
         if not t_end <= first * (1.0 + largest):
             break
         x[0] = t_end

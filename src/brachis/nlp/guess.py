@@ -17,7 +17,7 @@ from brachis.ik import margin_gradient
 from brachis.kinematics import Decomposition
 from brachis.nlp.transcription import Motion, Transcription
 
-_FEWEST_STEPS, _MOST_STEPS, _STEP_LENGTH = 40, 1000, 0.05  # metres a step
+_FEWEST_STEPS, _MOST_STEPS, _STEP_LENGTH = 24, 1000, 0.05  # metres a step
 _DAMPING = 1e-6
 _STRETCH = 1.1
 _CORRECTIONS = 5
