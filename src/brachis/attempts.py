@@ -27,6 +27,7 @@ _HELD_BACK = 1e-4
 """A margin that is nearer to its bound than this holds the motion back."""
 _MANY_VARIABLES = 150
 """Above this an active-set method spends its time in linear algebra, and ``auto`` begins with the interior point."""
+_FEASIBLE = 1e-6
 _PATIENCE = 100
 """Iterations that ``auto`` grants a solver on one guess, unless the task says otherwise: one that needs more grinds."""
 _LEAST_TIME = 0.1
@@ -130,6 +131,8 @@ def continued(
             failed.append(outcome)
             if solved:
                 break
+            if outcome[1].violation <= _FEASIBLE:  # it ran out of iterations on its way
+                x = outcome[1].x
     order = [*failed, *solved]
     return order[-1][0], tuple(report for _, report in order)
 

@@ -24,7 +24,8 @@ _CORRECTIONS = 5
 _UNFOLDING_STEPS = 20
 _UNFOLDING_STEP = 0.06
 _LARGEST_STEP = 0.2
-_LONGEST_TIME = 200.0
+_SHRINKAGE = 0.8
+_SHORTEST_TIME, _LONGEST_TIME = 0.01, 200.0
 _RANGE_PUSH = 20.0
 
 
@@ -190,7 +191,9 @@ def _starting_point(problem: Transcription, course: np.ndarray) -> np.ndarray | 
 
 
 def stretched(problem: Transcription, x: np.ndarray) -> np.ndarray:
-    """Return x with t_E so long that velocity, acceleration and torque limits hold, where any time does.
+    """Return x with t_E just so long that velocity, acceleration and torque limits hold, where any time does.
+
+    Far above the least time no limit is active, and a solver that has seen no curvature creeps towards it.
 
     Raises
     ------
@@ -204,6 +207,12 @@ def stretched(problem: Transcription, x: np.ndarray) -> np.ndarray:
             break
         # Without gravity and friction, torque falls with the square of the time.
         x[0] *= _STRETCH * min(np.sqrt(excess), 8.0)
+    shorter = x.copy()
+    while shorter[0] > _SHORTEST_TIME:
+        shorter[0] *= _SHRINKAGE
+        if worst_timed_ratio(problem, shorter) > 1.0:
+            break
+        x[0] = shorter[0]
     return x
 
 
