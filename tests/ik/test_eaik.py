@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from brachis.errors import DecompositionError
-from brachis.ik import ChainGeometry, NotApplicableError, check_answers, find, margin_gradient
+from brachis.ik import ChainGeometry, NotApplicableError, Polished, check_answers, find, margin_gradient
 from brachis.ik.eaik import eaik
 from brachis.ik.eaik_answers import exact_axes
 from brachis.kinematics import TaskKinematics
@@ -293,8 +293,14 @@ def test_refusals(robot, redundant, names, reason):
 
 def test_angles_that_the_urdf_rounds_too_far_are_named_as_the_cause():
     robot = iiwa_by_angles(1.5708)
-    with pytest.raises(NotApplicableError, match=r"rounds angles, as in 1\.5708"):
+    with pytest.raises(NotApplicableError, match="EAIK knows no decomposition"):
         eaik.build(ChainGeometry.of(robot), rows(robot), (2,))
+    # The registry then looks at the ideal arm; of one that is farther off it says what is the matter.
+    assert isinstance(find(robot, rows(robot), ["j3"]).solver, Polished)
+    robot = iiwa_by_angles(1.57)
+    with pytest.raises(DecompositionError) as caught:
+        find(robot, rows(robot), ["j7"])
+    assert "rounds angles, as in 1.57" in caught.value.reasons["eaik"]
 
 
 def test_without_eaik_the_reason_is_that(monkeypatch):

@@ -22,11 +22,11 @@ def plane(arm):
 
 
 def spatial_robot() -> Robot:
-    """Three joints whose axes are neither parallel nor do they leave slides."""
+    """Three joints whose axes are neither parallel nor do they meet or leave slides."""
     joints = [
         Joint("revolute", axis=(0.0, 0.0, 1.0)),
         Joint("revolute", axis=(0.0, 1.0, 0.0), xyz=(0.1, 0.0, 0.4)),
-        Joint("revolute", axis=(0.0, 1.0, 0.0), xyz=(0.5, 0.0, 0.0)),
+        Joint("revolute", axis=(0.0, 0.6, 0.8), xyz=(0.5, 0.1, 0.0)),
     ]
     return Robot.from_urdf("spatial", urdf_text=chain_urdf(joints, tool=(0.4, 0.0, 0.0)))
 
@@ -63,6 +63,7 @@ def test_no_closed_form_names_every_reason():
     reasons = caught.value.reasons
     assert "j1, j2, j3 would be left over and not prismatic" in reasons["prismatic"]
     assert "the axes of j1 and j2 are not parallel" in reasons["planar"]
+    assert "no closed form moves the tool by j1, j2, j3: the axes of j1 and j2 are not" in reasons["positioning"]
     assert all(reason in str(caught.value) for reason in reasons.values())
     assert caught.value.available == ()
 

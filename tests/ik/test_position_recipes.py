@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from brachis.ik.position_recipes import RECIPES
+from support.factored_bench import Bench
 from support.screw_arms import BASES, extra, screw_robot, wrist
-from support.wrist_bench import Bench
 
 
 def slots(name):

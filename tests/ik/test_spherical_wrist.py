@@ -13,9 +13,9 @@ from brachis.ik import ChainGeometry, NotApplicableError, find
 from brachis.ik.spherical_wrist import spherical_wrist
 from brachis.robot import Robot, TaskSpace, bind
 from support.chains import Joint, chain_urdf
+from support.factored_bench import Bench
 from support.screw_arms import BASES, Axis, extra, panda, screw_robot, seven_joints, unit, wrist
 from support.spatial import rail_arm, rail_arm_joints
-from support.wrist_bench import Bench
 
 X, Y, Z = np.eye(3)
 
@@ -117,7 +117,7 @@ def test_elbow_of_spherical_shoulder_and_wrist_is_not_redundant():
         Bench(seven_joints(), (3,), postures=1)
     assert str(caught.value) == (
         "J_nr is singular everywhere: j3 does not change the distance between the point where the axes of j5, j6, j7 "
-        "meet and the one where those of j1 and j2 do"
+        "meet and the point where the axes of j1 and j2 meet"
     )
 
 
@@ -200,7 +200,7 @@ def test_refusals():
 def test_solvers_can_be_sent_to_other_processes():
     bench = Bench(rail_arm(), (2,), postures=5)
     solver = pickle.loads(pickle.dumps(bench.solver))  # noqa: S301
-    targets, q_r = bench.poses(bench.q), bench.q[:, [2]]
+    targets, q_r = bench.targets(bench.q), bench.q[:, [2]]
     np.testing.assert_array_equal(solver.solve(targets, q_r), bench.solver.solve(targets, q_r))
 
 
@@ -212,7 +212,7 @@ def test_it_is_found_by_geometry():
     robot = rail_arm()
     match = find(robot, TaskSpace.of(robot, "pose"), ["j1"], families=[spherical_wrist])
     assert match.family == "spherical_wrist"
-    assert "positioning" in spherical_wrist.source
+    assert "placing" in spherical_wrist.source
     with pytest.raises(DecompositionError, match="j1 slides at an angle to the axis of j2") as caught:
         find(rail_arm(RAILS["at an angle to"]), TaskSpace.of(robot, "pose"), ["j3"], families=[spherical_wrist])
     assert ("j1",) in caught.value.available

@@ -62,7 +62,7 @@ def inspect_command(
     if r < 0:
         console.print("The robot has fewer joints than the task space has rows; prescribe fewer rows.")
         return
-    console.print(_table("choices of redundant joints", decompositions))
+    console.print(_table("choices of redundant joints", [_shortened(row) for row in decompositions]))
 
 
 def _tool(urdf: Path, remarks: list[str]) -> str:
@@ -149,6 +149,7 @@ def _decompositions(robot: Robot, task_space: TaskSpace) -> list[dict[str, Any]]
                 "branches": len(solver.branches) if solver else 0,
                 "labels": ", ".join(_counted(solver.branches)) if solver else "",
                 "why not": "" if solver else why,
+                "remark": candidate.remark,
             }
         )
     return rows
@@ -157,6 +158,12 @@ def _decompositions(robot: Robot, task_space: TaskSpace) -> list[dict[str, Any]]
 def _counted(labels: tuple[str, ...]) -> list[str]:
     """List labels once each, with their number where several answers share one."""
     return [label if n == 1 else f"{label} (up to {n})" for label, n in Counter(labels).items()]
+
+
+def _shortened(row: dict[str, Any]) -> dict[str, Any]:
+    """Put why there is no solver, and what there is to know of one, into a single column."""
+    shown = {name: value for name, value in row.items() if name != "why not"}
+    return {**shown, "remark": row["why not"] or row["remark"]}
 
 
 def _table(title: str, rows: list[dict[str, Any]]) -> Table:

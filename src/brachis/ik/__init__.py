@@ -1,8 +1,10 @@
 """Closed-form inverse kinematics: protocol, families, and the registry that finds them by geometry."""
 
+from brachis.ik.check import check_answers
 from brachis.ik.geometry import ChainGeometry, PosedScrews
+from brachis.ik.idealised import Polished
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError, ik_family, margin_gradient
-from brachis.ik.registry import BUILTIN, Candidate, Match, check_answers, find, find_all
+from brachis.ik.registry import BUILTIN, Candidate, Match, find, find_all
 
 __all__ = [
     "BUILTIN",
@@ -12,6 +14,7 @@ __all__ = [
     "IKSolver",
     "Match",
     "NotApplicableError",
+    "Polished",
     "PosedScrews",
     "check_answers",
     "find",

@@ -21,9 +21,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from brachis.ik.eaik_answers import COARSE, EXACT, EaikChain, installed
+from brachis.ik.eaik_answers import EaikChain, installed
 from brachis.ik.geometry import ChainGeometry
-from brachis.ik.polish import Poses, polished
+from brachis.ik.polish import EXACT, Poses, polished
+from brachis.ik.pose_joints import determinant
 from brachis.ik.protocol import Kind, NotApplicableError, ik_family
 from brachis.robot import TaskSpace
 
@@ -81,15 +82,8 @@ class EaikSolver:
 
     def _check_decomposition(self, values: np.ndarray) -> None:
         """Refuse axes of which EAIK knows no decomposition."""
-        if self._eaik.knows(values, EXACT):
-            return
-        reason = "EAIK knows no decomposition: too few of the six axes are parallel or meet"
-        if self._eaik.knows(values, COARSE):
-            reason += (
-                f". More do to within {COARSE:g} rad or m: if the URDF rounds angles, as in 1.5708, "
-                "write them with all digits"
-            )
-        raise NotApplicableError(reason)
+        if not self._eaik.knows(values):
+            raise NotApplicableError("EAIK knows no decomposition: too few of the six axes are parallel or meet")
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """See `IKSolver.solve`."""
@@ -105,9 +99,29 @@ class EaikSolver:
         q = np.empty((len(joints), self._chain.n))
         q[:, self._held] = values[samples]
         q[:, self._rest] = joints
-        q, miss, determinant = polished(self._chain, self._rest, q, wanted[samples], slack)
-        right = np.flatnonzero((miss < _REACHED) & (determinant != 0.0))
-        return _in_slots(_wrapped(q[right][:, self._rest]), samples[right], determinant[right] < 0.0, len(q_r))
+        determinants, right = self._put_to_test(q, wanted[samples], slack)
+        return _in_slots(_wrapped(q[right][:, self._rest]), samples[right], determinants[right] < 0.0, len(q_r))
+
+    def _put_to_test(self, q: np.ndarray, wanted: Poses, slack: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Polish postures (N, n) that miss their poses by less than a slack (N,), in place.
+
+        Returns
+        -------
+        determinants : (N,) ndarray
+            Det J_nr.
+        right : (R,) int ndarray
+            Which postures reach their poses, and are not singular.
+        """
+        posed, six = self._chain.posed(q), tuple(self._rest)
+        miss, determinants = wanted.miss(posed), determinant(posed, six)
+        near = np.flatnonzero((miss > EXACT) & (miss < slack))
+        joints = polished(self._chain, self._rest, q[near], wanted[near])
+        converged = np.isfinite(joints[:, 0])
+        moved = near[converged]
+        q[moved[:, None], self._rest] = joints[converged]
+        posed = self._chain.posed(q[moved])
+        miss[moved], determinants[moved] = wanted[moved].miss(posed), determinant(posed, six)
+        return determinants, np.flatnonzero((miss < _REACHED) & (determinants != 0.0))
 
     def _wanted(self, targets: np.ndarray, q_r: np.ndarray) -> Poses:
         """Targets of the chain in between, G_1^-1 T (G_2 M)^-1 M; `held` returns G M."""

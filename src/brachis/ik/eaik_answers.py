@@ -64,9 +64,9 @@ class EaikChain:
         """Leave EAIK's robots out, which cannot be pickled; they are made again when needed."""
         return {**self.__dict__, "_robots": {}}
 
-    def knows(self, values: np.ndarray, tolerance: float) -> bool:
-        """Whether EAIK has a decomposition at each of some held values (U, h), with axes made exact to a tolerance."""
-        return all(robot is not None for robot in self._made(values, tolerance))
+    def knows(self, values: np.ndarray) -> bool:
+        """Whether EAIK has a decomposition at each of some held values (U, h)."""
+        return all(robot is not None for robot in self._made(values, EXACT))
 
     def answers(self, targets: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Let EAIK solve for six joints.

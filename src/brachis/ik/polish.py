@@ -1,22 +1,54 @@
-"""Newton's method for postures that reach a pose almost."""
+"""Newton's method for postures that reach their target almost.
+
+With J the Jacobian of the joints that may move and g(q) the gap between target and posture, a round makes a step of
+Newton's method and one more with the same J,
+
+    d1 = J(q)^-1 g(q),    d2 = J(q)^-1 g(q + d1),
+
+which leaves a gap of about 2 |g(q + d1)|^2 / |g(q)|. Steps have to shrink, |d2| < |d1| / 2: then the method converges,
+and to the answer beside which it began; a posture whose steps do not has nowhere to go.
+
+P. Deuflhard, Newton methods for nonlinear problems, Springer 2004 (natural monotonicity test).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from brachis.ik.geometry import ChainGeometry, PosedScrews
 from brachis.ik.vectors import apply, apply_inverse, cross
+from brachis.robot import TaskSpace
 
-_EXACT = 1e-11
-"""A miss that needs no polishing, m or rad."""
+EXACT = 1e-11
+"""A gap that needs no polishing, m or rad, for joints near zero."""
+_ROUNDS = 4
+_FAR = 0.2
+"""A step that leads farther, rad or in proportion to a slide's position, leads anywhere."""
+
+
+class Goal(Protocol):
+    """What N postures are to reach, in m rows."""
+
+    def __getitem__(self, samples: np.ndarray) -> Goal:
+        """Return the goals of some of the postures."""
+        ...
+
+    def gap(self, posed: PosedScrews) -> np.ndarray:
+        """Displacement (N, m) that is left, m or rad."""
+        ...
+
+    def rows(self, columns: np.ndarray) -> np.ndarray:
+        """Rows (m, k, N) in which the gap is stated, out of the tool's Jacobian (6, k, N) in world axes."""
+        ...
 
 
 @dataclass(frozen=True)
 class Poses:
-    """N poses; components along the first axis (see `vectors`).
+    """N poses; components along the first axis (see `vectors`). As goals: gaps are along and about world axes.
 
     Attributes
     ----------
@@ -52,62 +84,113 @@ class Poses:
         return Poses(-apply_inverse(self.rotation, self.position), np.swapaxes(self.rotation, 0, 1))
 
     def __getitem__(self, samples: np.ndarray) -> Poses:
-        """Return some of the poses."""
+        """See `Goal`."""
         return Poses(self.position[:, samples], self.rotation[:, :, samples])
 
-    def gap(self, other: Poses) -> np.ndarray:
-        """Displacement (N, 6) that leads from another pose nearby to this one: linear, then angular, world axes."""
-        turn = 0.5 * sum(cross(other.rotation[:, column], self.rotation[:, column]) for column in range(3))
-        return np.concatenate([self.position - other.position, turn]).T
+    def gap(self, posed: PosedScrews) -> np.ndarray:
+        """See `Goal`."""
+        turn = 0.5 * cross(posed.tool_rotation, self.rotation).sum(axis=1)
+        return np.concatenate([self.position - posed.tool_position, turn]).T
 
-    def miss(self, other: Poses) -> np.ndarray:
+    def rows(self, columns: np.ndarray) -> np.ndarray:
+        """See `Goal`."""
+        return columns
+
+    def miss(self, posed: PosedScrews) -> np.ndarray:
         """Largest difference (N,) of positions (m) and rotation matrices."""
-        shift = np.abs(self.position - other.position).max(axis=0)
-        return np.maximum(shift, np.abs(self.rotation - other.rotation).max(axis=(0, 1)))
+        shift = np.abs(self.position - posed.tool_position).max(axis=0)
+        return np.maximum(shift, np.abs(self.rotation - posed.tool_rotation).max(axis=(0, 1)))
 
 
-def polished(
-    chain: ChainGeometry, joints: Sequence[int], q: np.ndarray, wanted: Poses, slack: np.ndarray, *, steps: int = 8
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Move six joints so that the tool meets poses which it misses by little.
+@dataclass(frozen=True)
+class Rows:
+    """Rows of N tool positions, and yaw where it is prescribed, as goals.
+
+    Attributes
+    ----------
+    task_space : TaskSpace
+    targets : (N, m) ndarray
+    """
+
+    task_space: TaskSpace
+    targets: np.ndarray
+
+    def __getitem__(self, samples: np.ndarray) -> Rows:
+        """See `Goal`."""
+        return Rows(self.task_space, self.targets[samples])
+
+    def gap(self, posed: PosedScrews) -> np.ndarray:
+        """See `Goal`."""
+        reached = self.task_space.values(posed.tool_position.T, np.moveaxis(posed.tool_rotation, 2, 0))
+        return self.task_space.difference(self.targets, reached)
+
+    def rows(self, columns: np.ndarray) -> np.ndarray:
+        """See `Goal`."""
+        space = self.task_space
+        rows = columns[list(space.axes)]
+        if space.yaw_axis is None:
+            return rows
+        return np.concatenate([rows, space.yaw_sign * columns[3 + space.yaw_world_axis, None]])
+
+
+def goal_of(task_space: TaskSpace, targets: np.ndarray) -> Goal:
+    """Return what task coordinates, (N, c), ask for."""
+    return Poses.of_targets(targets) if task_space.oriented else Rows(task_space, targets)
+
+
+def polished(chain: ChainGeometry, joints: Sequence[int], q: np.ndarray, goal: Goal) -> np.ndarray:
+    """Move joints so that the tool reaches what it misses by little.
 
     Parameters
     ----------
     chain : ChainGeometry
     joints : sequence of int
-        The six.
+        As many as the goal has rows.
     q : (N, n) ndarray
-    wanted : Poses
-    slack : (N,) ndarray
-        Postures that miss by more are left as they are, m or rad.
-    steps : int, optional
-        How many steps of Newton's method to make at most.
+    goal : Goal
 
     Returns
     -------
-    q : (N, n) ndarray
-        Nearer to the wanted poses, or unchanged.
-    miss : (N,) ndarray
-        Largest difference of position (m) and rotation matrix that is left.
-    determinant : (N,) ndarray
-        Of the Jacobian of the six joints.
+    (N, m) ndarray
+        Positions of these joints, NaN where the method does not converge to an answer beside the given posture.
     """
-    columns = list(joints)
+    q, columns = q.copy(), list(joints)
+    answers = np.full((len(q), len(columns)), np.nan)
+    left = np.arange(len(q))
+    for _ in range(_ROUNDS):
+        if len(left) == 0:
+            break
+        converged, shrinking = _round(chain, columns, q, goal)
+        answers[left[converged]] = q[converged][:, columns]
+        again = np.flatnonzero(shrinking & ~converged)
+        left, q, goal = left[again], q[again], goal[again]
+    return answers
+
+
+def _round(chain: ChainGeometry, columns: list[int], q: np.ndarray, goal: Goal) -> tuple[np.ndarray, np.ndarray]:
+    """Make two steps with one Jacobian, in place; tell which postures converged and of which the steps shrink."""
     posed = chain.posed(q)
-    reached = Poses.of_tool(posed)
-    jacobian = np.moveaxis(posed.jacobian_columns(columns), 2, 0)
-    miss, determinant = reached.miss(wanted), np.linalg.det(jacobian)
-    near = np.flatnonzero((miss > _EXACT) & (miss < slack) & (determinant != 0.0))
-    if steps == 0 or len(near) == 0:
-        return q, miss, determinant
-    trial = q[near]
-    gap = wanted[near].gap(reached[near])
-    trial[:, columns] += np.linalg.solve(jacobian[near], gap[:, :, None])[:, :, 0]
-    # A step that does not bring a posture much nearer is its last one: a wrong answer has nowhere to go.
-    slack = 0.5 * miss[near]
-    trial, trial_miss, trial_determinant = polished(chain, columns, trial, wanted[near], slack, steps=steps - 1)
-    better = trial_miss < miss[near]
-    q = q.copy()
-    for old, new in ((q, trial), (miss, trial_miss), (determinant, trial_determinant)):
-        old[near[better]] = new[better]
-    return q, miss, determinant
+    size = 1.0 + np.abs(q).max(axis=1)
+    inverse = _inverses(np.moveaxis(goal.rows(posed.jacobian_columns(columns)), 2, 0))
+    gaps, steps = [], []
+    for again in (False, True):
+        gap = goal.gap(chain.posed(q) if again else posed)
+        step = (inverse @ gap[:, :, None])[:, :, 0]
+        q[:, columns] += step
+        gaps.append(np.abs(gap).max(axis=1))
+        steps.append(np.abs(step).max(axis=1))
+    shrinking = (steps[1] < 0.5 * steps[0]) & (steps[0] < _FAR * size)
+    small = EXACT * size
+    converged = shrinking & (2.0 * gaps[1] ** 2 < small * gaps[0])
+    return converged | ((gaps[0] < small) & (gaps[1] < small)), shrinking
+
+
+def _inverses(matrices: np.ndarray) -> np.ndarray:
+    """Inverse matrices (N, m, m), NaN where there is none."""
+    try:
+        return np.linalg.inv(matrices)
+    except np.linalg.LinAlgError:
+        inverses = np.full_like(matrices, np.nan)
+        regular = np.linalg.det(matrices) != 0.0
+        inverses[regular] = np.linalg.inv(matrices[regular])
+        return inverses

@@ -1,177 +1,119 @@
-"""Three joints a, b, c that bring a point W0 to a target W: E_a E_b E_c W0 = W.
+"""Three joints that bring the tool to a position, whatever its orientation; all others are redundant.
 
-Each recipe solves for one joint after the other, and fits where something holds of a, b, c at all positions of the
-redundant joints. S is the point where two axes meet, n the normal of the plane in which two joints move; B is a point
-on the axis of b. Steps that have two answers are marked by *.
+With the redundant joints held, let W0 be the tool while the three joints a, b, c are at zero. They bring it to the
+target W,
 
-    plane of b, c   * a: n . E_a^-1 W = n . W0 (one answer for a slide);  b and c within the plane
-    plane of a, b   * c: n . E_c W0 = n . W (one answer for a slide);  a and b within the plane
-    a, b meet       * c: |E_c W0 - S| = |W - S|;  * b: a . E_b E_c W0 = a . W;  a by the angle
-    b, c meet       * a: |E_a^-1 W - S| = |W0 - S|;  * c: b . E_c W0 = b . E_a^-1 W;  b by the angle
-    cylinder        * g = +-sqrt(|b x (W - B)|^2 - (c . (W0 - B))^2);  * c: (b x c) . (E_c W0 - B) = g;  b by the angle;
-                    then the slide a along the axis of b, to which that of c is perpendicular
+    E_a E_b E_c W0 = W,
 
-Within a plane two joints that turn, or one that turns and one that slides, meet at a distance (*); two that slide are
-a linear system. A step that brings a position to a component or a distance tells its answers apart by the sign of that
-condition's derivative (`screws`). The functions ``..._factor`` are these derivatives, as functions of the posture:
-their product is the determinant of the centre's Jacobian, up to its sign.
+by one of the recipes of `placing`. Redundant joints may stand before, between and after them: these place the axes
+and W0, sample by sample. Seen from the tool the equation is E_c^-1 E_b^-1 E_a^-1 W = W0, where the first becomes the
+last joint, and target and tool change places; it serves where a recipe fits in this order alone.
 
-Sources: D. L. Pieper, The kinematics of manipulators under computer control, PhD thesis, Stanford 1968 (the wrist's
-centre first); B. Paden, Kinematics and control of robot manipulators, PhD thesis, Berkeley 1985 (subproblems);
-A. J. Elias, J. T. Wen, "IK-Geo: unified robot inverse kinematics using subproblem decomposition", 2022 (axes that are
-parallel or meet, beside a spherical wrist); M. Brandstoetter, A. Angerer, M. Hofbaur, "An analytical solution of the
-inverse kinematics problem of industrial serial manipulators with an ortho-parallel basis and a spherical wrist", 2014.
+Branches are told apart by the signs of the recipe's two factors (`position_recipes`); see `factors`.
+
+Sources: see `placing`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
+from brachis.ik.arm import Arm
+from brachis.ik.factored_solver import FactoredSolver, Structure, fitted
+from brachis.ik.geometry import ChainGeometry, PosedScrews
+from brachis.ik.held_joints import HeldJoints
+from brachis.ik.pose_joints import random_postures
+from brachis.ik.position_recipes import recipe_for
+from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import Screw
-from brachis.ik.spherical_arm import Arm
-from brachis.ik.vectors import across, angle_about, cross, dot
+from brachis.robot import TaskSpace
 
-FRONT, UP, FLIP = 0, 1, 2
-"""Slots of the two steps of a recipe, and of the wrist's."""
-
-Values = tuple[np.ndarray, np.ndarray, np.ndarray]
+_POINT = "the tool"
+_JOINTS = 3
+_VANISHES = 1e-9
 
 
-def plane_of_last(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for a, so that b and c have to act within their plane alone."""
-    a, b, c = arm.base
-    normal = _normal(b, c)
-    orbit = a.inverse.orbit(target)
-    first = orbit.component(-normal, -dot(normal, arm.centre), FRONT)
-    return first, *_within_plane(b, c, arm.centre, orbit.at(first), UP)
+@dataclass(frozen=True)
+class ToolStructure(Structure):
+    """Three joints and the recipe by which they place the tool."""
+
+    @classmethod
+    def of(cls, three: HeldJoints) -> ToolStructure:
+        """Find the recipe, from the base to the tool or the other way round.
+
+        Raises
+        ------
+        NotApplicableError
+            None fits.
+        """
+        reasons = []
+        for order in (three, three.reversed()):
+            try:
+                return cls(order, *recipe_for(order, _POINT))
+            except NotApplicableError as reason:
+                reasons.append(reason)
+        raise reasons[0]
+
+    def words(self) -> dict[str, str]:
+        """See `Structure.words`."""
+        return {**dict(zip("abc", self.joints.names, strict=True)), "point": _POINT}
+
+    def posed(self, posed: PosedScrews) -> Arm:
+        """See `Structure.posed`."""
+        return self.arm(self.joints.screws(posed), posed.tool_position)
+
+    def arm(self, screws: tuple[Screw, ...], centre: np.ndarray) -> Arm:
+        """Put in the points."""
+        return Arm(screws, centre, self.meeting.at(screws) if self.meeting else centre)
 
 
-def out_of_last_factor(arm: Arm) -> np.ndarray:
-    """Velocity that a gives the centre across the plane of b and c."""
-    a, b, c = arm.base
-    return dot(_normal(b, c), a.velocity(arm.centre))
+class PositioningSolver(FactoredSolver[ToolStructure]):
+    """Closed form of three joints for the tool's position; see the module's formulas.
 
-
-def within_last_factor(arm: Arm) -> np.ndarray:
-    """Area spanned by the velocities that b and c give the centre."""
-    return _area(arm.base[1], arm.base[2], arm.centre)
-
-
-def plane_of_first(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for c, so that a and b have to act within their plane alone."""
-    a, b, c = arm.base
-    normal = _normal(a, b)
-    orbit = c.orbit(arm.centre)
-    third = orbit.component(normal, dot(normal, target), UP)
-    return *_within_plane(a, b, orbit.at(third), target, FRONT), third
-
-
-def out_of_first_factor(arm: Arm) -> np.ndarray:
-    """Velocity that c gives the centre across the plane of a and b."""
-    a, b, c = arm.base
-    return dot(_normal(a, b), c.velocity(arm.centre))
-
-
-def within_first_factor(arm: Arm) -> np.ndarray:
-    """Area spanned by the velocities that a and b give the centre."""
-    return _area(arm.base[0], arm.base[1], arm.centre)
-
-
-def meeting_of_first(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for c by the distance from the point where a and b meet."""
-    a, b, c = arm.base
-    outer, away = c.orbit(arm.centre), target - arm.meeting
-    third = outer.distance(arm.meeting, dot(away, away), UP)
-    inner = b.orbit(outer.at(third))
-    second = inner.component(a.axis, dot(a.axis, target), FRONT)
-    return angle_about(a.axis, inner.at(second) - arm.meeting, away), second, third
-
-
-def approach_of_last_factor(arm: Arm) -> np.ndarray:
-    """Velocity that c gives the centre towards the point where a and b meet, times its distance."""
-    return dot(arm.meeting - arm.centre, arm.base[2].velocity(arm.centre))
-
-
-def along_first_factor(arm: Arm) -> np.ndarray:
-    """Velocity that b gives the centre along the axis of a."""
-    return dot(arm.base[0].axis, arm.base[1].velocity(arm.centre))
-
-
-def meeting_of_last(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for a by the distance from the point where b and c meet."""
-    a, b, c = arm.base
-    outer, away = a.inverse.orbit(target), arm.centre - arm.meeting
-    first = outer.distance(arm.meeting, dot(away, away), UP)
-    end, inner = outer.at(first), c.orbit(arm.centre)
-    third = inner.component(b.axis, dot(b.axis, end), FRONT)
-    return first, angle_about(b.axis, inner.at(third) - arm.meeting, end - arm.meeting), third
-
-
-def approach_of_first_factor(arm: Arm) -> np.ndarray:
-    """Velocity that a gives the centre away from the point where b and c meet, times its distance."""
-    return dot(arm.centre - arm.meeting, arm.base[0].velocity(arm.centre))
-
-
-def along_second_factor(arm: Arm) -> np.ndarray:
-    """Velocity that c gives the centre along the axis of b."""
-    return dot(arm.base[1].axis, arm.base[2].velocity(arm.centre))
-
-
-def cylinder(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for the centre's place in front of, or behind, the common direction of a and b; then for c."""
-    a, b, c = arm.base
-    front, away = cross(b.axis, c.axis), target - b.point
-    radius, side = across(b.axis, away), dot(c.axis, arm.centre - b.point)
-    reach = np.sqrt(dot(radius, radius) - side * side)
-    orbit = c.orbit(arm.centre)
-    third = orbit.component(front, np.concatenate([reach, -reach], axis=FRONT) + dot(front, b.point), UP)
-    start = orbit.at(third)
-    return dot(a.axis, target - start), angle_about(b.axis, start - b.point, away), third
-
-
-def in_front_factor(arm: Arm) -> np.ndarray:
-    """How far the centre is in front of the axis of b, as that of c sees it."""
-    _, b, c = arm.base
-    return dot(cross(b.axis, c.axis), arm.centre - b.point)
-
-
-def to_front_factor(arm: Arm) -> np.ndarray:
-    """Velocity that c gives the centre to the front."""
-    _, b, c = arm.base
-    return dot(cross(b.axis, c.axis), c.velocity(arm.centre))
-
-
-def _normal(first: Screw, second: Screw) -> np.ndarray:
-    """Return the normal of the plane in which two joints move positions."""
-    if first.revolute:
-        return first.axis
-    return second.axis if second.revolute else cross(first.axis, second.axis)
-
-
-def _within_plane(
-    first: Screw, second: Screw, start: np.ndarray, end: np.ndarray, slot: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Two joints that bring `start` to `end` within the plane in which both move."""
-    if first.revolute:
-        orbit, away = second.orbit(start), end - first.point
-        inner = orbit.distance(first.point, dot(away, away), slot)
-        return angle_about(first.axis, orbit.at(inner) - first.point, away), inner
-    if second.revolute:
-        orbit, away = first.inverse.orbit(end), start - second.point
-        outer = orbit.distance(second.point, dot(away, away), slot)
-        return outer, angle_about(second.axis, away, orbit.at(outer) - second.point)
-    normal, way = cross(first.axis, second.axis), end - start
-    size = dot(normal, normal)
-    return dot(cross(way, second.axis), normal) / size, dot(cross(first.axis, way), normal) / size
-
-
-def _area(first: Screw, second: Screw, position: np.ndarray) -> np.ndarray:
-    """Area spanned by the velocities that two joints which move in one plane give a position, up to its sign.
-
-    For two slides it is the length of `_normal`, and counted there.
+    Parameters
+    ----------
+    geometry : ChainGeometry
+    redundant : tuple of int
+    structure : ToolStructure
+    rows : sequence of int
+        World axes (0, 1, 2) of the target's coordinates.
     """
-    if first.revolute:
-        return dot(first.point - position, second.velocity(position))
-    if second.revolute:
-        return dot(position - second.point, first.axis)
-    return dot(first.axis, first.axis)
+
+    def __init__(
+        self, geometry: ChainGeometry, redundant: tuple[int, ...], structure: ToolStructure, rows: Sequence[int]
+    ) -> None:
+        super().__init__(geometry, redundant, structure)
+        self._order = np.argsort(rows)
+
+    def steps(self, targets: np.ndarray, q_r: np.ndarray) -> tuple[Arm, Sequence[np.ndarray]]:
+        """See `FactoredSolver.steps`."""
+        structure = self._structure
+        posed = self._geometry.held(self._redundant, q_r)
+        tool, target = posed.tool_position[:, None, None], targets.T[self._order, None, None]
+        start, end = (target, tool) if structure.joints.mirrored else (tool, target)
+        arm = structure.arm(structure.joints.screws(posed, slots=2), start)
+        return arm, structure.recipe.solve(arm, end)
+
+
+@ik_family("positioning", source="Pieper 1968; Paden 1985; IK-Geo 2022; `placing`")
+def positioning(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> PositioningSolver:
+    """Fit the family: the tool's position alone is prescribed, and three joints are left over for it."""
+    if task_space.oriented or len(task_space.axes) != _JOINTS:
+        raise NotApplicableError("only for the position: x, y and z")
+    if geometry.n - len(redundant) != _JOINTS:
+        raise NotApplicableError(f"{geometry.n - len(redundant)} joints would be left over, not three")
+    three = HeldJoints.beside(geometry, redundant)
+    _refuse_idle(geometry, three)
+    structure = fitted(geometry, three, (ToolStructure.of,))
+    return PositioningSolver(geometry, redundant, structure, task_space.axes)
+
+
+def _refuse_idle(geometry: ChainGeometry, three: HeldJoints) -> None:
+    """Refuse a joint that never moves the tool: the last one, often, if the tool is on its axis."""
+    speeds = np.abs(random_postures(geometry).jacobian_columns(three.joints)[:_JOINTS]).max(axis=(0, 2))
+    for name, speed in zip(three.names, speeds, strict=True):
+        if speed < _VANISHES:
+            raise NotApplicableError(f"J_nr is singular everywhere: {name} does not move the tool")

@@ -2,34 +2,38 @@
 
 The families are listed in `BUILTIN`; other packages add theirs through the entry-point group ``brachis.ik``, whose
 entries are `Family` objects (see `ik_family`). No answer is believed: a solver is returned only after its answers have
-been put into the chain's forward kinematics.
+been put into the chain's forward kinematics (`check`).
+
+Where no family fits the chain as it is, the ideal one is tried that it almost is (`idealised`); answers are polished.
 """
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
-import numpy as np
-
 from brachis.errors import DecompositionError, UnknownNameError
+from brachis.ik.check import check_answers
 from brachis.ik.eaik import eaik
 from brachis.ik.geometry import ChainGeometry
+from brachis.ik.idealised import TOLERANCE, Ideal, Polished, idealised
 from brachis.ik.parallel_axes import parallel_axes
 from brachis.ik.planar import planar
 from brachis.ik.polynomial import polynomial
+from brachis.ik.positioning import positioning
 from brachis.ik.prismatic import prismatic
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError
 from brachis.ik.spherical_wrist import spherical_wrist
 from brachis.robot import Robot, TaskSpace
 
-BUILTIN: tuple[Family, ...] = (prismatic, planar, spherical_wrist, parallel_axes, eaik, polynomial)
+BUILTIN: tuple[Family, ...] = (prismatic, planar, positioning, spherical_wrist, parallel_axes, eaik, polynomial)
 
-_CHECKED_POSTURES = 16
-_POSE_TOLERANCE = 1e-8
+_NEAR = 2e-3
+"""Axes this near (rad, m) to those of an ideal arm may be meant to be there."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +48,15 @@ class Candidate:
     solver : IKSolver or None
     reasons : dict of str to str
         Why the other families that were tried do not fit.
+    remark : str
+        What else there is to know of the solver; empty where there is nothing.
     """
 
     redundant_joints: tuple[str, ...]
     family: str | None
     solver: IKSolver | None
     reasons: dict[str, str]
+    remark: str = ""
 
 
 @dataclass(frozen=True)
@@ -142,71 +149,54 @@ def find_all(robot: Robot, task_space: TaskSpace, *, families: Sequence[Family] 
 
 
 def _try(robot: Robot, task_space: TaskSpace, names: tuple[str, ...], families: Sequence[Family]) -> Candidate:
-    """Let every family in turn look at one choice."""
+    """Let every family in turn look at one choice; where none fits, at the ideal arm that the robot almost is."""
     geometry = ChainGeometry.of(robot)
     redundant = tuple(sorted(robot.joint_names.index(name) for name in names))
-    ordered = tuple(robot.joint_names[i] for i in redundant)
     reasons: dict[str, str] = {}
-    for family in (*families, *BUILTIN, *plugin_families()):
+    tried = (*families, *BUILTIN, *plugin_families())
+    match = _fitting(robot, task_space, redundant, tried, reasons, None)
+    if match is None and (ideal := idealised(geometry, task_space)):
+        match = _fitting(robot, task_space, redundant, tried, reasons, ideal)
+    if match is None and (rough := idealised(geometry, task_space, _NEAR)):
+        _name_rounding(task_space, redundant, tried, reasons, rough)
+    return match or Candidate(tuple(robot.joint_names[i] for i in redundant), None, None, reasons)
+
+
+def _fitting(
+    robot: Robot,
+    task_space: TaskSpace,
+    redundant: tuple[int, ...],
+    families: Sequence[Family],
+    reasons: dict[str, str],
+    ideal: Ideal | None,
+) -> Match | None:
+    """Find the first family that fits the robot or the ideal arm; put down the others' reasons."""
+    geometry = ChainGeometry.of(robot)
+    for family in families:
         try:
-            solver = family.build(geometry, task_space, redundant)
+            solver = family.build(ideal.geometry if ideal else geometry, task_space, redundant)
+            if ideal:
+                solver = Polished(solver, geometry, task_space, redundant)
             check_answers(robot, task_space, redundant, solver)
         except NotApplicableError as reason:
             reasons[family.name] = str(reason)
         else:
-            return Match(ordered, family.name, solver, reasons)
-    return Candidate(ordered, None, None, reasons)
+            reasons.pop(family.name, None)
+            remark = f"axes within {ideal.miss} of an ideal arm's: answers are polished" if ideal else ""
+            return Match(tuple(robot.joint_names[i] for i in redundant), family.name, solver, reasons, remark)
+    return None
 
 
-def check_answers(
-    robot: Robot,
-    task_space: TaskSpace,
-    redundant: tuple[int, ...],
-    solver: IKSolver,
-    *,
-    postures: int = _CHECKED_POSTURES,
+def _name_rounding(
+    task_space: TaskSpace, redundant: tuple[int, ...], families: Sequence[Family], reasons: dict[str, str], ideal: Ideal
 ) -> None:
-    """Put a solver's answers for random postures into Pinocchio's forward kinematics.
-
-    Parameters
-    ----------
-    robot, task_space : Robot, TaskSpace
-    redundant : tuple of int
-        Indices of the redundant joints.
-    solver : IKSolver
-    postures : int, optional
-        How many.
-
-    Raises
-    ------
-    NotApplicableError
-        An answer misses its target by more than 1e-8 m or rad, or none of the answers is the posture itself.
-    """
-    low, high = _checked_ranges(robot)
-    q = np.random.default_rng(1).uniform(low, high, (postures, robot.n))
-    rest = [i for i in range(robot.n) if i not in redundant]
-    targets = task_space.values(*robot.tool_placements(q))
-    answers = solver.solve(targets, q[:, list(redundant)])
-    turning = ChainGeometry.of(robot).revolute[rest]
-    own = np.abs(_difference(answers, q[:, None, rest], turning)).max(axis=2)
-    if not np.all(np.nanmin(np.where(np.isnan(own), np.inf, own), axis=1) < _POSE_TOLERANCE * 100):
-        raise NotApplicableError("its answers leave out postures that reach the target")
-    sample, branch = np.nonzero(np.all(np.isfinite(answers), axis=2))
-    reached = q[sample]
-    reached[:, rest] = answers[sample, branch]
-    miss = np.abs(task_space.difference(task_space.values(*robot.tool_placements(reached)), targets[sample])).max()
-    if not miss < _POSE_TOLERANCE:
-        raise NotApplicableError(f"its answers miss the target by {miss:.1e}")
-
-
-def _checked_ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Whole turns of angles, and what prismatic joints can reach: a boom need not know what a negative length is."""
-    lower, upper = robot.limits.position_lower, robot.limits.position_upper
-    ranged = (np.array(robot.position_units) == "m") & np.isfinite(lower) & np.isfinite(upper)
-    return np.where(ranged, lower, -np.pi), np.where(ranged, upper, np.pi)
-
-
-def _difference(first: np.ndarray, second: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Difference of coordinates, modulo 2 pi where they are angles."""
-    delta = first - second
-    return np.where(angles, np.mod(delta + np.pi, 2.0 * np.pi) - np.pi, delta)
+    """Put down which families would fit if the axes were nearer to the ideal arm's."""
+    if max(ideal.turned, ideal.shifted) < TOLERANCE:
+        return
+    for family in families:
+        with contextlib.suppress(NotApplicableError):
+            family.build(ideal.geometry, task_space, redundant)
+            reasons[family.name] = (
+                f"fits an ideal arm only, and its axes are up to {ideal.miss} from there; at most {TOLERANCE:.0e} is "
+                "taken for rounding. If the URDF rounds angles, as in 1.57, write them with more digits"
+            )

@@ -4,7 +4,7 @@ Let W0 be this point while the six joints are at zero. Then E_1 ... E_6 = D (`di
 
     W = E_a E_b E_c W0 = D W0,
 
-for the last three, u, v, w, turn about it: equations for the first three, a, b, c, alone (`positioning`). What is left
+for the last three, u, v, w, turn about it: equations for the first three, a, b, c, alone (`placing`). What is left
 is a rotation R_u R_v R_w = (R_a R_b R_c)^-1 R_D =: R, for axes u, v, w at any angles:
 
     v    u . R_v w = u . R w, two answers
@@ -15,57 +15,63 @@ If the first three meet instead (an arm with a spherical shoulder), the reverse 
 the same form. Redundant joints may stand anywhere, even between axes that meet, if the point where they do stays at its
 place on one of them.
 
-Branches are told apart by the signs of the two factors of a recipe (`position_recipes`) and of u . (w x v). Divided by
-their largest size these are the branch margins. Their product is det J_nr up to a constant, so that a branch ends
-exactly where J_nr is singular.
+Branches are told apart by the signs of the two factors of a recipe (`position_recipes`) and of u . (w x v); see
+`factors`.
 
 Source: D. L. Pieper, The kinematics of manipulators under computer control, PhD thesis, Stanford 1968; for the first
-three joints see `positioning`.
+three joints see `placing`.
 """
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.ik.arm import Anchor, Arm, meeting, miss
 from brachis.ik.displacement import Displacement
+from brachis.ik.factored_solver import FactoredSolver, Structure, fitted
+from brachis.ik.factors import Factor
 from brachis.ik.geometry import ChainGeometry, PosedScrews
-from brachis.ik.pose_joints import PoseJoints, largest_determinant, random_postures
-from brachis.ik.position_recipes import RECIPES, WRIST, Factor, Recipe, reason_against, reason_singular
-from brachis.ik.positioning import FLIP
-from brachis.ik.protocol import Kind, NotApplicableError, ik_family
+from brachis.ik.held_joints import HeldJoints
+from brachis.ik.placing import FLIP
+from brachis.ik.pose_joints import PoseJoints
+from brachis.ik.position_recipes import recipe_for
+from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import Circle, Screw
-from brachis.ik.spherical_arm import Anchor, Arm, meeting, miss
-from brachis.ik.vectors import angle_about, apply, apply_inverse, dot, wrap
+from brachis.ik.vectors import angle_about, apply, apply_inverse, cross, dot
 from brachis.robot import TaskSpace
 
-_VANISHES = 1e-9
 _WRIST = (3, 4, 5)
-_LEFT = ("left", "right")
+
+
+def wrist_factor(arm: Arm) -> np.ndarray:
+    """Volume spanned by the axes of u, w, v."""
+    u, v, w = arm.wrist
+    return dot(u.axis, cross(w.axis, v.axis))
+
+
+WRIST = Factor(wrist_factor, "the axes of {u}, {v}, {w} always are parallel to one plane", ("noflip", "flip"))
 
 
 @dataclass(frozen=True)
-class Structure:
-    """Six joints, in one order or the other, and the recipe that fits them.
+class WristStructure(Structure):
+    """Six joints of which the last three have axes that meet.
 
     Attributes
     ----------
-    six : PoseJoints
-    recipe : Recipe
-    centre, meeting : Anchor
-        See `Arm`.
+    joints, recipe, meeting
+        See `Structure`.
+    centre : Anchor
+        The point where they do.
     """
 
-    six: PoseJoints
-    recipe: Recipe
     centre: Anchor
-    meeting: Anchor
 
     @classmethod
-    def of(cls, six: PoseJoints) -> Structure:
-        """Find the recipe.
+    def of(cls, six: HeldJoints) -> WristStructure:
+        """Find the centre and the recipe.
 
         Raises
         ------
@@ -75,33 +81,43 @@ class Structure:
         centre = meeting(six, *_WRIST)
         if centre is None:
             raise NotApplicableError(_reason_against_centre(six))
-        for recipe in RECIPES:
-            if recipe.fits(six):
-                point = meeting(six, *recipe.meets) if recipe.meets else None
-                return cls(six, recipe, centre, point or centre)
-        raise NotApplicableError(reason_against(six))
+        return cls(six, *recipe_for(six, _point(six)), centre)
+
+    @classmethod
+    def backwards(cls, six: HeldJoints) -> WristStructure:
+        """See the joints from the tool: the axes of the first three have to meet."""
+        return cls.of(six.reversed())
 
     @property
-    def factors(self) -> tuple[Factor, Factor, Factor]:
-        """Factors of det J_nr, of the slots `FRONT`, `UP`, `FLIP`."""
+    def factors(self) -> tuple[Factor, ...]:
+        """See `Structure.factors`; of the slots `FRONT`, `UP`, `FLIP`."""
         return *self.recipe.factors, WRIST
 
-    def arm(self, screws: tuple[Screw, ...]) -> Arm:
-        """Put in the points."""
-        return Arm(screws, self.centre.at(screws), self.meeting.at(screws))
+    def words(self) -> dict[str, str]:
+        """See `Structure.words`."""
+        return {**dict(zip("abcuvw", self.joints.names, strict=True)), "point": _point(self.joints)}
 
     def held(self, equation: Displacement) -> Arm:
         """Screws while the six joints are at zero: (3, 1, 1, 1, K), a slot for each step."""
         axes, points = (array[:, :, None, None, None] for array in (equation.axes, equation.points))
-        return self.arm(tuple(Screw(axes[:, i], points[:, i], bool(equation.revolute[i])) for i in range(6)))
+        return self._arm(tuple(Screw(axes[:, i], points[:, i], bool(equation.revolute[i])) for i in range(6)))
 
     def posed(self, posed: PosedScrews) -> Arm:
-        """Screws at postures, (3, K)."""
-        axes = -posed.axes if self.six.mirrored else posed.axes
-        return self.arm(tuple(Screw(axes[:, i], posed.points[:, i], bool(posed.revolute[i])) for i in self.six.joints))
+        """See `Structure.posed`."""
+        return self._arm(self.joints.screws(posed))
+
+    def _arm(self, screws: tuple[Screw, ...]) -> Arm:
+        """Put in the points."""
+        centre = self.centre.at(screws)
+        return Arm(screws, centre, self.meeting.at(screws) if self.meeting else centre)
 
 
-def _reason_against_centre(six: PoseJoints) -> str:
+def _point(six: HeldJoints) -> str:
+    """Put the centre into words."""
+    return f"the point where the axes of {', '.join(six.names[3:])} meet"
+
+
+def _reason_against_centre(six: HeldJoints) -> str:
     """Say why the last three joints have no centre."""
     names = ", ".join(six.names[3:])
     sliding = [six.names[i] for i in _WRIST if not six.revolute[i]]
@@ -110,71 +126,18 @@ def _reason_against_centre(six: PoseJoints) -> str:
     return f"the axes of {names} do not meet in a point (they miss it by {miss(six, *_WRIST):.2g} m)"
 
 
-class SphericalWristSolver:
+class SphericalWristSolver(FactoredSolver[WristStructure]):
     """Closed form of six joints with a spherical wrist or shoulder; see the module's formulas."""
 
-    kind: Kind = "closed_form"
-
-    def __init__(self, geometry: ChainGeometry, redundant: tuple[int, ...], structure: Structure) -> None:
-        self._geometry = geometry
-        self._redundant = redundant
-        self._structure = structure
-        posed = random_postures(geometry)
-        values = [factor.value(structure.posed(posed)) for factor in structure.factors]
-        self._scales = [float(np.abs(value).max()) for value in values]
-        self._bounds = [slot for slot, value in enumerate(values) if np.ptp(value) > _VANISHES * self._scales[slot]]
-        linear = [factor.linear(structure.six) for factor in structure.factors]
-        self._signs = [_signs(value, one_answer=one) for value, one in zip(values, linear, strict=True)]
-        self._choices = list(itertools.product(*self._signs))
-        words = [_LEFT if one else factor.words for factor, one in zip(structure.factors, linear, strict=True)]
-        named = [slot for slot in range(3) if len(self._signs[slot]) > 1]
-        # Linear steps of which either side exists, but not for the same redundant joints.
-        self._sided = [slot for slot in named if linear[slot]]
-        self.branches: tuple[str, ...] = tuple(
-            "_".join(words[slot][int(signs[slot] < 0.0)] for slot in named) for signs in self._choices
-        )
-
-    def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """See `IKSolver.solve`."""
-        structure = self._structure
+    def steps(self, targets: np.ndarray, q_r: np.ndarray) -> tuple[Arm, Sequence[np.ndarray]]:
+        """See `FactoredSolver.steps`."""
         equation = Displacement.of(self._geometry, self._redundant, targets, q_r)
-        if structure.six.mirrored:
+        if self._structure.joints.mirrored:
             equation = equation.reversed()
         rotation, translation = equation.rotation[:, :, None, None, None], equation.translation[:, None, None, None]
-        arm = structure.held(equation)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            base = structure.recipe.solve(arm, apply(rotation, arm.centre) + translation)
-            joints = self._collected((*base, *_wrist(arm, base, rotation)))
-        for slot in self._sided:
-            side = np.expand_dims(self._signs[slot], [axis for axis in range(4) if axis != slot])
-            joints = np.where(side * structure.factors[slot].value(arm) > 0.0, joints, np.nan)
-        ordered = joints[::-1] if structure.six.mirrored else joints
-        return ordered.reshape(6, len(self.branches), len(targets)).T
-
-    def _collected(self, values: tuple[np.ndarray, ...]) -> np.ndarray:
-        """Positions of the six joints, (6, slots, K), all NaN where one of them is; angles in (-pi, pi]."""
-        joints = np.empty((6, *(len(signs) for signs in self._signs), values[-1].shape[-1]))
-        for place, value in enumerate(values):
-            joints[place] = value
-        revolute = self._structure.six.revolute
-        turning = slice(None) if revolute.all() else revolute
-        joints[turning] = wrap(joints[turning])
-        return joints + 0.0 * joints.sum(axis=0)
-
-    def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
-        """See `IKSolver.branch_margins`: the factors of det J_nr that are not constant."""
-        arm, signs = self._structure.posed(self._geometry.posed(q)), self._choices[branch]
-        margins = np.empty((len(q), len(self._bounds)), dtype=q.dtype)
-        for place, slot in enumerate(self._bounds):
-            margins[:, place] = self._structure.factors[slot].value(arm) * (signs[slot] / self._scales[slot])
-        return margins
-
-
-def _signs(values: np.ndarray, *, one_answer: bool) -> np.ndarray:
-    """Signs of a factor by which the branches of its step differ; its only one where nothing is to be told apart."""
-    if one_answer and np.all(values[0] * values > 0.0):
-        return np.sign(values[:1])
-    return np.array([1.0, -1.0])
+        arm = self._structure.held(equation)
+        base = self._structure.recipe.solve(arm, apply(rotation, arm.centre) + translation)
+        return arm, (*base, *_wrist(arm, base, rotation))
 
 
 def _wrist(arm: Arm, base: tuple[np.ndarray, ...], rotation: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -196,33 +159,10 @@ def _wrist(arm: Arm, base: tuple[np.ndarray, ...], rotation: np.ndarray) -> tupl
     return first, bend, last
 
 
-@ik_family("spherical_wrist", source="Pieper 1968; Paden 1985; Brandstoetter et al. 2014; IK-Geo 2022; `positioning`")
+@ik_family("spherical_wrist", source="Pieper 1968; Paden 1985; Brandstoetter et al. 2014; IK-Geo 2022; `placing`")
 def spherical_wrist(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> SphericalWristSolver:
     """Fit the family: a pose, and six joints left over of which the last or the first three axes meet in a point."""
     six = PoseJoints.of(geometry, task_space, redundant)
-    structure, reasons = None, []
-    for order in (six, six.reversed()):
-        try:
-            structure = Structure.of(order)
-        except NotApplicableError as reason:
-            reasons.append(str(reason))
-        else:
-            break
-    posed = random_postures(geometry)
-    try:
-        largest_determinant(posed, six.joints)
-    except NotApplicableError as singular:
-        raise NotApplicableError(f"{singular}{_reason_singular(structure, posed)}") from None
-    if structure is None:
-        raise NotApplicableError("; ".join(reasons))
-    return SphericalWristSolver(geometry, redundant, structure)
-
-
-def _reason_singular(structure: Structure | None, posed: PosedScrews) -> str:
-    """Say why J_nr is singular everywhere, as far as it is known."""
-    if structure is not None:
-        arm = structure.posed(posed)
-        for factor in structure.factors:
-            if np.abs(factor.value(arm)).max() < _VANISHES:
-                return f": {reason_singular(structure.six, factor)}"
-    return ""
+    return SphericalWristSolver(
+        geometry, redundant, fitted(geometry, six, (WristStructure.of, WristStructure.backwards))
+    )

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.ik import ChainGeometry, IKSolver
+from brachis.ik import ChainGeometry, IKSolver, Polished
 from brachis.kinematics.task_kinematics import TaskKinematics
 from brachis.path import Path, PathSample
 from brachis.robot import Robot, TaskSpace
@@ -113,6 +113,7 @@ class Decomposition:
         self.rest = [i for i in range(robot.n) if i not in redundant]
         self.branch = branch
         self.slots = [i for i, label in enumerate(solver.branches) if label == solver.branches[branch]]
+        self._own = solver.only(self.slots) if isinstance(solver, Polished) else solver
         self.start = start
         self.kinematics = TaskKinematics(robot, task_space)
         self._turning = ChainGeometry.of(robot).revolute[self.rest]
@@ -148,7 +149,7 @@ class Decomposition:
             NaN in the non-redundant joints where the branch has no answer.
         """
         sample = sample or self.path.sample(y[:, 0])
-        answers = self.solver.solve(sample.target, y[:, 1:])[:, self.slots]
+        answers = self._own.solve(sample.target, y[:, 1:])[:, self.slots]
         if len(self.slots) == 1:
             answers = answers[:, 0]
         else:

@@ -1,9 +1,12 @@
 """A family of closed forms for brachis: arms that turn, tilt and reach, for the position of their tool.
 
-The turning axis a and the tilting axis n meet at a right angle in S, and the boom slides along d, away from S and
-perpendicular to n. The distance of the target from S gives the reach, its height along a the tilt, and its direction
-about a the turn. Turned by half a turn and tilted over backwards the arm reaches the same target: two branches.
-Redundant joints, a rail for example, come before the arm.
+The tilting axis n is at a right angle to the turning axis a, and S is a point on it at the distance e in front of a.
+The boom slides along d, away from S; it may lean to one side, g = d . n. For a target at the height h above S and at
+the distance rho from a, the boom's length L and the tool's distance x in front of S follow from
+
+    (e + x)^2 + (g L)^2 = rho^2   and   x^2 + h^2 = (1 - g^2) L^2,
+
+a quadratic equation for x with two answers: the branches. Redundant joints, a rail for example, come before the arm.
 """
 
 from __future__ import annotations
@@ -11,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.ik import ChainGeometry, NotApplicableError, PosedScrews, ik_family
-from brachis.ik.vectors import across, angle_about, cross, dot
+from brachis.ik.vectors import across, angle_about, cross, dot, meeting_point
 from brachis.robot import TaskSpace
 
 ROUNDING = 1e-9
@@ -25,40 +28,53 @@ class PolarSolver:
 
     def __init__(self, geometry: ChainGeometry) -> None:
         self._geometry = geometry
+        screws = geometry.posed(np.zeros((1, geometry.n)))
+        turn, tilt, boom = axes(screws)
+        self._lean = float(dot(boom, tilt)[0])
+        self._flat = 1.0 - self._lean**2
+        self._offset = float(dot(cross(tilt, turn), shoulder(screws) - screws.points[:, -3])[0])
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Return (K, 2, 3) for tool positions (K, 3) and redundant joints (K, r)."""
         screws = self._geometry.held(range(q_r.shape[1]), q_r)  # the arm at zero, moved by the joints before it
-        turn_axis, tilt_axis, boom = (screws.axes[:, i] for i in (-3, -2, -1))
-        away = targets.T - meeting_point(screws)
-        height = dot(turn_axis, away)
-        sideways = across(turn_axis, away)
-        level = np.sqrt(dot(sideways, sideways))
-        reach = np.sqrt(dot(away, away)) - length(screws)
+        turn_axis, tilt_axis, boom = axes(screws)
+        lean, flat, offset = self._lean, self._flat, self._offset
+        front, start = cross(tilt_axis, turn_axis), shoulder(screws) - screws.points[:, -3]
+        away = targets.T - screws.points[:, -3]
+        sideways, height = across(turn_axis, away), dot(turn_axis, away - start)
+        with np.errstate(invalid="ignore"):  # out of reach: NaN
+            root = np.sqrt(flat * (dot(sideways, sideways) - (lean * offset) ** 2) - (lean * height) ** 2)
         answers = np.empty((len(targets), 2, 3))
         for branch, sign in enumerate((1.0, -1.0)):
-            tilted = turn_axis * height + cross(tilt_axis, turn_axis) * (sign * level)
+            forward = sign * root - flat * offset
+            reach = np.sqrt((forward**2 + height**2) / flat)
+            tilted = front * forward + turn_axis * height + tilt_axis * (lean * reach)
+            turn = angle_about(turn_axis, start + tilted, away)
             tilt = angle_about(tilt_axis, boom, tilted)
-            answers[:, branch] = np.stack([angle_about(turn_axis, tilted, away), tilt, reach], axis=1)
+            answers[:, branch] = np.stack([turn, tilt, reach - length(screws)], axis=1)
         return answers
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
-        """Return (K, 2): the boom's tilt away from the turning axis, and its length."""
+        """Return (K, 2): the tool's distance from where the two answers meet, and the boom's length, m."""
         screws = self._geometry.posed(q)
-        turn_axis, tilt_axis, boom = (screws.axes[:, i] for i in (-3, -2, -1))
-        lean = dot(boom, cross(tilt_axis, turn_axis))
-        return np.stack([lean if branch == 0 else -lean, length(screws)], axis=1)
+        turn_axis, tilt_axis, _ = axes(screws)
+        forward = dot(cross(tilt_axis, turn_axis), screws.tool_position - shoulder(screws)) + self._flat * self._offset
+        return np.stack([forward if branch == 0 else -forward, length(screws)], axis=1)
 
 
-def meeting_point(screws: PosedScrews) -> np.ndarray:
-    """Return S, (3, K), m."""
-    tilt_axis, on_tilt = screws.axes[:, -2], screws.points[:, -2]
-    return on_tilt + tilt_axis * dot(tilt_axis, screws.points[:, -3] - on_tilt)
+def axes(screws: PosedScrews) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the directions of turning, tilting and reaching, each (3, K)."""
+    return screws.axes[:, -3], screws.axes[:, -2], screws.axes[:, -1]
+
+
+def shoulder(screws: PosedScrews) -> np.ndarray:
+    """Return S, where the boom's line meets the tilting axis, (3, K), m."""
+    return meeting_point(screws.axes[:, -2], screws.points[:, -2], screws.axes[:, -1], screws.tool_position)
 
 
 def length(screws: PosedScrews) -> np.ndarray:
     """Return the distance of the tool from S along the boom, (K,), m."""
-    return dot(screws.axes[:, -1], screws.tool_position - meeting_point(screws))
+    return dot(screws.axes[:, -1], screws.tool_position - shoulder(screws))
 
 
 @ik_family("polar", source="this module's docstring")
@@ -71,12 +87,12 @@ def polar(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, 
     if list(geometry.revolute[-3:]) != [True, True, False]:
         raise NotApplicableError("the last three joints are not revolute, revolute, prismatic")
     screws = geometry.posed(np.zeros((1, geometry.n)))
-    turn_axis, tilt_axis, boom = (screws.axes[:, i] for i in (-3, -2, -1))
-    centre = meeting_point(screws)
-    off_axis = across(turn_axis, centre - screws.points[:, -3])
-    off_boom = across(boom, screws.tool_position - centre)
-    if max(abs(dot(tilt_axis, turn_axis)), abs(dot(tilt_axis, boom))) > ROUNDING:
-        raise NotApplicableError("the tilting axis is not perpendicular to the turning axis and the boom")
-    if max(np.abs(off_axis).max(), np.abs(off_boom).max()) > ROUNDING:
-        raise NotApplicableError("the axes and the boom do not meet")
+    turn_axis, tilt_axis, boom = axes(screws)
+    if abs(dot(turn_axis, tilt_axis)) > ROUNDING:
+        raise NotApplicableError("the tilting axis is not perpendicular to the turning axis")
+    gap = dot(cross(tilt_axis, boom), screws.tool_position - screws.points[:, -2])
+    if abs(dot(tilt_axis, boom)) > 1.0 - ROUNDING or abs(gap) > ROUNDING:
+        raise NotApplicableError("the boom's line does not meet the tilting axis")
+    if abs(dot(tilt_axis, shoulder(screws) - screws.points[:, -3])) > ROUNDING:
+        raise NotApplicableError("where the boom's line meets the tilting axis is not in front of the turning axis")
     return PolarSolver(geometry)

@@ -1,0 +1,71 @@
+"""Putting a closed form to the test: no answer is believed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.ik.geometry import ChainGeometry
+from brachis.ik.protocol import IKSolver, NotApplicableError
+from brachis.robot import Robot, TaskSpace
+
+_CHECKED_POSTURES = 16
+_POSE_TOLERANCE = 1e-8
+
+
+def check_answers(
+    robot: Robot,
+    task_space: TaskSpace,
+    redundant: tuple[int, ...],
+    solver: IKSolver,
+    *,
+    postures: int = _CHECKED_POSTURES,
+) -> None:
+    """Put a solver's answers for random postures into Pinocchio's forward kinematics.
+
+    Of twice as many postures those with the larger branch margins are taken: beside a branch's boundary it is a matter
+    of rounding whether there is an answer.
+
+    Parameters
+    ----------
+    robot, task_space : Robot, TaskSpace
+    redundant : tuple of int
+        Indices of the redundant joints.
+    solver : IKSolver
+    postures : int, optional
+        How many.
+
+    Raises
+    ------
+    NotApplicableError
+        An answer misses its target by more than 1e-8 m or rad, or none of the answers is the posture itself.
+    """
+    low, high = _checked_ranges(robot)
+    q = np.random.default_rng(1).uniform(low, high, (2 * postures, robot.n))
+    margins = [solver.branch_margins(q, b).min(axis=1, initial=np.inf) for b in range(len(solver.branches))]
+    q = q[np.argsort(-np.max(margins, axis=0), kind="stable")[:postures]]
+    rest = [i for i in range(robot.n) if i not in redundant]
+    targets = task_space.values(*robot.tool_placements(q))
+    answers = solver.solve(targets, q[:, list(redundant)])
+    turning = ChainGeometry.of(robot).revolute[rest]
+    own = np.abs(_difference(answers, q[:, None, rest], turning)).max(axis=2)
+    if not np.all(np.nanmin(np.where(np.isnan(own), np.inf, own), axis=1) < _POSE_TOLERANCE * 100):
+        raise NotApplicableError("its answers leave out postures that reach the target")
+    sample, branch = np.nonzero(np.all(np.isfinite(answers), axis=2))
+    reached = q[sample]
+    reached[:, rest] = answers[sample, branch]
+    miss = np.abs(task_space.difference(task_space.values(*robot.tool_placements(reached)), targets[sample])).max()
+    if not miss < _POSE_TOLERANCE:
+        raise NotApplicableError(f"its answers miss the target by {miss:.1e}")
+
+
+def _checked_ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Whole turns of angles, and what prismatic joints can reach: a boom need not know what a negative length is."""
+    lower, upper = robot.limits.position_lower, robot.limits.position_upper
+    ranged = (np.array(robot.position_units) == "m") & np.isfinite(lower) & np.isfinite(upper)
+    return np.where(ranged, lower, -np.pi), np.where(ranged, upper, np.pi)
+
+
+def _difference(first: np.ndarray, second: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Difference of coordinates, modulo 2 pi where they are angles."""
+    delta = first - second
+    return np.where(angles, np.mod(delta + np.pi, 2.0 * np.pi) - np.pi, delta)

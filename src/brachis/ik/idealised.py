@@ -1,0 +1,245 @@
+"""Chains whose axes are parallel, at right angles, or meet but for a rounded figure, as in rpy="1.5708 0 0".
+
+The ideal chain follows the given one from the base to the tool. What no joint turns against a joint's direction are the
+revolute joint before it and the slides in between. A direction that is parallel to one of these to within a tolerance
+becomes so; else one that is at a right angle to some of them. A revolute axis that meets the one before it, or nearly
+coincides with it, is moved there; where that one meets its own predecessor nearby, into the same point. Whatever is
+turned or moved carries the rest of the chain and the tool along, so that errors do not add up along the chain, and what
+follows from neighbours, as that all of three axes are parallel or meet in one point, holds for the others too.
+
+Closed forms of the ideal chain miss the targets of the given one by little: Newton's method does the rest (`polish`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from brachis.ik.geometry import ChainGeometry
+from brachis.ik.polish import goal_of, polished
+from brachis.ik.protocol import IKSolver, Kind
+from brachis.robot import TaskSpace
+
+TOLERANCE = 1e-4
+"""Axes this near to parallel or perpendicular (rad), or to meeting (m), are taken to be meant so."""
+_ROUNDING = 1e-12
+_SKEW = 1e-2
+"""Axes at a smaller angle (rad) have no point where they meet that could be trusted."""
+
+
+@dataclass(frozen=True)
+class Ideal:
+    """A chain with exactly parallel, perpendicular and meeting axes near a given one.
+
+    Attributes
+    ----------
+    geometry : ChainGeometry
+    turned : float
+        Largest angle by which an axis of the given chain misses its direction to those before it, rad.
+    shifted : float
+        Largest distance by which one misses its place, m.
+    """
+
+    geometry: ChainGeometry
+    turned: float
+    shifted: float
+
+    @property
+    def miss(self) -> str:
+        """How far the axes of the given chain are from the ideal ones, for messages."""
+        sizes = ((self.turned, "rad"), (self.shifted, "m"))
+        least = 1e-3 * max(self.turned, self.shifted)
+        return " and ".join(f"{size:.1e} {unit}" for size, unit in sizes if size > least)
+
+
+def idealised(geometry: ChainGeometry, task_space: TaskSpace, tolerance: float = TOLERANCE) -> Ideal | None:
+    """Make axes that are almost parallel, perpendicular or meeting so exactly.
+
+    Parameters
+    ----------
+    geometry : ChainGeometry
+    task_space : TaskSpace
+        For positions the world's axes, and a tool on the last axis of rotation, matter as well.
+    tolerance : float, optional
+        rad for directions, m for points.
+
+    Returns
+    -------
+    Ideal or None
+        None where the chain is ideal as it is.
+    """
+    chain = _Chain([] if task_space.oriented else list(np.eye(3)), tolerance)
+    axes, points = np.empty_like(geometry.axes), np.zeros_like(geometry.points)
+    for i, revolute in enumerate(geometry.revolute):
+        axes[i] = chain.direction(geometry.axes[i], geometry.points[i], revolute=revolute)
+        if revolute:
+            points[i] = chain.place(axes[i], geometry.points[i])
+    if not task_space.oriented:
+        chain.place_tool(geometry.tool_position)
+    if max(chain.turned, chain.shifted) < _ROUNDING:
+        return None
+    moved = replace(
+        geometry,
+        axes=axes,
+        points=points,
+        tool_position=chain.moved(geometry.tool_position),
+        tool_rotation=chain.rotation @ geometry.tool_rotation,
+    )
+    return Ideal(moved, chain.turned, chain.shifted)
+
+
+class _Chain:
+    """What is known of the ideal chain up to some joint, and how it carries the rest of the given one.
+
+    Parameters
+    ----------
+    fixed : list of (3,) ndarray
+        Directions in the world that matter to the first joints.
+    tolerance : float
+    """
+
+    def __init__(self, fixed: list[np.ndarray], tolerance: float) -> None:
+        self.rotation, self.offset = np.eye(3), np.zeros(3)
+        self.turned = self.shifted = 0.0
+        self._tolerance = tolerance
+        self._fixed = fixed
+        self._axis: np.ndarray | None = None
+        self._point = np.zeros(3)
+        self._meets = False
+
+    def moved(self, point: np.ndarray) -> np.ndarray:
+        """Carry a point of the given chain along."""
+        return self.rotation @ point + self.offset
+
+    def direction(self, axis: np.ndarray, point: np.ndarray, *, revolute: bool) -> np.ndarray:
+        """Direction of the next joint; turns the rest of the chain about its axis' point that is nearest."""
+        given = self.rotation @ axis
+        ideal = _snapped(given, self._fixed, self._tolerance)
+        pivot = self._nearest(given, self.moved(point))[1] if revolute else self._point
+        turn = _least_rotation(given, ideal)
+        self.turned = max(self.turned, float(np.linalg.norm(ideal - given)))
+        self.rotation = turn @ self.rotation
+        self.offset = turn @ (self.offset - pivot) + pivot
+        self._fixed = [ideal] if revolute else [*self._fixed, ideal]
+        return ideal
+
+    def place(self, axis: np.ndarray, point: np.ndarray) -> np.ndarray:
+        """Point on the axis of the next revolute joint; moves the rest of the chain to where the axis should be."""
+        before, here = self._nearest(axis, self.moved(point))
+        meets = False
+        if self._axis is not None and np.linalg.norm(here - before) < self._tolerance:
+            parallel = abs(self._axis @ axis) > 1.0 - _ROUNDING
+            if self._meets and np.linalg.norm(self._point - before) < self._tolerance:
+                before = self._point
+            if parallel or np.linalg.norm(np.cross(self._axis, axis)) > _SKEW:
+                self._shift(before - here)
+                here, meets = before, self._meets or not parallel
+        self._axis, self._point, self._meets = axis, here, meets
+        return here
+
+    def place_tool(self, position: np.ndarray) -> None:
+        """Move the tool onto the last axis of rotation if it is meant to be there."""
+        if self._axis is not None:
+            gap = self.moved(position) - self._point
+            gap -= self._axis * (self._axis @ gap)
+            if np.linalg.norm(gap) < self._tolerance:
+                self._shift(-gap)
+
+    def _shift(self, step: np.ndarray) -> None:
+        self.shifted = max(self.shifted, float(np.linalg.norm(step)))
+        self.offset = self.offset + step
+
+    def _nearest(self, axis: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points where the last axis and another one are nearest; where they are parallel, beside the last point."""
+        if self._axis is None:
+            return point, point
+        normal = np.cross(self._axis, axis)
+        size = normal @ normal
+        before = self._point
+        if size > _SKEW**2:
+            before = before + self._axis * (np.cross(point - before, axis) @ normal / size)
+        return before, point + axis * (axis @ (before - point))
+
+
+def _snapped(axis: np.ndarray, fixed: Sequence[np.ndarray], tolerance: float) -> np.ndarray:
+    """Direction exactly parallel to one of some others, else perpendicular to one or two of them, if it almost is."""
+    for other in fixed:
+        if np.linalg.norm(np.cross(axis, other)) < tolerance:
+            return other * np.sign(axis @ other)
+    across = [other for other in fixed if abs(axis @ other) < tolerance]
+    if not across:
+        return axis
+    ideal = axis - across[0] * (axis @ across[0])
+    for other in across[1:]:
+        normal = np.cross(across[0], other)
+        if np.linalg.norm(normal) > _SKEW:
+            ideal = normal * np.sign(axis @ normal)
+            break
+    return ideal / np.linalg.norm(ideal)
+
+
+def _least_rotation(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Rotation (3, 3) that turns a direction to another one nearby the shortest way."""
+    x, y, z = np.cross(start, end)
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + skew + skew @ skew / (1.0 + start @ end)
+
+
+class Polished:
+    """Closed form of an ideal chain, made exact for the given one by Newton's method.
+
+    Answers are those of the ideal chain as far as the method leads from them to one beside them; labels and margins of
+    the branches are the ideal chain's. Where its margins are smaller than about the square root of how far the given
+    chain is from it, answers may be missing.
+
+    Parameters
+    ----------
+    solver : IKSolver
+        Of the ideal chain.
+    geometry : ChainGeometry
+        The given chain.
+    task_space : TaskSpace
+    redundant : tuple of int
+    branches : sequence of int, optional
+        Those in which answers are wanted; all unless given.
+    """
+
+    def __init__(
+        self,
+        solver: IKSolver,
+        geometry: ChainGeometry,
+        task_space: TaskSpace,
+        redundant: tuple[int, ...],
+        branches: Sequence[int] | None = None,
+    ) -> None:
+        self.branches: tuple[str, ...] = solver.branches
+        self.kind: Kind = solver.kind
+        self._solver = solver
+        self._geometry = geometry
+        self._task_space = task_space
+        self._redundant = list(redundant)
+        self._rest = [i for i in range(geometry.n) if i not in redundant]
+        every = range(len(self.branches))
+        self._wanted = np.isin(every, every if branches is None else branches)
+
+    def only(self, branches: Sequence[int]) -> Polished:
+        """Return a solver that answers in some branches (indices) alone, which takes less time."""
+        return Polished(self._solver, self._geometry, self._task_space, tuple(self._redundant), branches)
+
+    def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
+        """See `IKSolver.solve`."""
+        answers = self._solver.solve(targets, q_r)
+        sample, branch = np.nonzero(np.isfinite(answers).all(axis=2) & self._wanted)
+        q = np.empty((len(sample), self._geometry.n))
+        q[:, self._redundant] = q_r[sample]
+        q[:, self._rest] = answers[sample, branch]
+        goal = goal_of(self._task_space, targets[sample])
+        exact = np.full_like(answers, np.nan)
+        exact[sample, branch] = polished(self._geometry, self._rest, q, goal)
+        return exact
+
+    def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
+        """See `IKSolver.branch_margins`."""
+        return self._solver.branch_margins(q, branch)

@@ -1,0 +1,243 @@
+"""Three joints that place the tool: every recipe, built arms with all their choices of redundant joints, and plans."""
+
+from __future__ import annotations
+
+import itertools
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.ik import ChainGeometry, NotApplicableError, find, find_all
+from brachis.ik.position_recipes import RECIPES
+from brachis.ik.positioning import positioning
+from brachis.kinematics import TaskKinematics
+from brachis.robot import Robot, TaskSpace
+from support.chains import Joint, chain_urdf
+from support.factored_bench import Bench
+from support.pose_arms import panda as panda_urdf
+from support.screw_arms import BASES, SLIDE, Axis, extra, panda, screw_robot, seven_joints, unit
+from support.spatial import rail_arm, rail_arm_joints
+
+X, Y, Z = np.eye(3)
+ROBOTS = Path(__file__).parents[2] / "robots"
+
+
+def bench(robot, redundant, postures=2000, rows="position"):
+    return Bench(robot, redundant, postures, family=positioning, rows=rows)
+
+
+def built(name):
+    return Robot.from_urdf(ROBOTS / name / "robot.urdf")
+
+
+def three_joints():
+    """An industrial arm without its wrist."""
+    return Robot.from_urdf("arm", urdf_text=chain_urdf(rail_arm_joints()[1:4], tool=(0.3, 0.1, 0.4)))
+
+
+def scara(tool=(0.1, 0.05, 0.0)):
+    """Three parallel axes and a quill."""
+    joints = [Joint("revolute", xyz=xyz) for xyz in ((0.0, 0.0, 0.5), (0.4, 0.0, 0.1), (0.3, 0.0, 0.0))]
+    return Robot.from_urdf(
+        "scara", urdf_text=chain_urdf([*joints, Joint("prismatic", axis=(0.0, 0.0, -1.0), limit=SLIDE)], tool=tool)
+    )
+
+
+def crane():
+    """A rail, and an arm that turns, tilts and reaches."""
+    joints = [
+        Joint("prismatic", axis=(0.0, 1.0, 0.0), limit=SLIDE),
+        Joint("revolute", xyz=(0.0, 0.0, 0.6)),
+        Joint("revolute", axis=(0.0, 1.0, 0.0), xyz=(0.1, 0.0, 0.3)),
+        Joint("prismatic", axis=(1.0, 0.0, 0.0), xyz=(0.9, 0.0, 0.1), limit=SLIDE),
+    ]
+    return Robot.from_urdf("crane", urdf_text=chain_urdf(joints, tool=(0.1, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize("name", BASES)
+@pytest.mark.parametrize("arrangement", ["alone", "backwards", "carried", "carried backwards"])
+def test_every_recipe(name, arrangement):
+    rng = np.random.default_rng(len(name))
+    axes, redundant = [*BASES[name]], ()
+    if "backwards" in arrangement:
+        axes.reverse()
+    if "carried" in arrangement:  # redundant joints before and behind the three
+        axes, redundant = [extra(rng, "R"), *axes, extra(rng, "P"), extra(rng, "R")], (0, 4, 5)
+    checked = bench(screw_robot(axes), redundant).check()
+    assert len(set(checked.solver.branches)) == len(checked.solver.branches)
+
+
+def test_every_recipe_is_tried():
+    used = {RECIPES.index(bench(screw_robot(base), (), 1).solver._structure.recipe) for base in BASES.values()}
+    assert used == set(range(len(RECIPES)))
+    backwards = bench(screw_robot(BASES["cylinder"][::-1]), (), 1).solver._structure
+    assert backwards.joints.mirrored
+
+
+ARMS = {
+    "three joints": (three_joints, 1),
+    "scara": (scara, 3),
+    "crane": (crane, 4),
+    "tx90l_rail": (lambda: built("tx90l_rail"), 14),
+    "ur10_rail": (lambda: built("ur10_rail"), 16),
+    "iiwa14": (lambda: built("iiwa14"), 16),
+    "panda": (panda_urdf, 13),
+    "panda, tool off the last axis": (panda, 17),
+    "seven joints, tool off the last axis": (seven_joints, 28),
+}
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_built_arms_with_all_choices_of_redundant_joints(name):
+    make, expected = ARMS[name]
+    robot = make()
+    space, served = TaskSpace.of(robot, "position"), 0
+    jacobian = TaskKinematics(robot, space).jacobian(np.random.default_rng(2).uniform(-np.pi, np.pi, (200, robot.n)))
+    for redundant in itertools.combinations(range(robot.n), robot.n - 3):
+        rest = [i for i in range(robot.n) if i not in redundant]
+        singular = np.abs(np.linalg.det(jacobian[:, :, rest])).max() < 1e-9
+        try:
+            bench(robot, redundant).check()
+        except NotApplicableError as reason:
+            named = all(robot.joint_names[i] in str(reason) for i in rest)
+            assert str(reason).startswith("J_nr is singular everywhere") if singular else named  # noqa: PT017
+        else:
+            assert not singular
+            served += 1
+    assert served == expected
+
+
+@pytest.mark.parametrize("rows", [*itertools.permutations("xyz")], ids="".join)
+def test_rows_in_any_order(rows):
+    bench(built("tx90l_rail"), (0, 4, 5, 6), 300, rows).check()
+    bench(screw_robot(BASES["cylinder"][::-1]), (), 300, rows).check()
+
+
+def test_labels_say_where_the_arm_is():
+    checked = bench(rail_arm(), (0, 4, 5, 6), 1)
+    bend_forwards = np.array([[0.2, 0.3, 0.4, 1.2, 0.5, 0.8, -0.3]])
+    labels = checked.solver.branches
+    assert labels[np.argmax((checked.margins(bend_forwards) > 0.0).all(axis=2))] == "front_up"
+    other = bend_forwards * np.array([1.0, 1.0, -4.0, -1.0, 1.0, 1.0, 1.0])
+    assert labels[np.argmax((checked.margins(other) > 0.0).all(axis=2))] == "back_down"
+    # The rail moves the tool across the plane of the links to one side or, turned round, to the other.
+    assert bench(rail_arm(), (1, 4, 5, 6), 1).solver.branches == ("left_up", "left_down", "right_up", "right_down")
+    # A quill has one answer, and so have three slides.
+    assert bench(scara(), (0,), 1).solver.branches == ("front", "back")
+    assert bench(screw_robot(BASES["P|PP"]), (), 1).solver.branches == ("slides",)
+
+
+# Robot, redundant joints, and the joint of every step with two answers.
+SMOOTH = {
+    "three joints": (three_joints, (), (0, 2)),
+    "scara": (scara, (0,), (2,)),
+    "slide in a plane": (lambda: screw_robot(BASES["R|RP"]), (), (0, 2)),
+    "rail and wrist": (lambda: built("tx90l_rail"), (0, 4, 5, 6), (1, 3)),
+    "joint 1 and wrist": (lambda: built("tx90l_rail"), (1, 4, 5, 6), (None, 3)),
+    "iiwa14": (lambda: built("iiwa14"), (2, 4, 5, 6), (1, 3)),
+    "meeting of the last": (panda, (0, 1, 2, 6), (5, 3)),
+    "backwards": (lambda: screw_robot(BASES["cylinder"][::-1]), (), (0, 0)),
+}
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_labels_follow_the_branch_along_smooth_curves(name):
+    make, redundant, _ = SMOOTH[name]
+    bench(make(), redundant, 1).check_labels_along_curves()
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_margins_vanish_where_two_answers_meet(name):
+    make, redundant, steps = SMOOTH[name]
+    bench(make(), redundant).check_boundaries(steps)
+
+
+def test_refusals():
+    robot = built("tx90l_rail")
+    geometry, position = ChainGeometry.of(robot), TaskSpace.of(robot, "position")
+    for space in (TaskSpace.of(robot, "pose"), TaskSpace.of(robot, ["x", "y"]), TaskSpace(("x", "y", "yaw"), 0)):
+        with pytest.raises(NotApplicableError, match="only for the position: x, y and z"):
+            positioning.build(geometry, space, (0, 4, 5, 6))
+    with pytest.raises(NotApplicableError, match="4 joints would be left over, not three"):
+        positioning.build(geometry, position, (0, 4, 5))
+    with pytest.raises(NotApplicableError) as caught:
+        positioning.build(geometry, position, (0, 1, 2, 3))
+    assert str(caught.value) == "J_nr is singular everywhere: joint_6 does not move the tool"
+
+
+def test_refusals_say_what_the_joints_cannot_do():
+    with pytest.raises(NotApplicableError) as caught:
+        bench(seven_joints(), (3, 4, 5, 6), 1)
+    assert str(caught.value) == (
+        "J_nr is singular everywhere: j3 does not change the distance between the tool and the point where the axes of "
+        "j1 and j2 meet"
+    )
+    rng = np.random.default_rng(8)
+    general = [extra(rng, "R") for _ in range(3)]
+    with pytest.raises(NotApplicableError) as caught:
+        bench(screw_robot(general), (), 1)
+    apart = "are not parallel and do not meet in a fixed point of one of them"
+    assert str(caught.value) == (
+        f"no closed form moves the tool by j1, j2, j3: the axes of j1 and j2 {apart}, and the axes of j2 and j3 {apart}"
+    )
+    askew = [Axis("R", Z, np.zeros(3)), Axis("R", Y, X), Axis("P", unit(X + Y), np.zeros(3))]
+    with pytest.raises(NotApplicableError, match="and j3 slides at an angle to the axis of j2"):
+        bench(screw_robot(askew), (), 1)
+
+
+def test_solvers_can_be_sent_to_other_processes():
+    checked = bench(rail_arm(), (0, 4, 5, 6), 5)
+    solver = pickle.loads(pickle.dumps(checked.solver))  # noqa: S301
+    targets, q_r = checked.targets(checked.q), checked.q[:, [0, 4, 5, 6]]
+    np.testing.assert_array_equal(solver.solve(targets, q_r), checked.solver.solve(targets, q_r))
+
+
+def test_no_targets_have_no_answers():
+    solver = bench(rail_arm(), (0, 4, 5, 6), 1).solver
+    assert solver.solve(np.empty((0, 3)), np.empty((0, 4))).shape == (0, 4, 3)
+
+
+def test_out_of_reach_is_nan():
+    solver = bench(three_joints(), (), 1).solver
+    assert np.isnan(solver.solve(np.array([[9.0, 0.0, 0.0], [0.0, 0.0, 0.478]]), np.empty((2, 0)))).all()
+
+
+def test_it_is_found_by_geometry():
+    robot = rail_arm()
+    space = TaskSpace.of(robot, "position")
+    assert find(robot, space, ["j1", "j5", "j6", "j7"]).family == "positioning"
+    families = {candidate.redundant_joints: candidate.family for candidate in find_all(robot, space)}
+    assert families["j2", "j5", "j6", "j7"] == "positioning"
+    slides = screw_robot(BASES["P|PP"])
+    assert find(slides, TaskSpace.of(slides, "position"), []).family == "prismatic"
+
+
+PLANS = {
+    "tx90l_rail": ((0.0, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1), ("rail", "joint_4", "joint_5", "joint_6"), "front_up"),
+    "iiwa14": ((0.3, 0.6, 0.2, -1.4, 0.3, 0.9, 0.1), ("joint_3", "joint_5", "joint_6", "joint_7"), "back_down"),
+}
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_four_redundant_joints_are_faster_than_one(name):
+    start, redundant, branch = PLANS[name]
+    urdf, by = ROBOTS / name / "robot.urdf", [0.0, 0.2, -0.1]
+    task = {
+        "brachis": 1,
+        "start": {"joints": start},
+        "path": [{"line": {"by": by}}],
+        "spline": {"intervals": 8},
+        "solver": {"max_iterations": 600},
+    }
+    result = brachis.plan(urdf, {**task, "task_space": "position", "redundant_joints": redundant})
+    assert (result.family, result.trajectory.branch) == ("positioning", branch)
+    assert result.verified
+    ends = result.trajectory.robot.tool_placements(result.trajectory.q[[0, -1]])[0]
+    np.testing.assert_allclose(ends[1] - ends[0], by, atol=1e-8)
+    # The motion that keeps the orientation as well is one of those that keep the position.
+    pose = brachis.plan(urdf, {**task, "task_space": "pose", "redundant_joints": redundant[:1]})
+    assert pose.verified
+    assert result.t_end < 0.97 * pose.t_end
