@@ -1,11 +1,13 @@
 """Random reachable pose lines for every spatial robot: how many end in a verified plan.
 
-Usage: python benchmarks/random_poses.py [ROBOT|all] [SEED] [COUNT]
+Usage: python benchmarks/random_poses.py [ROBOT|all] [SEED] [COUNT] [roomiest|in_turn]
 
 A task starts in a random posture (a tenth of every range is kept clear at both ends), and its path leads straight, the
 orientation turning at a constant rate, to the pose of another posture whose joints are up to 0.5 rad or 0.5 m away. It
 counts as reachable if a damped least-squares inverse kinematics, which knows nothing of the planner, follows the path
-within the joint ranges and with torques that hold the arm at rest. The redundant joint goes round all closed forms.
+within the joint ranges and with torques that hold the arm at rest. The redundant joint is the one whose closed form has
+the most room at the start (the largest least branch margin), or goes round all closed forms in turn, which counts those
+as well whose branch ends along the path.
 """
 
 from __future__ import annotations
@@ -44,14 +46,20 @@ def robots() -> dict[str, Robot]:
     }
 
 
-def closed_forms(robot: Robot) -> list[tuple[str, ...]]:
+def closed_forms(robot: Robot) -> list[ik.Candidate]:
     """Choices of redundant joints that have a closed form for poses."""
     found = ik.find_all(robot, TaskSpace.of(robot, "pose"))
-    return [c.redundant_joints for c in found if c.solver is not None and c.solver.kind == "closed_form"]
+    return [c for c in found if c.solver is not None and c.solver.kind == "closed_form"]
+
+
+def room(start: np.ndarray, candidate: ik.Candidate) -> float:
+    """Least branch margin of a start posture on its own branch."""
+    solver = candidate.solver
+    return max(float(solver.branch_margins(start[None], b).min()) for b in range(len(solver.branches)))
 
 
 def random_tasks(
-    robot: Robot, seed: int, count: int, choices: Sequence[tuple[str, ...]]
+    robot: Robot, seed: int, count: int, choices: Sequence[ik.Candidate], *, in_turn: bool = False
 ) -> Iterator[dict[str, object]]:
     """Yield task mappings."""
     rng = np.random.default_rng(seed)
@@ -67,6 +75,7 @@ def random_tasks(
         goal = robot.tool_placement(end)
         turn = pin.log3(goal.rotation @ robot.tool_placement(start).rotation.T)
         angle = float(np.linalg.norm(turn))
+        choice = choices[number % len(choices)] if in_turn else max(choices, key=lambda c: room(start, c))
         yield {
             "brachis": 1,
             "start": {"joints": start},
@@ -77,7 +86,7 @@ def random_tasks(
                     "orientation": {"rotate": {"axis": list(turn / angle), "angle_deg": float(np.rad2deg(angle))}},
                 }
             ],
-            "redundant_joints": list(choices[number % len(choices)]),
+            "redundant_joints": list(choice.redundant_joints),
         }
 
 
@@ -115,13 +124,14 @@ def tried(robot: Robot, task: dict[str, object]) -> str:
 def main() -> None:
     """Print every failure with its reason, then the count."""
     chosen = sys.argv[1] if len(sys.argv) > 1 else "all"
-    seed, count = (int(value) for value in (*sys.argv[2:], *("0", "100")[len(sys.argv[2:]) :]))
+    seed, count = (int(value) for value in (*sys.argv[2:4], *("0", "100")[len(sys.argv[2:4]) :]))
+    rule = sys.argv[4] if len(sys.argv) > 4 else "roomiest"
     for name, robot in robots().items():
         if chosen not in ("all", name):
             continue
         choices = closed_forms(robot)
         verified, times = 0, []
-        for number, task in enumerate(random_tasks(robot, seed, count, choices)):
+        for number, task in enumerate(random_tasks(robot, seed, count, choices, in_turn=rule == "in_turn")):
             began = time.perf_counter()
             reason = tried(robot, task)
             times.append(time.perf_counter() - began)
@@ -130,7 +140,7 @@ def main() -> None:
                 print(f"{name} {number} {task['redundant_joints']}: {reason}")
         print(
             f"{name}: {verified} of {count} verified; median {np.median(times):.2f} s, longest {max(times):.1f} s; "
-            f"redundant joints in turn: {', '.join('+'.join(choice) for choice in choices)}"
+            f"redundant joint ({rule}) out of {', '.join('+'.join(c.redundant_joints) for c in choices)}"
         )
 
 
