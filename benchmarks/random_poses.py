@@ -6,8 +6,8 @@ A task starts in a random posture (a tenth of every range is kept clear at both 
 orientation turning at a constant rate, to the pose of another posture whose joints are up to 0.5 rad or 0.5 m away. It
 counts as reachable if a damped least-squares inverse kinematics, which knows nothing of the planner, follows the path
 within the joint ranges and with torques that hold the arm at rest. The redundant joint is the one whose closed form has
-the most room at the start (the largest least branch margin), or goes round all closed forms in turn, which counts those
-as well whose branch ends along the path.
+the most room along this course (the largest least branch margin), or goes round all closed forms in turn, which counts
+those as well whose branch ends along the path.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ def closed_forms(robot: Robot) -> list[ik.Candidate]:
     return [c for c in found if c.solver is not None and c.solver.kind == "closed_form"]
 
 
-def room(start: np.ndarray, candidate: ik.Candidate) -> float:
-    """Least branch margin of a start posture on its own branch."""
+def room(course: np.ndarray, candidate: ik.Candidate) -> float:
+    """Least branch margin along a course of postures (K, n), on the branch where it is largest."""
     solver = candidate.solver
-    return max(float(solver.branch_margins(start[None], b).min()) for b in range(len(solver.branches)))
+    return max(float(solver.branch_margins(course, b).min()) for b in range(len(solver.branches)))
 
 
 def random_tasks(
@@ -70,12 +70,13 @@ def random_tasks(
         while True:
             start = rng.uniform(lower + clear, upper - clear)
             end = np.clip(start + rng.uniform(-REACH, REACH, robot.n), lower + clear, upper - clear)
-            if followed(robot, start, robot.tool_placement(start), robot.tool_placement(end)):
+            course = followed(robot, start, robot.tool_placement(start), robot.tool_placement(end))
+            if course is not None:
                 break
         goal = robot.tool_placement(end)
         turn = pin.log3(goal.rotation @ robot.tool_placement(start).rotation.T)
         angle = float(np.linalg.norm(turn))
-        choice = choices[number % len(choices)] if in_turn else max(choices, key=lambda c: room(start, c))
+        choice = choices[number % len(choices)] if in_turn else max(choices, key=lambda c: room(course, c))
         yield {
             "brachis": 1,
             "start": {"joints": start},
@@ -90,13 +91,14 @@ def random_tasks(
         }
 
 
-def followed(robot: Robot, start: np.ndarray, first: pin.SE3, last: pin.SE3) -> bool:
-    """Tell whether damped least squares follow the straight line within ranges and static torques."""
+def followed(robot: Robot, start: np.ndarray, first: pin.SE3, last: pin.SE3) -> np.ndarray | None:
+    """Follow the straight line by damped least squares; None where ranges or static torques do not allow it."""
     q, zero = start.copy(), np.zeros((1, robot.n))
     data, frame, limits = robot.model.createData(), robot.frame_id, robot.limits
     turn = pin.log3(first.rotation.T @ last.rotation)
     middle = 0.5 * (limits.position_lower + limits.position_upper)
     middle = np.where(np.isfinite(middle), middle, start)
+    course = []
     for s in np.linspace(0.0, 1.0, STEPS + 1):
         target = pin.SE3(first.rotation @ pin.exp3(s * turn), (1.0 - s) * first.translation + s * last.translation)
         for _ in range(3):
@@ -108,8 +110,9 @@ def followed(robot: Robot, start: np.ndarray, first: pin.SE3, last: pin.SE3) -> 
         inside = np.all((q >= limits.position_lower) & (q <= limits.position_upper))
         held = np.all(np.abs(dynamics.torque(robot, q[None], zero, zero)[0]) <= limits.torque)
         if not (inside and held and np.abs(miss).max() < 1e-3):
-            return False
-    return True
+            return None
+        course.append(q)
+    return np.array(course)
 
 
 def tried(robot: Robot, task: dict[str, object]) -> str:
