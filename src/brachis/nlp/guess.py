@@ -54,10 +54,10 @@ class Strategy:
 STRATEGIES = (
     Strategy(push=2.0, threshold=0.4),
     Strategy(push=6.0, threshold=0.8),
-    Strategy(push=2.0, threshold=0.1, centre=12.0),
     Strategy(push=4.0, threshold=0.6, drift=1.0),
     Strategy(push=4.0, threshold=0.6, drift=-1.0),
     Strategy(push=15.0, threshold=1.0),
+    Strategy(push=2.0, threshold=0.1, centre=12.0),
     Strategy(push=4.0, threshold=0.6, drift=3.0),
     Strategy(push=4.0, threshold=0.6, drift=-3.0),
 )
@@ -176,8 +176,9 @@ def _wish(decomposition: Decomposition, strategy: Strategy, q: np.ndarray, previ
     wish += _RANGE_PUSH * np.maximum(limits.position_lower + clear - q, 0.0)
     wish -= _RANGE_PUSH * np.maximum(q - limits.position_upper + clear, 0.0)
     if strategy.centre:
-        middle = 0.5 * (limits.position_lower + limits.position_upper)
-        wish += strategy.centre * np.where(np.isfinite(middle), middle - q, 0.0)
+        ranged = np.isfinite(stroke)
+        middle = limits.position_lower[ranged] + 0.5 * stroke[ranged]
+        wish[ranged] += strategy.centre * (middle - q[ranged])
     if strategy.drift:
         direction = previous if previous.any() else np.eye(len(q))[decomposition.redundant[0]]
         wish += strategy.drift * direction / np.linalg.norm(direction)
