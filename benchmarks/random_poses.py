@@ -1,11 +1,13 @@
 """Random reachable pose lines for every spatial robot: how many end in a verified plan.
 
-Usage: python benchmarks/random_poses.py [ROBOT|all] [SEED] [COUNT]
+Usage: python benchmarks/random_poses.py [ROBOT|all] [SEED] [COUNT] [roomiest|in_turn]
 
 A task starts in a random posture (a tenth of every range is kept clear at both ends), and its path leads straight, the
 orientation turning at a constant rate, to the pose of another posture whose joints are up to 0.5 rad or 0.5 m away. It
 counts as reachable if a damped least-squares inverse kinematics, which knows nothing of the planner, follows the path
-within the joint ranges and with torques that hold the arm at rest. The redundant joint goes round all closed forms.
+within the joint ranges and with torques that hold the arm at rest. The redundant joint is the one whose closed form has
+the most room along this course (the largest least branch margin), or goes round all closed forms in turn, which counts
+those as well whose branch ends along the path.
 """
 
 from __future__ import annotations
@@ -44,14 +46,20 @@ def robots() -> dict[str, Robot]:
     }
 
 
-def closed_forms(robot: Robot) -> list[tuple[str, ...]]:
+def closed_forms(robot: Robot) -> list[ik.Candidate]:
     """Choices of redundant joints that have a closed form for poses."""
     found = ik.find_all(robot, TaskSpace.of(robot, "pose"))
-    return [c.redundant_joints for c in found if c.solver is not None and c.solver.kind == "closed_form"]
+    return [c for c in found if c.solver is not None and c.solver.kind == "closed_form"]
+
+
+def room(course: np.ndarray, candidate: ik.Candidate) -> float:
+    """Least branch margin along a course of postures (K, n), on the branch where it is largest."""
+    solver = candidate.solver
+    return max(float(solver.branch_margins(course, b).min()) for b in range(len(solver.branches)))
 
 
 def random_tasks(
-    robot: Robot, seed: int, count: int, choices: Sequence[tuple[str, ...]]
+    robot: Robot, seed: int, count: int, choices: Sequence[ik.Candidate], *, in_turn: bool = False
 ) -> Iterator[dict[str, object]]:
     """Yield task mappings."""
     rng = np.random.default_rng(seed)
@@ -62,11 +70,13 @@ def random_tasks(
         while True:
             start = rng.uniform(lower + clear, upper - clear)
             end = np.clip(start + rng.uniform(-REACH, REACH, robot.n), lower + clear, upper - clear)
-            if followed(robot, start, robot.tool_placement(start), robot.tool_placement(end)):
+            course = followed(robot, start, robot.tool_placement(start), robot.tool_placement(end))
+            if course is not None:
                 break
         goal = robot.tool_placement(end)
         turn = pin.log3(goal.rotation @ robot.tool_placement(start).rotation.T)
         angle = float(np.linalg.norm(turn))
+        choice = choices[number % len(choices)] if in_turn else max(choices, key=lambda c: room(course, c))
         yield {
             "brachis": 1,
             "start": {"joints": start},
@@ -77,17 +87,18 @@ def random_tasks(
                     "orientation": {"rotate": {"axis": list(turn / angle), "angle_deg": float(np.rad2deg(angle))}},
                 }
             ],
-            "redundant_joints": list(choices[number % len(choices)]),
+            "redundant_joints": list(choice.redundant_joints),
         }
 
 
-def followed(robot: Robot, start: np.ndarray, first: pin.SE3, last: pin.SE3) -> bool:
-    """Tell whether damped least squares follow the straight line within ranges and static torques."""
+def followed(robot: Robot, start: np.ndarray, first: pin.SE3, last: pin.SE3) -> np.ndarray | None:
+    """Follow the straight line by damped least squares; None where ranges or static torques do not allow it."""
     q, zero = start.copy(), np.zeros((1, robot.n))
     data, frame, limits = robot.model.createData(), robot.frame_id, robot.limits
     turn = pin.log3(first.rotation.T @ last.rotation)
     middle = 0.5 * (limits.position_lower + limits.position_upper)
     middle = np.where(np.isfinite(middle), middle, start)
+    course = []
     for s in np.linspace(0.0, 1.0, STEPS + 1):
         target = pin.SE3(first.rotation @ pin.exp3(s * turn), (1.0 - s) * first.translation + s * last.translation)
         for _ in range(3):
@@ -99,8 +110,9 @@ def followed(robot: Robot, start: np.ndarray, first: pin.SE3, last: pin.SE3) -> 
         inside = np.all((q >= limits.position_lower) & (q <= limits.position_upper))
         held = np.all(np.abs(dynamics.torque(robot, q[None], zero, zero)[0]) <= limits.torque)
         if not (inside and held and np.abs(miss).max() < 1e-3):
-            return False
-    return True
+            return None
+        course.append(q)
+    return np.array(course)
 
 
 def tried(robot: Robot, task: dict[str, object]) -> str:
@@ -115,13 +127,14 @@ def tried(robot: Robot, task: dict[str, object]) -> str:
 def main() -> None:
     """Print every failure with its reason, then the count."""
     chosen = sys.argv[1] if len(sys.argv) > 1 else "all"
-    seed, count = (int(value) for value in (*sys.argv[2:], *("0", "100")[len(sys.argv[2:]) :]))
+    seed, count = (int(value) for value in (*sys.argv[2:4], *("0", "100")[len(sys.argv[2:4]) :]))
+    rule = sys.argv[4] if len(sys.argv) > 4 else "roomiest"
     for name, robot in robots().items():
         if chosen not in ("all", name):
             continue
         choices = closed_forms(robot)
         verified, times = 0, []
-        for number, task in enumerate(random_tasks(robot, seed, count, choices)):
+        for number, task in enumerate(random_tasks(robot, seed, count, choices, in_turn=rule == "in_turn")):
             began = time.perf_counter()
             reason = tried(robot, task)
             times.append(time.perf_counter() - began)
@@ -130,7 +143,7 @@ def main() -> None:
                 print(f"{name} {number} {task['redundant_joints']}: {reason}")
         print(
             f"{name}: {verified} of {count} verified; median {np.median(times):.2f} s, longest {max(times):.1f} s; "
-            f"redundant joints in turn: {', '.join('+'.join(choice) for choice in choices)}"
+            f"redundant joint ({rule}) out of {', '.join('+'.join(c.redundant_joints) for c in choices)}"
         )
 
 

@@ -196,7 +196,7 @@ def test_statuses_carry_advice():
     assert all(len(status.value) > 10 for status in SolveStatus)
 
 
-@pytest.mark.parametrize("size", [0.01, 0.001])
+@pytest.mark.parametrize("size", [0.01, 0.004])
 def test_a_blend_of_millimetres_is_not_stepped_over(scara_urdf, size):
     """The torque peak inside a blend lies between the points of any even grid."""
     corner = [{"line": {"by": [-0.3, 0.3]}, "blend": size}, {"line": {"by": [-0.3, -0.2]}}]

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from brachis.errors import BrachisError, PlanningError
+from brachis.errors import BrachisError, PlanningError, UnreachableError
 from brachis.feasibility import explain_failure
 from brachis.nlp import Transcription
 from brachis.nlp.constraints.branch_margin import MARGIN
@@ -17,7 +17,11 @@ from brachis.refine import Refined, RefinementOptions, Solve, refine
 from brachis.result import Attempt
 from brachis.solvers import Solver, SolverOptions, SolverReport, solver_named
 from brachis.task import SolverSettings, Task
+from brachis.trajectory import Trajectory
+from brachis.verify import Verification
 
+Motion = tuple[Trajectory, Verification]
+Judge = Callable[[Refined], Motion]
 Listener = Callable[[str], None]
 """Told in plain words what the planner is doing, between iterations; may raise KeyboardInterrupt."""
 
@@ -27,28 +31,32 @@ _HELD_BACK = 1e-4
 """A margin that is nearer to its bound than this holds the motion back."""
 _MANY_VARIABLES = 150
 """Above this an active-set method spends its time in linear algebra, and ``auto`` begins with the interior point."""
-_FEASIBLE = 1e-6
+_ON_ITS_WAY = 1e-3
 _PATIENCE = 100
-"""Iterations that ``auto`` grants a solver on one guess, unless the task says otherwise: one that needs more grinds."""
+"""Iterations for each redundant joint that ``auto`` grants a solver on one guess, unless the task says otherwise."""
 _LEAST_TIME = 0.1
 """Seconds left to a solve that is begun."""
 
 
-def search(problem: Transcription, task: Task, listener: Listener) -> tuple[tuple[Attempt, ...], int, Refined]:
-    """Try guesses and solvers until one gives a motion within the limits everywhere.
+def search(
+    problem: Transcription, task: Task, judge: Judge, listener: Listener
+) -> tuple[tuple[Attempt, ...], int, Motion]:
+    """Try guesses and solvers until one gives a motion that passes the verification.
 
     Parameters
     ----------
     problem : Transcription
     task : Task
+    judge : callable
+        Makes the trajectory of an answer and verifies it.
     listener : callable
 
     Returns
     -------
     attempts : tuple of Attempt
     chosen : int
-        Index of the attempt that gave the motion: one within the limits, or the one that came nearest to them.
-    refined : Refined
+        Index of the attempt that gave the motion: a verified one, or the one that came nearest to the limits.
+    motion : tuple of Trajectory, Verification
 
     Raises
     ------
@@ -61,9 +69,9 @@ def search(problem: Transcription, task: Task, listener: Listener) -> tuple[tupl
     options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds)
     deadline = time.perf_counter() + task.solver.time_limit
     attempts: list[Attempt] = []
-    best: tuple[int, Refined] | None = None
+    best: tuple[float, int, Motion] | None = None
     for x, number, solver in _ways(problem, task):
-        solve = _solve_with(solver, task, deadline, listener)
+        solve = _solve_with(solver, task, problem.decomposition.r, deadline, listener)
         try:
             continued_problem, reports = continued(problem, x, solve, MARGINS)
         except ImportError as error:
@@ -74,18 +82,34 @@ def search(problem: Transcription, task: Task, listener: Listener) -> tuple[tupl
         refined = refine(continued_problem, reports[-1], solve, options)
         attempts.append(_attempt(refined, reports[:-1], number, settings.tolerance))
         listener(attempts[-1].outcome)
-        if refined.converged and (best is None or refined.excess < best[1].excess):
-            best = len(attempts) - 1, refined
-        content = refined.excess <= settings.tolerance or settings.max_rounds == 0
-        if (refined.converged and content) or time.perf_counter() > deadline:
+        if refined.converged and refined.excess < (np.inf if best is None else best[0]):
+            motion = _judged(judge, refined)
+            if motion is not None and (best is None or _excess(motion) < best[0]):
+                best = _excess(motion), len(attempts) - 1, motion
+                if motion[1].passed or settings.max_rounds == 0:
+                    break
+        if time.perf_counter() > deadline:
             break
-    if best is not None and np.isfinite(best[1].excess):
-        return tuple(attempts), *best
+    if best is not None:
+        return tuple(attempts), *best[1:]
     reason = explain_failure(problem.decomposition)
     if isinstance(reason, BrachisError):
         raise reason
     outcomes = _summary(attempts) or "no reachable initial guess"
     raise PlanningError(f"no motion within the limits was found: {outcomes}", hint=reason)
+
+
+def _judged(judge: Judge, refined: Refined) -> Motion | None:
+    """Return the verified motion; None where it leaves the branch between collocation points."""
+    try:
+        return judge(refined)
+    except UnreachableError:
+        return None
+
+
+def _excess(motion: Motion) -> float:
+    """Return how far a motion exceeds its limits, as a fraction of them; less than any excess where it passed."""
+    return -np.inf if motion[1].passed else motion[1].worst_ratio - 1.0
 
 
 def continued(
@@ -131,7 +155,7 @@ def continued(
             failed.append(outcome)
             if solved:
                 break
-            if outcome[1].violation <= _FEASIBLE:  # it ran out of iterations on its way
+            if outcome[1].violation <= _ON_ITS_WAY:  # it ran out of iterations on its way
                 x = outcome[1].x
     order = [*failed, *solved]
     return order[-1][0], tuple(report for _, report in order)
@@ -152,12 +176,12 @@ def _ways(problem: Transcription, task: Task) -> Iterator[tuple[np.ndarray, int,
             yield x, number, solver
 
 
-def _solve_with(solver: Solver, task: Task, deadline: float, listener: Listener) -> Solve:
+def _solve_with(solver: Solver, task: Task, redundancy: int, deadline: float, listener: Listener) -> Solve:
     """Make a function that runs one backend under the task's bounds."""
     settings = task.solver
     patience = settings.max_iterations
     if settings.name == "auto" and patience == SolverSettings.model_fields["max_iterations"].default:
-        patience = _PATIENCE
+        patience = _PATIENCE * max(redundancy, 1)
 
     def progress(iteration: int, objective: float) -> None:
         listener(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s")

@@ -11,7 +11,6 @@ from threadpoolctl import ThreadpoolController
 
 from brachis import ik
 from brachis.attempts import Listener, search
-from brachis.errors import PlanningError, UnreachableError
 from brachis.feasibility import check_end_branch, check_start, start_branch
 from brachis.kinematics import Decomposition, interpolate
 from brachis.nlp import Transcription
@@ -22,7 +21,7 @@ from brachis.robot import ROLL_JOINT, Robot, TaskSpace, bind
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import Task, load_task
 from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
-from brachis.verify import VerifyOptions, verify_trajectory
+from brachis.verify import Verification, VerifyOptions, verify_trajectory
 
 _SAME_TIME = 1e-7
 
@@ -81,12 +80,17 @@ def _plan(
     clock.stage("load")
     problem, family = transcribe(robot, task, families=families)
     clock.stage("transcribe")
-    attempts, chosen, refined = search(problem, task, listener)
-    clock.stage("solve")
-    trajectory = _trajectory(problem.decomposition, refined, task)
-    clock.stage("trajectory")
-    verification = verify_trajectory(trajectory, VerifyOptions(ratio_tolerance=task.refinement.tolerance))
-    clock.stage("verify")
+    options = VerifyOptions(ratio_tolerance=task.refinement.tolerance)
+
+    def judge(refined: Refined) -> tuple[Trajectory, Verification]:
+        clock.stage("solve")
+        trajectory = _trajectory(problem.decomposition, refined, task)
+        clock.stage("trajectory")
+        verification = verify_trajectory(trajectory, options)
+        clock.stage("verify")
+        return trajectory, verification
+
+    attempts, chosen, (trajectory, verification) = search(problem, task, judge, listener)
     return Result(task, trajectory, verification, family, attempts, chosen, clock.total())
 
 
@@ -147,10 +151,7 @@ def _trajectory(decomposition: Decomposition, refined: Refined, task: Task) -> T
     joins = motion.times_of(decomposition.path.breaks[1:-1])
     gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
     breaks = np.union1d(motion.breaks, joins[gaps > _SAME_TIME * motion.t_end])
-    try:
-        nodes = interpolate(decomposition, motion.at, breaks, jumps=motion.degree < CONTINUOUS_TORQUE)
-    except UnreachableError as error:
-        raise PlanningError("the motion found leaves the branch between collocation points") from error
+    nodes = interpolate(decomposition, motion.at, breaks, jumps=motion.degree < CONTINUOUS_TORQUE)
     robot = decomposition.robot
     return Trajectory(
         task=task,
@@ -179,7 +180,7 @@ class _Clock:
     def stage(self, name: str) -> None:
         """End the current stage."""
         now = time.perf_counter()
-        self._stages[name] = now - self._last
+        self._stages[name] = self._stages.get(name, 0.0) + now - self._last
         self._last = now
 
     def total(self) -> dict[str, float]:

@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from brachis import attempts, planner, plots
+from brachis import __version__, attempts, planner, plots
 from brachis.errors import InputError
 from brachis.verify import VerifyOptions
 
@@ -232,6 +232,11 @@ def test_plot_of_unknown_kind(run, planned, tmp_path):
     outcome = run("plot", planned[1] / "result.npz", "--kind", "torque", "--out", tmp_path / "x.png")
     assert outcome.code == 2
     assert "Did you mean 'torques'?" in outcome.err
+
+
+def test_version(run):
+    outcome = run("--version")
+    assert (outcome.code, outcome.out) == (0, f"brachis {__version__}\n")
 
 
 def test_inspect(run):

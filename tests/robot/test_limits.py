@@ -158,3 +158,11 @@ def test_empty_range():
 def test_range_of_a_wrong_shape(value):
     with pytest.raises(InputError, match="position"):
         limits_of(position=value)
+
+
+def test_coulomb_friction_that_no_torque_overcomes_is_refused():
+    friction = {"coulomb": {"j2": 90.0}}
+    with pytest.raises(InputError, match="Coulomb friction holds joint 'j2'"):
+        planar_robot("RR", friction=friction)
+    strong = LimitSpec(torque={"j2": 100.0})
+    assert planar_robot("RR", friction=friction, limits=strong).friction.coulomb[1] == 90.0

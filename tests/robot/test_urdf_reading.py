@@ -88,6 +88,11 @@ def test_a_loop_of_links_beside_the_tree_is_refused():
         load([TURN], more=loop)
 
 
+def test_a_joint_without_an_axis_is_refused():
+    with pytest.raises(UrdfError, match=r"joint 'j1' has no axis.*xyz='0 0 0'"):
+        load([Joint("revolute", axis=(0.0, 0.0, 0.0))])
+
+
 def test_the_last_link_before_the_chains_part():
     text = chain_urdf([TURN, TURN])
     assert last_common_link(text, "file.urdf") == ("tool", ("tool",))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from brachis.robot import Robot
+from support.arms import TX90L_STEPS
 from support.chains import INERTIAL, Joint, Vector, chain_urdf
 
 Y: Vector = (0.0, 1.0, 0.0)
@@ -16,19 +17,11 @@ def rail_arm_joints(rail: Vector = Y) -> list[Joint]:
     """Rail j1 and arm joints j2 to j7."""
     slide = {"lower": -2.0, "upper": 2.0, "velocity": 2.0, "effort": 1500.0}
     turn = {"lower": -4.0, "upper": 4.0, "velocity": 7.0, "effort": 300.0}
-    origins: list[Vector] = [
-        (0.0, 0.0, 0.478),
-        (0.05, 0.0, 0.0),
-        (0.0, 0.05, 0.5),
-        (0.0, 0.0, 0.0),
-        (0.0, 0.0, 0.55),
-        (0.0, 0.0, 0.1),
-    ]
     masses = (8.0, 6.0, 4.0, 2.0, 1.0, 0.5)
     axes = (Z, Y, Y, Z, Y, Z)
     arm = [
         Joint("revolute", axis=axis, xyz=xyz, limit=turn, inertial=INERTIAL.format(mass=mass))
-        for axis, xyz, mass in zip(axes, origins, masses, strict=True)
+        for axis, xyz, mass in zip(axes, TX90L_STEPS, masses, strict=True)
     ]
     return [Joint("prismatic", axis=rail, limit=slide), *arm]
 

@@ -14,7 +14,7 @@ from brachis.cli.output import print_json, result_console
 from brachis.errors import InputError
 from brachis.robot import LimitSpec, Robot, TaskSpace, bind
 from brachis.robot.limits import UrdfLimit
-from brachis.robot.task_space import AXES, POSE_ROWS, WORDS
+from brachis.robot.task_space import AXES, POSE_ROWS, YAW
 from brachis.robot.urdf import last_common_link, read_file
 
 _PARALLEL = 1e-9
@@ -79,7 +79,7 @@ def _tool(urdf: Path, remarks: list[str]) -> str:
 def _space(text: str) -> str | list[str]:
     """Read a word or a list of rows."""
     rows = [row.strip() for row in text.split(",") if row.strip()]
-    return rows[0] if len(rows) == 1 and rows[0] in WORDS else rows
+    return rows[0] if len(rows) == 1 and rows[0] not in (*AXES, YAW) else rows
 
 
 def _natural_space(robot: Robot, remarks: list[str]) -> str | list[str]:

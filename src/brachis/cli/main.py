@@ -53,6 +53,25 @@ ResultFile = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 
 
+def _print_version(asked: bool) -> None:  # noqa: FBT001  (Typer calls it so)
+    """Print the version and stop, where asked."""
+    if asked:
+        import brachis  # noqa: PLC0415
+
+        typer.echo(f"brachis {brachis.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Plan minimum-time motions of redundant robots along prescribed paths."""
+    del version
+
+
 @app.command()
 def plan(
     task: TaskFile,

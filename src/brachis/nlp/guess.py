@@ -41,11 +41,14 @@ class Strategy:
         Dimensionless.
     drift : float
         Constant motion along the first null-space direction, rad or m per unit s; other valleys lie beyond it.
+    centre : float
+        Strength with which joints are pulled to the middle of their ranges.
     """
 
     push: float
     threshold: float
     drift: float = 0.0
+    centre: float = 0.0
 
 
 STRATEGIES = (
@@ -54,6 +57,7 @@ STRATEGIES = (
     Strategy(push=4.0, threshold=0.6, drift=1.0),
     Strategy(push=4.0, threshold=0.6, drift=-1.0),
     Strategy(push=15.0, threshold=1.0),
+    Strategy(push=2.0, threshold=0.1, centre=12.0),
     Strategy(push=4.0, threshold=0.6, drift=3.0),
     Strategy(push=4.0, threshold=0.6, drift=-3.0),
 )
@@ -171,6 +175,10 @@ def _wish(decomposition: Decomposition, strategy: Strategy, q: np.ndarray, previ
     clear = 0.1 * np.where(np.isfinite(stroke), stroke, 1.0)
     wish += _RANGE_PUSH * np.maximum(limits.position_lower + clear - q, 0.0)
     wish -= _RANGE_PUSH * np.maximum(q - limits.position_upper + clear, 0.0)
+    if strategy.centre:
+        ranged = np.isfinite(stroke)
+        middle = limits.position_lower[ranged] + 0.5 * stroke[ranged]
+        wish[ranged] += strategy.centre * (middle - q[ranged])
     if strategy.drift:
         direction = previous if previous.any() else np.eye(len(q))[decomposition.redundant[0]]
         wish += strategy.drift * direction / np.linalg.norm(direction)

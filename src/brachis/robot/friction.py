@@ -60,6 +60,23 @@ class Friction:
             raise InputError("is not positive", where=where, found=coulomb_velocity, allowed="> 0 rad/s or m/s")
         return cls(**spread, v_eps=v_eps)
 
+    def check_against(self, joint_names: Sequence[str], limits: np.ndarray) -> None:
+        """Refuse Coulomb friction that the torque limits, (n,), cannot overcome: the joint could only creep.
+
+        Raises
+        ------
+        InputError
+        """
+        for name, coulomb, limit in zip(joint_names, self.coulomb, limits, strict=True):
+            if coulomb >= limit:
+                raise InputError(
+                    f"Coulomb friction holds joint {name!r} against its largest torque",
+                    where="robot.friction.coulomb",
+                    found=f"{coulomb:g} Nm (N for a prismatic joint)",
+                    allowed=f"less than the limit, {limit:g}",
+                    hint=f"Lower the friction, or raise robot.limits.torque.{name}",
+                )
+
     def torque(self, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
         """Torque of these terms, (..., n), for velocities and accelerations (..., n)."""
         return self.armature * qddot + self.viscous * qdot + self.coulomb * np.tanh(qdot / self.v_eps)

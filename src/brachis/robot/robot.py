@@ -118,14 +118,16 @@ class Robot:
             raise UrdfError(
                 "the chain is not serial", where=str(path), found=list(names), allowed=list(chain.joint_names)
             )
+        resolved, terms = resolve_limits(spec, names, chain.limits), Friction.of(names, **dict(friction or {}))
+        terms.check_against(names, resolved.torque)
         return cls(
             model=model,
             joint_names=names,
             tool_frame=chain.tool_frame,
             base_frame=chain.base_frame,
-            limits=resolve_limits(spec, names, chain.limits),
+            limits=resolved,
             stated_limits=chain.limits,
-            friction=Friction.of(names, **dict(friction or {})),
+            friction=terms,
             settings=_settings(path, names, tool_frame, base_frame, vector, locked_joints, spec, friction),
             source=str(path),
             urdf=text,

@@ -110,7 +110,7 @@ def last_common_link(text: str | bytes, where: str) -> tuple[str, tuple[str, ...
     Raises
     ------
     UrdfError
-        The text is broken.
+        The text is broken, or the chains part before a joint moves.
     """
     urdf = _parse(text, where)
     parents = {joint.child: joint for joint in urdf.robot.joints}
@@ -120,12 +120,19 @@ def last_common_link(text: str | bytes, where: str) -> tuple[str, tuple[str, ...
     leaves = tuple(name for name in links if name not in inner)
     chains = {leaf: _joints_between(root, leaf, parents, where) for leaf in leaves}
     moving = {leaf: chain for leaf, chain in chains.items() if any(joint.type in MOVING_TYPES for joint in chain)}
-    common = root
+    shared = []
     for step in zip(*moving.values(), strict=False):
         if len({joint.child for joint in step}) > 1:
             break
-        common = step[0].child
-    return common, tuple(moving)
+        shared.append(step[0])
+    if not any(joint.type in MOVING_TYPES for joint in shared):
+        raise UrdfError(
+            "the tool frame is not clear: no joint moves all chains",
+            where=where,
+            found=f"chains to {', '.join(moving) or 'nowhere'}",
+            hint="Name the link at the end of one of them as tool frame",
+        )
+    return shared[-1].child, tuple(moving)
 
 
 def read_file(path: Path) -> str:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import yourdfpy
 
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
+_LEAST_AXIS = 1e-9
 
 
 def check_joints(chain: Sequence[Any], names: set[str], by_name: Mapping[str, Any], where: str) -> None:
@@ -25,6 +26,13 @@ def check_joints(chain: Sequence[Any], names: set[str], by_name: Mapping[str, An
                 found=f"type {joint.type!r}",
                 allowed=", ".join(MOVING_TYPES),
                 hint="Lock it with robot.locked_joints, or set robot.base_frame below it",
+            )
+        if joint.axis is not None and not np.linalg.norm(joint.axis) > _LEAST_AXIS:
+            raise UrdfError(
+                f"joint {joint.name!r} has no axis",
+                where=where,
+                found=f"<axis xyz={' '.join(f'{component:g}' for component in joint.axis)!r}>",
+                allowed="a direction, any length but zero",
             )
     for joint in by_name.values():
         if joint.mimic is not None and (joint.name in names or joint.mimic.joint in names):

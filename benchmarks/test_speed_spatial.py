@@ -1,0 +1,83 @@
+"""Timings of the TX90L on its rail and of the closed forms for poses.
+
+Goals: 0.15 s a plan of the third example (N = 20), 2.5 ms for the Jacobian at 61 collocation points, 5 us a pose for
+the spherical wrist in batches of 2000, 15 us for EAIK.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brachis import Robot, TaskSpace, ik, load_task, plan, transcribe
+from brachis.ik.eaik import eaik
+from brachis.nlp.guess import guesses
+from brachis.solvers import SolverOptions, solver_named
+
+ROOT = Path(__file__).parents[1]
+POSES = 2000
+
+
+@pytest.fixture(scope="module")
+def task():
+    return load_task(ROOT / "examples/03_tx90l_rail_line.yaml")
+
+
+@pytest.fixture(scope="module")
+def tx90l():
+    return Robot.from_urdf(ROOT / "robots/tx90l_rail/robot.urdf")
+
+
+def test_plan_solved_once(benchmark, tx90l, task):
+    """Transcribe, guess and solve at N = 20: no refinement, no verification."""
+
+    def solve():
+        problem, _ = transcribe(tx90l, task)
+        return solver_named("uno")[0].solve(problem, next(guesses(problem)), SolverOptions(), None)
+
+    assert benchmark(solve).status.usable
+
+
+def test_plan_refined_and_verified(benchmark, tx90l, task):
+    """The library call at N = 20."""
+    assert benchmark(plan, tx90l, task).verified
+
+
+@pytest.mark.parametrize("part", ["rows", "Jacobian"])
+def test_evaluation(benchmark, tx90l, task, part):
+    """Rows, or the whole Jacobian once the rows are known, at K = 61."""
+    problem, _ = transcribe(tx90l, task)
+    assert len(problem.tau) == 61
+    x = next(guesses(problem))
+
+    def another():
+        x[0] += 1e-9  # another x every time, so that nothing is reused
+        if part == "Jacobian":
+            problem.rows(x)
+
+    benchmark.pedantic(lambda: problem.rows(x) if part == "rows" else problem.jacobian(x), setup=another, rounds=200)
+
+
+def poses(robot, task_space):
+    """Random postures, and the poses that they reach."""
+    q = np.random.default_rng(0).uniform(-1.5, 1.5, (POSES, robot.n))
+    return q, task_space.values(*robot.tool_placements(q))
+
+
+@pytest.mark.parametrize("joint", ["rail", "joint_1", "joint_2", "joint_3"])
+def test_spherical_wrist(benchmark, tx90l, joint):
+    """A batch of 2000 poses, all branches."""
+    space = TaskSpace.of(tx90l, "pose")
+    match = ik.find(tx90l, space, [joint])
+    q, targets = poses(tx90l, space)
+    benchmark(match.solver.solve, targets, q[:, [tx90l.joint_names.index(joint)]])
+
+
+def test_eaik(benchmark, tx90l):
+    """The same with EAIK, rail redundant: constant geometry."""
+    space = TaskSpace.of(tx90l, "pose")
+    solver = eaik.build(ik.ChainGeometry.of(tx90l), space, (0,))
+    q, targets = poses(tx90l, space)
+    benchmark(solver.solve, targets, q[:, [0]])

@@ -1,0 +1,109 @@
+"""`brachis inspect` on every robot of this repository and on five of example-robot-data: it explains, never crashes."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+OWN = sorted((ROOT / "robots").glob("*/*.urdf"))
+PUBLISHED = {
+    "UR5": "ur_description/urdf/ur5_robot.urdf",
+    "UR10": "ur_description/urdf/ur10_robot.urdf",
+    "Panda": "panda_description/urdf/panda.urdf",
+    "xArm7": "xarm_description/urdf/xarm7.urdf",
+    "Baxter": "baxter_description/urdf/baxter.urdf",
+    "Kinova": "kinova_description/robots/kinova.urdf",
+}
+
+
+def published(name: str) -> Path:
+    for folder in map(Path, sys.path):
+        path = folder / "cmeel.prefix/share/example-robot-data/robots" / PUBLISHED[name]
+        if path.is_file():
+            return path
+    pytest.skip("example-robot-data is not installed")
+
+
+def decompositions(run, urdf: Path, *options: str) -> dict[str, str]:
+    """Kind of every choice of redundant joints, after a look at what is printed besides."""
+    outcome = run("inspect", urdf, *options, "--json")
+    assert outcome.code == 0, outcome.err
+    data = json.loads(outcome.out)
+    assert len(data["joints"]) >= 2
+    for row in data["decompositions"]:
+        assert (row["solver"] == "-") == bool(row["why not"]), row
+        assert (row["kind"] == "-") == (row["branches"] == 0)
+    assert run("inspect", urdf, *options).code == 0
+    return {row["redundant joints"]: row["kind"] for row in data["decompositions"]}
+
+
+@pytest.mark.parametrize("urdf", OWN, ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_every_robot_of_the_repository(run, urdf):
+    assert "closed_form" in decompositions(run, urdf).values()
+
+
+def test_tx90l_on_its_rail(run):
+    kinds = decompositions(run, ROOT / "robots/tx90l_rail/robot.urdf")
+    assert [joint for joint, kind in kinds.items() if kind == "closed_form"] == [
+        "rail",
+        "joint_1",
+        "joint_2",
+        "joint_3",
+    ]
+    assert [joint for joint, kind in kinds.items() if kind == "polynomial"] == ["joint_4", "joint_5", "joint_6"]
+
+
+def test_ur10_on_its_rail(run):
+    kinds = decompositions(run, ROOT / "robots/ur10_rail/robot.urdf")
+    closed = [joint for joint, kind in kinds.items() if kind == "closed_form"]
+    assert closed == ["rail", "shoulder_pan_joint", "wrist_2_joint", "wrist_3_joint"]
+    assert set(kinds.values()) == {"closed_form", "polynomial"}
+
+
+def test_iiwa_has_none_for_its_elbow(run):
+    kinds = decompositions(run, ROOT / "robots/iiwa14/robot.urdf")
+    assert [joint for joint, kind in kinds.items() if kind == "-"] == ["joint_4"]
+    row = json.loads(run("inspect", ROOT / "robots/iiwa14/robot.urdf", "--json").out)["decompositions"][3]
+    assert "J_nr is singular everywhere" in row["why not"]
+
+
+@pytest.mark.parametrize("name", [name for name in PUBLISHED if name != "Baxter"])
+def test_published_robots(run, name):
+    decompositions(run, published(name))
+
+
+def test_kinds_of_published_robots(run):
+    pytest.importorskip("eaik.pybindings.EAIK")
+    panda = decompositions(run, published("Panda"))
+    closed = [joint for joint, kind in panda.items() if kind == "closed_form"]
+    assert closed == [f"panda_joint{i}" for i in (4, 5, 6, 7)]
+    assert decompositions(run, published("UR5")) == {"none": "closed_form"}
+
+
+def test_the_chosen_tool_frame_is_named(run):
+    out = run("inspect", published("Panda"), "--json").out
+    (tool, space) = json.loads(out)["remarks"]
+    assert tool.startswith("tool frame: panda_hand, the last link before the chains to panda_hand_tcp")
+    assert space.startswith("task space: pose")
+    named = run("inspect", published("Panda"), "--tool-frame", "panda_link8", "--json").out
+    assert json.loads(named)["remarks"] == [space]
+
+
+def test_a_robot_of_several_arms_asks_for_one(run):
+    outcome = run("inspect", published("Baxter"))
+    assert outcome.code == 2
+    assert "left_gripper" in outcome.err
+    kinds = decompositions(run, published("Baxter"), "--tool-frame", "left_gripper")
+    assert set(kinds.values()) == {"-"}  # offsets at the shoulder and the wrist
+
+
+def test_free_roll_and_unknown_words(run):
+    kinds = decompositions(run, ROOT / "robots/tx90l_rail/arm.urdf", "--task-space", "pose_free_roll")
+    assert kinds["tool_roll"] == "closed_form"
+    outcome = run("inspect", ROOT / "robots/tx90l_rail/arm.urdf", "--task-space", "poses")
+    assert outcome.code == 2
+    assert "pose_free_roll" in outcome.err

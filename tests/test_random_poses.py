@@ -1,0 +1,35 @@
+"""Random reachable pose lines for every spatial robot: nearly all end in a verified plan, the rest say why.
+
+The full count, 100 for each robot, is `benchmarks/random_poses.py`.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+import brachis
+
+ROOT = Path(__file__).parents[1]
+COUNT = 12
+
+
+@pytest.fixture(scope="module")
+def bench():
+    spec = importlib.util.spec_from_file_location("random_poses", ROOT / "benchmarks/random_poses.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("name", ["tx90l_rail", "ur10_rail", "iiwa14"])
+def test_random_reachable_pose_lines(bench, name):
+    robot = brachis.Robot.from_urdf(ROOT / f"robots/{name}/robot.urdf")
+    choices = bench.closed_forms(robot)
+    assert len(choices) >= 4
+    reasons = [bench.tried(robot, task) for task in bench.random_tasks(robot, 0, COUNT, choices)]
+    failed = [reason for reason in reasons if reason]
+    assert len(failed) <= 1, failed
+    assert all(len(reason) > 30 for reason in failed)
