@@ -24,6 +24,7 @@ _CORRECTIONS = 5
 _UNFOLDING_STEPS = 20
 _UNFOLDING_STEP = 0.06
 _LARGEST_STEP = 0.2
+_ROOMY = 0.05
 _SHRINKAGE = 0.8
 _SHORTEST_TIME, _LONGEST_TIME = 0.01, 200.0
 _RANGE_PUSH = 20.0
@@ -74,14 +75,33 @@ def guesses(problem: Transcription) -> Iterator[np.ndarray]:
     ------
     (v,) ndarray
     """
-    strategies = STRATEGIES if problem.decomposition.r else STRATEGIES[:1]
-    for strategy in strategies:
-        course = numeric_course(problem.decomposition, strategy)
-        if course is None:
-            continue
+    for course in _courses(problem.decomposition):
         x = _starting_point(problem, course)
         if x is not None:
             yield x
+
+
+def _courses(decomposition: Decomposition) -> Iterator[np.ndarray]:
+    """Yield courses one after the other; where the first one comes near a branch boundary, the roomiest ones first."""
+    strategies = STRATEGIES if decomposition.r else STRATEGIES[:1]
+    courses = (numeric_course(decomposition, strategy) for strategy in strategies)
+    found = (course for course in courses if course is not None)
+    first = next(found, None)
+    if first is None:
+        return
+    if _room(decomposition, first) > _ROOMY:
+        yield first
+        yield from found
+    else:
+        yield from sorted((first, *found), key=lambda course: -_room(decomposition, course))
+
+
+def _room(decomposition: Decomposition, course: np.ndarray) -> float:
+    """Return the least branch margin along a course; -inf where the branch cannot follow it."""
+    q = decomposition.postures(course)
+    if not np.isfinite(q).all():
+        return -np.inf
+    return float(decomposition.solver.branch_margins(q, decomposition.branch).min(initial=np.inf))
 
 
 def numeric_course(decomposition: Decomposition, strategy: Strategy) -> np.ndarray | None:

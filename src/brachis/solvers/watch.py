@@ -12,6 +12,8 @@ import numpy as np
 from brachis.errors import UnreachableError
 from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
 
+_EVALUATIONS = 10
+"""Evaluations for each iteration allowed, on average: a solver that needs more cannot leave a point out of reach."""
 _SETTLED_ITERATIONS = 15
 _SETTLED_PROGRESS = 1e-6
 _FEASIBLE = 10.0
@@ -38,6 +40,8 @@ class Watch:
         self.iterations = 0
         self.interrupt: KeyboardInterrupt | None = None
         self.timed_out = False
+        self.exhausted = False
+        self._evaluations = 0
         self.settled = False
         self._feasible: list[float] = []
         self._progress = progress
@@ -88,7 +92,8 @@ class Watch:
     def must_stop(self) -> bool:
         """Tell whether the user has interrupted or the time is over."""
         self.timed_out = self.timed_out or self.elapsed > self.options.time_limit
-        return self.timed_out or self.interrupt is not None
+        self.exhausted = self._evaluations > _EVALUATIONS * self.options.max_iterations
+        return self.timed_out or self.exhausted or self.interrupt is not None
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Rows at x; raises UnreachableError there, and everywhere once the solve has to stop."""
@@ -103,6 +108,7 @@ class Watch:
             signal.signal(signal.SIGINT, self._keep_interrupt)
         if self.must_stop():
             raise UnreachableError("the solve has to stop")
+        self._evaluations += 1
         try:
             return np.asarray(function(np.array(x)))  # type: ignore[operator]
         except KeyboardInterrupt as interrupt:
@@ -129,6 +135,8 @@ class Watch:
             status = SolveStatus.INFEASIBLE
         elif self.timed_out and not status.usable:
             status = SolveStatus.TIME_LIMIT
+        elif self.exhausted and not status.usable:
+            status = SolveStatus.ITERATION_LIMIT
         return SolverReport(
             solver=solver,
             status=status,
