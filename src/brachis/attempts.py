@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from brachis.errors import BrachisError, PlanningError, UnreachableError
+from brachis.errors import BrachisError, PathError, PlanningError, UnreachableError
 from brachis.feasibility import explain_failure
 from brachis.nlp import Transcription
 from brachis.nlp.constraints.branch_margin import MARGIN
@@ -34,6 +34,12 @@ _MANY_VARIABLES = 150
 _ON_ITS_WAY = 1e-3
 _PATIENCE = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess, unless the task says otherwise."""
+_WORTH_IT = 2e-4
+"""A smaller branch margin that shortens the motion by less than this fraction is not worth its sharper turns."""
+_SECOND_LOOKS = 4
+_FAILURES = 2
+_GOOD_PART = 0.1
+_BESIDE = 1e-4
 _LEAST_TIME = 0.1
 """Seconds left to a solve that is begun."""
 
@@ -79,17 +85,17 @@ def search(
                 Attempt(solver.name, number, (), 0, np.inf, 1.0, 0, f"{solver.name}: not installed ({error})")
             )
             continue
-        refined = refine(continued_problem, reports[-1], solve, options)
-        attempts.append(_attempt(refined, reports[:-1], number, settings.tolerance))
+        refined, motion = _refined_until_verified(continued_problem, reports[-1], solve, options, judge)
+        attempts.append(_attempt(refined, reports[:-1], number, settings.tolerance, motion))
         listener(attempts[-1].outcome)
-        if refined.converged and refined.excess < (np.inf if best is None else best[0]):
-            motion = _judged(judge, refined)
-            if motion is not None and (best is None or _excess(motion) < best[0]):
-                best = _excess(motion), len(attempts) - 1, motion
-                if motion[1].passed or settings.max_rounds == 0:
-                    break
+        if motion is not None and (best is None or _excess(motion) < best[0]):
+            best = _excess(motion), len(attempts) - 1, motion
+            if motion[1].passed or settings.max_rounds == 0:
+                break
         if time.perf_counter() > deadline:
             break
+        if best is None and len(attempts) == _FAILURES:
+            _refuse_what_is_out_of_reach(problem)
     if best is not None:
         return tuple(attempts), *best[1:]
     reason = explain_failure(problem.decomposition)
@@ -99,12 +105,50 @@ def search(
     raise PlanningError(f"no motion within the limits was found: {outcomes}", hint=reason)
 
 
+def _refuse_what_is_out_of_reach(problem: Transcription) -> None:
+    """Raise the reason where a good part of the path cannot be reached: further attempts would be in vain."""
+    reason = explain_failure(problem.decomposition)
+    if isinstance(reason, PathError) and reason.s_interval is not None and np.ptp(reason.s_interval) > _GOOD_PART:
+        raise reason
+
+
+def _refined_until_verified(
+    problem: Transcription, report: SolverReport, solve: Solve, options: RefinementOptions, judge: Judge
+) -> tuple[Refined, Motion | None]:
+    """Refine a solved problem, and again where the verification finds a limit exceeded between the points."""
+    refined = refine(problem, report, solve, options)
+    motion = _judged(judge, refined)
+    for _ in range(_SECOND_LOOKS if options.max_rounds else 0):
+        finer = None if motion is None else _where_it_failed(refined, motion)
+        if finer is None:
+            break
+        report = solve(finer, refined.x)
+        if not report.status.usable:
+            break
+        refined = refine(finer, report, solve, options)
+        motion = _judged(judge, refined)
+    return refined, motion
+
+
 def _judged(judge: Judge, refined: Refined) -> Motion | None:
-    """Return the verified motion; None where it leaves the branch between collocation points."""
+    """Return the motion and its verification; None without an answer, or where it leaves the branch in between."""
+    if not (refined.converged and np.isfinite(refined.excess)):
+        return None
     try:
         return judge(refined)
     except UnreachableError:
         return None
+
+
+def _where_it_failed(refined: Refined, motion: Motion) -> Transcription | None:
+    """Add collocation points where the verification found a limit exceeded; None where it found no such place."""
+    trajectory, verification = motion
+    failed = [check for check in verification.checks if not check.passed]
+    if not failed or any(not check.name.endswith("ratio") or check.time is None for check in failed):
+        return None
+    tau = np.array([check.time for check in failed]) / trajectory.t_end
+    near = tau[:, None] + _BESIDE * np.array([-1.0, 0.0, 1.0])
+    return refined.problem.resampled(np.union1d(refined.problem.tau, np.clip(near.ravel(), 0.0, 1.0)))
 
 
 def _excess(motion: Motion) -> float:
@@ -119,7 +163,7 @@ def continued(
 
     Near a branch boundary the problem is badly conditioned, and a solver that meets the boundary early creeps along it.
     Far from it the solve is easy, and its answer is a good start for a smaller margin. A margin that does not hold the
-    motion back ends the continuation.
+    motion back, or that hardly shortens it, ends the continuation.
 
     Parameters
     ----------
@@ -147,6 +191,9 @@ def continued(
         bounds.add(tried.guards)
         outcome = tried, solve(tried, x)
         if outcome[1].status.usable:
+            if solved and outcome[1].objective > (1.0 - _WORTH_IT) * solved[-1][1].objective:
+                failed.append(outcome)
+                break
             solved.append(outcome)
             x = outcome[1].x
             if tried.guard_slack(x) > _HELD_BACK:
@@ -193,7 +240,9 @@ def _solve_with(solver: Solver, task: Task, redundancy: int, deadline: float, li
     return solve
 
 
-def _attempt(refined: Refined, before: Sequence[SolverReport], number: int, tolerance: float) -> Attempt:
+def _attempt(
+    refined: Refined, before: Sequence[SolverReport], number: int, tolerance: float, motion: Motion | None
+) -> Attempt:
     """Put the outcome of an attempt into words."""
     last = refined.reports[-1]
     rounds = len(refined.reports) - 1
@@ -202,8 +251,13 @@ def _attempt(refined: Refined, before: Sequence[SolverReport], number: int, tole
     elif not np.isfinite(refined.excess):
         outcome = f"{last.solver}: the motion leaves the branch between collocation points"
     else:
-        inside = "limits hold" if refined.excess <= tolerance else f"limits exceeded by {100.0 * refined.excess:.2g} %"
-        outcome = f"{last.solver}: t_E = {refined.x[0]:.4f} s after {rounds} refinement rounds, {inside}"
+        if refined.excess > tolerance:
+            found = f"limits exceeded by {100.0 * refined.excess:.2g} %"
+        elif motion is None:
+            found = "too sharp for a trajectory"
+        else:
+            found = "verified" if motion[1].passed else "the verification fails"
+        outcome = f"{last.solver}: t_E = {refined.x[0]:.4f} s after {rounds} refinement rounds, {found}"
     reports = (*before, *refined.reports)
     points = len(refined.problem.tau)
     return Attempt(last.solver, number, reports, rounds, refined.excess, refined.stretched, points, outcome)
