@@ -234,6 +234,16 @@ def test_plot_of_unknown_kind(run, planned, tmp_path):
     assert "Did you mean 'torques'?" in outcome.err
 
 
+def test_the_saved_motion_is_not_written_over(run, planned):
+    saved = planned[1] / "result.npz"
+    before = saved.read_bytes()
+    outcome = run("export", saved, "--csv", saved)
+    assert outcome.code == 2
+    assert "would be written over the saved motion" in outcome.err
+    assert run("plot", saved, "--out", saved).code == 2
+    assert saved.read_bytes() == before
+
+
 def test_version(run):
     outcome = run("--version")
     assert (outcome.code, outcome.out) == (0, f"brachis {__version__}\n")

@@ -87,7 +87,7 @@ def test_kinds_of_published_robots(run):
 def test_the_chosen_tool_frame_is_named(run):
     out = run("inspect", published("Panda"), "--json").out
     (tool, space) = json.loads(out)["remarks"]
-    assert tool.startswith("tool frame: panda_hand, the last link before the chains to panda_hand_tcp")
+    assert tool.startswith("tool frame: panda_hand, the last link before the chains to panda_leftfinger")
     assert space.startswith("task space: pose")
     named = run("inspect", published("Panda"), "--tool-frame", "panda_link8", "--json").out
     assert json.loads(named)["remarks"] == [space]
@@ -96,7 +96,7 @@ def test_the_chosen_tool_frame_is_named(run):
 def test_a_robot_of_several_arms_asks_for_one(run):
     outcome = run("inspect", published("Baxter"))
     assert outcome.code == 2
-    assert "left_gripper" in outcome.err
+    assert "r_gripper_l_finger_tip" in outcome.err
     kinds = decompositions(run, published("Baxter"), "--tool-frame", "left_gripper")
     assert set(kinds.values()) == {"-"}  # offsets at the shoulder and the wrist
 
@@ -107,3 +107,19 @@ def test_free_roll_and_unknown_words(run):
     outcome = run("inspect", ROOT / "robots/tx90l_rail/arm.urdf", "--task-space", "poses")
     assert outcome.code == 2
     assert "pose_free_roll" in outcome.err
+
+
+def test_where_the_tool_is(run):
+    urdf = ROOT / "robots/tx90l_rail/robot.urdf"
+    remark = json.loads(run("inspect", urdf, "--posture", "0, 0, 0, 0, 0, 0, 0", "--json").out)["remarks"][-1]
+    assert remark == "tool at [0.05, 0.05, 1.628] m, quaternion w, x, y, z [1, 0, 0, 0]"
+    assert run("inspect", urdf, "--posture", "0 0").code == 2
+    assert "--posture" in run("inspect", urdf, "--posture", "a").err
+
+
+def test_rails_leave_the_arm_s_tool_frame_alone(run, tmp_path):
+    """Frames half way up the arm, which a rail moves as well, are no tools."""
+    out = tmp_path / "ur5.urdf"
+    options = ("--axis", "0", "1", "0", "--range", "-2", "2", "--velocity", "2", "--force", "2000", "--mass", "60")
+    assert run("compose", published("UR5"), *options, "--out", out).code == 0
+    assert decompositions(run, out)["rail"] == "closed_form"

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from brachis.errors import PathError
 from brachis.path import Array, Curve, SequencePath, build_path
 from brachis.path.blend import septic
 from brachis.path.site import Site
-from brachis.task import load_task
+from brachis.task import ArcSegment, load_task
 
 
 def path_of(segments: list[dict[str, Any]], start: Any, rows: list[str]) -> SequencePath:
@@ -205,3 +206,15 @@ def test_a_site_knows_its_position_rows() -> None:
     site = Site("path[0].line", np.array([1.0, 2.0, 3.0]), ("x", "z", "yaw"))
     assert site.positions == ("x", "z")
     np.testing.assert_array_equal(site.position, [1.0, 2.0])
+
+
+def test_a_centre_of_few_digits_is_moved_into_the_plane_of_the_arc():
+    start = np.array([0.5, 0.0, 0.18959559])
+    arc = ArcSegment(arc={"center": (0.3, 0.0, 0.18959), "angle_deg": 360.0, "normal": (0.0, 0.0, 1.0)})
+    path = build_path([arc], start, ["x", "y", "z"])
+    around = path.sample(np.linspace(0.0, 1.0, 9)).target
+    np.testing.assert_allclose(around[:, 2], start[2], atol=1e-15)
+    np.testing.assert_allclose(around[[0, -1]], [start, start], atol=1e-12)
+    wrong = arc.model_copy(update={"arc": arc.arc.model_copy(update={"center": (0.3, 0.0, 0.18)})})
+    with pytest.raises(PathError, match=r"Move the centre by 0\.00959559 m along the normal"):
+        build_path([wrong], start, ["x", "y", "z"])

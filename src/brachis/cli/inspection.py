@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
+from rich.console import Console
 from rich.table import Table
 
 from brachis import ik
@@ -18,6 +20,14 @@ from brachis.robot.task_space import AXES, POSE_ROWS, YAW
 from brachis.robot.urdf import last_common_link, read_file
 
 _PARALLEL = 1e-9
+_LISTED = 12
+_OTHER_TASKS = (
+    "a whole pose is prescribed",
+    "no whole pose is prescribed",
+    "only for poses",
+    "only for the position: x, y and z",
+)
+"""Reasons of families for other task spaces, which need not be told where there are others."""
 
 
 def inspect_command(
@@ -27,6 +37,7 @@ def inspect_command(
     tool_frame: str | None,
     base_frame: str | None,
     lock: list[str],
+    posture: str | None,
     as_json: bool,
 ) -> None:
     """Print a robot's joints and its decompositions."""
@@ -38,6 +49,8 @@ def inspect_command(
     robot, rows = bind(robot, _space(task_space) if task_space else _natural_space(robot, remarks))
     joints = _joints(robot)
     decompositions = _decompositions(robot, rows)
+    if posture is not None:
+        remarks.append(_tool_pose(robot, posture))
     if as_json:
         print_json(
             {
@@ -62,7 +75,7 @@ def inspect_command(
     if r < 0:
         console.print("The robot has fewer joints than the task space has rows; prescribe fewer rows.")
         return
-    console.print(_table("choices of redundant joints", [_shortened(row) for row in decompositions]))
+    _print_decompositions(console, decompositions)
 
 
 def _tool(urdf: Path, remarks: list[str]) -> str:
@@ -118,7 +131,7 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
             {
                 "joint": name,
                 "type": "revolute" if geometry.revolute[i] else "prismatic",
-                "axis at zero": " ".join(f"{component + 0.0:.4g}" for component in geometry.axes[i]),
+                "axis at zero": " ".join(f"{round(component, 6) + 0.0:.4g}" for component in geometry.axes[i]),
                 "range": _range(stated, unit),
                 "velocity": _figure(stated.velocity, f"{unit}/s"),
                 "effort": _figure(stated.effort, "Nm" if unit == "rad" else "N"),
@@ -140,7 +153,8 @@ def _decompositions(robot: Robot, task_space: TaskSpace) -> list[dict[str, Any]]
     rows = []
     for candidate in ik.find_all(robot, task_space):
         solver = candidate.solver
-        why = "; ".join(f"{family}: {reason}" for family, reason in candidate.reasons.items())
+        told = {family: reason for family, reason in candidate.reasons.items() if reason not in _OTHER_TASKS}
+        why = "; ".join(f"{family}: {reason}" for family, reason in (told or candidate.reasons).items())
         rows.append(
             {
                 "redundant joints": ", ".join(candidate.redundant_joints) or "none",
@@ -160,16 +174,46 @@ def _counted(labels: tuple[str, ...]) -> list[str]:
     return [label if n == 1 else f"{label} (up to {n})" for label, n in Counter(labels).items()]
 
 
-def _shortened(row: dict[str, Any]) -> dict[str, Any]:
-    """Put why there is no solver, and what there is to know of one, into a single column."""
-    shown = {name: value for name, value in row.items() if name != "why not"}
-    return {**shown, "remark": row["why not"] or row["remark"]}
+def _print_decompositions(console: Console, rows: list[dict[str, Any]]) -> None:
+    """Print the choices that have a solver as a table, their branches, and the reasons against the others."""
+    solved = [row for row in rows if row["solver"] != "-"]
+    columns = [
+        "redundant joints",
+        "solver",
+        "kind",
+        "branches",
+        *(["remark"] if any(r["remark"] for r in solved) else []),
+    ]
+    if solved:
+        console.print(_table("choices of redundant joints", [{name: row[name] for name in columns} for row in solved]))
+    for labels in dict.fromkeys(row["labels"] for row in solved):
+        choices = "; ".join(row["redundant joints"] for row in solved if row["labels"] == labels)
+        console.print(f"branches with {choices} redundant: {labels}")
+    refused = [row for row in rows if row["solver"] == "-"]
+    if refused:
+        console.print(f"no closed form with these redundant ({len(refused)} of {len(rows)} choices):")
+    for row in refused[:_LISTED]:
+        console.print(f"  {row['redundant joints']}: {row['why not']}")
+    if len(refused) > _LISTED:
+        console.print(f"  ... and {len(refused) - _LISTED} more, which --json lists")
+
+
+def _tool_pose(robot: Robot, text: str) -> str:
+    """Say where the tool is at a posture given as numbers, as ``path_start`` of a task takes it."""
+    try:
+        values = [float(word) for word in text.replace(",", " ").split()]
+    except ValueError as error:
+        raise InputError("is not understood", where="--posture", found=text, allowed="numbers, rad or m") from error
+    placement = robot.tool_placement(robot.posture(values, "--posture"))
+    x, y, z, qx, qy, qz, qw = pin.SE3ToXYZQUAT(placement)
+    position = ", ".join(f"{value:.9g}" for value in (x, y, z))
+    return f"tool at [{position}] m, quaternion w, x, y, z [{', '.join(f'{value:.9g}' for value in (qw, qx, qy, qz))}]"
 
 
 def _table(title: str, rows: list[dict[str, Any]]) -> Table:
     table = Table(title=title, title_justify="left")
     for column in rows[0] if rows else ():
-        table.add_column(column)
+        table.add_column(column, overflow="fold")
     for row in rows:
         table.add_row(*(str(value) for value in row.values()))
     return table

@@ -139,6 +139,9 @@ def inspect(
     ] = None,
     tool_frame: Annotated[str | None, typer.Option(help="Link at the chain's end.")] = None,
     base_frame: Annotated[str | None, typer.Option(help="Link at the chain's beginning.")] = None,
+    posture: Annotated[
+        str | None, typer.Option(help="Say where the tool is at these joint positions, for example '0, 0.3, 1.2'.")
+    ] = None,
     lock: Annotated[list[str] | None, typer.Option(help="Joint held at a position: name=value, repeatable.")] = None,
     json: Json = False,
 ) -> None:
@@ -146,7 +149,13 @@ def inspect(
     from brachis.cli import inspection  # noqa: PLC0415
 
     inspection.inspect_command(
-        urdf, task_space=task_space, tool_frame=tool_frame, base_frame=base_frame, lock=lock or [], as_json=json
+        urdf,
+        task_space=task_space,
+        tool_frame=tool_frame,
+        base_frame=base_frame,
+        lock=lock or [],
+        posture=posture,
+        as_json=json,
     )
 
 

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from brachis.cli.output import json_text, print_json, result_console, verification_table
-from brachis.errors import UnknownNameError
+from brachis.errors import InputError, UnknownNameError
 from brachis.files import atomic_write
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import json_schema
@@ -31,6 +31,7 @@ def export_command(result: Path, out: Path, *, form: str, dt: float) -> None:
     """Write a saved motion in one of the formats of `brachis.export.FORMATS`."""
     from brachis.export import FORMATS  # noqa: PLC0415
 
+    _keep(result, out)
     FORMATS[form](Trajectory.load(result), out, dt)
     result_console().print(f"wrote {out}")
 
@@ -41,8 +42,17 @@ def plot_command(result: Path, *, out: Path, kind: str) -> None:
 
     if kind not in PLOTS:
         raise UnknownNameError("figure", kind, PLOTS, where="--kind")
+    _keep(result, out)
     save_figure(PLOTS[kind](Trajectory.load(result)), out)
     result_console().print(f"wrote {out}")
+
+
+def _keep(result: Path, out: Path) -> None:
+    """Refuse to write over the motion that is read."""
+    if out.resolve() == result.resolve():
+        raise InputError(
+            "would be written over the saved motion", where=str(out), found="the same file", allowed="another file name"
+        )
 
 
 def schema_command(out: Path | None) -> None:

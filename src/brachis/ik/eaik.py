@@ -195,5 +195,5 @@ def eaik(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, .
     if sliding:
         raise NotApplicableError(f"{', '.join(sliding)} would be left over and not revolute")
     if not installed():
-        raise NotApplicableError("EAIK is not installed (pip install EAIK)")
+        raise NotApplicableError('EAIK is not installed (pip install "brachis[eaik]")')
     return EaikSolver(geometry, redundant)

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from brachis.task import ArcCenter, ArcVia, Circle
 
 _PLANE_ROWS = 2
-# Relative: angles are given with about six digits, and so are points on a plane.
-_PERPENDICULAR = 1e-6
+# Relative: coordinates are given with a few digits.
+_PERPENDICULAR = 1e-3
 _COLLINEAR = 1e-6
 
 
@@ -142,7 +142,11 @@ def _about_center(shape: ArcCenter | Circle, angle: float, site: Site) -> ArcCur
             raise PathError(problem, found=list(shape.normal), allowed="no normal", where=f"{site.key}.normal")
         forward = np.array([-outward[1], outward[0]])
     else:
-        forward = np.cross(_normal(shape.normal, outward, site), outward)
+        normal = _normal(shape.normal, outward, site)
+        # The plane is the one through the start: a centre given with a few digits is moved into it.
+        center = center + (normal @ outward) * normal
+        outward = site.position - center
+        forward = np.cross(normal, outward)
     length = abs(angle) * float(np.linalg.norm(outward))
     return _with_yaw(ArcCurve(center, outward, np.sign(angle) * forward, length), shape.yaw, site)
 
@@ -167,8 +171,13 @@ def _normal(normal: tuple[float, float, float] | None, outward: Array, site: Sit
     slope = float(unit @ outward / np.linalg.norm(outward))
     if abs(slope) > _PERPENDICULAR:
         problem = "the normal is not perpendicular to the radius from the centre to the segment's start"
-        found = f"{np.rad2deg(np.arccos(np.clip(slope, -1, 1))):.6g} degrees between them"
-        raise PathError(problem, found=found, allowed="90 degrees", where=where)
+        raise PathError(
+            problem,
+            found=f"{np.rad2deg(np.arccos(np.clip(slope, -1, 1))):.6g} degrees between them",
+            allowed=f"90 degrees to within {np.rad2deg(_PERPENDICULAR):.2g}",
+            where=where,
+            hint=f"Move the centre by {float(unit @ outward):.6g} m along the normal, or use via and to",
+        )
     return unit
 
 

@@ -103,7 +103,7 @@ def read_chain(
 
 
 def last_common_link(text: str | bytes, where: str) -> tuple[str, tuple[str, ...]]:
-    """Return the last link before a URDF's moving chains part, and the links at their ends.
+    """Return the last link before a URDF's longest moving chains part, and the links at their ends.
 
     For an arm with a gripper that is the link to which the fingers are attached; for a single chain its end.
 
@@ -119,7 +119,9 @@ def last_common_link(text: str | bytes, where: str) -> tuple[str, tuple[str, ...
     inner = {joint.parent for joint in urdf.robot.joints}
     leaves = tuple(name for name in links if name not in inner)
     chains = {leaf: _joints_between(root, leaf, parents, where) for leaf in leaves}
-    moving = {leaf: chain for leaf, chain in chains.items() if any(joint.type in MOVING_TYPES for joint in chain)}
+    counts = {leaf: sum(joint.type in MOVING_TYPES for joint in chain) for leaf, chain in chains.items()}
+    # Frames half way up the arm are no tools: the chains of most joints count.
+    moving = {leaf: chain for leaf, chain in chains.items() if counts[leaf] == max(counts.values())}
     shared = []
     for step in zip(*moving.values(), strict=False):
         if len({joint.child for joint in step}) > 1:

@@ -106,6 +106,9 @@ def read_result(path: Path) -> Content:
 
 def _parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Read the metadata and the arrays, unchecked but for their types."""
+    if not zipfile.is_zipfile(stream):
+        raise ValueError("no npz archive")
+    stream.seek(0)
     archive = np.load(stream, allow_pickle=False)
     if not isinstance(archive, np.lib.npyio.NpzFile):
         raise ValueError("a single array")  # noqa: TRY004  (a wrong file, not a wrong call)
