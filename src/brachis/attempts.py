@@ -15,7 +15,7 @@ from brachis.nlp.constraints.branch_margin import MARGIN
 from brachis.nlp.guess import guesses
 from brachis.refine import Refined, RefinementOptions, Solve, refine
 from brachis.result import Attempt
-from brachis.solvers import Solver, SolverOptions, SolverReport, solver_named
+from brachis.solvers import Solver, SolverOptions, SolverReport, SolveStatus, solver_named
 from brachis.task import SolverSettings, Task
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
@@ -200,7 +200,7 @@ def continued(
                 break
         else:
             failed.append(outcome)
-            if solved:
+            if solved or outcome[1].status is SolveStatus.TIME_LIMIT:
                 break
             if outcome[1].violation <= _ON_ITS_WAY:  # it ran out of iterations on its way
                 x = outcome[1].x

@@ -37,7 +37,7 @@ def inspect_command(
     tool_frame: str | None,
     base_frame: str | None,
     lock: list[str],
-    posture: str | None,
+    posture: str | None = None,
     as_json: bool,
 ) -> None:
     """Print a robot's joints and its decompositions."""

@@ -8,7 +8,8 @@ from brachis.ik.geometry import ChainGeometry
 from brachis.ik.protocol import IKSolver, NotApplicableError
 from brachis.robot import Robot, TaskSpace
 
-_CHECKED_POSTURES = 16
+_CHECKED_POSTURES = 100
+_INSIDE = 1e-2
 _POSE_TOLERANCE = 1e-8
 
 
@@ -22,8 +23,7 @@ def check_answers(
 ) -> None:
     """Put a solver's answers for random postures into Pinocchio's forward kinematics.
 
-    Of twice as many postures those with the larger branch margins are taken: beside a branch's boundary it is a matter
-    of rounding whether there is an answer.
+    Postures beside a branch's boundary are left out: there it is a matter of rounding whether there is an answer.
 
     Parameters
     ----------
@@ -40,9 +40,11 @@ def check_answers(
         An answer misses its target by more than 1e-8 m or rad, or none of the answers is the posture itself.
     """
     low, high = _checked_ranges(robot)
-    q = np.random.default_rng(1).uniform(low, high, (2 * postures, robot.n))
+    q = np.random.default_rng(1).uniform(low, high, (postures, robot.n))
     margins = [solver.branch_margins(q, b).min(axis=1, initial=np.inf) for b in range(len(solver.branches))]
-    q = q[np.argsort(-np.max(margins, axis=0), kind="stable")[:postures]]
+    q = q[np.max(margins, axis=0) > _INSIDE]
+    if not len(q):
+        raise NotApplicableError("no random posture is inside a branch")
     rest = [i for i in range(robot.n) if i not in redundant]
     targets = task_space.values(*robot.tool_placements(q))
     answers = solver.solve(targets, q[:, list(redundant)])

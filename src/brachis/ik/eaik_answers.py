@@ -35,7 +35,7 @@ def installed() -> bool:
     """Whether EAIK can be imported."""
     try:
         _extension()
-    except ImportError:
+    except ModuleNotFoundError:
         return False
     return True
 

@@ -128,7 +128,8 @@ class Equations:
         theta = np.stack([*_cosine_roots(terms.alpha, terms.level), *_cosine_roots(beta, right)])
         miss = np.abs((beta * np.exp(1j * theta)).real - right) / (np.abs(beta) + np.abs(right))
         of_first = np.array([True, True, False, False])[:, None]
-        usual = np.where(of_first, (miss < _CREDIBLE) | (miss <= miss[:2].min(axis=0)) | sideways, flat)
+        free = np.abs(beta) < _SMALL  # the third equation does not know theta then
+        usual = np.where(of_first, free | (miss < _CREDIBLE) | (miss <= miss[:2].min(axis=0)) | sideways, flat)
         unusual = sideways & (of_first | flat)
         slides = np.stack(np.broadcast_arrays(terms.way / terms.rate, *self._slides(terms, theta)))
         kept = np.stack([usual, unusual, unusual])

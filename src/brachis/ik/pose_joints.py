@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.ik.arm import aligned, meeting
 from brachis.ik.geometry import ChainGeometry, PosedScrews
 from brachis.ik.held_joints import HeldJoints
 from brachis.ik.protocol import NotApplicableError
-from brachis.ik.vectors import cross, dot
+from brachis.ik.vectors import cross
 from brachis.robot import TaskSpace
 
 _JOINTS = 6
@@ -45,11 +46,7 @@ class PoseJoints(HeldJoints):
 
     def meet(self, first: int, second: int) -> bool:
         """Whether two joints are revolute and their axes meet in one point."""
-        normal = cross(self.axes[:, first], self.axes[:, second])
-        size = np.sqrt(dot(normal, normal))
-        gap = np.abs(dot(normal, self.points[:, second] - self.points[:, first]))
-        revolute = bool(self.revolute[first] and self.revolute[second])
-        return revolute and bool(size.max() > _TOLERANCE) and bool(np.all(gap < _TOLERANCE * np.maximum(size, 1e-3)))
+        return meeting(self, first, second) is not None and not aligned(self, first, second)
 
 
 def random_postures(geometry: ChainGeometry) -> PosedScrews:

@@ -38,11 +38,6 @@ def rotate(axis: np.ndarray, angle: np.ndarray, vector: np.ndarray) -> np.ndarra
     return vector * cos + cross(axis, vector) * sin + axis * (dot(axis, vector) * (1.0 - cos))
 
 
-def turn_about(axis: np.ndarray, point: np.ndarray, angle: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Turn a position about the line through `point` along a unit axis, shape (3, ...)."""
-    return point + rotate(axis, angle, position - point)
-
-
 def apply(rotation: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Apply rotation matrices (3, 3, ...) to vectors (3, ...)."""
     return rotation[:, 0] * vector[0] + rotation[:, 1] * vector[1] + rotation[:, 2] * vector[2]
@@ -75,40 +70,6 @@ def cosine_roots(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarra
         half = np.arccos(c / np.sqrt(a * a + b * b))
     middle = np.arctan2(b, a)
     return middle - half, middle + half
-
-
-def turned_component(
-    axis: np.ndarray, point: np.ndarray, position: np.ndarray, direction: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Coefficients of the component of a turned position along a direction.
-
-    With E the turn by an angle about the line through `point` along `axis`:
-    ``direction . E position = a cos + b sin + rest``.
-
-    Returns
-    -------
-    a, b, rest : (...) ndarray
-    """
-    arm = position - point
-    lever = across(axis, arm)
-    return dot(direction, lever), dot(direction, cross(axis, lever)), dot(direction, position - lever)
-
-
-def turned_distance(
-    axis: np.ndarray, point: np.ndarray, position: np.ndarray, other: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Coefficients of the squared distance of a turned position from another one.
-
-    ``|E position - other|^2 = rest - 2 (a cos + b sin)``, with E as in `turned_component`.
-
-    Returns
-    -------
-    a, b, rest : (...) ndarray
-    """
-    arm, away = position - point, other - point
-    lever = across(axis, arm)
-    rest = dot(arm, arm) + dot(away, away) - 2.0 * dot(axis, arm) * dot(axis, away)
-    return dot(away, lever), dot(away, cross(axis, lever)), rest
 
 
 def perpendiculars(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -37,6 +37,14 @@ def bind(robot: Robot, space: str | Sequence[str]) -> tuple[Robot, TaskSpace]:
     InputError
         See `TaskSpace.of`; or the robot has a joint of the virtual joint's name.
     """
+    if robot.rolls_freely and space != FREE_ROLL:
+        raise InputError(
+            "the robot's tool rolls freely",
+            where="task_space",
+            found=space,
+            allowed=FREE_ROLL,
+            hint="Use the URDF's robot",
+        )
     if space == FREE_ROLL and not robot.rolls_freely:
         robot = with_free_roll(robot)
     return robot, TaskSpace.of(robot, space)

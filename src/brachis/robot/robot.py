@@ -190,7 +190,7 @@ def _with_roll(joints: object, n: int) -> object:
     """Add the virtual joint's position, zero, to a posture that leaves it out."""
     if isinstance(joints, Mapping):
         return {ROLL_JOINT: 0.0, **joints}
-    if isinstance(joints, Sequence) and len(joints) == n - 1:
+    if isinstance(joints, (Sequence, np.ndarray)) and len(joints) == n - 1:
         return [*joints, 0.0]
     return joints
 

@@ -19,8 +19,11 @@ _UNIT = 0.01
 Vector3 = tuple[Number, Number, Number]
 
 
+_LEAST_LENGTH = 1e-9
+
+
 def _check_direction(vector: Vector3) -> Vector3:
-    if math.hypot(*vector) == 0.0:
+    if math.hypot(*vector) < _LEAST_LENGTH:
         problem = "a direction cannot have zero length"
         raise refuse(problem, found=list(vector), allowed="any other vector; its length is of no importance")
     return vector

@@ -61,6 +61,9 @@ def verify_trajectory(
     path = build_path(trajectory.task.path, task_space.value(robot.tool_placement(start)), task_space.rows)
     t = np.unique(np.concatenate([grid, trajectory.times, _times_within_pieces(trajectory, path.breaks, options)]))
     q, qdot, qddot = trajectory.position(t), trajectory.velocity(t), trajectory.acceleration(t)
+    # Splines of degree 2 jump in acceleration at knots: both sides are looked at.
+    t, q, qdot = (np.concatenate(pair) for pair in ((t, trajectory.times), (q, trajectory.q), (qdot, trajectory.qdot)))
+    qddot = np.concatenate([qddot, trajectory.qddot_before])
     tau = torques(robot, q, qdot, qddot)
     path_check = _path_error(trajectory, robot, path, task_space, t, q, options)
     limits = _limit_checks(robot, t, q, qdot, qddot, tau, options)
