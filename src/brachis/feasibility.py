@@ -16,7 +16,7 @@ from brachis.robot.task_space import AXES
 
 _RANGE_SLACK = 1e-9
 _ON_PATH = 1e-6
-_UNIT = 1e-4
+_UNIT = 1e-2
 _SAME_POSTURE = 1e-5
 _SEARCHED = 400
 _STATIONS = 101

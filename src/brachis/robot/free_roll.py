@@ -43,7 +43,7 @@ def bind(robot: Robot, space: str | Sequence[str]) -> tuple[Robot, TaskSpace]:
             where="task_space",
             found=space,
             allowed=FREE_ROLL,
-            hint="Use the URDF's robot",
+            hint="Use the robot as it was before it was bound to pose_free_roll",
         )
     if space == FREE_ROLL and not robot.rolls_freely:
         robot = with_free_roll(robot)
