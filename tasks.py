@@ -63,6 +63,8 @@ def run(task: str, arguments: list[str]) -> int:
     for command in COMMANDS[task]:
         print("+", *command, *arguments, flush=True)
         code = max(code, subprocess.run([BIN / command[0], *command[1:], *arguments], cwd=ROOT, check=False).returncode)
+    if task == "demo" and code == 0:
+        print(f"look at out/overview.png; then '. {ENVIRONMENT.name}/bin/activate', and README.md goes on from there")
     return code
 
 

@@ -83,6 +83,7 @@ def _plan(
     options = VerifyOptions(ratio_tolerance=task.refinement.tolerance)
 
     def judge(refined: Refined) -> tuple[Trajectory, Verification]:
+        """Make the trajectory of an answer and verify it."""
         clock.stage("solve")
         trajectory = _trajectory(problem.decomposition, refined, task)
         clock.stage("trajectory")

@@ -149,10 +149,11 @@ def test_a_third_party_family_comes_first_where_it_fits(arm, plane):
     [
         (lambda answers: answers + 1e-4, "leave out postures"),
         (lambda answers: answers[:, ::-1] * np.array([1.0, np.nan])[:, None], "leave out postures"),
-        (lambda answers: np.concatenate([answers, answers + 1e-6], axis=1), "miss the target by"),
+        (lambda answers: answers + 3e-7, "miss the target by"),
+        (lambda answers: np.concatenate([answers, answers], axis=1), "have the shape"),
         (lambda answers: np.full_like(answers, np.nan), "leave out postures"),
     ],
-    ids=["off by 1e-4", "one branch lost", "a branch that misses", "no answers"],
+    ids=["off by 1e-4", "one branch lost", "near misses", "more answers than labels", "no answers"],
 )
 def test_a_wrong_family_is_rejected_and_the_next_one_taken(arm, plane, change, reason):
     family = third_party(arm, plane, change)
@@ -166,3 +167,13 @@ def test_a_wrong_family_is_rejected_and_the_next_one_taken(arm, plane, change, r
 def test_lifted_angles_are_right_answers(arm, plane):
     family = third_party(arm, plane, lambda answers: answers + 2.0 * np.pi)
     assert find(arm, plane, ["j3"], families=[family]).family == "third_party"
+
+
+def test_a_family_of_others_that_breaks_down_is_named_and_passed_over(arm, plane):
+    @ik_family("broken", source="this test")
+    def broken(*_arguments):
+        return {}["nothing"]
+
+    candidate = find(arm, plane, ["j3"], families=[broken])
+    assert candidate.family == "planar"
+    assert candidate.reasons["broken"] == "its code failed: KeyError: 'nothing'"

@@ -45,9 +45,9 @@ def test_it_sees_every_joint_that_is_a_little_off(motion, joint):
     assert check.value == pytest.approx(1e-7, rel=0.9)
 
 
+@pytest.mark.parametrize("motion", ["pose_free_roll"], indirect=True)
 def test_it_sees_a_roll_that_does_not_fit_the_joints(motion):
-    if motion.joint_names[-1] != "tool_roll":
-        pytest.skip("the roll is not free")
+    assert motion.joint_names[-1] == "tool_roll"
     q = np.array(motion.q)
     q[:, -1] += 1e-7
     assert path_error(replace(motion, q=q)).value == pytest.approx(1e-7, rel=1e-3)
@@ -65,8 +65,7 @@ def test_saved_motions_come_back(motion, tmp_path):
     assert "q_j7" in (tmp_path / "motion.csv").read_text().splitlines()[0]
 
 
+@pytest.mark.parametrize("motion", ["pose_free_roll"], indirect=True)
 def test_a_tool_that_rolls_freely_is_for_that_task_space_alone(motion):
-    if motion.joint_names[-1] != "tool_roll":
-        pytest.skip("the roll is not free")
     with pytest.raises(brachis.BrachisError, match="rolls freely"):
         brachis.plan(motion.robot, {**motion.task.to_dict(), "task_space": "pose"})

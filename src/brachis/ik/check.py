@@ -48,6 +48,9 @@ def check_answers(
     rest = [i for i in range(robot.n) if i not in redundant]
     targets = task_space.values(*robot.tool_placements(q))
     answers = solver.solve(targets, q[:, list(redundant)])
+    expected = (len(q), len(solver.branches), len(rest))
+    if answers.shape != expected:
+        raise NotApplicableError(f"its answers have the shape {answers.shape}, not {expected}")
     turning = ChainGeometry.of(robot).revolute[rest]
     own = np.abs(_difference(answers, q[:, None, rest], turning)).max(axis=2)
     if not np.all(np.nanmin(np.where(np.isnan(own), np.inf, own), axis=1) < _POSE_TOLERANCE * 100):

@@ -12,7 +12,7 @@ from __future__ import annotations
 import contextlib
 import importlib.metadata
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -128,7 +128,7 @@ def find(
             if r >= 0
             else None,
         )
-    candidate = _try(robot, task_space, names, families)
+    candidate = _try(robot, task_space, names, families, _ideals(robot, task_space))
     if not isinstance(candidate, Match):
         available = [c.redundant_joints for c in find_all(robot, task_space, families=families) if c.solver is not None]
         raise DecompositionError(
@@ -145,19 +145,31 @@ def find_all(robot: Robot, task_space: TaskSpace, *, families: Sequence[Family] 
     r = robot.n - task_space.m
     if r < 0:
         return []
-    return [_try(robot, task_space, names, families) for names in itertools.combinations(robot.joint_names, r)]
+    ideals = _ideals(robot, task_space)
+    return [_try(robot, task_space, names, families, ideals) for names in itertools.combinations(robot.joint_names, r)]
 
 
-def _try(robot: Robot, task_space: TaskSpace, names: tuple[str, ...], families: Sequence[Family]) -> Candidate:
-    """Let every family in turn look at one choice; where none fits, at the ideal arm that the robot almost is."""
+def _ideals(robot: Robot, task_space: TaskSpace) -> Callable[[float], Ideal | None]:
+    """Return the ideal arm within a tolerance as a function of it; the redundant joints have no part in it."""
     geometry = ChainGeometry.of(robot)
+    return cache(lambda tolerance: idealised(geometry, task_space, tolerance))
+
+
+def _try(
+    robot: Robot,
+    task_space: TaskSpace,
+    names: tuple[str, ...],
+    families: Sequence[Family],
+    ideals: Callable[[float], Ideal | None],
+) -> Candidate:
+    """Let every family in turn look at one choice; where none fits, at the ideal arm that the robot almost is."""
     redundant = tuple(sorted(robot.joint_names.index(name) for name in names))
     reasons: dict[str, str] = {}
     tried = (*families, *BUILTIN, *plugin_families())
     match = _fitting(robot, task_space, redundant, tried, reasons, None)
-    if match is None and (ideal := idealised(geometry, task_space)):
+    if match is None and (ideal := ideals(TOLERANCE)):
         match = _fitting(robot, task_space, redundant, tried, reasons, ideal)
-    if match is None and (rough := idealised(geometry, task_space, _NEAR)):
+    if match is None and (rough := ideals(_NEAR)):
         _name_rounding(task_space, redundant, tried, reasons, rough)
     return match or Candidate(tuple(robot.joint_names[i] for i in redundant), None, None, reasons)
 
@@ -180,6 +192,10 @@ def _fitting(
             check_answers(robot, task_space, redundant, solver)
         except NotApplicableError as reason:
             reasons[family.name] = str(reason)
+        except Exception as error:
+            if family in BUILTIN:
+                raise
+            reasons[family.name] = f"its code failed: {type(error).__name__}: {error}"  # another package's fault
         else:
             reasons.pop(family.name, None)
             remark = f"axes within {ideal.miss} of an ideal arm's: answers are polished" if ideal else ""
@@ -193,7 +209,7 @@ def _name_rounding(
     """Put down which families would fit if the axes were nearer to the ideal arm's."""
     if max(ideal.turned, ideal.shifted) < TOLERANCE:
         return
-    for family in families:
+    for family in (family for family in families if family in BUILTIN):
         with contextlib.suppress(NotApplicableError):
             family.build(ideal.geometry, task_space, redundant)
             reasons[family.name] = (

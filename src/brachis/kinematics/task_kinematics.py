@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from brachis.ik.vectors import cross
 from brachis.robot import Robot, TaskSpace
 
 
@@ -99,7 +100,7 @@ class TaskKinematics:
         acceleration = (_bracket(before, twists) * qdot).sum(axis=2, keepdims=True)
         if not self._oriented:
             velocity = (twists * qdot).sum(axis=2, keepdims=True)
-            acceleration[:3] += _cross(velocity[3:], velocity[:3])
+            acceleration[:3] += cross(velocity[3:], velocity[:3])
         return self.rows(acceleration)[:, :, 0]
 
     def derivatives(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:
@@ -111,9 +112,9 @@ class TaskKinematics:
         acceleration_qdot = 2.0 * velocity_q + _bracket(twists, velocity)
         if not self._oriented:
             turning, v, w = twists[3:], velocity[:3], velocity[3:]
-            acceleration_qdot[:3] += _cross(turning, v) + _cross(w, twists[:3])
-            acceleration_q[:3] += _cross(velocity_q[3:], v) + _cross(w, velocity_q[:3])
-            classical = np.concatenate([acceleration[:3] + _cross(w, v), acceleration[3:]])
+            acceleration_qdot[:3] += cross(turning, v) + cross(w, twists[:3])
+            acceleration_q[:3] += cross(velocity_q[3:], v) + cross(w, velocity_q[:3])
+            classical = np.concatenate([acceleration[:3] + cross(w, v), acceleration[3:]])
             velocity_q = velocity_q + _turned(turning, velocity)
             acceleration_q += _turned(turning, classical)
         return TaskDerivatives(self.rows(velocity_q), self.rows(acceleration_q), self.rows(acceleration_qdot))
@@ -125,17 +126,12 @@ def _sums(parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return upto - parts, upto[:, :, -1:]
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Vector product with components along the first axis."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
 def _bracket(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Lie bracket of twists (6, K, n or 1)."""
     v, w = first[:3], first[3:]
-    return np.concatenate([_cross(w, second[:3]) + _cross(v, second[3:]), _cross(w, second[3:])])
+    return np.concatenate([cross(w, second[:3]) + cross(v, second[3:]), cross(w, second[3:])])
 
 
 def _turned(turning: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Rates (6, K, n) at which linear and angular parts (6, K, 1) change as their axes turn."""
-    return np.concatenate([_cross(turning, vectors[:3]), _cross(turning, vectors[3:])])
+    return np.concatenate([cross(turning, vectors[:3]), cross(turning, vectors[3:])])

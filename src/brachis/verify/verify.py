@@ -61,9 +61,11 @@ def verify_trajectory(
     path = build_path(trajectory.task.path, task_space.value(robot.tool_placement(start)), task_space.rows)
     t = np.unique(np.concatenate([grid, trajectory.times, _times_within_pieces(trajectory, path.breaks, options)]))
     q, qdot, qddot = trajectory.position(t), trajectory.velocity(t), trajectory.acceleration(t)
-    # Splines of degree 2 jump in acceleration at knots: both sides are looked at.
-    t, q, qdot = (np.concatenate(pair) for pair in ((t, trajectory.times), (q, trajectory.q), (qdot, trajectory.qdot)))
-    qddot = np.concatenate([qddot, trajectory.qddot_before])
+    # Splines of degree 2 jump in acceleration at knots: there both sides are looked at.
+    jumps = np.any(trajectory.qddot_before != trajectory.qddot, axis=1)
+    t = np.concatenate([t, trajectory.times[jumps]])
+    q, qdot = np.concatenate([q, trajectory.q[jumps]]), np.concatenate([qdot, trajectory.qdot[jumps]])
+    qddot = np.concatenate([qddot, trajectory.qddot_before[jumps]])
     tau = torques(robot, q, qdot, qddot)
     path_check = _path_error(trajectory, robot, path, task_space, t, q, options)
     limits = _limit_checks(robot, t, q, qdot, qddot, tau, options)

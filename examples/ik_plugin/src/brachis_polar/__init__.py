@@ -18,6 +18,8 @@ from brachis.ik.vectors import across, angle_about, cross, dot, meeting_point
 from brachis.robot import TaskSpace
 
 ROUNDING = 1e-9
+METRE = 1.0
+"""Size of the arm, m, by which margins are made dimensionless."""
 
 
 class PolarSolver:
@@ -59,7 +61,7 @@ class PolarSolver:
         screws = self._geometry.posed(q)
         turn_axis, tilt_axis, _ = axes(screws)
         forward = dot(cross(tilt_axis, turn_axis), screws.tool_position - shoulder(screws)) + self._flat * self._offset
-        return np.stack([forward if branch == 0 else -forward, length(screws)], axis=1)
+        return np.stack([forward if branch == 0 else -forward, length(screws)], axis=1) / METRE
 
 
 def axes(screws: PosedScrews) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
