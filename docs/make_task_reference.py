@@ -15,6 +15,7 @@ from brachis.task import (
     LimitSettings,
     RefinementSettings,
     RobotSettings,
+    SearchSettings,
     SolverSettings,
     SplineSettings,
     Task,
@@ -40,6 +41,7 @@ PARTS: dict[str, type[BaseModel]] = {
     "robot.limits.scale": LimitScale,
     "robot.friction": FrictionSettings,
     "spline": SplineSettings,
+    "search": SearchSettings,
     "solver": SolverSettings,
     "refinement": RefinementSettings,
 }

@@ -260,7 +260,7 @@ def _attempt(
         outcome = f"{last.solver}: t_E = {refined.x[0]:.4f} s after {rounds} refinement rounds, {found}"
     reports = (*before, *refined.reports)
     points = len(refined.problem.tau)
-    return Attempt(last.solver, number, reports, rounds, refined.excess, refined.stretched, points, outcome)
+    return Attempt(last.solver, number, reports, rounds, refined.excess, refined.stretched, points, outcome, refined)
 
 
 def _summary(attempts: Sequence[Attempt]) -> str:

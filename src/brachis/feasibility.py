@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-import pinocchio as pin
 
-from brachis.errors import BrachisError, InputError, PathError, StartError, UnknownNameError
+from brachis.errors import BrachisError, PathError, StartError, UnknownNameError
 from brachis.ik import Match
 from brachis.kinematics import Decomposition
-from brachis.path import Path
+from brachis.path import Path, check_on_path
 from brachis.robot import Robot, TaskSpace, dynamics
-from brachis.robot.task_space import AXES
 
 _RANGE_SLACK = 1e-9
-_ON_PATH = 1e-6
-_UNIT = 1e-2
 _SAME_POSTURE = 1e-5
 _SEARCHED = 400
 _STATIONS = 101
@@ -28,7 +22,6 @@ def check_start(
     end: np.ndarray | None,
     path: Path,
     task_space: TaskSpace,
-    path_start: Sequence[float] | None = None,
 ) -> None:
     """Refuse start and end postures out of range, off the path, or too heavy to hold.
 
@@ -40,55 +33,17 @@ def check_start(
     path : Path
         From where the start posture's tool is.
     task_space : TaskSpace
-    path_start : sequence of float, optional
-        Where the task says that the path begins: the rows of the task space, or position and quaternion (w x y z).
 
     Raises
     ------
-    StartError, InputError
+    StartError
     """
     _check_range(robot, start, "start")
     _check_holding(robot, start, "start")
-    if path_start is not None:
-        _check_on_path(robot, task_space, start, _path_start(task_space, path_start), "start")
     if end is not None:
         _check_range(robot, end, "end")
         _check_holding(robot, end, "end")
-        _check_on_path(robot, task_space, end, path.sample(np.array([1.0])).target[0], "end")
-
-
-def _path_start(task_space: TaskSpace, given: Sequence[float]) -> np.ndarray:
-    """Task coordinates, (c,), of what the task says; a pose is given as a position and a quaternion."""
-    rows = (*AXES, "qw", "qx", "qy", "qz") if task_space.oriented else task_space.rows
-    if len(given) != len(rows):
-        raise InputError(
-            "has the wrong number of coordinates",
-            where="path_start",
-            found=len(given),
-            allowed=f"{len(rows)}: {', '.join(rows)}",
-        )
-    values = np.array(given, dtype=float)
-    if not task_space.oriented:
-        return values
-    size = float(np.linalg.norm(values[3:]))
-    if abs(size - 1.0) > _UNIT:
-        raise InputError("has no unit quaternion", where="path_start", found=f"a norm of {size:.6g}", allowed="1")
-    w, x, y, z = values[3:] / size
-    return task_space.value(pin.SE3(pin.Quaternion(w, x, y, z).matrix(), values[:3]))
-
-
-def _check_on_path(robot: Robot, task_space: TaskSpace, posture: np.ndarray, target: np.ndarray, name: str) -> None:
-    """Refuse a posture whose tool is not at the path's beginning or end."""
-    miss = np.abs(task_space.difference(task_space.value(robot.tool_placement(posture)), target))
-    worst = int(np.argmax(miss))
-    if miss[worst] > _ON_PATH:
-        raise StartError(
-            f"the {name} posture is off the path",
-            where=f"{name}.joints",
-            found=f"{miss[worst]:.3g} {task_space.units[worst]} off in {task_space.rows[worst]}",
-            allowed=f"at most {_ON_PATH:g} {task_space.units[worst]}",
-            hint=f"Choose a posture whose tool is at the path's {'beginning' if name == 'start' else 'end'}",
-        )
+        check_on_path(robot, task_space, end, path.sample(np.array([1.0])).target[0], "end")
 
 
 def _check_range(robot: Robot, posture: np.ndarray, name: str) -> None:
@@ -123,7 +78,7 @@ def _check_holding(robot: Robot, posture: np.ndarray, name: str) -> None:
             )
 
 
-def start_branch(robot: Robot, task_space: TaskSpace, match: Match, start: np.ndarray, wanted: str | None) -> int:
+def start_branch(robot: Robot, task_space: TaskSpace, match: Match, start: np.ndarray, wanted: str) -> int:
     """Index of the closed form's branch on which the start posture lies.
 
     Raises
@@ -134,10 +89,10 @@ def start_branch(robot: Robot, task_space: TaskSpace, match: Match, start: np.nd
         There is no branch of the wanted name.
     """
     branches = match.solver.branches
-    if wanted is not None and wanted not in branches:
+    if wanted != "auto" and wanted not in branches:
         raise UnknownNameError("branch", wanted, dict.fromkeys(branches), where="branch")
     branch = _branch_of(robot, task_space, match, start, "start")
-    if wanted is not None and branches[branch] != wanted:
+    if wanted != "auto" and branches[branch] != wanted:
         raise StartError(
             "the start posture is on another branch",
             where="branch",

@@ -11,10 +11,11 @@ from threadpoolctl import ThreadpoolController
 
 from brachis import ik
 from brachis.attempts import Listener, search
+from brachis.errors import InputError
 from brachis.feasibility import check_end_branch, check_start, start_branch
 from brachis.kinematics import Decomposition, interpolate
 from brachis.nlp import Transcription
-from brachis.path import build_path
+from brachis.path import path_of
 from brachis.refine import Refined
 from brachis.result import Result
 from brachis.robot import ROLL_JOINT, Robot, TaskSpace, bind
@@ -117,23 +118,26 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
         See `plan`.
     """
     robot, task_space = bind(robot, task.task_space)
+    if task.start == "free":
+        raise InputError("a free start posture is not supported yet", where="start")
     start = robot.posture(task.start.joints, "start.joints")
     end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
-    path = build_path(task.path, task_space.value(robot.tool_placement(start)), task_space.rows)
+    path = path_of(robot, task_space, task)
     candidate = ik.find(robot, task_space, _redundant_joints(robot, task_space, task), families=families)
     redundant = tuple(robot.joint_names.index(name) for name in candidate.redundant_joints)
-    check_start(robot, start, end, path, task_space, task.path_start)
+    check_start(robot, start, end, path, task_space)
     branch = start_branch(robot, task_space, candidate, start, task.branch)
     if end is not None:
         check_end_branch(robot, task_space, candidate, end, branch)
     decomposition = Decomposition(robot, task_space, path, candidate.solver, redundant, branch, start)
     spline = task.spline
+    intervals = 20 if spline.intervals == "auto" else spline.intervals
     problem = Transcription(
         decomposition,
         degree=spline.degree,
-        intervals=spline.intervals,
+        intervals=intervals,
         derivatives_at_rest=2 if spline.rest == "full" else 1,
-        tau=np.linspace(0.0, 1.0, spline.points_per_interval * spline.intervals + 1),
+        tau=np.linspace(0.0, 1.0, spline.points_per_interval * intervals + 1),
         end=end,
     )
     return problem, str(candidate.family)
@@ -141,6 +145,9 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
 
 def _redundant_joints(robot: Robot, task_space: TaskSpace, task: Task) -> tuple[str, ...]:
     """Return the task's redundant joints, and the free roll where it is the one that is left out."""
+    if task.redundant_joints == "auto":
+        candidates = ik.find_all(robot, task_space)
+        return next((c.redundant_joints for c in candidates if c.solver is not None), ())
     names = task.redundant_joints
     missing = robot.n - task_space.m - len(names)
     return (*names, ROLL_JOINT) if robot.rolls_freely and missing == 1 and ROLL_JOINT not in names else names

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from brachis.refine import Refined
 from brachis.solvers import SolverReport
 from brachis.task import Task
 from brachis.trajectory import Trajectory
@@ -31,6 +32,8 @@ class Attempt:
     collocation_points : int
     outcome : str
         In plain words.
+    refined : Refined or None
+        The last problem, its answer and its multipliers; None where nothing was solved.
     """
 
     solver: str
@@ -41,6 +44,7 @@ class Attempt:
     stretched: float
     collocation_points: int
     outcome: str
+    refined: Refined | None = None
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from brachis.task.load import check_robot_settings, load_task
 from brachis.task.models import (
     Posture,
     RefinementSettings,
+    SearchSettings,
     SolverSettings,
     SplineSettings,
     Task,
@@ -72,6 +73,7 @@ __all__ = [
     "Rotate",
     "Rotation",
     "RotationVector",
+    "SearchSettings",
     "Segment",
     "SegmentModel",
     "Shape",

@@ -50,9 +50,26 @@ class Posture(Model):
     joints: JointValues = Field(description="Joint positions, rad (m): in the order of the chain, or by joint name.")
 
 
-End = Annotated[
+FreePosture = Annotated[
     Annotated[Literal["free"], Tag("<word>")] | Annotated[Posture, Tag("<mapping>")],
     by_form("free, or a mapping {joints: [...]}", "free"),
+]
+
+
+def _each_once(joints: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(joints)) < len(joints):
+        raise refuse("a joint occurs twice", found=list(joints), allowed="each joint once")
+    return joints
+
+
+RedundantJoints = Annotated[
+    Annotated[Literal["auto"], Tag("<word>")]
+    | Annotated[Annotated[tuple[Name, ...], AfterValidator(_each_once)], Tag("<list>")],
+    by_form("auto, or a list of joint names", "auto"),
+]
+Intervals = Annotated[
+    Annotated[Literal["auto"], Tag("<word>")] | Annotated[Annotated[Count, Field(ge=4)], Tag("<number>")],
+    by_form("auto, or a whole number", "auto"),
 ]
 
 
@@ -62,7 +79,20 @@ class SplineSettings(Model):
     degree: Count = Field(
         default=3, ge=2, le=7, description="Degree; 3 gives continuous torque, 4 continuous torque rate."
     )
-    intervals: Count = Field(default=20, ge=4, description="Number of knot intervals.")
+    intervals: Intervals = Field(
+        default=20,
+        description="Number of knot intervals; auto doubles them where it pays until another doubling gains less than "
+        "the tolerance.",
+    )
+    tolerance: Positive = Field(
+        default=1.0e-3, le=0.1, description="With intervals: auto, the gain, as a fraction of t_E, that ends it."
+    )
+    knots: Literal["uniform", "free"] = Field(
+        default="uniform", description="Equal intervals, or their lengths as variables of the optimisation."
+    )
+    shortest_interval: Positive = Field(
+        default=0.1, lt=1.0, description="With knots: free, the least length of an interval, in mean intervals."
+    )
     rest: Literal["full", "velocity"] = Field(
         default="full", description="What vanishes at both ends: velocity and acceleration (full), or velocity alone."
     )
@@ -74,6 +104,24 @@ class SplineSettings(Model):
             problem = "rest: full asks for a continuous acceleration that is zero at the ends: degree 2 cannot give it"
             raise refuse(problem, key=".degree", found=self.degree, allowed=">= 3, or rest: velocity")
         return self
+
+
+class SearchSettings(Model):
+    """The search over redundant joints, branches and initial guesses."""
+
+    effort: Literal["fast", "thorough", "exhaustive"] = Field(
+        default="fast", description="How many initial guesses are tried, and how many of the best plans are refined."
+    )
+    guesses: Literal["lattice", "numeric"] = Field(
+        default="lattice",
+        description="Where initial guesses come from: a lattice of closed-form postures, or numeric inverse kinematics "
+        "from the start posture.",
+    )
+    jobs: Count = Field(default=1, ge=1, description="Number of processes that plan at the same time.")
+    time_limit: Positive = Field(
+        default=60.0, description="Time after which the best motion verified so far is returned, s."
+    )
+    seed: Count = Field(default=0, ge=0, description="Seed of what is drawn at random.")
 
 
 class SolverSettings(Model):
@@ -103,25 +151,33 @@ class Task(Model):
 
     brachis: Literal[1] = Field(description="Version of the task format.")
     robot: RobotSettings = Field(default_factory=RobotSettings, description="The robot.")
-    start: Posture = Field(description="Configuration at the start of the path.")
+    start: FreePosture = Field(
+        description="Configuration at the start of the path: {joints: ...}, or free, which needs path_start."
+    )
     path_start: tuple[Number, ...] | None = Field(
         default=None,
         description="Where the path begins: all rows of the task space (m, yaw in rad); of a pose the position and a "
         "quaternion w, x, y, z. Null: where the start posture's tool is; otherwise a start posture whose tool is "
         "elsewhere is refused.",
     )
-    end: End = Field(default="free", description="Configuration at the end of the path: free, or {joints: ...}.")
+    end: FreePosture = Field(
+        default="free", description="Configuration at the end of the path: free, or {joints: ...}."
+    )
     task_space: TaskSpace = Field(
         description="What the path prescribes: rows out of x, y, z, yaw (yaw last, with two others); position (all "
         "of x, y, z); pose; or pose_free_roll, a pose that may roll about the tool frame's z axis."
     )
     path: Annotated[tuple[Segment, ...], Field(min_length=1)] = Field(description="Segments of the path, in order.")
-    redundant_joints: tuple[Name, ...] = Field(
-        default=(),
-        description="Joints that are free along the path. With pose_free_roll the virtual joint tool_roll, which rolls "
-        "the tool, is one of the robot's; it may be left out here.",
+    redundant_joints: RedundantJoints = Field(
+        default="auto",
+        description="Joints that are free along the path; auto tries every choice that has a closed form. With "
+        "pose_free_roll the virtual joint tool_roll, which rolls the tool, is one of the robot's; it may be left out.",
     )
-    branch: Name | None = Field(default=None, description="Label of the branch of the closed form. Null: the start's.")
+    branch: Name = Field(
+        default="auto",
+        description="Label of the branch of the closed form; auto: the start's, and all of them with start: free.",
+    )
+    search: SearchSettings = Field(default_factory=SearchSettings, description="Search.")
     spline: SplineSettings = Field(default_factory=SplineSettings, description="B-splines.")
     solver: SolverSettings = Field(default_factory=SolverSettings, description="Solver.")
     refinement: RefinementSettings = Field(default_factory=RefinementSettings, description="Refinement.")
@@ -145,13 +201,12 @@ class Task(Model):
             )
         return path
 
-    @field_validator("redundant_joints")
-    @classmethod
-    def _joints_once(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
-        if len(set(joints)) < len(joints):
-            problem = "a joint occurs twice"
-            raise refuse(problem, found=list(joints), allowed="each joint once")
-        return joints
+    @model_validator(mode="after")
+    def _free_start_needs_a_place(self) -> Task:
+        if self.start == "free" and self.path_start is None:
+            problem = "a free start posture leaves open where the path begins"
+            raise refuse(problem, key="path_start", found="nothing", allowed="the rows of the task space")
+        return self
 
     def to_dict(self) -> dict[str, Any]:
         """Return the task as plain mappings, lists, numbers and strings.

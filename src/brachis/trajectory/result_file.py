@@ -133,7 +133,8 @@ def _content(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Content:
         raise InputError(
             "other joints than the URDF's", where="joint_names", found=meta["joint_names"], allowed=robot.joint_names
         )
-    robot.posture(task.start.joints, "task.start.joints")
+    if task.start != "free":
+        robot.posture(task.start.joints, "task.start.joints")
     if task.end != "free":
         robot.posture(task.end.joints, "task.end.joints")
     redundant = [name for name in robot.joint_names if name in meta["redundant_joints"]]

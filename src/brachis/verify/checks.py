@@ -28,9 +28,9 @@ def end_checks(trajectory: Trajectory, robot: Robot, options: VerifyOptions) -> 
     """Check that the motion begins and ends as the task says."""
     task = trajectory.task
     checks = []
-    wanted = {"start": (0.0, task.start), "end": (trajectory.t_end, None if task.end == "free" else task.end)}
+    wanted = {"start": (0.0, task.start), "end": (trajectory.t_end, task.end)}
     for name, (time, posture) in wanted.items():
-        if posture is not None:
+        if posture != "free":
             miss = np.abs(trajectory.position(time) - robot.posture(posture.joints, f"{name}.joints"))
             checks.append(_worst_joint(f"{name} posture", miss, options.posture_tolerance, "rad, m", robot, time))
         speed, allowed = np.abs(trajectory.velocity(time)), options.rest_velocity_tolerance

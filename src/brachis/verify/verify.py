@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.errors import InputError
-from brachis.path import Path, build_path
+from brachis.path import Path, path_of
 from brachis.robot import Robot, TaskSpace, bind
 from brachis.trajectory import Trajectory
 from brachis.verify.checks import continuity_checks, end_checks, progress_checks, spline_checks
@@ -43,7 +43,7 @@ def verify_trajectory(
     ------
     InputError
         `robot` has other joints than the trajectory; or the trajectory's task does not fit the robot: its postures
-        (`InputError`), task space (`InputError`) or path (`PathError`).
+        (`InputError`, `StartError`), task space (`InputError`) or path (`PathError`).
     """
     options = options or VerifyOptions()
     robot, task_space = bind(trajectory.robot if robot is None else robot, trajectory.task.task_space)
@@ -57,8 +57,7 @@ def verify_trajectory(
     breaks = np.unique(trajectory.knots) * trajectory.t_end
     steps = (np.arange(options.points_per_interval) + 0.5) / options.points_per_interval  # between the nodes
     grid = (breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel()
-    start = robot.posture(trajectory.task.start.joints, "start.joints")
-    path = build_path(trajectory.task.path, task_space.value(robot.tool_placement(start)), task_space.rows)
+    path = path_of(robot, task_space, trajectory.task)
     t = np.unique(np.concatenate([grid, trajectory.times, _times_within_pieces(trajectory, path.breaks, options)]))
     q, qdot, qddot = trajectory.position(t), trajectory.velocity(t), trajectory.acceleration(t)
     # Splines of degree 2 jump in acceleration at knots: there both sides are looked at.
