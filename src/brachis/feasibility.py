@@ -16,9 +16,9 @@ _SEARCHED = 400
 _STATIONS = 101
 
 
-def check_start(
+def check_postures(
     robot: Robot,
-    start: np.ndarray,
+    start: np.ndarray | None,
     end: np.ndarray | None,
     path: Path,
     task_space: TaskSpace,
@@ -28,18 +28,18 @@ def check_start(
     Parameters
     ----------
     robot : Robot
-    start : (n,) ndarray
-    end : (n,) ndarray or None
+    start, end : (n,) ndarray or None
+        None where free.
     path : Path
-        From where the start posture's tool is.
     task_space : TaskSpace
 
     Raises
     ------
     StartError
     """
-    _check_range(robot, start, "start")
-    _check_holding(robot, start, "start")
+    if start is not None:
+        _check_range(robot, start, "start")
+        _check_holding(robot, start, "start")
     if end is not None:
         _check_range(robot, end, "end")
         _check_holding(robot, end, "end")

@@ -6,25 +6,16 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 
-import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from brachis import ik
-from brachis.attempts import Listener, search
-from brachis.errors import InputError
-from brachis.feasibility import check_end_branch, check_start, start_branch
-from brachis.kinematics import Decomposition, interpolate
 from brachis.nlp import Transcription
-from brachis.path import path_of
-from brachis.refine import Refined
 from brachis.result import Result
-from brachis.robot import ROLL_JOINT, Robot, TaskSpace, bind
+from brachis.robot import Robot
 from brachis.robot.from_task import robot_from_settings
+from brachis.search import Listener, find_fastest, first_start
+from brachis.setting import Setting, choices, intervals_of, transcription
 from brachis.task import Task, load_task
-from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
-from brachis.verify import Verification, VerifyOptions, verify_trajectory
-
-_SAME_TIME = 1e-7
 
 
 def plan(
@@ -75,25 +66,24 @@ def _plan(
     robot: str | os.PathLike[str] | Robot | None, task: Task, families: Sequence[ik.Family], listener: Listener
 ) -> Result:
     """Run the pipeline stage by stage."""
-    clock = _Clock()
+    began = time.perf_counter()
     robot = robot if isinstance(robot, Robot) else robot_from_settings(task.robot, urdf=robot)
     task = task.model_copy(update={"robot": robot.settings})
-    clock.stage("load")
-    problem, family = transcribe(robot, task, families=families)
-    clock.stage("transcribe")
-    options = VerifyOptions(ratio_tolerance=task.refinement.tolerance)
-
-    def judge(refined: Refined) -> tuple[Trajectory, Verification]:
-        """Make the trajectory of an answer and verify it."""
-        clock.stage("solve")
-        trajectory = _trajectory(problem.decomposition, refined, task)
-        clock.stage("trajectory")
-        verification = verify_trajectory(trajectory, options)
-        clock.stage("verify")
-        return trajectory, verification
-
-    attempts, chosen, (trajectory, verification) = search(problem, task, judge, listener)
-    return Result(task, trajectory, verification, family, attempts, chosen, clock.total())
+    loaded = time.perf_counter()
+    setting = Setting.of(robot, task)
+    found = find_fastest(choices(setting, families), listener)
+    trajectory, verification = found.motion
+    return Result(
+        task=task,
+        trajectory=trajectory,
+        verification=verification,
+        family=found.family,
+        attempts=found.attempts,
+        chosen=found.chosen,
+        timing={"load": loaded - began, "total": time.perf_counter() - began},
+        candidates=found.candidates,
+        interrupted=found.interrupted,
+    )
 
 
 def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) -> tuple[Transcription, str]:
@@ -117,80 +107,8 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
     InputError
         See `plan`.
     """
-    robot, task_space = bind(robot, task.task_space)
-    if task.start == "free":
-        raise InputError("a free start posture is not supported yet", where="start")
-    start = robot.posture(task.start.joints, "start.joints")
-    end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
-    path = path_of(robot, task_space, task)
-    candidate = ik.find(robot, task_space, _redundant_joints(robot, task_space, task), families=families)
-    redundant = tuple(robot.joint_names.index(name) for name in candidate.redundant_joints)
-    check_start(robot, start, end, path, task_space)
-    branch = start_branch(robot, task_space, candidate, start, task.branch)
-    if end is not None:
-        check_end_branch(robot, task_space, candidate, end, branch)
-    decomposition = Decomposition(robot, task_space, path, candidate.solver, redundant, branch, start)
-    spline = task.spline
-    intervals = 20 if spline.intervals == "auto" else spline.intervals
-    problem = Transcription(
-        decomposition,
-        degree=spline.degree,
-        intervals=intervals,
-        derivatives_at_rest=2 if spline.rest == "full" else 1,
-        tau=np.linspace(0.0, 1.0, spline.points_per_interval * intervals + 1),
-        end=end,
-    )
-    return problem, str(candidate.family)
-
-
-def _redundant_joints(robot: Robot, task_space: TaskSpace, task: Task) -> tuple[str, ...]:
-    """Return the task's redundant joints, and the free roll where it is the one that is left out."""
-    if task.redundant_joints == "auto":
-        candidates = ik.find_all(robot, task_space)
-        return next((c.redundant_joints for c in candidates if c.solver is not None), ())
-    names = task.redundant_joints
-    missing = robot.n - task_space.m - len(names)
-    return (*names, ROLL_JOINT) if robot.rolls_freely and missing == 1 and ROLL_JOINT not in names else names
-
-
-def _trajectory(decomposition: Decomposition, refined: Refined, task: Task) -> Trajectory:
-    """Turn the answer into a trajectory that can be evaluated without the closed form."""
-    motion = refined.problem.motion(refined.x)
-    joins = motion.times_of(decomposition.path.breaks[1:-1])
-    gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
-    breaks = np.union1d(motion.breaks, joins[gaps > _SAME_TIME * motion.t_end])
-    nodes = interpolate(decomposition, motion.at, breaks, jumps=motion.degree < CONTINUOUS_TORQUE)
-    robot = decomposition.robot
-    return Trajectory(
-        task=task,
-        urdf=robot.urdf,
-        robot=robot,
-        redundant_joints=tuple(robot.joint_names[i] for i in decomposition.redundant),
-        branch=decomposition.solver.branches[decomposition.branch],
-        times=nodes.times,
-        q=nodes.q,
-        qdot=nodes.qdot,
-        qddot=nodes.qddot,
-        qddot_before=nodes.qddot_before,
-        knots=motion.knots,
-        degree=motion.degree,
-        control_points=motion.control_points,
-    )
-
-
-class _Clock:
-    """Wall time of stages."""
-
-    def __init__(self) -> None:
-        self._began = self._last = time.perf_counter()
-        self._stages: dict[str, float] = {}
-
-    def stage(self, name: str) -> None:
-        """End the current stage."""
-        now = time.perf_counter()
-        self._stages[name] = self._stages.get(name, 0.0) + now - self._last
-        self._last = now
-
-    def total(self) -> dict[str, float]:
-        """Return the stages and their total, s."""
-        return {**self._stages, "total": time.perf_counter() - self._began}
+    setting = Setting.of(robot, task)
+    choice = choices(setting, families)[0]
+    decomposition = choice.decomposition(*first_start(choice))
+    problem = transcription(setting, decomposition, intervals_of(task))
+    return problem, choice.match.family

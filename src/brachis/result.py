@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from brachis.refine import Refined
@@ -48,6 +48,45 @@ class Attempt:
 
 
 @dataclass(frozen=True)
+class Candidate:
+    """One way to plan the motion that the search looked at.
+
+    Attributes
+    ----------
+    redundant_joints : tuple of str
+    branch : str
+        Label of the branch; empty where no course was found.
+    origin : str
+        Where the initial guess came from, for example ``lattice 2``.
+    solver : str
+        Empty where nothing was solved.
+    estimate : float
+        Least time along the initial course from the phase plane, s; a rough one.
+    coarse : float
+        End time at the first collocation points, s; infinite where there is none.
+    t_end : float
+        End time when refined, s; infinite where it was not.
+    status : str
+        In plain words.
+    verified : bool
+    """
+
+    redundant_joints: tuple[str, ...]
+    branch: str
+    origin: str
+    solver: str
+    estimate: float
+    coarse: float
+    t_end: float
+    status: str
+    verified: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return {**asdict(self), "redundant_joints": list(self.redundant_joints)}
+
+
+@dataclass(frozen=True)
 class Result:
     """What a plan gives: trajectory, verification, and how they came about.
 
@@ -65,6 +104,10 @@ class Result:
         Index of the attempt that gave the trajectory.
     timing : dict of str to float
         Wall time of every stage, s.
+    candidates : tuple of Candidate
+        All that the search looked at, the fastest verified one first.
+    interrupted : bool
+        True where Ctrl-C or ``search.time_limit`` ended the search: a faster motion may have been missed.
     """
 
     task: Task
@@ -74,6 +117,8 @@ class Result:
     attempts: tuple[Attempt, ...]
     chosen: int
     timing: dict[str, float] = field(default_factory=dict)
+    candidates: tuple[Candidate, ...] = ()
+    interrupted: bool = False
 
     @property
     def t_end(self) -> float:
@@ -111,6 +156,8 @@ class Result:
             "collocation_points": last.collocation_points,
             "stretched": last.stretched,
             "attempts": [attempt.outcome for attempt in self.attempts],
+            "candidates": [candidate.to_dict() for candidate in self.candidates],
+            "interrupted": self.interrupted,
             "wall_time_s": self.timing["total"],
             "timing_s": self.timing,
             "verified": self.verified,

@@ -75,14 +75,24 @@ def guesses(problem: Transcription) -> Iterator[np.ndarray]:
     ------
     (v,) ndarray
     """
-    for course in _courses(problem.decomposition):
-        x = _starting_point(problem, course)
+    for course in numeric_courses(problem.decomposition):
+        x = starting_point(problem, course)
         if x is not None:
             yield x
 
 
-def _courses(decomposition: Decomposition) -> Iterator[np.ndarray]:
-    """Yield courses one after the other; where the first one comes near a branch boundary, the roomiest ones first."""
+def numeric_courses(decomposition: Decomposition) -> Iterator[np.ndarray]:
+    """Yield courses one after the other; where the first one comes near a branch boundary, the roomiest ones first.
+
+    Parameters
+    ----------
+    decomposition : Decomposition
+
+    Yields
+    ------
+    (steps, 1 + r) ndarray
+        See `numeric_course`.
+    """
     strategies = STRATEGIES if decomposition.r else STRATEGIES[:1]
     courses = (numeric_course(decomposition, strategy) for strategy in strategies)
     found = (course for course in courses if course is not None)
@@ -205,8 +215,20 @@ def _wish(decomposition: Decomposition, strategy: Strategy, q: np.ndarray, previ
     return wish
 
 
-def _starting_point(problem: Transcription, course: np.ndarray) -> np.ndarray | None:
-    """Fit splines to a course, and stretch the time until the limits hold; None where the fit is unreachable."""
+def starting_point(problem: Transcription, course: np.ndarray) -> np.ndarray | None:
+    """Fit splines to a course, and stretch the time until the limits hold.
+
+    Parameters
+    ----------
+    problem : Transcription
+    course : (S, 1 + r) ndarray
+        Successive values of s and the redundant joints.
+
+    Returns
+    -------
+    (v,) ndarray or None
+        None where the fit is out of reach at a collocation point.
+    """
     tau = problem.splines[0].greville
     u = tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)
     grid = np.linspace(0.0, 1.0, len(course))

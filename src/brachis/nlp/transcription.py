@@ -95,6 +95,8 @@ class Transcription:
         Collocation points in normalised time, ascending, from 0 to 1.
     end : (n,) ndarray or None
         End posture, None where free.
+    start_free : bool
+        The motion begins anywhere near the decomposition's start posture, with its tool at the path's beginning.
 
     Attributes
     ----------
@@ -116,11 +118,12 @@ class Transcription:
         derivatives_at_rest: int,
         tau: np.ndarray,
         end: np.ndarray | None = None,
+        start_free: bool = False,
     ) -> None:
         self.decomposition = decomposition
         self.knots = clamped_uniform_knots(degree, intervals)
         self.degree = degree
-        self.splines = self._make_splines(derivatives_at_rest, end)
+        self.splines = self._make_splines(derivatives_at_rest, end, start_free=start_free)
         self.constraints = self._build_constraints(MARGIN)
         self._lay_out_variables()
         self._collocate(tau)
@@ -140,9 +143,9 @@ class Transcription:
         other._collocate(tau)  # noqa: SLF001  (its own class)
         return other
 
-    def _make_splines(self, derivatives: int, end: np.ndarray | None) -> tuple[TiedSpline, ...]:
+    def _make_splines(self, derivatives: int, end: np.ndarray | None, *, start_free: bool) -> tuple[TiedSpline, ...]:
         """s, then the redundant joints."""
-        start = self.decomposition.start
+        start = np.full(self.decomposition.robot.n, None) if start_free else self.decomposition.start
         pairs: list[tuple[float | None, float | None]] = [(0.0, 1.0)]
         pairs += [(start[joint], None if end is None else end[joint]) for joint in self.decomposition.redundant]
         return tuple(

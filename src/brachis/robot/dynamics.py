@@ -39,11 +39,29 @@ def torque(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> 
     (K, n) ndarray
         ``rnea + armature * qddot + viscous * qdot + coulomb * tanh(qdot / v_eps)``, Nm or N.
     """
+    return rigid_torque(robot, q, qdot, qddot) + robot.friction.torque(qdot, qddot)
+
+
+def rigid_torque(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+    """Joint torques of K states without friction and armature; parameters as for `torque`."""
     model, data, rnea = robot.model, robot.model.createData(), pin.rnea
     rigid = np.empty_like(q)
     for k in range(len(q)):
         rigid[k] = rnea(model, data, q[k], qdot[k], qddot[k])
-    return rigid + robot.friction.torque(qdot, qddot)
+    return rigid
+
+
+def mass_matrices(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Mass matrices with armature, (K, n, n), of K postures (K, n)."""
+    model, data, crba = robot.model, robot.model.createData(), pin.crba
+    matrices = np.empty((len(q), robot.n, robot.n))
+    for k in range(len(q)):
+        matrices[k] = crba(model, data, q[k])
+    upper = np.triu(matrices)
+    matrices = upper + np.swapaxes(np.triu(matrices, 1), 1, 2)
+    diagonal = np.arange(robot.n)
+    matrices[:, diagonal, diagonal] += robot.friction.armature
+    return matrices
 
 
 def torque_derivatives(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TorqueDerivatives:

@@ -1,0 +1,48 @@
+"""How far the search goes, by the word for it in the task."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How far the search goes.
+
+    Attributes
+    ----------
+    choices : int
+        Choices of redundant joints that are looked at; those with the most room at the start come first.
+    polynomial : bool
+        Whether choices whose inverse kinematics is a polynomial's roots are looked at beside closed forms.
+    seeds : int
+        Courses taken from the lattice of a choice, for each branch on which the motion may begin.
+    numeric : int
+        Courses by numeric inverse kinematics beside them, where the start posture is given.
+    plans : int
+        Coarse plans; those with the least estimated time come first.
+    refined : int
+        Plans that are refined and verified at most, as long as they may beat the best one.
+    cells_per_turn, nodes : int
+        Of the lattice.
+    """
+
+    choices: int
+    polynomial: bool
+    seeds: int
+    numeric: int
+    plans: int
+    refined: int
+    cells_per_turn: int
+    nodes: int
+
+
+EFFORTS = {
+    "single": Effort(1, polynomial=False, seeds=1, numeric=0, plans=1, refined=1, cells_per_turn=72, nodes=120),
+    "fast": Effort(6, polynomial=False, seeds=4, numeric=0, plans=24, refined=4, cells_per_turn=72, nodes=120),
+    "thorough": Effort(20, polynomial=True, seeds=8, numeric=8, plans=100, refined=12, cells_per_turn=96, nodes=300),
+    "exhaustive": Effort(
+        10_000, polynomial=True, seeds=30, numeric=8, plans=10_000, refined=40, cells_per_turn=144, nodes=600
+    ),
+}
+"""By the task's ``search.effort``."""

@@ -1,0 +1,76 @@
+"""Why no motion was found."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from brachis.errors import BrachisError, PathError, PlanningError
+from brachis.feasibility import explain_failure
+from brachis.kinematics import Decomposition
+from brachis.result import Candidate
+from brachis.search.lattice import DeadEnd
+from brachis.setting import Choice
+
+_GOOD_PART = 0.1
+
+
+def refuse_what_is_out_of_reach(choices: Sequence[Choice], dead_ends: Mapping[str, DeadEnd]) -> None:
+    """Raise the reason where the lattice of no choice has a course, or a good part of the path cannot be reached.
+
+    Further attempts would be in vain.
+
+    Raises
+    ------
+    PathError
+    """
+    reasons = [explain_failure(_decomposition(choice)) for choice in choices]
+    clear = [
+        (reason.s_interval, reason)
+        for reason in reasons
+        if isinstance(reason, PathError) and reason.s_interval is not None
+    ]
+    if len(clear) < len(reasons):
+        return
+    none_has_a_course = len(dead_ends) == len(choices)
+    if none_has_a_course or all(end - begin > _GOOD_PART for (begin, end), _ in clear):
+        raise max(clear, key=lambda item: item[0][0])[1]
+
+
+def no_motion(
+    choices: Sequence[Choice], candidates: Sequence[Candidate], dead_ends: Mapping[str, DeadEnd]
+) -> BrachisError:
+    """Return the error that says why no motion was found.
+
+    Parameters
+    ----------
+    choices : sequence of Choice
+    candidates : sequence of Candidate
+    dead_ends : mapping of str to DeadEnd
+        Where the lattices end, by the names of the redundant joints.
+
+    Returns
+    -------
+    PathError or PlanningError
+    """
+    reason = explain_failure(_decomposition(choices[0]))
+    if isinstance(reason, BrachisError):
+        return reason
+    if len(dead_ends) == len(choices):
+        name, furthest = max(dead_ends.items(), key=lambda item: item[1].s)
+        redundant = f" (redundant joints: {name})" if name != "none" else ""
+        return PathError(
+            f"no course along the path was found{redundant}: {furthest}",
+            s_interval=(furthest.s, 1.0),
+            hint="Start in another posture, shorten or move the path, or widen the joint ranges",
+        )
+    counts = Counter(candidate.status for candidate in candidates)
+    outcomes = "; ".join(status if n == 1 else f"{status} ({n} times)" for status, n in counts.items())
+    return PlanningError(f"no motion within the limits was found: {outcomes or 'no initial guess'}", hint=reason)
+
+
+def _decomposition(choice: Choice) -> Decomposition:
+    start = choice.setting.start
+    return choice.decomposition(np.zeros(choice.setting.robot.n) if start is None else start, choice.branches[0])

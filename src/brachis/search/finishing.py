@@ -1,0 +1,87 @@
+"""Refining a plan until it passes the verification."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from brachis.errors import UnreachableError
+from brachis.nlp import Transcription
+from brachis.refine import Refined, RefinementOptions, Solve, refine
+from brachis.result import Attempt
+from brachis.solvers import SolverReport
+from brachis.trajectory import Trajectory
+from brachis.verify import Verification
+
+Motion = tuple[Trajectory, Verification]
+Judge = Callable[[Refined], Motion]
+_SECOND_LOOKS = 4
+_BESIDE = 1e-4
+
+
+def refined_until_verified(
+    problem: Transcription, report: SolverReport, solve: Solve, options: RefinementOptions, judge: Judge
+) -> tuple[Refined, Motion | None]:
+    """Refine a solved problem, and again where the verification finds a limit exceeded between the points."""
+    refined = refine(problem, report, solve, options)
+    motion = _judged(judge, refined)
+    for _ in range(_SECOND_LOOKS if options.max_rounds else 0):
+        finer = None if motion is None else _where_it_failed(refined, motion)
+        if finer is None:
+            break
+        report = solve(finer, refined.x)
+        if not report.status.usable:
+            break
+        refined = refine(finer, report, solve, options)
+        motion = _judged(judge, refined)
+    return refined, motion
+
+
+def _judged(judge: Judge, refined: Refined) -> Motion | None:
+    """Return the motion and its verification; None without an answer, or where it leaves the branch in between."""
+    if not (refined.converged and np.isfinite(refined.excess)):
+        return None
+    try:
+        return judge(refined)
+    except UnreachableError:
+        return None
+
+
+def _where_it_failed(refined: Refined, motion: Motion) -> Transcription | None:
+    """Add collocation points where the verification found a limit exceeded; None where it found no such place."""
+    trajectory, verification = motion
+    failed = [check for check in verification.checks if not check.passed]
+    if not failed or any(not check.name.endswith("ratio") or check.time is None for check in failed):
+        return None
+    tau = np.array([check.time for check in failed]) / trajectory.t_end
+    near = tau[:, None] + _BESIDE * np.array([-1.0, 0.0, 1.0])
+    return refined.problem.resampled(np.union1d(refined.problem.tau, np.clip(near.ravel(), 0.0, 1.0)))
+
+
+def _excess(motion: Motion) -> float:
+    """Return how far a motion exceeds its limits, as a fraction of them; less than any excess where it passed."""
+    return -np.inf if motion[1].passed else motion[1].worst_ratio - 1.0
+
+
+def attempt_of(
+    refined: Refined, before: Sequence[SolverReport], number: int, tolerance: float, motion: Motion | None
+) -> Attempt:
+    """Put the outcome of an attempt into words."""
+    last = refined.reports[-1]
+    rounds = len(refined.reports) - 1
+    if not refined.converged:
+        outcome = f"{last.solver}: {last.status.value}"
+    elif not np.isfinite(refined.excess):
+        outcome = f"{last.solver}: the motion leaves the branch between collocation points"
+    else:
+        if refined.excess > tolerance:
+            found = f"limits exceeded by {100.0 * refined.excess:.2g} %"
+        elif motion is None:
+            found = "too sharp for a trajectory"
+        else:
+            found = "verified" if motion[1].passed else "the verification fails"
+        outcome = f"{last.solver}: t_E = {refined.x[0]:.4f} s after {rounds} refinement rounds, {found}"
+    reports = (*before, *refined.reports)
+    points = len(refined.problem.tau)
+    return Attempt(last.solver, number, reports, rounds, refined.excess, refined.stretched, points, outcome, refined)

@@ -1,0 +1,147 @@
+"""Seeds: courses from which plans are begun, each with an estimate of its least time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.errors import PathError
+from brachis.kinematics import Decomposition
+from brachis.nlp.guess import numeric_courses
+from brachis.search.efforts import EFFORTS, Effort
+from brachis.search.lattice import Course, DeadEnd, Lattice
+from brachis.search.phase_plane import least_time
+from brachis.setting import Choice
+
+_PIECES = (3, 8)
+_START_WEIGHT = 1e3
+_FINER = 3
+
+
+@dataclass(frozen=True)
+class Seed:
+    """A course from which a plan is begun.
+
+    Attributes
+    ----------
+    choice : Choice
+    branch : int
+        Index into the closed form's branches.
+    start : (n,) ndarray
+        Start posture; a first guess of it where the task leaves it free.
+    course : (S, 1 + r) ndarray
+        Successive values of s and the redundant joints.
+    estimate : float
+        Least time along the course from the phase plane, s; infinite where there is none.
+    origin : str
+        In plain words.
+    """
+
+    choice: Choice
+    branch: int
+    start: np.ndarray
+    course: np.ndarray
+    estimate: float
+    origin: str
+
+    @property
+    def decomposition(self) -> Decomposition:
+        """Robot, path, closed form and branch, put together."""
+        return self.choice.decomposition(self.start, self.branch)
+
+
+def lattice_seeds(choice: Choice, effort: Effort, seed: int) -> list[Seed] | DeadEnd:
+    """Take the shortest distinct courses from the lattice of a choice; from a finer one where the first one ends.
+
+    Parameters
+    ----------
+    choice : Choice
+    effort : Effort
+    seed : int
+        Of what is drawn at random with several redundant joints.
+
+    Returns
+    -------
+    list of Seed or DeadEnd
+    """
+    cells, nodes, most = effort.cells_per_turn, effort.nodes, effort.seeds * len(choice.branches)
+    found = Lattice(choice, cells_per_turn=cells, nodes=nodes, seed=seed).courses(most)
+    if isinstance(found, DeadEnd):
+        found = Lattice(choice, cells_per_turn=_FINER * cells, nodes=_FINER * nodes, seed=seed).courses(most)
+    if isinstance(found, DeadEnd):
+        return found
+    return [_seed(course, f"lattice {number}") for number, course in enumerate(found, 1)]
+
+
+def _seed(course: Course, origin: str) -> Seed:
+    """Smooth a course, as far as the closed form can follow, and estimate its time."""
+    choice, s = course.choice, course.s
+    decomposition = choice.decomposition(course.q[0], course.branch)
+    fine = np.linspace(0.0, 1.0, 2 * len(s) - 1)
+    for pieces in _PIECES:
+        stations = np.column_stack([fine, _smoothed(s, course.stations[:, 1:], fine, pieces)])
+        q = decomposition.postures(stations)
+        if np.isfinite(q).all() and _clear(decomposition, q):
+            return Seed(choice, course.branch, course.q[0], stations, least_time(choice.setting.robot, fine, q), origin)
+    estimate = least_time(choice.setting.robot, s, course.q)
+    return Seed(choice, course.branch, course.q[0], course.stations, estimate, origin)
+
+
+def _smoothed(s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int) -> np.ndarray:
+    """Least-squares cubic splines through values (S, r), exact at the start, at the places `fine`."""
+    from scipy.interpolate import make_lsq_spline  # noqa: PLC0415  (imports in 0.3 s)
+
+    if not values.shape[1]:
+        return np.zeros((len(fine), 0))
+    knots = np.concatenate([np.zeros(3), np.linspace(0.0, 1.0, pieces + 1), np.ones(3)])
+    weights = np.ones(len(s))
+    weights[[0, -1]] = _START_WEIGHT
+    return np.asarray(make_lsq_spline(s, values, knots, k=3, w=weights)(fine))
+
+
+def _clear(decomposition: Decomposition, q: np.ndarray) -> bool:
+    """Tell whether a course keeps clear of the branch boundary, (K, n)."""
+    margins = decomposition.solver.branch_margins(q, decomposition.branch)
+    return bool(margins.min(initial=np.inf) > 0.5 * min(0.02, float(margins[0].min(initial=np.inf))))
+
+
+def numeric_seeds(choice: Choice, most: int) -> list[Seed]:
+    """Carry the given start posture along the path by numeric inverse kinematics, in up to `most` ways.
+
+    Parameters
+    ----------
+    choice : Choice
+        With a given start posture.
+    most : int
+
+    Returns
+    -------
+    list of Seed
+    """
+    start = choice.setting.start
+    if start is None:
+        return []
+    decomposition = choice.decomposition(start, choice.branches[0])
+    seeds: list[Seed] = []
+    for course in numeric_courses(decomposition):
+        if len(seeds) == most:
+            break
+        seeds.append(Seed(choice, choice.branches[0], start, course, np.inf, f"numeric {len(seeds) + 1}"))
+    return seeds
+
+
+def first_start(choice: Choice) -> tuple[np.ndarray, int]:
+    """Return the given start posture, (n,), or that of the lattice's shortest course where it is free, and its branch.
+
+    Raises
+    ------
+    PathError
+        The start posture is free, and the lattice has no course.
+    """
+    if choice.setting.start is not None:
+        return choice.setting.start, choice.branches[0]
+    found = lattice_seeds(choice, EFFORTS["fast"], choice.setting.task.search.seed)
+    if isinstance(found, DeadEnd):
+        raise PathError(f"no course along the path was found: {found}", s_interval=(found.s, 1.0))
+    return found[0].start, found[0].branch

@@ -1,0 +1,112 @@
+"""Solving one NLP from one starting point, with ever smaller branch margins."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from brachis.nlp import Transcription
+from brachis.nlp.constraints.branch_margin import MARGIN
+from brachis.refine import Solve
+from brachis.solvers import Solver, SolverOptions, SolverReport, SolveStatus
+from brachis.task import SolverSettings
+
+Listener = Callable[[str], None]
+"""Told in plain words what the planner is doing, between iterations; may raise KeyboardInterrupt."""
+
+MARGINS = (0.1, 0.02, MARGIN)
+"""Branch margins that are tried in turn; see `continued`."""
+_HELD_BACK = 1e-4
+"""A margin that is nearer to its bound than this holds the motion back."""
+_ON_ITS_WAY = 1e-3
+_PATIENCE = 100
+"""Iterations for each redundant joint that ``auto`` grants a solver on one guess, unless the task says otherwise."""
+_WORTH_IT = 2e-4
+"""A smaller branch margin that shortens the motion by less than this fraction is not worth its sharper turns."""
+_LEAST_TIME = 0.1
+"""Seconds left to a solve that is begun."""
+
+
+def continued(
+    problem: Transcription, x: np.ndarray, solve: Solve, margins: Sequence[float]
+) -> tuple[Transcription, tuple[SolverReport, ...]]:
+    """Solve with ever smaller branch margins, each from the last answer.
+
+    Near a branch boundary the problem is badly conditioned, and a solver that meets the boundary early creeps along it.
+    Far from it the solve is easy, and its answer is a good start for a smaller margin. A margin that does not hold the
+    motion back, or that hardly shortens it, ends the continuation.
+
+    Parameters
+    ----------
+    problem : Transcription
+    x : (v,) ndarray
+        Starting point.
+    solve : callable
+    margins : sequence of float
+        Least branch margins, descending.
+
+    Returns
+    -------
+    problem : Transcription
+        With the last margin for which the solve ended well; with the last one tried if none did.
+    reports : tuple of SolverReport
+        Of all solves; the last one belongs to `problem`.
+    """
+    solved: list[tuple[Transcription, SolverReport]] = []
+    failed: list[tuple[Transcription, SolverReport]] = []
+    bounds: set[tuple[float, ...]] = set()
+    for margin in margins:
+        tried = problem.with_margin(margin)
+        if tried.guards in bounds:  # the closed form has no margins, or the start posture caps them
+            continue
+        bounds.add(tried.guards)
+        outcome = tried, solve(tried, x)
+        if outcome[1].status.usable:
+            if solved and outcome[1].objective > (1.0 - _WORTH_IT) * solved[-1][1].objective:
+                failed.append(outcome)
+                break
+            solved.append(outcome)
+            x = outcome[1].x
+            if tried.guard_slack(x) > _HELD_BACK:
+                break
+        else:
+            failed.append(outcome)
+            if solved or outcome[1].status is SolveStatus.TIME_LIMIT:
+                break
+            if outcome[1].violation <= _ON_ITS_WAY:  # it ran out of iterations on its way
+                x = outcome[1].x
+    order = [*failed, *solved]
+    return order[-1][0], tuple(report for _, report in order)
+
+
+def solve_with(solver: Solver, settings: SolverSettings, redundancy: int, deadline: float, listener: Listener) -> Solve:
+    """Make a function that runs one backend under the task's bounds.
+
+    Parameters
+    ----------
+    solver : Solver
+    settings : SolverSettings
+    redundancy : int
+        Degree of redundancy r.
+    deadline : float
+        When to end, by the monotonic clock, s.
+    listener : callable
+
+    Returns
+    -------
+    callable
+    """
+    patience = settings.max_iterations
+    if settings.name == "auto" and patience == SolverSettings.model_fields["max_iterations"].default:
+        patience = _PATIENCE * max(redundancy, 1)
+
+    def progress(iteration: int, objective: float) -> None:
+        listener(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s")
+
+    def solve(problem: Transcription, x: np.ndarray) -> SolverReport:
+        remaining = max(min(deadline - time.monotonic(), settings.time_limit), _LEAST_TIME)
+        return solver.solve(problem, x, SolverOptions(settings.tolerance, patience, remaining), progress)
+
+    return solve

@@ -1,0 +1,167 @@
+"""The work of the search, fit to be sent to other processes: a coarse plan, and its finish.
+
+A coarse plan solves the NLP at the first collocation points. Finishing refines it and verifies the motion.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from brachis.nlp import Transcription
+from brachis.nlp.guess import starting_point
+from brachis.refine import RefinementOptions, Solve
+from brachis.result import Attempt
+from brachis.search.finishing import Motion, attempt_of, refined_until_verified
+from brachis.search.motion import judge
+from brachis.search.seeds import Seed
+from brachis.search.solving import MARGINS, Listener, continued, solve_with
+from brachis.setting import intervals_of, transcription
+from brachis.solvers import SolverReport, solver_named
+
+_Given = TypeVar("_Given")
+_Made = TypeVar("_Made")
+
+
+@dataclass(frozen=True)
+class Way:
+    """A seed and the solver that plans from it.
+
+    Attributes
+    ----------
+    seed : Seed
+    solver : str
+    """
+
+    seed: Seed
+    solver: str
+
+
+@dataclass(frozen=True)
+class Coarse:
+    """A plan at the first collocation points.
+
+    Attributes
+    ----------
+    way : Way
+    problem : Transcription or None
+        None where nothing was solved.
+    reports : tuple of SolverReport
+        Of all solves; the last one belongs to `problem`.
+    status : str
+        In plain words.
+    """
+
+    way: Way
+    problem: Transcription | None
+    reports: tuple[SolverReport, ...]
+    status: str
+
+    @property
+    def usable(self) -> bool:
+        """True where there is a plan."""
+        return bool(self.reports) and self.reports[-1].status.usable
+
+    @property
+    def t_end(self) -> float:
+        """End time, s; infinite where there is no plan."""
+        return self.reports[-1].objective if self.usable else np.inf
+
+    @property
+    def family(self) -> str:
+        """Family of the closed form."""
+        return self.way.seed.choice.match.family
+
+
+def plan_coarse(way: Way, deadline: float, listener: Listener) -> Coarse:
+    """Solve the NLP from a seed.
+
+    Parameters
+    ----------
+    way : Way
+    deadline : float
+        When to end, by the monotonic clock, s.
+    listener : callable
+
+    Returns
+    -------
+    Coarse
+    """
+    if time.monotonic() > deadline:
+        return Coarse(way, None, (), "not tried: the time was up")
+    seed, setting = way.seed, way.seed.choice.setting
+    problem = transcription(setting, seed.decomposition, intervals_of(setting.task))
+    x = starting_point(problem, seed.course)
+    if x is None:
+        return Coarse(way, None, (), "the splines through the course leave the branch")
+    try:
+        problem, reports = continued(problem, x, _solve(way, deadline, listener), MARGINS)
+    except ImportError as error:
+        return Coarse(way, None, (), f"{way.solver}: not installed ({error})")
+    return Coarse(way, problem, reports, f"{way.solver}: {reports[-1].status.value}")
+
+
+def finish(numbered: tuple[int, Coarse], deadline: float, listener: Listener) -> tuple[Attempt, Motion | None]:
+    """Refine and verify a coarse plan.
+
+    Parameters
+    ----------
+    numbered : tuple of int, Coarse
+        Number of the candidate, and its usable plan.
+    deadline : float
+        When to end, by the monotonic clock, s.
+    listener : callable
+
+    Returns
+    -------
+    Attempt
+    Motion or None
+        None where no trajectory came out.
+    """
+    number, coarse = numbered
+    assert coarse.problem is not None  # noqa: S101  (it is usable)
+    task = coarse.way.seed.choice.setting.task
+    settings = task.refinement
+    options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds)
+    solve = _solve(coarse.way, deadline, listener)
+    decomposition = coarse.problem.decomposition
+    refined, motion = refined_until_verified(
+        coarse.problem, coarse.reports[-1], solve, options, lambda answer: judge(decomposition, answer, task)
+    )
+    return attempt_of(refined, coarse.reports[:-1], number, settings.tolerance, motion), motion
+
+
+def _solve(way: Way, deadline: float, listener: Listener) -> Solve:
+    """Make a function that solves with the way's solver."""
+    seed = way.seed
+    (solver,) = solver_named(way.solver)
+    return solve_with(solver, seed.choice.setting.task.solver, len(seed.choice.redundant), deadline, listener)
+
+
+def each(
+    function: Callable[..., _Made], given: Sequence[_Given], *others: object, jobs: int, listener: Listener
+) -> Iterator[_Made]:
+    """Yield ``function(item, *others, listener)`` for all items, in order, from up to `jobs` processes."""
+    if jobs == 1 or len(given) <= 1:
+        for item in given:
+            yield function(item, *others, listener)
+        return
+    from joblib import Parallel, delayed  # noqa: PLC0415  (a fifth of a second that a single process need not wait)
+
+    workers = Parallel(n_jobs=jobs, return_as="generator")
+    yield from workers(delayed(_apart)(function, item, *others) for item in given)
+
+
+def _apart(function: Callable[..., _Made], *arguments: object) -> _Made:
+    """Run in a process of its own: one thread for linear algebra, nobody listening."""
+    with ThreadpoolController().limit(limits=1, user_api="blas"):
+        return function(*arguments, _deaf)
+
+
+def _deaf(_text: str) -> None:
+    """Listen to nothing."""

@@ -1,0 +1,202 @@
+"""What a task comes to on a robot: path and postures, the choices of redundant joints and branch, and their NLPs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis import ik
+from brachis.errors import DecompositionError, StartError, UnknownNameError
+from brachis.feasibility import check_end_branch, check_postures, start_branch
+from brachis.kinematics import Decomposition
+from brachis.nlp import Transcription
+from brachis.path import Path, path_of
+from brachis.robot import ROLL_JOINT, Robot, TaskSpace, bind
+from brachis.task import Task
+
+COARSE_INTERVALS = 10
+"""Intervals of the first mesh where the task leaves their number open."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A task on a robot.
+
+    Attributes
+    ----------
+    task : Task
+    robot : Robot
+        With the virtual roll joint where the tool may roll.
+    task_space : TaskSpace
+    path : Path
+    start, end : (n,) ndarray or None
+        Postures, None where free.
+    """
+
+    task: Task
+    robot: Robot
+    task_space: TaskSpace
+    path: Path
+    start: np.ndarray | None
+    end: np.ndarray | None
+
+    @classmethod
+    def of(cls, robot: Robot, task: Task) -> Setting:
+        """Bind robot and task, and check the postures that the task gives.
+
+        Raises
+        ------
+        InputError
+            Task space, postures or path do not fit the robot.
+        """
+        robot, task_space = bind(robot, task.task_space)
+        start = None if task.start == "free" else robot.posture(task.start.joints, "start.joints")
+        end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
+        path = path_of(robot, task_space, task)
+        check_postures(robot, start, end, path, task_space)
+        return cls(task, robot, task_space, path, start, end)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Redundant joints with their closed form, and the branches on which a motion may begin.
+
+    Attributes
+    ----------
+    setting : Setting
+    match : Match
+    redundant : tuple of int
+        Indices of the redundant joints, ascending.
+    branches : tuple of int
+        Indices into ``match.solver.branches``, of each label the first; one where the start posture is given.
+    """
+
+    setting: Setting
+    match: ik.Match
+    redundant: tuple[int, ...]
+    branches: tuple[int, ...]
+
+    @property
+    def name(self) -> str:
+        """Names of the redundant joints."""
+        return ", ".join(self.match.redundant_joints) or "none"
+
+    @property
+    def room(self) -> float:
+        """Least branch margin of the start posture; zero where that is free."""
+        if self.setting.start is None:
+            return 0.0
+        margins = self.match.solver.branch_margins(self.setting.start[None], self.branches[0])
+        return float(margins.min(initial=np.inf))
+
+    def decomposition(self, start: np.ndarray, branch: int) -> Decomposition:
+        """Put robot, path and closed form together for a motion that begins at, or near, `start`, (n,)."""
+        given = self.setting
+        solver = self.match.solver
+        return Decomposition(given.robot, given.task_space, given.path, solver, self.redundant, branch, start)
+
+
+def choices(setting: Setting, families: Sequence[ik.Family] = ()) -> list[Choice]:
+    """List the choices that the task allows.
+
+    Parameters
+    ----------
+    setting : Setting
+    families : sequence of Family, optional
+        Closed forms to try before the built-in ones.
+
+    Returns
+    -------
+    list of Choice
+        At least one; with ``redundant_joints: auto`` the one with the largest branch margin at the start posture
+        first, and closed forms before polynomials.
+
+    Raises
+    ------
+    DecompositionError
+        No closed form fits.
+    StartError
+        The start posture is singular for every choice, or on another branch than the task's, or than the end posture.
+    UnknownNameError
+        There is no such joint or branch.
+    """
+    task, robot, task_space = setting.task, setting.robot, setting.task_space
+    if task.redundant_joints != "auto":
+        wanted = _with_roll(robot, task_space, task.redundant_joints)
+        return [_choice(setting, ik.find(robot, task_space, wanted, families=families))]
+    found = ik.find_all(robot, task_space, families=families)
+    matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
+    if not matches:
+        if len(found) <= 1:  # nothing to choose: the reasons of the only choice, or the wrong number of joints
+            return [_choice(setting, ik.find(robot, task_space, (), families=families))]
+        raise DecompositionError(
+            "no choice of redundant joints has a closed form",
+            redundant_joints=(),
+            reasons={", ".join(c.redundant_joints): "; ".join(c.reasons.values()) for c in found},
+            available=[],
+        )
+    allowed: list[Choice] = []
+    refusals: list[StartError | UnknownNameError] = []
+    for match in matches:
+        try:
+            allowed.append(_choice(setting, match))
+        except (StartError, UnknownNameError) as error:
+            refusals.append(error)
+    if not allowed:
+        raise refusals[0]
+    return sorted(allowed, key=lambda choice: (choice.match.solver.kind != "closed_form", -choice.room))
+
+
+def _with_roll(robot: Robot, task_space: TaskSpace, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Add the free roll where it is the one redundant joint that is left out."""
+    missing = robot.n - task_space.m - len(names)
+    return (*names, ROLL_JOINT) if robot.rolls_freely and missing == 1 and ROLL_JOINT not in names else names
+
+
+def _choice(setting: Setting, match: ik.Match) -> Choice:
+    """Find the branches on which a motion may begin."""
+    robot, task_space, wanted = setting.robot, setting.task_space, setting.task.branch
+    redundant = tuple(robot.joint_names.index(name) for name in match.redundant_joints)
+    labels = match.solver.branches
+    if setting.start is not None:
+        branch = start_branch(robot, task_space, match, setting.start, wanted)
+        if setting.end is not None:
+            check_end_branch(robot, task_space, match, setting.end, branch)
+        return Choice(setting, match, redundant, (branch,))
+    if wanted != "auto" and wanted not in labels:
+        raise UnknownNameError("branch", wanted, dict.fromkeys(labels), where="branch")
+    first = tuple(labels.index(label) for label in dict.fromkeys(labels) if wanted in ("auto", label))
+    return Choice(setting, match, redundant, first)
+
+
+def transcription(setting: Setting, decomposition: Decomposition, intervals: int) -> Transcription:
+    """Write the NLP of a decomposition down, with uniform knots.
+
+    Parameters
+    ----------
+    setting : Setting
+    decomposition : Decomposition
+        Beginning at the task's start posture, or at a first guess of it where that is free.
+    intervals : int
+
+    Returns
+    -------
+    Transcription
+    """
+    spline = setting.task.spline
+    return Transcription(
+        decomposition,
+        degree=spline.degree,
+        intervals=intervals,
+        derivatives_at_rest=2 if spline.rest == "full" else 1,
+        tau=np.linspace(0.0, 1.0, spline.points_per_interval * intervals + 1),
+        end=setting.end,
+        start_free=setting.start is None,
+    )
+
+
+def intervals_of(task: Task) -> int:
+    """Return the task's number of intervals; of the first mesh where it is left open."""
+    return COARSE_INTERVALS if task.spline.intervals == "auto" else task.spline.intervals
