@@ -14,8 +14,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from brachis import __version__, attempts, planner, plots
+from brachis import __version__, planner, plots
 from brachis.errors import InputError
+from brachis.search import motion, portfolio
 from brachis.verify import VerifyOptions
 
 from .conftest import SCARA
@@ -52,7 +53,7 @@ def test_plan_json(planned):
 
 def test_plan_writes_what_it_says(planned):
     data, out = planned
-    assert sorted(path.name for path in out.iterdir()) == ["overview.png", "result.json", "result.npz"]
+    assert sorted(path.name for path in out.iterdir()) == ["candidates.png", "overview.png", "result.json", "result.npz"]
     assert sorted(data["files"]) == sorted(str(path) for path in out.iterdir())
     assert json.loads((out / "result.json").read_text())["t_end"] == data["t_end"]
 
@@ -67,7 +68,7 @@ def test_plan_for_people(run, task, write):
 
 @pytest.fixture
 def too_strict(monkeypatch):
-    honest = planner.verify_trajectory
+    honest = motion.verify_trajectory
     strict = VerifyOptions(ratio_tolerance=-0.5)
     monkeypatch.setattr(planner, "verify_trajectory", lambda trajectory, _options: honest(trajectory, strict))
 
@@ -89,7 +90,7 @@ def test_two_motions_do_not_mix_in_one_folder(run, task, write, planned, request
     assert {path.name for path in out.iterdir()} == {"unverified.npz", "unverified.json", "unverified.png", "notes.txt"}
     request.getfixturevalue("monkeypatch").undo()
     assert run("plan", write(task), "--out", out).code == 0
-    assert {path.name for path in out.iterdir()} == {"result.npz", "result.json", "overview.png", "notes.txt"}
+    assert {path.name for path in out.iterdir()} == {"result.npz", "result.json", "overview.png", "candidates.png", "notes.txt"}
 
 
 def test_failure_while_writing_leaves_the_earlier_result(run, task, write, planned, monkeypatch):
@@ -115,12 +116,12 @@ def test_folder_in_the_place_of_a_result(run, task, write, tmp_path):
 
 
 def test_json_knows_no_nan(run, task, write, tmp_path, monkeypatch):
-    honest = planner.verify_trajectory
+    honest = motion.verify_trajectory
 
     def endless(trajectory, options):
         return replace(honest(trajectory, options), worst_ratio=math.inf, path_error=math.nan)
 
-    monkeypatch.setattr(planner, "verify_trajectory", endless)
+    monkeypatch.setattr(motion, "verify_trajectory", endless)
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
     for text in (outcome.out, (tmp_path / "out/result.json").read_text()):
         data = json.loads(text, parse_constant=pytest.fail)
@@ -143,25 +144,22 @@ def test_lengthened_end_time_is_said(run, task, write, monkeypatch):
         assert ("0.004 % to meet the limits between collocation points" in text) is expected
 
 
-def test_attempts_that_were_given_up(run, task, write, monkeypatch):
-    honest = planner.plan
-
-    def chosen_first(*arguments, **options):
-        result = honest(*arguments, **options)
-        other = replace(result.attempt, outcome="slower than the first")
-        return replace(result, attempts=(result.attempt, other), chosen=0)
-
-    monkeypatch.setattr(planner, "plan", chosen_first)
-    outcome = run("plan", write(task))
-    assert "attempt 2 was given up: slower than the first" in outcome.out
-    assert "attempt 1" not in outcome.out
+def test_candidates_are_listed(run, task, write):
+    outcome = run("plan", write({**task, "redundant_joints": "auto"}))
+    data = json.loads(run("plan", write({**task, "redundant_joints": "auto"}), "--json").out)
+    assert f"candidates ({len(data['candidates'])})" in outcome.out
+    assert {tuple(candidate["redundant_joints"]) for candidate in data["candidates"]} == {("j1",), ("j2",), ("j3",)}
+    first = data["candidates"][0]
+    assert first["verified"]
+    assert first["t_end"] == data["t_end"]
+    assert f"{first['t_end']:.4f}" in outcome.out
 
 
 def test_interrupt(run, task, write, tmp_path, monkeypatch):
     def interrupt(*_arguments, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(attempts, "guesses", interrupt)
+    monkeypatch.setattr(portfolio, "plan_coarse", interrupt)
     outcome = run("plan", write(task), "--out", tmp_path / "out")
     assert outcome.code == 130
     assert "interrupted" in outcome.err

@@ -78,8 +78,8 @@ def plan(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for result.npz, result.json and overview.png; a motion that fails the verification is named "
-            "unverified.npz, unverified.json and unverified.png."
+            help="Folder for result.npz, result.json, overview.png and candidates.png; of a motion that fails the "
+            "verification the names begin with unverified."
         ),
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,

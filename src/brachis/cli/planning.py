@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import secrets
 import shutil
 from collections.abc import Callable
@@ -16,10 +17,12 @@ from brachis.files import atomic_write, writing_errors
 from brachis.result import Result
 
 _FILES = {
-    True: ("result.npz", "result.json", "overview.png"),
-    False: ("unverified.npz", "unverified.json", "unverified.png"),
+    True: ("result.npz", "result.json", "overview.png", "candidates.png"),
+    False: ("unverified.npz", "unverified.json", "unverified.png", "unverified_candidates.png"),
 }
-"""Names of the trajectory, the figures of merit and the drawing, by whether the motion passed the verification."""
+"""Names of the trajectory, the figures of merit, the drawings of motion and search, by whether it was verified."""
+_MANY = 40
+"""Candidates that are listed on the screen."""
 
 
 def plan_command(task: Path, *, urdf: Path | None, out: Path | None, as_json: bool) -> int:
@@ -35,6 +38,8 @@ def plan_command(task: Path, *, urdf: Path | None, out: Path | None, as_json: bo
         print_json(data)
     else:
         _show(result, data)
+    if result.interrupted:
+        print_error("the search was ended early; this is the best motion verified so far")
     if not result.verified:
         print_error("the motion found did not pass the verification; it is marked unverified")
     return 0 if result.verified else 1
@@ -53,13 +58,14 @@ def _write(result: Result, data: dict[str, object], out: Path) -> list[str]:
     All are written into a temporary folder and then moved, so that a failure leaves the folder as it was. Files of an
     earlier plan with the other names are removed: they would be another motion's.
     """
-    from brachis.plots import plot_overview, save_figure  # noqa: PLC0415  (matplotlib takes 0.7 s)
+    from brachis.plots import plot_candidates, plot_overview, save_figure  # noqa: PLC0415  (matplotlib takes 0.7 s)
 
     names = _FILES[result.verified]
     writers: tuple[Callable[[Path], object], ...] = (
         result.trajectory.save,
         lambda path: _write_text(json_text(data), path),
         lambda path: save_figure(plot_overview(result.trajectory), path),
+        lambda path: save_figure(plot_candidates(result.candidates), path),
     )
     for name in names:
         if (out / name).is_dir():
@@ -112,9 +118,29 @@ def _show(result: Result, data: dict[str, object]) -> None:
     for name, value in rows.items():
         table.add_row(name, value)
     console.print(table)
-    for number, other in enumerate(result.attempts):
-        if number != result.chosen:
-            console.print(f"attempt {number + 1} was given up: {other.outcome}")
+    if len(result.candidates) > 1:
+        console.print(_candidates_table(result))
     console.print(verification_table(result.verification))
     for name in data.get("files", []):  # type: ignore[attr-defined]
         console.print(f"wrote {name}")
+
+
+def _candidates_table(result: Result) -> Table:
+    """Lay out what the search looked at, one candidate a row, the fastest first."""
+    hidden = len(result.candidates) - _MANY
+    title = f"candidates ({len(result.candidates)}" + (
+        f", {hidden} of them in result.json only)" if hidden > 0 else ")"
+    )
+    table = Table(title=title, title_justify="left")
+    for column in ("redundant joints", "branch", "guess", "estimate [s]", "planned [s]", "refined [s]", "status"):
+        table.add_column(column, justify="right" if column.endswith("[s]") else "left")
+    for candidate in result.candidates[:_MANY]:
+        times = (candidate.estimate, candidate.coarse, candidate.t_end)
+        table.add_row(
+            ", ".join(candidate.redundant_joints) or "none",
+            candidate.branch,
+            candidate.origin,
+            *(f"{time:.4f}" if math.isfinite(time) else "" for time in times),
+            candidate.status,
+        )
+    return table

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from brachis.plots.candidates import plot_candidates
 from brachis.plots.comparison import plot_comparison
 from brachis.plots.motion import plot_motion
 from brachis.plots.overview import plot_overview
@@ -26,11 +27,12 @@ PLOTS: dict[str, Callable[[Trajectory], Figure]] = {
     "motion": plot_motion,
     "overview": plot_overview,
 }
-"""Plots of one trajectory by name; `plot_comparison` compares many."""
+"""Plots of one trajectory by name; `plot_comparison` compares many, `plot_candidates` draws a search."""
 
 __all__ = [
     "PLOTS",
     "SUFFIXES",
+    "plot_candidates",
     "plot_comparison",
     "plot_motion",
     "plot_overview",

@@ -10,8 +10,8 @@ by 2 pi follow the course. The length of an edge,
 
 does not depend on how fast the course is followed: with the first term alone the time of a straight course is
 2 sqrt(length). One redundant joint is searched completely at the lattice's spacing. Of several, all neighbours along
-one joint at a time and random ones, and a layer keeps a bounded number of nodes, half of them the nearest and half at
-random.
+one joint at a time and random ones, and a layer keeps a bounded number of nodes, half of them the nearest and half far
+from each other.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ _TYPICAL_TIME = 0.5  # s
 _CLEAR = 0.02
 _SLACK = 1e-9
 _RANDOM_OFFSETS = 24
-_APART = 0.3
+_APART = 0.02
+_LONGEST = 4.0
 _AT_END = 1.0  # cells
 
 NO_ANSWER = "it is out of reach"
@@ -171,25 +172,37 @@ class Lattice:
         return self._distinct(layers, ends, most)
 
     def _distinct(self, layers: list[_Layer], ends: np.ndarray, most: int) -> list[Course]:
-        """Trace courses back from their ends, and leave out those that run close to a shorter one."""
-        found: list[Course] = []
-        for end in ends:
-            if len(found) == most:
-                break
-            q, node = [], int(end)
-            for layer in reversed(layers):
-                q.append(layer.q[node])
-                last, node = node, int(layer.parent[node])
-            course = np.array(q[::-1])
-            branch = self._first[int(layers[0].slot[last])]
-            length = float(layers[-1].length[end])
-            if all(other.branch != branch or self._apart(other.q, course) > _APART * length for other in found):
-                found.append(Course(self.choice, branch, self.s, course, length))
-        return found
+        """Trace courses back from their ends, and choose the shortest one and others far from those chosen.
 
-    def _apart(self, first: np.ndarray, second: np.ndarray) -> float:
-        """Largest distance between two courses, in the measure of the edges' length."""
-        return float(self._measure(first, second - first, np.arange(len(first))).max())
+        A course is the better the farther it is from those chosen and the shorter it is.
+        """
+        length = layers[-1].length[ends]
+        ends = ends[length <= _LONGEST * length[0] + _SLACK]
+        nodes, q = ends, []
+        for layer in reversed(layers):
+            q.append(layer.q[nodes])
+            slots, nodes = layer.slot[nodes], layer.parent[nodes]
+        courses = np.array(q[::-1]).swapaxes(0, 1)
+        branches = np.array([self._first[int(slot)] for slot in slots])
+        length = layers[-1].length[ends]
+        weights = self._weights(courses[0, len(self.s) // 2])
+        distance = np.full(len(ends), np.inf)
+        chosen, best = [], 0
+        while len(chosen) < min(most, len(ends)):
+            chosen.append(best)
+            apart = (np.abs(courses - courses[best]) * weights).max(axis=(1, 2))
+            distance = np.minimum(distance, np.where(branches == branches[best], apart, np.inf))
+            best = int(np.argmax(distance / (length + _SLACK)))
+            if distance[best] <= _APART * distance[np.isfinite(distance)].max(initial=0.0):
+                break
+        return [Course(self.choice, int(branches[e]), self.s, courses[e], float(length[e])) for e in chosen]
+
+    def _weights(self, q: np.ndarray) -> np.ndarray:
+        """Weights of the joints, (n,), where postures near `q`, (n,), are compared."""
+        limits = self._robot.limits
+        if not np.isfinite(limits.torque).any():
+            return np.asarray(1.0 / limits.velocity)
+        return np.asarray(np.diag(dynamics.mass_matrices(self._robot, q[None])[0]) / limits.torque)
 
     def _first_layer(self) -> _Layer:
         """Make the node of the start posture, or nodes all over the ranges where it is free."""
@@ -288,7 +301,7 @@ class Lattice:
         if not good.any():
             return +reasons
         parent, slot, where, q, step = parent[good], slot[good], where[good], q[good], step[good]
-        length = before.length[parent] + self._measure(before.q, step, parent)
+        length = before.length[parent] + self._lengths(before.q, step, parent)
         order = np.lexsort((length, slot, where))
         key = where[order] * len(self._solver.branches) + slot[order]
         best = order[np.append(True, key[1:] != key[:-1])]
@@ -298,8 +311,8 @@ class Lattice:
             return +(reasons + Counter({OTHER_BRANCH: int((~clear).sum()), TOO_HEAVY: int((clear & ~held).sum())}))
         return self._bounded(layer[clear & held])
 
-    def _measure(self, q: np.ndarray, step: np.ndarray, origin: np.ndarray) -> np.ndarray:
-        """Length of steps, (E, n), from the postures q[origin]; see the module."""
+    def _lengths(self, q: np.ndarray, step: np.ndarray, origin: np.ndarray) -> np.ndarray:
+        """Lengths of steps, (E, n), from the postures q[origin]; see the module."""
         limits = self._robot.limits
         masses = dynamics.mass_matrices(self._robot, q) / limits.torque[:, None]
         effort = np.abs(np.einsum("eij,ej->ei", masses[origin], step)).max(axis=1)
@@ -322,8 +335,16 @@ class Lattice:
             return layer
         order = np.argsort(layer.length, kind="stable")
         half = self._nodes // 2
-        others = self._rng.permutation(order[half:])[: self._nodes - half]
-        return layer[np.sort(np.concatenate([order[:half], others]))]
+        nearest, others = layer[order[:half]], layer[order[half:]]
+        # Farthest points: each further node is the one that is farthest from all that are kept.
+        weights = self._weights(layer.q[order[0]])
+        places, kept = others.q * weights, nearest.q * weights
+        distance = np.abs(places[:, None] - kept[None]).max(axis=2).min(axis=1)
+        chosen = []
+        for _ in range(self._nodes - half):
+            chosen.append(int(np.argmax(distance)))
+            distance = np.minimum(distance, np.abs(places - places[chosen[-1]]).max(axis=1))
+        return layer[np.sort(np.concatenate([order[:half], order[half:][np.unique(chosen)]]))]
 
 
 def _unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -153,7 +153,7 @@ class _Search:
         ranked: list[tuple[int, Coarse]] = []
         for number, plan in sorted((item for item in plans if item[1].usable), key=lambda item: item[1].t_end):
             if any(_agree(plan, other) for _, other in ranked):
-                self._note(number, status="the same motion as a faster candidate")
+                self._note(number, status="same motion as another")
             else:
                 ranked.append((number, plan))
         return ranked
@@ -187,7 +187,8 @@ class _Search:
         self._listener(attempt.outcome)
         self._attempts.append(attempt)
         t_end = np.inf if motion is None else motion[0].t_end
-        self._note(number, status=attempt.outcome, t_end=t_end, verified=motion is not None and motion[1].passed)
+        passed = motion is not None and motion[1].passed
+        self._note(number, status="verified" if passed else attempt.outcome, t_end=t_end, verified=passed)
         if motion is None:
             return
         will_do = motion[1].passed or self._task.refinement.max_rounds == 0

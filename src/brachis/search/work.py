@@ -103,7 +103,7 @@ def plan_coarse(way: Way, deadline: float, listener: Listener) -> Coarse:
         problem, reports = continued(problem, x, _solve(way, deadline, listener), MARGINS)
     except ImportError as error:
         return Coarse(way, None, (), f"{way.solver}: not installed ({error})")
-    return Coarse(way, problem, reports, f"{way.solver}: {reports[-1].status.value}")
+    return Coarse(way, problem, reports, reports[-1].status.name.lower().replace("_", " "))
 
 
 def finish(numbered: tuple[int, Coarse], deadline: float, listener: Listener) -> tuple[Attempt, Motion | None]:

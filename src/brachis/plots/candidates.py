@@ -1,0 +1,79 @@
+"""The end times of all that a search looked at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from brachis.errors import InputError
+from brachis.plots import style
+from brachis.result import Candidate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_ROW_MM = 5.0
+_FRAME_MM = 24.0
+_MARKS: dict[str, dict[str, Any]] = {
+    "planned": {"marker": "o", "facecolors": "none", "edgecolors": style.GREY, "label": "planned"},
+    "refined": {"marker": "s", "color": style.COLOURS[0], "label": "refined and verified"},
+    "failed": {"marker": "x", "color": style.COLOURS[1], "label": "no verified motion (at the right edge without any)"},
+    "fastest": {"marker": "*", "color": style.COLOURS[2], "s": 60.0, "label": "the fastest"},
+}
+
+
+def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
+    """Plot the end times of candidates, one row for each choice of redundant joints and branch.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        The fastest verified one first, as a `Result` has them.
+
+    Returns
+    -------
+    Figure
+        Two columns wide; the row of the fastest candidate is the uppermost one.
+
+    Raises
+    ------
+    InputError
+        There are no candidates.
+    """
+    if not candidates:
+        raise InputError("there is nothing to draw", where="candidates", found="none", allowed="at least one")
+    rows = list(dict.fromkeys(_row(candidate) for candidate in candidates))
+    known = [time for c in candidates for time in (c.coarse, c.t_end) if math.isfinite(time)]
+    edge = 1.05 * max(known, default=1.0)
+    figure = style.new_figure(style.PAGE_WIDTH, _FRAME_MM + _ROW_MM * len(rows))
+    ax = figure.add_subplot()
+    drawn: dict[str, list[tuple[float, int]]] = {kind: [] for kind in _MARKS}
+    for number, candidate in enumerate(candidates):
+        drawn[_kind(candidate, first=number == 0)].append((_time(candidate, edge), rows.index(_row(candidate))))
+    for kind, places in drawn.items():
+        if places:
+            times, heights = zip(*places, strict=True)
+            ax.scatter(times, heights, **{"s": 18.0, "linewidths": 0.8, "zorder": 3.0, **_MARKS[kind]})
+    style.dress(ax, r"$t_\mathrm{E}$ (s)", "")
+    ax.set_yticks(range(len(rows)), [style.plain(row) for row in rows])
+    ax.set_ylim(len(rows) - 0.5, -0.5)
+    ax.grid(axis="y", color=style.FAINT, linewidth=0.5)
+    style.legend_above(ax, style.PAGE_WIDTH - 60.0)
+    return figure
+
+
+def _row(candidate: Candidate) -> str:
+    joints = ", ".join(candidate.redundant_joints) or "no redundant joint"
+    return f"{joints}: {candidate.branch}" if candidate.branch else joints
+
+
+def _time(candidate: Candidate, edge: float) -> float:
+    """Return the refined end time, else the planned one, else the right edge."""
+    return next((time for time in (candidate.t_end, candidate.coarse) if math.isfinite(time)), edge)
+
+
+def _kind(candidate: Candidate, *, first: bool) -> str:
+    if candidate.verified:
+        return "fastest" if first else "refined"
+    return "planned" if math.isfinite(candidate.coarse) and not math.isfinite(candidate.t_end) else "failed"
