@@ -53,7 +53,8 @@ def test_plan_json(planned):
 
 def test_plan_writes_what_it_says(planned):
     data, out = planned
-    assert sorted(path.name for path in out.iterdir()) == ["candidates.png", "overview.png", "result.json", "result.npz"]
+    names = ["candidates.png", "overview.png", "result.json", "result.npz"]
+    assert sorted(path.name for path in out.iterdir()) == names
     assert sorted(data["files"]) == sorted(str(path) for path in out.iterdir())
     assert json.loads((out / "result.json").read_text())["t_end"] == data["t_end"]
 
@@ -70,7 +71,7 @@ def test_plan_for_people(run, task, write):
 def too_strict(monkeypatch):
     honest = motion.verify_trajectory
     strict = VerifyOptions(ratio_tolerance=-0.5)
-    monkeypatch.setattr(planner, "verify_trajectory", lambda trajectory, _options: honest(trajectory, strict))
+    monkeypatch.setattr(motion, "verify_trajectory", lambda trajectory, _options: honest(trajectory, strict))
 
 
 def test_unverified_plan_says_so(run, task, write, tmp_path, too_strict):  # noqa: ARG001
@@ -78,7 +79,7 @@ def test_unverified_plan_says_so(run, task, write, tmp_path, too_strict):  # noq
     assert outcome.code == 1
     assert json.loads(outcome.out)["verified"] is False
     assert "unverified" in outcome.err
-    names = ["unverified.json", "unverified.npz", "unverified.png"]
+    names = ["unverified.json", "unverified.npz", "unverified.png", "unverified_candidates.png"]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names
 
 
@@ -87,10 +88,12 @@ def test_two_motions_do_not_mix_in_one_folder(run, task, write, planned, request
     (out / "notes.txt").write_text("mine")
     request.getfixturevalue("too_strict")
     assert run("plan", write(task), "--out", out).code == 1
-    assert {path.name for path in out.iterdir()} == {"unverified.npz", "unverified.json", "unverified.png", "notes.txt"}
+    names = {path.name for path in out.iterdir()}
+    assert names == {"unverified.npz", "unverified.json", "unverified.png", "unverified_candidates.png", "notes.txt"}
     request.getfixturevalue("monkeypatch").undo()
     assert run("plan", write(task), "--out", out).code == 0
-    assert {path.name for path in out.iterdir()} == {"result.npz", "result.json", "overview.png", "candidates.png", "notes.txt"}
+    names = {path.name for path in out.iterdir()}
+    assert names == {"result.npz", "result.json", "overview.png", "candidates.png", "notes.txt"}
 
 
 def test_failure_while_writing_leaves_the_earlier_result(run, task, write, planned, monkeypatch):

@@ -11,7 +11,7 @@ from brachis.errors import BrachisError, PathError, PlanningError
 from brachis.feasibility import explain_failure
 from brachis.kinematics import Decomposition
 from brachis.result import Candidate
-from brachis.search.lattice import DeadEnd
+from brachis.search.course import DeadEnd
 from brachis.setting import Choice
 
 _GOOD_PART = 0.1

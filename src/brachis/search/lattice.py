@@ -16,12 +16,22 @@ from each other.
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 
 from brachis.robot import dynamics
+from brachis.search.course import (
+    JUMPS,
+    NO_ANSWER,
+    OTHER_BRANCH,
+    TOO_HEAVY,
+    Course,
+    DeadEnd,
+    causes_of,
+    distinct,
+    weights_near,
+)
 from brachis.setting import Choice
 
 _TURN = 2.0 * np.pi
@@ -33,63 +43,8 @@ _TYPICAL_TIME = 0.5  # s
 _CLEAR = 0.02
 _SLACK = 1e-9
 _RANDOM_OFFSETS = 24
-_APART = 0.02
 _LONGEST = 4.0
 _AT_END = 1.0  # cells
-
-NO_ANSWER = "it is out of reach"
-OTHER_BRANCH = "the branch ends"
-OUT_OF_RANGE = "a joint range ends"
-TOO_HEAVY = "the torque limits cannot hold the arm against gravity"
-JUMPS = "no posture is near enough to continue"
-
-
-@dataclass(frozen=True)
-class Course:
-    """Redundant joints along the path.
-
-    Attributes
-    ----------
-    choice : Choice
-    branch : int
-        Index into the closed form's branches.
-    s : (S + 1,) ndarray
-    q : (S + 1, n) ndarray
-        Postures, rad or m, angles lifted so that they are continuous.
-    length : float
-        See the module.
-    """
-
-    choice: Choice
-    branch: int
-    s: np.ndarray
-    q: np.ndarray
-    length: float
-
-    @property
-    def stations(self) -> np.ndarray:
-        """Path coordinate and redundant joints, (S + 1, 1 + r)."""
-        return np.column_stack([self.s, self.q[:, list(self.choice.redundant)]])
-
-
-@dataclass(frozen=True)
-class DeadEnd:
-    """Where the lattice ends.
-
-    Attributes
-    ----------
-    s : float
-        Path coordinate of the first station that no node reaches.
-    causes : dict of str to int
-        Why, and how many edges say so, the most frequent cause first.
-    """
-
-    s: float
-    causes: dict[str, int]
-
-    def __str__(self) -> str:
-        """Return the place and its first cause, in words."""
-        return f"from s = {self.s:.3g} on {next(iter(self.causes))}"
 
 
 @dataclass(frozen=True)
@@ -159,9 +114,8 @@ class Lattice:
         layers = [self._first_layer()]
         for station in range(1, len(self.s)):
             layer = self._next(layers[-1], station) if len(layers[-1].slot) else None
-            if isinstance(layer, Counter) or layer is None:
-                causes = dict((layer or Counter({NO_ANSWER: 1})).most_common())
-                return DeadEnd(float(self.s[station if layer is not None else 0]), causes)
+            if not isinstance(layer, _Layer):
+                return DeadEnd(float(self.s[station if layer else 0]), layer or {NO_ANSWER: 1})
             layers.append(layer)
         ends = np.argsort(layers[-1].length, kind="stable")
         if self.choice.setting.end is not None:
@@ -169,40 +123,22 @@ class Lattice:
             ends = ends[np.all(gap[ends] < np.maximum(_AT_END * self._cell.max(initial=0.0), _SLACK), axis=1)]
             if not len(ends):
                 return DeadEnd(1.0, {JUMPS: 1})
-        return self._distinct(layers, ends, most)
+        lengths = layers[-1].length[ends]
+        ends = ends[lengths <= _LONGEST * lengths[0] + _SLACK]
+        q, slots = self._traced(layers, ends)
+        branches = [self._first[int(slot)] for slot in slots]
+        found = zip(branches, q, layers[-1].length[ends], strict=True)
+        return distinct(
+            [Course(self.choice, branch, self.s, each, float(length)) for branch, each, length in found], most
+        )
 
-    def _distinct(self, layers: list[_Layer], ends: np.ndarray, most: int) -> list[Course]:
-        """Trace courses back from their ends, and choose the shortest one and others far from those chosen.
-
-        A course is the better the farther it is from those chosen and the shorter it is.
-        """
-        length = layers[-1].length[ends]
-        ends = ends[length <= _LONGEST * length[0] + _SLACK]
+    def _traced(self, layers: list[_Layer], ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Trace courses back from their ends, (E,): postures (E, S + 1, n) and first slots (E,)."""
         nodes, q = ends, []
         for layer in reversed(layers):
             q.append(layer.q[nodes])
             slots, nodes = layer.slot[nodes], layer.parent[nodes]
-        courses = np.array(q[::-1]).swapaxes(0, 1)
-        branches = np.array([self._first[int(slot)] for slot in slots])
-        length = layers[-1].length[ends]
-        weights = self._weights(courses[0, len(self.s) // 2])
-        distance = np.full(len(ends), np.inf)
-        chosen, best = [], 0
-        while len(chosen) < min(most, len(ends)):
-            chosen.append(best)
-            apart = (np.abs(courses - courses[best]) * weights).max(axis=(1, 2))
-            distance = np.minimum(distance, np.where(branches == branches[best], apart, np.inf))
-            best = int(np.argmax(distance / (length + _SLACK)))
-            if distance[best] <= _APART * distance[np.isfinite(distance)].max(initial=0.0):
-                break
-        return [Course(self.choice, int(branches[e]), self.s, courses[e], float(length[e])) for e in chosen]
-
-    def _weights(self, q: np.ndarray) -> np.ndarray:
-        """Weights of the joints, (n,), where postures near `q`, (n,), are compared."""
-        limits = self._robot.limits
-        if not np.isfinite(limits.torque).any():
-            return np.asarray(1.0 / limits.velocity)
-        return np.asarray(np.diag(dynamics.mass_matrices(self._robot, q[None])[0]) / limits.torque)
+        return np.array(q[::-1]).swapaxes(0, 1), slots
 
     def _first_layer(self) -> _Layer:
         """Make the node of the start posture, or nodes all over the ranges where it is free."""
@@ -262,7 +198,7 @@ class Lattice:
         random = np.rint(self._rng.normal(0.0, 2.5, (_RANDOM_OFFSETS, r))).astype(int)
         return np.unique(np.vstack([np.zeros((1, r), dtype=int), single, random]), axis=0)
 
-    def _next(self, before: _Layer, station: int) -> _Layer | Counter[str]:
+    def _next(self, before: _Layer, station: int) -> _Layer | dict[str, int]:
         """Join the nodes of a layer to the next station, or say why none can be."""
         offsets = self._offsets()
         count = len(before.slot) * len(offsets)
@@ -290,16 +226,8 @@ class Lattice:
             in_range = self._in_range(q)
             near = np.all(np.abs(step[:, self._rest]) <= _LARGEST_STEP, axis=1)
         good = found & in_range & near
-        reasons = Counter(
-            {
-                NO_ANSWER: int((~exists.any(axis=1)[where]).sum()),
-                OTHER_BRANCH: int((exists.any(axis=1)[where] & ~found).sum()),
-                OUT_OF_RANGE: int((found & ~in_range).sum()),
-                JUMPS: int((found & in_range & ~near).sum()),
-            }
-        )
         if not good.any():
-            return +reasons
+            return causes_of(exists, where, found, in_range, near)
         parent, slot, where, q, step = parent[good], slot[good], where[good], q[good], step[good]
         length = before.length[parent] + self._lengths(before.q, step, parent)
         order = np.lexsort((length, slot, where))
@@ -308,7 +236,9 @@ class Lattice:
         layer = _Layer(cells[where[best]], slot[best], q[best], length[best], parent[best])
         clear, held = self._usable(layer)
         if not (clear & held).any():
-            return +(reasons + Counter({OTHER_BRANCH: int((~clear).sum()), TOO_HEAVY: int((clear & ~held).sum())}))
+            return {
+                cause: int(n) for cause, n in ((TOO_HEAVY, (clear & ~held).sum()), (OTHER_BRANCH, (~clear).sum())) if n
+            }
         return self._bounded(layer[clear & held])
 
     def _lengths(self, q: np.ndarray, step: np.ndarray, origin: np.ndarray) -> np.ndarray:
@@ -337,10 +267,10 @@ class Lattice:
         half = self._nodes // 2
         nearest, others = layer[order[:half]], layer[order[half:]]
         # Farthest points: each further node is the one that is farthest from all that are kept.
-        weights = self._weights(layer.q[order[0]])
+        weights = weights_near(self._robot, layer.q[order[0]])
         places, kept = others.q * weights, nearest.q * weights
         distance = np.abs(places[:, None] - kept[None]).max(axis=2).min(axis=1)
-        chosen = []
+        chosen: list[int] = []
         for _ in range(self._nodes - half):
             chosen.append(int(np.argmax(distance)))
             distance = np.minimum(distance, np.abs(places - places[chosen[-1]]).max(axis=1))

@@ -41,11 +41,12 @@ def least_time(robot: Robot, s: np.ndarray, q: np.ndarray) -> float:
     step = s[1] - s[0]
     slope, offset, ceiling = _lines(robot, q, np.gradient(q, step, axis=0), step)
     low, high = _controllable(slope, offset, ceiling, step)
-    if low is None:
+    if low is None or low[0] > 0.0:
         return np.inf
     x = _fastest(slope, offset, low, high, step)
     # Between stations nothing stops; a station where the grid says so is an artefact of its width.
-    speed = np.sqrt(np.maximum(x, _STANDING * x.max()))
+    x[1:-1] = np.maximum(x[1:-1], _STANDING * x.max())
+    speed = np.sqrt(x)
     return float(np.sum(2.0 * step / (speed[1:] + speed[:-1]))) if x.max() > 0.0 else np.inf
 
 

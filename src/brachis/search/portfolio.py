@@ -20,10 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.result import Attempt, Candidate
+from brachis.search.course import DeadEnd
 from brachis.search.efforts import EFFORTS
 from brachis.search.explain import no_motion, refuse_what_is_out_of_reach
 from brachis.search.finishing import Motion
-from brachis.search.lattice import DeadEnd
 from brachis.search.solving import Listener
 from brachis.search.ways import Wave, waves
 from brachis.search.work import Coarse, each, finish, plan_coarse

@@ -9,8 +9,9 @@ import numpy as np
 from brachis.errors import PathError
 from brachis.kinematics import Decomposition
 from brachis.nlp.guess import numeric_courses
+from brachis.search.course import Course, DeadEnd
 from brachis.search.efforts import EFFORTS, Effort
-from brachis.search.lattice import Course, DeadEnd, Lattice
+from brachis.search.lattice import Lattice
 from brachis.search.phase_plane import least_time
 from brachis.setting import Choice
 

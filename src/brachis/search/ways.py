@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from brachis.nlp.guess import STRATEGIES
+from brachis.search.course import DeadEnd
 from brachis.search.efforts import Effort
-from brachis.search.lattice import DeadEnd
 from brachis.search.seeds import Seed, lattice_seeds, numeric_seeds
 from brachis.search.solving import Listener
 from brachis.search.work import Way, each

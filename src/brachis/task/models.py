@@ -206,6 +206,9 @@ class Task(Model):
         if self.start == "free" and self.path_start is None:
             problem = "a free start posture leaves open where the path begins"
             raise refuse(problem, key="path_start", found="nothing", allowed="the rows of the task space")
+        if self.start == "free" and self.search.guesses == "numeric":
+            problem = "numeric inverse kinematics needs a posture to begin with, and start is free"
+            raise refuse(problem, key="search.guesses", found="numeric", allowed="lattice")
         return self
 
     def to_dict(self) -> dict[str, Any]:

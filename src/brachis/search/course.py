@@ -1,0 +1,125 @@
+"""Courses of the redundant joints, which of them differ, and where there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.robot import Robot, dynamics
+from brachis.setting import Choice
+
+_APART = 0.02
+_TINY = 1e-9
+
+NO_ANSWER = "it is out of reach"
+OTHER_BRANCH = "the branch ends"
+OUT_OF_RANGE = "a joint range ends"
+TOO_HEAVY = "the torque limits cannot hold the arm against gravity"
+JUMPS = "no posture is near enough to continue"
+
+
+@dataclass(frozen=True)
+class Course:
+    """Redundant joints along the path.
+
+    Attributes
+    ----------
+    choice : Choice
+    branch : int
+        Index into the closed form's branches.
+    s : (S + 1,) ndarray
+    q : (S + 1, n) ndarray
+        Postures, rad or m, angles lifted so that they are continuous.
+    length : float
+        See the module.
+    """
+
+    choice: Choice
+    branch: int
+    s: np.ndarray
+    q: np.ndarray
+    length: float
+
+    @property
+    def stations(self) -> np.ndarray:
+        """Path coordinate and redundant joints, (S + 1, 1 + r)."""
+        return np.column_stack([self.s, self.q[:, list(self.choice.redundant)]])
+
+
+@dataclass(frozen=True)
+class DeadEnd:
+    """Where the lattice ends.
+
+    Attributes
+    ----------
+    s : float
+        Path coordinate of the first station that no node reaches.
+    causes : dict of str to int
+        Why, and how many edges say so; the cause of those that came nearest to being possible first.
+    """
+
+    s: float
+    causes: dict[str, int]
+
+    def __str__(self) -> str:
+        """Return the place and its first cause, in words."""
+        return f"from s = {self.s:.3g} on {next(iter(self.causes))}"
+
+
+def distinct(courses: Sequence[Course], most: int) -> list[Course]:
+    """Choose up to `most` courses: the shortest one, and others far from those chosen.
+
+    The next one is the one with the largest ratio of its distance from those chosen to its length; on another branch
+    the distance is infinite.
+
+    Parameters
+    ----------
+    courses : sequence of Course
+        The shortest one first, at least one.
+    most : int
+
+    Returns
+    -------
+    list of Course
+    """
+    branches, q = np.array([course.branch for course in courses]), np.array([course.q for course in courses])
+    length = np.array([course.length for course in courses])
+    weights = weights_near(courses[0].choice.setting.robot, q[0, q.shape[1] // 2])
+    distance = np.full(len(courses), np.inf)
+    chosen: list[int] = []
+    best = 0
+    while len(chosen) < min(most, len(courses)):
+        chosen.append(best)
+        apart = (np.abs(q - q[best]) * weights).max(axis=(1, 2))
+        distance = np.minimum(distance, np.where(branches == branches[best], apart, np.inf))
+        best = int(np.argmax(distance / (length + _TINY)))
+        if distance[best] <= _APART * distance[np.isfinite(distance)].max(initial=0.0):
+            break
+    return [courses[one] for one in chosen]
+
+
+def weights_near(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Weights of the joints, (n,), with which postures near `q`, (n,), are compared: inertia over torque limit."""
+    limits = robot.limits
+    if not np.isfinite(limits.torque).any():
+        return np.asarray(1.0 / limits.velocity)
+    return np.asarray(np.diag(dynamics.mass_matrices(robot, q[None])[0]) / limits.torque)
+
+
+def causes_of(
+    exists: np.ndarray, where: np.ndarray, found: np.ndarray, in_range: np.ndarray, near: np.ndarray
+) -> dict[str, int]:
+    """Count why edges, (E,), are impossible, those first that came nearest to being possible.
+
+    `exists` tells of cells (C, B) which branches have an answer, `where` the cells of the edges.
+    """
+    anywhere = np.asarray(exists.any(axis=1))
+    counts = {
+        OUT_OF_RANGE: found & ~in_range & near,
+        OTHER_BRANCH: anywhere[where] & ~found,
+        JUMPS: found & ~near,
+        NO_ANSWER: ~anywhere[where],
+    }
+    return {cause: int(those.sum()) for cause, those in counts.items() if those.any()}

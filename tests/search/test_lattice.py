@@ -1,0 +1,134 @@
+"""Courses on the lattice: on the path, continuous, within limits, different; and the reasons where there is none."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.errors import PathError
+from brachis.robot import dynamics
+from brachis.robot.from_task import robot_from_settings
+from brachis.search.course import DeadEnd
+from brachis.search.efforts import EFFORTS
+from brachis.search.lattice import Lattice
+from brachis.search.seeds import lattice_seeds
+from brachis.setting import Setting, choices
+
+ROOT = Path(__file__).parents[2]
+START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
+
+
+def scara(limits: dict[str, Any] | None = None, **options: Any) -> brachis.Robot:
+    spec = brachis.LimitSpec(**({"torque": 10.0, "velocity": None} | (limits or {})))
+    return brachis.Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", limits=spec, **({"gravity": [0, 0, 0]} | options))
+
+
+def setting(robot: brachis.Robot, **changes: Any) -> Setting:
+    task = {
+        "brachis": 1,
+        "start": {"joints": START},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
+    }
+    return Setting.of(robot, brachis.load_task(task | changes))
+
+
+def example(name: str, **changes: Any) -> Setting:
+    task = brachis.load_task(brachis.load_task(ROOT / "examples" / name).to_dict() | changes)
+    return Setting.of(robot_from_settings(task.robot), task)
+
+
+CASES = {
+    "planar": lambda: setting(scara()),
+    "ranges": lambda: setting(scara({"position": {"j1": [-0.5, 1.5], "j2": [-3.0, 0.0], "j3": [0.0, 3.5]}})),
+    "free start": lambda: setting(scara(), start="free", path_start=[math.sqrt(3.0), 0.0]),
+    "rail": lambda: example("03_tx90l_rail_line.yaml", redundant_joints="auto"),
+    "two redundant": lambda: example("06_free_roll.yaml"),
+    "none redundant": lambda: setting(scara(locked_joints={"j3": 0.4}), start={"joints": START[:2]}),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_courses_are_motions_of_the_robot(case):
+    given = CASES[case]()
+    robot, limits = given.robot, given.robot.limits
+    found = 0
+    for choice in choices(given):
+        courses = Lattice(choice).courses(4)
+        if isinstance(courses, DeadEnd):
+            continue
+        found += len(courses)
+        for course in courses:
+            targets = given.path.sample(course.s).target
+            miss = given.task_space.difference(given.task_space.values(*robot.tool_placements(course.q)), targets)
+            assert np.abs(miss).max() < 1e-6
+            assert np.abs(np.diff(course.q, axis=0)).max() < 0.9
+            assert np.all(course.q >= limits.position_lower - 1e-9)
+            assert np.all(course.q <= limits.position_upper + 1e-9)
+            still = np.zeros_like(course.q)
+            assert np.all(np.abs(dynamics.torque(robot, course.q, still, still)) <= limits.torque)
+            margins = choice.match.solver.branch_margins(course.q, course.branch)
+            assert margins.min(initial=1.0) > 0.0
+            if given.start is not None:
+                np.testing.assert_allclose(course.q[0], given.start, atol=1e-12)
+        stations = [course.q for course in courses]
+        assert all(np.abs(a - b).max() > 0.05 for i, a in enumerate(stations) for b in stations[:i])
+    assert found >= 3 or case == "none redundant"
+    assert found
+
+
+def test_the_shortest_course_comes_first_and_is_shorter_than_any_detour():
+    (choice, *_) = choices(setting(scara(), redundant_joints=["j1"]))
+    first, *others = Lattice(choice).courses(6)
+    assert others
+    assert all(other.length >= first.length for other in others)
+
+
+def test_an_end_posture_is_reached():
+    free = Lattice(choices(setting(scara(), redundant_joints=["j1"]))[0]).courses(3)
+    end = free[-1].q[-1]
+    given = setting(scara(), redundant_joints=["j1"], end={"joints": end})
+    courses = Lattice(choices(given)[0]).courses(3)
+    assert all(np.abs(course.q[-1] - end).max() < 0.2 for course in courses)
+
+
+def test_lifts_follow_the_course():
+    """Three turns about the base: the joint leaves (-pi, pi]."""
+    arm = scara(locked_joints={"j3": 0.4})
+    given = setting(arm, start={"joints": [0.3, 0.9]}, path=[{"circle": {"center": [0.0, 0.0], "turns": 3}}])
+    (course,) = Lattice(choices(given)[0]).courses(1)
+    assert course.q[-1, 0] - course.q[0, 0] == pytest.approx(6 * math.pi, abs=1e-6)
+
+
+REASONS = {
+    "out of reach": ({}, {"path": [{"line": {"to": [4.0, 0.0]}}]}, "it is out of reach"),
+    "joint range": (
+        {"limits": {"position": {"j1": [0.3, 0.8], "j2": [-2.2, -1.9]}}},
+        {"redundant_joints": ["j1"]},
+        "a joint range ends",
+    ),
+    "gravity": (
+        {"gravity": [0, -9.81, 0], "limits": {"torque": [280.0, 200.0, 100.0]}},
+        {"path": [{"line": {"to": [2.8, 0.0]}}]},
+        "the torque limits cannot hold",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REASONS)
+def test_why_there_is_no_course(case):
+    options, changes, reason = REASONS[case]
+    given = setting(scara(**options), **changes)
+    ends = [lattice_seeds(choice, EFFORTS["fast"], 0) for choice in choices(given)]
+    assert all(isinstance(end, DeadEnd) for end in ends)
+    furthest = max(ends, key=lambda end: end.s)
+    assert 0.0 < furthest.s <= 1.0
+    assert reason in str(furthest)
+    with pytest.raises(PathError) as caught:
+        brachis.plan(given.robot, given.task)
+    assert caught.value.s_interval is not None
