@@ -46,7 +46,7 @@ def has_course(robot: Robot, task: dict[str, object]) -> bool:
         found = choices(Setting.of(robot, load_task(task)))
     except BrachisError:
         return False
-    return any(not isinstance(lattice_seeds(choice, EFFORTS["fast"], 0), DeadEnd) for choice in found)
+    return any(not isinstance(lattice_seeds(choice, EFFORTS["fast"][0], 0), DeadEnd) for choice in found)
 
 
 def main() -> None:

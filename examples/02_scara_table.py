@@ -19,23 +19,25 @@ PUBLISHED_S = {(90, "j3"): 2.51}
 """End times that the paper prints."""
 
 
-def plan_all(intervals: int = 20) -> dict[tuple[int, str], brachis.Result]:
-    """Plan the 24 motions; keys are angle in degrees and redundant joint."""
+def robot_and_task(angle_deg: int, joint: str, intervals: int = 20) -> tuple[brachis.Robot, dict[str, object]]:
+    """Return the paper's arm and one of its lines; `joint` is the redundant one, or auto."""
     limits = brachis.LimitSpec(torque=10.0, velocity=None)
     robot = brachis.Robot.from_urdf(HERE.parent / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
-    results = {}
-    for angle in ANGLES_DEG:
-        for joint in JOINTS:
-            task = {
-                "brachis": 1,
-                "start": {"joints": [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]},
-                "task_space": ["x", "y"],
-                "path": [{"line": {"length": 1.0, "angle_deg": angle}}],
-                "redundant_joints": [joint],
-                "spline": {"degree": 3, "intervals": intervals, "rest": "full"},
-            }
-            results[angle, joint] = brachis.plan(robot, task)
-    return results
+    task = {
+        "brachis": 1,
+        "start": {"joints": [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"length": 1.0, "angle_deg": angle_deg}}],
+        "redundant_joints": "auto" if joint == "auto" else [joint],
+        "spline": {"degree": 3, "intervals": intervals, "rest": "full"},
+    }
+    return robot, task
+
+
+def plan_all(intervals: int = 20) -> dict[tuple[int, str], brachis.Result]:
+    """Plan the 24 motions; keys are angle in degrees and redundant joint."""
+    cases = [(angle, joint) for angle in ANGLES_DEG for joint in JOINTS]
+    return {case: brachis.plan(*robot_and_task(*case, intervals)) for case in cases}
 
 
 def markdown_table(results: dict[tuple[int, str], brachis.Result]) -> str:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from brachis.errors import PlanningError as PlanningError
     from brachis.planner import plan as plan
     from brachis.planner import transcribe as transcribe
+    from brachis.result import Candidate as Candidate
     from brachis.result import Result as Result
     from brachis.robot import LimitSpec as LimitSpec
     from brachis.robot import Robot as Robot
@@ -30,6 +31,7 @@ __version__ = "0.1.0"
 _STAGES = ("compose",)
 _HOME = {
     "BrachisError": "brachis.errors",
+    "Candidate": "brachis.result",
     "InputError": "brachis.errors",
     "LimitSpec": "brachis.robot",
     "PlanningError": "brachis.errors",
@@ -47,6 +49,7 @@ _HOME = {
 
 __all__ = [
     "BrachisError",
+    "Candidate",
     "InputError",
     "LimitSpec",
     "PlanningError",

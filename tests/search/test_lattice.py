@@ -124,7 +124,7 @@ REASONS = {
 def test_why_there_is_no_course(case):
     options, changes, reason = REASONS[case]
     given = setting(scara(**options), **changes)
-    ends = [lattice_seeds(choice, EFFORTS["fast"], 0) for choice in choices(given)]
+    ends = [lattice_seeds(choice, EFFORTS["fast"][0], 0) for choice in choices(given)]
     assert all(isinstance(end, DeadEnd) for end in ends)
     furthest = max(ends, key=lambda end: end.s)
     assert 0.0 < furthest.s <= 1.0

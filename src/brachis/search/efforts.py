@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Effort:
-    """How far the search goes.
+    """One level of the search.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Effort:
     nodes: int
 
 
-EFFORTS = {
+_LEVELS = {
     "single": Effort(1, polynomial=False, seeds=1, numeric=0, plans=1, refined=1, cells_per_turn=72, nodes=120),
     "fast": Effort(6, polynomial=False, seeds=4, numeric=0, plans=24, refined=4, cells_per_turn=72, nodes=120),
     "thorough": Effort(20, polynomial=True, seeds=8, numeric=8, plans=100, refined=12, cells_per_turn=96, nodes=300),
@@ -45,4 +45,11 @@ EFFORTS = {
         10_000, polynomial=True, seeds=30, numeric=8, plans=10_000, refined=40, cells_per_turn=144, nodes=600
     ),
 }
-"""By the task's ``search.effort``."""
+
+EFFORTS = {
+    "single": (_LEVELS["single"],),
+    "fast": (_LEVELS["fast"],),
+    "thorough": (_LEVELS["fast"], _LEVELS["thorough"]),
+    "exhaustive": (_LEVELS["fast"], _LEVELS["thorough"], _LEVELS["exhaustive"]),
+}
+"""Levels that are gone through one after the other, by the task's ``search.effort``; so a good motion is known soon."""

@@ -15,18 +15,25 @@ from brachis.search.course import DeadEnd
 from brachis.setting import Choice
 
 _GOOD_PART = 0.1
+_LOOKED_AT = 6
 
 
-def refuse_what_is_out_of_reach(choices: Sequence[Choice], dead_ends: Mapping[str, DeadEnd]) -> None:
+def refuse_what_is_out_of_reach(choices: Sequence[Choice], candidates: Sequence[Candidate]) -> None:
     """Raise the reason where the lattice of no choice has a course, or a good part of the path cannot be reached.
 
     Further attempts would be in vain.
+
+    Parameters
+    ----------
+    choices : sequence of Choice
+    candidates : sequence of Candidate
+        So far.
 
     Raises
     ------
     PathError
     """
-    reasons = [explain_failure(_decomposition(choice)) for choice in choices]
+    reasons = [explain_failure(_decomposition(choice)) for choice in choices[:_LOOKED_AT]]
     clear = [
         (reason.s_interval, reason)
         for reason in reasons
@@ -34,8 +41,7 @@ def refuse_what_is_out_of_reach(choices: Sequence[Choice], dead_ends: Mapping[st
     ]
     if len(clear) < len(reasons):
         return
-    none_has_a_course = len(dead_ends) == len(choices)
-    if none_has_a_course or all(end - begin > _GOOD_PART for (begin, end), _ in clear):
+    if _no_course(candidates) or all(end - begin > _GOOD_PART for (begin, end), _ in clear):
         raise max(clear, key=lambda item: item[0][0])[1]
 
 
@@ -58,7 +64,7 @@ def no_motion(
     reason = explain_failure(_decomposition(choices[0]))
     if isinstance(reason, BrachisError):
         return reason
-    if len(dead_ends) == len(choices):
+    if dead_ends and _no_course(candidates):
         name, furthest = max(dead_ends.items(), key=lambda item: item[1].s)
         redundant = f" (redundant joints: {name})" if name != "none" else ""
         return PathError(
@@ -69,6 +75,12 @@ def no_motion(
     counts = Counter(candidate.status for candidate in candidates)
     outcomes = "; ".join(status if n == 1 else f"{status} ({n} times)" for status, n in counts.items())
     return PlanningError(f"no motion within the limits was found: {outcomes or 'no initial guess'}", hint=reason)
+
+
+def _no_course(candidates: Sequence[Candidate]) -> bool:
+    """Tell whether the lattices that were looked at have no course."""
+    lattice = [candidate for candidate in candidates if candidate.origin.startswith("lattice")]
+    return bool(lattice) and not any(candidate.branch for candidate in lattice)
 
 
 def _decomposition(choice: Choice) -> Decomposition:

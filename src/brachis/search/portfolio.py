@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.errors import PlanningError
 from brachis.result import Attempt, Candidate
 from brachis.search.course import DeadEnd
-from brachis.search.efforts import EFFORTS
 from brachis.search.explain import no_motion, refuse_what_is_out_of_reach
 from brachis.search.finishing import Motion
 from brachis.search.solving import Listener
@@ -88,13 +88,9 @@ def find_fastest(choices: Sequence[Choice], listener: Listener) -> Found:
     KeyboardInterrupt
         Ctrl-C before any motion was verified.
     """
-    task = choices[0].setting.task
-    effort = EFFORTS[task.search.effort]
-    closed = [choice for choice in choices if effort.polynomial or choice.match.solver.kind == "closed_form"]
-    choices = (closed or choices)[: effort.choices]
     search = _Search(choices, listener)
     try:
-        search.run(waves(choices, effort, listener, search.note_dead_end))
+        search.run(waves(choices, search.deadline, listener, search.note_dead_end))
     except KeyboardInterrupt:
         if not search.content:
             raise
@@ -108,9 +104,8 @@ class _Search:
     def __init__(self, choices: Sequence[Choice], listener: Listener) -> None:
         self._choices, self._listener = choices, listener
         self._task = choices[0].setting.task
-        self._effort = EFFORTS[self._task.search.effort]
         self._began = time.monotonic()
-        self._deadline = self._began + self._task.search.time_limit
+        self.deadline = self._began + self._task.search.time_limit
         self._candidates: list[Candidate] = []
         self._attempts: list[Attempt] = []
         self._dead_ends: dict[str, DeadEnd] = {}
@@ -136,16 +131,16 @@ class _Search:
             if wave.last_resort and self.content:
                 return
             if wave.last_resort and not refused:
-                refuse_what_is_out_of_reach(self._choices, self._dead_ends)
+                refuse_what_is_out_of_reach(self._choices, self._candidates)
                 refused = True
-            if time.monotonic() > self._deadline:
+            if time.monotonic() > self.deadline:
                 self.interrupted = True
                 return
-            self._finish(self._plan(wave))
+            self._finish(self._plan(wave), wave.refined)
 
     def _plan(self, wave: Wave) -> list[tuple[int, Coarse]]:
         """Plan the ways of a wave coarsely, and rank those that differ."""
-        limit = self._deadline if self.content else self._began + _COARSE_SHARE * self._task.search.time_limit
+        limit = self.deadline if self.content else self._began + _COARSE_SHARE * self._task.search.time_limit
         plans: list[tuple[int, Coarse]] = []
         for plan in each(plan_coarse, wave.ways, limit, jobs=self._task.search.jobs, listener=self._listener):
             plans.append((len(self._candidates), plan))
@@ -158,29 +153,29 @@ class _Search:
                 ranked.append((number, plan))
         return ranked
 
-    def _finish(self, ranked: Sequence[tuple[int, Coarse]]) -> None:
+    def _finish(self, ranked: Sequence[tuple[int, Coarse]], most: int) -> None:
         """Refine and verify plans in the order of their end times while they may be the fastest."""
-        jobs, finished = self._task.search.jobs, 0
+        jobs, left = self._task.search.jobs, most
         for first in range(0, len(ranked), jobs):
             batch = ranked[first : first + jobs]
-            if not self._may_win(batch[0][1], finished):
+            if not self._may_win(batch[0][1], left):
                 return
-            deadline = self._deadline if self.content else max(self._deadline, time.monotonic() + _GRACE)
+            deadline = self.deadline if self.content else max(self.deadline, time.monotonic() + _GRACE)
             outcomes = each(finish, batch, deadline, jobs=jobs, listener=self._listener)
             for (number, plan), (attempt, motion) in zip(batch, outcomes, strict=True):
-                if not self._may_win(plan, finished):
+                if not self._may_win(plan, left):
                     return
-                finished += 1
+                left -= 1
                 self._record(number, plan, attempt, motion)
 
-    def _may_win(self, plan: Coarse, finished: int) -> bool:
+    def _may_win(self, plan: Coarse, left: int) -> bool:
         """Tell whether a plan is worth finishing."""
         if self._best is None or not self.content:
             return True
-        if time.monotonic() > self._deadline:
+        if time.monotonic() > self.deadline:
             self.interrupted = True
             return False
-        return finished < self._effort.refined and plan.t_end < (1.0 - _WORTH_IT) * self._best[0][1]
+        return left > 0 and plan.t_end < (1.0 - _WORTH_IT) * self._best[0][1]
 
     def _record(self, number: int, plan: Coarse, attempt: Attempt, motion: Motion | None) -> None:
         """Put down what became of a plan, and keep the best one."""
@@ -202,6 +197,10 @@ class _Search:
     def found(self) -> Found:
         """Return the best motion, or say why there is none."""
         if self._best is None:
+            if self.interrupted:
+                limit = self._task.search.time_limit
+                problem = f"no motion was found within the time limit of {limit:g} s"
+                raise PlanningError(problem, hint="Raise search.time_limit")
             raise no_motion(self._choices, self._candidates, self._dead_ends)
         _, chosen, motion, family = self._best
         order = sorted(self._candidates, key=lambda c: (not c.verified, c.t_end, c.coarse, c.estimate))

@@ -142,7 +142,7 @@ def first_start(choice: Choice) -> tuple[np.ndarray, int]:
     """
     if choice.setting.start is not None:
         return choice.setting.start, choice.branches[0]
-    found = lattice_seeds(choice, EFFORTS["fast"], choice.setting.task.search.seed)
+    found = lattice_seeds(choice, EFFORTS["fast"][0], choice.setting.task.search.seed)
     if isinstance(found, DeadEnd):
         raise PathError(f"no course along the path was found: {found}", s_interval=(found.s, 1.0))
     return found[0].start, found[0].branch

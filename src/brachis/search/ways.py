@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from brachis.nlp.guess import STRATEGIES
 from brachis.search.course import DeadEnd
-from brachis.search.efforts import Effort
+from brachis.search.efforts import EFFORTS, Effort
 from brachis.search.seeds import Seed, lattice_seeds, numeric_seeds
 from brachis.search.solving import Listener
 from brachis.search.work import Way, each
@@ -28,23 +29,27 @@ class Wave:
     Attributes
     ----------
     ways : tuple of Way
+    refined : int
+        How many of them are refined and verified at most once a motion is verified.
     last_resort : bool
         Whether it is tried only while no motion is verified.
     """
 
     ways: tuple[Way, ...]
+    refined: int
     last_resort: bool = False
 
 
 def waves(
-    choices: Sequence[Choice], effort: Effort, listener: Listener, note: Callable[[Choice, DeadEnd], None]
+    choices: Sequence[Choice], deadline: float, listener: Listener, note: Callable[[Choice, DeadEnd], None]
 ) -> Iterator[Wave]:
-    """Yield waves: the most promising seeds with the first solver, then what is tried where these fail.
+    """Yield waves: level by level the most promising seeds with the first solver, then what is tried where all fail.
 
     Parameters
     ----------
     choices : sequence of Choice
-    effort : Effort
+    deadline : float
+        By the monotonic clock, s; no lattice is begun after it.
     listener : callable
     note : callable
         Told of choices whose lattice has no course.
@@ -54,50 +59,63 @@ def waves(
     Wave
     """
     task = choices[0].setting.task
-    numeric = task.search.guesses == "numeric"
-    if numeric:
-        seeds = [seed for choice in choices for seed in numeric_seeds(choice, effort.seeds)]
-    else:
-        seeds = _from_lattices(choices, effort, task, listener, note)
     solvers = [solver.name for solver in solver_named(task.solver.name)]
-    if task.solver.name == "auto" and seeds and _variables(task, seeds[0]) > _MANY_VARIABLES:
+    if task.solver.name == "auto" and _variables(task, choices[0]) > _MANY_VARIABLES:
         solvers[:2] = solvers[1::-1]
-    for first in range(0, len(seeds), _WAVE):
-        yield Wave(tuple(Way(seed, solvers[0]) for seed in seeds[first : first + _WAVE]))
-    yield Wave(tuple(Way(seed, solver) for seed in seeds[:_WAVE] for solver in solvers[1:2]), last_resort=True)
-    for choice in choices:
-        for seed in numeric_seeds(choice, len(STRATEGIES))[effort.seeds if numeric else 0 :]:
-            yield Wave(tuple(Way(seed, solver) for solver in solvers[:2]), last_resort=True)
-    yield Wave(tuple(Way(seed, solver) for solver in solvers[2:] for seed in seeds[:2]), last_resort=True)
+    known: list[Seed] = []
+    for effort in EFFORTS[task.search.effort]:
+        allowed = _within(choices, effort)
+        if task.search.guesses == "numeric":
+            seeds = [seed for choice in allowed for seed in numeric_seeds(choice, effort.seeds)]
+        else:
+            seeds = _from_lattices(allowed, effort, deadline, listener, note)
+        known += seeds
+        for first in range(0, len(seeds), _WAVE):
+            yield Wave(tuple(Way(seed, solvers[0]) for seed in seeds[first : first + _WAVE]), effort.refined)
+    many = len(known) + len(STRATEGIES)
+    yield Wave(tuple(Way(seed, solver) for seed in known[:_WAVE] for solver in solvers[1:2]), many, last_resort=True)
+    for choice in allowed:
+        for seed in numeric_seeds(choice, len(STRATEGIES)):
+            yield Wave(tuple(Way(seed, solver) for solver in solvers[:2]), many, last_resort=True)
+    yield Wave(tuple(Way(seed, solver) for solver in solvers[2:] for seed in known[:2]), many, last_resort=True)
+
+
+def _within(choices: Sequence[Choice], effort: Effort) -> Sequence[Choice]:
+    """Return the choices that a level looks at."""
+    closed = [choice for choice in choices if effort.polynomial or choice.match.solver.kind == "closed_form"]
+    return (closed or choices)[: effort.choices]
 
 
 def _from_lattices(
     choices: Sequence[Choice],
     effort: Effort,
-    task: Task,
+    deadline: float,
     listener: Listener,
     note: Callable[[Choice, DeadEnd], None],
 ) -> list[Seed]:
     """Take seeds of all choices in turn, those with the least estimated times first."""
+    search = choices[0].setting.task.search
     ranked: list[tuple[int, float, int, Seed]] = []
-    outcomes = each(_seeds_of, choices, effort, task.search.seed, jobs=task.search.jobs, listener=listener)
+    outcomes = each(_seeds_of, choices, effort, search.seed, deadline, jobs=search.jobs, listener=listener)
     for choice, outcome in zip(choices, outcomes, strict=True):
         if isinstance(outcome, DeadEnd):
             note(choice, outcome)
-        else:
-            own = [dataclasses.replace(seed, choice=choice) for seed in outcome]  # not another process's copy
-            own = sorted(own, key=lambda seed: seed.estimate) + numeric_seeds(choice, effort.numeric)
-            ranked += [(place, seed.estimate, len(ranked) + place, seed) for place, seed in enumerate(own)]
+            continue
+        own = [dataclasses.replace(seed, choice=choice) for seed in outcome]  # not another process's copy
+        own = sorted(own, key=lambda seed: seed.estimate) + numeric_seeds(choice, effort.numeric)
+        ranked += [(place, seed.estimate, len(ranked) + place, seed) for place, seed in enumerate(own)]
     return [seed for *_, seed in sorted(ranked, key=lambda item: item[:-1])[: effort.plans]]
 
 
-def _seeds_of(choice: Choice, effort: Effort, seed: int, listener: Listener) -> list[Seed] | DeadEnd:
+def _seeds_of(choice: Choice, effort: Effort, seed: int, deadline: float, listener: Listener) -> list[Seed] | DeadEnd:
+    if time.monotonic() > deadline:
+        return []
     listener(f"looking for courses on the lattice of {choice.name}")
     return lattice_seeds(choice, effort, seed)
 
 
-def _variables(task: Task, seed: Seed) -> int:
+def _variables(task: Task, choice: Choice) -> int:
     """Return about how many variables the NLP has."""
     spline = task.spline
     intervals = 0 if spline.intervals == "auto" else spline.intervals
-    return (1 + len(seed.choice.redundant)) * (intervals + spline.degree)
+    return (1 + len(choice.redundant)) * (intervals + spline.degree)

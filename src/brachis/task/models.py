@@ -109,8 +109,10 @@ class SplineSettings(Model):
 class SearchSettings(Model):
     """The search over redundant joints, branches and initial guesses."""
 
-    effort: Literal["fast", "thorough", "exhaustive"] = Field(
-        default="fast", description="How many initial guesses are tried, and how many of the best plans are refined."
+    effort: Literal["single", "fast", "thorough", "exhaustive"] = Field(
+        default="fast",
+        description="How far the search goes: single plans once, from the most promising guess, and goes on only if "
+        "that fails.",
     )
     guesses: Literal["lattice", "numeric"] = Field(
         default="lattice",

@@ -1,0 +1,68 @@
+"""The paper's eight lines with everything left open: at the best optimum that random restarts find."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.nlp.guess import starting_point
+from brachis.search.solving import MARGINS, continued
+from brachis.setting import Setting, choices, transcription
+from brachis.solvers import SolverOptions, solver_named
+
+ROOT = Path(__file__).parents[2]
+RESTARTS = 20
+spec = importlib.util.spec_from_file_location("scara_table", ROOT / "examples/02_scara_table.py")
+table = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(table)
+
+
+def random_course(rng: np.random.Generator, start: float) -> np.ndarray:
+    """A smooth course of the redundant joint that may go anywhere, (S, 2)."""
+    s = np.linspace(0.0, 1.0, 41)
+    sizes = rng.normal(size=4) * [1.5, 0.8, 0.5, 0.3]
+    waves = sum(size * np.sin(k * np.pi * s) for k, size in enumerate(sizes[1:], 1))
+    return np.column_stack([s, start + sizes[0] * s + waves])
+
+
+def restarts(setting: Setting) -> dict[str, np.ndarray]:
+    """End times, s, of plans from random courses, for every choice of the redundant joint."""
+    rng = np.random.default_rng(0)
+    times = {}
+    for choice in choices(setting):
+        problem = transcription(setting, choice.decomposition(setting.start, choice.branches[0]), 20)
+        found = []
+        for _ in range(4000):
+            x = starting_point(problem, random_course(rng, setting.start[choice.redundant[0]]))
+            if x is None:
+                continue
+            _, reports = continued(problem, x, solve, MARGINS)
+            found.append(reports[-1].objective if reports[-1].status.usable else np.inf)
+            if len(found) == RESTARTS:
+                break
+        times[choice.name] = np.array(found)
+    return times
+
+
+def solve(problem, x):
+    return solver_named("uno")[0].solve(problem, x, SolverOptions(max_iterations=100, time_limit=5.0), None)
+
+
+@pytest.mark.parametrize("angle", table.ANGLES_DEG)
+def test_auto_is_at_the_best_optimum_of_random_restarts(angle):
+    robot, task = table.robot_and_task(angle, "auto")
+    result = brachis.plan(robot, task)
+    assert result.verified
+    times = restarts(Setting.of(robot, brachis.load_task(task)))
+    assert set(times) == {"j1", "j2", "j3"}
+    assert all(len(found) == RESTARTS for found in times.values())
+    best = min(found.min() for found in times.values())
+    assert min(candidate.coarse for candidate in result.candidates) <= best * (1.0 + 1e-4)
+    assert result.t_end <= best * (1.0 + 2e-3)  # the limits now hold between the points as well
+    if angle == 180:
+        assert result.t_end <= 2.10
+        assert np.median(times["j1"]) > 2.3, "this line asks for the search"

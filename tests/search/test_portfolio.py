@@ -1,0 +1,181 @@
+"""The search as a whole: what is left open, order, limits, interruptions."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import signal
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.errors import PlanningError, TaskError, UnknownNameError
+from brachis.plots import plot_candidates
+from brachis.search import portfolio
+
+ROOT = Path(__file__).parents[2]
+START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
+HERE = [math.sqrt(3.0), 0.0]
+
+
+@pytest.fixture(scope="module")
+def robot() -> brachis.Robot:
+    limits = brachis.LimitSpec(torque=10.0, velocity=None)
+    return brachis.Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
+
+
+def task(**changes: Any) -> dict[str, Any]:
+    return {
+        "brachis": 1,
+        "start": {"joints": START},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"length": 0.6, "angle_deg": 90}}],
+        "spline": {"intervals": 10},
+    } | changes
+
+
+def without_times(result: brachis.Result) -> list[brachis.Candidate]:
+    return [dataclasses.replace(candidate, t_end=round(candidate.t_end, 9)) for candidate in result.candidates]
+
+
+def test_every_candidate_is_listed_the_fastest_first(robot):
+    result = brachis.plan(robot, task())
+    first = result.candidates[0]
+    assert first.verified
+    assert first.t_end == result.t_end
+    assert first.redundant_joints == result.trajectory.redundant_joints
+    assert {candidate.redundant_joints for candidate in result.candidates} == {("j1",), ("j2",), ("j3",)}
+    finished = [candidate for candidate in result.candidates if candidate.verified]
+    assert result.t_end == min(candidate.t_end for candidate in finished)
+    # Refinement only adds rows: nothing that was left unfinished could have been faster.
+    unfinished = [candidate.coarse for candidate in result.candidates if candidate.status in ("optimal", "settled")]
+    assert unfinished
+    assert min(unfinished) >= result.t_end * (1.0 - 2e-4)
+    assert len(plot_candidates(result.candidates).axes) == 1
+
+
+def test_the_same_candidates_whatever_the_number_of_processes(robot):
+    one = brachis.plan(robot, task(search={"jobs": 1}))
+    two = brachis.plan(robot, task(search={"jobs": 2}))
+    assert one.t_end == two.t_end
+    assert without_times(one) == without_times(two)
+    np.testing.assert_array_equal(one.trajectory.control_points, two.trajectory.control_points)
+
+
+def test_more_effort_is_never_slower(robot):
+    fast = brachis.plan(robot, task())
+    single = brachis.plan(robot, task(search={"effort": "single"}))
+    thorough = brachis.plan(robot, task(search={"effort": "thorough"}))
+    assert len(single.candidates) == 1
+    assert len(single.candidates) < len(fast.candidates) < len(thorough.candidates)
+    assert thorough.t_end <= fast.t_end * (1.0 + 2e-4) <= single.t_end * (1.0 + 4e-4)
+
+
+def test_a_free_start_is_faster_and_on_the_path(robot):
+    given = brachis.plan(robot, task())
+    free = brachis.plan(robot, task(start="free", path_start=HERE))
+    assert free.verified
+    assert free.t_end < 0.9 * given.t_end
+    begun = robot.tool_placement(free.trajectory.position(0.0)).translation[:2]
+    np.testing.assert_allclose(begun, HERE, atol=1e-9)
+    labels = {candidate.branch for candidate in free.candidates}
+    assert labels == {"elbow_positive", "elbow_negative"}
+
+
+def test_a_branch_can_be_asked_for(robot):
+    for label in ("elbow_positive", "elbow_negative"):
+        result = brachis.plan(
+            robot, task(start="free", path_start=HERE, branch=label, redundant_joints=["j1"], spline={"intervals": 8})
+        )
+        assert result.trajectory.branch == label
+        assert {candidate.branch for candidate in result.candidates} == {label}
+    with pytest.raises(UnknownNameError, match="elbow_up"):
+        brachis.plan(robot, task(start="free", path_start=HERE, branch="elbow_up", redundant_joints=["j1"]))
+
+
+def test_a_free_start_needs_a_place_and_no_numeric_guess(robot):
+    with pytest.raises(TaskError, match="path_start"):
+        brachis.plan(robot, task(start="free"))
+    with pytest.raises(TaskError, match=r"search\.guesses"):
+        brachis.plan(robot, task(start="free", path_start=HERE, search={"guesses": "numeric"}))
+
+
+def test_an_end_posture_with_a_free_start(robot):
+    free = brachis.plan(robot, task(start="free", path_start=HERE))
+    end = free.trajectory.position(free.t_end)
+    result = brachis.plan(robot, task(start="free", path_start=HERE, end={"joints": list(end)}))
+    assert result.verified
+    assert result.t_end == pytest.approx(free.t_end, rel=1e-2)
+
+
+def test_numeric_guesses_stay_an_option(robot):
+    result = brachis.plan(robot, task(search={"guesses": "numeric"}))
+    assert result.verified
+    assert all(candidate.origin.startswith("numeric") for candidate in result.candidates)
+
+
+def test_numeric_guesses_step_in_where_the_lattice_has_no_course(robot, monkeypatch):
+    from brachis.search import seeds  # noqa: PLC0415
+    from brachis.search.course import DeadEnd  # noqa: PLC0415
+
+    class Nothing:
+        def __init__(self, *_arguments: object, **_options: object) -> None:
+            pass
+
+        def courses(self, _most: int) -> DeadEnd:
+            return DeadEnd(0.5, {"nothing": 1})
+
+    monkeypatch.setattr(seeds, "Lattice", Nothing)
+    result = brachis.plan(robot, task())
+    assert result.verified
+    assert result.candidates[0].origin.startswith("numeric")
+    assert sum(candidate.status == "from s = 0.5 on nothing" for candidate in result.candidates) == 3
+
+
+def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
+    honest, calls = portfolio.plan_coarse, []
+
+    def interrupted(*arguments: Any) -> Any:
+        calls.append(arguments)
+        if len(calls) == 20:
+            raise KeyboardInterrupt
+        return honest(*arguments)
+
+    monkeypatch.setattr(portfolio, "plan_coarse", interrupted)
+    result = brachis.plan(robot, task(search={"effort": "thorough"}))
+    assert result.interrupted
+    assert result.verified
+    assert len(calls) == 20
+    calls.clear()
+    calls.extend([()] * 19)
+    with pytest.raises(KeyboardInterrupt):
+        brachis.plan(robot, task())
+
+
+def test_a_real_ctrl_c_ends_worker_processes(robot):
+    timer = threading.Timer(8.0, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    try:
+        result = brachis.plan(robot, task(search={"effort": "exhaustive", "jobs": 2}, spline={"intervals": 40}))
+    except KeyboardInterrupt:
+        return  # nothing was verified yet
+    finally:
+        timer.cancel()
+    assert result.verified
+
+
+def test_the_time_limit_gives_the_best_motion_so_far(robot):
+    result = brachis.plan(robot, task(search={"effort": "exhaustive", "time_limit": 3.0}))
+    assert result.verified
+    assert result.interrupted
+    assert result.timing["total"] < 8.0
+
+
+def test_a_time_limit_that_is_too_short_says_so(robot):
+    with pytest.raises(PlanningError, match=r"within the time limit of 0\.001 s\. Raise search\.time_limit"):
+        brachis.plan(robot, task(search={"time_limit": 1e-3}))
