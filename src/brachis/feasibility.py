@@ -145,11 +145,17 @@ def _branch_of(robot: Robot, task_space: TaskSpace, match: Match, posture: np.nd
     return branch
 
 
-def explain_failure(decomposition: Decomposition) -> BrachisError | str:
+def explain_failure(decomposition: Decomposition, *, any_branch: bool = False) -> BrachisError | str:
     """Why no motion was found: an error where the path is out of reach or too heavy to hold, else advice.
 
     Redundant joints are searched at random at stations along the path, so "out of reach" means that none of many
     postures reaches the target.
+
+    Parameters
+    ----------
+    decomposition : Decomposition
+    any_branch : bool, optional
+        Whether a motion may be on any branch, not the decomposition's alone.
     """
     s = np.linspace(0.0, 1.0, _STATIONS)
     answers = _postures_along(decomposition, s)
@@ -164,7 +170,8 @@ def explain_failure(decomposition: Decomposition) -> BrachisError | str:
             s_interval=(first, float(s[np.flatnonzero(~anyhow)[-1]])),
             hint="Shorten or move the path, or widen the joint ranges",
         )
-    own = reached[:, :, decomposition.slots].any(axis=(1, 2))
+    slots = list(range(reached.shape[2])) if any_branch else decomposition.slots
+    own = reached[:, :, slots].any(axis=(1, 2))
     if not own.all():
         first = float(s[int(np.argmin(own))])
         label = decomposition.solver.branches[decomposition.branch]
@@ -173,7 +180,7 @@ def explain_failure(decomposition: Decomposition) -> BrachisError | str:
             s_interval=(first, float(s[np.flatnonzero(~own)[-1]])),
             hint="Start in a posture of another branch, or choose other redundant joints",
         )
-    held = _held(decomposition, answers[:, :, decomposition.slots], reached[:, :, decomposition.slots])
+    held = _held(decomposition, answers[:, :, slots], reached[:, :, slots])
     if not held.all():
         first = float(s[int(np.argmin(held))])
         return PathError(

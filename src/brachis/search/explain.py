@@ -9,7 +9,6 @@ import numpy as np
 
 from brachis.errors import BrachisError, PathError, PlanningError
 from brachis.feasibility import explain_failure
-from brachis.kinematics import Decomposition
 from brachis.result import Candidate
 from brachis.search.course import DeadEnd
 from brachis.setting import Choice
@@ -33,7 +32,7 @@ def refuse_what_is_out_of_reach(choices: Sequence[Choice], candidates: Sequence[
     ------
     PathError
     """
-    reasons = [explain_failure(_decomposition(choice)) for choice in choices[:_LOOKED_AT]]
+    reasons = [_reason(choice) for choice in choices[:_LOOKED_AT]]
     clear = [
         (reason.s_interval, reason)
         for reason in reasons
@@ -61,7 +60,7 @@ def no_motion(
     -------
     PathError or PlanningError
     """
-    reason = explain_failure(_decomposition(choices[0]))
+    reason = _reason(choices[0])
     if isinstance(reason, BrachisError):
         return reason
     if dead_ends and _no_course(candidates):
@@ -83,6 +82,7 @@ def _no_course(candidates: Sequence[Candidate]) -> bool:
     return bool(lattice) and not any(candidate.branch for candidate in lattice)
 
 
-def _decomposition(choice: Choice) -> Decomposition:
+def _reason(choice: Choice) -> BrachisError | str:
     start = choice.setting.start
-    return choice.decomposition(np.zeros(choice.setting.robot.n) if start is None else start, choice.branches[0])
+    given = np.zeros(choice.setting.robot.n) if start is None else start
+    return explain_failure(choice.decomposition(given, choice.branches[0]), any_branch=start is None)
