@@ -1,0 +1,23 @@
+"""The page on the search states the efforts as they are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from brachis.search.efforts import EFFORTS
+
+PAGE = Path(__file__).parents[2] / "docs/search.md"
+
+
+def test_the_documented_efforts_are_the_real_ones():
+    rows = [line.split("|")[1:-1] for line in PAGE.read_text().splitlines() if line.startswith("| `")]
+    named = {cells[0].split("`")[1]: [cell.strip() for cell in cells[1:]] for cells in rows if len(cells) == 5}
+    table = {name: cells for name, cells in named.items() if name != "search.effort"}
+    assert set(table) == set(EFFORTS)
+    for name, (choices, seeds, plans, refined) in table.items():
+        level = EFFORTS[name][-1]
+        assert choices == {1: "the first one", 6: "6", 20: "20"}.get(level.choices, "all")
+        assert seeds.split(",")[0] == str(level.seeds)
+        assert ("and 8" in seeds) is (level.numeric == 8)
+        assert plans == (str(level.plans) if level.plans < 10_000 else "all")
+        assert refined == str(level.refined)
