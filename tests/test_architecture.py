@@ -31,6 +31,7 @@ ORDER = (
     "result",
     "attempts",
     "planner",
+    "bottleneck",
     "plots",
     "export",
     "cli",

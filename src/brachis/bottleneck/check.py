@@ -1,0 +1,180 @@
+"""Predictions checked by solving again: the same problem with one limit after the other raised.
+
+Knots, collocation points and branch margins stay; every solve begins at the answer and is held to a tighter tolerance.
+An answer counts as an optimum where least squares find multipliers for it, whatever the solver says of itself.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from brachis.bottleneck.multipliers import multipliers_of
+from brachis.bottleneck.sensitivities import Sensitivities, Sensitivity, sensitivities
+from brachis.errors import PlanningError, UnreachableError
+from brachis.nlp import Transcription
+from brachis.refine import Refined
+from brachis.solvers import SolverOptions, solver_named
+
+STEP = 0.01
+"""Fraction by which limits are raised, unless asked otherwise."""
+_TOLERANCE, _ITERATIONS, _SECONDS = 1e-8, 300, 10.0
+_OPTIMAL = 1e-5
+_FEASIBLE = 1e-7
+_NO_CHANGE = 1e-9
+"""A limit that is predicted to change t_E by a smaller fraction of it does not press: the answer stays an optimum."""
+
+
+@dataclass(frozen=True)
+class CheckedSensitivity:
+    """A prediction beside the change that solving again gives.
+
+    Attributes
+    ----------
+    sensitivity : Sensitivity
+    predicted, re_solved : float
+        Change of t_E, s.
+    optimal : bool
+        False where the solve again ended without an optimum, so that `re_solved` says little.
+    """
+
+    sensitivity: Sensitivity
+    predicted: float
+    re_solved: float
+    optimal: bool
+
+    @property
+    def deviation(self) -> float:
+        """How far the prediction is off, as a fraction of the re-solved change; 0 where neither is a change."""
+        if self.re_solved == self.predicted:
+            return 0.0
+        return abs(self.predicted - self.re_solved) / abs(self.re_solved) if self.re_solved else np.inf
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as plain data for JSON."""
+        entry = self.sensitivity
+        return {
+            "joint": entry.joint,
+            "kind": entry.kind,
+            "end": entry.end,
+            "predicted_s": self.predicted,
+            "re_solved_s": self.re_solved,
+            "difference_s": self.predicted - self.re_solved,
+            "deviation": self.deviation,
+            "optimal": self.optimal,
+        }
+
+
+@dataclass(frozen=True)
+class SensitivityCheck:
+    """All predictions beside the changes that solving again gives.
+
+    Attributes
+    ----------
+    step : float
+        Fraction by which every limit left more room.
+    t_end : float
+        Of the unchanged problem at the tighter tolerance, s.
+    entries : tuple of CheckedSensitivity
+        In the order of the sensitivities.
+    wall_time : float
+        s.
+    """
+
+    step: float
+    t_end: float
+    entries: tuple[CheckedSensitivity, ...]
+    wall_time: float
+
+    def worst_deviation(self, above: float = 1e-4) -> float:
+        """Largest deviation among the re-solved changes larger than `above`, s; 0 where there are none."""
+        return max((entry.deviation for entry in self.entries if abs(entry.re_solved) > above), default=0.0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as plain data for JSON."""
+        return {
+            "step": self.step,
+            "t_end_s": self.t_end,
+            "entries": [entry.to_dict() for entry in self.entries],
+            "worst_deviation_of_changes_above_1e-4_s": self.worst_deviation(),
+            "wall_time_s": self.wall_time,
+        }
+
+
+def check_sensitivities(
+    refined: Refined, predictions: Sensitivities | None = None, *, step: float = STEP
+) -> SensitivityCheck:
+    """Solve the refined problem again with every limit raised, and compare with what the multipliers predict.
+
+    Parameters
+    ----------
+    refined : Refined
+        ``result.attempt.refined``.
+    predictions : Sensitivities, optional
+        What is checked; by default what `sensitivities` says.
+    step : float, optional
+        Fraction by which each limit leaves more room.
+
+    Returns
+    -------
+    SensitivityCheck
+
+    Raises
+    ------
+    PlanningError
+        No solver could solve the unchanged problem again.
+    """
+    began = time.perf_counter()
+    predictions = predictions or sensitivities(refined)
+    problem, robot = refined.problem, refined.problem.decomposition.robot
+    base, _ = _solved_again(problem, refined.reports[-1].x)
+    checked: list[CheckedSensitivity] = []
+    for entry in predictions.limits:
+        predicted = entry.change(step)
+        if abs(predicted) <= _NO_CHANGE * base[0]:
+            checked.append(CheckedSensitivity(entry, predicted, predicted, optimal=True))
+            continue
+        limits = entry.raised(robot.limits, robot.joint_names.index(entry.joint), step)
+        answer, optimal = _solved_again(problem.with_limits(limits), base)
+        checked.append(CheckedSensitivity(entry, predicted, float(answer[0] - base[0]), optimal))
+    return SensitivityCheck(step, float(base[0]), tuple(checked), time.perf_counter() - began)
+
+
+def _solved_again(problem: Transcription, x: np.ndarray) -> tuple[np.ndarray, bool]:
+    """Solve to a tight tolerance from x with one backend after the other; tell whether it is an optimum.
+
+    Raises
+    ------
+    PlanningError
+        No backend found a feasible point.
+    """
+    answers: list[np.ndarray] = []
+    for solver in solver_named("auto"):
+        try:
+            report = solver.solve(problem, x, SolverOptions(_TOLERANCE, _ITERATIONS, _SECONDS), None)
+        except ImportError:
+            continue
+        if report.violation > _FEASIBLE:
+            continue
+        if _residual(problem, report.x) <= _OPTIMAL:
+            return report.x, True
+        answers.append(report.x)
+    if not answers:
+        raise PlanningError("the answer could not be solved again", hint="Plan with a smaller solver.tolerance.")
+    return min(answers, key=_first), False
+
+
+def _residual(problem: Transcription, x: np.ndarray) -> float:
+    try:
+        return multipliers_of(problem, x).residual
+    except UnreachableError:
+        return np.inf
+
+
+def _first(x: Sequence[float]) -> float:
+    """Return the end time, s."""
+    return float(x[0])
