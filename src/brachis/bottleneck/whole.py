@@ -11,6 +11,7 @@ from brachis.bottleneck.check import SensitivityCheck, check_sensitivities
 from brachis.bottleneck.reference import Reference, find_reference
 from brachis.bottleneck.saturation import THRESHOLD, Saturation, saturations
 from brachis.bottleneck.sensitivities import Sensitivities, sensitivities
+from brachis.bottleneck.words import in_words
 from brachis.errors import InputError
 from brachis.result import Result
 
@@ -41,6 +42,10 @@ class BottleneckReport:
     check: SensitivityCheck | None = None
     reference: Reference | None = None
     reference_sought: bool = False
+
+    def __str__(self) -> str:
+        """Say all in plain words."""
+        return "\n".join(in_words(self))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
