@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from brachis.bottleneck.check import SensitivityCheck
@@ -31,6 +32,11 @@ def in_words(report: BottleneckReport) -> list[str]:
     return lines
 
 
+def _figures(value: float) -> str:
+    """Write a positive number with two significant figures, or all before the point."""
+    return f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f}"
+
+
 def _costs(found: Sensitivities, t_end: float) -> list[str]:
     """Sentences on every limit that costs time, the costliest first."""
     lines = []
@@ -41,9 +47,8 @@ def _costs(found: Sensitivities, t_end: float) -> list[str]:
         )
     costly = [entry for entry in found.limits if -entry.change(_FRACTION) > _NOTHING * t_end]
     lines += [_saving(entry, t_end) for entry in costly]
-    rest = len(found.limits) - len(costly)
-    if rest:
-        lines.append(f"the other {rest} limits cost no time" if costly else "no limit of a joint costs time")
+    if len(costly) < len(found.limits):
+        lines.append("no other limit costs time" if costly else "no limit of a joint costs time")
     lines.append(f"(to first order, from multipliers by the {found.source}, residual {found.residual:.0e})")
     return lines + [_boundary(entry) for entry in found.boundaries]
 
@@ -56,13 +61,13 @@ def _saving(entry: Sensitivity, t_end: float) -> str:
         more = f"{100.0 * _FRACTION:.0f} % more {entry.kind} at {entry.joint} ({amount})"
     else:
         more = f"{amount} more range at the {entry.end} end of {entry.joint}"
-    return f"{more} saves {100.0 * saved / t_end:.2g} % ({1e3 * saved:.2g} ms)"
+    return f"{more} saves {_figures(100.0 * saved / t_end)} % ({_figures(1e3 * saved)} ms)"
 
 
 def _boundary(entry: BranchBoundary) -> str:
-    saved = 1e3 * entry.derivative * entry.margin
+    saved = _figures(1e3 * entry.derivative * entry.margin)
     return (
-        f"the branch boundary of {entry.label} costs {saved:.2g} ms (margin {entry.margin:.3g}, to first order): no "
+        f"the branch boundary of {entry.label} costs {saved} ms (margin {entry.margin:.3g}, to first order): no "
         "limit of the robot; other redundant joints may be faster"
     )
 

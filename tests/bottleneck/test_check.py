@@ -1,0 +1,75 @@
+"""Predictions within 5 % of what solving again gives: the project's own requirement."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.bottleneck import check_sensitivities, sensitivities
+from brachis.errors import InputError
+
+ROOT = Path(__file__).parents[2]
+LARGE = 1e-4
+
+
+def holds(result, least):
+    check = check_sensitivities(result.attempt.refined)
+    large = [entry for entry in check.entries if abs(entry.re_solved) > LARGE]
+    assert len(large) >= least
+    assert all(entry.optimal for entry in large)
+    assert check.worst_deviation(LARGE) < 0.05
+    assert check.worst_deviation(LARGE * check.t_end) < 0.05
+    return check
+
+
+@pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
+def test_planar_line(scara, joint):
+    check = holds(scara(joint), 2)
+    assert check.entries[0].predicted == min(entry.predicted for entry in check.entries)
+
+
+def test_arm_on_a_rail():
+    task = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
+    check = holds(brachis.plan(None, {**task, "redundant_joints": ["rail"]}), 3)
+    assert {entry.sensitivity.kind for entry in check.entries[:3]} == {"torque", "velocity"}
+
+
+def test_range_of_a_joint(slide):
+    limits = {"torque": {"j1": 30.0}, "position": {"j1": [-0.05, 0.05]}}
+    result = slide(((1.0, 0.0, 0.0),) * 2, ("x",), (1.2,), redundant=["j1"], robot={"limits": limits})
+    check = holds(result, 2)
+    assert any(entry.sensitivity.kind == "position" and entry.re_solved < -LARGE for entry in check.entries)
+
+
+def test_a_wrong_prediction_is_found(scara):
+    refined = scara("j3").attempt.refined
+    found = sensitivities(refined)
+    doubled = tuple(dataclasses.replace(entry, derivative=2.0 * entry.derivative) for entry in found.limits)
+    check = check_sensitivities(refined, dataclasses.replace(found, limits=doubled))
+    assert check.worst_deviation(LARGE) == pytest.approx(1.0, abs=0.05)
+
+
+def test_other_limits_are_the_robots_own(scara):
+    refined = scara("j1").attempt.refined
+    problem, x = refined.problem, refined.x
+    robot = problem.decomposition.robot
+    entry = sensitivities(refined).of("j2", "torque")
+    other = problem.with_limits(entry.raised(robot.limits, 1, 0.25))
+    rows, weaker = problem.rows(x), other.rows(x)
+    torque = slice(0, 3 * len(problem.tau))
+    ratio = weaker[torque].reshape(-1, 3) / rows[torque].reshape(-1, 3)
+    np.testing.assert_allclose(ratio, np.broadcast_to([1.0, 0.8, 1.0], ratio.shape))
+    np.testing.assert_array_equal(weaker[torque.stop :], rows[torque.stop :])
+    assert other.guards == problem.guards
+    assert robot.limits.torque[1] == 10.0, "the robot itself keeps its limits"
+
+
+def test_report_needs_the_solved_problem(scara):
+    result = scara("j3")
+    bare = dataclasses.replace(result, attempts=tuple(dataclasses.replace(a, refined=None) for a in result.attempts))
+    with pytest.raises(InputError, match="no solved problem"):
+        brachis.bottleneck.report(bare)
