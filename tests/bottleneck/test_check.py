@@ -73,3 +73,24 @@ def test_report_needs_the_solved_problem(scara):
     bare = dataclasses.replace(result, attempts=tuple(dataclasses.replace(a, refined=None) for a in result.attempts))
     with pytest.raises(InputError, match="no solved problem"):
         brachis.bottleneck.report(bare)
+
+
+def test_another_limit_that_takes_over_within_the_step(slide):
+    free = slide()
+    fastest = np.abs(free.trajectory.velocity(np.linspace(0.0, free.t_end, 4001))).max()
+    result = slide(robot={"limits": {"velocity": 1.002 * fastest}})
+    assert result.t_end == pytest.approx(free.t_end, rel=1e-6), "the velocity limit does not hold it back yet"
+    check = check_sensitivities(result.attempt.refined, step=0.05)
+    (entry,) = [entry for entry in check.entries if entry.predicted]
+    assert entry.predicted == pytest.approx(-0.025 * check.t_end, rel=1e-4)
+    assert entry.deviation > 0.2, "the multipliers know nothing of the velocity limit"
+    assert entry.predicted < entry.linearised
+    assert entry.linearised_deviation < 0.5 * entry.deviation
+
+
+@pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
+def test_linearised_changes_promise_no_more_than_multipliers(scara, joint):
+    for step, rel in ((0.01, 0.05), (1e-5, 1e-3)):
+        for entry in check_sensitivities(scara(joint).attempt.refined, step=step).entries:
+            assert entry.predicted * (1.0 + 1e-5) <= entry.linearised <= 0.0
+            assert entry.linearised == pytest.approx(entry.predicted, rel=rel, abs=1e-8)

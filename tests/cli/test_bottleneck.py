@@ -36,7 +36,9 @@ def test_check_and_reference(run, task, write):
     assert {joint for joint, *_ in checked} >= {"j1", "j2"}
     for _, predicted, found in checked:
         assert float(predicted) == pytest.approx(float(found), rel=0.05)
-    assert re.search(r"reference 2\.\d+ s \(.*not a proven bound.*\): the motion takes \d+\.\d+ % \(.* ms\) longer", outcome.out)
+    assert re.search(
+        r"reference 2\.\d+ s \(.*not a proven bound.*\): the motion takes \d+\.\d+ % \(.* ms\) longer", outcome.out
+    )
 
 
 def test_json(run, task, write):

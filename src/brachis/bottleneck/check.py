@@ -7,24 +7,26 @@ An answer counts as an optimum where least squares find multipliers for it, what
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from brachis.bottleneck.linearised import linearised_change
 from brachis.bottleneck.multipliers import multipliers_of
 from brachis.bottleneck.sensitivities import Sensitivities, Sensitivity, sensitivities
 from brachis.errors import PlanningError, UnreachableError
 from brachis.nlp import Transcription
 from brachis.refine import Refined
-from brachis.solvers import SolverOptions, solver_named
+from brachis.solvers import SolverOptions, residual, solver_named
 
 STEP = 0.01
 """Fraction by which limits are raised, unless asked otherwise."""
-_TOLERANCE, _ITERATIONS, _SECONDS = 1e-8, 300, 10.0
+_TOLERANCE, _ITERATIONS, _SECONDS = 1e-8, 300, 3.0
 _OPTIMAL = 1e-5
 _FEASIBLE = 1e-7
+_EXACT = 1e-9
+"""An answer that violates no row and leaves no gradient beyond this is not solved again."""
 _NO_CHANGE = 1e-9
 """A limit that is predicted to change t_E by a smaller fraction of it does not press: the answer stays an optimum."""
 
@@ -36,23 +38,31 @@ class CheckedSensitivity:
     Attributes
     ----------
     sensitivity : Sensitivity
-    predicted, re_solved : float
-        Change of t_E, s.
+    predicted : float
+        Change of t_E that the multipliers promise, s.
+    linearised : float
+        Change by `linearised_change`, which lets other limits take over within the step, s.
+    re_solved : float
+        Change found by solving again, s.
     optimal : bool
         False where the solve again ended without an optimum, so that `re_solved` says little.
     """
 
     sensitivity: Sensitivity
     predicted: float
+    linearised: float
     re_solved: float
     optimal: bool
 
     @property
     def deviation(self) -> float:
-        """How far the prediction is off, as a fraction of the re-solved change; 0 where neither is a change."""
-        if self.re_solved == self.predicted:
-            return 0.0
-        return abs(self.predicted - self.re_solved) / abs(self.re_solved) if self.re_solved else np.inf
+        """How far the multipliers' promise is off, as a fraction of the re-solved change; 0 where neither changes."""
+        return _deviation(self.predicted, self.re_solved)
+
+    @property
+    def linearised_deviation(self) -> float:
+        """As `deviation`, of `linearised`."""
+        return _deviation(self.linearised, self.re_solved)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -62,11 +72,19 @@ class CheckedSensitivity:
             "kind": entry.kind,
             "end": entry.end,
             "predicted_s": self.predicted,
+            "linearised_s": self.linearised,
             "re_solved_s": self.re_solved,
             "difference_s": self.predicted - self.re_solved,
             "deviation": self.deviation,
+            "linearised_deviation": self.linearised_deviation,
             "optimal": self.optimal,
         }
+
+
+def _deviation(predicted: float, found: float) -> float:
+    if found == predicted:
+        return 0.0
+    return abs(predicted - found) / abs(found) if found else np.inf
 
 
 @dataclass(frozen=True)
@@ -92,7 +110,11 @@ class SensitivityCheck:
 
     def worst_deviation(self, above: float = 1e-4) -> float:
         """Largest deviation among the re-solved changes larger than `above`, s; 0 where there are none."""
-        return max((entry.deviation for entry in self.entries if abs(entry.re_solved) > above), default=0.0)
+        return max((entry.deviation for entry in self.larger(above)), default=0.0)
+
+    def larger(self, above: float = 1e-4) -> tuple[CheckedSensitivity, ...]:
+        """Entries whose re-solved change is larger than `above`, s."""
+        return tuple(entry for entry in self.entries if abs(entry.re_solved) > above)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -131,16 +153,22 @@ def check_sensitivities(
     began = time.perf_counter()
     predictions = predictions or sensitivities(refined)
     problem, robot = refined.problem, refined.problem.decomposition.robot
-    base, _ = _solved_again(problem, refined.reports[-1].x)
+    base = refined.reports[-1].x
+    if residual(problem, base) > _EXACT or _unbalanced(problem, base) > _EXACT:
+        base, _ = _solved_again(problem, base)
     checked: list[CheckedSensitivity] = []
     for entry in predictions.limits:
         predicted = entry.change(step)
         if abs(predicted) <= _NO_CHANGE * base[0]:
-            checked.append(CheckedSensitivity(entry, predicted, predicted, optimal=True))
+            checked.append(CheckedSensitivity(entry, predicted, predicted, predicted, optimal=True))
             continue
-        limits = entry.raised(robot.limits, robot.joint_names.index(entry.joint), step)
-        answer, optimal = _solved_again(problem.with_limits(limits), base)
-        checked.append(CheckedSensitivity(entry, predicted, float(answer[0] - base[0]), optimal))
+        raised = problem.with_limits(entry.raised(robot.limits, robot.joint_names.index(entry.joint), step))
+        linearised = linearised_change(raised, base)
+        answer, optimal = _solved_again(raised, base)
+        change = float(answer[0] - base[0])
+        checked.append(
+            CheckedSensitivity(entry, predicted, predicted if linearised is None else linearised, change, optimal)
+        )
     return SensitivityCheck(step, float(base[0]), tuple(checked), time.perf_counter() - began)
 
 
@@ -160,7 +188,7 @@ def _solved_again(problem: Transcription, x: np.ndarray) -> tuple[np.ndarray, bo
             continue
         if report.violation > _FEASIBLE:
             continue
-        if _residual(problem, report.x) <= _OPTIMAL:
+        if _unbalanced(problem, report.x) <= _OPTIMAL:
             return report.x, True
         answers.append(report.x)
     if not answers:
@@ -168,13 +196,13 @@ def _solved_again(problem: Transcription, x: np.ndarray) -> tuple[np.ndarray, bo
     return min(answers, key=_first), False
 
 
-def _residual(problem: Transcription, x: np.ndarray) -> float:
+def _unbalanced(problem: Transcription, x: np.ndarray) -> float:
     try:
         return multipliers_of(problem, x).residual
     except UnreachableError:
         return np.inf
 
 
-def _first(x: Sequence[float]) -> float:
+def _first(x: np.ndarray) -> float:
     """Return the end time, s."""
     return float(x[0])

@@ -141,7 +141,8 @@ class Multipliers:
 
         slopes = self.pushes.slopes
         found = linprog(rates, A_eq=slopes.T, b_eq=self.weights @ slopes, bounds=(0.0, None), method="highs")
-        return float(found.fun if found.success else rates @ self.weights)
+        best = self.weights if found.x is None else found.x
+        return float(rates @ best)
 
 
 def multipliers_of(problem: Transcription, x: np.ndarray, given: np.ndarray | None = None) -> Multipliers:

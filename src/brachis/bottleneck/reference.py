@@ -1,10 +1,10 @@
 """The best value known: the same problem with discontinuous torque allowed, on a fine mesh.
 
-Rest means zero velocity only, and the splines have many more intervals than the answer, so that torques may leave their
-static values at once and switch as fast as the mesh allows. Cubic splines are tried on the answer's own mesh and then on
-the fine one, each from the motion before, at last parabolas, whose torques jump at every knot; the fastest motion within
-the limits counts. Redundant joints and branch stay. It is the best value known for them and no proven bound: it is
-another local optimum, on a mesh that is finite still.
+Rest means zero velocity only, and the splines have many more intervals than the answer, so that torques may leave
+their static values at once and switch as fast as the mesh allows. Cubic splines are tried on the answer's own mesh and
+then on finer ones, each from the motion before, at last parabolas, whose torques jump at every knot; the fastest motion
+within the limits counts. Redundant joints and branch stay. It is the best value known for them and no proven bound: it
+is another local optimum, on a mesh that is finite still.
 """
 
 from __future__ import annotations

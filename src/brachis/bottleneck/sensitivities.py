@@ -189,9 +189,7 @@ def sensitivities_at(problem: Transcription, multipliers: Multipliers) -> Sensit
                 boundaries.append(BranchBoundary(label, float(constraint.lower[column]), slope))
         first += count * size
     limits.sort(key=lambda entry: entry.change(1.0))
-    return Sensitivities(
-        tuple(limits), tuple(boundaries), multipliers.source, multipliers.residual, multipliers.unique
-    )
+    return Sensitivities(tuple(limits), tuple(boundaries), multipliers.source, multipliers.residual, multipliers.unique)
 
 
 def _of_joint(robot: Robot, kind: str, joint: str, rows: np.ndarray, multipliers: Multipliers) -> list[Sensitivity]:

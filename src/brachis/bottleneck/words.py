@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from brachis.bottleneck.check import SensitivityCheck
+from brachis.bottleneck.check import CheckedSensitivity, SensitivityCheck
 from brachis.bottleneck.reference import MEANING, Reference
 from brachis.bottleneck.saturation import THRESHOLD, Saturation
 from brachis.bottleneck.sensitivities import BranchBoundary, Sensitivities, Sensitivity
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 _FRACTION = 0.1
 _NOTHING = 1e-5
 """Of t_E; what saves less for `_FRACTION` is not worth a line."""
+
+_TAKEN_BACK = 0.02
 
 
 def in_words(report: BottleneckReport) -> list[str]:
@@ -83,10 +85,20 @@ def _checked(check: SensitivityCheck) -> list[str]:
         line = (
             f"checked, {what} +{percent}: predicted {1e3 * entry.predicted:+.4f} ms, solved again "
             f"{1e3 * entry.re_solved:+.4f} ms, off by {100.0 * entry.deviation:.2g} %"
+            f"{_taken_back(entry)}"
         )
         lines.append(line if entry.optimal else f"{line} (solved again without reaching an optimum)")
+    if not check.larger():
+        return [*lines, "checked: no change is larger than 0.1 ms"]
     worst = f"{100.0 * check.worst_deviation():.2g} %"
     return [*lines, f"checked: changes larger than 0.1 ms are predicted to within {worst}"]
+
+
+def _taken_back(entry: CheckedSensitivity) -> str:
+    """Say how much of a promise other limits take back within the step, where it is worth saying."""
+    if abs(entry.linearised - entry.predicted) <= _TAKEN_BACK * abs(entry.predicted):
+        return ""
+    return f"; other limits take over within the step, which leaves {1e3 * entry.linearised:+.4f} ms"
 
 
 def _active(found: tuple[Saturation, ...]) -> list[str]:

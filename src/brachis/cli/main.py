@@ -151,7 +151,9 @@ def export(
 def plot(
     result: ResultFile,
     out: Annotated[Path, typer.Option(help="Figure to write: png, pdf or svg.")],
-    kind: Annotated[str, typer.Option(help="Which figure: torques, postures, motion, overview or timeline.")] = "overview",
+    kind: Annotated[
+        str, typer.Option(help="Which figure: torques, postures, motion, overview or timeline.")
+    ] = "overview",
 ) -> None:
     """Draw a saved motion."""
     from brachis.cli import results  # noqa: PLC0415

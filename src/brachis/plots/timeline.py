@@ -83,8 +83,8 @@ def _dress(figure: Figure, ax: Axes, trajectory: Trajectory, names: list[tuple[s
     bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), _COLOURS), ax=ax, pad=0.01, fraction=0.03)
     bar.set_label("part of the limit", fontsize=style.LABEL_SIZE)
     bar.ax.tick_params(labelsize=style.TICK_SIZE, width=0.6, length=3.0)
-    handles = [Patch(facecolor=_ACTIVE, label=f"active: at {100.0 * THRESHOLD:g} % of the limit or beyond")]
-    style.legend_above(ax, style.PAGE_WIDTH - 20.0, handles, [handles[0].get_label()])
+    words = f"active: at {100.0 * THRESHOLD:g} % of the limit or beyond"
+    style.legend_above(ax, style.PAGE_WIDTH - 20.0, [Patch(facecolor=_ACTIVE)], [words])
     ax.text(
         1.0,
         1.02,
