@@ -52,11 +52,12 @@ def print_case(name: str, result: Result) -> SensitivityCheck:
     check = check_sensitivities(refined, found, step=STEP)
     smaller = check_sensitivities(refined, found, step=SMALL_STEP)
     for entry, near in zip(check.entries, smaller.entries, strict=True):
-        if entry.predicted == entry.re_solved:
+        if not entry.predicted:
             continue
         limit = " ".join(filter(None, (entry.sensitivity.joint, entry.sensitivity.kind, entry.sensitivity.end)))
         mark = "" if abs(entry.re_solved) <= LARGE or entry.deviation <= REQUIRED else " > 5 %"
         mark += "" if entry.optimal else " not optimal"
+        mark += f" other optimum {1e3 * entry.other_optimum:+.2f} ms" if entry.other_optimum else ""
         print(
             f"| {name} | {check.t_end:.4f} | {limit} | {1e3 * entry.predicted:.4f} | {1e3 * entry.re_solved:.4f} "
             f"| {100 * entry.deviation:.2f} %{mark} | {100 * near.deviation:.2f} % "

@@ -1,7 +1,9 @@
 """Predictions checked by solving again: the same problem with one limit after the other raised.
 
 Knots, collocation points and branch margins stay; every solve begins at the answer and is held to a tighter tolerance.
-An answer counts as an optimum where least squares find multipliers for it, whatever the solver says of itself.
+An answer counts as an optimum where least squares find multipliers for it, whatever the solver says of itself. Where a
+change is not as predicted, the unchanged problem is solved again from the new answer: a step into the valley of another
+local optimum is no change that the limit makes.
 """
 
 from __future__ import annotations
@@ -27,6 +29,10 @@ _OPTIMAL = 1e-5
 _FEASIBLE = 1e-7
 _EXACT = 1e-9
 """An answer that violates no row and leaves no gradient beyond this is not solved again."""
+_SUSPICIOUS = 0.02
+"""A change that is off by a larger fraction may be one to another local optimum, which solving back tells."""
+_SAME = 1e-6
+"""End times that differ by a smaller fraction are those of one optimum."""
 _NO_CHANGE = 1e-9
 """A limit that is predicted to change t_E by a smaller fraction of it does not press: the answer stays an optimum."""
 
@@ -44,6 +50,9 @@ class CheckedSensitivity:
         Change by `linearised_change`, which lets other limits take over within the step, s.
     re_solved : float
         Change found by solving again, s.
+    other_optimum : float
+        Where the solve again came to another local optimum: how much longer the unchanged problem takes there, s.
+        `re_solved` is then the change from there. 0 otherwise.
     optimal : bool
         False where the solve again ended without an optimum, so that `re_solved` says little.
     """
@@ -52,6 +61,7 @@ class CheckedSensitivity:
     predicted: float
     linearised: float
     re_solved: float
+    other_optimum: float
     optimal: bool
 
     @property
@@ -74,6 +84,7 @@ class CheckedSensitivity:
             "predicted_s": self.predicted,
             "linearised_s": self.linearised,
             "re_solved_s": self.re_solved,
+            "other_optimum_s": self.other_optimum,
             "difference_s": self.predicted - self.re_solved,
             "deviation": self.deviation,
             "linearised_deviation": self.linearised_deviation,
@@ -156,20 +167,36 @@ def check_sensitivities(
     base = refined.reports[-1].x
     if residual(problem, base) > _EXACT or _unbalanced(problem, base) > _EXACT:
         base, _ = _solved_again(problem, base)
-    checked: list[CheckedSensitivity] = []
+    checked = []
     for entry in predictions.limits:
-        predicted = entry.change(step)
-        if abs(predicted) <= _NO_CHANGE * base[0]:
-            checked.append(CheckedSensitivity(entry, predicted, predicted, predicted, optimal=True))
-            continue
-        raised = problem.with_limits(entry.raised(robot.limits, robot.joint_names.index(entry.joint), step))
-        linearised = linearised_change(raised, base)
-        answer, optimal = _solved_again(raised, base)
-        change = float(answer[0] - base[0])
-        checked.append(
-            CheckedSensitivity(entry, predicted, predicted if linearised is None else linearised, change, optimal)
-        )
+        if abs(entry.change(step)) <= _NO_CHANGE * base[0]:
+            checked.append(CheckedSensitivity(entry, 0.0, 0.0, 0.0, 0.0, optimal=True))
+        else:
+            limits = entry.raised(robot.limits, robot.joint_names.index(entry.joint), step)
+            checked.append(_compared(entry, entry.change(step), problem, problem.with_limits(limits), base))
     return SensitivityCheck(step, float(base[0]), tuple(checked), time.perf_counter() - began)
+
+
+def _compared(
+    entry: Sensitivity, predicted: float, problem: Transcription, raised: Transcription, base: np.ndarray
+) -> CheckedSensitivity:
+    """Solve with one limit raised, and back where the change is suspicious."""
+    linearised = linearised_change(raised, base)
+    answer, optimal = _solved_again(raised, base)
+    before, off = base, abs(predicted - (answer[0] - base[0]))
+    if off > _SUSPICIOUS * abs(predicted) and off > _SAME * base[0]:
+        before, sure = _solved_again(problem, answer)
+        optimal = optimal and sure
+        if abs(before[0] - base[0]) <= _SAME * base[0]:
+            before = base
+    return CheckedSensitivity(
+        sensitivity=entry,
+        predicted=predicted,
+        linearised=predicted if linearised is None else linearised,
+        re_solved=float(answer[0] - before[0]),
+        other_optimum=float(before[0] - base[0]),
+        optimal=optimal,
+    )
 
 
 def _solved_again(problem: Transcription, x: np.ndarray) -> tuple[np.ndarray, bool]:

@@ -79,7 +79,7 @@ def _checked(check: SensitivityCheck) -> list[str]:
     percent = f"{100.0 * check.step:g} %"
     lines = []
     for entry in check.entries:
-        if entry.predicted == entry.re_solved:
+        if not entry.predicted:
             continue
         what = " ".join(filter(None, (entry.sensitivity.joint, entry.sensitivity.kind, entry.sensitivity.end)))
         line = (
@@ -87,6 +87,9 @@ def _checked(check: SensitivityCheck) -> list[str]:
             f"{1e3 * entry.re_solved:+.4f} ms, off by {100.0 * entry.deviation:.2g} %"
             f"{_taken_back(entry)}"
         )
+        if entry.other_optimum:
+            line += f"; from another local optimum, {1e3 * abs(entry.other_optimum):.2g} ms "
+            line += "faster" if entry.other_optimum < 0.0 else "slower"
         lines.append(line if entry.optimal else f"{line} (solved again without reaching an optimum)")
     if not check.larger():
         return [*lines, "checked: no change is larger than 0.1 ms"]
