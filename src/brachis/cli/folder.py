@@ -36,7 +36,7 @@ def write_files(out: Path, files: Mapping[str, Writer], *, stale: Iterable[str] 
     out : Path
         Folder that exists.
     files : mapping of str to callable
-        Names, and what writes each of them.
+        Names, and what writes each.
     stale : iterable of str, optional
         Files that are removed in the end: the new ones take their place.
 
@@ -44,11 +44,6 @@ def write_files(out: Path, files: Mapping[str, Writer], *, stale: Iterable[str] 
     -------
     list of str
         Paths of the files.
-
-    Raises
-    ------
-    InputError
-        A file cannot be written.
     """
     for name in files:
         if (out / name).is_dir():
