@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from brachis.bottleneck.linearised import linearised_change
 from brachis.bottleneck.multipliers import multipliers_of
@@ -161,8 +162,13 @@ def check_sensitivities(
     PlanningError
         No solver could solve the unchanged problem again.
     """
+    with ThreadpoolController().limit(limits=1, user_api="blas"):  # as in `plan`: batches are small
+        return _checked(refined, predictions or sensitivities(refined), step)
+
+
+def _checked(refined: Refined, predictions: Sensitivities, step: float) -> SensitivityCheck:
+    """Compare limit by limit."""
     began = time.perf_counter()
-    predictions = predictions or sensitivities(refined)
     problem, robot = refined.problem, refined.problem.decomposition.robot
     base = refined.reports[-1].x
     if residual(problem, base) > _EXACT or _unbalanced(problem, base) > _EXACT:

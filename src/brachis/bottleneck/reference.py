@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from brachis.bspline import basis_matrix
 from brachis.errors import UnreachableError
@@ -107,6 +108,12 @@ def find_reference(
     Reference or None
         None where no motion faster than the answer was found.
     """
+    with ThreadpoolController().limit(limits=1, user_api="blas"):  # as in `plan`: batches are small
+        return _found(refined, tolerance, intervals, time_limit)
+
+
+def _found(refined: Refined, tolerance: float, intervals: int, time_limit: float) -> Reference | None:
+    """Try one mesh after the other."""
     began = time.perf_counter()
     problem = refined.problem
     own = len(np.unique(problem.knots)) - 1

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from threadpoolctl import ThreadpoolController
-
 from brachis.bottleneck.check import SensitivityCheck, check_sensitivities
 from brachis.bottleneck.reference import Reference, find_reference
 from brachis.bottleneck.saturation import THRESHOLD, Saturation, saturations
@@ -90,13 +88,12 @@ def report(result: Result, *, check: bool = False, reference: bool = False) -> B
     refined = result.attempt.refined
     if refined is None:
         raise InputError("the result holds no solved problem", where="result", allowed="a result of brachis.plan")
-    with ThreadpoolController().limit(limits=1, user_api="blas"):  # as in `plan`: batches are small
-        found, tolerance = sensitivities(refined), result.task.refinement.tolerance
-        return BottleneckReport(
-            t_end=result.t_end,
-            sensitivities=found,
-            saturations=saturations(result.trajectory),
-            check=check_sensitivities(refined, found) if check else None,
-            reference=find_reference(refined, tolerance=tolerance) if reference else None,
-            reference_sought=reference,
-        )
+    found, tolerance = sensitivities(refined), result.task.refinement.tolerance
+    return BottleneckReport(
+        t_end=result.t_end,
+        sensitivities=found,
+        saturations=saturations(result.trajectory),
+        check=check_sensitivities(refined, found) if check else None,
+        reference=find_reference(refined, tolerance=tolerance) if reference else None,
+        reference_sought=reference,
+    )

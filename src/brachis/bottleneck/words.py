@@ -18,6 +18,8 @@ _NOTHING = 1e-5
 """Of t_E; what saves less for `_FRACTION` is not worth a line."""
 
 _TAKEN_BACK = 0.02
+_MOMENT = 5e-4
+"""Smallest share of the time that is worth a line."""
 
 
 def in_words(report: BottleneckReport) -> list[str]:
@@ -108,12 +110,12 @@ def _active(found: tuple[Saturation, ...]) -> list[str]:
     """Sentences on the limits that are active for some time."""
     lines = []
     for entry in found:
-        if entry.share:
+        if entry.share >= _MOMENT:
             times = "once" if len(entry.active) == 1 else f"in {len(entry.active)} stretches"
             share = f"{100.0 * entry.share:.1f} % of the time"
             lines.append(f"{entry.joint} is at its {entry.kind} limit for {share}, {times}")
     if not lines:
-        lines = [f"no joint reaches {100.0 * THRESHOLD:g} % of a limit"]
+        lines = ["no joint stays at a limit"]
     return [*lines, f"(at its limit: at {100.0 * THRESHOLD:g} % of it or beyond)"]
 
 
