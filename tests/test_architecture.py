@@ -32,6 +32,7 @@ ORDER = (
     "setting",
     "search",
     "planner",
+    "bottleneck",
     "plots",
     "export",
     "cli",

@@ -9,7 +9,9 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from brachis import bottleneck as bottleneck
     from brachis import compose as compose
+    from brachis.bottleneck import BottleneckReport as BottleneckReport
     from brachis.errors import BrachisError as BrachisError
     from brachis.errors import InputError as InputError
     from brachis.errors import PlanningError as PlanningError
@@ -28,8 +30,9 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_STAGES = ("compose",)
+_STAGES = ("bottleneck", "compose")
 _HOME = {
+    "BottleneckReport": "brachis.bottleneck",
     "BrachisError": "brachis.errors",
     "Candidate": "brachis.result",
     "InputError": "brachis.errors",
@@ -48,6 +51,7 @@ _HOME = {
 }
 
 __all__ = [
+    "BottleneckReport",
     "BrachisError",
     "Candidate",
     "InputError",
@@ -60,6 +64,7 @@ __all__ = [
     "Trajectory",
     "Verification",
     "__version__",
+    "bottleneck",
     "compose",
     "load_task",
     "plan",

@@ -1,4 +1,4 @@
-"""The command line: ``brachis plan | verify | export | plot | inspect | compose | schema``.
+"""The command line: ``brachis plan | bottleneck | verify | export | plot | inspect | compose | schema``.
 
 Exit codes: 0 planned and verified, 1 no verified plan, 2 wrong input. Results go to standard output, everything else to
 standard error. With ``--json`` standard output gets one JSON object, also for an error.
@@ -92,6 +92,38 @@ def plan(
 
 
 @app.command()
+def bottleneck(
+    task: TaskFile,
+    check: Annotated[
+        bool, typer.Option("--check", help="Solve again with every limit raised by 1 %, and compare.")
+    ] = False,
+    reference: Annotated[
+        bool,
+        typer.Option(
+            "--reference",
+            help="Compare with the best value known: the same problem with discontinuous torque allowed, on a fine "
+            "mesh; not a proven bound. Takes seconds.",
+        ),
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for bottleneck.json and timeline.png; of a motion that fails the verification the names "
+            "begin with unverified_."
+        ),
+    ] = None,
+    urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
+    json: Json = False,
+) -> None:
+    """Plan a task and say which limits cost how much time, and which is active when."""
+    from brachis.cli import bottleneck as command  # noqa: PLC0415
+
+    raise typer.Exit(
+        command.bottleneck_command(task, urdf=urdf, check=check, reference=reference, out=out, as_json=json)
+    )
+
+
+@app.command()
 def verify(
     result: ResultFile,
     urdf: Annotated[Path | None, typer.Option(help="Check against this URDF instead of the saved one.")] = None,
@@ -119,7 +151,9 @@ def export(
 def plot(
     result: ResultFile,
     out: Annotated[Path, typer.Option(help="Figure to write: png, pdf or svg.")],
-    kind: Annotated[str, typer.Option(help="Which figure: torques, postures, motion or overview.")] = "overview",
+    kind: Annotated[
+        str, typer.Option(help="Which figure: torques, postures, motion, overview or timeline.")
+    ] = "overview",
 ) -> None:
     """Draw a saved motion."""
     from brachis.cli import results  # noqa: PLC0415

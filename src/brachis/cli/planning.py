@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-import secrets
-import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 from rich.table import Table
 
 from brachis import planner
+from brachis.cli.folder import Writer, make_folder, write_files, write_text
 from brachis.cli.output import json_text, print_error, print_json, progress, result_console, verification_table
-from brachis.errors import InputError
-from brachis.files import atomic_write, writing_errors
 from brachis.result import Result
 
 _FILES = {
@@ -28,7 +24,7 @@ _MANY = 40
 def plan_command(task: Path, *, urdf: Path | None, out: Path | None, as_json: bool) -> int:
     """Plan, show, write; returns the exit code."""
     if out is not None:
-        _make_folder(out)
+        make_folder(out)
     with progress() as listener:
         result = planner.plan(urdf, task, listener=listener)
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
@@ -45,54 +41,21 @@ def plan_command(task: Path, *, urdf: Path | None, out: Path | None, as_json: bo
     return 0 if result.verified else 1
 
 
-def _make_folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError("the folder cannot be made", where=str(out), found=error.strerror) from error
-
-
 def _write(result: Result, data: dict[str, object], out: Path) -> list[str]:
     """Write trajectory, figures of merit and drawing; an unverified motion gets names that say so.
 
-    All are written into a temporary folder and then moved, so that a failure leaves the folder as it was. Files of an
-    earlier plan with the other names are removed: they would be another motion's.
+    Files of an earlier plan with the other names are removed: they would be another motion's.
     """
     from brachis.plots import plot_candidates, plot_overview, save_figure  # noqa: PLC0415  (matplotlib takes 0.7 s)
 
-    names = _FILES[result.verified]
-    writers: tuple[Callable[[Path], object], ...] = (
+    writers: tuple[Writer, ...] = (
         result.trajectory.save,
-        lambda path: _write_text(json_text(data), path),
+        lambda path: write_text(json_text(data), path),
         lambda path: save_figure(plot_overview(result.trajectory), path),
         lambda path: save_figure(plot_candidates(result.candidates), path),
     )
-    for name in names:
-        if (out / name).is_dir():
-            raise InputError("cannot be written", where=str(out / name), found="a folder of this name")
-    temporary = out / f".{secrets.token_hex(8)}.part"
-    with writing_errors(out):
-        temporary.mkdir()
-    try:
-        for name, write in zip(names, writers, strict=True):
-            try:
-                write(temporary / name)
-            except InputError as error:  # it names the temporary file
-                raise InputError(error.problem, where=str(out / name), found=error.found) from error
-        for name in names:
-            with writing_errors(out / name):
-                (temporary / name).replace(out / name)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-    for name in _FILES[not result.verified]:
-        with writing_errors(out / name):
-            (out / name).unlink(missing_ok=True)
-    return [str(out / name) for name in names]
-
-
-def _write_text(text: str, path: Path) -> None:
-    with atomic_write(path) as stream:
-        stream.write(text.encode())
+    files = dict(zip(_FILES[result.verified], writers, strict=True))
+    return write_files(out, files, stale=_FILES[not result.verified])
 
 
 def _show(result: Result, data: dict[str, object]) -> None:

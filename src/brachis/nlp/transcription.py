@@ -34,6 +34,7 @@ from brachis.nlp import constraints
 from brachis.nlp.constraints import Constraint, Partials
 from brachis.nlp.constraints.branch_margin import MARGIN
 from brachis.nlp.curves import TiedSpline, Windows
+from brachis.robot import Limits
 
 _SHORTEST_TIME = 1e-4
 _BISECTIONS = 45
@@ -190,6 +191,14 @@ class Transcription:
         """Return the same problem with another least branch margin; x keeps its meaning."""
         other = copy.copy(self)
         other.constraints = self._build_constraints(margin)
+        other._collocate(self.tau)  # noqa: SLF001  (its own class)
+        return other
+
+    def with_limits(self, limits: Limits) -> Transcription:
+        """Return the same problem for a robot with other limits; x and the branch margins keep their meaning."""
+        other = copy.copy(self)
+        other.decomposition = self.decomposition.with_limits(limits)
+        other.constraints = other._build_constraints(max(self.guards, default=MARGIN))  # noqa: SLF001  (its own class)
         other._collocate(self.tau)  # noqa: SLF001  (its own class)
         return other
 

@@ -15,6 +15,7 @@ from brachis.plots.motion import plot_motion
 from brachis.plots.overview import plot_overview
 from brachis.plots.postures import plot_postures
 from brachis.plots.save import SUFFIXES, save_figure
+from brachis.plots.timeline import plot_timeline
 from brachis.plots.torques import plot_torques
 from brachis.trajectory import Trajectory
 
@@ -26,6 +27,7 @@ PLOTS: dict[str, Callable[[Trajectory], Figure]] = {
     "postures": plot_postures,
     "motion": plot_motion,
     "overview": plot_overview,
+    "timeline": plot_timeline,
 }
 """Plots of one trajectory by name; `plot_comparison` compares many, `plot_candidates` draws a search."""
 
@@ -37,6 +39,7 @@ __all__ = [
     "plot_motion",
     "plot_overview",
     "plot_postures",
+    "plot_timeline",
     "plot_torques",
     "save_figure",
 ]

@@ -1,8 +1,17 @@
 """The trajectory: immutable, evaluated at any time, saved and loaded with all that is needed to verify it again."""
 
 from brachis.trajectory.pieces import one_sided_derivatives
+from brachis.trajectory.ratios import LimitRatios, limit_ratios
 from brachis.trajectory.result_file import SCHEMA
 from brachis.trajectory.samples import Samples
 from brachis.trajectory.trajectory import CONTINUOUS_TORQUE, Trajectory
 
-__all__ = ["CONTINUOUS_TORQUE", "SCHEMA", "Samples", "Trajectory", "one_sided_derivatives"]
+__all__ = [
+    "CONTINUOUS_TORQUE",
+    "SCHEMA",
+    "LimitRatios",
+    "Samples",
+    "Trajectory",
+    "limit_ratios",
+    "one_sided_derivatives",
+]

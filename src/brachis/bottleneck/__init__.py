@@ -1,0 +1,25 @@
+"""What holds a motion back: what every limit costs, which limit is active when, and the distance to a reference."""
+
+from brachis.bottleneck.check import CheckedSensitivity, SensitivityCheck, check_sensitivities
+from brachis.bottleneck.reference import Reference, find_reference
+from brachis.bottleneck.saturation import THRESHOLD, Saturation, Stretch, saturations
+from brachis.bottleneck.sensitivities import BranchBoundary, Sensitivities, Sensitivity, sensitivities
+from brachis.bottleneck.whole import BottleneckReport, report
+
+__all__ = [
+    "THRESHOLD",
+    "BottleneckReport",
+    "BranchBoundary",
+    "CheckedSensitivity",
+    "Reference",
+    "Saturation",
+    "Sensitivities",
+    "Sensitivity",
+    "SensitivityCheck",
+    "Stretch",
+    "check_sensitivities",
+    "find_reference",
+    "report",
+    "saturations",
+    "sensitivities",
+]

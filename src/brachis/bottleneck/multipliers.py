@@ -1,0 +1,179 @@
+"""Multipliers of a solved problem: the solver's where they balance the gradient, otherwise least squares.
+
+At an optimum the gradient of t_E is a combination of the slopes of the active rows and variable bounds,
+
+    grad t_E = sum_i w_i p_i,    w_i >= 0,
+
+with p_i the gradient of a row or variable at its lower bound, or minus that at its upper bound. The norm of what is
+left over, relative to the gradient's, tells how far an answer is from being stationary.
+
+If the bounds of the active rows give way at rates d_i >= 0, then dt_E = -sum_i w_i d_i. Where the slopes are linearly
+dependent, many sets of multipliers balance the gradient, and the one that holds for a relief is the one that promises
+the least (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977): a linear program.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.nlp import Transcription
+from brachis.refine import Refined
+
+ACTIVE = 1e-5
+"""Rows and variables nearer to a bound than this press on it; dimensionless."""
+_GOOD = 1e-5
+"""The solver's multipliers with a smaller residual are taken as they are."""
+_DEPENDENT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Pushes:
+    """What presses on a point x.
+
+    Attributes
+    ----------
+    slopes : (p, v) ndarray
+        Gradients of active rows, then of active variables; negative ones at upper bounds.
+    rows : (a,) int ndarray
+        Rows to which the first a slopes belong.
+    signs : (a,) ndarray
+        1 at a lower bound, -1 at an upper one.
+    """
+
+    slopes: np.ndarray
+    rows: np.ndarray
+    signs: np.ndarray
+
+    @classmethod
+    def at(cls, problem: Transcription, x: np.ndarray) -> Pushes:
+        """Collect what presses on x, (v,).
+
+        Raises
+        ------
+        UnreachableError
+            A collocation point is out of the branch's reach.
+        """
+        from scipy import sparse  # noqa: PLC0415
+
+        values = problem.rows(x)
+        low = np.flatnonzero(values <= problem.lower + ACTIVE)
+        high = np.flatnonzero(values >= problem.upper - ACTIVE)
+        rows, signs = np.concatenate([low, high]), np.repeat([1.0, -1.0], [len(low), len(high)])
+        places = (problem.jacobian_rows, problem.jacobian_columns)
+        jacobian = sparse.coo_array((problem.jacobian(x), places), shape=(len(values), len(x))).tocsr()
+        unit = np.eye(len(x))
+        bounds = unit[x <= problem.x_lower + ACTIVE], -unit[x >= problem.x_upper - ACTIVE]
+        return cls(np.vstack([signs[:, None] * jacobian[rows].toarray(), *bounds]), rows, signs)
+
+    @property
+    def dependent(self) -> bool:
+        """True where several sets of multipliers may balance a gradient."""
+        return bool(np.linalg.matrix_rank(self.slopes, tol=_DEPENDENT) < len(self.slopes))
+
+    def leftover(self, gradient: np.ndarray, weights: np.ndarray) -> float:
+        """Norm of the part of a gradient, (v,), that weights, (p,), do not balance; relative to the gradient's."""
+        return float(np.linalg.norm(gradient - weights @ self.slopes) / np.linalg.norm(gradient))
+
+    def weights_of(self, gradient: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        """Weights, (p,), from a solver's multipliers of all rows, (c,); those of variables balance what they can."""
+        of_rows = np.maximum(self.signs * multipliers[self.rows], 0.0)
+        rest = gradient - of_rows @ self.slopes[: len(of_rows)]
+        return np.concatenate([of_rows, np.maximum(self.slopes[len(of_rows) :] @ rest, 0.0)])
+
+    def fitted_weights(self, gradient: np.ndarray) -> np.ndarray:
+        """Weights, (p,), that balance a gradient best: non-negative least squares (Lawson and Hanson)."""
+        from scipy.optimize import nnls  # noqa: PLC0415
+
+        return np.asarray(nnls(self.slopes.T, gradient)[0]) if len(self.slopes) else np.empty(0)
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Multipliers at an answer, and how well they balance the gradient.
+
+    Attributes
+    ----------
+    pushes : Pushes
+    weights : (p,) ndarray
+        Multipliers of the pushes, >= 0; s for a row, whose values are dimensionless.
+    source : str
+        ``"solver"`` or ``"least squares"``.
+    residual : float
+        See `Pushes.leftover`; 1 where nothing balances.
+    unique : bool
+        False where other multipliers balance the gradient as well.
+    """
+
+    pushes: Pushes
+    weights: np.ndarray
+    source: str
+    residual: float
+    unique: bool
+
+    def change(self, relief: np.ndarray, side: float | None = None) -> float:
+        """Directional derivative of t_E as bounds give way.
+
+        Parameters
+        ----------
+        relief : (c,) ndarray
+            Rates >= 0 at which the bounds of every row move outwards, dimensionless.
+        side : {1, -1}, optional
+            Only lower, or only upper bounds move.
+
+        Returns
+        -------
+        float
+            <= 0, s.
+        """
+        rates = relief[self.pushes.rows]
+        if side is not None:
+            rates = np.where(self.pushes.signs == side, rates, 0.0)
+        active = self.weights[: len(rates)]
+        if self.unique or not (rates @ active):
+            return -float(rates @ active)
+        return -self._least(np.concatenate([rates, np.zeros(len(self.weights) - len(rates))]))
+
+    def _least(self, rates: np.ndarray) -> float:
+        """Least of ``rates @ w`` over all weights that balance as much as `weights` do."""
+        from scipy.optimize import linprog  # noqa: PLC0415
+
+        slopes = self.pushes.slopes
+        found = linprog(rates, A_eq=slopes.T, b_eq=self.weights @ slopes, bounds=(0.0, None), method="highs")
+        best = self.weights if found.x is None else found.x
+        return float(rates @ best)
+
+
+def multipliers_of(problem: Transcription, x: np.ndarray, given: np.ndarray | None = None) -> Multipliers:
+    """Find the multipliers at an answer.
+
+    Parameters
+    ----------
+    problem : Transcription
+    x : (v,) ndarray
+    given : (c,) ndarray, optional
+        The solver's own multipliers of the rows; L = t_E - given . rows.
+
+    Returns
+    -------
+    Multipliers
+
+    Raises
+    ------
+    UnreachableError
+        A collocation point is out of the branch's reach.
+    """
+    pushes, gradient = Pushes.at(problem, x), problem.gradient()
+    candidates = [] if given is None else [("solver", pushes.weights_of(gradient, given))]
+    if not candidates or pushes.leftover(gradient, candidates[0][1]) > _GOOD:
+        candidates.append(("least squares", pushes.fitted_weights(gradient)))
+    source, weights = min(candidates, key=lambda candidate: pushes.leftover(gradient, candidate[1]))
+    residual = pushes.leftover(gradient, weights)
+    return Multipliers(pushes, weights, source, residual, unique=not pushes.dependent)
+
+
+def multipliers_of_answer(refined: Refined) -> Multipliers:
+    """Find the multipliers of a refined answer, before its end time was lengthened."""
+    report = refined.reports[-1]
+    return multipliers_of(refined.problem, report.x, report.multipliers)

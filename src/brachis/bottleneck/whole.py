@@ -1,0 +1,99 @@
+"""The bottleneck report: what every limit costs, which is active when, and how far the motion is from a reference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from brachis.bottleneck.check import SensitivityCheck, check_sensitivities
+from brachis.bottleneck.reference import Reference, find_reference
+from brachis.bottleneck.saturation import THRESHOLD, Saturation, saturations
+from brachis.bottleneck.sensitivities import Sensitivities, sensitivities
+from brachis.bottleneck.words import in_words
+from brachis.errors import InputError
+from brachis.result import Result
+
+
+@dataclass(frozen=True)
+class BottleneckReport:
+    """What holds a motion back.
+
+    Attributes
+    ----------
+    t_end : float
+        Of the motion, s.
+    sensitivities : Sensitivities
+        What every limit costs.
+    saturations : tuple of Saturation
+        When every limit is active, those active longest first.
+    check : SensitivityCheck or None
+        The predictions beside solving again, where asked for.
+    reference : Reference or None
+        The best value known, where asked for and found.
+    reference_sought : bool
+        True where it was asked for.
+    """
+
+    t_end: float
+    sensitivities: Sensitivities
+    saturations: tuple[Saturation, ...]
+    check: SensitivityCheck | None = None
+    reference: Reference | None = None
+    reference_sought: bool = False
+
+    def __str__(self) -> str:
+        """Say all in plain words."""
+        return "\n".join(in_words(self))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as plain data for JSON."""
+        return {
+            "t_end_s": self.t_end,
+            "sensitivities": self.sensitivities.to_dict(),
+            "active_from_ratio": THRESHOLD,
+            "saturations": [entry.to_dict() for entry in self.saturations],
+            "check": None if self.check is None else self.check.to_dict(),
+            "reference": None if self.reference is None else self.reference.to_dict(),
+        }
+
+
+def report(result: Result, *, check: bool = False, reference: bool = False) -> BottleneckReport:
+    """Find out what holds a planned motion back.
+
+    Parameters
+    ----------
+    result : Result
+        Of `brachis.plan`.
+    check : bool, optional
+        Solve again with every limit raised by 1 % and compare with the multipliers' predictions.
+    reference : bool, optional
+        Plan again with discontinuous torque allowed on a fine mesh: the best value known, not a proven bound.
+
+    Returns
+    -------
+    BottleneckReport
+
+    Raises
+    ------
+    InputError
+        The result was made without keeping its solved problem.
+    PlanningError
+        With `check`: no solver could solve the problem again.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> print(brachis.bottleneck.report(brachis.plan(None, "examples/01_scara_line.yaml")))  # doctest: +SKIP
+    """
+    refined = result.attempt.refined
+    if refined is None:
+        raise InputError("the result holds no solved problem", where="result", allowed="a result of brachis.plan")
+    found, tolerance = sensitivities(refined), result.task.refinement.tolerance
+    return BottleneckReport(
+        t_end=result.t_end,
+        sensitivities=found,
+        saturations=saturations(result.trajectory),
+        check=check_sensitivities(refined, found) if check else None,
+        reference=find_reference(refined, tolerance=tolerance) if reference else None,
+        reference_sought=reference,
+    )

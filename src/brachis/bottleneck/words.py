@@ -1,0 +1,127 @@
+"""The bottleneck report in plain words."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from brachis.bottleneck.check import CheckedSensitivity, SensitivityCheck
+from brachis.bottleneck.reference import MEANING, Reference
+from brachis.bottleneck.saturation import THRESHOLD, Saturation
+from brachis.bottleneck.sensitivities import BranchBoundary, Sensitivities, Sensitivity
+
+if TYPE_CHECKING:
+    from brachis.bottleneck.whole import BottleneckReport
+
+_FRACTION = 0.1
+_NOTHING = 1e-5
+"""Of t_E; what saves less for `_FRACTION` is not worth a line."""
+
+_TAKEN_BACK = 0.02
+_MOMENT = 5e-4
+"""Smallest share of the time that is worth a line."""
+
+
+def in_words(report: BottleneckReport) -> list[str]:
+    """Say what a report found, a line each."""
+    lines = [
+        *_costs(report.sensitivities, report.t_end),
+        *([] if report.check is None else _checked(report.check)),
+        *_active(report.saturations),
+    ]
+    if report.reference is not None:
+        lines.append(_reference(report.reference, report.t_end))
+    elif report.reference_sought:
+        lines.append("reference: no faster motion was found")
+    return lines
+
+
+def _figures(value: float) -> str:
+    """Write a positive number with two significant figures, or all before the point."""
+    return f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f}"
+
+
+def _costs(found: Sensitivities, t_end: float) -> list[str]:
+    """Sentences on every limit that costs time, the costliest first."""
+    lines = []
+    if not found.reliable:
+        lines.append(
+            f"beware: the multipliers leave {100.0 * found.residual:.2g} % of the gradient of t_E unbalanced, so the "
+            "motion is not an optimum, and the savings below are rough"
+        )
+    costly = [entry for entry in found.limits if -entry.change(_FRACTION) > _NOTHING * t_end]
+    lines += [_saving(entry, t_end) for entry in costly]
+    if len(costly) < len(found.limits):
+        lines.append("no other limit costs time" if costly else "no limit of a joint costs time")
+    lines.append(f"(to first order, from multipliers by the {found.source}, residual {found.residual:.0e})")
+    return lines + [_boundary(entry) for entry in found.boundaries]
+
+
+def _saving(entry: Sensitivity, t_end: float) -> str:
+    """Say what more room at one limit saves."""
+    saved = -entry.change(_FRACTION)
+    amount = f"{_FRACTION * entry.whole:.3g} {entry.unit}"
+    if entry.end is None:
+        more = f"{100.0 * _FRACTION:.0f} % more {entry.kind} at {entry.joint} ({amount})"
+    else:
+        more = f"{amount} more range at the {entry.end} end of {entry.joint}"
+    return f"{more} saves {_figures(100.0 * saved / t_end)} % ({_figures(1e3 * saved)} ms)"
+
+
+def _boundary(entry: BranchBoundary) -> str:
+    saved = _figures(1e3 * entry.derivative * entry.margin)
+    return (
+        f"the branch boundary of {entry.label} costs {saved} ms (margin {entry.margin:.3g}, to first order): no "
+        "limit of the robot; other redundant joints may be faster"
+    )
+
+
+def _checked(check: SensitivityCheck) -> list[str]:
+    """Sentences on the predictions beside solving again."""
+    percent = f"{100.0 * check.step:g} %"
+    lines = []
+    for entry in check.entries:
+        if not entry.predicted:
+            continue
+        what = " ".join(filter(None, (entry.sensitivity.joint, entry.sensitivity.kind, entry.sensitivity.end)))
+        line = (
+            f"checked, {what} +{percent}: predicted {1e3 * entry.predicted:+.4f} ms, solved again "
+            f"{1e3 * entry.re_solved:+.4f} ms, off by {100.0 * entry.deviation:.2g} %"
+            f"{_taken_back(entry)}"
+        )
+        if entry.other_optimum:
+            line += f"; from another local optimum, {1e3 * abs(entry.other_optimum):.2g} ms "
+            line += "faster" if entry.other_optimum < 0.0 else "slower"
+        lines.append(line if entry.optimal else f"{line} (solved again without reaching an optimum)")
+    if not check.larger():
+        return [*lines, "checked: no change is larger than 0.1 ms"]
+    worst = f"{100.0 * check.worst_deviation():.2g} %"
+    return [*lines, f"checked: changes larger than 0.1 ms are predicted to within {worst}"]
+
+
+def _taken_back(entry: CheckedSensitivity) -> str:
+    """Say how much of a promise other limits take back within the step, where it is worth saying."""
+    if abs(entry.linearised - entry.predicted) <= _TAKEN_BACK * abs(entry.predicted):
+        return ""
+    return f"; other limits take over within the step, which leaves {1e3 * entry.linearised:+.4f} ms"
+
+
+def _active(found: tuple[Saturation, ...]) -> list[str]:
+    """Sentences on the limits that are active for some time."""
+    lines = []
+    for entry in found:
+        if entry.share >= _MOMENT:
+            times = "once" if len(entry.active) == 1 else f"in {len(entry.active)} stretches"
+            share = f"{100.0 * entry.share:.1f} % of the time"
+            lines.append(f"{entry.joint} is at its {entry.kind} limit for {share}, {times}")
+    if not lines:
+        lines = ["no joint stays at a limit"]
+    return [*lines, f"(at its limit: at {100.0 * THRESHOLD:g} % of it or beyond)"]
+
+
+def _reference(reference: Reference, t_end: float) -> str:
+    longer = f"{100.0 * reference.distance:.2f} % ({1e3 * (t_end - reference.t_end):.1f} ms)"
+    return (
+        f"reference {reference.t_end:.4f} s ({MEANING}; degree {reference.degree}, {reference.intervals} intervals): "
+        f"the motion takes {longer} longer"
+    )

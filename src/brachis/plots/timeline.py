@@ -1,0 +1,96 @@
+"""Which limit is near or active when."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brachis.bottleneck.saturation import THRESHOLD, Saturation, saturations_of
+from brachis.plots import style
+from brachis.plots.curves import knot_times
+from brachis.trajectory import LimitRatios, Trajectory, limit_ratios
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_SHOWN = 0.5
+"""Limits that the motion never comes this near to are left out."""
+_COLOURS = "Blues"
+_ACTIVE = "#D55E00"
+_ROW_MM = 5.0
+_FRAME_MM = 26.0
+_THICK = 0.84
+
+
+def plot_timeline(trajectory: Trajectory) -> Figure:
+    """Plot how near the motion is to each limit over time.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Any one, a saved one for example.
+
+    Returns
+    -------
+    Figure
+        Two columns wide; a row for each joint and kind of limit of which the motion ever uses more than half. The
+        deeper the blue the nearer to the limit; orange where the limit is active, from 99.9 % of it on. The faint ticks
+        are the knots of the splines.
+
+    Examples
+    --------
+    >>> from brachis import Trajectory
+    >>> from brachis.plots import plot_timeline, save_figure
+    >>> save_figure(plot_timeline(Trajectory.load("out/result.npz")), "timeline.pdf")  # doctest: +SKIP
+    """
+    ratios = limit_ratios(trajectory)
+    found = {(entry.kind, entry.joint): entry for entry in saturations_of(ratios)}
+    shown = [column for column, name in enumerate(ratios.names) if found[name].peak > _SHOWN]
+    figure = style.new_figure(style.PAGE_WIDTH, _FRAME_MM + _ROW_MM * max(len(shown), 1))
+    ax = figure.add_subplot()
+    for row, column in enumerate(shown):
+        _draw_row(ax, row, ratios, column, found[ratios.names[column]])
+    _dress(figure, ax, trajectory, [ratios.names[column] for column in shown])
+    return figure
+
+
+def _draw_row(ax: Axes, row: int, ratios: LimitRatios, column: int, entry: Saturation) -> None:
+    """Draw one limit: its ratio as colour, and the stretches on which it is active."""
+    used = np.abs(ratios.values[:, column])
+    edges = row - 0.5 * _THICK, row + 0.5 * _THICK
+    cells = 0.5 * (used[1:] + used[:-1])[None]
+    ax.pcolormesh(ratios.t, edges, cells, cmap=_COLOURS, vmin=0.0, vmax=1.0, shading="flat", rasterized=True)
+    spans = [(stretch.begin, stretch.end - stretch.begin) for stretch in entry.active]
+    ax.broken_barh(spans, (edges[0], _THICK), facecolor=_ACTIVE, edgecolor=_ACTIVE, linewidth=0.8, label="active")
+
+
+def _dress(figure: Figure, ax: Axes, trajectory: Trajectory, names: list[tuple[str, str]]) -> None:
+    """Label rows, time and colours."""
+    from matplotlib.cm import ScalarMappable  # noqa: PLC0415
+    from matplotlib.colors import Normalize  # noqa: PLC0415
+    from matplotlib.patches import Patch  # noqa: PLC0415
+
+    style.dress(ax, r"$t$ (s)", "")
+    ax.set_ylim(max(len(names), 1) - 0.5, -0.5)
+    ax.set_yticks(range(len(names)), [f"{style.plain(joint)} {kind}" for kind, joint in names])
+    ax.tick_params(axis="y", length=0.0)
+    style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
+    if not names:
+        text = "no limit is ever used by half"
+        ax.text(0.5, 0.5, text, transform=ax.transAxes, fontsize=style.TICK_SIZE, ha="center", va="center")
+    bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), _COLOURS), ax=ax, pad=0.01, fraction=0.03)
+    bar.set_label("part of the limit", fontsize=style.LABEL_SIZE)
+    bar.ax.tick_params(labelsize=style.TICK_SIZE, width=0.6, length=3.0)
+    words = f"active: at {100.0 * THRESHOLD:g} % of the limit or beyond"
+    style.legend_above(ax, style.PAGE_WIDTH - 20.0, [Patch(facecolor=_ACTIVE)], [words])
+    ax.text(
+        1.0,
+        1.02,
+        rf"$t_\mathrm{{E}} = {trajectory.t_end:.3f}$ s",
+        transform=ax.transAxes,
+        fontsize=style.TICK_SIZE,
+        ha="right",
+        va="bottom",
+    )

@@ -1,0 +1,116 @@
+"""Predictions within 5 % of what solving again gives: the project's own requirement."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.bottleneck import check, check_sensitivities, sensitivities
+from brachis.errors import InputError
+
+ROOT = Path(__file__).parents[2]
+LARGE = 1e-4
+
+
+def holds(result, least):
+    found = check_sensitivities(result.attempt.refined)
+    large = [entry for entry in found.entries if abs(entry.re_solved) > LARGE]
+    assert len(large) >= least
+    assert all(entry.optimal for entry in large)
+    assert found.worst_deviation(LARGE) < 0.05
+    assert found.worst_deviation(LARGE * found.t_end) < 0.05
+    return found
+
+
+@pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
+def test_planar_line(scara, joint):
+    found = holds(scara(joint), 2)
+    assert found.entries[0].predicted == min(entry.predicted for entry in found.entries)
+
+
+def test_arm_on_a_rail():
+    task = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
+    found = holds(brachis.plan(None, {**task, "redundant_joints": ["rail"]}), 3)
+    assert {entry.sensitivity.kind for entry in found.entries[:3]} == {"torque", "velocity"}
+
+
+def test_range_of_a_joint(slide):
+    limits = {"torque": {"j1": 30.0}, "position": {"j1": [-0.05, 0.05]}}
+    result = slide(((1.0, 0.0, 0.0),) * 2, ("x",), (1.2,), redundant=["j1"], robot={"limits": limits})
+    found = holds(result, 2)
+    assert any(entry.sensitivity.kind == "position" and entry.re_solved < -LARGE for entry in found.entries)
+
+
+def test_a_wrong_prediction_is_found(scara):
+    refined = scara("j3").attempt.refined
+    honest = sensitivities(refined)
+    doubled = tuple(dataclasses.replace(entry, derivative=2.0 * entry.derivative) for entry in honest.limits)
+    found = check_sensitivities(refined, dataclasses.replace(honest, limits=doubled))
+    assert found.worst_deviation(LARGE) == pytest.approx(1.0, abs=0.05)
+
+
+def test_other_limits_are_the_robots_own(scara):
+    refined = scara("j1").attempt.refined
+    problem, x = refined.problem, refined.x
+    robot = problem.decomposition.robot
+    entry = sensitivities(refined).of("j2", "torque")
+    other = problem.with_limits(entry.raised(robot.limits, 1, 0.25))
+    rows, weaker = problem.rows(x), other.rows(x)
+    torque = slice(0, 3 * len(problem.tau))
+    ratio = weaker[torque].reshape(-1, 3) / rows[torque].reshape(-1, 3)
+    np.testing.assert_allclose(ratio, np.broadcast_to([1.0, 0.8, 1.0], ratio.shape))
+    np.testing.assert_array_equal(weaker[torque.stop :], rows[torque.stop :])
+    assert other.guards == problem.guards
+    assert robot.limits.torque[1] == 10.0, "the robot itself keeps its limits"
+
+
+def test_report_needs_the_solved_problem(scara):
+    result = scara("j3")
+    bare = dataclasses.replace(result, attempts=tuple(dataclasses.replace(a, refined=None) for a in result.attempts))
+    with pytest.raises(InputError, match="no solved problem"):
+        brachis.bottleneck.report(bare)
+
+
+def test_another_limit_that_takes_over_within_the_step(slide):
+    free = slide()
+    fastest = np.abs(free.trajectory.velocity(np.linspace(0.0, free.t_end, 4001))).max()
+    result = slide(robot={"limits": {"velocity": 1.002 * fastest}})
+    assert result.t_end == pytest.approx(free.t_end, rel=1e-6), "the velocity limit does not hold it back yet"
+    found = check_sensitivities(result.attempt.refined, step=0.05)
+    (entry,) = [entry for entry in found.entries if entry.predicted]
+    assert entry.predicted == pytest.approx(-0.025 * found.t_end, rel=1e-4)
+    assert entry.deviation > 0.1, "the multipliers know nothing of the velocity limit"
+    assert entry.predicted < entry.linearised
+    assert entry.linearised_deviation < 0.5 * entry.deviation
+
+
+@pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
+def test_linearised_changes_promise_no_more_than_multipliers(scara, joint):
+    for step, rel in ((0.01, 0.05), (1e-5, 1e-3)):
+        for entry in check_sensitivities(scara(joint).attempt.refined, step=step).entries:
+            assert entry.predicted * (1.0 + 1e-4) <= entry.linearised <= 0.0
+            assert entry.linearised == pytest.approx(entry.predicted, rel=rel, abs=1e-8)
+
+
+def test_a_step_into_another_valley_is_no_change_by_the_limit(scara, monkeypatch):
+    refined = scara("j3").attempt.refined
+    honest, valley = check._solved_again, 2e-3
+
+    def wandering(problem, x):
+        """Find an optimum that is faster by `valley`, whatever the limits, once a limit has been raised."""
+        answer, optimal = honest(problem, x)
+        if problem is not refined.problem or x[0] < refined.reports[-1].x[0] - valley:
+            answer = answer.copy()
+            answer[0] -= valley
+        return answer, optimal
+
+    expected = {entry.sensitivity: entry.re_solved for entry in check_sensitivities(refined).entries}
+    monkeypatch.setattr(check, "_solved_again", wandering)
+    for entry in check_sensitivities(refined).entries:
+        if entry.predicted:
+            assert entry.other_optimum == pytest.approx(-valley, rel=1e-3)
+            assert entry.re_solved == pytest.approx(expected[entry.sensitivity], abs=1e-6)

@@ -1,0 +1,63 @@
+"""The best value known: reachable, faster, and within the limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.bottleneck import find_reference
+from brachis.robot import dynamics
+
+from .conftest import FORCE, LENGTH, MASS
+
+
+def test_the_slide_comes_to_bang_bang_itself(slide):
+    result = slide(intervals=10, rest="full")
+    best = 2.0 * np.sqrt(2.0 * MASS * LENGTH / FORCE)
+    reference = find_reference(result.attempt.refined, intervals=40)
+    assert reference.degree == 2, "parabolas alone can jump from full force forwards to full force back"
+    assert reference.t_end == pytest.approx(best, rel=2e-4)
+    assert reference.distance == pytest.approx(result.t_end / reference.t_end - 1.0)
+    assert reference.distance > 0.1
+
+
+def test_planar_line(scara):
+    report = brachis.bottleneck.report(scara("j3"), reference=True)
+    reference = report.reference
+    assert 2.32 < reference.t_end < 2.34
+    assert reference.intervals == 100
+    motion, decomposition = reference.refined.problem.motion(reference.refined.x), scara("j3").attempt.refined.problem
+    decomposition = decomposition.decomposition
+    t = np.sort(np.random.default_rng(3).uniform(0.0, motion.t_end, 4000))
+    state = decomposition.state(*motion.at(t), t=t)
+    torque = dynamics.torque(decomposition.robot, state.q, state.qdot, state.qddot)
+    assert np.abs(torque / decomposition.robot.limits.torque).max() <= 1.0 + 1e-4
+    y, ydot, _ = motion.at(np.array([0.0, motion.t_end]))
+    np.testing.assert_allclose(y[:, 0], [0.0, 1.0], atol=1e-12)
+    np.testing.assert_allclose(ydot, 0.0, atol=1e-9)
+    words = str(report)
+    assert "best value known, not a proven bound" in words
+    assert f"reference {reference.t_end:.4f} s" in words
+
+
+def test_nothing_faster_is_said(slide):
+    # Parabolas on a mesh with a knot in the middle are at the optimum already.
+    result = slide(degree=2, intervals=4)
+    reference = find_reference(result.attempt.refined, intervals=8)
+    assert reference is None or reference.distance < 2e-4
+
+
+def test_end_posture_is_kept(slide):
+    limits = {"torque": {"j1": 30.0}}
+    from brachis.bottleneck.reference import _end_of, _on_mesh  # noqa: PLC0415
+
+    free = slide(((1.0, 0.0, 0.0),) * 2, ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits})
+    problem = free.attempt.refined.problem
+    assert _end_of(problem) is None
+    task = free.task.to_dict()
+    task["end"] = {"joints": [0.1, LENGTH - 0.1]}
+    given, _ = brachis.transcribe(free.trajectory.robot, brachis.load_task(task))
+    assert _end_of(given)[0] == 0.1
+    fine = _on_mesh(given, 3, 40)
+    assert fine.motion(np.zeros(fine.variables) + 0.5).control_points[1, -1] == 0.1

@@ -1,0 +1,105 @@
+"""Which limit is active when, on motions made by hand."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from brachis.bottleneck import saturations
+from brachis.trajectory import limit_ratios
+
+from .conftest import FORCE, MASS
+
+T = 2.0
+
+
+@pytest.fixture(scope="module")
+def made(slide):
+    """A trajectory of the two slides whose first one has a given piecewise linear acceleration in m/s^2."""
+    base = slide(degree=2, intervals=4).trajectory
+
+    def make(times, after, before):
+        times, after, before = (np.array(part, dtype=float) for part in (times, after, before))
+        h = np.diff(times)
+        first, last = after[:-1], before[1:]
+        qdot = np.concatenate([[0.0], np.cumsum(h * 0.5 * (first + last))])
+        q = np.concatenate([[0.0], np.cumsum(h * qdot[:-1] + h**2 * (first / 3.0 + last / 6.0))])
+        still = np.zeros_like(q)
+        columns = {"q": q, "qdot": qdot, "qddot": after, "qddot_before": before}
+        stacked = {name: np.stack([column, still], axis=1) for name, column in columns.items()}
+        return dataclasses.replace(base, times=times, **stacked)
+
+    return make
+
+
+LIMIT = FORCE / (2.0 * MASS)
+
+
+def of(found, joint, kind):
+    (entry,) = [entry for entry in found if (entry.joint, entry.kind) == (joint, kind)]
+    return entry
+
+
+def test_full_force_for_a_part_of_the_time(made):
+    trajectory = made([0.0, 0.3 * T, T], [LIMIT, 0.0, 0.0], [LIMIT, LIMIT, 0.0])
+    entry = of(saturations(trajectory), "j1", "torque")
+    assert entry.share == pytest.approx(0.3, abs=1e-12)
+    (stretch,) = entry.active
+    assert (stretch.begin, stretch.end, stretch.side) == (0.0, pytest.approx(0.3 * T), "upper")
+    assert entry.peak == pytest.approx(1.0)
+
+
+def test_both_directions_count(made):
+    turn = [0.0, 0.25 * T, 0.75 * T, T]
+    entry = of(saturations(made(turn, [0.0, LIMIT, -LIMIT, 0.0], [0.0, 0.0, LIMIT, -LIMIT])), "j1", "torque")
+    assert entry.share == pytest.approx(0.75, abs=1e-12)
+    assert [stretch.side for stretch in entry.active] == ["upper", "lower"]
+    assert entry.active[1].begin == entry.active[0].end == pytest.approx(0.75 * T)
+
+
+def test_the_threshold_is_met_between_grid_points(made):
+    ramp = made([0.0, T], [0.0, LIMIT], [0.0, LIMIT])
+    assert of(saturations(ramp), "j1", "torque").share == pytest.approx(1e-3, rel=1e-6)
+    half = of(saturations(ramp, threshold=0.4321), "j1", "torque")
+    assert half.share == pytest.approx(1.0 - 0.4321, rel=1e-9)
+    assert half.active[0].begin == pytest.approx(0.4321 * T)
+
+
+def test_below_the_threshold_nothing_is_active(made):
+    trajectory = made([0.0, T], [0.998 * LIMIT] * 2, [0.998 * LIMIT] * 2)
+    entry = of(saturations(trajectory), "j1", "torque")
+    assert (entry.active, entry.share) == ((), 0.0)
+    assert entry.peak == pytest.approx(0.998)
+
+
+def test_positions_are_measured_in_half_ranges(made):
+    trajectory = made([0.0, T], [1.0, 1.0], [1.0, 1.0])  # from 0 to 2 m
+    limits = dataclasses.replace(
+        trajectory.robot.limits, position_lower=np.array([-2.0, -np.inf]), position_upper=np.array([2.0, 0.25])
+    )
+    trajectory = dataclasses.replace(trajectory, robot=dataclasses.replace(trajectory.robot, limits=limits))
+    ratios = limit_ratios(trajectory)
+    column = dict(zip(ratios.names, ratios.values.T, strict=True))
+    np.testing.assert_allclose(column["position", "j1"], 0.25 * ratios.t**2, atol=1e-12)
+    np.testing.assert_allclose(column["position", "j2"], 0.75)
+
+
+def test_unlimited_joints_are_left_out(made):
+    trajectory = made([0.0, T], [1.0, 1.0], [1.0, 1.0])
+    limits = dataclasses.replace(trajectory.robot.limits, torque=np.array([FORCE, np.inf]))
+    trajectory = dataclasses.replace(trajectory, robot=dataclasses.replace(trajectory.robot, limits=limits))
+    names = limit_ratios(trajectory).names
+    assert ("torque", "j1") in names
+    assert ("torque", "j2") not in names
+    assert not [name for name in names if name[0] == "acceleration"]
+
+
+def test_a_saved_motion_will_do(scara, tmp_path):
+    trajectory = scara("j1").trajectory
+    trajectory.save(tmp_path / "motion.npz")
+    found = saturations(type(trajectory).load(tmp_path / "motion.npz"))
+    assert found == saturations(trajectory)
+    assert 0.05 < found[0].share < 1.0
+    assert [entry.share for entry in found] == sorted((entry.share for entry in found), reverse=True)

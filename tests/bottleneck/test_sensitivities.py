@@ -1,0 +1,163 @@
+"""What limits cost, on problems whose answer is known by hand and against least squares."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from brachis.bottleneck import sensitivities
+from brachis.bottleneck.multipliers import Multipliers, Pushes, multipliers_of
+from brachis.bottleneck.sensitivities import sensitivities_at
+from brachis.solvers import SolverOptions, solver_named
+
+from .conftest import FORCE, LENGTH, MASS, X, Z
+
+CARRIED = 2.0 * MASS
+
+
+def found_of(result):
+    return sensitivities(result.attempt.refined)
+
+
+@pytest.mark.parametrize("rest", ["full", "velocity"])
+@pytest.mark.parametrize("degree", [3, 4])
+def test_time_falls_with_the_root_of_the_force(slide, rest, degree):
+    # t = 2 sqrt(m L / F) times a factor of the spline alone: d t / d ln F = -t / 2 exactly.
+    result = slide(rest=rest, degree=degree)
+    found, answer = found_of(result), result.report.objective
+    assert found.of("j1", "torque").change(1.0) == pytest.approx(-0.5 * answer, rel=1e-5)
+    assert found.of("j1", "torque").derivative == pytest.approx(-0.5 * answer / FORCE, rel=1e-5)
+    assert [entry.change(1.0) for entry in found.limits if (entry.joint, entry.kind) != ("j1", "torque")] == [0.0] * 7
+    assert found.limits[0].joint == "j1"
+    assert found.reliable
+
+
+def test_trapezoid(slide):
+    limit = 2.0
+    result = slide(intervals=40, robot={"limits": {"velocity": limit}})
+    found = found_of(result)
+    ramp = limit * CARRIED / FORCE  # t = L / v + v m / F, but for the corners that a spline rounds
+    force, speed = found.of("j1", "torque").change(1.0), found.of("j1", "velocity").change(1.0)
+    assert force == pytest.approx(-ramp, rel=0.1)
+    assert speed == pytest.approx(ramp - LENGTH / limit, rel=0.1)
+    # The same motion k times as fast needs k times the velocity and k^2 times the force.
+    assert 2.0 * force + speed == pytest.approx(-result.report.objective, rel=1e-4)
+    assert found.of("j1", "velocity").unit == "m/s"
+
+
+def test_acceleration_limit(slide):
+    result = slide(robot={"limits": {"acceleration": 6.0, "torque": None}})
+    found = found_of(result)
+    assert found.of("j1", "acceleration").change(1.0) == pytest.approx(-0.5 * result.report.objective, rel=1e-5)
+    assert found.of("j1", "acceleration").unit == "m/s^2"
+
+
+def test_lifting_against_gravity(slide):
+    # From rest to rest t^2 = 2 L (a + b) / (a b) with a = F / m - g, b = F / m + g: no mere scaling of time.
+    force, g = 30.0, 9.81
+    robot = {"gravity": [0, 0, -g], "limits": {"torque": {"j1": 200.0, "j2": force}}}
+    found = found_of(slide((X, Z), ("x", "z"), (0.0, LENGTH), intervals=40, robot=robot))
+
+    def best(force):
+        up, down = force / MASS - g, force / MASS + g
+        return np.sqrt(2.0 * LENGTH * (up + down) / (up * down))
+
+    exact = (best(force + 1e-4) - best(force - 1e-4)) / 2e-4
+    assert found.of("j2", "torque").derivative == pytest.approx(exact, rel=0.02)
+    assert found.of("j2", "torque").unit == "N"
+
+
+def held(slide, half):
+    """Two slides along one line; the lower one recoils within a narrow range, which costs time."""
+    limits = {"torque": {"j1": 30.0}, "position": {"j1": [-half, half]}}
+    return slide((X, X), ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits})
+
+
+def test_ends_of_a_range(slide):
+    half = 0.02
+    result = held(slide, half)
+    found = found_of(result)
+    ends = {end: found.of("j1", "position", end) for end in ("lower", "upper")}
+    assert ends["lower"].derivative >= 0.0 >= ends["upper"].derivative
+    assert min(entry.change(1.0) for entry in ends.values()) < -1e-3, "a wider range saves time"
+    assert ends["lower"].whole == pytest.approx(2.0 * half)
+    assert ends["lower"].unit == "m"
+    for entry in ends.values():
+        wider = entry.raised(result.trajectory.robot.limits, 0, 0.5)
+        lower, upper = wider.position_lower[0], wider.position_upper[0]
+        expected = (-2.0 * half, half) if entry.end == "lower" else (-half, 2.0 * half)
+        assert (lower, upper) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
+def test_no_limit_costs_less_than_nothing(scara, joint):
+    found = found_of(scara(joint))
+    assert all(entry.change(1.0) <= 0.0 for entry in found.limits)
+    # Torque limits and nothing else: were all torques f times as large, the time would fall with the root of f.
+    expected = -0.5 * scara(joint).report.objective
+    assert sum(entry.change(1.0) for entry in found.limits) == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
+def test_least_squares_agree_with_the_solver(scara, joint):
+    refined = scara(joint).attempt.refined
+    problem, report = refined.problem, refined.reports[-1]
+    own, fitted = multipliers_of(problem, report.x, report.multipliers), multipliers_of(problem, report.x)
+    assert (own.source, fitted.source) == ("solver", "least squares")
+    assert max(own.residual, fitted.residual) < 1e-5
+    for entry in sensitivities_at(problem, own).limits:
+        other = sensitivities_at(problem, fitted).of(entry.joint, entry.kind, entry.end)
+        assert other.change(1.0) == pytest.approx(entry.change(1.0), rel=1e-4, abs=1e-6)
+
+
+def test_a_solver_without_multipliers(slide):
+    result = slide(intervals=10, solver="slsqp")
+    assert not result.report.multipliers.any()
+    found = found_of(result)
+    assert found.source == "least squares"
+    assert found.of("j1", "torque").change(1.0) == pytest.approx(-0.5 * result.report.objective, rel=1e-3)
+
+
+def test_an_answer_that_is_no_optimum_is_told(scara):
+    refined = scara("j3").attempt.refined
+    report = refined.reports[-1]
+    x = report.x.copy()
+    x[0] *= 1.02  # slower: no torque is at its limit any more
+    slower = dataclasses.replace(refined, reports=(dataclasses.replace(report, x=x),))
+    assert not sensitivities(slower).reliable
+    assert sensitivities(refined).reliable
+
+
+def test_multipliers_of_wrong_sign_are_not_believed(scara):
+    refined = scara("j3").attempt.refined
+    report = refined.reports[-1]
+    wrong = multipliers_of(refined.problem, report.x, -report.multipliers)
+    assert wrong.source == "least squares"
+    assert wrong.residual < 1e-5
+
+
+def test_two_rows_that_hold_alike_give_way_together_only():
+    # min t over t >= b1, t >= b2 with b1 = b2: relief of one alone saves nothing.
+    pushes = Pushes(np.array([[1.0], [1.0]]), np.array([0, 1]), np.array([1.0, 1.0]))
+    assert pushes.dependent
+    for weights in ([1.0, 0.0], [0.3, 0.7]):
+        both = Multipliers(pushes, np.array(weights), "solver", 0.0, unique=False)
+        assert both.change(np.array([1.0, 0.0])) == pytest.approx(0.0)
+        assert both.change(np.array([0.0, 1.0])) == pytest.approx(0.0)
+        assert both.change(np.array([1.0, 2.0])) == pytest.approx(-1.0)
+        assert both.change(np.array([1.0, 1.0]), side=-1.0) == 0.0
+
+
+def test_branch_boundary_is_told_apart(scara):
+    refined = scara("j3").attempt.refined
+    problem, report = refined.problem, refined.reports[-1]
+    tight = problem.with_margin(0.2)
+    answer = solver_named("uno")[0].solve(tight, report.x, SolverOptions(), None)
+    assert answer.objective > report.objective + 1e-4
+    found = sensitivities_at(tight, multipliers_of(tight, answer.x, answer.multipliers))
+    (boundary,) = found.boundaries
+    wider = solver_named("uno")[0].solve(problem.with_margin(0.198), answer.x, SolverOptions(), None)
+    assert boundary.derivative * 0.002 == pytest.approx(answer.objective - wider.objective, rel=0.1)
+    assert {entry.kind for entry in found.limits} <= {"torque", "velocity", "acceleration", "position"}

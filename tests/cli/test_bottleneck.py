@@ -1,0 +1,98 @@
+"""``brachis bottleneck``: what it prints and writes."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+from brachis import planner, plots
+from brachis.errors import InputError
+from brachis.verify import VerifyOptions
+
+
+def test_in_plain_words(run, task, write):
+    outcome = run("bottleneck", write(task))
+    assert outcome.code == 0, outcome.err
+    assert outcome.err == ""
+    assert "end time t_E: 2.47" in outcome.out
+    savings = re.findall(r"10 % more torque at (j\d) \(1 Nm\) saves (\S+) % \((\S+) ms\)", outcome.out)
+    assert [joint for joint, *_ in savings] == ["j1", "j2"]
+    percent, milliseconds = float(savings[0][1]), float(savings[0][2])
+    assert percent == pytest.approx(3.8, abs=0.2)
+    assert milliseconds == pytest.approx(10.0 * percent * 2.475, rel=0.05)
+    assert "no other limit costs time" in outcome.out
+    assert re.search(r"j2 is at its torque limit for \d+\.\d % of the time", outcome.out)
+    assert "reference" not in outcome.out
+    assert "checked" not in outcome.out
+
+
+def test_check_and_reference(run, task, write):
+    task["spline"]["intervals"] = 10
+    outcome = run("bottleneck", write(task), "--check", "--reference")
+    assert outcome.code == 0, outcome.err
+    checked = re.findall(r"checked, (\S+) torque \+1 %: predicted (\S+) ms, solved again (\S+) ms", outcome.out)
+    assert {joint for joint, *_ in checked} >= {"j1", "j2"}
+    for _, predicted, found in checked:
+        assert float(predicted) == pytest.approx(float(found), rel=0.05)
+    assert re.search(
+        r"reference 2\.\d+ s \(.*not a proven bound.*\): the motion takes \d+\.\d+ % \(.* ms\) longer", outcome.out
+    )
+
+
+def test_json(run, task, write):
+    outcome = run("bottleneck", write(task), "--json")
+    data = json.loads(outcome.out, parse_constant=pytest.fail)
+    found = data["bottleneck"]
+    assert data["verified"] is True
+    assert found["t_end_s"] == data["t_end"]
+    first = found["sensitivities"]["limits"][0]
+    assert (first["joint"], first["kind"], first["unit"]) == ("j1", "torque", "Nm")
+    assert first["change_for_1_percent_s"] == pytest.approx(0.01 * first["derivative_s_per_unit"] * first["limit"])
+    assert found["sensitivities"]["multipliers"] == "solver"
+    assert {entry["joint"] for entry in found["saturations"]} == {"j1", "j2", "j3"}
+    assert found["check"] is None
+    assert found["reference"] is None
+
+
+def test_files(run, task, write, tmp_path):
+    out = tmp_path / "out"
+    outcome = run("bottleneck", write(task), "--out", out)
+    assert outcome.code == 0, outcome.err
+    assert sorted(path.name for path in out.iterdir()) == ["bottleneck.json", "timeline.png"]
+    assert f"wrote {out / 'timeline.png'}" in outcome.out
+    assert json.loads((out / "bottleneck.json").read_text())["bottleneck"]["sensitivities"]["reliable"] is True
+    assert (out / "timeline.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_unverified_motion(run, task, write, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    task["solver"] = {"time_limit": 1.0}
+    run("bottleneck", write(task), "--out", out)
+    honest = planner.verify_trajectory
+    strict = VerifyOptions(ratio_tolerance=-0.5)
+    monkeypatch.setattr(planner, "verify_trajectory", lambda trajectory, _options: honest(trajectory, strict))
+    outcome = run("bottleneck", write(task), "--out", out)
+    assert outcome.code == 1
+    assert "did not pass the verification" in outcome.err
+    assert sorted(path.name for path in out.iterdir()) == ["unverified_bottleneck.json", "unverified_timeline.png"]
+
+
+def test_failure_while_writing_leaves_the_folder_as_it_was(run, task, write, tmp_path, monkeypatch):
+    def full(_figure, path):
+        raise InputError("cannot be written", where=str(path), found="No space left on device")
+
+    monkeypatch.setattr(plots, "save_figure", full)
+    outcome = run("bottleneck", write(task), "--out", tmp_path / "out")
+    assert outcome.code == 2
+    assert "timeline.png: cannot be written" in outcome.err
+    assert not list((tmp_path / "out").iterdir())
+
+
+def test_wrong_input(run, task, write, tmp_path):
+    assert run("bottleneck", tmp_path / "gone.yaml").code == 2
+    task["robot"]["limits"]["torque"] = -1
+    outcome = run("bottleneck", write(task), "--json")
+    assert outcome.code == 2
+    assert "torque" in json.loads(outcome.out)["error"]

@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+from matplotlib.collections import PolyCollection, QuadMesh
+
+from brachis.bottleneck import saturations
+from brachis.plots import plot_timeline
+from brachis.trajectory import limit_ratios
+
+
+def rows(ax):
+    return [label.get_text() for label in ax.get_yticklabels()]
+
+
+def meshes(ax):
+    return [each for each in ax.collections if isinstance(each, QuadMesh)]
+
+
+def spans(ax):
+    """Times of the marked stretches, row by row."""
+    bars = [each for each in ax.collections if isinstance(each, PolyCollection) and not isinstance(each, QuadMesh)]
+    return [[(path.vertices[:, 0].min(), path.vertices[:, 0].max()) for path in bar.get_paths()] for bar in bars]
+
+
+def test_a_row_for_every_limit_that_comes_near(line_trajectory):
+    ax = plot_timeline(line_trajectory).axes[0]
+    peaks = {(entry.joint, entry.kind): entry.peak for entry in saturations(line_trajectory)}
+    expected = {f"{joint} {kind}" for (joint, kind), peak in peaks.items() if peak > 0.5}
+    assert {"j1 torque", "j2 torque"} <= expected
+    assert set(rows(ax)) == expected
+    assert len(meshes(ax)) == len(expected)
+
+
+def test_a_limit_that_stays_far_off_is_left_out(line_trajectory, with_limits):
+    far = with_limits(line_trajectory, torque=np.array([10.0, 10.0, 1e3]))
+    assert "j3 torque" not in rows(plot_timeline(far).axes[0])
+    near = with_limits(line_trajectory, torque=np.array([10.0, 10.0, 0.1]))
+    assert "j3 torque" in rows(plot_timeline(near).axes[0])
+
+
+def test_colours_are_the_ratios(line_trajectory):
+    ax = plot_timeline(line_trajectory).axes[0]
+    ratios = limit_ratios(line_trajectory)
+    column = ratios.names.index(("torque", "j1"))
+    drawn = meshes(ax)[rows(ax).index("j1 torque")].get_array().ravel()
+    used = np.abs(ratios.values[:, column])
+    np.testing.assert_allclose(drawn, 0.5 * (used[1:] + used[:-1]))
+
+
+def test_active_stretches_are_marked_where_they_are(line_trajectory):
+    ax = plot_timeline(line_trajectory).axes[0]
+    (entry,) = [each for each in saturations(line_trajectory) if (each.joint, each.kind) == ("j1", "torque")]
+    assert entry.active
+    drawn = spans(ax)[rows(ax).index("j1 torque")]
+    np.testing.assert_allclose(sorted(drawn), [(stretch.begin, stretch.end) for stretch in entry.active])
+
+
+def test_time_axis(line_trajectory):
+    ax = plot_timeline(line_trajectory).axes[0]
+    assert ax.get_xlabel() == "$t$ (s)"
+    assert ax.get_xlim() == (0.0, line_trajectory.t_end)
+    knots = np.unique(line_trajectory.knots)[1:-1] * line_trajectory.t_end
+    assert np.array_equal(ax.get_xticks(minor=True), knots)
+
+
+def test_limits_that_are_never_near_are_said(line_trajectory, with_limits):
+    open_range = {"position_lower": np.full(3, -np.inf), "position_upper": np.full(3, np.inf)}
+    ax = plot_timeline(with_limits(line_trajectory, torque=np.full(3, 1e4), **open_range)).axes[0]
+    assert rows(ax) == []
+    assert any("no limit" in text.get_text() for text in ax.texts)
+
+
+@pytest.mark.parametrize("name", ["line_trajectory", "spatial_trajectory"])
+def test_nothing_is_cut_off(name, request):
+    figure = plot_timeline(request.getfixturevalue(name))
+    figure.draw_without_rendering()
+    box = figure.get_tightbbox().transformed(figure.dpi_scale_trans)
+    assert box.x0 >= -1.0
+    assert box.y0 >= -1.0
+    assert box.x1 <= figure.bbox.x1 + 1.0
+    assert box.y1 <= figure.bbox.y1 + 1.0
