@@ -7,8 +7,9 @@ import re
 
 import pytest
 
-from brachis import planner, plots
+from brachis import plots
 from brachis.errors import InputError
+from brachis.search import motion
 from brachis.verify import VerifyOptions
 
 
@@ -70,9 +71,9 @@ def test_unverified_motion(run, task, write, tmp_path, monkeypatch):
     out = tmp_path / "out"
     task["solver"] = {"time_limit": 1.0}
     run("bottleneck", write(task), "--out", out)
-    honest = planner.verify_trajectory
+    honest = motion.verify_trajectory
     strict = VerifyOptions(ratio_tolerance=-0.5)
-    monkeypatch.setattr(planner, "verify_trajectory", lambda trajectory, _options: honest(trajectory, strict))
+    monkeypatch.setattr(motion, "verify_trajectory", lambda trajectory, _options: honest(trajectory, strict))
     outcome = run("bottleneck", write(task), "--out", out)
     assert outcome.code == 1
     assert "did not pass the verification" in outcome.err

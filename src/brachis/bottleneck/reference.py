@@ -18,10 +18,9 @@ from typing import Any
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from brachis.bspline import basis_matrix
 from brachis.errors import UnreachableError
 from brachis.nlp import Transcription
-from brachis.nlp.guess import stretched, worst_timed_ratio
+from brachis.nlp.guess import fitted, stretched, worst_timed_ratio
 from brachis.nlp.transcription import Motion
 from brachis.refine import Refined, RefinementOptions, Solve, refine
 from brachis.solvers import SolverOptions, SolverReport, SolveStatus, solver_named
@@ -34,6 +33,7 @@ _POINTS = 3
 _BESIDE = 1e-6
 """Parabolas are looked at this much of the whole time before every knot, too: their accelerations jump there."""
 _DENSE = 30
+_FIT_DENSITY = 4
 _FEASIBLE = 1e-5
 _AS_GOOD = 1.001
 """A start beyond its limits by less needs no longer time: solvers mend that themselves."""
@@ -172,7 +172,8 @@ def _planned(problem: Transcription, motion: Motion, tolerance: float, deadline:
     It need not be an optimum: any motion within the limits is as good a reference as it is fast.
     """
     try:
-        x = _fitted(problem, motion)
+        tau = np.linspace(0.0, 1.0, _FIT_DENSITY * len(problem.knots))
+        x = fitted(problem, motion.t_end, tau, motion.at(tau * motion.t_end)[0])
         if worst_timed_ratio(problem, x) > _AS_GOOD:
             x = stretched(problem, x)
     except UnreachableError:
@@ -196,20 +197,6 @@ def _bounded(backend: Callable[..., SolverReport], deadline: float) -> Solve:
         return backend(problem, x, SolverOptions(max_iterations=_ITERATIONS, time_limit=seconds), None)
 
     return solve
-
-
-def _fitted(problem: Transcription, motion: Motion) -> np.ndarray:
-    """Point x whose curves are nearest to a motion's, by least squares; exact where the mesh contains its knots."""
-    tau = np.linspace(0.0, 1.0, 4 * len(problem.knots))
-    wanted = motion.at(tau * motion.t_end)[0]
-    basis = basis_matrix(problem.knots, problem.degree, tau).toarray()
-    parts = [np.array([motion.t_end])]
-    for spline, values in zip(problem.splines, wanted.T, strict=True):
-        tied = np.zeros((len(spline.variable), spline.free))
-        kept = np.flatnonzero(spline.variable >= 0)
-        tied[kept, spline.variable[kept]] = 1.0
-        parts.append(np.linalg.lstsq(basis @ tied, values - basis @ spline.fixed, rcond=None)[0])
-    return np.clip(np.concatenate(parts), problem.x_lower, problem.x_upper)
 
 
 def _excess(problem: Transcription, x: np.ndarray) -> float:

@@ -7,11 +7,13 @@ until all limits hold, which gives the solver a feasible start wherever gravity 
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.bspline import basis_matrix
 from brachis.errors import UnreachableError
 from brachis.ik import margin_gradient
 from brachis.kinematics import Decomposition
@@ -28,6 +30,7 @@ _ROOMY = 0.05
 _SHRINKAGE = 0.8
 _SHORTEST_TIME, _LONGEST_TIME = 0.01, 200.0
 _RANGE_PUSH = 20.0
+_FIT_DENSITY = 4
 
 
 @dataclass(frozen=True)
@@ -218,6 +221,8 @@ def _wish(decomposition: Decomposition, strategy: Strategy, q: np.ndarray, previ
 def starting_point(problem: Transcription, course: np.ndarray) -> np.ndarray | None:
     """Fit splines to a course, and stretch the time until the limits hold.
 
+    Control points taken from the course itself smooth it; where that leaves the branch, least squares follow it closer.
+
     Parameters
     ----------
     problem : Transcription
@@ -230,14 +235,46 @@ def starting_point(problem: Transcription, course: np.ndarray) -> np.ndarray | N
         None where the fit is out of reach at a collocation point.
     """
     tau = problem.splines[0].greville
+    smooth = Motion(1.0, problem.knots, problem.degree, _timed(course, tau).T)
+    dense = np.linspace(0.0, 1.0, _FIT_DENSITY * len(problem.knots))
+    for x in (problem.variables_from(smooth), fitted(problem, 1.0, dense, _timed(course, dense))):
+        with contextlib.suppress(UnreachableError):
+            return stretched(problem, x)
+    return None
+
+
+def _timed(course: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    """Follow a course, (S, 1 + r), with a smooth motion from rest to rest: the places at `tau`, (K, 1 + r)."""
     u = tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)
     grid = np.linspace(0.0, 1.0, len(course))
-    points = [np.interp(u, grid, column) for column in course.T]
-    x = problem.variables_from(Motion(1.0, problem.knots, problem.degree, np.array(points)))
-    try:
-        return stretched(problem, x)
-    except UnreachableError:
-        return None
+    return np.column_stack([np.interp(u, grid, column) for column in course.T])
+
+
+def fitted(problem: Transcription, t_end: float, tau: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Point x whose curves come nearest to given values, by least squares; exact where the splines contain them.
+
+    Parameters
+    ----------
+    problem : Transcription
+    t_end : float
+        s.
+    tau : (K,) ndarray
+        Normalised times.
+    wanted : (K, 1 + r) ndarray
+        Path coordinate and redundant joints there.
+
+    Returns
+    -------
+    (v,) ndarray
+    """
+    basis = basis_matrix(problem.knots, problem.degree, tau).toarray()
+    parts = [np.array([t_end])]
+    for spline, values in zip(problem.splines, wanted.T, strict=True):
+        tied = np.zeros((len(spline.variable), spline.free))
+        kept = np.flatnonzero(spline.variable >= 0)
+        tied[kept, spline.variable[kept]] = 1.0
+        parts.append(np.linalg.lstsq(basis @ tied, values - basis @ spline.fixed, rcond=None)[0])
+    return np.clip(np.concatenate(parts), problem.x_lower, problem.x_upper)
 
 
 def stretched(problem: Transcription, x: np.ndarray) -> np.ndarray:
