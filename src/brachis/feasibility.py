@@ -199,7 +199,7 @@ def _postures_along(decomposition: Decomposition, s: np.ndarray) -> np.ndarray:
     turning = np.array([unit == "rad" for unit in robot.position_units])
     low = np.where(np.isfinite(lower), lower, np.where(turning, -np.pi, decomposition.start - 10.0))
     high = np.where(np.isfinite(upper), upper, np.where(turning, np.pi, decomposition.start + 10.0))
-    tries = _SEARCHED if redundant else 1
+    tries = _SEARCHED * len(redundant) ** 2 if redundant else 1
     q_r = np.random.default_rng(0).uniform(low[redundant], high[redundant], (tries, len(redundant)))
     targets = decomposition.path.sample(s).target
     answers = decomposition.solver.solve(np.repeat(targets, tries, axis=0), np.tile(q_r, (len(s), 1)))

@@ -15,12 +15,16 @@ from brachis.setting import Choice
 
 _GOOD_PART = 0.1
 _LOOKED_AT = 6
+_THERE_IS_A_COURSE = (
+    "There is a course along the path within reach, but no motion along it was found; raise search.effort, or try "
+    "another start posture"
+)
 
 
 def refuse_what_is_out_of_reach(choices: Sequence[Choice], candidates: Sequence[Candidate]) -> None:
-    """Raise the reason where the lattice of no choice has a course, or a good part of the path cannot be reached.
+    """Raise the reason where the path is out of reach, so that further attempts would be in vain.
 
-    Further attempts would be in vain.
+    Where no lattice has a course, any part of it counts; where no lattice was looked at, a good part.
 
     Parameters
     ----------
@@ -32,6 +36,8 @@ def refuse_what_is_out_of_reach(choices: Sequence[Choice], candidates: Sequence[
     ------
     PathError
     """
+    if _some_course(candidates):
+        return
     reasons = [_reason(choice) for choice in choices[:_LOOKED_AT]]
     clear = [
         (reason.s_interval, reason)
@@ -40,7 +46,7 @@ def refuse_what_is_out_of_reach(choices: Sequence[Choice], candidates: Sequence[
     ]
     if len(clear) < len(reasons):
         return
-    if _no_course(candidates) or all(end - begin > _GOOD_PART for (begin, end), _ in clear):
+    if _lattices(candidates) or all(end - begin > _GOOD_PART for (begin, end), _ in clear):
         raise max(clear, key=lambda item: item[0][0])[1]
 
 
@@ -60,10 +66,11 @@ def no_motion(
     -------
     PathError or PlanningError
     """
-    reason = _reason(choices[0])
+    course = _some_course(candidates)
+    reason = _THERE_IS_A_COURSE if course else _reason(choices[0])
     if isinstance(reason, BrachisError):
         return reason
-    if dead_ends and _no_course(candidates):
+    if dead_ends and not course:
         name, furthest = max(dead_ends.items(), key=lambda item: item[1].s)
         redundant = f" (redundant joints: {name})" if name != "none" else ""
         return PathError(
@@ -76,10 +83,13 @@ def no_motion(
     return PlanningError(f"no motion within the limits was found: {outcomes or 'no initial guess'}", hint=reason)
 
 
-def _no_course(candidates: Sequence[Candidate]) -> bool:
-    """Tell whether the lattices that were looked at have no course."""
-    lattice = [candidate for candidate in candidates if candidate.origin.startswith("lattice")]
-    return bool(lattice) and not any(candidate.branch for candidate in lattice)
+def _lattices(candidates: Sequence[Candidate]) -> list[Candidate]:
+    return [candidate for candidate in candidates if candidate.origin.startswith("lattice")]
+
+
+def _some_course(candidates: Sequence[Candidate]) -> bool:
+    """Tell whether a lattice that was looked at has a course."""
+    return any(candidate.branch for candidate in _lattices(candidates))
 
 
 def _reason(choice: Choice) -> BrachisError | str:

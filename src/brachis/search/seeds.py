@@ -66,7 +66,11 @@ def lattice_seeds(choice: Choice, effort: Effort, seed: int) -> list[Seed] | Dea
     -------
     list of Seed or DeadEnd
     """
-    cells, nodes, most = effort.cells_per_turn, effort.nodes, effort.seeds * len(choice.branches)
+    cells, nodes, most = (
+        effort.cells_per_turn,
+        effort.nodes,
+        max(1, effort.seeds // max(1, len(choice.redundant))) * len(choice.branches),
+    )
     found = Lattice(choice, cells_per_turn=cells, nodes=nodes, seed=seed).courses(most)
     if isinstance(found, DeadEnd):
         found = Lattice(choice, cells_per_turn=_FINER * cells, nodes=_FINER * nodes, seed=seed).courses(most)

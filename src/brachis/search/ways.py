@@ -64,11 +64,15 @@ def waves(
         solvers[:2] = solvers[1::-1]
     known: list[Seed] = []
     for effort in EFFORTS[task.search.effort]:
-        allowed = _within(choices, effort)
-        if task.search.guesses == "numeric":
-            seeds = [seed for choice in allowed for seed in numeric_seeds(choice, effort.seeds)]
-        else:
-            seeds = _from_lattices(allowed, effort, deadline, listener, note)
+        allowed = [choice for choice in choices if effort.polynomial or choice.match.solver.kind == "closed_form"]
+        seeds: list[Seed] = []
+        rest = allowed or choices
+        while rest and not seeds:  # choices without a course make room for others
+            allowed, rest = rest[: effort.choices], rest[effort.choices :]
+            if task.search.guesses == "numeric":
+                seeds = [seed for choice in allowed for seed in numeric_seeds(choice, effort.seeds)]
+            else:
+                seeds = _from_lattices(allowed, effort, deadline, listener, note)
         known += seeds
         for first in range(0, len(seeds), _WAVE):
             yield Wave(tuple(Way(seed, solvers[0]) for seed in seeds[first : first + _WAVE]), effort.refined)
@@ -80,12 +84,6 @@ def waves(
     yield Wave(tuple(Way(seed, solver) for solver in solvers[2:] for seed in known[:2]), many, last_resort=True)
 
 
-def _within(choices: Sequence[Choice], effort: Effort) -> Sequence[Choice]:
-    """Return the choices that a level looks at."""
-    closed = [choice for choice in choices if effort.polynomial or choice.match.solver.kind == "closed_form"]
-    return (closed or choices)[: effort.choices]
-
-
 def _from_lattices(
     choices: Sequence[Choice],
     effort: Effort,
@@ -95,6 +93,7 @@ def _from_lattices(
 ) -> list[Seed]:
     """Take seeds of all choices in turn, those with the least estimated times first."""
     search = choices[0].setting.task.search
+    redundancy = max(1, len(choices[0].redundant))
     ranked: list[tuple[int, float, int, Seed]] = []
     outcomes = each(_seeds_of, choices, effort, search.seed, deadline, jobs=search.jobs, listener=listener)
     for choice, outcome in zip(choices, outcomes, strict=True):
@@ -104,7 +103,7 @@ def _from_lattices(
         own = [dataclasses.replace(seed, choice=choice) for seed in outcome]  # not another process's copy
         own = sorted(own, key=lambda seed: seed.estimate) + numeric_seeds(choice, effort.numeric)
         ranked += [(place, seed.estimate, len(ranked) + place, seed) for place, seed in enumerate(own)]
-    return [seed for *_, seed in sorted(ranked, key=lambda item: item[:-1])[: effort.plans]]
+    return [seed for *_, seed in sorted(ranked, key=lambda item: item[:-1])[: effort.plans // redundancy]]
 
 
 def _seeds_of(choice: Choice, effort: Effort, seed: int, deadline: float, listener: Listener) -> list[Seed] | DeadEnd:

@@ -78,7 +78,7 @@ class Coarse:
         return self.way.seed.choice.match.family
 
 
-def plan_coarse(way: Way, deadline: float, listener: Listener) -> Coarse:
+def plan_coarse(way: Way, deadline: float, share: float, listener: Listener) -> Coarse:
     """Solve the NLP from a seed.
 
     Parameters
@@ -86,6 +86,8 @@ def plan_coarse(way: Way, deadline: float, listener: Listener) -> Coarse:
     way : Way
     deadline : float
         When to end, by the monotonic clock, s.
+    share : float
+        Time that this plan may take at most, s.
     listener : callable
 
     Returns
@@ -94,6 +96,7 @@ def plan_coarse(way: Way, deadline: float, listener: Listener) -> Coarse:
     """
     if time.monotonic() > deadline:
         return Coarse(way, None, (), "not tried: the time was up")
+    deadline = min(deadline, time.monotonic() + share)
     seed, setting = way.seed, way.seed.choice.setting
     problem = transcription(setting, seed.decomposition, intervals_of(setting.task))
     x = starting_point(problem, seed.course)
