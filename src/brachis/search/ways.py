@@ -66,7 +66,7 @@ def waves(
     for effort in EFFORTS[task.search.effort]:
         allowed = [choice for choice in choices if effort.polynomial or choice.match.solver.kind == "closed_form"]
         seeds: list[Seed] = []
-        rest = allowed or choices
+        rest = allowed or list(choices)
         while rest and not seeds:  # choices without a course make room for others
             allowed, rest = rest[: effort.choices], rest[effort.choices :]
             if task.search.guesses == "numeric":
@@ -103,7 +103,7 @@ def _from_lattices(
         own = [dataclasses.replace(seed, choice=choice) for seed in outcome]  # not another process's copy
         own = sorted(own, key=lambda seed: seed.estimate) + numeric_seeds(choice, effort.numeric)
         ranked += [(place, seed.estimate, len(ranked) + place, seed) for place, seed in enumerate(own)]
-    return [seed for *_, seed in sorted(ranked, key=lambda item: item[:-1])[: effort.plans // redundancy]]
+    return [seed for *_, seed in sorted(ranked, key=lambda item: item[:-1])[: max(1, effort.plans // redundancy)]]
 
 
 def _seeds_of(choice: Choice, effort: Effort, seed: int, deadline: float, listener: Listener) -> list[Seed] | DeadEnd:
