@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 
@@ -25,6 +26,8 @@ class Effort:
         Plans that are refined and verified at most, as long as they may beat the best one.
     cells_per_turn, nodes : int
         Of the lattice.
+    last_resort : bool
+        Whether it is gone through only while no motion is verified.
     """
 
     choices: int
@@ -35,6 +38,7 @@ class Effort:
     refined: int
     cells_per_turn: int
     nodes: int
+    last_resort: bool = False
 
 
 _LEVELS = {
@@ -47,7 +51,7 @@ _LEVELS = {
 }
 
 EFFORTS = {
-    "single": (_LEVELS["single"],),
+    "single": (_LEVELS["single"], dataclasses.replace(_LEVELS["fast"], last_resort=True)),
     "fast": (_LEVELS["fast"],),
     "thorough": (_LEVELS["fast"], _LEVELS["thorough"]),
     "exhaustive": (_LEVELS["fast"], _LEVELS["thorough"], _LEVELS["exhaustive"]),

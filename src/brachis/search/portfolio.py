@@ -35,8 +35,8 @@ _SAME_TIME = 1e-4
 _SAME_MOTION = 0.1  # rad or m
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no coarse plan is begun while nothing is verified."""
-_LEAST_SHARE = 2.0
-"""Seconds that every coarse plan may take."""
+_LEAST_SHARE, _LARGEST_SHARE = 2.0, 0.15
+"""Seconds that every coarse plan may take, and part of the time limit that none may exceed."""
 _GRACE = 1.0
 """Seconds to finish the best plan where the time is up and nothing is verified."""
 
@@ -143,7 +143,8 @@ class _Search:
     def _plan(self, wave: Wave) -> list[tuple[int, Coarse]]:
         """Plan the ways of a wave coarsely, and rank those that differ."""
         limit = self.deadline if self.content else self._began + _COARSE_SHARE * self._task.search.time_limit
-        share = max(_LEAST_SHARE, _COARSE_SHARE * self._task.search.time_limit / max(1, len(wave.ways)))
+        share = self._task.search.time_limit * min(_LARGEST_SHARE, _COARSE_SHARE / max(1, len(wave.ways)))
+        share = max(_LEAST_SHARE, share)
         plans: list[tuple[int, Coarse]] = []
         for plan in each(plan_coarse, wave.ways, limit, share, jobs=self._task.search.jobs, listener=self._listener):
             plans.append((len(self._candidates), plan))

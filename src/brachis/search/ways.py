@@ -75,7 +75,11 @@ def waves(
                 seeds = _from_lattices(allowed, effort, deadline, listener, note)
         known += seeds
         for first in range(0, len(seeds), _WAVE):
-            yield Wave(tuple(Way(seed, solvers[0]) for seed in seeds[first : first + _WAVE]), effort.refined)
+            yield Wave(
+                tuple(Way(seed, solvers[0]) for seed in seeds[first : first + _WAVE]),
+                effort.refined,
+                effort.last_resort,
+            )
     many = len(known) + len(STRATEGIES)
     yield Wave(tuple(Way(seed, solver) for seed in known[:_WAVE] for solver in solvers[1:2]), many, last_resort=True)
     for choice in allowed:
