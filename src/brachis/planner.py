@@ -11,6 +11,7 @@ from threadpoolctl import ThreadpoolController
 
 from brachis import ik
 from brachis.attempts import Listener, search
+from brachis.bspline import clamped_uniform_knots
 from brachis.errors import InputError
 from brachis.feasibility import check_end_branch, check_start, start_branch
 from brachis.kinematics import Decomposition, interpolate
@@ -135,7 +136,7 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
     problem = Transcription(
         decomposition,
         degree=spline.degree,
-        intervals=intervals,
+        knots=clamped_uniform_knots(spline.degree, intervals),
         derivatives_at_rest=2 if spline.rest == "full" else 1,
         tau=np.linspace(0.0, 1.0, spline.points_per_interval * intervals + 1),
         end=end,
