@@ -10,6 +10,7 @@ import numpy as np
 
 from brachis.errors import BrachisError, PathError, PlanningError, UnreachableError
 from brachis.feasibility import explain_failure
+from brachis.mesh import settle_knots
 from brachis.nlp import Transcription
 from brachis.nlp.constraints.branch_margin import MARGIN
 from brachis.nlp.guess import guesses
@@ -85,6 +86,7 @@ def search(
                 Attempt(solver.name, number, (), 0, np.inf, 1.0, 0, f"{solver.name}: not installed ({error})")
             )
             continue
+        continued_problem, reports = settle_knots(continued_problem, reports, solve, task.spline, options)
         refined, motion = _refined_until_verified(continued_problem, reports[-1], solve, options, judge)
         attempts.append(_attempt(refined, reports[:-1], number, settings.tolerance, motion))
         listener(attempts[-1].outcome)

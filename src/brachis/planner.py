@@ -15,6 +15,7 @@ from brachis.bspline import clamped_uniform_knots
 from brachis.errors import InputError
 from brachis.feasibility import check_end_branch, check_start, start_branch
 from brachis.kinematics import Decomposition, interpolate
+from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Transcription
 from brachis.path import path_of
 from brachis.refine import Refined
@@ -132,7 +133,7 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
         check_end_branch(robot, task_space, candidate, end, branch)
     decomposition = Decomposition(robot, task_space, path, candidate.solver, redundant, branch, start)
     spline = task.spline
-    intervals = 20 if spline.intervals == "auto" else spline.intervals
+    intervals = COARSE_INTERVALS if spline.intervals == "auto" else spline.intervals
     problem = Transcription(
         decomposition,
         degree=spline.degree,

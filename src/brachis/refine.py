@@ -108,7 +108,7 @@ def refine(problem: Transcription, first: SolverReport, solve: Solve, options: R
         x, remaining = _stretched(dense, answer, excess, goal, options.tolerance)
         if remaining <= goal:
             return Refined(problem, tuple(reports), x, remaining, float(x[0] / answer[0]))
-        tau = _merged(problem.tau, places)
+        tau = merged(problem.tau, places)
         if len(tau) == len(problem.tau):
             break
         finer = problem.resampled(tau)
@@ -125,7 +125,7 @@ def refine(problem: Transcription, first: SolverReport, solve: Solve, options: R
 
 def _dense_grid(problem: Transcription, density: int) -> np.ndarray:
     """Spread times evenly over every knot interval, `density` for each of its collocation points."""
-    breaks = np.unique(problem.knots)
+    breaks = problem.breaks
     behind = np.searchsorted(problem.tau, breaks + _SAME_TIME)
     return spread(breaks, density * np.maximum(np.diff(behind), 1))
 
@@ -223,7 +223,7 @@ def _zoomed(
     return fine[chosen], worst.reshape(fine.shape)[chosen]
 
 
-def _merged(tau: np.ndarray, extra: np.ndarray) -> np.ndarray:
+def merged(tau: np.ndarray, extra: np.ndarray) -> np.ndarray:
     """Collocation points with extra ones, without pairs so close that their rows would be the same."""
     gap = np.min(np.abs(extra[:, None] - tau[None]), axis=1)
     return np.union1d(tau, extra[gap > _CLOSEST])

@@ -141,7 +141,7 @@ class FreeGrid:
 
     def knots_at(self, h: np.ndarray) -> np.ndarray:
         """See `Grid`."""
-        breaks = np.concatenate([[0.0], np.cumsum(h)])
+        breaks = np.concatenate([[0.0], np.cumsum(np.maximum(h, self.lower))])
         return clamped_knots(self.degree, breaks / breaks[-1])
 
     def tau_at(self, h: np.ndarray) -> np.ndarray:

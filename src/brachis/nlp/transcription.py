@@ -146,6 +146,11 @@ class Transcription:
         return self.grid.knots
 
     @property
+    def breaks(self) -> np.ndarray:
+        """Ends of the knot intervals in normalised time, (N + 1,)."""
+        return self.knots[self.degree : len(self.knots) - self.degree]
+
+    @property
     def tau(self) -> np.ndarray:
         """Collocation points in normalised time, (K,); see `Grid`."""
         return self.grid.tau
