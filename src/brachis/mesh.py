@@ -24,8 +24,9 @@ COARSE_INTERVALS = 10
 _SHARE = 0.6
 """A round halves the intervals that lose most, and that lose this part of the time lost altogether."""
 _SAMPLES = 8
-_SHORTEST = 1e-3
-"""Intervals of less than twice this part of t_E are not halved."""
+_SHORTEST = 0.5, 5e-5
+"""No interval gets shorter than this part of the tolerance, for it cannot lose more than its own length; nor, as a
+part of t_E, than this: collocation points would fall together."""
 _MOST_INTERVALS = 300
 _MESH_ROUNDS = 20
 _FREE_ROUNDS = 5
@@ -159,7 +160,8 @@ def _halved(
 ) -> tuple[Transcription, np.ndarray]:
     """Halve intervals of a problem: the finer problem, and the same motion as its point."""
     breaks = problem.breaks
-    intervals = intervals[np.diff(breaks)[intervals] >= 2.0 * _SHORTEST]
+    shortest = max(_SHORTEST[0] * options.tolerance, _SHORTEST[1])
+    intervals = intervals[np.diff(breaks)[intervals] >= 2.0 * shortest]
     finer = np.union1d(breaks, 0.5 * (breaks[intervals] + breaks[intervals + 1]))
     knots = clamped_knots(problem.degree, finer)
     other = problem.with_knots(knots, merged(problem.tau, spread(finer, options.points_per_interval)))
