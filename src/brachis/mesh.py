@@ -118,25 +118,29 @@ def refine_mesh(
         Of all solves, `first` included; the last one belongs to `problem`.
     """
     reports, last = [first], first
+    held: list[Refined] = []
     for _ in range(_MESH_ROUNDS):
         finer, x = _halved(problem, last.x, _losers(problem, last.x), options)
         if finer.variables == problem.variables or len(finer.breaks) > _MOST_INTERVALS:
             break
         report = solve(finer, x)
+        reports.append(report)
         if not report.status.usable:
             break
         gain = 1.0 - report.objective / last.objective
         problem, last = finer, report
-        reports.append(report)
         if gain > options.tolerance:
             continue
-        settled = refine(problem, report, solve, refinement)
+        settled = refine(problem, last, solve, refinement)
         doubled = _doubled(settled, solve, options, refinement)
         reports += [*settled.reports[1:], *doubled.reports]
+        held += [settled, doubled]
         if not _gain(settled, doubled, refinement) >= options.tolerance:
-            chosen = doubled if _gain(settled, doubled, refinement) > 0.0 else settled
-            return chosen.problem, _ending_with(chosen.reports[-1], reports)
-    return problem, _ending_with(last, reports)
+            break
+    best = min(held, key=lambda refined: _time(refined, refinement), default=None)
+    if best is None or last.objective < _time(best, refinement):
+        return problem, _ending_with(last, reports)
+    return best.problem, _ending_with(best.reports[-1], reports)
 
 
 def _losers(problem: Transcription, x: np.ndarray) -> np.ndarray:
