@@ -8,7 +8,7 @@ iterations. `free_knots` leaves the number of intervals as it is and moves the k
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from brachis.bspline import clamped_knots, spread
 from brachis.errors import UnreachableError
 from brachis.nlp import Transcription
 from brachis.refine import Refined, RefinementOptions, Solve, merged, refine
-from brachis.solvers import SolverReport
+from brachis.solvers import SolverReport, SolveStatus
 from brachis.task.models import SplineSettings
 
 COARSE_INTERVALS = 10
@@ -30,6 +30,7 @@ part of t_E, than this: collocation points would fall together."""
 _MOST_INTERVALS = 300
 _MESH_ROUNDS = 20
 _FREE_ROUNDS = 5
+_FEASIBLE = 1e-5
 _WORTH_IT = 2e-4
 """Knots are moved again as long as that shortens the motion by this part of it."""
 
@@ -123,7 +124,7 @@ def refine_mesh(
         finer, x = _halved(problem, last.x, _losers(problem, last.x), options)
         if finer.variables == problem.variables or len(finer.breaks) > _MOST_INTERVALS:
             break
-        report = solve(finer, x)
+        report = _accepted(solve(finer, x), last)
         reports.append(report)
         if not report.status.usable:
             break
@@ -172,11 +173,18 @@ def _halved(
     return other, other.variables_from(problem.motion(x).over(knots))
 
 
+def _accepted(report: SolverReport, before: SolverReport) -> SolverReport:
+    """Accept a solve that ended early with a feasible motion faster than the one that it began with."""
+    better = report.violation <= _FEASIBLE and report.objective < before.objective
+    early = report.status in (SolveStatus.ITERATION_LIMIT, SolveStatus.TIME_LIMIT, SolveStatus.STALLED)
+    return replace(report, status=SolveStatus.ACCEPTABLE) if better and early else report
+
+
 def _doubled(settled: Refined, solve: Solve, options: MeshOptions, refinement: RefinementOptions) -> Refined:
     """Halve every interval of a refined problem, solve and refine again."""
     every = np.arange(len(settled.problem.breaks) - 1)
     finer, x = _halved(settled.problem, settled.x, every, options)
-    return refine(finer, solve(finer, x), solve, refinement)
+    return refine(finer, _accepted(solve(finer, x), settled.reports[-1]), solve, refinement)
 
 
 def _time(refined: Refined, refinement: RefinementOptions) -> float:
@@ -225,7 +233,8 @@ def free_knots(
         free = problem.with_free_knots(shortest)
         moved = solve(free, free.variables_from(problem.motion(x)))
         fixed, start = free.frozen(moved.x)
-        report = solve(fixed, start)  # a few iterations, where the solver stalled before the knots came to rest
+        # A few iterations, where the solver stalled before the knots came to rest.
+        report = _accepted(solve(fixed, start), reports[-1])
         reports += [moved, report]
         if not report.status.usable:
             break
