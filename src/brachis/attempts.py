@@ -41,6 +41,8 @@ _SECOND_LOOKS = 4
 _FAILURES = 2
 _GOOD_PART = 0.1
 _BESIDE = 1e-4
+_KNOT_TIME = 0.4
+"""Part of the remaining time that may go into the knots."""
 _LEAST_TIME = 0.1
 """Seconds left to a solve that is begun."""
 
@@ -86,7 +88,8 @@ def search(
                 Attempt(solver.name, number, (), 0, np.inf, 1.0, 0, f"{solver.name}: not installed ({error})")
             )
             continue
-        continued_problem, reports = settle_knots(continued_problem, reports, solve, task.spline, options)
+        budget = _KNOT_TIME * (deadline - time.perf_counter())
+        continued_problem, reports = settle_knots(continued_problem, reports, solve, task.spline, options, budget)
         refined, motion = _refined_until_verified(continued_problem, reports[-1], solve, options, judge)
         attempts.append(_attempt(refined, reports[:-1], number, settings.tolerance, motion))
         listener(attempts[-1].outcome)
