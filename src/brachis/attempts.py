@@ -10,7 +10,7 @@ import numpy as np
 
 from brachis.errors import BrachisError, PathError, PlanningError, UnreachableError
 from brachis.feasibility import explain_failure
-from brachis.mesh import settle_knots
+from brachis.mesh import coarsest, settle_knots
 from brachis.nlp import Transcription
 from brachis.nlp.constraints.branch_margin import MARGIN
 from brachis.nlp.guess import guesses
@@ -31,7 +31,7 @@ MARGINS = (0.1, 0.02, MARGIN)
 _HELD_BACK = 1e-4
 """A margin that is nearer to its bound than this holds the motion back."""
 _MANY_VARIABLES = 150
-"""Above this an active-set method spends its time in linear algebra, and ``auto`` begins with the interior point."""
+"""Above this a cold solve takes seconds, and the problem is first solved over some of its knots."""
 _ON_ITS_WAY = 1e-3
 _PATIENCE = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess, unless the task says otherwise."""
@@ -79,17 +79,20 @@ def search(
     deadline = time.perf_counter() + task.solver.time_limit
     attempts: list[Attempt] = []
     best: tuple[float, int, Motion] | None = None
-    for x, number, solver in _ways(problem, task):
+    start = coarsest(problem) if problem.variables > _MANY_VARIABLES else problem
+    for x, number, solver in _ways(start, task):
         solve = _solve_with(solver, task, problem.decomposition.r, deadline, listener)
         try:
-            continued_problem, reports = continued(problem, x, solve, MARGINS)
+            continued_problem, reports = continued(start, x, solve, MARGINS)
         except ImportError as error:
             attempts.append(
                 Attempt(solver.name, number, (), 0, np.inf, 1.0, 0, f"{solver.name}: not installed ({error})")
             )
             continue
         budget = _KNOT_TIME * (deadline - time.perf_counter())
-        continued_problem, reports = settle_knots(continued_problem, reports, solve, task.spline, options, budget)
+        continued_problem, reports = settle_knots(
+            continued_problem, reports, solve, task.spline, options, target=problem, time_limit=budget
+        )
         refined, motion = _refined_until_verified(continued_problem, reports[-1], solve, options, judge)
         attempts.append(_attempt(refined, reports[:-1], number, settings.tolerance, motion))
         listener(attempts[-1].outcome)
@@ -216,8 +219,6 @@ def continued(
 def _ways(problem: Transcription, task: Task) -> Iterator[tuple[np.ndarray, int, Solver]]:
     """Yield guesses and solvers in the order of trying: every guess with the first two solvers, then the rest."""
     backends = solver_named(task.solver.name)
-    if task.solver.name == "auto" and problem.variables > _MANY_VARIABLES:
-        backends = (backends[1], backends[0], *backends[2:])
     known: list[np.ndarray] = []
     for number, x in enumerate(guesses(problem)):
         known.append(x)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.mesh.freeing import free_knots
+from brachis.mesh.growing import grow
 from brachis.mesh.halving import MeshOptions, refine_mesh
 from brachis.mesh.judgement import Answer
 from brachis.nlp import Transcription
@@ -19,6 +20,8 @@ def settle_knots(
     solve: Solve,
     spline: SplineSettings,
     refinement: RefinementOptions,
+    *,
+    target: Transcription | None = None,
     time_limit: float = np.inf,
 ) -> Answer:
     """Do with the knots of a solved problem what a task's ``spline`` part asks for: nothing, free them, or refine.
@@ -32,6 +35,8 @@ def settle_knots(
         ``solve(problem, x)`` returns a `SolverReport`.
     spline : SplineSettings
     refinement : RefinementOptions
+    target : Transcription, optional
+        The problem over all its knots, where the solved one is its coarsest (see `grow`).
     time_limit : float, optional
         Time after which no further round is begun, s.
 
@@ -42,6 +47,9 @@ def settle_knots(
     reports : tuple of SolverReport
         Those given, and those of further solves.
     """
+    if target is not None and reports[-1].status.usable:
+        problem, further = grow(target, problem, reports[-1], solve)
+        reports = (*reports[:-1], *further)
     if not reports[-1].status.usable:
         return problem, reports
     if spline.knots == "free":
