@@ -1,4 +1,4 @@
-"""Meshes from coarse to fine and free knots, on the paper's arm: 90 degrees, 10 Nm, no gravity."""
+"""Meshes from coarse to fine, free knots and many knots from few, on the paper's arm: 90 degrees, 10 Nm, no gravity."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.mesh import MeshOptions, free_knots, refine_mesh, settle_knots
+from brachis.mesh import MeshOptions, coarsest, free_knots, grow, refine_mesh, settle_knots
 from brachis.nlp.guess import guesses
 from brachis.refine import RefinementOptions
 from brachis.solvers import SolverOptions, SolveStatus, solver_named
 from brachis.task import SplineSettings
 
-SCARA = Path(__file__).parents[1] / "robots/scara3/robot.urdf"
+SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
 FINE = {("j1", "velocity"): 2.1207, ("j1", "full"): 2.1309}
 """End times with 100 (rest: velocity) and 200 (rest: full) even intervals, s."""
 
@@ -128,6 +128,52 @@ def test_a_free_solve_that_stalls_still_gives_good_knots(solved):
     assert reports[-1].status.usable
     assert reports[-1].objective < 0.95 * report.objective
     assert moved.variables == problem.variables, "the knots should be fixed again"
+
+
+@pytest.mark.parametrize("intervals", [20, 53, 100])
+def test_coarsest_problem(intervals):
+    problem, _ = brachis.transcribe(robot(), task(intervals=intervals))
+    coarse = coarsest(problem)
+    assert 12 <= len(coarse.breaks) - 1 < 26
+    assert (intervals > 24) == (coarse.variables < problem.variables)
+    for fine, rough in ((problem.breaks, coarse.breaks), (problem.tau, coarse.tau)):
+        assert np.isin(rough, fine).all()
+        assert (rough[0], rough[-1]) == (0.0, 1.0)
+    assert np.diff(coarse.tau).max() == pytest.approx(np.diff(coarse.breaks).max() / 3.0), "3 points an interval"
+
+
+@pytest.mark.parametrize("intervals", [53, 100])
+def test_growing_gives_the_answer_of_a_cold_solve_in_a_few_iterations(intervals):
+    problem, _ = brachis.transcribe(robot(), task(intervals=intervals))
+    coarse = coarsest(problem).with_margin(0.05)
+    report = solve(coarse, next(guesses(coarse)))
+    grown, reports = grow(problem, coarse, report, solve)
+    np.testing.assert_array_equal(grown.knots, problem.knots)
+    np.testing.assert_array_equal(grown.tau, problem.tau)
+    assert grown.guards == coarse.guards
+    assert reports[0] is report
+    assert max(later.iterations for later in reports[1:]) <= 10
+    assert reports[-1].objective == pytest.approx(solve(problem, next(guesses(problem))).objective, rel=1e-4)
+
+
+def test_growing_tells_of_a_level_that_cannot_be_solved():
+    problem, _ = brachis.transcribe(robot(), task(intervals=60))
+    coarse = coarsest(problem)
+    report = solve(coarse, next(guesses(coarse)))
+    grown, reports = grow(problem, coarse, report, failing)
+    assert not reports[-1].status.usable
+    assert reports[-1].x.shape == (grown.variables,)
+    _, settled = settle_knots(coarse, (report,), failing, SplineSettings(), RefinementOptions(), target=problem)
+    assert [later.status for later in settled] == [SolveStatus.OPTIMAL, SolveStatus.FAILED]
+
+
+def test_many_intervals_are_planned_from_few():
+    result = brachis.plan(robot(), task(intervals=100))
+    assert result.verified
+    assert result.t_end == pytest.approx(2.1421, abs=5e-4)
+    assert len(np.unique(result.trajectory.knots)) == 101
+    reports = result.attempts[result.chosen].reports
+    assert len(reports[0].x) < 0.4 * len(reports[-1].x)
 
 
 def test_settings_choose_what_is_done(solved):
