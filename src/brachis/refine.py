@@ -30,6 +30,8 @@ _ZOOMS = 2
 _PIECE_POINTS = 9
 _CLOSEST = 1e-5
 _SAME_TIME = 1e-9
+_JUST_BEFORE = 1e-7
+_CONTINUOUS_ACCELERATION = 3
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,7 @@ def refine(problem: Transcription, first: SolverReport, solve: Solve, options: R
         x, remaining = _stretched(dense, answer, excess, goal, options.tolerance)
         if remaining <= goal:
             return Refined(problem, tuple(reports), x, remaining, float(x[0] / answer[0]))
-        tau = merged(problem.tau, places)
+        tau = merged(problem, places)
         if len(tau) == len(problem.tau):
             break
         finer = problem.resampled(tau)
@@ -127,7 +129,13 @@ def _dense_grid(problem: Transcription, density: int) -> np.ndarray:
     """Spread times evenly over every knot interval, `density` for each of its collocation points."""
     breaks = problem.breaks
     behind = np.searchsorted(problem.tau, breaks + _SAME_TIME)
-    return spread(breaks, density * np.maximum(np.diff(behind), 1))
+    grid = spread(breaks, density * np.maximum(np.diff(behind), 1))
+    return np.union1d(grid, _jumps(problem) - _JUST_BEFORE)
+
+
+def _jumps(problem: Transcription) -> np.ndarray:
+    """Knots at which the acceleration jumps, so that a limit must hold on both sides."""
+    return problem.breaks[1:-1] if problem.degree < _CONTINUOUS_ACCELERATION else np.empty(0)
 
 
 def _still_good(report: SolverReport, before: SolverReport) -> bool:
@@ -223,10 +231,12 @@ def _zoomed(
     return fine[chosen], worst.reshape(fine.shape)[chosen]
 
 
-def merged(tau: np.ndarray, extra: np.ndarray) -> np.ndarray:
-    """Collocation points with extra ones, without pairs so close that their rows would be the same."""
-    gap = np.min(np.abs(extra[:, None] - tau[None]), axis=1)
-    return np.union1d(tau, extra[gap > _CLOSEST])
+def merged(problem: Transcription, extra: np.ndarray) -> np.ndarray:
+    """Collocation points of a problem with extra ones, without pairs so close that their rows would be the same."""
+    tau, jumps = problem.tau, _jumps(problem)
+    sides = [np.searchsorted(jumps, times, side="right") for times in (extra, tau)]
+    apart = np.where(sides[0][:, None] == sides[1], np.abs(extra[:, None] - tau), np.inf)
+    return np.union1d(tau, extra[apart.min(axis=1) > _CLOSEST])
 
 
 def _stretched(

@@ -113,3 +113,16 @@ def test_lengths_that_do_not_add_up_make_a_longer_motion():
     state = free.state(longer)
     at = free.motion(longer).at(spread(free.motion(longer).breaks, 2))
     np.testing.assert_allclose(state.yddot, at[2], atol=1e-10 * np.abs(at[2]).max())
+
+
+def test_curves_at_knots_are_those_behind_them_whatever_the_rounding():
+    problem = problem_of("r1", degree=2, rest="velocity", intervals=11)
+    (x,) = reachable_points(problem, 1)
+    x[0] = 2.0 / 3.0
+    motion = problem.motion(x)
+    knots = motion.breaks[1:-1]
+    behind = motion.at(knots + 1e-9)[2]
+    before = motion.at(knots - 1e-9)[2]
+    assert np.abs(behind - before).min(axis=1).max() > 1e-3, "the acceleration should jump"
+    for rounded in (knots, np.nextafter(knots, 0.0), np.nextafter(knots, 1.0)):
+        np.testing.assert_allclose(motion.at(rounded)[2], behind, atol=1e-12 * np.abs(behind).max())

@@ -132,7 +132,7 @@ def _halved(
     intervals = intervals[np.diff(breaks)[intervals] >= 2.0 * shortest]
     finer = np.union1d(breaks, 0.5 * (breaks[intervals] + breaks[intervals + 1]))
     knots = clamped_knots(problem.degree, finer)
-    other = problem.with_knots(knots, merged(problem.tau, spread(finer, options.points_per_interval)))
+    other = problem.with_knots(knots, merged(problem, spread(finer, options.points_per_interval)))
     return other, other.variables_from(problem.motion(x).over(knots))
 
 

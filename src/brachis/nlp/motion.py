@@ -10,6 +10,8 @@ from brachis.bspline import insert_knots
 from brachis.nlp.curves import Windows
 
 _BISECTIONS = 45
+_SAME_TIME = 1e-13
+"""Normalised times this near to a knot are at the knot."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +40,11 @@ class Motion:
         return np.unique(self.knots) * self.t_end
 
     def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """y, ydot and yddot, each (K, 1 + r), at times t, (K,), in seconds."""
-        windows = Windows.of(self.knots, self.degree, t / self.t_end)
+        """y, ydot and yddot, each (K, 1 + r), at times t, (K,), in seconds; at knots the values behind them."""
+        tau, breaks = t / self.t_end, np.unique(self.knots)
+        behind = breaks[np.searchsorted(breaks, tau - _SAME_TIME).clip(max=len(breaks) - 1)]
+        # Rounding must not choose the side of a knot: splines of degree 2 jump in acceleration there.
+        windows = Windows.of(self.knots, self.degree, np.where(np.abs(behind - tau) <= _SAME_TIME, behind, tau))
         y, ydot, yddot = windows.curves(self.control_points)
         return y, ydot / self.t_end, yddot / self.t_end**2
 
