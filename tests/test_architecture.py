@@ -25,6 +25,7 @@ ORDER = (
     "nlp",
     "solvers",
     "refine",
+    "mesh",
     "feasibility",
     "trajectory",
     "verify",
@@ -37,7 +38,7 @@ ORDER = (
     "export",
     "cli",
 )
-VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "bspline", "nlp", "solvers", "refine"}
+VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "bspline", "nlp", "solvers", "refine", "mesh"}
 HEAVY = {"matplotlib", "viser", "yourdfpy", "unopy", "ipyopt"}
 
 

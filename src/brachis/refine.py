@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.bspline import spread
 from brachis.errors import UnreachableError
 from brachis.nlp import Transcription
 from brachis.solvers import SolverReport
@@ -28,6 +29,9 @@ _FINE = 9
 _ZOOMS = 2
 _PIECE_POINTS = 9
 _CLOSEST = 1e-5
+_SAME_TIME = 1e-9
+_JUST_BEFORE = 1e-7
+_CONTINUOUS_ACCELERATION = 3
 
 
 @dataclass(frozen=True)
@@ -95,7 +99,7 @@ def refine(problem: Transcription, first: SolverReport, solve: Solve, options: R
     -------
     Refined
     """
-    dense = problem.resampled(np.linspace(0.0, 1.0, options.density * (len(problem.tau) - 1) + 1))
+    dense = problem.resampled(_dense_grid(problem, options.density))
     goal = options.tolerance * _GOAL
     reports = [first]
     if not first.status.usable:
@@ -106,7 +110,7 @@ def refine(problem: Transcription, first: SolverReport, solve: Solve, options: R
         x, remaining = _stretched(dense, answer, excess, goal, options.tolerance)
         if remaining <= goal:
             return Refined(problem, tuple(reports), x, remaining, float(x[0] / answer[0]))
-        tau = _merged(problem.tau, places)
+        tau = merged(problem, places)
         if len(tau) == len(problem.tau):
             break
         finer = problem.resampled(tau)
@@ -121,6 +125,19 @@ def refine(problem: Transcription, first: SolverReport, solve: Solve, options: R
     return Refined(problem, tuple(reports), x, remaining, float(x[0] / answer[0]))
 
 
+def _dense_grid(problem: Transcription, density: int) -> np.ndarray:
+    """Spread times evenly over every knot interval, `density` for each of its collocation points."""
+    breaks = problem.breaks
+    behind = np.searchsorted(problem.tau, breaks + _SAME_TIME)
+    grid = spread(breaks, density * np.maximum(np.diff(behind), 1))
+    return np.union1d(grid, _jumps(problem) - _JUST_BEFORE)
+
+
+def _jumps(problem: Transcription) -> np.ndarray:
+    """Knots at which the acceleration jumps, so that a limit must hold on both sides."""
+    return problem.breaks[1:-1] if problem.degree < _CONTINUOUS_ACCELERATION else np.empty(0)
+
+
 def _still_good(report: SolverReport, before: SolverReport) -> bool:
     """Tell whether a solve that ended early left a feasible motion about as fast as the one before it."""
     return report.violation <= _FEASIBLE and report.objective <= before.objective * (1.0 + _LARGEST_STRETCH)
@@ -132,26 +149,25 @@ def _violations(dense: Transcription, x: np.ndarray, goal: float) -> tuple[float
     Around every peak of the grid that comes near a limit ever finer grids look for the true peak.
     """
     tau = dense.tau
-    reach = tau[1] - tau[0]
     try:
         table = dense.excess(x)
         centres = _suspects(tau, table, dense.knots, goal - _NEAR)
-        heights = table.max(axis=1)[np.searchsorted(tau, centres - 1e-9).clip(max=len(tau) - 1)]
+        heights = table.max(axis=1)[np.searchsorted(tau, centres - _SAME_TIME).clip(max=len(tau) - 1)]
         if table.max() > _COARSE * goal:  # the grid's own peaks will do until they are nearly held down
-            return float(table.max()), _around(centres[heights > goal], reach)
+            return float(table.max()), _around(centres[heights > goal], tau)
+        reach = _spacing(tau, centres)
         for _ in range(_ZOOMS):
             if not len(centres):
                 break
             centres, heights = _zoomed(dense, x, centres, reach)
-            reach *= 2.0 / (_FINE - 1)
             kept = heights > goal - 0.1 * _NEAR
-            centres, heights = centres[kept], heights[kept]
+            centres, heights, reach = centres[kept], heights[kept], reach[kept] * 2.0 / (_FINE - 1)
         places = _within_pieces(dense, x)
         worst = dense.excess_at(x, places).max(axis=1) if len(places) else places
     except UnreachableError:
         return np.inf, _unreachable(dense, x)
     largest = max(table.max(), heights.max(initial=-np.inf), worst.max(initial=-np.inf))
-    return float(largest), np.union1d(_around(centres[heights > goal], tau[1] - tau[0]), places[worst > goal])
+    return float(largest), np.union1d(_around(centres[heights > goal], tau), places[worst > goal])
 
 
 def _within_pieces(dense: Transcription, x: np.ndarray) -> np.ndarray:
@@ -163,9 +179,18 @@ def _within_pieces(dense: Transcription, x: np.ndarray) -> np.ndarray:
     return np.unique(motion.times_of(spread.ravel()) / motion.t_end)
 
 
-def _around(centres: np.ndarray, step: float) -> np.ndarray:
-    """List times at and beside the centres: a peak moves when it is held down."""
-    return np.unique(np.clip(centres[:, None] + step * np.array([-1.0, 0.0, 1.0]), 0.0, 1.0))
+def _spacing(tau: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Find the distance between grid times around each of `times`; at a knot the larger one of its two sides."""
+    gaps = np.diff(tau)
+    before = np.clip(np.searchsorted(tau, times - _SAME_TIME) - 1, 0, len(gaps) - 1)
+    behind = np.clip(np.searchsorted(tau, times + _SAME_TIME) - 1, 0, len(gaps) - 1)
+    return np.maximum(gaps[before], gaps[behind])
+
+
+def _around(centres: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    """List times at and a grid step beside the centres: a peak moves when it is held down."""
+    steps = _spacing(tau, centres)[:, None] * np.array([-1.0, 0.0, 1.0])
+    return np.unique(np.clip(centres[:, None] + steps, 0.0, 1.0))
 
 
 def _unreachable(dense: Transcription, x: np.ndarray) -> np.ndarray:
@@ -187,15 +212,17 @@ def _suspects(tau: np.ndarray, table: np.ndarray, knots: np.ndarray, near: float
     padded = np.pad(table, ((1, 1), (0, 0)), mode="edge")
     bend = np.abs(padded[:-2] - 2.0 * table + padded[2:])
     peaks = (table + 0.5 * bend > near + _NEAR) & (table > near) & (table >= padded[:-2]) & (table >= padded[2:])
-    at_knots = np.searchsorted(tau, np.unique(knots) - 1e-9)
+    at_knots = np.searchsorted(tau, np.unique(knots) - _SAME_TIME)
     close = tau[at_knots[(table[at_knots] > near).any(axis=1)]]
-    half = 0.5 * (tau[1] - tau[0])
+    half = 0.5 * _spacing(tau, close)
     return np.unique(np.clip(np.concatenate([tau[peaks.any(axis=1)], close - half, close + half]), 0.0, 1.0))
 
 
-def _zoomed(dense: Transcription, x: np.ndarray, centres: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+def _zoomed(
+    dense: Transcription, x: np.ndarray, centres: np.ndarray, reach: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Look on a fine grid within `reach` of every centre: the places of the largest excess, and its size there."""
-    fine = np.clip(centres[:, None] + reach * np.linspace(-1.0, 1.0, _FINE), 0.0, 1.0)
+    fine = np.clip(centres[:, None] + reach[:, None] * np.linspace(-1.0, 1.0, _FINE), 0.0, 1.0)
     order = np.argsort(fine.ravel(), kind="stable")
     worst = np.empty(fine.size)
     worst[order] = dense.excess_at(x, fine.ravel()[order]).max(axis=1)
@@ -204,10 +231,12 @@ def _zoomed(dense: Transcription, x: np.ndarray, centres: np.ndarray, reach: flo
     return fine[chosen], worst.reshape(fine.shape)[chosen]
 
 
-def _merged(tau: np.ndarray, extra: np.ndarray) -> np.ndarray:
-    """Collocation points with extra ones, without pairs so close that their rows would be the same."""
-    gap = np.min(np.abs(extra[:, None] - tau[None]), axis=1)
-    return np.union1d(tau, extra[gap > _CLOSEST])
+def merged(problem: Transcription, extra: np.ndarray) -> np.ndarray:
+    """Collocation points of a problem with extra ones, without pairs so close that their rows would be the same."""
+    tau, jumps = problem.tau, _jumps(problem)
+    sides = [np.searchsorted(jumps, times, side="right") for times in (extra, tau)]
+    apart = np.where(sides[0][:, None] == sides[1], np.abs(extra[:, None] - tau), np.inf)
+    return np.union1d(tau, extra[apart.min(axis=1) > _CLOSEST])
 
 
 def _stretched(

@@ -8,16 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis import ik
+from brachis.bspline import clamped_uniform_knots
 from brachis.errors import DecompositionError, StartError, UnknownNameError
 from brachis.feasibility import check_end_branch, check_postures, start_branch
 from brachis.kinematics import Decomposition
+from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Transcription
 from brachis.path import Path, path_of
 from brachis.robot import ROLL_JOINT, Robot, TaskSpace, bind
 from brachis.task import Task
-
-COARSE_INTERVALS = 10
-"""Intervals of the first mesh where the task leaves their number open."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +188,7 @@ def transcription(setting: Setting, decomposition: Decomposition, intervals: int
     return Transcription(
         decomposition,
         degree=spline.degree,
-        intervals=intervals,
+        knots=clamped_uniform_knots(spline.degree, intervals),
         derivatives_at_rest=2 if spline.rest == "full" else 1,
         tau=np.linspace(0.0, 1.0, spline.points_per_interval * intervals + 1),
         end=setting.end,

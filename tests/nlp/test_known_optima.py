@@ -7,6 +7,11 @@ ends:
 
     rest: velocity    t = t* / sqrt(1 - 4 / (3 N^2))
     rest: full        t = t* / sqrt(1 - 2 / N)
+
+With free knots the ramp in the middle takes one interval of the least length, l, and so does each ramp at an end:
+
+    rest: velocity    t = t* / sqrt(1 - l^2 / 3)
+    rest: full        t = t* / sqrt(1 - 2 l + l^2)
 """
 
 from __future__ import annotations
@@ -40,7 +45,18 @@ def slides(tmp_path):
 
 
 def plan(
-    urdf, rows, by, *, redundant=(), robot=None, joints=None, intervals=40, degree=3, rest="velocity", solver="auto"
+    urdf,
+    rows,
+    by,
+    *,
+    redundant=(),
+    robot=None,
+    joints=None,
+    intervals=40,
+    degree=3,
+    rest="velocity",
+    solver="auto",
+    **spline,
 ):
     task = {
         "brachis": 1,
@@ -49,7 +65,7 @@ def plan(
         "task_space": rows,
         "path": [{"line": {"by": by}}],
         "redundant_joints": list(redundant),
-        "spline": {"degree": degree, "intervals": intervals, "rest": rest},
+        "spline": {"degree": degree, "intervals": intervals, "rest": rest, **spline},
         "solver": {"name": solver},
     }
     return brachis.plan(urdf, task)
@@ -92,6 +108,25 @@ def test_rest_in_acceleration_costs_two_more_ramps(slides, intervals):
     assert result.t_end == pytest.approx(bang_bang(2.0 * MASS) / np.sqrt(1.0 - 2.0 / intervals), rel=SLACK)
     ends = result.trajectory.acceleration(np.array([0.0, result.t_end]))
     np.testing.assert_allclose(ends, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("rest", ["velocity", "full"])
+def test_free_knots_leave_the_shortest_ramps(slides, rest):
+    urdf, by, shortest = slides([X, Y], [FORCE, FORCE]), [LENGTH, 0.0], 0.2
+    result = plan(urdf, ["x", "y"], by, intervals=5, rest=rest, knots="free", shortest_interval=shortest)
+    assert result.verified
+    ramp = shortest / 5
+    lost = ramp**2 / 3.0 if rest == "velocity" else 2.0 * ramp - ramp**2
+    assert result.t_end == pytest.approx(bang_bang(2.0 * MASS) / np.sqrt(1.0 - lost), rel=SLACK)
+
+
+@pytest.mark.parametrize("rest", ["velocity", "full"])
+def test_mesh_refinement_comes_near_bang_bang(slides, rest):
+    result = plan(slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, 0.0], intervals="auto", rest=rest)
+    assert result.verified
+    assert bang_bang(2.0 * MASS) <= result.t_end < 1.003 * bang_bang(2.0 * MASS)
+    lengths = np.diff(np.unique(result.trajectory.knots))
+    assert lengths.max() > 8.0 * lengths.min(), "knots belong where the force switches"
 
 
 # The acceleration jumps at knots: nodes packed closely around one would let rounding spoil the pieces.

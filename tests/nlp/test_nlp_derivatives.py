@@ -18,7 +18,9 @@ def blocks(problem) -> dict[str, slice]:
         size = len(constraint.lower) * len(problem.tau)
         result[constraint.kind] = slice(first, first + size)
         first += size
-    result["progress"] = slice(first, len(problem.lower))
+    result["progress"] = slice(first, first + problem.splines[0].free - 1)
+    if len(problem.grid.total):
+        result["lengths"] = slice(result["progress"].stop, len(problem.lower))
     return result
 
 
@@ -38,15 +40,21 @@ def differences(problem, x, h=1e-4) -> np.ndarray:
     return np.stack(columns, axis=1)
 
 
-@pytest.fixture(params=[(case, degree) for case in CASES for degree in (3, 4, 5)], ids=str, scope="module")
+UNIFORM = [(case, degree, "uniform") for case in CASES for degree in (3, 4, 5)]
+FREE = [(case, degree, "free") for case in ("r0", "r1", "r2") for degree in (3, 4, 5)]
+
+
+@pytest.fixture(params=[*UNIFORM, *FREE], ids=str, scope="module")
 def problem(request):
-    case, degree = request.param
-    return problem_of(case, degree=degree)
+    case, degree, knots = request.param
+    fixed = problem_of(case, degree=degree)
+    return fixed if knots == "uniform" else fixed.with_free_knots(0.1)
 
 
 def test_jacobian_equals_differences(problem):
     parts = blocks(problem)
-    assert list(parts) == [*KINDS, "progress"]
+    assert list(parts) == [*KINDS, "progress", *(["lengths"] if len(problem.grid.total) else [])]
+    assert list(parts.values())[-1].stop == len(problem.lower)
     assert list(constraints.TABLE) == KINDS
     for x in reachable_points(problem, 2):
         exact, expected = dense(problem, x), differences(problem, x)
@@ -71,9 +79,12 @@ def test_pattern_is_fixed_has_no_place_twice_and_covers_all(problem):
         assert len(problem.jacobian(x)) == len(places)
         wrong = np.abs(differences(problem, x)) > 1e-7
         assert not np.any(wrong & ~pattern)
-    # Each row touches the end time and at most degree + 1 control points of every curve.
-    widest = np.bincount(problem.jacobian_rows).max()
-    assert widest <= 1 + (problem.degree + 1) * (1 + problem.decomposition.r)
+    # Each row touches the end time, at most degree + 1 control points of every curve, and free lengths nearby; the
+    # very last row of free knots is the sum of them.
+    lengths = len(problem.grid.lower)
+    widest = np.bincount(problem.jacobian_rows)[: len(problem.lower) - len(problem.grid.total)].max()
+    nearby = min(lengths, 2 * problem.degree - 1)
+    assert widest <= 1 + (problem.degree + 1) * (1 + problem.decomposition.r) + nearby
 
 
 def test_gradient_of_the_objective(problem):

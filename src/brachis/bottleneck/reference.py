@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+from brachis.bspline import clamped_uniform_knots
 from brachis.errors import UnreachableError
-from brachis.nlp import Transcription
+from brachis.nlp import Motion, Transcription
 from brachis.nlp.guess import fitted, stretched, worst_timed_ratio
-from brachis.nlp.transcription import Motion
 from brachis.refine import Refined, RefinementOptions, Solve, refine
 from brachis.solvers import SolverOptions, SolverReport, SolveStatus, solver_named
 
@@ -151,19 +151,15 @@ def _on_mesh(problem: Transcription, degree: int, intervals: int) -> Transcripti
     if degree == _PARABOLAS:
         tau = np.union1d(tau, np.arange(1, intervals) / intervals - _BESIDE)
     fine = Transcription(
-        problem.decomposition, degree=degree, intervals=intervals, derivatives_at_rest=1, tau=tau, end=_end_of(problem)
+        problem.decomposition,
+        degree=degree,
+        knots=clamped_uniform_knots(degree, intervals),
+        derivatives_at_rest=1,
+        tau=tau,
+        end=problem.end,
+        start_free=problem.start_free,
     )
     return fine.with_margin(max(problem.guards)) if problem.guards else fine
-
-
-def _end_of(problem: Transcription) -> np.ndarray | None:
-    """End posture, (n,), as far as it is given: its redundant joints; None where it is free."""
-    redundant = problem.splines[1:]
-    if not redundant or redundant[0].variable[-1] >= 0:
-        return None
-    end = problem.decomposition.start.copy()
-    end[problem.decomposition.redundant] = [spline.fixed[-1] for spline in redundant]
-    return end
 
 
 def _planned(problem: Transcription, motion: Motion, tolerance: float, deadline: float) -> Refined | None:

@@ -112,17 +112,30 @@ class Windows:
         """Value and two derivatives (3, K, c) of c splines with control points (c, N + d)."""
         return np.asarray(np.einsum("okw,ckw->okc", self.values, control_points[:, self.columns]))
 
-    def entries(self, spline: TiedSpline) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Differentiate the curves with respect to the free variables, each place once.
 
-        Returns
-        -------
-        point, variable : (z,) int ndarray
-        entries : (3, z) ndarray
-        """
-        variable = spline.variable[self.columns]
+@dataclass(frozen=True)
+class Places:
+    """Where the free variables of a spline matter: each pair of a time and a variable once.
+
+    Attributes
+    ----------
+    point, variable : (z,) int ndarray
+    """
+
+    point: np.ndarray
+    variable: np.ndarray
+    _kept: np.ndarray
+    _place: np.ndarray
+
+    @classmethod
+    def of(cls, columns: np.ndarray, spline: TiedSpline) -> Places:
+        """Find the places of a spline's windows, whose `columns` are (K, d + 1)."""
+        variable = spline.variable[columns]
         kept = variable >= 0
-        place = (np.arange(len(variable))[:, None] * spline.free + variable)[kept]
-        unique, inverse = np.unique(place, return_inverse=True)
-        entries = np.array([np.bincount(inverse, weights=values[kept]) for values in self.values])
-        return unique // spline.free, unique % spline.free, entries
+        numbers = (np.arange(len(variable))[:, None] * spline.free + variable)[kept]
+        unique, place = np.unique(numbers, return_inverse=True)
+        return cls(unique // spline.free, unique % spline.free, kept, place)
+
+    def entries(self, values: np.ndarray) -> np.ndarray:
+        """Differentiate value and two derivatives by the free variables, (3, z); `values` are windows (3, K, d + 1)."""
+        return np.array([np.bincount(self._place, weights=window[self._kept]) for window in values])

@@ -17,7 +17,8 @@ from brachis.bspline import basis_matrix
 from brachis.errors import UnreachableError
 from brachis.ik import margin_gradient
 from brachis.kinematics import Decomposition
-from brachis.nlp.transcription import Motion, Transcription
+from brachis.nlp.motion import Motion
+from brachis.nlp.transcription import Transcription
 
 _FEWEST_STEPS, _MOST_STEPS, _STEP_LENGTH = 24, 1000, 0.05  # metres a step
 _DAMPING = 1e-6

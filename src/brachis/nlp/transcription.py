@@ -1,20 +1,21 @@
 """The nonlinear program: minimum end time of spline trajectories along a path.
 
     minimise    t_E
-    over        x = (t_E, s, q_r1, ..., q_rr)
+    over        x = (t_E, s, q_r1, ..., q_rr [, h])
     subject to  lower <= rows(x) <= upper,   x_lower <= x <= x_upper
 
 Variables: the end time t_E in seconds, then the free control points (see `curves`) of s(t), then those of each
 redundant joint in chain order. s(0) = 0, s(t_E) = 1, the start posture and rest at both ends are built into the control
-points and have no rows.
+points and have no rows. Where the knots are free, the interval lengths h in normalised time come last (see `grid`).
 
 Rows: for each constraint of `constraints.TABLE` that applies, in the table's order, its c values at collocation point
-0, then at point 1, and so on; last the differences of successive control points of s, which are >= 0 so that
-ds/dt >= 0 holds at all times. All rows are dimensionless.
+0, then at point 1, and so on; then the differences of successive control points of s, which are >= 0 so that
+ds/dt >= 0 holds at all times; where the knots are free, last the sum of h, which is 1. All rows are dimensionless.
 
 Derivatives: with y = (s, q_r) and basis matrices B, B', B'' in normalised time,
 
     dy/dc = B,  dydot/dc = B' / t_E,  dyddot/dc = B'' / t_E^2,  dydot/dt_E = -ydot / t_E,  dyddot/dt_E = -2 yddot / t_E
+    dy/dh = dB/dh c,  dydot/dh = dB'/dh c / t_E,  dyddot/dh = dB''/dh c / t_E^2
 
 and a constraint with partials (p_q, p_v, p_a) has d/dy = p_q G + p_v dqdot/dy + p_a dqddot/dy,
 d/dydot = p_v G + p_a dqddot/dydot and d/dyddot = p_a G, with G and the rest from `kinematics.decomposition`.
@@ -24,63 +25,20 @@ from __future__ import annotations
 
 import copy
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.bspline import clamped_uniform_knots
-from brachis.kinematics import Decomposition, JointDerivatives, JointState
+from brachis.kinematics import Decomposition, JointState
 from brachis.nlp import constraints
-from brachis.nlp.constraints import Constraint, Partials
+from brachis.nlp.chain import chain
+from brachis.nlp.constraints import Constraint
 from brachis.nlp.constraints.branch_margin import MARGIN
-from brachis.nlp.curves import TiedSpline, Windows
+from brachis.nlp.curves import Places, TiedSpline, Windows
+from brachis.nlp.grid import FixedGrid, FreeGrid, Grid
+from brachis.nlp.motion import Motion
 from brachis.robot import Limits
 
 _SHORTEST_TIME = 1e-4
-_BISECTIONS = 45
-
-
-@dataclass(frozen=True)
-class Motion:
-    """A point x of the NLP as curves.
-
-    Attributes
-    ----------
-    t_end : float
-        s.
-    knots : ndarray
-        In normalised time.
-    degree : int
-    control_points : (1 + r, N + d) ndarray
-        Of s, then of each redundant joint in chain order.
-    """
-
-    t_end: float
-    knots: np.ndarray
-    degree: int
-    control_points: np.ndarray
-
-    @property
-    def breaks(self) -> np.ndarray:
-        """Times between which the curves are polynomials, (N + 1,), s."""
-        return np.unique(self.knots) * self.t_end
-
-    def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """y, ydot and yddot, each (K, 1 + r), at times t, (K,), in seconds."""
-        windows = Windows.of(self.knots, self.degree, t / self.t_end)
-        y, ydot, yddot = windows.curves(self.control_points)
-        return y, ydot / self.t_end, yddot / self.t_end**2
-
-    def times_of(self, s: np.ndarray) -> np.ndarray:
-        """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
-        low, high = np.zeros(len(s)), np.full(len(s), self.t_end)
-        for _ in range(_BISECTIONS if len(s) else 0):
-            middle = 0.5 * (low + high)
-            order = np.argsort(middle, kind="stable")
-            before = np.empty(len(s), dtype=bool)
-            before[order] = self.at(middle[order])[0][:, 0] < s[order]
-            low, high = np.where(before, middle, low), np.where(before, high, middle)
-        return 0.5 * (low + high)
 
 
 class Transcription:
@@ -89,7 +47,9 @@ class Transcription:
     Parameters
     ----------
     decomposition : Decomposition
-    degree, intervals : int
+    degree : int
+    knots : (N + 2 d + 1,) ndarray
+        Clamped knot vector in normalised time.
     derivatives_at_rest : int
         1: zero velocity at both ends; 2: zero acceleration too.
     tau : (K,) ndarray
@@ -108,6 +68,10 @@ class Transcription:
         Fixed sparsity pattern; each place occurs once.
     evaluations : dict of str to int
         How often states and Jacobians were computed.
+    grid : Grid
+        Knots and collocation points.
+    end, start_free
+        As given.
     """
 
     def __init__(
@@ -115,42 +79,99 @@ class Transcription:
         decomposition: Decomposition,
         *,
         degree: int,
-        intervals: int,
+        knots: np.ndarray,
         derivatives_at_rest: int,
         tau: np.ndarray,
         end: np.ndarray | None = None,
         start_free: bool = False,
     ) -> None:
         self.decomposition = decomposition
-        self.knots = clamped_uniform_knots(degree, intervals)
-        self.degree = degree
-        self.splines = self._make_splines(derivatives_at_rest, end, start_free=start_free)
         self.constraints = self._build_constraints(MARGIN)
-        self._lay_out_variables()
-        self._collocate(tau)
+        self._derivatives_at_rest = derivatives_at_rest
+        self.end, self.start_free = end, start_free
+        self._lay_out(FixedGrid(knots, degree, tau))
 
-    def _collocate(self, tau: np.ndarray) -> None:
-        """Set the collocation points and all that depends on them."""
-        self.tau = tau
-        self._windows = Windows.of(self.knots, self.degree, tau)
-        self._entries = [self._windows.entries(spline) for spline in self.splines]
-        self.evaluations = {"states": 0, "jacobians": 0}
+    def _lay_out(self, grid: Grid) -> None:
+        """Set the grid and all that depends on it."""
+        self.grid = grid
+        self.splines = self._make_splines()
+        windows = grid.windows(grid.lengths_of(grid.knots))
+        self._places = [Places.of(windows.columns, spline) for spline in self.splines]
+        self._entries: tuple[Windows, list[np.ndarray]] | None = None
         self._last: tuple[bytes, JointState] | None = None
+        self.evaluations = {"states": 0, "jacobians": 0}
+        self._lay_out_variables()
         self._lay_out_rows()
 
-    def resampled(self, tau: np.ndarray) -> Transcription:
-        """Return the same problem with other collocation points `tau`, (K,); x keeps its meaning."""
+    def _over(self, grid: Grid) -> Transcription:
         other = copy.copy(self)
-        other._collocate(tau)  # noqa: SLF001  (its own class)
+        other._lay_out(grid)  # noqa: SLF001  (its own class)
         return other
 
-    def _make_splines(self, derivatives: int, end: np.ndarray | None, *, start_free: bool) -> tuple[TiedSpline, ...]:
+    def resampled(self, tau: np.ndarray, x: np.ndarray | None = None) -> Transcription:
+        """Return the same problem with other collocation points; x keeps its meaning.
+
+        Parameters
+        ----------
+        tau : (K,) ndarray
+            In normalised time, ascending, from 0 to 1.
+        x : (v,) ndarray, optional
+            Where `tau` is meant, if knots are free: the points keep the places that they have there. By default at the
+            present `knots`.
+        """
+        h = self.grid.lengths_of(self.knots) if x is None else x[self._lengths]
+        return self._over(self.grid.resampled(tau, h))
+
+    def with_knots(self, knots: np.ndarray, tau: np.ndarray) -> Transcription:
+        """Return the same problem over other fixed knots, with collocation points `tau`.
+
+        Where `knots` contain the present ones, ``variables_from(before.motion(x).over(knots))`` is the same motion.
+        """
+        return self._over(FixedGrid(knots, self.degree, tau))
+
+    def with_free_knots(self, shortest: float) -> Transcription:
+        """Return the same problem with interval lengths as variables, each at least `shortest` mean intervals."""
+        knots, degree = self.knots, self.degree
+        return self._over(FreeGrid(knots, degree, self.tau, shortest / (len(knots) - 2 * degree - 1)))
+
+    def frozen(self, x: np.ndarray) -> tuple[Transcription, np.ndarray]:
+        """Return the problem with its knots fixed where they are at x, and the same motion as its point x."""
+        grid = self.grid.frozen(x[self._lengths])
+        if grid is self.grid:
+            return self, x
+        other = self._over(grid)
+        return other, other.variables_from(self.motion(x))
+
+    @property
+    def degree(self) -> int:
+        """Degree of the splines."""
+        return self.grid.degree
+
+    @property
+    def knots(self) -> np.ndarray:
+        """Clamped knot vector; see `Grid`."""
+        return self.grid.knots
+
+    @property
+    def breaks(self) -> np.ndarray:
+        """Ends of the knot intervals in normalised time, (N + 1,)."""
+        return self.knots[self.degree : len(self.knots) - self.degree]
+
+    @property
+    def tau(self) -> np.ndarray:
+        """Collocation points in normalised time, (K,); see `Grid`."""
+        return self.grid.tau
+
+    def _make_splines(self) -> tuple[TiedSpline, ...]:
         """s, then the redundant joints."""
-        start = np.full(self.decomposition.robot.n, None) if start_free else self.decomposition.start
+        start, end = self.decomposition.start, self.end
         pairs: list[tuple[float | None, float | None]] = [(0.0, 1.0)]
-        pairs += [(start[joint], None if end is None else end[joint]) for joint in self.decomposition.redundant]
+        pairs += [
+            (None if self.start_free else start[joint], None if end is None else end[joint])
+            for joint in self.decomposition.redundant
+        ]
         return tuple(
-            TiedSpline.resting(self.knots, self.degree, derivatives=derivatives, start=first, end=last)
+            TiedSpline.resting(self.knots, self.degree, derivatives=self._derivatives_at_rest, start=first, end=last)
             for first, last in pairs
         )
 
@@ -158,8 +179,9 @@ class Transcription:
         """Slices of x and bounds on it."""
         ends = np.cumsum([1, *(spline.free for spline in self.splines)])
         self.slices = tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
-        self.x_lower = np.full(ends[-1], -np.inf)
-        self.x_upper = np.full(ends[-1], np.inf)
+        self._lengths = slice(int(ends[-1]), None)
+        self.x_lower = np.concatenate([np.full(ends[-1], -np.inf), self.grid.lower])
+        self.x_upper = np.concatenate([np.full(ends[-1], np.inf), self.grid.upper])
         self.x_lower[0] = _SHORTEST_TIME
         self.x_lower[self.slices[0]], self.x_upper[self.slices[0]] = 0.0, 1.0
 
@@ -167,6 +189,8 @@ class Transcription:
         """Bounds of the rows and the Jacobian's sparsity pattern."""
         count = len(self.tau)
         lower, upper, rows, columns = [], [], [], []
+        patterns = [(p.point, p.variable + part.start) for p, part in zip(self._places, self.slices, strict=True)]
+        patterns.append((self.grid.point, self.grid.variable + self._lengths.start))
         first = 0
         for constraint in self.constraints:
             size = len(constraint.lower)
@@ -175,15 +199,17 @@ class Transcription:
             places = first + np.arange(count * size).reshape(count, size)
             rows.append(places.ravel())
             columns.append(np.zeros(count * size, dtype=int))
-            for (point, variable, _), part in zip(self._entries, self.slices, strict=True):
+            for point, variable in patterns:
                 rows.append(places[point].ravel())
-                columns.append(np.repeat(variable + part.start, size))
+                columns.append(np.repeat(variable, size))
             first += count * size
         steps = self.splines[0].free - 1
         rows += [first + np.arange(steps), first + np.arange(steps)]
         columns += [self.slices[0].start + np.arange(steps), self.slices[0].start + 1 + np.arange(steps)]
-        lower.append(np.zeros(steps))
-        upper.append(np.full(steps, np.inf))
+        rows.append(np.full(len(self.grid.lower), first + steps))
+        columns.append(self._lengths.start + np.arange(len(self.grid.lower)))
+        lower += [np.zeros(steps), self.grid.total]
+        upper += [np.full(steps, np.inf), self.grid.total]
         self.lower, self.upper = np.concatenate(lower), np.concatenate(upper)
         self.jacobian_rows, self.jacobian_columns = np.concatenate(rows), np.concatenate(columns)
 
@@ -191,7 +217,7 @@ class Transcription:
         """Return the same problem with another least branch margin; x keeps its meaning."""
         other = copy.copy(self)
         other.constraints = self._build_constraints(margin)
-        other._collocate(self.tau)  # noqa: SLF001  (its own class)
+        other._lay_out(self.grid)  # noqa: SLF001  (its own class)
         return other
 
     def with_limits(self, limits: Limits) -> Transcription:
@@ -199,7 +225,7 @@ class Transcription:
         other = copy.copy(self)
         other.decomposition = self.decomposition.with_limits(limits)
         other.constraints = other._build_constraints(max(self.guards, default=MARGIN))  # noqa: SLF001  (its own class)
-        other._collocate(self.tau)  # noqa: SLF001  (its own class)
+        other._lay_out(self.grid)  # noqa: SLF001  (its own class)
         return other
 
     def _build_constraints(self, margin: float) -> tuple[Constraint, ...]:
@@ -230,7 +256,10 @@ class Transcription:
 
     def motion(self, x: np.ndarray) -> Motion:
         """Curves that belong to x."""
-        return Motion(float(x[0]), self.knots, self.degree, self._control_points(x))
+        h = x[self._lengths]
+        # Should the lengths add up to a little more or less than 1, so much longer or shorter is the motion.
+        span = self.grid.tau_at(h)[-1]
+        return Motion(float(x[0] * span), self.grid.knots_at(h), self.degree, self._control_points(x))
 
     def _control_points(self, x: np.ndarray) -> np.ndarray:
         """Control points (1 + r, N + d)."""
@@ -238,9 +267,9 @@ class Transcription:
         return np.array([spline.control_points(x[part]) for spline, part in parts])
 
     def variables_from(self, motion: Motion) -> np.ndarray:
-        """Point x nearest to given curves over the same knots."""
+        """Point x nearest to given curves over the same knots, or over as many where these are free."""
         free = [spline.free_from(c) for spline, c in zip(self.splines, motion.control_points, strict=True)]
-        return np.concatenate([[motion.t_end], *free])
+        return np.concatenate([[motion.t_end], *free, self.grid.lengths_of(motion.knots)])
 
     def objective(self, x: np.ndarray) -> float:
         """End time t_E, s."""
@@ -263,9 +292,10 @@ class Transcription:
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
             self.evaluations["states"] += 1
-            y, ydot, yddot = self._windows.curves(self._control_points(x))
+            h = x[self._lengths]
+            y, ydot, yddot = self.grid.windows(h).curves(self._control_points(x))
             ydot, yddot = ydot / x[0], yddot / x[0] ** 2
-            self._last = (key, self.decomposition.state(y, ydot, yddot, t=self.tau * x[0]))
+            self._last = (key, self.decomposition.state(y, ydot, yddot, t=self.grid.tau_at(h) * x[0]))
         return self._last[1]
 
     def rows(self, x: np.ndarray) -> np.ndarray:
@@ -278,7 +308,8 @@ class Transcription:
         """
         state = self.state(x)
         values = [constraint.values(state).ravel() for constraint in self.constraints]
-        return np.concatenate([*values, np.diff(x[self.slices[0]])])
+        totals = np.full(len(self.grid.total), x[self._lengths].sum())
+        return np.concatenate([*values, np.diff(x[self.slices[0]]), totals])
 
     def excess(self, x: np.ndarray) -> np.ndarray:
         """How far the physical limits are exceeded at every collocation point, (K, c); negative inside.
@@ -294,9 +325,9 @@ class Transcription:
 
     def excess_at(self, x: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """As `excess`, at other normalised times `tau`, (K,); 2 pi lifts follow the nearest collocation point."""
-        motion, known = self.motion(x), self.state(x)
-        place = np.clip(np.searchsorted(self.tau, tau), 0, len(self.tau) - 1)
-        near = known.q[place] + known.qdot[place] * ((tau - self.tau[place]) * motion.t_end)[:, None]
+        motion, known, at = self.motion(x), self.state(x), self.grid.tau_at(x[self._lengths])
+        place = np.clip(np.searchsorted(at, tau), 0, len(at) - 1)
+        near = known.q[place] + known.qdot[place] * ((tau - at[place]) * motion.t_end)[:, None]
         return self._excess(self.decomposition.state(*motion.at(tau * motion.t_end), near=near))
 
     def _excess(self, state: JointState) -> np.ndarray:
@@ -315,6 +346,8 @@ class Transcription:
         state = self.state(x)
         self.evaluations["jacobians"] += 1
         exact = self.decomposition.derivatives(state)
+        bases = [_timed(basis, x[0]) for basis in self._bases(x)]
+        slopes = np.hstack(_timed(self.grid.slopes(x[self._lengths], self._control_points(x)), x[0]))
         entries: list[np.ndarray] = []
         for constraint in self.constraints:
             by_y, by_ydot, by_yddot = chain(constraint.partials(state), state, exact)
@@ -322,27 +355,25 @@ class Transcription:
                 "kcj,kj->kc", by_yddot, state.yddot
             )
             entries.append(by_time.ravel() / -x[0])
-            for j, (point, _, basis) in enumerate(self._entries):
-                entry = by_y[point, :, j] * basis[0][:, None]
-                entry += by_ydot[point, :, j] * (basis[1] / x[0])[:, None]
-                entry += by_yddot[point, :, j] * (basis[2] / x[0] ** 2)[:, None]
+            for j, (places, basis) in enumerate(zip(self._places, bases, strict=True)):
+                entry = by_y[places.point, :, j] * basis[0][:, None]
+                entry += by_ydot[places.point, :, j] * basis[1][:, None]
+                entry += by_yddot[places.point, :, j] * basis[2][:, None]
                 entries.append(entry.ravel())
+            by = np.concatenate([by_y, by_ydot, by_yddot], axis=2)
+            entries.append((by[self.grid.point] @ slopes[:, :, None]).ravel())
         steps = self.splines[0].free - 1
-        return np.concatenate([*entries, np.full(steps, -1.0), np.ones(steps)])
+        ones = np.ones(len(self.grid.lower))
+        return np.concatenate([*entries, np.full(steps, -1.0), np.ones(steps), ones])
+
+    def _bases(self, x: np.ndarray) -> list[np.ndarray]:
+        """Basis functions of every curve's free variables, (3, z) each; computed anew where the windows change."""
+        windows = self.grid.windows(x[self._lengths])
+        if self._entries is None or self._entries[0] is not windows:
+            self._entries = windows, [places.entries(windows.values) for places in self._places]
+        return self._entries[1]
 
 
-def chain(partials: Partials, state: JointState, exact: JointDerivatives) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Differentiate a constraint with respect to y, ydot and yddot, each (K, c, 1 + r), from its partials."""
-    given = next(part for part in (partials.q, partials.qdot, partials.qddot) if part is not None)
-    zeros = np.zeros((*given.shape[:2], state.y.shape[1]))
-    by_y, by_ydot, by_yddot = zeros, zeros, zeros
-    if partials.q is not None:
-        by_y = by_y + partials.q @ state.gradient
-    if partials.qdot is not None:
-        by_y = by_y + partials.qdot @ exact.qdot_y
-        by_ydot = by_ydot + partials.qdot @ state.gradient
-    if partials.qddot is not None:
-        by_y = by_y + partials.qddot @ exact.qddot_y
-        by_ydot = by_ydot + partials.qddot @ exact.qddot_ydot
-        by_yddot = by_yddot + partials.qddot @ state.gradient
-    return by_y, by_ydot, by_yddot
+def _timed(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Value and two derivatives per second, from those per unit of normalised time."""
+    return orders[0], orders[1] / t_end, orders[2] / t_end**2

@@ -33,6 +33,8 @@ _WORTH_IT = 2e-4
 """A plan is finished if it may be faster than the best one by more than this fraction."""
 _SAME_TIME = 1e-4
 _SAME_MOTION = 0.1  # rad or m
+_GAIN_SLACK = 0.005
+"""By which other plans may gain more from better knots than those finished."""
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no coarse plan is begun while nothing is verified."""
 _LEAST_SHARE, _LARGEST_SHARE = 2.0, 0.15
@@ -112,6 +114,7 @@ class _Search:
         self._attempts: list[Attempt] = []
         self._dead_ends: dict[str, DeadEnd] = {}
         self._best: tuple[tuple[float, float], int, Motion, str] | None = None
+        self._gain = 1.0
         self.interrupted = False
 
     @property
@@ -179,7 +182,7 @@ class _Search:
         if time.monotonic() > self.deadline:
             self.interrupted = True
             return False
-        return left > 0 and plan.t_end < (1.0 - _WORTH_IT) * self._best[0][1]
+        return left > 0 and plan.t_end * self._gain < (1.0 - _WORTH_IT) * self._best[0][1]
 
     def _record(self, number: int, plan: Coarse, attempt: Attempt, motion: Motion | None) -> None:
         """Put down what became of a plan, and keep the best one."""
@@ -190,6 +193,8 @@ class _Search:
         self._note(number, status="verified" if passed else attempt.outcome, t_end=t_end, verified=passed)
         if motion is None:
             return
+        if not plan.keeps_knots:
+            self._gain = min(self._gain, (1.0 - _GAIN_SLACK) * t_end / plan.t_end)
         will_do = motion[1].passed or self._task.refinement.max_rounds == 0
         merit = (-np.inf if will_do else motion[1].worst_ratio - 1.0), t_end
         if self._best is None or merit < self._best[0]:

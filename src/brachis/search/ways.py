@@ -15,11 +15,8 @@ from brachis.search.solving import Listener
 from brachis.search.work import Way, each
 from brachis.setting import Choice
 from brachis.solvers import solver_named
-from brachis.task import Task
 
 _WAVE = 12
-_MANY_VARIABLES = 150
-"""Above this an active-set method spends its time in linear algebra, and ``auto`` begins with the interior point."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +57,6 @@ def waves(
     """
     task = choices[0].setting.task
     solvers = [solver.name for solver in solver_named(task.solver.name)]
-    if task.solver.name == "auto" and _variables(task, choices[0]) > _MANY_VARIABLES:
-        solvers[:2] = solvers[1::-1]
     known: list[Seed] = []
     for effort in EFFORTS[task.search.effort]:
         allowed = [choice for choice in choices if effort.polynomial or choice.match.solver.kind == "closed_form"]
@@ -115,10 +110,3 @@ def _seeds_of(choice: Choice, effort: Effort, seed: int, deadline: float, listen
         return []
     listener(f"looking for courses on the lattice of {choice.name}")
     return lattice_seeds(choice, effort, seed)
-
-
-def _variables(task: Task, choice: Choice) -> int:
-    """Return about how many variables the NLP has."""
-    spline = task.spline
-    intervals = 0 if spline.intervals == "auto" else spline.intervals
-    return (1 + len(choice.redundant)) * (intervals + spline.degree)

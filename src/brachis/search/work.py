@@ -13,6 +13,7 @@ from typing import TypeVar
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+from brachis.mesh import coarsest, settle_knots
 from brachis.nlp import Transcription
 from brachis.nlp.guess import starting_point
 from brachis.refine import RefinementOptions, Solve
@@ -23,6 +24,11 @@ from brachis.search.seeds import Seed
 from brachis.search.solving import MARGINS, Listener, continued, solve_with
 from brachis.setting import intervals_of, transcription
 from brachis.solvers import SolverReport, solver_named
+
+_MANY_VARIABLES = 150
+"""Above this a cold solve takes seconds, and the problem is first solved over some of its knots."""
+_KNOT_TIME = 0.4
+"""Part of the remaining time that may go into the knots."""
 
 _Given = TypeVar("_Given")
 _Made = TypeVar("_Made")
@@ -51,6 +57,8 @@ class Coarse:
     way : Way
     problem : Transcription or None
         None where nothing was solved.
+    target : Transcription or None
+        The problem over all its knots, where `problem` has only some of them.
     reports : tuple of SolverReport
         Of all solves; the last one belongs to `problem`.
     status : str
@@ -61,6 +69,7 @@ class Coarse:
     problem: Transcription | None
     reports: tuple[SolverReport, ...]
     status: str
+    target: Transcription | None = None
 
     @property
     def usable(self) -> bool:
@@ -71,6 +80,14 @@ class Coarse:
     def t_end(self) -> float:
         """End time, s; infinite where there is no plan."""
         return self.reports[-1].objective if self.usable else np.inf
+
+    @property
+    def keeps_knots(self) -> bool:
+        """True where the finished plan has the same knots, so that its end time is no shorter."""
+        spline = self.way.seed.choice.setting.task.spline
+        if spline.knots == "free" or spline.intervals == "auto" or self.problem is None or self.target is None:
+            return False
+        return len(self.problem.knots) == len(self.target.knots)
 
     @property
     def family(self) -> str:
@@ -98,7 +115,8 @@ def plan_coarse(way: Way, deadline: float, share: float, listener: Listener) -> 
         return Coarse(way, None, (), "not tried: the time was up")
     deadline = min(deadline, time.monotonic() + share)
     seed, setting = way.seed, way.seed.choice.setting
-    problem = transcription(setting, seed.decomposition, intervals_of(setting.task))
+    target = transcription(setting, seed.decomposition, intervals_of(setting.task))
+    problem = coarsest(target) if target.variables > _MANY_VARIABLES else target
     x = starting_point(problem, seed.course)
     if x is None:
         return Coarse(way, None, (), "the splines through the course leave the branch")
@@ -106,7 +124,7 @@ def plan_coarse(way: Way, deadline: float, share: float, listener: Listener) -> 
         problem, reports = continued(problem, x, _solve(way, deadline, listener), MARGINS)
     except ImportError as error:
         return Coarse(way, None, (), f"{way.solver}: not installed ({error})")
-    return Coarse(way, problem, reports, reports[-1].status.name.lower().replace("_", " "))
+    return Coarse(way, problem, reports, reports[-1].status.name.lower().replace("_", " "), target)
 
 
 def finish(numbered: tuple[int, Coarse], deadline: float, listener: Listener) -> tuple[Attempt, Motion | None]:
@@ -132,11 +150,15 @@ def finish(numbered: tuple[int, Coarse], deadline: float, listener: Listener) ->
     settings = task.refinement
     options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds)
     solve = _solve(coarse.way, deadline, listener)
-    decomposition = coarse.problem.decomposition
-    refined, motion = refined_until_verified(
-        coarse.problem, coarse.reports[-1], solve, options, lambda answer: judge(decomposition, answer, task)
+    budget = _KNOT_TIME * max(deadline - time.monotonic(), 0.0)
+    problem, reports = settle_knots(
+        coarse.problem, coarse.reports, solve, task.spline, options, target=coarse.target, time_limit=budget
     )
-    return attempt_of(refined, coarse.reports[:-1], number, settings.tolerance, motion), motion
+    decomposition = problem.decomposition
+    refined, motion = refined_until_verified(
+        problem, reports[-1], solve, options, lambda answer: judge(decomposition, answer, task)
+    )
+    return attempt_of(refined, reports[:-1], number, settings.tolerance, motion), motion
 
 
 def _solve(way: Way, deadline: float, listener: Listener) -> Solve:

@@ -82,7 +82,7 @@ class SplineSettings(Model):
     intervals: Intervals = Field(
         default=20,
         description="Number of knot intervals; auto doubles them where it pays until another doubling gains less than "
-        "the tolerance.",
+        "the tolerance. Free knots need a number.",
     )
     tolerance: Positive = Field(
         default=1.0e-3, le=0.1, description="With intervals: auto, the gain, as a fraction of t_E, that ends it."
@@ -103,6 +103,13 @@ class SplineSettings(Model):
         if self.rest == "full" and self.degree < _FULL_REST_DEGREE:
             problem = "rest: full asks for a continuous acceleration that is zero at the ends: degree 2 cannot give it"
             raise refuse(problem, key=".degree", found=self.degree, allowed=">= 3, or rest: velocity")
+        return self
+
+    @model_validator(mode="after")
+    def _free_knots_are_counted(self) -> SplineSettings:
+        if self.knots == "free" and self.intervals == "auto":
+            problem = "free knots move; how many there are must be given"
+            raise refuse(problem, key=".intervals", found="auto", allowed="a whole number, or knots: uniform")
         return self
 
 

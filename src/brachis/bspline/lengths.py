@@ -1,0 +1,81 @@
+"""B-spline windows as functions of the interval lengths, and their exact derivatives by these.
+
+A point lies at a fixed fraction of its interval. The d + 1 basis functions that matter there depend on the lengths of
+the 2 d - 1 intervals around it alone, by the recursion of Cox and de Boor (Piegl and Tiller, The NURBS Book, A2.2). Its
+denominators are never less than the point's own interval, so that neighbours may have length zero: beyond the ends of
+a clamped knot vector they do. The recursion is rational and takes complex lengths; a step along the imaginary axis
+gives derivatives without cancellation (Squire and Trapp, 1998).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+_STEP = 1e-30
+
+
+def windows_of_lengths(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+    """Value and two derivatives of the basis functions that matter at points.
+
+    Parameters
+    ----------
+    lengths : (..., 2 d - 1) ndarray, real or complex
+        Of the intervals around each point; its own is the middle one. d >= 2.
+    fraction : (...) ndarray
+        Place within the point's own interval, 0 to 1.
+
+    Returns
+    -------
+    (3, ..., d + 1) ndarray
+        Per unit of what the lengths are measured in.
+    """
+    degree = (lengths.shape[-1] + 1) // 2
+    middle = degree - 1
+    own = lengths[..., middle : middle + 1]
+    part = fraction[..., None] * own
+    # left[m]: from the m-th knot before the point to the point; right[m]: from it to the m-th knot behind.
+    left = np.cumsum(np.concatenate([part, lengths[..., :middle][..., ::-1]], axis=-1), axis=-1)
+    right = np.cumsum(np.concatenate([own - part, lengths[..., middle + 1 :]], axis=-1), axis=-1)
+    value = [np.ones_like(part)]
+    for p in range(1, degree + 1):
+        value.append(_raised(value[-1], left, right, p))
+    slope = _slope(value[degree - 1], left, right, degree)
+    bend = _slope(_slope(value[degree - 2], left, right, degree - 1), left, right, degree)
+    return np.array([value[degree], slope, bend])
+
+
+def window_derivatives(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+    """Differentiate `windows_of_lengths` by each of the lengths, at K points.
+
+    Parameters
+    ----------
+    lengths : (K, 2 d - 1) ndarray
+    fraction : (K,) ndarray
+
+    Returns
+    -------
+    (3, 2 d - 1, K, d + 1) ndarray
+    """
+    steps = 1j * _STEP * np.eye(lengths.shape[-1])
+    return np.asarray(windows_of_lengths(lengths + steps[:, None], fraction[None]).imag / _STEP)
+
+
+def _raised(value: np.ndarray, left: np.ndarray, right: np.ndarray, p: int) -> np.ndarray:
+    """Basis functions of degree p from those of degree p - 1."""
+    before, behind = left[..., :p][..., ::-1], right[..., :p]
+    share = value / (before + behind)
+    return _shifted(before * share) + _padded(behind * share)
+
+
+def _slope(lower: np.ndarray, left: np.ndarray, right: np.ndarray, p: int) -> np.ndarray:
+    """Differentiate functions of degree p, given `lower`, the same functions of degree p - 1."""
+    share = p * lower / (left[..., :p][..., ::-1] + right[..., :p])
+    return _shifted(share) - _padded(share)
+
+
+def _padded(window: np.ndarray) -> np.ndarray:
+    return np.concatenate([window, np.zeros_like(window[..., :1])], axis=-1)
+
+
+def _shifted(window: np.ndarray) -> np.ndarray:
+    return np.concatenate([np.zeros_like(window[..., :1]), window], axis=-1)

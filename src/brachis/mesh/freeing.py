@@ -1,0 +1,75 @@
+"""Free knots: interval lengths as variables of the optimisation, from the answer for given ones."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from brachis.mesh.judgement import Answer, accepted, ending_with, gain
+from brachis.nlp import Transcription
+from brachis.refine import RefinementOptions, Solve, refine
+from brachis.solvers import SolverReport
+
+_ROUNDS = 5
+_WORTH_IT = 2e-4
+"""Knots are moved again as long as that shortens the motion by this part of it."""
+
+
+def free_knots(
+    problem: Transcription,
+    first: SolverReport,
+    solve: Solve,
+    shortest: float,
+    refinement: RefinementOptions,
+    time_limit: float = np.inf,
+) -> Answer:
+    """Optimise the interval lengths of a solved problem together with the motion.
+
+    Collocation points keep their places within their intervals while the knots move. The knots are then fixed and the
+    limits made to hold in between (`refine`); from there, with the points that this added, the knots are freed again,
+    as long as that gains.
+
+    Parameters
+    ----------
+    problem : Transcription
+        With fixed knots.
+    first : SolverReport
+        Of the problem's solve.
+    solve : callable
+        ``solve(problem, x)`` returns a `SolverReport`.
+    shortest : float
+        Least length of an interval, in mean intervals.
+    refinement : RefinementOptions
+    time_limit : float, optional
+        Time after which the knots are not freed again, s.
+
+    Returns
+    -------
+    problem : Transcription
+        With its knots fixed where they are best; the given one if freeing them led nowhere.
+    reports : tuple of SolverReport
+        Of all solves, `first` included; the last one belongs to `problem`.
+    """
+    reports, best, x = [first], None, first.x
+    deadline = time.perf_counter() + time_limit
+    for _ in range(_ROUNDS):
+        free = problem.with_free_knots(shortest)
+        moved = solve(free, free.variables_from(problem.motion(x)))
+        fixed, start = free.frozen(moved.x)
+        # A few iterations, where the solver stalled before the knots came to rest.
+        report = accepted(solve(fixed, start), reports[-1])
+        reports += [moved, report]
+        if not report.status.usable:
+            break
+        refined = refine(fixed, report, solve, refinement)
+        reports += refined.reports[1:]
+        gained = np.inf if best is None else gain(best, refined, refinement)
+        if best is None or gained > 0.0:
+            best = refined
+        if not gained > _WORTH_IT or time.perf_counter() > deadline:
+            break
+        problem, x = refined.problem, refined.x
+    if best is None:
+        return problem, ending_with(first, reports)
+    return best.problem, ending_with(best.reports[-1], reports)

@@ -1,0 +1,143 @@
+"""A mesh refined from coarse to fine by exact knot insertion, so that every solve starts from the motion before it.
+
+A time-optimal motion has 1 + r limits active at almost every instant, and jumps from one set of them to another. A
+spline can only ramp: where it does, time is lost, about the ramp's length times its height. The intervals that lose
+most are halved.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.bspline import clamped_knots, spread
+from brachis.errors import UnreachableError
+from brachis.mesh.judgement import Answer, accepted, end_time, ending_with, gain
+from brachis.nlp import Transcription
+from brachis.refine import Refined, RefinementOptions, Solve, merged, refine
+from brachis.solvers import SolverReport
+
+COARSE_INTERVALS = 10
+"""Intervals with which a mesh begins."""
+_SHARE = 0.6
+"""A round halves the intervals that lose most, and that lose this part of the time lost altogether."""
+_SAMPLES = 8
+_SHORTEST = 0.5, 5e-5
+"""No interval gets shorter than this part of the tolerance, for it cannot lose more than its own length; nor, as a
+part of t_E, than this: collocation points would fall together."""
+_MOST_INTERVALS = 300
+_MOST_ROUNDS = 20
+_GROWTH = 3.0
+"""So many times as long as a round the next one may take."""
+
+
+@dataclass(frozen=True)
+class MeshOptions:
+    """When a mesh is fine enough.
+
+    Attributes
+    ----------
+    tolerance : float
+        Gain of halving every interval, as a fraction of t_E, that ends the refinement.
+    points_per_interval : int
+        Collocation points of every interval.
+    time_limit : float
+        Time after which no round is begun, s; nor is one that looks as if it would end later.
+    """
+
+    tolerance: float = 1e-3
+    points_per_interval: int = 3
+    time_limit: float = np.inf
+
+
+def refine_mesh(
+    problem: Transcription, first: SolverReport, solve: Solve, options: MeshOptions, refinement: RefinementOptions
+) -> Answer:
+    """Insert knots into a solved problem until halving every interval gains less than the tolerance.
+
+    Rounds that halve the intervals that lose most go on until one of them gains little. Then the limits are made to
+    hold in between (`refine`), every interval is halved, and the limits are made to hold again: the gain of that is
+    what is compared with the tolerance. If it is less, the mesh is done, and the faster of the two motions is kept.
+
+    Parameters
+    ----------
+    problem : Transcription
+    first : SolverReport
+        Of the problem's solve.
+    solve : callable
+        ``solve(problem, x)`` returns a `SolverReport`.
+    options : MeshOptions
+    refinement : RefinementOptions
+
+    Returns
+    -------
+    problem : Transcription
+        With all knots and collocation points.
+    reports : tuple of SolverReport
+        Of all solves, `first` included; the last one belongs to `problem`.
+    """
+    reports, last = [first], first
+    held: list[Refined] = []
+    deadline = time.perf_counter() + options.time_limit
+    for _ in range(_MOST_ROUNDS):
+        if time.perf_counter() + _GROWTH * last.wall_time > deadline:
+            break
+        finer, x = _halved(problem, last.x, _losers(problem, last.x), options)
+        if finer.variables == problem.variables or len(finer.breaks) > _MOST_INTERVALS:
+            break
+        report = accepted(solve(finer, x), last)
+        reports.append(report)
+        if not report.status.usable:
+            break
+        worth_it = report.objective < last.objective * (1.0 - options.tolerance)
+        problem, last = finer, report
+        if worth_it:
+            continue
+        settled = refine(problem, last, solve, refinement)
+        doubled = _doubled(settled, solve, options, refinement)
+        reports += [*settled.reports[1:], *doubled.reports]
+        held += [settled, doubled]
+        if not gain(settled, doubled, refinement) >= options.tolerance:
+            break
+    best = min(held, key=lambda refined: end_time(refined, refinement), default=None)
+    if best is None or last.objective < end_time(best, refinement):
+        return problem, ending_with(last, reports)
+    return best.problem, ending_with(best.reports[-1], reports)
+
+
+def _losers(problem: Transcription, x: np.ndarray) -> np.ndarray:
+    """Intervals that lose most time, ascending: how far the 1 + r limits that press most swing, times the length."""
+    lengths = np.diff(problem.breaks)
+    try:
+        state = problem.resampled(spread(problem.breaks, _SAMPLES)).state(x)
+    except UnreachableError:  # between the collocation points
+        return np.arange(len(lengths))
+    ratios = np.concatenate([np.abs(c.values(state)) for c in problem.constraints if c.timed], axis=1)
+    slack = 1.0 - np.sort(ratios, axis=1)[:, -(1 + problem.decomposition.r) :].clip(max=1.0)
+    within = np.lib.stride_tricks.sliding_window_view(slack, _SAMPLES + 1, axis=0)[::_SAMPLES]
+    lost = np.ptp(within, axis=2).sum(axis=1) * lengths
+    order = np.argsort(-lost, kind="stable")
+    most = np.searchsorted(np.cumsum(lost[order]), _SHARE * lost.sum()) + 1
+    return np.sort(order[:most])
+
+
+def _halved(
+    problem: Transcription, x: np.ndarray, intervals: np.ndarray, options: MeshOptions
+) -> tuple[Transcription, np.ndarray]:
+    """Halve intervals of a problem: the finer problem, and the same motion as its point."""
+    breaks = problem.breaks
+    shortest = max(_SHORTEST[0] * options.tolerance, _SHORTEST[1])
+    intervals = intervals[np.diff(breaks)[intervals] >= 2.0 * shortest]
+    finer = np.union1d(breaks, 0.5 * (breaks[intervals] + breaks[intervals + 1]))
+    knots = clamped_knots(problem.degree, finer)
+    other = problem.with_knots(knots, merged(problem, spread(finer, options.points_per_interval)))
+    return other, other.variables_from(problem.motion(x).over(knots))
+
+
+def _doubled(settled: Refined, solve: Solve, options: MeshOptions, refinement: RefinementOptions) -> Refined:
+    """Halve every interval of a refined problem, solve and refine again."""
+    every = np.arange(len(settled.problem.breaks) - 1)
+    finer, x = _halved(settled.problem, settled.x, every, options)
+    return refine(finer, accepted(solve(finer, x), settled.reports[-1]), solve, refinement)

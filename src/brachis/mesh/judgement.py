@@ -1,0 +1,41 @@
+"""What the rounds of both methods are judged by."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from brachis.nlp import Transcription
+from brachis.refine import Refined, RefinementOptions
+from brachis.solvers import SolverReport, SolveStatus
+
+_FEASIBLE = 1e-5
+
+Answer = tuple[Transcription, tuple[SolverReport, ...]]
+"""A problem and the reports of all solves, of which the last one belongs to it."""
+
+
+def accepted(report: SolverReport, before: SolverReport) -> SolverReport:
+    """Accept a solve that ended early with a feasible motion faster than the one that it began with."""
+    better = report.violation <= _FEASIBLE and report.objective < before.objective
+    early = report.status in (SolveStatus.ITERATION_LIMIT, SolveStatus.TIME_LIMIT, SolveStatus.STALLED)
+    return replace(report, status=SolveStatus.ACCEPTABLE) if better and early else report
+
+
+def end_time(refined: Refined, refinement: RefinementOptions) -> float:
+    """End time of a motion that holds the limits, infinite for others."""
+    holds = refined.converged and (refined.excess <= refinement.tolerance or not refinement.max_rounds)
+    return float(refined.x[0]) if holds else np.inf
+
+
+def gain(before: Refined, after: Refined, refinement: RefinementOptions) -> float:
+    """Part of the end time that is gained; NaN where neither motion holds the limits."""
+    if not np.isfinite(end_time(before, refinement)):
+        return 1.0 if np.isfinite(end_time(after, refinement)) else np.nan
+    return 1.0 - end_time(after, refinement) / end_time(before, refinement)
+
+
+def ending_with(last: SolverReport, reports: list[SolverReport]) -> tuple[SolverReport, ...]:
+    """Move one of the reports to the end."""
+    return (*(report for report in reports if report is not last), last)

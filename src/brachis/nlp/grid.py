@@ -1,0 +1,179 @@
+"""Where the knots and the collocation points lie: fixed, or moved by the interval lengths h as variables of the NLP.
+
+Collocation points keep their place (interval, fraction of it). Where the knots are free, h = (h_1, ..., h_N) are
+variables at the end of x, in normalised time: bounded from below, and with a row that holds their sum at 1. The
+collocation points then move with the knots, and the basis functions at a point depend on the 2 d - 1 intervals around
+it. Both kinds of grid answer for both cases: a fixed one has no variables, no rows and empty derivatives.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from brachis.bspline import clamped_knots, window_derivatives, windows_of_lengths
+from brachis.nlp.curves import ORDERS, Windows
+
+
+class Grid(Protocol):
+    """Knots and collocation points as functions of the interval lengths h, (v,), that are variables.
+
+    Attributes
+    ----------
+    degree : int
+    knots : (N + 2 d + 1,) ndarray
+        In normalised time; where they are variables, at the lengths that the grid was made with.
+    tau : (K,) ndarray
+        Collocation points in normalised time, ascending, from 0 to 1; as `knots`.
+    lower, upper : (v,) ndarray
+        Bounds on h.
+    total : (0,) or (1,) ndarray
+        What rows of sums of h must be.
+    point, variable : (z,) int ndarray
+        Pattern of the curves' derivatives with respect to h, each place once.
+    """
+
+    degree: int
+    knots: np.ndarray
+    tau: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    total: np.ndarray
+    point: np.ndarray
+    variable: np.ndarray
+
+    def knots_at(self, h: np.ndarray) -> np.ndarray:
+        """Knots, in units of h."""
+        ...
+
+    def tau_at(self, h: np.ndarray) -> np.ndarray:
+        """Collocation points, in units of h."""
+        ...
+
+    def lengths_of(self, knots: np.ndarray) -> np.ndarray:
+        """Variables h that belong to given knots."""
+        ...
+
+    def windows(self, h: np.ndarray) -> Windows:
+        """Basis functions at the collocation points; the same object as long as they are the same."""
+        ...
+
+    def slopes(self, h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
+        """Differentiate value and two derivatives of splines (c, N + d) by h, on the pattern, (3, z, c)."""
+        ...
+
+    def resampled(self, tau: np.ndarray, h: np.ndarray) -> Grid:
+        """Return the grid with other collocation points, which are at `tau` where the lengths are `h`."""
+        ...
+
+    def frozen(self, h: np.ndarray) -> Grid:
+        """Return the grid with its knots fixed where they are at `h`."""
+        ...
+
+
+class FixedGrid:
+    """Knots that are given; see `Grid`."""
+
+    lower = upper = total = np.empty(0)
+    point = variable = np.empty(0, dtype=int)
+
+    def __init__(self, knots: np.ndarray, degree: int, tau: np.ndarray) -> None:
+        self.knots, self.degree, self.tau = knots, degree, tau
+        self._windows = Windows.of(knots, degree, tau)
+
+    def knots_at(self, _h: np.ndarray) -> np.ndarray:
+        """See `Grid`."""
+        return self.knots
+
+    def tau_at(self, _h: np.ndarray) -> np.ndarray:
+        """See `Grid`."""
+        return self.tau
+
+    def lengths_of(self, _knots: np.ndarray) -> np.ndarray:
+        """See `Grid`."""
+        return np.empty(0)
+
+    def windows(self, _h: np.ndarray) -> Windows:
+        """See `Grid`."""
+        return self._windows
+
+    def slopes(self, _h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
+        """See `Grid`."""
+        return np.empty((ORDERS, 0, len(control_points)))
+
+    def resampled(self, tau: np.ndarray, _h: np.ndarray) -> FixedGrid:
+        """See `Grid`."""
+        return FixedGrid(self.knots, self.degree, tau)
+
+    def frozen(self, _h: np.ndarray) -> FixedGrid:
+        """See `Grid`."""
+        return self
+
+
+class FreeGrid:
+    """Knots that are variables; see `Grid`.
+
+    Parameters
+    ----------
+    knots, degree, tau
+        See `Grid`.
+    shortest : float
+        Least length of an interval, in normalised time.
+    """
+
+    total = np.ones(1)
+
+    def __init__(self, knots: np.ndarray, degree: int, tau: np.ndarray, shortest: float) -> None:
+        self.knots, self.degree, self.tau, self._shortest = knots, degree, tau, shortest
+        breaks = knots[degree : len(knots) - degree]
+        count = len(breaks) - 1
+        self.lower, self.upper = np.full(count, shortest), np.ones(count)
+        self._interval = np.clip(np.searchsorted(breaks, tau, side="right") - 1, 0, count - 1)
+        self._fraction = (tau - breaks[self._interval]) / np.diff(breaks)[self._interval]
+        around = self._interval[:, None] + np.arange(1 - degree, degree)
+        self._inside = (around >= 0) & (around < count)
+        self._around = np.where(self._inside, around, count)  # beyond the ends: an interval without length
+        self._columns = self._interval[:, None] + np.arange(degree + 1)
+        self.point, _ = np.nonzero(self._inside)
+        self.variable = around[self._inside]
+        self._last: tuple[bytes, Windows] | None = None
+
+    def knots_at(self, h: np.ndarray) -> np.ndarray:
+        """See `Grid`."""
+        breaks = np.concatenate([[0.0], np.cumsum(np.maximum(h, self.lower))])
+        return clamped_knots(self.degree, breaks / breaks[-1])
+
+    def tau_at(self, h: np.ndarray) -> np.ndarray:
+        """See `Grid`."""
+        return (np.cumsum(h) - h)[self._interval] + self._fraction * h[self._interval]
+
+    def lengths_of(self, knots: np.ndarray) -> np.ndarray:
+        """See `Grid`."""
+        return np.diff(knots[self.degree : len(knots) - self.degree])
+
+    def _lengths_around(self, h: np.ndarray) -> np.ndarray:
+        return np.append(h, 0.0)[self._around]
+
+    def windows(self, h: np.ndarray) -> Windows:
+        """See `Grid`."""
+        key = h.tobytes()
+        if self._last is None or self._last[0] != key:
+            values = windows_of_lengths(self._lengths_around(h), self._fraction)
+            self._last = key, Windows(self._columns, values)
+        return self._last[1]
+
+    def slopes(self, h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
+        """See `Grid`."""
+        derivatives = window_derivatives(self._lengths_around(h), self._fraction)
+        slopes = np.einsum("oikw,ckw->okic", derivatives, control_points[:, self._columns])
+        return np.asarray(slopes[:, self._inside])
+
+    def resampled(self, tau: np.ndarray, h: np.ndarray) -> FreeGrid:
+        """See `Grid`."""
+        return FreeGrid(self.knots_at(h), self.degree, tau, self._shortest)
+
+    def frozen(self, h: np.ndarray) -> FixedGrid:
+        """See `Grid`."""
+        tau = self.tau_at(h)
+        return FixedGrid(self.knots_at(h), self.degree, tau / tau[-1])

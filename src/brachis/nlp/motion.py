@@ -1,0 +1,65 @@
+"""A point of the NLP as curves over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.bspline import insert_knots
+from brachis.nlp.curves import Windows
+
+_BISECTIONS = 45
+_SAME_TIME = 1e-13
+"""Normalised times this near to a knot are at the knot."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A point x of the NLP as curves.
+
+    Attributes
+    ----------
+    t_end : float
+        s.
+    knots : ndarray
+        In normalised time.
+    degree : int
+    control_points : (1 + r, N + d) ndarray
+        Of s, then of each redundant joint in chain order.
+    """
+
+    t_end: float
+    knots: np.ndarray
+    degree: int
+    control_points: np.ndarray
+
+    @property
+    def breaks(self) -> np.ndarray:
+        """Times between which the curves are polynomials, (N + 1,), s."""
+        return np.unique(self.knots) * self.t_end
+
+    def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """y, ydot and yddot, each (K, 1 + r), at times t, (K,), in seconds; at knots the values behind them."""
+        tau, breaks = t / self.t_end, np.unique(self.knots)
+        behind = breaks[np.searchsorted(breaks, tau - _SAME_TIME).clip(max=len(breaks) - 1)]
+        # Rounding must not choose the side of a knot: splines of degree 2 jump in acceleration there.
+        windows = Windows.of(self.knots, self.degree, np.where(np.abs(behind - tau) <= _SAME_TIME, behind, tau))
+        y, ydot, yddot = windows.curves(self.control_points)
+        return y, ydot / self.t_end, yddot / self.t_end**2
+
+    def over(self, knots: np.ndarray) -> Motion:
+        """Return the same curves over a clamped knot vector that contains the present one."""
+        points = insert_knots(self.control_points, self.knots, knots, self.degree)
+        return Motion(self.t_end, knots, self.degree, points)
+
+    def times_of(self, s: np.ndarray) -> np.ndarray:
+        """Find the times, (P,), s, at which path coordinates s, (P,), are reached; s(t) does not decrease."""
+        low, high = np.zeros(len(s)), np.full(len(s), self.t_end)
+        for _ in range(_BISECTIONS if len(s) else 0):
+            middle = 0.5 * (low + high)
+            order = np.argsort(middle, kind="stable")
+            before = np.empty(len(s), dtype=bool)
+            before[order] = self.at(middle[order])[0][:, 0] < s[order]
+            low, high = np.where(before, middle, low), np.where(before, high, middle)
+        return 0.5 * (low + high)

@@ -1,0 +1,88 @@
+"""Inserted knots leave the curves as they are; windows as functions of interval lengths; times within intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import BSpline
+
+from brachis.bspline import (
+    basis_windows,
+    clamped_knots,
+    clamped_uniform_knots,
+    insert_knots,
+    spread,
+    window_derivatives,
+    windows_of_lengths,
+)
+
+LENGTHS = np.array([0.3, 0.05, 0.2, 0.01, 0.14, 0.3])
+
+
+def around(lengths: np.ndarray, degree: int, interval: int) -> np.ndarray:
+    """Lengths of the 2 d - 1 intervals around one; those beyond the ends are zero."""
+    return np.pad(lengths, degree - 1)[interval : interval + 2 * degree - 1]
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(degree=st.integers(1, 6), old=st.integers(1, 8), new=st.integers(0, 12), seed=st.integers(0, 99))
+def test_the_same_curves(degree, old, new, seed):
+    rng = np.random.default_rng(seed)
+    breaks = np.unique(np.concatenate([[0.0, 1.0], rng.uniform(0.0, 1.0, old - 1)]))
+    finer = np.union1d(breaks, rng.uniform(0.0, 1.0, new))
+    knots, fine_knots = clamped_knots(degree, breaks), clamped_knots(degree, finer)
+    points = rng.normal(size=(3, len(knots) - degree - 1))
+    inserted = insert_knots(points, knots, fine_knots, degree)
+    assert inserted.shape == (3, len(finer) - 1 + degree)
+    tau = np.linspace(0.0, 1.0, 101)
+    before, after = BSpline(knots, points.T, degree)(tau), BSpline(fine_knots, inserted.T, degree)(tau)
+    np.testing.assert_allclose(after, before, atol=1e-13)
+
+
+def test_one_knot_by_boehm():
+    """Boehm's rule: new points divide the old legs in the ratio of the new knot."""
+    points = np.array([[0.0, 1.0, 3.0, -2.0]])
+    inserted = insert_knots(points, clamped_uniform_knots(3, 1), clamped_knots(3, np.array([0.0, 0.25, 1.0])), 3)
+    np.testing.assert_allclose(inserted, [[0.0, 0.25, 1.5, 1.75, -2.0]], atol=1e-15)
+
+
+@pytest.mark.parametrize("degree", range(2, 7))
+def test_windows_of_lengths_are_the_basis(degree):
+    breaks = np.concatenate([[0.0], np.cumsum(LENGTHS)])
+    knots = clamped_knots(degree, breaks / breaks[-1])
+    for interval, length in enumerate(LENGTHS):
+        for fraction in (0.0, 0.31, 0.999):
+            lengths = around(LENGTHS, degree, interval)
+            mine = windows_of_lengths(lengths[None], np.array([fraction]))[:, 0]
+            tau = np.array([breaks[interval] + fraction * length])
+            for order in range(3):
+                first, expected = basis_windows(knots, degree, tau, order)
+                assert first[0] == interval
+                np.testing.assert_allclose(mine[order], expected[0], atol=1e-12 * max(1.0, np.abs(expected).max()))
+
+
+@pytest.mark.parametrize("degree", range(2, 7))
+def test_window_derivatives_are_differences(degree):
+    lengths = np.array([around(LENGTHS, degree, interval) for interval in range(len(LENGTHS))])
+    fraction = np.linspace(0.05, 1.0, len(LENGTHS))
+    exact = window_derivatives(lengths, fraction)
+    assert exact.shape == (3, 2 * degree - 1, len(LENGTHS), degree + 1)
+    h = 1e-5
+    for i, unit in enumerate(np.eye(2 * degree - 1)):
+        ahead, behind = (windows_of_lengths(lengths + step * unit, fraction) for step in (h, -h))
+        expected = (ahead - behind) / (2.0 * h)
+        for order in range(3):
+            scale = np.abs(exact[order]).max()
+            assert scale > 0.0
+            np.testing.assert_allclose(exact[order, i], expected[order], atol=1e-4 * scale)
+    # Twice the lengths: the same values, half the slopes, a quarter of the bends (Euler's theorem).
+    for order, values in enumerate(windows_of_lengths(lengths, fraction)):
+        turned = np.einsum("ikw,ki->kw", exact[order], lengths)
+        np.testing.assert_allclose(turned, -order * values, atol=1e-12 * max(1.0, np.abs(values).max()))
+
+
+def test_spread():
+    np.testing.assert_allclose(spread(np.array([0.0, 0.2, 1.0]), 2), [0.0, 0.1, 0.2, 0.6, 1.0])
+    np.testing.assert_allclose(spread(np.array([0.0, 0.3, 1.0]), np.array([3, 1])), [0.0, 0.1, 0.2, 0.3, 1.0])

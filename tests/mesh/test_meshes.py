@@ -1,0 +1,196 @@
+"""Meshes from coarse to fine, free knots and many knots from few, on the paper's arm: 90 degrees, 10 Nm, no gravity."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.mesh import MeshOptions, coarsest, free_knots, grow, refine_mesh, settle_knots
+from brachis.nlp.guess import guesses
+from brachis.refine import RefinementOptions
+from brachis.solvers import SolverOptions, SolveStatus, solver_named
+from brachis.task import SplineSettings
+
+SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
+FINE = {("j1", "velocity"): 2.1207, ("j1", "full"): 2.1309}
+"""End times with 100 (rest: velocity) and 200 (rest: full) even intervals, s."""
+
+
+def task(joint="j1", **spline) -> brachis.Task:
+    return brachis.load_task(
+        {
+            "brachis": 1,
+            "start": {"joints": [np.pi / 6, -2 * np.pi / 3, 2 * np.pi / 3]},
+            "task_space": ["x", "y"],
+            "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
+            "redundant_joints": [joint],
+            "spline": spline,
+        }
+    )
+
+
+def robot() -> brachis.Robot:
+    return brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=brachis.LimitSpec(torque=10.0, velocity=None))
+
+
+def solve(problem, x):
+    return solver_named("uno")[0].solve(problem, x, SolverOptions(), None)
+
+
+@pytest.fixture
+def solved():
+    """Problem of 10 even intervals, and its solve."""
+    problem, _ = brachis.transcribe(robot(), task(intervals=10))
+    return problem, solve(problem, next(guesses(problem)))
+
+
+def failing(problem, x):
+    """A solver that breaks down."""
+    return dataclasses.replace(solve(problem, x), status=SolveStatus.FAILED)
+
+
+@pytest.mark.parametrize(("joint", "intervals", "longest"), [("j1", 8, 2.285), ("j1", 12, 2.185), ("j3", 12, 2.38)])
+def test_free_knots_make_few_intervals_fast(joint, intervals, longest):
+    result = brachis.plan(robot(), task(joint, intervals=intervals, knots="free"))
+    assert result.verified
+    assert result.t_end < longest
+    lengths = np.diff(np.unique(result.trajectory.knots))
+    assert len(lengths) == intervals
+    # Rest: full ramps the torque up and down in the first and the last interval: these are as short as allowed.
+    np.testing.assert_allclose(lengths[[0, -1]], 0.1 / intervals, rtol=1e-6)
+    assert lengths.min() >= 0.1 / intervals * (1.0 - 1e-9)
+    even = brachis.plan(robot(), task(joint, intervals=intervals))
+    assert result.t_end < 0.93 * even.t_end
+
+
+@pytest.mark.parametrize("rest", ["velocity", "full"])
+def test_auto_is_within_half_a_percent_of_a_fine_mesh(rest):
+    result = brachis.plan(robot(), task(intervals="auto", rest=rest))
+    assert result.verified
+    assert result.t_end < 1.005 * FINE["j1", rest]
+    assert len(np.unique(result.trajectory.knots)) - 1 < 150
+
+
+def test_intervals_are_refined_where_the_motion_switches(solved):
+    problem, report = solved
+    finer, _ = refine_mesh(problem, report, solve, MeshOptions(tolerance=0.02), RefinementOptions())
+    lengths = np.diff(finer.breaks)
+    assert len(lengths) < 60
+    assert lengths.max() >= 4.0 * lengths.min()
+    np.testing.assert_allclose(lengths[[0, -1]], lengths.min(), rtol=1e-9)
+    assert set(np.round(problem.breaks, 12)) <= set(np.round(finer.breaks, 12))
+
+
+def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
+    problem, report = solved
+    rough, reports = refine_mesh(problem, report, solve, MeshOptions(tolerance=0.1), RefinementOptions())
+    fine, more = refine_mesh(problem, report, solve, MeshOptions(tolerance=0.01), RefinementOptions())
+    assert len(problem.breaks) < len(rough.breaks) < len(fine.breaks)
+    assert more[-1].objective < reports[-1].objective < report.objective
+    assert reports[0] is report
+    assert reports[-1].x.shape == (rough.variables,)
+    assert rough.excess(reports[-1].x).max() < 1e-5
+
+
+def test_the_gain_of_a_doubling_ends_it(solved):
+    problem, report = solved
+    tolerance = 0.02
+    mesh, reports = refine_mesh(problem, report, solve, MeshOptions(tolerance), RefinementOptions())
+    again, further = refine_mesh(mesh, reports[-1], solve, MeshOptions(tolerance), RefinementOptions())
+    assert len(again.breaks) > len(mesh.breaks)
+    assert further[-1].objective > (1.0 - tolerance) * reports[-1].objective
+
+
+def test_what_cannot_be_solved_is_left_as_it_was(solved):
+    problem, report = solved
+    mesh, reports = refine_mesh(problem, report, failing, MeshOptions(), RefinementOptions())
+    assert mesh is problem
+    assert reports[-1] is report
+    assert len(reports) == 2
+    same, reports = free_knots(problem, report, failing, 0.1, RefinementOptions())
+    assert same is problem
+    assert reports[-1] is report
+
+
+def test_a_free_solve_that_stalls_still_gives_good_knots(solved):
+    problem, report = solved
+
+    def stalling(tried, x):
+        answer = solve(tried, x)
+        free = len(tried.grid.lower) > 0
+        return dataclasses.replace(answer, status=SolveStatus.STALLED) if free else answer
+
+    moved, reports = free_knots(problem, report, stalling, 0.1, RefinementOptions())
+    assert reports[-1].status.usable
+    assert reports[-1].objective < 0.95 * report.objective
+    assert moved.variables == problem.variables, "the knots should be fixed again"
+
+
+@pytest.mark.parametrize("intervals", [20, 53, 100])
+def test_coarsest_problem(intervals):
+    problem, _ = brachis.transcribe(robot(), task(intervals=intervals))
+    coarse = coarsest(problem)
+    assert 12 <= len(coarse.breaks) - 1 < 26
+    assert (intervals > 24) == (coarse.variables < problem.variables)
+    for fine, rough in ((problem.breaks, coarse.breaks), (problem.tau, coarse.tau)):
+        assert np.isin(rough, fine).all()
+        assert (rough[0], rough[-1]) == (0.0, 1.0)
+    assert np.diff(coarse.tau).max() == pytest.approx(np.diff(coarse.breaks).max() / 3.0), "3 points an interval"
+
+
+@pytest.mark.parametrize("intervals", [53, 100])
+def test_growing_gives_the_answer_of_a_cold_solve_in_a_few_iterations(intervals):
+    problem, _ = brachis.transcribe(robot(), task(intervals=intervals))
+    coarse = coarsest(problem).with_margin(0.05)
+    report = solve(coarse, next(guesses(coarse)))
+    grown, reports = grow(problem, coarse, report, solve)
+    np.testing.assert_array_equal(grown.knots, problem.knots)
+    np.testing.assert_array_equal(grown.tau, problem.tau)
+    assert grown.guards == coarse.guards
+    assert reports[0] is report
+    assert max(later.iterations for later in reports[1:]) <= 10
+    assert reports[-1].objective == pytest.approx(solve(problem, next(guesses(problem))).objective, rel=1e-4)
+
+
+def test_growing_tells_of_a_level_that_cannot_be_solved():
+    problem, _ = brachis.transcribe(robot(), task(intervals=60))
+    coarse = coarsest(problem)
+    report = solve(coarse, next(guesses(coarse)))
+    grown, reports = grow(problem, coarse, report, failing)
+    assert not reports[-1].status.usable
+    assert reports[-1].x.shape == (grown.variables,)
+    _, settled = settle_knots(coarse, (report,), failing, SplineSettings(), RefinementOptions(), target=problem)
+    assert [later.status for later in settled] == [SolveStatus.OPTIMAL, SolveStatus.FAILED]
+
+
+def test_many_intervals_are_planned_from_few():
+    result = brachis.plan(robot(), task(intervals=100))
+    assert result.verified
+    assert result.t_end == pytest.approx(2.1421, abs=5e-4)
+    assert len(np.unique(result.trajectory.knots)) == 101
+    reports = result.attempts[result.chosen].reports
+    assert len(reports[0].x) < 0.4 * len(reports[-1].x)
+
+
+def test_settings_choose_what_is_done(solved):
+    problem, report = solved
+    options = RefinementOptions()
+    assert settle_knots(problem, (report,), solve, SplineSettings(), options) == (problem, (report,))
+    unusable = (report, failing(problem, report.x))
+    assert settle_knots(problem, unusable, solve, SplineSettings(knots="free"), options) == (problem, unusable)
+    before = dataclasses.replace(report)
+    free, reports = settle_knots(problem, (before, report), solve, SplineSettings(knots="free", intervals=10), options)
+    assert reports[0] is before
+    assert len(free.breaks) == len(problem.breaks)
+    auto = SplineSettings(intervals="auto", tolerance=0.1)
+    mesh, _ = settle_knots(problem, (before, report), solve, auto, options)
+    assert len(mesh.breaks) > len(problem.breaks)
+
+
+def test_auto_begins_coarse():
+    problem, _ = brachis.transcribe(robot(), task(intervals="auto"))
+    assert len(problem.breaks) - 1 == 10
