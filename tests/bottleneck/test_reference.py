@@ -50,14 +50,12 @@ def test_nothing_faster_is_said(slide):
 
 def test_end_posture_is_kept(slide):
     limits = {"torque": {"j1": 30.0}}
-    from brachis.bottleneck.reference import _end_of, _on_mesh  # noqa: PLC0415
+    from brachis.bottleneck.reference import _on_mesh  # noqa: PLC0415
 
     free = slide(((1.0, 0.0, 0.0),) * 2, ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits})
-    problem = free.attempt.refined.problem
-    assert _end_of(problem) is None
+    assert free.attempt.refined.problem.end is None
     task = free.task.to_dict()
     task["end"] = {"joints": [0.1, LENGTH - 0.1]}
     given, _ = brachis.transcribe(free.trajectory.robot, brachis.load_task(task))
-    assert _end_of(given)[0] == 0.1
     fine = _on_mesh(given, 3, 40)
     assert fine.motion(np.zeros(fine.variables) + 0.5).control_points[1, -1] == 0.1

@@ -275,6 +275,7 @@ def fitted(problem: Transcription, t_end: float, tau: np.ndarray, wanted: np.nda
         kept = np.flatnonzero(spline.variable >= 0)
         tied[kept, spline.variable[kept]] = 1.0
         parts.append(np.linalg.lstsq(basis @ tied, values - basis @ spline.fixed, rcond=None)[0])
+    parts.append(problem.grid.lengths_of(problem.knots))
     return np.clip(np.concatenate(parts), problem.x_lower, problem.x_upper)
 
 
