@@ -5,7 +5,9 @@ A coarse plan solves the NLP at the first collocation points. Finishing refines 
 
 from __future__ import annotations
 
+import signal
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -178,12 +180,18 @@ def each(
         return
     from joblib import Parallel, delayed  # noqa: PLC0415  (a fifth of a second that a single process need not wait)
 
-    workers = Parallel(n_jobs=jobs, return_as="generator")
-    yield from workers(delayed(_apart)(function, item, *others) for item in given)
+    made = Parallel(n_jobs=jobs, return_as="generator")(delayed(_apart)(function, item, *others) for item in given)
+    try:
+        yield from made
+    finally:
+        with warnings.catch_warnings():  # that work is thrown away is meant
+            warnings.simplefilter("ignore")
+            made.close()
 
 
 def _apart(function: Callable[..., _Made], *arguments: object) -> _Made:
-    """Run in a process of its own: one thread for linear algebra, nobody listening."""
+    """Run in a process of its own: one thread for linear algebra, nobody listening, Ctrl-C left to the main process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     with ThreadpoolController().limit(limits=1, user_api="blas"):
         return function(*arguments, _deaf)
 
