@@ -6,7 +6,7 @@ import importlib.util
 from pathlib import Path
 
 import brachis
-from brachis.plots import plot_comparison, plot_overview, save_figure
+from brachis.plots import plot_candidates, plot_comparison, plot_overview, plot_timeline, save_figure
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ROOT / "docs/figures"
@@ -22,6 +22,10 @@ def main() -> None:
     spec.loader.exec_module(table)
     rows = [(float(angle), joint, result.t_end) for (angle, joint), result in table.plan_all().items()]
     save_figure(plot_comparison(rows), FIGURES / "scara_table.png")
+    found = brachis.plan(None, ROOT / "examples/07_find_the_fastest.yaml")
+    save_figure(plot_candidates(found.candidates), FIGURES / "candidates.png")
+    rail = brachis.plan(None, ROOT / "examples/03_tx90l_rail_line.yaml")
+    save_figure(plot_timeline(rail.trajectory), FIGURES / "timeline.png")
 
 
 if __name__ == "__main__":

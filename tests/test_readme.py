@@ -171,6 +171,35 @@ def test_example_06():
     assert results["free roll"].trajectory.joint_names[-1] == "tool_roll"
 
 
+@pytest.fixture(scope="module")
+def fastest_table():
+    module = load(ROOT / "examples/07_find_the_fastest.py")
+    return module, module.plan_all()
+
+
+def test_example_07_auto_is_never_slower_than_one_guess(fastest_table):
+    module, results = fastest_table
+    assert all(result.verified for result in results.values())
+    for angle in module.ANGLES_DEG:
+        one_guess = min(results[angle, joint].t_end for joint in module.JOINTS)
+        assert results[angle, "auto"].t_end <= one_guess * (1.0 + 1e-3)
+        assert results[angle, "free start"].t_end <= results[angle, "auto"].t_end * (1.0 + 1e-3)
+    assert results[180, "auto"].t_end <= 2.10
+
+
+def test_a_free_start_makes_mirror_images_equally_fast(fastest_table):
+    """The path begins on the x axis: a line and its mirror image only differ by the start posture."""
+    _, results = fastest_table
+    for angle in (45, 90, 135):
+        mirrored = results[360 - angle, "free start"].t_end
+        assert results[angle, "free start"].t_end == pytest.approx(mirrored, rel=2e-3)
+
+
+def test_table_of_the_readme_is_what_example_07_prints(fastest_table):
+    module, results = fastest_table
+    check_table("examples/07_find_the_fastest.py", module.markdown_table(results))
+
+
 def test_published_figure_lies_between_16_and_17_intervals():
     benchmark = load(ROOT / "benchmarks/published_figure.py")
     assert benchmark.end_time(17) < benchmark.PUBLISHED_S < benchmark.end_time(16)

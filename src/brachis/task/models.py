@@ -139,7 +139,7 @@ class SolverSettings(Model):
     name: Name = Field(default="auto", description="Solver; auto takes the best one installed.")
     max_iterations: Count = Field(default=300, ge=1, description="Largest number of iterations.")
     time_limit: Positive = Field(
-        default=20.0, description="Time after which no further attempt is begun, and largest time of one solve, s."
+        default=20.0, description="Largest time of one solve, s; search.time_limit bounds the whole plan."
     )
     tolerance: Positive = Field(default=1.0e-6, description="Tolerance of the optimality conditions.")
 
@@ -167,7 +167,7 @@ class Task(Model):
         default=None,
         description="Where the path begins: all rows of the task space (m, yaw in rad); of a pose the position and a "
         "quaternion w, x, y, z. Null: where the start posture's tool is; otherwise a start posture whose tool is "
-        "elsewhere is refused.",
+        "elsewhere is refused. With start: free it must be given.",
     )
     end: FreePosture = Field(
         default="free", description="Configuration at the end of the path: free, or {joints: ...}."
