@@ -20,14 +20,22 @@ def robot() -> brachis.Robot:
 
 @pytest.fixture(scope="session")
 def make_task():
-    def make(joint: str, *, intervals: int = 20, rounds: int = 10, solver: str = "auto") -> brachis.Task:
+    def make(
+        joint: str,
+        *,
+        intervals: int = 20,
+        rounds: int = 10,
+        solver: str = "auto",
+        search: dict[str, object] | None = None,
+    ) -> brachis.Task:
         return brachis.load_task(
             {
                 "brachis": 1,
                 "start": {"joints": [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]},
                 "task_space": ["x", "y"],
                 "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
-                "redundant_joints": [joint],
+                "redundant_joints": "auto" if joint == "auto" else [joint],
+                "search": search or {},
                 "spline": {"intervals": intervals},
                 "refinement": {"max_rounds": rounds},
                 "solver": {"name": solver},

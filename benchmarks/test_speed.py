@@ -27,11 +27,21 @@ def test_plan_solved_once(benchmark, robot, make_task, joint):
     assert report.status.usable
 
 
-@pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
-def test_plan_refined_and_verified(benchmark, robot, make_task, joint):
+@pytest.mark.parametrize("effort", ["single", "fast"])
+@pytest.mark.parametrize("joint", ["j1", "j2", "j3", "auto"])
+def test_plan_refined_and_verified(benchmark, robot, make_task, joint, effort):
     """The library call at N = 20."""
-    result = benchmark(plan, robot, make_task(joint))
+    result = benchmark(plan, robot, make_task(joint, search={"effort": effort}))
     assert result.verified
+
+
+@pytest.mark.parametrize("angle", range(0, 360, 45))
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_fastest_motion(benchmark, robot, make_task, angle, jobs):
+    """The paper's eight lines with everything left open; the goal is 3 s on two cores."""
+    task = make_task("auto", search={"jobs": jobs}).to_dict()
+    task["path"][0]["line"]["angle_deg"] = angle
+    assert benchmark.pedantic(plan, (robot, task), rounds=3, warmup_rounds=1).verified
 
 
 def test_plan_from_urdf(benchmark, robot, make_task):

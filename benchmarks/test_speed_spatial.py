@@ -40,9 +40,13 @@ def test_plan_solved_once(benchmark, tx90l, task):
     assert benchmark(solve).status.usable
 
 
-def test_plan_refined_and_verified(benchmark, tx90l, task):
+@pytest.mark.parametrize("effort", ["single", "fast"])
+@pytest.mark.parametrize("joint", ["rail", "auto"])
+def test_plan_refined_and_verified(benchmark, tx90l, task, joint, effort):
     """The library call at N = 20."""
-    assert benchmark(plan, tx90l, task).verified
+    search = {"effort": effort}
+    given = {**task.to_dict(), "redundant_joints": "auto" if joint == "auto" else [joint], "search": search}
+    assert benchmark.pedantic(plan, (tx90l, given), rounds=5, warmup_rounds=1).verified
 
 
 @pytest.mark.parametrize("part", ["rows", "Jacobian"])

@@ -1,0 +1,67 @@
+"""Everything left open on spatial arms, and on random postures and lines (all of them: `benchmarks/random_auto.py`)."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.robot.from_task import robot_from_settings
+from brachis.search.ways import waves
+from brachis.setting import Setting, choices
+
+ROOT = Path(__file__).parents[2]
+RAIL_LINE = ROOT / "examples/03_tx90l_rail_line.yaml"
+
+
+@pytest.fixture(scope="module")
+def bench():
+    folder = str(ROOT / "benchmarks")
+    sys.path.insert(0, folder)
+    try:
+        spec = importlib.util.spec_from_file_location("random_auto", ROOT / "benchmarks/random_auto.py")
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(folder)
+    return module
+
+
+@pytest.mark.parametrize("intervals", [10, 20])
+def test_auto_is_never_slower_than_the_rail_alone(intervals):
+    task = brachis.load_task(RAIL_LINE).to_dict()
+    task["spline"]["intervals"] = intervals
+    rail = brachis.plan(None, task)
+    auto = brachis.plan(None, {**task, "redundant_joints": "auto"})
+    assert rail.verified
+    assert auto.verified
+    assert auto.t_end <= rail.t_end * (1.0 + 1e-6)
+    names = {joint for candidate in auto.candidates for joint in candidate.redundant_joints}
+    assert names >= {"rail", "joint_1", "joint_2", "joint_3"}
+
+
+def test_thorough_looks_at_polynomials_too():
+    task = brachis.load_task({**brachis.load_task(RAIL_LINE).to_dict(), "redundant_joints": "auto"})
+    names: dict[str, set[str]] = {}
+    for effort in ("fast", "thorough"):
+        asked = task.model_copy(update={"search": task.search.model_copy(update={"effort": effort})})
+        allowed = choices(Setting.of(robot_from_settings(task.robot), asked))
+        planned = waves(allowed, np.inf, lambda _text: None, lambda *_dead_end: None)
+        seeds = [way.seed for wave in planned if not wave.last_resort for way in wave.ways]
+        names[effort] = {seed.choice.name for seed in seeds}
+    assert names["fast"] == {"rail", "joint_1", "joint_2", "joint_3"}
+    assert names["thorough"] == names["fast"] | {"joint_4", "joint_5", "joint_6"}
+
+
+@pytest.mark.parametrize(("name", "count"), [("scara3", 12), ("tx90l_rail", 3), ("ur10_rail", 3), ("iiwa14", 3)])
+def test_random_postures_and_lines_with_everything_left_open(bench, name, count):
+    robot = {"scara3": bench.planar_arm()}.get(name) or brachis.Robot.from_urdf(ROOT / f"robots/{name}/robot.urdf")
+    tasks = list(bench.tasks(name, robot, seed=1, count=count))
+    assert len(tasks) == count
+    for task in tasks:
+        assert bench.has_course(robot, task)
+        assert bench.random_poses.tried(robot, task) == ""
