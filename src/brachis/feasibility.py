@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.errors import BrachisError, PathError, StartError, UnknownNameError
+from brachis.errors import StartError, UnknownNameError
 from brachis.ik import Match
-from brachis.kinematics import Decomposition
 from brachis.path import Path, check_on_path
 from brachis.robot import Robot, TaskSpace, dynamics
 
 _RANGE_SLACK = 1e-9
 _SAME_POSTURE = 1e-5
-_SEARCHED = 400
-_STATIONS = 101
 
 
 def check_postures(
@@ -143,83 +140,3 @@ def _branch_of(robot: Robot, task_space: TaskSpace, match: Match, posture: np.nd
             hint="Bend the arm a little, or choose other redundant joints",
         )
     return branch
-
-
-def explain_failure(decomposition: Decomposition, *, any_branch: bool = False) -> BrachisError | str:
-    """Why no motion was found: an error where the path is out of reach or too heavy to hold, else advice.
-
-    Redundant joints are searched at random at stations along the path, so "out of reach" means that none of many
-    postures reaches the target.
-
-    Parameters
-    ----------
-    decomposition : Decomposition
-    any_branch : bool, optional
-        Whether a motion may be on any branch, not the decomposition's alone.
-    """
-    s = np.linspace(0.0, 1.0, _STATIONS)
-    answers = _postures_along(decomposition, s)
-    reached = np.isfinite(answers).all(axis=3)
-    anyhow = reached.any(axis=(1, 2))
-    if not anyhow[0]:  # the start posture itself was not hit: the ranges are too narrow for a random search to tell
-        return "Why not could not be told; widen narrow joint ranges, or raise solver.max_iterations and time_limit"
-    if not anyhow.all():
-        first = float(s[int(np.argmin(anyhow))])
-        return PathError(
-            f"the path is out of reach from s = {first:.3g} on (no posture was found)",
-            s_interval=(first, float(s[np.flatnonzero(~anyhow)[-1]])),
-            hint="Shorten or move the path, or widen the joint ranges",
-        )
-    slots = list(range(reached.shape[2])) if any_branch else decomposition.slots
-    own = reached[:, :, slots].any(axis=(1, 2))
-    if not own.all():
-        first = float(s[int(np.argmin(own))])
-        label = decomposition.solver.branches[decomposition.branch]
-        return PathError(
-            f"the branch {label!r} of the start posture does not reach beyond s = {first:.3g}",
-            s_interval=(first, float(s[np.flatnonzero(~own)[-1]])),
-            hint="Start in a posture of another branch, or choose other redundant joints",
-        )
-    held = _held(decomposition, answers[:, :, slots], reached[:, :, slots])
-    if not held.all():
-        first = float(s[int(np.argmin(held))])
-        return PathError(
-            f"the torque limits cannot hold the arm against gravity from s = {first:.3g} on",
-            s_interval=(first, float(s[np.flatnonzero(~held)[-1]])),
-            hint="Raise robot.limits.torque, or choose other redundant joints",
-        )
-    others = "try other redundant joints, another start posture" if decomposition.r else "try another start posture"
-    return f"Every point of the path is within reach of this branch, but no course along it was found; {others}"
-
-
-def _postures_along(decomposition: Decomposition, s: np.ndarray) -> np.ndarray:
-    """All postures that reach stations s with random redundant joints: (S, tries, B, n), NaN where none does."""
-    robot, redundant, rest = decomposition.robot, decomposition.redundant, decomposition.rest
-    lower, upper = robot.limits.position_lower, robot.limits.position_upper
-    turning = np.array([unit == "rad" for unit in robot.position_units])
-    low = np.where(np.isfinite(lower), lower, np.where(turning, -np.pi, decomposition.start - 10.0))
-    high = np.where(np.isfinite(upper), upper, np.where(turning, np.pi, decomposition.start + 10.0))
-    tries = _SEARCHED * len(redundant) ** 2 if redundant else 1
-    q_r = np.random.default_rng(0).uniform(low[redundant], high[redundant], (tries, len(redundant)))
-    targets = decomposition.path.sample(s).target
-    answers = decomposition.solver.solve(np.repeat(targets, tries, axis=0), np.tile(q_r, (len(s), 1)))
-    branches = answers.shape[1]
-    postures = np.empty((len(s), tries, branches, robot.n))
-    postures[..., redundant] = q_r[None, :, None]
-    postures[..., rest] = answers.reshape(len(s), tries, branches, -1)
-    middle = 0.5 * (low + high)
-    lifted = np.where(turning, postures - 2.0 * np.pi * np.round((postures - middle) / (2.0 * np.pi)), postures)
-    inside = np.all((lifted >= lower - _RANGE_SLACK) & (lifted <= upper + _RANGE_SLACK), axis=-1, keepdims=True)
-    return np.where(inside, lifted, np.nan)
-
-
-def _held(decomposition: Decomposition, postures: np.ndarray, reached: np.ndarray) -> np.ndarray:
-    """At which stations some posture is held by the torque limits, (S,) bool."""
-    robot = decomposition.robot
-    held = np.zeros(len(postures), dtype=bool)
-    for station, (choices, exist) in enumerate(zip(postures, reached, strict=True)):
-        q = choices[exist][:60]
-        still = np.zeros_like(q)
-        tau = np.abs(dynamics.torque(robot, q, still, still))
-        held[station] = bool(np.any(np.all(tau <= robot.limits.torque, axis=1)))
-    return held

@@ -129,6 +129,6 @@ def test_why_there_is_no_course(case):
     furthest = max(ends, key=lambda end: end.s)
     assert 0.0 < furthest.s <= 1.0
     assert reason in str(furthest)
-    with pytest.raises(PathError) as caught:
+    with pytest.raises(PathError, match=reason.replace("it is", "").replace("a joint range ends", "joint ranges.*j2")) as caught:
         brachis.plan(given.robot, given.task)
     assert caught.value.s_interval is not None

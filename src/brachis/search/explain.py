@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from brachis.errors import BrachisError, PathError, PlanningError
-from brachis.feasibility import explain_failure
 from brachis.result import Candidate
 from brachis.search.course import DeadEnd
+from brachis.search.reach import explain_failure
 from brachis.setting import Choice
 
 _GOOD_PART = 0.1
-_LOOKED_AT = 6
+_LOOKED_AT = 2
 _THERE_IS_A_COURSE = (
     "There is a course along the path within reach, but no motion along it was found; raise search.effort, or try "
     "another start posture"

@@ -1,0 +1,133 @@
+"""What of a path a decomposition reaches, by random postures: out of reach, joint ranges, branches, static torques."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.errors import BrachisError, PathError
+from brachis.kinematics import Decomposition
+from brachis.robot import dynamics
+
+_RANGE_SLACK = 1e-9
+_SEARCHED = 400
+_STATIONS = 101
+_HELD_CHECKS = 60
+
+
+def explain_failure(decomposition: Decomposition, *, any_branch: bool = False) -> BrachisError | str:
+    """Why no motion was found: an error where the path is out of reach or too heavy to hold, else advice.
+
+    Redundant joints are searched at random at stations along the path, so "out of reach" means that none of many
+    postures reaches the target.
+
+    Parameters
+    ----------
+    decomposition : Decomposition
+    any_branch : bool, optional
+        Whether a motion may be on any branch, not the decomposition's alone.
+
+    Returns
+    -------
+    BrachisError or str
+    """
+    s = np.linspace(0.0, 1.0, _STATIONS)
+    found = _answers_along(decomposition, s)
+    slots = list(range(found.q.shape[2])) if any_branch else decomposition.slots
+    own = _Answers(found.q[:, :, slots], found.exists[:, :, slots], found.inside[:, :, slots])
+    if not found.within[0].any():
+        # The start posture itself was not hit: the ranges are too narrow for a random search to tell.
+        return "Why not could not be told; widen narrow joint ranges, or raise solver.max_iterations and time_limit"
+    label = decomposition.solver.branches[decomposition.branch]
+    reasons = (
+        (
+            found.exists.any(axis=(1, 2)),
+            "the path is out of reach from s = {first:.3g} on (no posture was found)",
+            "Shorten or move the path, or choose another start posture",
+        ),
+        (
+            found.within.any(axis=(1, 2)),
+            f"no posture within the joint ranges was found from s = {{first:.3g}} on{_narrowest(decomposition, found)}",
+            "Shorten or move the path, or widen the joint ranges",
+        ),
+        (
+            own.within.any(axis=(1, 2)),
+            f"the branch {label!r} of the start posture does not reach beyond s = {{first:.3g}}",
+            "Start in a posture of another branch, or choose other redundant joints",
+        ),
+        (
+            _held(decomposition, own),
+            "the torque limits cannot hold the arm against gravity from s = {first:.3g} on",
+            "Raise robot.limits.torque, or choose other redundant joints",
+        ),
+    )
+    for possible, problem, hint in reasons:
+        if not possible.all():
+            first, last = float(s[int(np.argmin(possible))]), float(s[np.flatnonzero(~possible)[-1]])
+            return PathError(problem.format(first=first), s_interval=(first, last), hint=hint)
+    others = "try other redundant joints, another start posture" if decomposition.r else "try another start posture"
+    return f"Every point of the path is within reach of this branch, but no course along it was found; {others}"
+
+
+@dataclass(frozen=True)
+class _Answers:
+    """Closed-form postures at S stations for T random choices of the redundant joints and B branches.
+
+    Attributes
+    ----------
+    q : (S, T, B, n) ndarray
+    exists : (S, T, B) bool ndarray
+    inside : (S, T, B, n) bool ndarray
+        Which joints are within their ranges.
+    """
+
+    q: np.ndarray
+    exists: np.ndarray
+    inside: np.ndarray
+
+    @property
+    def within(self) -> np.ndarray:
+        """Which postures exist within all joint ranges, (S, T, B)."""
+        return np.asarray(self.exists & self.inside.all(axis=3))
+
+
+def _answers_along(decomposition: Decomposition, s: np.ndarray) -> _Answers:
+    """Postures that reach stations s, (S,), with random redundant joints, angles lifted into their ranges."""
+    robot, redundant, rest = decomposition.robot, decomposition.redundant, decomposition.rest
+    lower, upper = robot.limits.position_lower, robot.limits.position_upper
+    turning = np.array([unit == "rad" for unit in robot.position_units])
+    low = np.where(np.isfinite(lower), lower, np.where(turning, -np.pi, decomposition.start - 10.0))
+    high = np.where(np.isfinite(upper), upper, np.where(turning, np.pi, decomposition.start + 10.0))
+    tries = _SEARCHED * len(redundant) ** 2 if redundant else 1
+    q_r = np.random.default_rng(0).uniform(low[redundant], high[redundant], (tries, len(redundant)))
+    targets = decomposition.path.sample(s).target
+    answers = decomposition.solver.solve(np.repeat(targets, tries, axis=0), np.tile(q_r, (len(s), 1)))
+    postures = np.empty((len(s), tries, answers.shape[1], robot.n))
+    postures[..., redundant] = q_r[None, :, None]
+    postures[..., rest] = answers.reshape(len(s), tries, answers.shape[1], -1)
+    middle = 0.5 * (low + high)
+    lifted = np.where(turning, postures - 2.0 * np.pi * np.round((postures - middle) / (2.0 * np.pi)), postures)
+    inside = (lifted >= lower - _RANGE_SLACK) & (lifted <= upper + _RANGE_SLACK)
+    return _Answers(lifted, np.asarray(np.isfinite(lifted).all(axis=3)), inside)
+
+
+def _narrowest(decomposition: Decomposition, found: _Answers) -> str:
+    """Name the joint that is most often beyond its range at the first station without a posture, in words."""
+    blocked = np.flatnonzero(~found.within.any(axis=(1, 2)) & found.exists.any(axis=(1, 2)))
+    if not len(blocked):
+        return ""
+    beyond = (~found.inside[blocked[0]])[found.exists[blocked[0]]].mean(axis=0)
+    return f" ({decomposition.robot.joint_names[int(np.argmax(beyond))]!r} is beyond its own most often)"
+
+
+def _held(decomposition: Decomposition, found: _Answers) -> np.ndarray:
+    """At which stations some posture is held by the torque limits, (S,) bool."""
+    robot = decomposition.robot
+    held = np.zeros(len(found.q), dtype=bool)
+    for station, (choices, exist) in enumerate(zip(found.q, found.within, strict=True)):
+        q = choices[exist][:_HELD_CHECKS]
+        still = np.zeros_like(q)
+        tau = np.abs(dynamics.torque(robot, q, still, still))
+        held[station] = bool(np.any(np.all(tau <= robot.limits.torque, axis=1)))
+    return held
