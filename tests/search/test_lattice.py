@@ -106,15 +106,17 @@ def test_lifts_follow_the_course():
 
 
 REASONS = {
-    "out of reach": ({}, {"path": [{"line": {"to": [4.0, 0.0]}}]}, "it is out of reach"),
+    "out of reach": ({}, {"path": [{"line": {"to": [4.0, 0.0]}}]}, "it is out of reach", "out of reach from"),
     "joint range": (
         {"limits": {"position": {"j1": [0.3, 0.8], "j2": [-2.2, -1.9]}}},
         {"redundant_joints": ["j1"]},
         "a joint range ends",
+        r"within the joint ranges .*'j2' is beyond",
     ),
     "gravity": (
         {"gravity": [0, -9.81, 0], "limits": {"torque": [280.0, 200.0, 100.0]}},
         {"path": [{"line": {"to": [2.8, 0.0]}}]},
+        "the torque limits cannot hold",
         "the torque limits cannot hold",
     ),
 }
@@ -122,13 +124,13 @@ REASONS = {
 
 @pytest.mark.parametrize("case", REASONS)
 def test_why_there_is_no_course(case):
-    options, changes, reason = REASONS[case]
+    options, changes, reason, message = REASONS[case]
     given = setting(scara(**options), **changes)
     ends = [lattice_seeds(choice, EFFORTS["fast"][0], 0) for choice in choices(given)]
     assert all(isinstance(end, DeadEnd) for end in ends)
     furthest = max(ends, key=lambda end: end.s)
     assert 0.0 < furthest.s <= 1.0
     assert reason in str(furthest)
-    with pytest.raises(PathError, match=reason.replace("it is", "").replace("a joint range ends", "joint ranges.*j2")) as caught:
+    with pytest.raises(PathError, match=message) as caught:
         brachis.plan(given.robot, given.task)
     assert caught.value.s_interval is not None

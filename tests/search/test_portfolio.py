@@ -157,6 +157,8 @@ def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
         brachis.plan(robot, task())
 
 
+# The signal may hit a finaliser, where Python can only warn.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_a_real_ctrl_c_ends_worker_processes(robot):
     timer = threading.Timer(8.0, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
