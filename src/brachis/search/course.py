@@ -33,7 +33,7 @@ class Course:
     q : (S + 1, n) ndarray
         Postures, rad or m, angles lifted so that they are continuous.
     length : float
-        See the module.
+        In the measure of the lattice, s^2.
     """
 
     choice: Choice
@@ -101,11 +101,15 @@ def distinct(courses: Sequence[Course], most: int) -> list[Course]:
 
 
 def weights_near(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Weights of the joints, (n,), with which postures near `q`, (n,), are compared: inertia over torque limit."""
+    """Weights of the joints, (n,), with which postures near `q`, (n,), are compared.
+
+    The reciprocal of the largest acceleration that torque and acceleration limits allow a joint alone; where there are
+    no such limits, that of its velocity limit.
+    """
     limits = robot.limits
-    if not np.isfinite(limits.torque).any():
-        return np.asarray(1.0 / limits.velocity)
-    return np.asarray(np.diag(dynamics.mass_matrices(robot, q[None])[0]) / limits.torque)
+    inertia = np.diag(dynamics.mass_matrices(robot, q[None])[0])
+    weights = np.maximum(inertia / limits.torque, 1.0 / limits.acceleration)
+    return weights if weights.any() else np.asarray(1.0 / limits.velocity)
 
 
 def causes_of(

@@ -19,7 +19,7 @@ import numpy as np
 from brachis.robot import Robot, dynamics
 
 _SLOWEST = 1e-9
-_STANDING = 1e-4
+_STANDING = 1e-3
 
 
 def least_time(robot: Robot, s: np.ndarray, q: np.ndarray) -> float:
@@ -39,13 +39,13 @@ def least_time(robot: Robot, s: np.ndarray, q: np.ndarray) -> float:
         s; infinite where the course cannot be followed at any speed.
     """
     step = s[1] - s[0]
-    slope, offset, ceiling = _lines(robot, q, np.gradient(q, step, axis=0), step)
-    low, high = _controllable(slope, offset, ceiling, step)
-    if low is None or low[0] > 0.0:
+    slope, offset, ceiling = _lines(robot, q, np.gradient(q, step, axis=0, edge_order=2), step)
+    intervals = _controllable(slope, offset, ceiling, step)
+    if intervals is None or intervals[0][0] > 0.0:
         return np.inf
-    x = _fastest(slope, offset, low, high, step)
+    x = _fastest(slope, offset, *intervals, step)
     # Between stations nothing stops; a station where the grid says so is an artefact of its width.
-    x[1:-1] = np.maximum(x[1:-1], _STANDING * x.max())
+    x[1:-1] = np.maximum(x[1:-1], _STANDING * np.median(x))
     speed = np.sqrt(x)
     return float(np.sum(2.0 * step / (speed[1:] + speed[:-1]))) if x.max() > 0.0 else np.inf
 
@@ -55,7 +55,7 @@ def _lines(
 ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray], np.ndarray]:
     """Bounds on u as lines in x, slope and offset of the upper and the lower ones, each (S, c), and largest x, (S,)."""
     limits = robot.limits
-    q_dds = np.gradient(q_ds, step, axis=0)
+    q_dds = np.gradient(q_ds, step, axis=0, edge_order=2)
     still = np.zeros_like(q)
     rest = dynamics.rigid_torque(robot, q, still, still)
     by_u = dynamics.rigid_torque(robot, q, still, q_ds) - rest + robot.friction.armature * q_ds
@@ -75,7 +75,7 @@ def _lines(
 
 def _controllable(
     slope: tuple[np.ndarray, np.ndarray], offset: tuple[np.ndarray, np.ndarray], ceiling: np.ndarray, step: float
-) -> tuple[np.ndarray | None, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray] | None:
     """Go backwards: the intervals of x, (S,), from which the end can be reached at rest; None where one is empty."""
     count = len(ceiling)
     low, high = np.zeros(count), np.zeros(count)
@@ -86,12 +86,12 @@ def _controllable(
         tilt = (up[0][:, None] - down[0][None]).ravel()
         room = (up[1][:, None] - down[1][None]).ravel()
         if np.any((room < 0.0) & (np.abs(tilt) < _SLOWEST)):
-            return None, high
+            return None
         falling, rising = tilt < -_SLOWEST, tilt > _SLOWEST
         high[i] = min(ceiling[i], np.min(room[falling] / -tilt[falling], initial=np.inf))
         low[i] = max(0.0, np.max(-room[rising] / tilt[rising], initial=0.0))
         if low[i] > high[i]:
-            return None, high
+            return None
     return low, high
 
 

@@ -26,7 +26,7 @@ from brachis.search.explain import no_motion, refuse_what_is_out_of_reach
 from brachis.search.finishing import Motion
 from brachis.search.solving import Listener
 from brachis.search.ways import Wave, waves
-from brachis.search.work import Coarse, each, finish, plan_coarse
+from brachis.search.work import NOT_TRIED, Coarse, each, finish, plan_coarse, processes
 from brachis.setting import Choice
 
 _WORTH_IT = 2e-4
@@ -109,6 +109,7 @@ class _Search:
         self._choices, self._listener = choices, listener
         self._task = choices[0].setting.task
         self._began = time.monotonic()
+        self._jobs = processes(self._task.search.jobs)
         self.deadline = self._began + self._task.search.time_limit
         self._candidates: list[Candidate] = []
         self._attempts: list[Attempt] = []
@@ -145,15 +146,18 @@ class _Search:
 
     def _plan(self, wave: Wave) -> list[tuple[int, Coarse]]:
         """Plan the ways of a wave coarsely, and rank those that differ."""
-        limit = self.deadline if self.content else self._began + _COARSE_SHARE * self._task.search.time_limit
+        now = time.monotonic()
+        limit = self.deadline if self.content else now + _COARSE_SHARE * (self.deadline - now)
         share = self._task.search.time_limit * min(_LARGEST_SHARE, _COARSE_SHARE / max(1, len(wave.ways)))
         share = max(_LEAST_SHARE, share)
         plans: list[tuple[int, Coarse]] = []
-        for plan in each(plan_coarse, wave.ways, limit, share, jobs=self._task.search.jobs, listener=self._listener):
+        for plan in each(plan_coarse, wave.ways, limit, share, jobs=self._jobs, listener=self._listener):
             plans.append((len(self._candidates), plan))
             self._candidates.append(_candidate(plan))
+            self.interrupted |= plan.status == NOT_TRIED
+        usable = [item for item in plans if item[1].usable]
         ranked: list[tuple[int, Coarse]] = []
-        for number, plan in sorted((item for item in plans if item[1].usable), key=lambda item: item[1].t_end):
+        for number, plan in sorted(usable, key=lambda item: (_rounded(item[1].t_end), item[0])):
             if any(_agree(plan, other) for _, other in ranked):
                 self._note(number, status="same motion as another")
             else:
@@ -162,12 +166,12 @@ class _Search:
 
     def _finish(self, ranked: Sequence[tuple[int, Coarse]], most: int) -> None:
         """Refine and verify plans in the order of their end times while they may be the fastest."""
-        jobs, left = self._task.search.jobs, most
+        jobs, left = self._jobs, most
         for first in range(0, len(ranked), jobs):
             batch = ranked[first : first + jobs]
             if not self._may_win(batch[0][1], left):
                 return
-            deadline = self.deadline if self.content else max(self.deadline, time.monotonic() + _GRACE)
+            deadline = self.deadline if self.content else self.deadline + _GRACE
             outcomes = each(finish, batch, deadline, jobs=jobs, listener=self._listener)
             for (number, plan), (attempt, motion) in zip(batch, outcomes, strict=True):
                 if not self._may_win(plan, left):
@@ -177,11 +181,11 @@ class _Search:
 
     def _may_win(self, plan: Coarse, left: int) -> bool:
         """Tell whether a plan is worth finishing."""
-        if self._best is None or not self.content:
-            return True
-        if time.monotonic() > self.deadline:
+        if time.monotonic() > self.deadline + (0.0 if self.content else _GRACE):
             self.interrupted = True
             return False
+        if self._best is None or not self.content:
+            return True
         return left > 0 and plan.t_end * self._gain < (1.0 - _WORTH_IT) * self._best[0][1]
 
     def _record(self, number: int, plan: Coarse, attempt: Attempt, motion: Motion | None) -> None:
@@ -212,8 +216,15 @@ class _Search:
                 raise PlanningError(problem, hint="Raise search.time_limit")
             raise no_motion(self._choices, self._candidates, self._dead_ends)
         _, chosen, motion, family = self._best
-        order = sorted(self._candidates, key=lambda c: (not c.verified, c.t_end, c.coarse, c.estimate))
+        order = sorted(
+            self._candidates, key=lambda c: (not c.verified, *map(_rounded, (c.t_end, c.coarse, c.estimate)))
+        )
         return Found(tuple(self._attempts), chosen, motion, family, tuple(order), self.interrupted)
+
+
+def _rounded(time: float) -> float:
+    """Leave out the digits in which processes differ, so that these do not choose."""
+    return float(f"{time:.6g}")
 
 
 def _candidate(plan: Coarse) -> Candidate:

@@ -17,7 +17,8 @@ from brachis.setting import Choice
 
 _PIECES = (3, 8)
 _START_WEIGHT = 1e3
-_FINER = 3
+_FINER, _DENSER = 3, 2.0
+_FINEST = 96
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,8 @@ def lattice_seeds(choice: Choice, effort: Effort, seed: int) -> list[Seed] | Dea
     )
     found = Lattice(choice, cells_per_turn=cells, nodes=nodes, seed=seed).courses(most)
     if isinstance(found, DeadEnd):
-        found = Lattice(choice, cells_per_turn=_FINER * cells, nodes=_FINER * nodes, seed=seed).courses(most)
+        finer = Lattice(choice, cells_per_turn=_FINER * cells, density=_DENSER, nodes=_FINER * nodes, seed=seed)
+        found = finer.courses(most)
     if isinstance(found, DeadEnd):
         return found
     return [_seed(course, f"lattice {number}") for number, course in enumerate(found, 1)]
@@ -83,7 +85,7 @@ def _seed(course: Course, origin: str) -> Seed:
     """Smooth a course, as far as the closed form can follow, and estimate its time."""
     choice, s = course.choice, course.s
     decomposition = choice.decomposition(course.q[0], course.branch)
-    fine = np.linspace(0.0, 1.0, 2 * len(s) - 1)
+    fine = np.linspace(0.0, 1.0, max(2 * len(s) - 1, _FINEST + 1))
     for pieces in _PIECES:
         stations = np.column_stack([fine, _smoothed(s, course.stations[:, 1:], fine, pieces)])
         q = decomposition.postures(stations)
@@ -94,7 +96,7 @@ def _seed(course: Course, origin: str) -> Seed:
 
 
 def _smoothed(s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int) -> np.ndarray:
-    """Least-squares cubic splines through values (S, r), exact at the start, at the places `fine`."""
+    """Least-squares cubic splines through values (S, r), nearly exact at both ends, at the places `fine`."""
     from scipy.interpolate import make_lsq_spline  # noqa: PLC0415  (imports in 0.3 s)
 
     if not values.shape[1]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from brachis.search.course import DeadEnd
 from brachis.search.efforts import EFFORTS, Effort
 from brachis.search.seeds import Seed, lattice_seeds, numeric_seeds
 from brachis.search.solving import Listener
-from brachis.search.work import Way, each
+from brachis.search.work import Way, each, processes
 from brachis.setting import Choice
 from brachis.solvers import solver_named
 
@@ -59,15 +60,15 @@ def waves(
     solvers = [solver.name for solver in solver_named(task.solver.name)]
     known: list[Seed] = []
     for effort in EFFORTS[task.search.effort]:
-        allowed = [choice for choice in choices if effort.polynomial or choice.match.solver.kind == "closed_form"]
+        closed = [choice for choice in choices if effort.polynomial or choice.match.solver.kind == "closed_form"]
         seeds: list[Seed] = []
-        rest = allowed or list(choices)
+        rest = closed or list(choices)
         while rest and not seeds:  # choices without a course make room for others
-            allowed, rest = rest[: effort.choices], rest[effort.choices :]
+            looked_at, rest = rest[: effort.choices], rest[effort.choices :]
             if task.search.guesses == "numeric":
-                seeds = [seed for choice in allowed for seed in numeric_seeds(choice, effort.seeds)]
+                seeds = [seed for choice in looked_at for seed in numeric_seeds(choice, effort.seeds)]
             else:
-                seeds = _from_lattices(allowed, effort, deadline, listener, note)
+                seeds = _from_lattices(looked_at, effort, deadline, listener, note)
         known += seeds
         for first in range(0, len(seeds), _WAVE):
             yield Wave(
@@ -77,7 +78,7 @@ def waves(
             )
     many = len(known) + len(STRATEGIES)
     yield Wave(tuple(Way(seed, solver) for seed in known[:_WAVE] for solver in solvers[1:2]), many, last_resort=True)
-    for choice in allowed:
+    for choice in (closed or choices)[: effort.choices]:
         for seed in numeric_seeds(choice, len(STRATEGIES)):
             yield Wave(tuple(Way(seed, solver) for solver in solvers[:2]), many, last_resort=True)
     yield Wave(tuple(Way(seed, solver) for solver in solvers[2:] for seed in known[:2]), many, last_resort=True)
@@ -90,18 +91,19 @@ def _from_lattices(
     listener: Listener,
     note: Callable[[Choice, DeadEnd], None],
 ) -> list[Seed]:
-    """Take seeds of all choices in turn, those with the least estimated times first."""
+    """Take one seed of every choice after the other, of each those with the least estimated times first."""
     search = choices[0].setting.task.search
     redundancy = max(1, len(choices[0].redundant))
     ranked: list[tuple[int, float, int, Seed]] = []
-    outcomes = each(_seeds_of, choices, effort, search.seed, deadline, jobs=search.jobs, listener=listener)
+    number = itertools.count()
+    outcomes = each(_seeds_of, choices, effort, search.seed, deadline, jobs=processes(search.jobs), listener=listener)
     for choice, outcome in zip(choices, outcomes, strict=True):
         if isinstance(outcome, DeadEnd):
             note(choice, outcome)
             continue
         own = [dataclasses.replace(seed, choice=choice) for seed in outcome]  # not another process's copy
         own = sorted(own, key=lambda seed: seed.estimate) + numeric_seeds(choice, effort.numeric)
-        ranked += [(place, seed.estimate, len(ranked) + place, seed) for place, seed in enumerate(own)]
+        ranked += [(place, seed.estimate, next(number), seed) for place, seed in enumerate(own)]
     return [seed for *_, seed in sorted(ranked, key=lambda item: item[:-1])[: max(1, effort.plans // redundancy)]]
 
 

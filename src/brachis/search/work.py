@@ -5,6 +5,8 @@ A coarse plan solves the NLP at the first collocation points. Finishing refines 
 
 from __future__ import annotations
 
+import multiprocessing
+import os
 import signal
 import time
 import warnings
@@ -27,10 +29,13 @@ from brachis.search.solving import MARGINS, Listener, continued, solve_with
 from brachis.setting import intervals_of, transcription
 from brachis.solvers import SolverReport, solver_named
 
+NOT_TRIED = "not tried: the time was up"
 _MANY_VARIABLES = 150
 """Above this a cold solve takes seconds, and the problem is first solved over some of its knots."""
 _KNOT_TIME = 0.4
 """Part of the remaining time that may go into the knots."""
+
+_MAIN = "MainProcess"
 
 _Given = TypeVar("_Given")
 _Made = TypeVar("_Made")
@@ -114,7 +119,7 @@ def plan_coarse(way: Way, deadline: float, share: float, listener: Listener) -> 
     Coarse
     """
     if time.monotonic() > deadline:
-        return Coarse(way, None, (), "not tried: the time was up")
+        return Coarse(way, None, (), NOT_TRIED)
     deadline = min(deadline, time.monotonic() + share)
     seed, setting = way.seed, way.seed.choice.setting
     target = transcription(setting, seed.decomposition, intervals_of(setting.task))
@@ -174,13 +179,15 @@ def each(
     function: Callable[..., _Made], given: Sequence[_Given], *others: object, jobs: int, listener: Listener
 ) -> Iterator[_Made]:
     """Yield ``function(item, *others, listener)`` for all items, in order, from up to `jobs` processes."""
-    if jobs == 1 or len(given) <= 1:
+    if jobs == 1 or len(given) <= 1 or _within_a_worker():
         for item in given:
             yield function(item, *others, listener)
         return
     from joblib import Parallel, delayed  # noqa: PLC0415  (a fifth of a second that a single process need not wait)
 
-    made = Parallel(n_jobs=jobs, return_as="generator")(delayed(_apart)(function, item, *others) for item in given)
+    made = Parallel(n_jobs=jobs, backend="loky", return_as="generator")(
+        delayed(_apart)(function, item, *others) for item in given
+    )
     try:
         yield from made
     finally:
@@ -189,9 +196,22 @@ def each(
             made.close()
 
 
+def processes(jobs: int) -> int:
+    """Return the number of processes that is used where a task asks for `jobs`: no more than there are processors."""
+    return min(jobs, os.cpu_count() or 1)
+
+
+def _within_a_worker() -> bool:
+    """Tell whether this is somebody's worker process: processes of processes would multiply."""
+    from joblib.parallel import get_active_backend  # noqa: PLC0415
+
+    return bool(get_active_backend()[0].nesting_level) or multiprocessing.current_process().name != _MAIN
+
+
 def _apart(function: Callable[..., _Made], *arguments: object) -> _Made:
     """Run in a process of its own: one thread for linear algebra, nobody listening, Ctrl-C left to the main process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if multiprocessing.current_process().name != _MAIN:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     with ThreadpoolController().limit(limits=1, user_api="blas"):
         return function(*arguments, _deaf)
 

@@ -126,7 +126,9 @@ class SearchSettings(Model):
         description="Where initial guesses come from: a lattice of closed-form postures, or numeric inverse kinematics "
         "from the start posture.",
     )
-    jobs: Count = Field(default=1, ge=1, description="Number of processes that plan at the same time.")
+    jobs: Count = Field(
+        default=1, ge=1, description="Processes that plan at the same time; no more than there are processors are used."
+    )
     time_limit: Positive = Field(
         default=60.0, description="Time after which the best motion verified so far is returned, s."
     )
