@@ -33,6 +33,8 @@ def bottleneck_command(
         print_json(data)
     else:
         _show(result, found, data)
+    if result.interrupted:
+        print_error("the search was ended early; this is the best motion verified so far")
     if not result.verified:
         print_error("the motion found did not pass the verification; what is said of it may not hold")
     return 0 if result.verified else 1

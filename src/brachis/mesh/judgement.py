@@ -10,6 +10,8 @@ from brachis.nlp import Transcription
 from brachis.refine import Refined, RefinementOptions
 from brachis.solvers import SolverReport, SolveStatus
 
+SHORTEST = 5e-5
+"""No interval gets shorter than this part of t_E: collocation points would fall together."""
 _FEASIBLE = 1e-5
 
 Answer = tuple[Transcription, tuple[SolverReport, ...]]
