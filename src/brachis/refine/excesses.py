@@ -9,14 +9,19 @@ from brachis.errors import UnreachableError
 from brachis.nlp import Transcription
 
 _NEAR = 0.005
+"""An excess may hide between grid points where the motion comes so near a limit, as a part of it."""
 _COARSE = 20.0
-_FINE = 9
-_ZOOMS = 2
+"""Excesses of so many times the goal are held down at the grid's points first."""
+_FINE, _ZOOMS = 9, 2
+"""Points of every finer grid around a peak, and how many such grids follow each other."""
 _PIECE_POINTS = 9
 _CLOSEST = 1e-5
+"""Collocation points are at least so far apart, in normalised time."""
 _SAME_TIME = 1e-9
 _JUST_BEFORE = 1e-7
+"""How long before a knot the acceleration before its jump is looked at, in normalised time."""
 _CONTINUOUS_ACCELERATION = 3
+"""Least degree without such jumps."""
 
 
 def dense_grid(problem: Transcription, density: int) -> np.ndarray:

@@ -19,7 +19,6 @@ from brachis.solvers import SolverReport
 
 Solve = Callable[[Transcription, np.ndarray], SolverReport]
 _LARGEST_STRETCH = 0.01
-_FEASIBLE = 1e-5
 _GOAL = 0.5
 """Refinement aims at this part of the tolerance: the verification's grid is another one."""
 
@@ -117,7 +116,7 @@ def refine(problem: Transcription, first: SolverReport, solve: Solve, options: R
 
 def _still_good(report: SolverReport, before: SolverReport) -> bool:
     """Tell whether a solve that ended early left a feasible motion about as fast as the one before it."""
-    return report.violation <= _FEASIBLE and report.objective <= before.objective * (1.0 + _LARGEST_STRETCH)
+    return report.feasible and report.objective <= before.objective * (1.0 + _LARGEST_STRETCH)
 
 
 def _stretched(
