@@ -11,6 +11,7 @@ import pytest
 import brachis
 from brachis.bottleneck import check, check_sensitivities, sensitivities
 from brachis.errors import InputError
+from brachis.solvers import solver_named
 
 ROOT = Path(__file__).parents[2]
 LARGE = 1e-4
@@ -114,3 +115,23 @@ def test_a_step_into_another_valley_is_no_change_by_the_limit(scara, monkeypatch
         if entry.predicted:
             assert entry.other_optimum == pytest.approx(-valley, rel=1e-3)
             assert entry.re_solved == pytest.approx(expected[entry.sensitivity], abs=1e-6)
+
+
+def test_a_raised_limit_that_no_solver_copes_with_leaves_the_answer(scara, monkeypatch):
+    refined = scara("j3").attempt.refined
+
+    class Broken:
+        name = "broken"
+
+        @staticmethod
+        def solve(problem, x, options, progress):
+            answer = solver_named("uno")[0].solve(problem, x, options, progress)
+            broken = problem.decomposition.robot is not refined.problem.decomposition.robot
+            return dataclasses.replace(answer, violation=np.inf) if broken else answer
+
+    monkeypatch.setattr(check, "solver_named", lambda _name: (Broken,))
+    found = [entry for entry in check_sensitivities(refined).entries if entry.predicted]
+    assert found
+    for entry in found:
+        assert not entry.optimal
+        assert entry.re_solved == pytest.approx(0.0, abs=1e-6)

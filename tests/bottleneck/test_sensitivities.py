@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+import brachis
 from brachis.bottleneck import sensitivities
 from brachis.bottleneck.multipliers import Multipliers, Pushes, multipliers_of
 from brachis.bottleneck.sensitivities import sensitivities_at
@@ -98,6 +99,31 @@ def test_no_limit_costs_less_than_nothing(scara, joint):
     # Torque limits and nothing else: were all torques f times as large, the time would fall with the root of f.
     expected = -0.5 * scara(joint).report.objective
     assert sum(entry.change(1.0) for entry in found.limits) == pytest.approx(expected, rel=2e-3)
+
+
+def test_control_points_near_zero_on_a_fine_mesh_do_not_press(scara):
+    # The first ones of s are some 1e-6 there; taken for active, they would take back most of what a limit costs.
+    task = scara("j1").task.to_dict()
+    task["spline"]["intervals"] = "auto"
+    result = brachis.plan(scara("j1").trajectory.robot, task)
+    refined = result.attempt.refined
+    problem, x = refined.problem, refined.reports[-1].x
+    assert 0.0 < x[problem.slices[0]][0] < 1e-5, "else this tests nothing"
+    found = sensitivities(refined)
+    assert sum(entry.change(1.0) for entry in found.limits) == pytest.approx(-0.5 * x[0], rel=1e-4)
+
+
+@pytest.mark.parametrize("end", [1, -1])
+def test_rows_that_nothing_can_change_do_not_press(slide, end):
+    # The first slide begins at an end of its range, which holds whatever x.
+    lower, upper = sorted((0.0, end * 0.5))
+    limits = {"torque": {"j1": 30.0}, "position": {"j1": [lower, upper]}}
+    refined = slide((X, X), ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits}).attempt.refined
+    problem, x = refined.problem, refined.reports[-1].x
+    pushes = Pushes.at(problem, x, 1e-5)
+    assert np.abs(pushes.slopes).max(axis=1).min() > 0.0
+    at_start = np.flatnonzero(np.minimum(problem.rows(x) - problem.lower, problem.upper - problem.rows(x)) == 0.0)
+    assert set(at_start) - set(pushes.rows), "some row should hold without pressing"
 
 
 @pytest.mark.parametrize("joint", ["j1", "j2", "j3"])

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 
 import pytest
 
-from brachis import plots
+from brachis import planner, plots
 from brachis.errors import InputError
 from brachis.search import motion
 from brachis.verify import VerifyOptions
@@ -78,6 +79,16 @@ def test_unverified_motion(run, task, write, tmp_path, monkeypatch):
     assert outcome.code == 1
     assert "did not pass the verification" in outcome.err
     assert sorted(path.name for path in out.iterdir()) == ["unverified_bottleneck.json", "unverified_timeline.png"]
+
+
+def test_a_search_ended_early_is_told(run, task, write, monkeypatch):
+    honest = planner.plan
+    monkeypatch.setattr(
+        planner, "plan", lambda *given, **more: dataclasses.replace(honest(*given, **more), interrupted=True)
+    )
+    outcome = run("bottleneck", write(task))
+    assert outcome.code == 0
+    assert "ended early" in outcome.err
 
 
 def test_failure_while_writing_leaves_the_folder_as_it_was(run, task, write, tmp_path, monkeypatch):

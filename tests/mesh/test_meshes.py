@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.mesh import MeshOptions, coarsest, free_knots, grow, refine_mesh, settle_knots
+from brachis.mesh import MeshOptions, coarsest, free_knots, freeing, grow, refine_mesh, settle_knots
 from brachis.nlp.guess import guesses
-from brachis.refine import RefinementOptions
+from brachis.refine import RefinementOptions, refine
 from brachis.solvers import SolverOptions, SolveStatus, solver_named
 from brachis.task import SplineSettings
 
@@ -114,6 +114,21 @@ def test_what_cannot_be_solved_is_left_as_it_was(solved):
     same, reports = free_knots(problem, report, failing, 0.1, RefinementOptions())
     assert same is problem
     assert reports[-1] is report
+
+
+def test_no_interval_is_so_short_that_points_fall_together(solved):
+    problem, report = solved
+    moved, _ = free_knots(problem, report, solve, 1e-9, RefinementOptions())
+    assert np.diff(moved.breaks).min() == pytest.approx(5e-5, rel=1e-3)
+
+
+def test_free_knots_without_a_motion_within_the_limits_are_given_up(solved, monkeypatch):
+    problem, report = solved
+    monkeypatch.setattr(freeing, "refine", lambda *given: dataclasses.replace(refine(*given), excess=0.5))
+    kept, reports = free_knots(problem, report, solve, 0.1, RefinementOptions())
+    assert kept is problem
+    assert reports[-1] is report
+    assert len(reports) > 2
 
 
 def test_a_free_solve_that_stalls_still_gives_good_knots(solved):

@@ -89,7 +89,7 @@ def test_points_move_with_the_knots():
     np.testing.assert_allclose(free.excess_at(there, tau), free.excess(there), atol=1e-9)
 
 
-def test_frozen_and_resampled():
+def test_frozen():
     problem = problem_of("r2")
     (x,) = reachable_points(problem, 1)
     free, there = moved(problem, x)
@@ -98,9 +98,6 @@ def test_frozen_and_resampled():
     assert_same_motion(fixed.motion(same), free.motion(there))
     np.testing.assert_allclose(fixed.excess(same), free.excess(there), atol=1e-9)
     assert problem.frozen(x) == (problem, x)
-    # Points that are asked for where the lengths are those of x stay there.
-    tau = np.linspace(0.0, 1.0, 12)
-    np.testing.assert_allclose(free.resampled(tau, there).excess(there), fixed.resampled(tau).excess(same), atol=1e-9)
 
 
 def test_lengths_that_do_not_add_up_make_a_longer_motion():

@@ -211,7 +211,7 @@ def _solved_again(problem: Transcription, x: np.ndarray) -> tuple[np.ndarray, bo
     Raises
     ------
     PlanningError
-        No backend found a feasible point.
+        No backend found a feasible point, and x is none.
     """
     answers: list[np.ndarray] = []
     for solver in solver_named("auto"):
@@ -224,6 +224,8 @@ def _solved_again(problem: Transcription, x: np.ndarray) -> tuple[np.ndarray, bo
         if _unbalanced(problem, report.x) <= _OPTIMAL:
             return report.x, True
         answers.append(report.x)
+    if residual(problem, x) <= _FEASIBLE:
+        answers.append(x)
     if not answers:
         raise PlanningError("the answer could not be solved again", hint="Plan with a smaller solver.tolerance.")
     return min(answers, key=_first), False

@@ -10,15 +10,35 @@ promise, since they are feasible for its dual; it tells how much of the promise 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from brachis.nlp import Transcription
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 _NEAR = 0.1
 """Rows farther from their bounds are left out at first; dimensionless."""
 _LARGEST_STEP = 1.0
 """Of any variable: directions that change nothing to first order are not followed without end."""
 _TOUCHED = 1e-9
+
+
+def rows_and_jacobian(problem: Transcription, x: np.ndarray) -> tuple[np.ndarray, sparse.csr_array]:
+    """Evaluate the rows of a problem, (c,), and their Jacobian, (c, v).
+
+    Raises
+    ------
+    UnreachableError
+        A collocation point is out of the branch's reach.
+    """
+    from scipy import sparse  # noqa: PLC0415
+
+    places = (problem.jacobian_rows, problem.jacobian_columns)
+    shape = (len(problem.lower), len(x))
+    return problem.rows(x), sparse.coo_array((problem.jacobian(x), places), shape=shape).tocsr()
 
 
 def linearised_change(problem: Transcription, x: np.ndarray) -> float | None:
@@ -43,9 +63,7 @@ def linearised_change(problem: Transcription, x: np.ndarray) -> float | None:
     """
     from scipy import sparse  # noqa: PLC0415
 
-    rows = problem.rows(x)
-    places = (problem.jacobian_rows, problem.jacobian_columns)
-    jacobian = sparse.coo_array((problem.jacobian(x), places), shape=(len(rows), len(x))).tocsr()
+    rows, jacobian = rows_and_jacobian(problem, x)
     below, above = np.isfinite(problem.lower), np.isfinite(problem.upper)
     slopes = sparse.vstack([-jacobian[np.flatnonzero(below)], jacobian[np.flatnonzero(above)]], format="csr")
     room = np.concatenate([(rows - problem.lower)[below], (problem.upper - rows)[above]])

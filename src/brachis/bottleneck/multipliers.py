@@ -18,11 +18,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.bottleneck.linearised import rows_and_jacobian
 from brachis.nlp import Transcription
 from brachis.refine import Refined
 
-ACTIVE = 1e-5
-"""Rows and variables nearer to a bound than this press on it; dimensionless."""
+ACTIVE = (1e-8, 1e-7, 1e-6, 1e-5)
+"""Distances from a bound within which rows and variables press on it; dimensionless. The least that gives a balance
+counts: solvers differ in how near they come, and what does not press would seem to take back what a relief promises."""
 _GOOD = 1e-5
 """The solver's multipliers with a smaller residual are taken as they are."""
 _DEPENDENT = 1e-9
@@ -47,25 +49,23 @@ class Pushes:
     signs: np.ndarray
 
     @classmethod
-    def at(cls, problem: Transcription, x: np.ndarray) -> Pushes:
-        """Collect what presses on x, (v,).
+    def at(cls, problem: Transcription, x: np.ndarray, near: float) -> Pushes:
+        """Collect what presses on x, (v,): what is nearer to its bound than `near`, dimensionless.
 
         Raises
         ------
         UnreachableError
             A collocation point is out of the branch's reach.
         """
-        from scipy import sparse  # noqa: PLC0415
-
-        values = problem.rows(x)
-        low = np.flatnonzero(values <= problem.lower + ACTIVE)
-        high = np.flatnonzero(values >= problem.upper - ACTIVE)
+        values, jacobian = rows_and_jacobian(problem, x)
+        low = np.flatnonzero(values <= problem.lower + near)
+        high = np.flatnonzero(values >= problem.upper - near)
         rows, signs = np.concatenate([low, high]), np.repeat([1.0, -1.0], [len(low), len(high)])
-        places = (problem.jacobian_rows, problem.jacobian_columns)
-        jacobian = sparse.coo_array((problem.jacobian(x), places), shape=(len(values), len(x))).tocsr()
+        slopes = signs[:, None] * jacobian[rows].toarray()
+        pressing = slopes.any(axis=1)  # what holds at the given start posture holds whatever x
         unit = np.eye(len(x))
-        bounds = unit[x <= problem.x_lower + ACTIVE], -unit[x >= problem.x_upper - ACTIVE]
-        return cls(np.vstack([signs[:, None] * jacobian[rows].toarray(), *bounds]), rows, signs)
+        bounds = unit[x <= problem.x_lower + near], -unit[x >= problem.x_upper - near]
+        return cls(np.vstack([slopes[pressing], *bounds]), rows[pressing], signs[pressing])
 
     @property
     def dependent(self) -> bool:
@@ -164,7 +164,16 @@ def multipliers_of(problem: Transcription, x: np.ndarray, given: np.ndarray | No
     UnreachableError
         A collocation point is out of the branch's reach.
     """
-    pushes, gradient = Pushes.at(problem, x), problem.gradient()
+    tried: list[Multipliers] = []
+    for near in ACTIVE:
+        tried.append(_balancing(Pushes.at(problem, x, near), problem.gradient(), given))
+        if tried[-1].residual <= _GOOD:
+            break
+    return min(tried, key=lambda multipliers: multipliers.residual)
+
+
+def _balancing(pushes: Pushes, gradient: np.ndarray, given: np.ndarray | None) -> Multipliers:
+    """Choose the weights of pushes that balance a gradient, (v,), best."""
     candidates = [] if given is None else [("solver", pushes.weights_of(gradient, given))]
     if not candidates or pushes.leftover(gradient, candidates[0][1]) > _GOOD:
         candidates.append(("least squares", pushes.fitted_weights(gradient)))

@@ -34,7 +34,6 @@ _BESIDE = 1e-6
 """Parabolas are looked at this much of the whole time before every knot, too: their accelerations jump there."""
 _DENSE = 30
 _FIT_DENSITY = 4
-_FEASIBLE = 1e-5
 _AS_GOOD = 1.001
 """A start beyond its limits by less needs no longer time: solvers mend that themselves."""
 _ITERATIONS = 200
@@ -181,8 +180,9 @@ def _planned(problem: Transcription, motion: Motion, tolerance: float, deadline:
             first = solve(problem, x)
         except ImportError:
             continue
-        if first.status.usable or (first.violation <= _FEASIBLE and first.x[0] < motion.t_end):
+        if not first.status.usable and first.feasible and first.x[0] < motion.t_end:
             first = dataclasses.replace(first, status=SolveStatus.ACCEPTABLE)
+        if first.status.usable:
             return refine(problem, first, solve, RefinementOptions(tolerance=tolerance, max_rounds=_ROUNDS))
     return None
 

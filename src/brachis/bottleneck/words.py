@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
 _FRACTION = 0.1
 _NOTHING = 1e-5
-"""Of t_E; what saves less for `_FRACTION` is not worth a line."""
-
+"""Of t_E; what saves less for `_FRACTION`, and a boundary that costs less, is not worth a line."""
 _TAKEN_BACK = 0.02
 _MOMENT = 5e-4
 """Smallest share of the time that is worth a line."""
@@ -54,7 +53,7 @@ def _costs(found: Sensitivities, t_end: float) -> list[str]:
     if len(costly) < len(found.limits):
         lines.append("no other limit costs time" if costly else "no limit of a joint costs time")
     lines.append(f"(to first order, from multipliers by the {found.source}, residual {found.residual:.0e})")
-    return lines + [_boundary(entry) for entry in found.boundaries]
+    return lines + [_boundary(e) for e in found.boundaries if e.derivative * e.margin > _NOTHING * t_end]
 
 
 def _saving(entry: Sensitivity, t_end: float) -> str:

@@ -27,12 +27,15 @@ def bottleneck_command(
         listener("looking for what holds the motion back")
         found = bottleneck.report(result, check=check, reference=reference)
     data = {**result.to_dict(), "bottleneck": found.to_dict()}
+    files = [] if out is None else _write(result, data, out)
     if out is not None:
-        data["files"] = _write(result, data, out)
+        data["files"] = files
     if as_json:
         print_json(data)
     else:
-        _show(result, found, data)
+        _show(result, found, files)
+    if result.interrupted:
+        print_error("the search was ended early; this is the best motion verified so far")
     if not result.verified:
         print_error("the motion found did not pass the verification; what is said of it may not hold")
     return 0 if result.verified else 1
@@ -50,11 +53,11 @@ def _write(result: Result, data: dict[str, object], out: Path) -> list[str]:
     return write_files(out, files, stale=_FILES[not result.verified])
 
 
-def _show(result: Result, found: bottleneck.BottleneckReport, data: dict[str, object]) -> None:
+def _show(result: Result, found: bottleneck.BottleneckReport, files: list[str]) -> None:
     """Print the report for a person."""
     console = result_console()
     redundant = ", ".join(result.trajectory.redundant_joints) or "none"
     console.print(f"end time t_E: {result.t_end:.4f} s, redundant joints: {redundant}")
     console.print(str(found))
-    for name in data.get("files", []):  # type: ignore[attr-defined]
+    for name in files:
         console.print(f"wrote {name}")

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from brachis.mesh.judgement import Answer, accepted, ending_with, gain
+from brachis.mesh.judgement import SHORTEST, Answer, accepted, end_time, ending_with, gain
 from brachis.nlp import Transcription
 from brachis.refine import RefinementOptions, Solve, refine
 from brachis.solvers import SolverReport
@@ -39,7 +39,7 @@ def free_knots(
     solve : callable
         ``solve(problem, x)`` returns a `SolverReport`.
     shortest : float
-        Least length of an interval, in mean intervals.
+        Least length of an interval, in mean intervals; 5e-5 t_E at least is taken.
     refinement : RefinementOptions
     time_limit : float, optional
         Time after which the knots are not freed again, s.
@@ -47,11 +47,13 @@ def free_knots(
     Returns
     -------
     problem : Transcription
-        With its knots fixed where they are best; the given one if freeing them led nowhere.
+        With its knots fixed where they are best; the given one if freeing them led to no motion within the limits.
     reports : tuple of SolverReport
         Of all solves, `first` included; the last one belongs to `problem`.
     """
+    given = problem
     reports, best, x = [first], None, first.x
+    shortest = max(shortest, SHORTEST * (len(problem.breaks) - 1))
     deadline = time.perf_counter() + time_limit
     for _ in range(_ROUNDS):
         free = problem.with_free_knots(shortest)
@@ -70,6 +72,6 @@ def free_knots(
         if not gained > _WORTH_IT or time.perf_counter() > deadline:
             break
         problem, x = refined.problem, refined.x
-    if best is None:
-        return problem, ending_with(first, reports)
+    if best is None or not np.isfinite(end_time(best, refinement)):
+        return given, ending_with(first, reports)
     return best.problem, ending_with(best.reports[-1], reports)

@@ -14,7 +14,7 @@ import numpy as np
 
 from brachis.bspline import clamped_knots, spread
 from brachis.errors import UnreachableError
-from brachis.mesh.judgement import Answer, accepted, end_time, ending_with, gain
+from brachis.mesh.judgement import SHORTEST, Answer, accepted, end_time, ending_with, gain
 from brachis.nlp import Transcription
 from brachis.refine import Refined, RefinementOptions, Solve, merged, refine
 from brachis.solvers import SolverReport
@@ -24,9 +24,8 @@ COARSE_INTERVALS = 10
 _SHARE = 0.6
 """A round halves the intervals that lose most, and that lose this part of the time lost altogether."""
 _SAMPLES = 8
-_SHORTEST = 0.5, 5e-5
-"""No interval gets shorter than this part of the tolerance, for it cannot lose more than its own length; nor, as a
-part of t_E, than this: collocation points would fall together."""
+_SHORTEST = 0.5
+"""No interval gets shorter than this part of the tolerance, for it cannot lose more than its own length."""
 _MOST_INTERVALS = 300
 _MOST_ROUNDS = 20
 _GROWTH = 3.0
@@ -128,7 +127,7 @@ def _halved(
 ) -> tuple[Transcription, np.ndarray]:
     """Halve intervals of a problem: the finer problem, and the same motion as its point."""
     breaks = problem.breaks
-    shortest = max(_SHORTEST[0] * options.tolerance, _SHORTEST[1])
+    shortest = max(_SHORTEST * options.tolerance, SHORTEST)
     intervals = intervals[np.diff(breaks)[intervals] >= 2.0 * shortest]
     finer = np.union1d(breaks, 0.5 * (breaks[intervals] + breaks[intervals + 1]))
     knots = clamped_knots(problem.degree, finer)

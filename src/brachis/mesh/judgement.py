@@ -10,7 +10,8 @@ from brachis.nlp import Transcription
 from brachis.refine import Refined, RefinementOptions
 from brachis.solvers import SolverReport, SolveStatus
 
-_FEASIBLE = 1e-5
+SHORTEST = 5e-5
+"""No interval gets shorter than this part of t_E: collocation points would fall together."""
 
 Answer = tuple[Transcription, tuple[SolverReport, ...]]
 """A problem and the reports of all solves, of which the last one belongs to it."""
@@ -18,7 +19,7 @@ Answer = tuple[Transcription, tuple[SolverReport, ...]]
 
 def accepted(report: SolverReport, before: SolverReport) -> SolverReport:
     """Accept a solve that ended early with a feasible motion faster than the one that it began with."""
-    better = report.violation <= _FEASIBLE and report.objective < before.objective
+    better = report.feasible and report.objective < before.objective
     early = report.status in (SolveStatus.ITERATION_LIMIT, SolveStatus.TIME_LIMIT, SolveStatus.STALLED)
     return replace(report, status=SolveStatus.ACCEPTABLE) if better and early else report
 

@@ -1,4 +1,4 @@
-"""From a constraint's partials with respect to the joints to its derivatives with respect to the curves."""
+"""From a constraint's partials with respect to the joints to its derivatives with respect to curves and end time."""
 
 from __future__ import annotations
 
@@ -23,3 +23,14 @@ def chain(partials: Partials, state: JointState, exact: JointDerivatives) -> tup
         by_ydot = by_ydot + partials.qddot @ exact.qddot_ydot
         by_yddot = by_yddot + partials.qddot @ state.gradient
     return by_y, by_ydot, by_yddot
+
+
+def by_time(by: tuple[np.ndarray, np.ndarray, np.ndarray], state: JointState) -> np.ndarray:
+    """Add up what `chain` found to -t_E d/dt_E of the constraint, (K, c): a longer time slows the curves down."""
+    of_rates = np.einsum("kcj,kj->kc", by[1], state.ydot)
+    return np.asarray(of_rates + 2.0 * np.einsum("kcj,kj->kc", by[2], state.yddot))
+
+
+def timed(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Value and two derivatives per second, from those per unit of normalised time."""
+    return orders[0], orders[1] / t_end, orders[2] / t_end**2

@@ -63,10 +63,6 @@ class Grid(Protocol):
         """Differentiate value and two derivatives of splines (c, N + d) by h, on the pattern, (3, z, c)."""
         ...
 
-    def resampled(self, tau: np.ndarray, h: np.ndarray) -> Grid:
-        """Return the grid with other collocation points, which are at `tau` where the lengths are `h`."""
-        ...
-
     def frozen(self, h: np.ndarray) -> Grid:
         """Return the grid with its knots fixed where they are at `h`."""
         ...
@@ -102,10 +98,6 @@ class FixedGrid:
         """See `Grid`."""
         return np.empty((ORDERS, 0, len(control_points)))
 
-    def resampled(self, tau: np.ndarray, _h: np.ndarray) -> FixedGrid:
-        """See `Grid`."""
-        return FixedGrid(self.knots, self.degree, tau)
-
     def frozen(self, _h: np.ndarray) -> FixedGrid:
         """See `Grid`."""
         return self
@@ -125,7 +117,7 @@ class FreeGrid:
     total = np.ones(1)
 
     def __init__(self, knots: np.ndarray, degree: int, tau: np.ndarray, shortest: float) -> None:
-        self.knots, self.degree, self.tau, self._shortest = knots, degree, tau, shortest
+        self.knots, self.degree, self.tau = knots, degree, tau
         breaks = knots[degree : len(knots) - degree]
         count = len(breaks) - 1
         self.lower, self.upper = np.full(count, shortest), np.ones(count)
@@ -168,10 +160,6 @@ class FreeGrid:
         derivatives = window_derivatives(self._lengths_around(h), self._fraction)
         slopes = np.einsum("oikw,ckw->okic", derivatives, control_points[:, self._columns])
         return np.asarray(slopes[:, self._inside])
-
-    def resampled(self, tau: np.ndarray, h: np.ndarray) -> FreeGrid:
-        """See `Grid`."""
-        return FreeGrid(self.knots_at(h), self.degree, tau, self._shortest)
 
     def frozen(self, h: np.ndarray) -> FixedGrid:
         """See `Grid`."""

@@ -4,15 +4,7 @@
     over        x = (t_E, s, q_r1, ..., q_rr [, h])
     subject to  lower <= rows(x) <= upper,   x_lower <= x <= x_upper
 
-Variables: the end time t_E in seconds, then the free control points (see `curves`) of s(t), then those of each
-redundant joint in chain order. s(0) = 0, s(t_E) = 1, the start posture and rest at both ends are built into the control
-points and have no rows. Where the knots are free, the interval lengths h in normalised time come last (see `grid`).
-
-Rows: for each constraint of `constraints.TABLE` that applies, in the table's order, its c values at collocation point
-0, then at point 1, and so on; then the differences of successive control points of s, which are >= 0 so that
-ds/dt >= 0 holds at all times; where the knots are free, last the sum of h, which is 1. All rows are dimensionless.
-
-Derivatives: with y = (s, q_r) and basis matrices B, B', B'' in normalised time,
+See `layout` for the variables and rows. With y = (s, q_r) and basis matrices B, B', B'' in normalised time,
 
     dy/dc = B,  dydot/dc = B' / t_E,  dyddot/dc = B'' / t_E^2,  dydot/dt_E = -ydot / t_E,  dyddot/dt_E = -2 yddot / t_E
     dy/dh = dB/dh c,  dydot/dh = dB'/dh c / t_E,  dyddot/dh = dB''/dh c / t_E^2
@@ -24,21 +16,19 @@ d/dydot = p_v G + p_a dqddot/dydot and d/dyddot = p_a G, with G and the rest fro
 from __future__ import annotations
 
 import copy
-import itertools
 
 import numpy as np
 
 from brachis.kinematics import Decomposition, JointState
 from brachis.nlp import constraints
-from brachis.nlp.chain import chain
+from brachis.nlp.chain import by_time, chain, timed
 from brachis.nlp.constraints import Constraint
 from brachis.nlp.constraints.branch_margin import MARGIN
-from brachis.nlp.curves import Places, TiedSpline, Windows
+from brachis.nlp.curves import TiedSpline, Windows
 from brachis.nlp.grid import FixedGrid, FreeGrid, Grid
+from brachis.nlp.layout import Layout
 from brachis.nlp.motion import Motion
 from brachis.robot import Limits
-
-_SHORTEST_TIME = 1e-4
 
 
 class Transcription:
@@ -86,7 +76,7 @@ class Transcription:
         start_free: bool = False,
     ) -> None:
         self.decomposition = decomposition
-        self.constraints = self._build_constraints(MARGIN)
+        self.constraints = _constraints(decomposition, MARGIN)
         self._derivatives_at_rest = derivatives_at_rest
         self.end, self.start_free = end, start_free
         self._lay_out(FixedGrid(knots, degree, tau))
@@ -95,32 +85,29 @@ class Transcription:
         """Set the grid and all that depends on it."""
         self.grid = grid
         self.splines = self._make_splines()
-        windows = grid.windows(grid.lengths_of(grid.knots))
-        self._places = [Places.of(windows.columns, spline) for spline in self.splines]
+        layout = Layout.of(grid, self.splines, self.constraints)
+        self.slices, self._lengths, self._places = layout.slices, layout.lengths, layout.places
+        self.x_lower, self.x_upper = layout.x_lower, layout.x_upper
+        self.lower, self.upper = layout.lower, layout.upper
+        self.jacobian_rows, self.jacobian_columns = layout.jacobian_rows, layout.jacobian_columns
         self._entries: tuple[Windows, list[np.ndarray]] | None = None
         self._last: tuple[bytes, JointState] | None = None
         self.evaluations = {"states": 0, "jacobians": 0}
-        self._lay_out_variables()
-        self._lay_out_rows()
 
     def _over(self, grid: Grid) -> Transcription:
         other = copy.copy(self)
         other._lay_out(grid)  # noqa: SLF001  (its own class)
         return other
 
-    def resampled(self, tau: np.ndarray, x: np.ndarray | None = None) -> Transcription:
-        """Return the same problem with other collocation points; x keeps its meaning.
+    def resampled(self, tau: np.ndarray) -> Transcription:
+        """Return the same problem over its present knots, fixed, with other collocation points; x keeps its meaning.
 
         Parameters
         ----------
         tau : (K,) ndarray
             In normalised time, ascending, from 0 to 1.
-        x : (v,) ndarray, optional
-            Where `tau` is meant, if knots are free: the points keep the places that they have there. By default at the
-            present `knots`.
         """
-        h = self.grid.lengths_of(self.knots) if x is None else x[self._lengths]
-        return self._over(self.grid.resampled(tau, h))
+        return self.with_knots(self.knots, tau)
 
     def with_knots(self, knots: np.ndarray, tau: np.ndarray) -> Transcription:
         """Return the same problem over other fixed knots, with collocation points `tau`.
@@ -175,62 +162,20 @@ class Transcription:
             for first, last in pairs
         )
 
-    def _lay_out_variables(self) -> None:
-        """Slices of x and bounds on it."""
-        ends = np.cumsum([1, *(spline.free for spline in self.splines)])
-        self.slices = tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
-        self._lengths = slice(int(ends[-1]), None)
-        self.x_lower = np.concatenate([np.full(ends[-1], -np.inf), self.grid.lower])
-        self.x_upper = np.concatenate([np.full(ends[-1], np.inf), self.grid.upper])
-        self.x_lower[0] = _SHORTEST_TIME
-        self.x_lower[self.slices[0]], self.x_upper[self.slices[0]] = 0.0, 1.0
-
-    def _lay_out_rows(self) -> None:
-        """Bounds of the rows and the Jacobian's sparsity pattern."""
-        count = len(self.tau)
-        lower, upper, rows, columns = [], [], [], []
-        patterns = [(p.point, p.variable + part.start) for p, part in zip(self._places, self.slices, strict=True)]
-        patterns.append((self.grid.point, self.grid.variable + self._lengths.start))
-        first = 0
-        for constraint in self.constraints:
-            size = len(constraint.lower)
-            lower.append(np.tile(constraint.lower, count))
-            upper.append(np.tile(constraint.upper, count))
-            places = first + np.arange(count * size).reshape(count, size)
-            rows.append(places.ravel())
-            columns.append(np.zeros(count * size, dtype=int))
-            for point, variable in patterns:
-                rows.append(places[point].ravel())
-                columns.append(np.repeat(variable, size))
-            first += count * size
-        steps = self.splines[0].free - 1
-        rows += [first + np.arange(steps), first + np.arange(steps)]
-        columns += [self.slices[0].start + np.arange(steps), self.slices[0].start + 1 + np.arange(steps)]
-        rows.append(np.full(len(self.grid.lower), first + steps))
-        columns.append(self._lengths.start + np.arange(len(self.grid.lower)))
-        lower += [np.zeros(steps), self.grid.total]
-        upper += [np.full(steps, np.inf), self.grid.total]
-        self.lower, self.upper = np.concatenate(lower), np.concatenate(upper)
-        self.jacobian_rows, self.jacobian_columns = np.concatenate(rows), np.concatenate(columns)
-
     def with_margin(self, margin: float) -> Transcription:
         """Return the same problem with another least branch margin; x keeps its meaning."""
-        other = copy.copy(self)
-        other.constraints = self._build_constraints(margin)
-        other._lay_out(self.grid)  # noqa: SLF001  (its own class)
-        return other
+        return self._guarded(self.decomposition, margin)
 
     def with_limits(self, limits: Limits) -> Transcription:
         """Return the same problem for a robot with other limits; x and the branch margins keep their meaning."""
+        return self._guarded(self.decomposition.with_limits(limits), max(self.guards, default=MARGIN))
+
+    def _guarded(self, decomposition: Decomposition, margin: float) -> Transcription:
         other = copy.copy(self)
-        other.decomposition = self.decomposition.with_limits(limits)
-        other.constraints = other._build_constraints(max(self.guards, default=MARGIN))  # noqa: SLF001  (its own class)
+        other.decomposition = decomposition
+        other.constraints = _constraints(decomposition, margin)
         other._lay_out(self.grid)  # noqa: SLF001  (its own class)
         return other
-
-    def _build_constraints(self, margin: float) -> tuple[Constraint, ...]:
-        built = (build(self.decomposition, margin) for build in constraints.TABLE.values())
-        return tuple(c for c in built if c is not None)
 
     @property
     def guards(self) -> tuple[float, ...]:
@@ -346,22 +291,16 @@ class Transcription:
         state = self.state(x)
         self.evaluations["jacobians"] += 1
         exact = self.decomposition.derivatives(state)
-        bases = [_timed(basis, x[0]) for basis in self._bases(x)]
-        slopes = np.hstack(_timed(self.grid.slopes(x[self._lengths], self._control_points(x)), x[0]))
+        bases = [timed(basis, x[0]) for basis in self._bases(x)]
+        slopes = np.hstack(timed(self.grid.slopes(x[self._lengths], self._control_points(x)), x[0]))
         entries: list[np.ndarray] = []
         for constraint in self.constraints:
-            by_y, by_ydot, by_yddot = chain(constraint.partials(state), state, exact)
-            by_time = np.einsum("kcj,kj->kc", by_ydot, state.ydot) + 2.0 * np.einsum(
-                "kcj,kj->kc", by_yddot, state.yddot
-            )
-            entries.append(by_time.ravel() / -x[0])
+            by = chain(constraint.partials(state), state, exact)
+            entries.append(by_time(by, state).ravel() / -x[0])
             for j, (places, basis) in enumerate(zip(self._places, bases, strict=True)):
-                entry = by_y[places.point, :, j] * basis[0][:, None]
-                entry += by_ydot[places.point, :, j] * basis[1][:, None]
-                entry += by_yddot[places.point, :, j] * basis[2][:, None]
-                entries.append(entry.ravel())
-            by = np.concatenate([by_y, by_ydot, by_yddot], axis=2)
-            entries.append((by[self.grid.point] @ slopes[:, :, None]).ravel())
+                parts = (part[places.point, :, j] * values[:, None] for part, values in zip(by, basis, strict=True))
+                entries.append(sum(parts, start=np.zeros(())).ravel())
+            entries.append((np.concatenate(by, axis=2)[self.grid.point] @ slopes[:, :, None]).ravel())
         steps = self.splines[0].free - 1
         ones = np.ones(len(self.grid.lower))
         return np.concatenate([*entries, np.full(steps, -1.0), np.ones(steps), ones])
@@ -374,6 +313,7 @@ class Transcription:
         return self._entries[1]
 
 
-def _timed(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Value and two derivatives per second, from those per unit of normalised time."""
-    return orders[0], orders[1] / t_end, orders[2] / t_end**2
+def _constraints(decomposition: Decomposition, margin: float) -> tuple[Constraint, ...]:
+    """Build those of the table that apply, with a least branch margin."""
+    built = (build(decomposition, margin) for build in constraints.TABLE.values())
+    return tuple(c for c in built if c is not None)

@@ -1,4 +1,4 @@
-"""IPOPT through the ipyopt wheel: an interior-point method, for many intervals and as a second opinion.
+"""IPOPT through the ipyopt wheel: an interior-point method, the second opinion where Uno fails.
 
 The Hessian is IPOPT's limited-memory approximation. https://coin-or.github.io/Ipopt
 """

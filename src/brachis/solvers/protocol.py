@@ -9,6 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
+_FEASIBLE = 1e-5
+"""Violation of rows and bounds, dimensionless, that refinement mends."""
+
 
 class SolveStatus(enum.Enum):
     """How a solve ended; the value is the advice to the user."""
@@ -106,6 +109,11 @@ class SolverReport:
     iterations: int
     wall_time: float
     message: str
+
+    @property
+    def feasible(self) -> bool:
+        """True where the answer is a motion within the limits at the collocation points, however the solve ended."""
+        return self.violation <= _FEASIBLE
 
 
 Progress = Callable[[int, float], None]

@@ -91,7 +91,9 @@ class SplineSettings(Model):
         default="uniform", description="Equal intervals, or their lengths as variables of the optimisation."
     )
     shortest_interval: Positive = Field(
-        default=0.1, lt=1.0, description="With knots: free, the least length of an interval, in mean intervals."
+        default=0.1,
+        lt=1.0,
+        description="With knots: free, the least length of an interval, in mean intervals; never less than 5e-5 t_E.",
     )
     rest: Literal["full", "velocity"] = Field(
         default="full", description="What vanishes at both ends: velocity and acceleration (full), or velocity alone."

@@ -1,0 +1,104 @@
+"""Where variables, rows and entries of the Jacobian stand in the nonlinear program.
+
+Variables: the end time t_E in seconds, then the free control points (see `curves`) of s(t), then those of each
+redundant joint in chain order. s(0) = 0, s(t_E) = 1, the start posture and rest at both ends are built into the control
+points and have no rows. Where the knots are free, the interval lengths h in normalised time come last (see `grid`).
+
+Rows: for each constraint of `constraints.TABLE` that applies, in the table's order, its c values at collocation point
+0, then at point 1, and so on; then the differences of successive control points of s, which are >= 0 so that
+ds/dt >= 0 holds at all times; where the knots are free, last the sum of h, which is 1. All rows are dimensionless.
+
+Entries of the Jacobian: for each constraint those by t_E, by the variables of each curve and by h, all points of a
+place together; then -1 and 1 for each difference; last 1 for each of h.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.nlp.constraints import Constraint
+from brachis.nlp.curves import Places, TiedSpline
+from brachis.nlp.grid import Grid
+
+_SHORTEST_TIME = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Variables, rows and the Jacobian's pattern; see the module.
+
+    Attributes
+    ----------
+    slices : tuple of slice
+        Variables of s, then of each redundant joint.
+    lengths : slice
+        Variables h; none where the knots are fixed.
+    places : tuple of Places
+        Where the variables of each curve matter.
+    x_lower, x_upper : (v,) ndarray
+    lower, upper : (c,) ndarray
+        Bounds of the rows.
+    jacobian_rows, jacobian_columns : (nnz,) int ndarray
+        Sparsity pattern; each place occurs once.
+    """
+
+    slices: tuple[slice, ...]
+    lengths: slice
+    places: tuple[Places, ...]
+    x_lower: np.ndarray
+    x_upper: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    jacobian_rows: np.ndarray
+    jacobian_columns: np.ndarray
+
+    @classmethod
+    def of(cls, grid: Grid, splines: Sequence[TiedSpline], constraints: Sequence[Constraint]) -> Layout:
+        """Lay out the program of s and the redundant joints, `splines`, over a grid."""
+        ends = np.cumsum([1, *(spline.free for spline in splines)])
+        slices = tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
+        x_lower = np.concatenate([np.full(ends[-1], -np.inf), grid.lower])
+        x_upper = np.concatenate([np.full(ends[-1], np.inf), grid.upper])
+        x_lower[0] = _SHORTEST_TIME
+        x_lower[slices[0]], x_upper[slices[0]] = 0.0, 1.0
+        lengths = slice(int(ends[-1]), len(x_lower))
+        windows = grid.windows(grid.lengths_of(grid.knots))
+        places = tuple(Places.of(windows.columns, spline) for spline in splines)
+        steps = splines[0].free - 1
+        pattern = _pattern(grid, constraints, slices, lengths, places)
+        return cls(slices, lengths, places, x_lower, x_upper, *_bounds(grid, constraints, steps), *pattern)
+
+
+def _bounds(grid: Grid, constraints: Sequence[Constraint], steps: int) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of the rows, (c,) each, with `steps` differences of control points of s."""
+    count = len(grid.tau)
+    lower = [*(np.tile(each.lower, count) for each in constraints), np.zeros(steps), grid.total]
+    upper = [*(np.tile(each.upper, count) for each in constraints), np.full(steps, np.inf), grid.total]
+    return np.concatenate(lower), np.concatenate(upper)
+
+
+def _pattern(
+    grid: Grid, constraints: Sequence[Constraint], slices: Sequence[slice], lengths: slice, places: Sequence[Places]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of the Jacobian's entries, (nnz,) each."""
+    count = len(grid.tau)
+    patterns = [(np.arange(count), np.zeros(count, dtype=int))]
+    patterns += [(place.point, place.variable + part.start) for place, part in zip(places, slices, strict=True)]
+    patterns.append((grid.point, grid.variable + lengths.start))
+    rows, columns = [], []
+    first = 0
+    for constraint in constraints:
+        size = len(constraint.lower)
+        numbers = first + np.arange(count * size).reshape(count, size)
+        rows += [numbers[point].ravel() for point, _ in patterns]
+        columns += [np.repeat(variable, size) for _, variable in patterns]
+        first += count * size
+    step = np.arange(slices[0].stop - slices[0].start - 1)
+    of_h = np.arange(lengths.start, lengths.stop)
+    rows += [first + step, first + step, np.full(len(of_h), first + len(step))]
+    columns += [slices[0].start + step, slices[0].start + 1 + step, of_h]
+    return np.concatenate(rows), np.concatenate(columns)
