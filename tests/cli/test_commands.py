@@ -150,7 +150,7 @@ def test_lengthened_end_time_is_said(run, task, write, monkeypatch):
 def test_candidates_are_listed(run, task, write):
     outcome = run("plan", write({**task, "redundant_joints": "auto"}))
     data = json.loads(run("plan", write({**task, "redundant_joints": "auto"}), "--json").out)
-    assert f"candidates ({len(data['candidates'])})" in outcome.out
+    assert f"candidates ({len(data['candidates'])}" in outcome.out
     assert {tuple(candidate["redundant_joints"]) for candidate in data["candidates"]} == {("j1",), ("j2",), ("j3",)}
     first = data["candidates"][0]
     assert first["verified"]

@@ -67,7 +67,7 @@ def progress() -> Iterator[Callable[[str], None]]:
 def verification_table(verification: Verification) -> Table:
     """Lay out the checks, one a row."""
     title = "verification: passed" if verification.passed else "verification: FAILED"
-    table = Table(title=f"{title} ({verification.points} times checked)", title_justify="left")
+    table = Table(title=f"{title} (checked at {verification.points} instants)", title_justify="left")
     for column in ("check", "worst", "allowed", "unit", "joint", "time [s]", ""):
         table.add_column(column, justify="right" if column in ("worst", "allowed", "time [s]") else "left")
     for check in verification.checks:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 from rich.table import Table
 
@@ -11,6 +12,7 @@ from brachis import planner
 from brachis.cli.folder import Writer, make_folder, write_files, write_text
 from brachis.cli.output import json_text, print_error, print_json, progress, result_console, verification_table
 from brachis.result import Result
+from brachis.search.portfolio import SAME_MOTION
 
 _FILES = {
     True: ("result.npz", "result.json", "overview.png", "candidates.png"),
@@ -35,7 +37,7 @@ def plan_command(task: Path, *, urdf: Path | None, out: Path | None, as_json: bo
     else:
         _show(result, data)
     if result.interrupted:
-        print_error("the search was ended early; this is the best motion verified so far")
+        print_error("the search was ended early; this is the best motion so far")
     if not result.verified:
         print_error("the motion found did not pass the verification; it is marked unverified")
     return 0 if result.verified else 1
@@ -58,7 +60,7 @@ def _write(result: Result, data: dict[str, object], out: Path) -> list[str]:
     return write_files(out, files, stale=_FILES[not result.verified])
 
 
-def _show(result: Result, data: dict[str, object]) -> None:
+def _show(result: Result, data: dict[str, Any]) -> None:
     """Print the plan for a person."""
     console = result_console()
     attempt = result.attempt
@@ -67,6 +69,8 @@ def _show(result: Result, data: dict[str, object]) -> None:
         "end time t_E": f"{result.t_end:.4f} s",
         "redundant joints": ", ".join(result.trajectory.redundant_joints) or "none",
         "branch": f"{result.trajectory.branch} ({result.family})",
+        "start posture": _posture(data, "start_posture"),
+        "end posture": _posture(data, "end_posture"),
         "solver": f"{result.report.solver}, {result.report.status.value}",
         "iterations": f"{sum(r.iterations for r in attempt.reports)} in {len(attempt.reports)} solves (refined to "
         f"{attempt.collocation_points} collocation points)",
@@ -84,21 +88,30 @@ def _show(result: Result, data: dict[str, object]) -> None:
     if len(result.candidates) > 1:
         console.print(_candidates_table(result))
     console.print(verification_table(result.verification))
-    for name in data.get("files", []):  # type: ignore[attr-defined]
+    for name in data.get("files", []):
         console.print(f"wrote {name}")
 
 
+def _posture(data: dict[str, Any], key: str) -> str:
+    """Write a posture with names and units."""
+    values = zip(data["joint_names"], data[key], data["position_units"], strict=True)
+    return ", ".join(f"{name} {value:.4f} {unit}" for name, value, unit in values)
+
+
 def _candidates_table(result: Result) -> Table:
-    """Lay out what the search looked at, one candidate a row, the fastest first."""
-    hidden = len(result.candidates) - _MANY
-    title = f"candidates ({len(result.candidates)}" + (
-        f", {hidden} of them in result.json only)" if hidden > 0 else ")"
-    )
+    """Lay out what the search looked at, one candidate a row, the fastest first; the same motion is shown once.
+
+    Columns are named as in the JSON.
+    """
+    shown = [candidate for candidate in result.candidates if candidate.status != SAME_MOTION]
+    others = len(result.candidates) - len(shown[:_MANY])
+    title = f"candidates ({len(result.candidates)}" + (f", {others} of them in the JSON only)" if others else ")")
     table = Table(title=title, title_justify="left")
-    for column in ("redundant joints", "branch", "guess", "estimate [s]", "planned [s]", "refined [s]", "status"):
-        table.add_column(column, justify="right" if column.endswith("[s]") else "left")
-    for candidate in result.candidates[:_MANY]:
-        times = (candidate.estimate, candidate.coarse, candidate.t_end)
+    for column in ("joints", "branch", "origin", "coarse [s]", "t_end [s]", "status"):
+        numeric = column.endswith("[s]")
+        table.add_column(column, justify="right" if numeric else "left", overflow="fold", no_wrap=numeric)
+    for candidate in shown[:_MANY]:
+        times = (candidate.coarse, candidate.t_end)
         table.add_row(
             ", ".join(candidate.redundant_joints) or "none",
             candidate.branch,

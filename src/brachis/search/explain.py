@@ -72,11 +72,14 @@ def no_motion(
         return reason
     if dead_ends and not course:
         name, furthest = max(dead_ends.items(), key=lambda item: item[1].s)
-        redundant = f" (redundant joints: {name})" if name != "none" else ""
+        others = (
+            f" (redundant joints {name}; {len(dead_ends) - 1} other choices end sooner)" if len(dead_ends) > 1 else ""
+        )
+        start = "" if choices[0].setting.start is None else "start in another posture, "
         return PathError(
-            f"no course along the path was found{redundant}: {furthest}",
+            f"no course along the path was found: {furthest}{others}",
             s_interval=(furthest.s, 1.0),
-            hint="Start in another posture, shorten or move the path, or widen the joint ranges",
+            hint=f"{start}shorten or move the path, or widen the joint ranges".capitalize(),
         )
     counts = Counter(candidate.status for candidate in candidates)
     outcomes = "; ".join(status if n == 1 else f"{status} ({n} times)" for status, n in counts.items())

@@ -29,6 +29,8 @@ from brachis.search.ways import Wave, waves
 from brachis.search.work import NOT_TRIED, Coarse, each, finish, plan_coarse, processes
 from brachis.setting import Choice
 
+SAME_MOTION = "same motion as another"
+"""Status of a plan that agrees with one that ranks before it."""
 _WORTH_IT = 2e-4
 """A plan is finished if it may be faster than the best one by more than this fraction."""
 _SAME_TIME = 1e-4
@@ -159,7 +161,7 @@ class _Search:
         ranked: list[tuple[int, Coarse]] = []
         for number, plan in sorted(usable, key=lambda item: (_rounded(item[1].t_end), item[0])):
             if any(_agree(plan, other) for _, other in ranked):
-                self._note(number, status="same motion as another")
+                self._note(number, status=SAME_MOTION)
             else:
                 ranked.append((number, plan))
         return ranked

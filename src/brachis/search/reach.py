@@ -36,7 +36,7 @@ def explain_failure(decomposition: Decomposition, *, any_branch: bool = False) -
     found = _answers_along(decomposition, s)
     slots = list(range(found.q.shape[2])) if any_branch else decomposition.slots
     own = _Answers(found.q[:, :, slots], found.exists[:, :, slots], found.inside[:, :, slots])
-    if not found.within[0].any():
+    if not any_branch and not found.within[0].any():
         # The start posture itself was not hit: the ranges are too narrow for a random search to tell.
         return "Why not could not be told; widen narrow joint ranges, or raise solver.max_iterations and time_limit"
     label = decomposition.solver.branches[decomposition.branch]
@@ -54,12 +54,12 @@ def explain_failure(decomposition: Decomposition, *, any_branch: bool = False) -
         (
             own.within.any(axis=(1, 2)),
             f"the branch {label!r} of the start posture does not reach beyond s = {{first:.3g}}",
-            "Start in a posture of another branch, or choose other redundant joints",
+            "Start in a posture of another branch, or leave redundant_joints: auto",
         ),
         (
             _held(decomposition, own),
             "the torque limits cannot hold the arm against gravity from s = {first:.3g} on",
-            "Raise robot.limits.torque, or choose other redundant joints",
+            "Raise robot.limits.torque, or lead the path where the arm reaches less far",
         ),
     )
     for possible, problem, hint in reasons:

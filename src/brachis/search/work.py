@@ -27,7 +27,7 @@ from brachis.search.motion import judge
 from brachis.search.seeds import Seed
 from brachis.search.solving import MARGINS, Listener, continued, solve_with
 from brachis.setting import intervals_of, transcription
-from brachis.solvers import SolverReport, solver_named
+from brachis.solvers import SolverReport, SolveStatus, solver_named
 
 NOT_TRIED = "not tried: the time was up"
 _MANY_VARIABLES = 150
@@ -131,7 +131,7 @@ def plan_coarse(way: Way, deadline: float, share: float, listener: Listener) -> 
         problem, reports = continued(problem, x, _solve(way, deadline, listener), MARGINS)
     except ImportError as error:
         return Coarse(way, None, (), f"{way.solver}: not installed ({error})")
-    return Coarse(way, problem, reports, reports[-1].status.name.lower().replace("_", " "), target)
+    return Coarse(way, problem, reports, _in_words(reports[-1].status), target)
 
 
 def finish(numbered: tuple[int, Coarse], deadline: float, listener: Listener) -> tuple[Attempt, Motion | None]:
@@ -166,6 +166,13 @@ def finish(numbered: tuple[int, Coarse], deadline: float, listener: Listener) ->
         problem, reports[-1], solve, options, lambda answer: judge(decomposition, answer, task)
     )
     return attempt_of(refined, reports[:-1], number, settings.tolerance, motion), motion
+
+
+def _in_words(status: SolveStatus) -> str:
+    name = status.name.lower().replace("_", " ")
+    if not status.usable:
+        return name
+    return "planned" if status is SolveStatus.OPTIMAL else f"planned, {name}"
 
 
 def _solve(way: Way, deadline: float, listener: Listener) -> Solve:

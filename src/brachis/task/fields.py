@@ -38,7 +38,9 @@ Name = Annotated[str, Strict(), Field(min_length=1)]
 Vector = Annotated[tuple[Number, ...], Field(min_length=1)]
 
 
-def refuse(problem: str, *, key: str = "", found: object = None, allowed: str = "") -> PydanticCustomError:
+def refuse(
+    problem: str, *, key: str = "", found: object = None, allowed: str = "", absent: bool = False
+) -> PydanticCustomError:
     """Return the error that a validator raises to refuse a value.
 
     Parameters
@@ -51,10 +53,12 @@ def refuse(problem: str, *, key: str = "", found: object = None, allowed: str = 
         What was found; the validated value itself where it is None.
     allowed : str, optional
         What would have been accepted.
+    absent : bool, optional
+        Whether the fault is that nothing was given, so that there is nothing to show.
     """
     # Pydantic fills braces of the template from the context; the facts travel in the context, not in the text.
     return PydanticCustomError(
-        REFUSED, "{problem}", {"problem": problem, "key": key, "found": found, "allowed": allowed}
+        REFUSED, "{problem}", {"problem": problem, "key": key, "found": found, "allowed": allowed, "absent": absent}
     )
 
 

@@ -130,7 +130,8 @@ def _unknown(detail: ErrorDetails, model: type[Model]) -> _Complaint:
 def _refused(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
     facts = detail["ctx"]
     found = detail["input"] if facts["found"] is None else facts["found"]
-    return _Complaint(facts["problem"], show(found), facts["allowed"] or None, key=facts["key"])
+    shown = None if facts["absent"] else show(found)
+    return _Complaint(facts["problem"], shown, facts["allowed"] or None, key=facts["key"])
 
 
 def _wrong_form(detail: ErrorDetails, _model: type[Model]) -> _Complaint:

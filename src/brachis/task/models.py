@@ -218,7 +218,9 @@ class Task(Model):
     def _free_start_needs_a_place(self) -> Task:
         if self.start == "free" and self.path_start is None:
             problem = "a free start posture leaves open where the path begins"
-            raise refuse(problem, key="path_start", found="nothing", allowed="the rows of the task space")
+            pose = isinstance(self.task_space, str)
+            rows = (*POSITION_ROWS, "qw", "qx", "qy", "qz") if pose else self.task_space
+            raise refuse(problem, key="path_start", absent=True, allowed=f"[{', '.join(rows)}]")
         if self.start == "free" and self.search.guesses == "numeric":
             problem = "numeric inverse kinematics needs a posture to begin with, and start is free"
             raise refuse(problem, key="search.guesses", found="numeric", allowed="lattice")
