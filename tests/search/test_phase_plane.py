@@ -12,6 +12,7 @@ from brachis.robot import dynamics
 from brachis.search.phase_plane import least_time
 
 GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
+SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
 S = np.linspace(0.0, 1.0, 201)
 
 
@@ -48,10 +49,44 @@ def test_gravity_that_no_torque_holds():
 
 
 def test_mass_matrices_are_what_the_torque_multiplies():
-    robot = brachis.Robot.from_urdf(
-        Path(__file__).parents[2] / "robots/scara3/robot.urdf", friction={"armature": 0.3}, gravity=[0, 0, 0]
-    )
+    robot = brachis.Robot.from_urdf(SCARA, friction={"armature": 0.3}, gravity=[0, 0, 0])
     rng = np.random.default_rng(0)
     q, qddot = rng.normal(size=(2, 5, 3))
     expected = dynamics.torque(robot, q, np.zeros_like(q), qddot)
     np.testing.assert_allclose(np.einsum("kij,kj->ki", dynamics.mass_matrices(robot, q), qddot), expected, atol=1e-12)
+
+
+def test_a_curved_course_against_plain_trial():
+    """Joints that turn against each other: the terms with the square of the speed decide."""
+    robot = brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=brachis.LimitSpec(torque=10.0, velocity=None))
+    q = np.column_stack([0.5 + np.sin(2.0 * S), -1.5 + 0.8 * S**2, 1.0 + np.cos(3.0 * S)])
+    assert least_time(robot, S, q) == pytest.approx(least_time_by_trial(robot, S, q), rel=0.02)
+
+
+def least_time_by_trial(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> float:
+    """Least time by trying every x of a grid: backwards whether one can still brake, then forwards at full throttle."""
+    step = s[1] - s[0]
+    q_ds = np.gradient(q, step, axis=0, edge_order=2)
+    q_dds = np.gradient(q_ds, step, axis=0, edge_order=2)
+    limit = robot.limits.torque
+    zero = np.zeros_like(q)
+    a = dynamics.torque(robot, q, zero, q_ds)
+    b = dynamics.torque(robot, q, q_ds, q_dds)
+
+    def accelerations(k: int, x: float) -> tuple[float, float]:
+        low, high = np.sort([(-limit - b[k] * x) / a[k], (limit - b[k] * x) / a[k]], axis=0)
+        return float(low.max()), float(high.min())
+
+    grid = np.linspace(0.0, 4.0, 4001)
+    reach = 0.0
+    highest = np.zeros(len(s))
+    for k in range(len(s) - 2, -1, -1):
+        bounds = [(x, *accelerations(k, x)) for x in grid]
+        good = [x for x, low, high in bounds if low <= high and x + 2 * step * low <= reach]
+        reach = max(good, default=0.0)
+        highest[k] = reach
+    x = np.zeros(len(s))
+    for k in range(len(s) - 1):
+        x[k + 1] = np.clip(x[k] + 2 * step * accelerations(k, x[k])[1], 0.0, highest[k + 1])
+    speed = np.sqrt(np.maximum(x, 1e-6))
+    return float(np.sum(2 * step / (speed[1:] + speed[:-1])))

@@ -7,6 +7,7 @@ import math
 import os
 import signal
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -165,13 +166,14 @@ def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
 def test_a_real_ctrl_c_ends_worker_processes(robot):
     timer = threading.Timer(8.0, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
+    began = time.perf_counter()
     try:
         result = brachis.plan(robot, task(search={"effort": "exhaustive", "jobs": 2}, spline={"intervals": 40}))
-    except KeyboardInterrupt:
-        return  # nothing was verified yet
     finally:
         timer.cancel()
     assert result.verified
+    assert result.interrupted, "the search ended before it could be interrupted"
+    assert time.perf_counter() - began < 20.0
 
 
 def test_the_time_limit_gives_the_best_motion_so_far(robot):
@@ -184,3 +186,51 @@ def test_the_time_limit_gives_the_best_motion_so_far(robot):
 def test_a_time_limit_that_is_too_short_says_so(robot):
     with pytest.raises(PlanningError, match=r"within the time limit of 0\.001 s\. Raise search\.time_limit"):
         brachis.plan(robot, task(search={"time_limit": 1e-3}))
+
+
+def test_time_that_is_spent_on_lattices_is_said_to_be_up(robot, monkeypatch):
+    from brachis.search import ways  # noqa: PLC0415
+
+    honest = ways.lattice_seeds
+
+    def slow(*arguments: Any) -> Any:
+        time.sleep(0.4)
+        return honest(*arguments)
+
+    monkeypatch.setattr(ways, "lattice_seeds", slow)
+    with pytest.raises(PlanningError, match=r"Raise search\.time_limit"):
+        brachis.plan(robot, task(search={"time_limit": 1.0}))
+
+
+def test_only_one_second_of_grace_for_what_fails(robot, monkeypatch):
+    honest = portfolio.finish
+
+    def never_verified(*arguments: Any) -> Any:
+        attempt, _ = honest(*arguments)
+        time.sleep(0.5)
+        return attempt, None
+
+    monkeypatch.setattr(portfolio, "finish", never_verified)
+    began = time.perf_counter()
+    with pytest.raises(PlanningError, match="within the time limit"):
+        brachis.plan(robot, task(search={"time_limit": 1.5}))
+    assert time.perf_counter() - began < 5.0
+
+
+def test_within_other_workers_no_processes_are_made(robot):
+    joblib = pytest.importorskip("joblib")
+    handler = signal.getsignal(signal.SIGINT)
+    asked = task(search={"jobs": 2}, redundant_joints=["j1"])
+    for backend in ("threading", "loky"):
+        times = joblib.Parallel(n_jobs=2, backend=backend)(joblib.delayed(end_time)(robot, asked) for _ in range(2))
+        assert times[0] == pytest.approx(times[1], rel=1e-9)
+    assert signal.getsignal(signal.SIGINT) is handler
+
+
+def end_time(robot: brachis.Robot, asked: dict[str, Any]) -> float:
+    return brachis.plan(robot, asked).t_end
+
+
+def test_more_processes_than_processors_are_not_made(robot, monkeypatch):
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    assert brachis.plan(robot, task(search={"jobs": 100_000}, redundant_joints=["j1"])).verified

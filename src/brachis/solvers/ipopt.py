@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.errors import UnreachableError
+from brachis.solvers.one_at_a_time import one_at_a_time
 from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
 from brachis.solvers.watch import Watch
 
@@ -26,6 +27,7 @@ _STATUS = {
 _INFINITY = 2e19  # IPOPT takes bounds beyond 1e19 for none
 
 
+@one_at_a_time
 def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
     """See `brachis.solvers.protocol.Solver`."""
     import ipyopt  # noqa: PLC0415  (a solver is imported when it is used)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from brachis.solvers.one_at_a_time import one_at_a_time
 from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
 from brachis.solvers.watch import Watch
 
@@ -35,6 +36,7 @@ _STOPPED = {
 }
 
 
+@one_at_a_time
 def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
     """See `brachis.solvers.protocol.Solver`."""
     with Watch(problem, options, progress) as watch:
