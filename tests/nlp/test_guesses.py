@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.nlp.guess import STRATEGIES, guesses, numeric_course, stretched, worst_timed_ratio
+from brachis.nlp.guess import guesses, stretched, worst_timed_ratio
+from brachis.nlp.numeric_course import STRATEGIES, numeric_course
 from support.chains import planar_robot, transcription
 from support.transcriptions import CASES, problem_of
 

@@ -18,6 +18,7 @@ import brachis
 from brachis.errors import PlanningError, TaskError, UnknownNameError
 from brachis.plots import plot_candidates
 from brachis.search import portfolio
+from brachis.search.efforts import EFFORTS
 
 ROOT = Path(__file__).parents[2]
 START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
@@ -234,3 +235,21 @@ def end_time(robot: brachis.Robot, asked: dict[str, Any]) -> float:
 def test_more_processes_than_processors_are_not_made(robot, monkeypatch):
     monkeypatch.setattr("os.cpu_count", lambda: 1)
     assert brachis.plan(robot, task(search={"jobs": 100_000}, redundant_joints=["j1"])).verified
+
+
+def test_the_rule_that_leaves_plans_unfinished_loses_nothing(robot, monkeypatch):
+    ruled = brachis.plan(robot, task())
+    (fast,) = EFFORTS["fast"]
+    monkeypatch.setitem(EFFORTS, "fast", (dataclasses.replace(fast, refined=100),))
+    monkeypatch.setattr(portfolio, "_WORTH_IT", -100.0)
+    every = brachis.plan(robot, task())
+    finished = [candidate for candidate in every.candidates if math.isfinite(candidate.t_end)]
+    assert len(finished) > sum(math.isfinite(candidate.t_end) for candidate in ruled.candidates)
+    assert all(candidate.t_end >= candidate.coarse * (1.0 - 1e-6) for candidate in finished)
+    assert ruled.t_end <= every.t_end * (1.0 + 2e-4)
+
+
+def test_a_motion_of_an_earlier_level_is_not_finished_again(robot):
+    result = brachis.plan(robot, task(search={"effort": "thorough"}, redundant_joints=["j1"]))
+    finished = [candidate.coarse for candidate in result.candidates if math.isfinite(candidate.t_end)]
+    assert len({f"{coarse:.4g}" for coarse in finished}) == len(finished)

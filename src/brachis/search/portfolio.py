@@ -117,6 +117,7 @@ class _Search:
         self._attempts: list[Attempt] = []
         self._dead_ends: dict[str, DeadEnd] = {}
         self._best: tuple[tuple[float, float], int, Motion, str] | None = None
+        self._known: list[Coarse] = []
         self._gain = 1.0
         self.interrupted = False
 
@@ -160,9 +161,10 @@ class _Search:
         usable = [item for item in plans if item[1].usable]
         ranked: list[tuple[int, Coarse]] = []
         for number, plan in sorted(usable, key=lambda item: (_rounded(item[1].t_end), item[0])):
-            if any(_agree(plan, other) for _, other in ranked):
+            if any(_agree(plan, other) for other in self._known):
                 self._note(number, status=SAME_MOTION)
             else:
+                self._known.append(plan)
                 ranked.append((number, plan))
         return ranked
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from brachis.errors import PathError
 from brachis.kinematics import Decomposition
-from brachis.nlp.guess import numeric_courses
+from brachis.nlp.numeric_course import numeric_courses
 from brachis.search.course import Course, DeadEnd
 from brachis.search.efforts import EFFORTS, Effort
 from brachis.search.lattice import Lattice

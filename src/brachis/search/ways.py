@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from brachis.nlp.guess import STRATEGIES
+from brachis.nlp.numeric_course import STRATEGIES
 from brachis.search.course import DeadEnd
 from brachis.search.efforts import EFFORTS, Effort
 from brachis.search.seeds import Seed, lattice_seeds, numeric_seeds
