@@ -60,6 +60,8 @@ def waves(
     solvers = [solver.name for solver in solver_named(task.solver.name)]
     known: list[Seed] = []
     for effort in EFFORTS[task.search.effort]:
+        if effort.last_resort:
+            yield Wave((), 0, last_resort=True)  # the search may end here, before lattices are looked at
         closed = [choice for choice in choices if effort.polynomial or choice.match.solver.kind == "closed_form"]
         seeds: list[Seed] = []
         rest = closed or list(choices)
