@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
 
 from brachis.search.efforts import EFFORTS
+from brachis.search.ways import looked_at
 
 PAGE = Path(__file__).parents[2] / "docs/search.md"
 
@@ -21,3 +25,22 @@ def test_the_documented_efforts_are_the_real_ones():
         assert ("and 8" in seeds) is (level.numeric == 8)
         assert plans == (str(level.plans) if level.plans < 10_000 else "all")
         assert refined == str(level.refined)
+
+
+@pytest.mark.parametrize(
+    ("rooms", "start", "expected"),
+    [
+        ([0.5, 0.05], [0.0], ["closed_form", "closed_form"]),
+        ([0.09, 0.05], [0.0], ["closed_form", "closed_form", "polynomial"]),
+        ([0.0, 0.0], None, ["closed_form", "closed_form"]),
+        ([], [0.0], ["polynomial"]),
+    ],
+)
+def test_polynomials_are_looked_at_where_every_closed_form_is_cramped(rooms, start, expected):
+    def choice(kind, room):
+        solver = SimpleNamespace(kind=kind)
+        return SimpleNamespace(match=SimpleNamespace(solver=solver), room=room, setting=SimpleNamespace(start=start))
+
+    choices = [*(choice("closed_form", room) for room in rooms), choice("polynomial", 0.6)]
+    (fast,) = EFFORTS["fast"]
+    assert [found.match.solver.kind for found in looked_at(choices, fast)] == expected

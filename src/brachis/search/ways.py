@@ -18,6 +18,7 @@ from brachis.setting import Choice
 from brachis.solvers import solver_named
 
 _WAVE = 12
+_CRAMPED = 0.1
 
 
 @dataclass(frozen=True)
@@ -62,15 +63,15 @@ def waves(
     for effort in EFFORTS[task.search.effort]:
         if effort.last_resort:
             yield Wave((), 0, last_resort=True)  # the search may end here, before lattices are looked at
-        closed = [choice for choice in choices if effort.polynomial or choice.match.solver.kind == "closed_form"]
+        allowed = looked_at(choices, effort)
         seeds: list[Seed] = []
-        rest = closed or list(choices)
+        rest = allowed or list(choices)
         while rest and not seeds:  # choices without a course make room for others
-            looked_at, rest = rest[: effort.choices], rest[effort.choices :]
+            batch, rest = rest[: effort.choices], rest[effort.choices :]
             if task.search.guesses == "numeric":
-                seeds = [seed for choice in looked_at for seed in numeric_seeds(choice, effort.seeds)]
+                seeds = [seed for choice in batch for seed in numeric_seeds(choice, effort.seeds)]
             else:
-                seeds = _from_lattices(looked_at, effort, deadline, listener, note)
+                seeds = _from_lattices(batch, effort, deadline, listener, note)
         known += seeds
         for first in range(0, len(seeds), _WAVE):
             yield Wave(
@@ -80,10 +81,21 @@ def waves(
             )
     many = len(known) + len(STRATEGIES)
     yield Wave(tuple(Way(seed, solver) for seed in known[:_WAVE] for solver in solvers[1:2]), many, last_resort=True)
-    for choice in (closed or choices)[: effort.choices]:
+    for choice in (allowed or choices)[: effort.choices]:
         for seed in numeric_seeds(choice, len(STRATEGIES)):
             yield Wave(tuple(Way(seed, solver) for solver in solvers[:2]), many, last_resort=True)
     yield Wave(tuple(Way(seed, solver) for solver in solvers[2:] for seed in known[:2]), many, last_resort=True)
+
+
+def looked_at(choices: Sequence[Choice], effort: Effort) -> list[Choice]:
+    """Return the choices that a level looks at: closed forms, and polynomials where asked for, or where all is cramped.
+
+    That is where a given start posture is near the branch boundary of every closed form.
+    """
+    closed = [choice for choice in choices if choice.match.solver.kind == "closed_form"]
+    given = choices[0].setting.start is not None
+    cramped = given and max((choice.room for choice in closed), default=0.0) < _CRAMPED
+    return list(choices) if effort.polynomial or cramped else closed
 
 
 def _from_lattices(
