@@ -73,7 +73,9 @@ def test_iiwa_has_none_for_its_elbow(run):
 
 @pytest.mark.parametrize("name", [name for name in PUBLISHED if name != "Baxter"])
 def test_published_robots(run, name):
-    decompositions(run, published(name))
+    kinds = decompositions(run, published(name))
+    assert kinds
+    assert set(kinds.values()) <= {"closed_form", "polynomial", "-"}
 
 
 def test_kinds_of_published_robots(run):

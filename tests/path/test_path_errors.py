@@ -159,6 +159,8 @@ def test_the_longest_blend_is_accepted_as_the_message_writes_it() -> None:
     longest = float(str(refused(segments, XY)).split("at most ")[1].removesuffix(" m"))
     segments[0]["blend"] = longest
     build(segments, XY)
+    segments[0]["blend"] = longest * (1.0 + 1e-4)
+    assert "longer than half" in str(refused(segments, XY))
 
 
 def test_neighbouring_blends_do_not_overlap() -> None:

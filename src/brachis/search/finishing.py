@@ -23,7 +23,25 @@ _BESIDE = 1e-4
 def refined_until_verified(
     problem: Transcription, report: SolverReport, solve: Solve, options: RefinementOptions, judge: Judge
 ) -> tuple[Refined, Motion | None]:
-    """Refine a solved problem, and again where the verification finds a limit exceeded between the points."""
+    """Refine a solved problem, and again where the verification finds a limit exceeded between the points.
+
+    Parameters
+    ----------
+    problem : Transcription
+    report : SolverReport
+        Of the problem's solve.
+    solve : callable
+        ``solve(problem, x)`` returns a `SolverReport`.
+    options : RefinementOptions
+    judge : callable
+        Makes the trajectory of an answer and verifies it; raises `UnreachableError` where it leaves the branch.
+
+    Returns
+    -------
+    refined : Refined
+    motion : tuple of Trajectory, Verification, or None
+        None where no trajectory came out.
+    """
     refined = refine(problem, report, solve, options)
     motion = _judged(judge, refined)
     for _ in range(_SECOND_LOOKS if options.max_rounds else 0):
@@ -59,15 +77,26 @@ def _where_it_failed(refined: Refined, motion: Motion) -> Transcription | None:
     return refined.problem.resampled(np.union1d(refined.problem.tau, np.clip(near.ravel(), 0.0, 1.0)))
 
 
-def _excess(motion: Motion) -> float:
-    """Return how far a motion exceeds its limits, as a fraction of them; less than any excess where it passed."""
-    return -np.inf if motion[1].passed else motion[1].worst_ratio - 1.0
-
-
 def attempt_of(
     refined: Refined, before: Sequence[SolverReport], number: int, tolerance: float, motion: Motion | None
 ) -> Attempt:
-    """Put the outcome of an attempt into words."""
+    """Put down what became of a plan, in words too.
+
+    Parameters
+    ----------
+    refined : Refined
+    before : sequence of SolverReport
+        Of the solves before refinement.
+    number : int
+        Of the candidate.
+    tolerance : float
+        Largest excess over a limit, as a fraction of it.
+    motion : tuple of Trajectory, Verification, or None
+
+    Returns
+    -------
+    Attempt
+    """
     last = refined.reports[-1]
     rounds = len(refined.reports) - 1
     if not refined.converged:

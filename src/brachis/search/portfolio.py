@@ -110,9 +110,8 @@ class _Search:
     def __init__(self, choices: Sequence[Choice], listener: Listener) -> None:
         self._choices, self._listener = choices, listener
         self._task = choices[0].setting.task
-        self._began = time.monotonic()
         self._jobs = processes(self._task.search.jobs)
-        self.deadline = self._began + self._task.search.time_limit
+        self.deadline = time.monotonic() + self._task.search.time_limit
         self._candidates: list[Candidate] = []
         self._attempts: list[Attempt] = []
         self._dead_ends: dict[str, DeadEnd] = {}
@@ -138,6 +137,7 @@ class _Search:
         refused = False
         for wave in plan:
             if wave.last_resort and self.content:
+                self.interrupted |= time.monotonic() > self.deadline  # lattices were left out
                 return
             if wave.last_resort and not refused:
                 refuse_what_is_out_of_reach(self._choices, self._candidates)
@@ -159,12 +159,14 @@ class _Search:
             self._candidates.append(_candidate(plan))
             self.interrupted |= plan.status == NOT_TRIED
         usable = [item for item in plans if item[1].usable]
+        # In the last resort a motion that could not be verified gets another chance, with another solver.
+        known = [] if wave.last_resort else self._known
         ranked: list[tuple[int, Coarse]] = []
         for number, plan in sorted(usable, key=lambda item: (_rounded(item[1].t_end), item[0])):
-            if any(_agree(plan, other) for other in self._known):
+            if any(_agree(plan, other) for other in known):
                 self._note(number, status=SAME_MOTION)
             else:
-                self._known.append(plan)
+                known.append(plan)
                 ranked.append((number, plan))
         return ranked
 

@@ -79,11 +79,12 @@ def waves(
                 effort.refined,
                 effort.last_resort,
             )
-    many = len(known) + len(STRATEGIES)
+    many, tried = len(known) + len(STRATEGIES), {(seed.choice.name, seed.origin) for seed in known}
     yield Wave(tuple(Way(seed, solver) for seed in known[:_WAVE] for solver in solvers[1:2]), many, last_resort=True)
     for choice in (allowed or choices)[: effort.choices]:
         for seed in numeric_seeds(choice, len(STRATEGIES)):
-            yield Wave(tuple(Way(seed, solver) for solver in solvers[:2]), many, last_resort=True)
+            if (choice.name, seed.origin) not in tried:
+                yield Wave(tuple(Way(seed, solver) for solver in solvers[:2]), many, last_resort=True)
     yield Wave(tuple(Way(seed, solver) for solver in solvers[2:] for seed in known[:2]), many, last_resort=True)
 
 

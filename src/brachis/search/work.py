@@ -185,7 +185,26 @@ def _solve(way: Way, deadline: float, listener: Listener) -> Solve:
 def each(
     function: Callable[..., _Made], given: Sequence[_Given], *others: object, jobs: int, listener: Listener
 ) -> Iterator[_Made]:
-    """Yield ``function(item, *others, listener)`` for all items, in order, from up to `jobs` processes."""
+    """Do a piece of work for every item, in up to `jobs` processes.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(item, *others, listener)``; a function of a module, so that it can be sent to other processes.
+    given : sequence
+        The items.
+    *others : object
+        The same for all items.
+    jobs : int
+        With 1, and within another program's workers, the work is done here, item by item as it is asked for.
+    listener : callable
+        Only heard of work that is done here.
+
+    Yields
+    ------
+    object
+        What the function returns, in the order of the items.
+    """
     if jobs == 1 or len(given) <= 1 or _within_a_worker():
         for item in given:
             yield function(item, *others, listener)

@@ -17,6 +17,7 @@ class _Loader(yaml.SafeLoader):
     """A safe loader that refuses duplicate keys."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:  # noqa: FBT001, FBT002 - PyYAML's signature
+        """Make a mapping of a node, as PyYAML does, unless a key occurs twice (ConstructorError)."""
         # Before merge keys (<<) are expanded: what they bring in may be overridden.
         seen: set[str] = set()
         for key, _ in node.value:
