@@ -10,7 +10,7 @@ import numpy as np
 from brachis import ik
 from brachis.bspline import clamped_uniform_knots
 from brachis.errors import DecompositionError, StartError, UnknownNameError
-from brachis.feasibility import check_end_branch, check_postures, start_branch
+from brachis.feasibility import branch_of, check_end_branch, check_postures
 from brachis.kinematics import Decomposition
 from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Transcription
@@ -69,7 +69,7 @@ class Choice:
     redundant : tuple of int
         Indices of the redundant joints, ascending.
     branches : tuple of int
-        Indices into ``match.solver.branches``, of each label the first; one where the start posture is given.
+        Indices into ``match.solver.branches``, of each label the first; one where start or end posture is given.
     """
 
     setting: Setting
@@ -84,10 +84,11 @@ class Choice:
 
     @property
     def room(self) -> float:
-        """Least branch margin of the start posture; zero where that is free."""
-        if self.setting.start is None:
+        """Least branch margin of the start posture, of the end posture where the start is free; zero without both."""
+        given = self.setting.end if self.setting.start is None else self.setting.start
+        if given is None:
             return 0.0
-        margins = self.match.solver.branch_margins(self.setting.start[None], self.branches[0])
+        margins = self.match.solver.branch_margins(given[None], self.branches[0])
         return float(margins.min(initial=np.inf))
 
     def decomposition(self, start: np.ndarray, branch: int) -> Decomposition:
@@ -160,9 +161,12 @@ def _choice(setting: Setting, match: ik.Match) -> Choice:
     redundant = tuple(robot.joint_names.index(name) for name in match.redundant_joints)
     labels = match.solver.branches
     if setting.start is not None:
-        branch = start_branch(robot, task_space, match, setting.start, wanted)
+        branch = branch_of(robot, task_space, match, setting.start, wanted)
         if setting.end is not None:
             check_end_branch(robot, task_space, match, setting.end, branch)
+        return Choice(setting, match, redundant, (branch,))
+    if setting.end is not None:
+        branch = branch_of(robot, task_space, match, setting.end, wanted, name="end")
         return Choice(setting, match, redundant, (branch,))
     if wanted != "auto" and wanted not in labels:
         raise UnknownNameError("branch", wanted, dict.fromkeys(labels), where="branch")

@@ -58,14 +58,23 @@ class DeadEnd:
         Path coordinate of the first station that no node reaches.
     causes : dict of str to int
         Why, and how many edges say so; the cause of those that came nearest to being possible first.
+    backwards : bool
+        Whether the lattice begins at the given end posture.
     """
 
     s: float
     causes: dict[str, int]
+    backwards: bool = False
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Part of the path, in s, that is not reached."""
+        return (0.0, self.s) if self.backwards else (self.s, 1.0)
 
     def __str__(self) -> str:
         """Return the place and its first cause, in words."""
-        return f"from s = {self.s:.3g} on {next(iter(self.causes))}"
+        place = f"back from the end posture, at s = {self.s:.3g}" if self.backwards else f"from s = {self.s:.3g} on"
+        return f"{place} {next(iter(self.causes))}"
 
 
 def distinct(courses: Sequence[Course], most: int) -> list[Course]:

@@ -71,14 +71,14 @@ def no_motion(
     if isinstance(reason, BrachisError):
         return reason
     if dead_ends and not course:
-        name, furthest = max(dead_ends.items(), key=lambda item: item[1].s)
+        name, furthest = min(dead_ends.items(), key=lambda item: np.diff(item[1].interval)[0])
         others = (
             f" (redundant joints {name}; {len(dead_ends) - 1} other choices end sooner)" if len(dead_ends) > 1 else ""
         )
         start = "" if choices[0].setting.start is None else "start in another posture, "
         return PathError(
             f"no course along the path was found: {furthest}{others}",
-            s_interval=(furthest.s, 1.0),
+            s_interval=furthest.interval,
             hint=f"{start}shorten or move the path, or widen the joint ranges".capitalize(),
         )
     counts = Counter(candidate.status for candidate in candidates)
