@@ -28,10 +28,10 @@ from brachis.search.course import (
     JUMPS,
     NO_ANSWER,
     OTHER_BRANCH,
-    OUT_OF_RANGE,
     TOO_HEAVY,
     Course,
     DeadEnd,
+    beyond_ranges,
     causes_of,
     distinct,
 )
@@ -164,10 +164,10 @@ class Lattice:
         last = np.where(self._loose, np.floor((self._upper - high) / _TURN), -1.0 * (high > self._upper))
         return first, last
 
-    def _in_range(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Which courses, (E,), can be brought into the ranges; see `_turns_within`."""
+    def _inside(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """Which joints of courses, (E, n), can be brought into their ranges; see `_turns_within`."""
         first, last = self._turns_within(low, high)
-        return np.all(first <= last, axis=1)
+        return np.asarray(first <= last)
 
     def _first_layer(self, rng: np.random.Generator) -> Layer | dict[str, int]:
         """Make the node of the given posture, or nodes all over the ranges where none is given, or say why not."""
@@ -186,9 +186,10 @@ class Lattice:
         if not exists.any():
             return {NO_ANSWER: len(cells)}
         cell, slot, q = cell[exists], slot[exists], q[exists]
-        inside = self._in_range(q, q)
+        within = self._inside(q, q)
+        inside = within.all(axis=1)
         if not inside.any():
-            return {OUT_OF_RANGE: len(q)}
+            return beyond_ranges(self._robot, within)
         cell, slot, q = cell[inside], slot[inside], q[inside]
         nothing = np.zeros(len(q))
         return self._kept(Layer(cell, slot, q, q, q, nothing, nothing.astype(int)))
@@ -230,11 +231,11 @@ class Lattice:
         low, high = np.minimum(before.low[parent], q), np.maximum(before.high[parent], q)
         found = exists[where, slot]
         with np.errstate(invalid="ignore"):
-            in_range = self._in_range(low, high)
+            inside = self._inside(low, high)
             near = np.all(np.abs(step) <= _LARGEST_STEP, axis=1)
-        good = found & in_range & near
+        good = found & inside.all(axis=1) & near
         if not good.any():
-            return causes_of(exists, where, found, in_range, near)
+            return causes_of(self._robot, exists, where, found, inside, near)
         parent, where, step = parent[good], where[good], step[good]
         length = before.length[parent] + self._lengths(before.q, step, parent)
         layer = Layer(cells[where], slot[good], q[good], low[good], high[good], length, parent)
