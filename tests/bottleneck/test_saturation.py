@@ -74,7 +74,7 @@ def test_below_the_threshold_nothing_is_active(made):
     assert entry.peak == pytest.approx(0.998)
 
 
-def test_positions_are_measured_in_half_ranges(made):
+def test_positions_are_measured_by_their_distance_from_an_end(made):
     trajectory = made([0.0, T], [1.0, 1.0], [1.0, 1.0])  # from 0 to 2 m
     limits = dataclasses.replace(
         trajectory.robot.limits, position_lower=np.array([-2.0, -np.inf]), position_upper=np.array([2.0, 0.25])
@@ -82,7 +82,8 @@ def test_positions_are_measured_in_half_ranges(made):
     trajectory = dataclasses.replace(trajectory, robot=dataclasses.replace(trajectory.robot, limits=limits))
     ratios = limit_ratios(trajectory)
     column = dict(zip(ratios.names, ratios.values.T, strict=True))
-    np.testing.assert_allclose(column["position", "j1"], 0.25 * ratios.t**2, atol=1e-12)
+    q = 0.5 * ratios.t**2
+    np.testing.assert_allclose(column["position", "j1"], np.maximum(q - 1.0, 0.0), atol=1e-12)  # 1 m from the end: 0
     np.testing.assert_allclose(column["position", "j2"], 0.75)
 
 

@@ -5,8 +5,9 @@ e lets the bounds of its rows out by e, so that with the multipliers w of the jo
 
     dt_E / d(ln limit) = -sum w.
 
-Positions are measured in half ranges about the middle of the range, or in rad or m where it is open; an end that moves
-outwards lets out the rows at that end alone. See `multipliers` for w, and for what holds where it is not unique.
+Positions are measured in half ranges about the middle of the range, or in rad or m where it is wide or open; an end
+that moves outwards lets out the rows at that end alone. See `multipliers` for w, and for what holds where it is not
+unique.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 
 from brachis.bottleneck.multipliers import Multipliers, multipliers_of_answer
 from brachis.nlp import Transcription
+from brachis.nlp.constraints.position import WIDE
 from brachis.refine import Refined
 from brachis.robot import Limits, Robot
 
@@ -203,7 +205,7 @@ def _of_joint(robot: Robot, kind: str, joint: str, rows: np.ndarray, multipliers
     ends = {"lower": float(robot.limits.position_lower[index]), "upper": float(robot.limits.position_upper[index])}
     closed = np.isfinite(list(ends.values())).all()
     whole = ends["upper"] - ends["lower"] if closed else 1.0
-    per_unit = 2.0 / whole if closed else 1.0  # rows count half ranges, or rad or m
+    per_unit = 2.0 / whole if closed and 0.5 * whole <= WIDE else 1.0  # rows count half ranges, or rad or m
     found = []
     for end, limit in ends.items():
         if np.isfinite(limit):

@@ -278,7 +278,7 @@ class Transcription:
     def _excess(self, state: JointState) -> np.ndarray:
         limits = [c for c in self.constraints if c.physical]
         values = [(constraint.values(state), constraint) for constraint in limits]
-        return np.concatenate([np.maximum(v - c.upper, c.lower - v) for v, c in values], axis=1)
+        return np.concatenate([np.maximum(v - c.upper, c.lower - v) * c.excess_scale for v, c in values], axis=1)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,).

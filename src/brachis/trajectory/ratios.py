@@ -11,6 +11,8 @@ from brachis.trajectory.samples import freeze
 from brachis.trajectory.trajectory import Trajectory
 
 _POINTS_PER_INTERVAL = 40
+_LEAST_HALF_RANGE, _LARGEST_HALF_RANGE = 1e-5, 1.0
+"""Positions are measured in half ranges between these, rad or m."""
 KINDS = ("torque", "velocity", "acceleration", "position")
 """Kinds of limits, in the order of `LimitRatios.names`."""
 
@@ -26,8 +28,8 @@ class LimitRatios:
     names : tuple of (str, str)
         Kind of limit and joint of every column.
     values : (K, c) ndarray
-        1 at the upper limit, -1 at the lower one. Positions count from the middle of the range in half ranges; where
-        one end alone is limited, by their distance from it, so that 0.9 is 0.1 rad or m away.
+        1 at the upper limit, -1 at the lower one. Positions count by their distance from an end, so that 0.9 is
+        0.1 rad or m away; in half ranges where these are shorter than that, and 0 where both ends are further away.
     """
 
     t: np.ndarray
@@ -76,10 +78,8 @@ def limit_ratios(trajectory: Trajectory) -> LimitRatios:
 
 
 def _positions(q: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Place of positions (K, n) in their ranges; 0 where both ends are open."""
-    with np.errstate(invalid="ignore"):  # inf - inf
-        middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
-        inside = (q - middle) / half
-    from_upper = np.maximum(1.0 + q - upper, 0.0)
-    from_lower = np.minimum(-1.0 + q - lower, 0.0)
-    return np.where(np.isfinite(half), inside, from_upper + from_lower)
+    """Place of positions (K, n) in their ranges; 0 where both ends are far or open."""
+    half = np.clip(0.5 * upper - 0.5 * lower, _LEAST_HALF_RANGE, _LARGEST_HALF_RANGE)
+    from_upper = np.maximum(1.0 + (q - upper) / half, 0.0)
+    from_lower = np.minimum(-1.0 + (q - lower) / half, 0.0)
+    return np.asarray(from_upper + from_lower)

@@ -5,19 +5,26 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.robot import Robot
-from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory, one_sided_derivatives
-from brachis.verify.mechanics import torques
+from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
+from brachis.verify.motion import States
 from brachis.verify.options import VerifyOptions
 from brachis.verify.report import Check
 
 
 def progress_checks(trajectory: Trajectory, t: np.ndarray, options: VerifyOptions) -> list[Check]:
-    """Check that the path is travelled once, forwards, from its beginning to its end."""
+    """Check that the path is travelled once, forwards, from its beginning to its end.
+
+    ds/dt is looked at where it is smallest: at the times t, (K,), at knots, and where its derivative vanishes.
+    """
+    from scipy.interpolate import PPoly  # noqa: PLC0415  (imports in 0.3 s)
+
     spline, allowed = trajectory.path_spline, options.progress_tolerance
-    velocity = spline(t, nu=1)
+    turning = PPoly.from_spline(spline.derivative(2).tck).roots(discontinuity=True, extrapolate=False)
+    times = np.concatenate([t, np.unique(spline.t), turning[np.isfinite(turning)]])
+    velocity = spline(times, nu=1)
     backwards = float(np.maximum(0.0, -velocity).max())
     ends = float(np.abs([spline(0.0), spline(trajectory.t_end) - 1.0]).max())
-    time = float(t[int(np.argmin(velocity))]) if backwards else None
+    time = float(times[int(np.argmin(velocity))]) if backwards else None
     return [
         Check("ds/dt below zero", backwards, allowed, "1/s", backwards <= allowed, time=time),
         Check("s at the ends", ends, allowed, "-", ends <= allowed),
@@ -41,39 +48,33 @@ def end_checks(trajectory: Trajectory, robot: Robot, options: VerifyOptions) -> 
     return checks
 
 
-def spline_checks(trajectory: Trajectory, robot: Robot, options: VerifyOptions) -> list[Check]:
-    """Check at the nodes that the splines of the redundant joints are their motion."""
+def spline_checks(trajectory: Trajectory, robot: Robot, states: States, options: VerifyOptions) -> list[Check]:
+    """Check that the splines of the redundant joints are their motion."""
     if not trajectory.redundant_joints:
         return []
     joints = [robot.joint_names.index(name) for name in trajectory.redundant_joints]
-    misses = np.zeros((len(trajectory.times), robot.n))
-    misses[:, joints] = np.abs(trajectory.redundant_spline(trajectory.times) - trajectory.q[:, joints])
-    node = int(np.argmax(misses.max(axis=1)))
-    time = float(trajectory.times[node])
+    misses = np.zeros_like(states.q)
+    misses[:, joints] = np.abs(trajectory.redundant_spline(states.t) - states.q[:, joints])
+    worst = int(np.argmax(misses.max(axis=1)))
+    time = float(states.t[worst])
     allowed = options.spline_tolerance
-    return [_worst_joint("redundant joints' splines", misses[node], allowed, "rad, m", robot, time)]
+    return [_worst_joint("redundant joints' splines", misses[worst], allowed, "rad, m", robot, time)]
 
 
-def continuity_checks(trajectory: Trajectory, robot: Robot, options: VerifyOptions) -> list[Check]:
+def continuity_checks(trajectory: Trajectory, states: States, options: VerifyOptions) -> list[Check]:
     """Jumps of position, velocity, acceleration and torque where polynomial pieces join, relative to their size."""
-    inner, lengths, coefficients = trajectory.times[1:-1], np.diff(trajectory.times), trajectory.pieces.c
-    left = [one_sided_derivatives(coefficients, lengths, order, at_end=True)[:-1] for order in range(3)]
-    right = [one_sided_derivatives(coefficients, lengths, order, at_end=False)[1:] for order in range(3)]
-    left[0] = trajectory.q[:-2] + left[0]  # coefficients are relative to the node before
-    right[0] = trajectory.q[1:-1] + right[0]
-    sides = {
-        name: (before, after)
-        for name, before, after in zip(("position", "velocity", "acceleration"), left, right, strict=True)
-    }
-    sides["torque"] = (torques(robot, *left), torques(robot, *right))
+    before = states.only(np.flatnonzero(states.u == 1.0)[:-1])
+    after = states.only(np.flatnonzero(states.u == 0.0)[1:])
+    names = {"position": "q", "velocity": "qdot", "acceleration": "qddot", "torque": "tau"}
     if trajectory.degree < CONTINUOUS_TORQUE:  # the asked degree has them jump
-        del sides["acceleration"], sides["torque"]
+        del names["acceleration"], names["torque"]
     checks, allowed = [], options.jump_tolerance
-    for name, (before, after) in sides.items():
-        scale = 1.0 + np.abs(before).max(initial=0.0)
-        jumps = np.abs(after - before).max(axis=1, initial=0.0) / scale
+    for name, part in names.items():
+        left, right = getattr(before, part), getattr(after, part)
+        scale = 1.0 + np.abs(left).max(initial=0.0)
+        jumps = np.abs(right - left).max(axis=1, initial=0.0) / scale
         value = float(jumps.max(initial=0.0))
-        time = float(inner[int(np.argmax(jumps))]) if len(jumps) else None
+        time = float(after.t[int(np.argmax(jumps))]) if len(jumps) else None
         checks.append(Check(f"{name} jump", value, allowed, "relative", value <= allowed, time=time))
     return checks
 

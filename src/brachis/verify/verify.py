@@ -14,11 +14,12 @@ from brachis.path import Path, path_of
 from brachis.robot import Robot, TaskSpace, bind
 from brachis.trajectory import Trajectory
 from brachis.verify.checks import continuity_checks, end_checks, progress_checks, spline_checks
-from brachis.verify.mechanics import torques
+from brachis.verify.limits import limit_checks
+from brachis.verify.motion import Pieces, States
 from brachis.verify.options import VerifyOptions
+from brachis.verify.peaks import with_peaks
+from brachis.verify.places import reversals, sharpest, spread_out, within_path_pieces
 from brachis.verify.report import Check, Verification
-
-_BISECTIONS = 50
 
 
 def verify_trajectory(
@@ -54,42 +55,29 @@ def verify_trajectory(
             found=", ".join(robot.joint_names),
             allowed=", ".join(trajectory.joint_names),
         )
-    breaks = np.unique(trajectory.knots) * trajectory.t_end
-    steps = (np.arange(options.points_per_interval) + 0.5) / options.points_per_interval  # between the nodes
-    grid = (breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel()
-    path = path_of(robot, task_space, trajectory.task)
-    t = np.unique(np.concatenate([grid, trajectory.times, _times_within_pieces(trajectory, path.breaks, options)]))
-    q, qdot, qddot = trajectory.position(t), trajectory.velocity(t), trajectory.acceleration(t)
-    # Splines of degree 2 jump in acceleration at knots: there both sides are looked at.
-    jumps = np.any(trajectory.qddot_before != trajectory.qddot, axis=1)
-    t = np.concatenate([t, trajectory.times[jumps]])
-    q, qdot = np.concatenate([q, trajectory.q[jumps]]), np.concatenate([qdot, trajectory.qdot[jumps]])
-    qddot = np.concatenate([qddot, trajectory.qddot_before[jumps]])
-    tau = torques(robot, q, qdot, qddot)
-    path_check = _path_error(trajectory, robot, path, task_space, t, q, options)
-    limits = _limit_checks(robot, t, q, qdot, qddot, tau, options)
+    pieces, path = Pieces.of(trajectory), path_of(robot, task_space, trajectory.task)
+    parts = (
+        spread_out(trajectory, pieces, options),
+        within_path_pieces(trajectory, pieces, path.breaks, options),
+        sharpest(pieces),
+        reversals(pieces, robot),
+    )
+    places = (np.concatenate(part) for part in zip(*parts, strict=True))
+    states = States.at(pieces, robot, *places)
+    path_check = _path_error(trajectory, robot, path, task_space, states, options)
+    joins = continuity_checks(trajectory, states, options)
+    states = with_peaks(states, pieces, robot)
+    limits = limit_checks(robot, pieces, states, options)
     checks = [
         path_check,
         *limits,
-        *progress_checks(trajectory, t, options),
+        *progress_checks(trajectory, states.t, options),
         *end_checks(trajectory, robot, options),
-        *spline_checks(trajectory, robot, options),
-        *continuity_checks(trajectory, robot, options),
+        *spline_checks(trajectory, robot, states, options),
+        *joins,
     ]
     worst = max((check.value for check in limits), default=0.0)
-    return Verification(tuple(checks), len(t), worst, path_check.value)
-
-
-def _times_within_pieces(trajectory: Trajectory, breaks: np.ndarray, options: VerifyOptions) -> np.ndarray:
-    """Spread times over every piece of the path, however short: a small blend is not stepped over."""
-    parts = np.linspace(0.0, 1.0, options.points_per_interval)
-    wanted = (breaks[:-1, None] + np.diff(breaks)[:, None] * parts).ravel()
-    low, high = np.zeros_like(wanted), np.full_like(wanted, trajectory.t_end)
-    for _ in range(_BISECTIONS):  # s(t) does not decrease
-        middle = 0.5 * (low + high)
-        before = trajectory.path_spline(middle) < wanted
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
-    return 0.5 * (low + high)
+    return Verification(tuple(checks), len(states.t), worst, path_check.value)
 
 
 def _path_error(
@@ -97,11 +85,12 @@ def _path_error(
     robot: Robot,
     path: Path,
     task_space: TaskSpace,
-    t: np.ndarray,
-    q: np.ndarray,
+    states: States,
     options: VerifyOptions,
 ) -> Check:
     """Largest distance of the tool from the path at the saved s(t)."""
+    once = np.append(np.diff(states.t) > 0.0, True)  # not both sides of a node
+    t, q = states.t[once], states.q[once]
     targets = path.sample(np.clip(trajectory.path_spline(t), 0.0, 1.0)).target
     miss = task_space.difference(task_space.values(*robot.tool_placements(q)), targets)
     positions = len(task_space.axes)
@@ -111,45 +100,3 @@ def _path_error(
     return Check(
         "path error", float(errors[worst]), tolerance, "m, rad", bool(errors[worst] <= tolerance), time=float(t[worst])
     )
-
-
-def _limit_checks(
-    robot: Robot,
-    t: np.ndarray,
-    q: np.ndarray,
-    qdot: np.ndarray,
-    qddot: np.ndarray,
-    tau: np.ndarray,
-    options: VerifyOptions,
-) -> list[Check]:
-    """Worst ratio to every kind of limit that the robot has."""
-    limits = robot.limits
-    tables = {
-        "torque": np.abs(tau) / limits.torque,
-        "velocity": np.abs(qdot) / limits.velocity,
-        "acceleration": np.abs(qddot) / limits.acceleration,
-    }
-    with np.errstate(invalid="ignore"):
-        half = 0.5 * (limits.position_upper - limits.position_lower)
-        middle = limits.position_lower + half
-    closed = np.isfinite(half)
-    tables["position"] = np.abs(q - np.where(closed, middle, 0.0)) / half
-    one_sided = ~closed & (np.isfinite(limits.position_lower) | np.isfinite(limits.position_upper))
-    beyond = np.maximum(limits.position_lower - q, q - limits.position_upper)
-    tables["position"] = np.where(one_sided, 1.0 + beyond, tables["position"])
-    limited = {
-        "torque": np.isfinite(limits.torque).any(),
-        "velocity": np.isfinite(limits.velocity).any(),
-        "acceleration": np.isfinite(limits.acceleration).any(),
-        "position": (closed | one_sided).any(),
-    }
-    checks = []
-    for name, table in tables.items():
-        if not limited[name]:
-            continue
-        k, joint = np.unravel_index(np.argmax(table), table.shape)
-        value = float(table[k, joint])
-        allowed = 1.0 + options.ratio_tolerance
-        passed = bool(value <= allowed)
-        checks.append(Check(f"{name} ratio", value, allowed, "-", passed, robot.joint_names[joint], float(t[k])))
-    return checks

@@ -27,6 +27,7 @@ class BranchMarginConstraint:
         count = len(at_start)
         self.labels = tuple(f"{label} {i}" for i in range(count)) if count > 1 else (label,)
         self.lower, self.upper = np.minimum(margin, 0.5 * at_start), np.full(count, np.inf)
+        self.excess_scale = np.ones(count)
 
     def values(self, state: JointState) -> np.ndarray:
         """See `Constraint.values`."""

@@ -28,6 +28,7 @@ class JointRateConstraint:
         self.kind = kind
         self.labels = tuple(robot.joint_names[i] for i in joints)
         self.lower, self.upper = -np.ones(len(joints)), np.ones(len(joints))
+        self.excess_scale = np.ones(len(joints))
         self._joints = joints
         self._scale = 1.0 / limits
         self._selection = np.eye(robot.n)[joints] * self._scale[:, None]

@@ -1,4 +1,4 @@
-"""q_min <= q <= q_max, as (q - middle) / half range in [-1, 1]; an open range is measured in rad or m."""
+"""q_min <= q <= q_max, as (q - middle) / half range in [-1, 1]; wide and open ranges are measured in rad or m."""
 
 from __future__ import annotations
 
@@ -6,6 +6,11 @@ import numpy as np
 
 from brachis.kinematics import Decomposition, JointState
 from brachis.nlp.constraints.protocol import Partials
+
+WIDE = 10.0
+"""Ranges whose half is larger count as open ones do, in rad or m: half of a far range is no measure at its near end."""
+_LEAST_HALF, _LARGEST_HALF = 1e-5, 1.0
+"""An excess of 1 is half the range, but between these, rad or m, so that each end is judged by itself."""
 
 
 class PositionConstraint:
@@ -18,14 +23,17 @@ class PositionConstraint:
     def __init__(self, decomposition: Decomposition, joints: np.ndarray) -> None:
         robot = decomposition.robot
         low, high = robot.limits.position_lower[joints], robot.limits.position_upper[joints]
-        closed = np.isfinite(low) & np.isfinite(high)
-        half = np.where(closed, 0.5 * np.where(closed, high - low, 0.0), 1.0)
-        self._middle = np.where(closed, 0.5 * np.where(closed, low + high, 0.0), 0.0)
+        half = 0.5 * high - 0.5 * low
+        ranged = half <= WIDE
+        per_row = np.where(ranged, half, 1.0)
+        with np.errstate(invalid="ignore"):  # -inf + inf
+            self._middle = np.where(ranged, 0.5 * low + 0.5 * high, 0.0)
         self._joints = joints
-        self._selection = np.eye(robot.n)[joints] / half[:, None]
-        self._scale = 1.0 / half
+        self._selection = np.eye(robot.n)[joints] / per_row[:, None]
+        self._scale = 1.0 / per_row
         self.labels = tuple(robot.joint_names[i] for i in joints)
-        self.lower, self.upper = (low - self._middle) / half, (high - self._middle) / half
+        self.lower, self.upper = (low - self._middle) / per_row, (high - self._middle) / per_row
+        self.excess_scale = per_row / np.clip(half, _LEAST_HALF, _LARGEST_HALF)
 
     def values(self, state: JointState) -> np.ndarray:
         """See `Constraint.values`."""

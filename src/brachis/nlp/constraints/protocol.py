@@ -34,6 +34,8 @@ class Constraint(Protocol):
         True for a limit of the robot; False for one that only guards the computation.
     lower, upper : (c,) ndarray
         Bounds, dimensionless: values are divided by their limits.
+    excess_scale : (c,) ndarray
+        Excess over a limit, as refinement and verification measure it, for a value that is beyond its bound by 1.
     """
 
     kind: str
@@ -42,6 +44,7 @@ class Constraint(Protocol):
     physical: bool
     lower: np.ndarray
     upper: np.ndarray
+    excess_scale: np.ndarray
 
     def values(self, state: JointState) -> np.ndarray:
         """Values (K, c)."""

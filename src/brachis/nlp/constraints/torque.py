@@ -22,6 +22,7 @@ class TorqueConstraint:
         self._scale = 1.0 / self._robot.limits.torque[joints]
         self.labels = tuple(self._robot.joint_names[i] for i in joints)
         self.lower, self.upper = -np.ones(len(joints)), np.ones(len(joints))
+        self.excess_scale = np.ones(len(joints))
 
     def values(self, state: JointState) -> np.ndarray:
         """See `Constraint.values`."""
