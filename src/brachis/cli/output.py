@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
+from brachis.errors import InputError
+
 if TYPE_CHECKING:  # loads Pinocchio, which no error message and no help needs
     from brachis.verify import Verification
 
+_NO_FIGURE = 3
+"""Exit code of a verified motion whose figures could not all be written."""
+
 
 def print_error(message: str) -> None:
-    """One message on standard error."""
-    Console(stderr=True, soft_wrap=True, highlight=False, markup=False).print(f"brachis: {message}")
+    """One message on standard error, where that can be written."""
+    with suppress(OSError):
+        Console(stderr=True, soft_wrap=True, highlight=False, markup=False).print(f"brachis: {message}")
 
 
 def json_text(data: Mapping[str, object]) -> str:
@@ -33,9 +41,45 @@ def print_json(data: Mapping[str, object]) -> None:
 
 def print_failure(message: str, exit_code: int, *, as_json: bool) -> None:
     """Say on standard error what went wrong; with `as_json` also as one JSON object on standard output."""
-    if as_json:
-        print_json({"verified": False, "status": "error", "error": message, "t_end": None, "exit_code": exit_code})
+    with suppress(OSError):  # `written_out` says so in the end
+        if as_json:
+            print_json({"verified": False, "status": "error", "error": message, "t_end": None, "exit_code": exit_code})
     print_error(message)
+
+
+def exit_code(verified: bool, failures: Sequence[InputError]) -> int:  # noqa: FBT001  (what the code is of)
+    """Say which figures could not be written, and return the exit code of a motion."""
+    for failure in failures:
+        print_error(f"the result is written, this figure is not: {failure}")
+    if not verified:
+        return 1
+    return _NO_FIGURE if failures else 0
+
+
+def open_streams() -> None:
+    """See to it that there are streams, and that they take any name of a file."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by whoever started this program
+            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115  (for as long as the program runs)
+        reconfigure = getattr(getattr(sys, name), "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors="backslashreplace")
+
+
+def written_out() -> bool:
+    """Write out what standard output still holds; False where that fails, which is said unless a pipe was closed.
+
+    What could not be written is then thrown away, lest the interpreter tries again at its end.
+    """
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        with suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            print_error(f"standard output cannot be written: {error.strerror}")
+        return False
+    return True
 
 
 def _plain(value: object) -> object:

@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from brachis.errors import InputError, ResultFileError
-from brachis.files import atomic_write
+from brachis.files import atomic_write, open_file
 from brachis.robot import Robot, bind
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import Task, load_task
@@ -22,6 +22,8 @@ from brachis.task import Task, load_task
 SCHEMA = 1
 ARRAYS = ("times", "q", "qdot", "qddot", "qddot_before", "knots", "control_points")
 """Names of the arrays in the file; as in `Trajectory`."""
+LARGEST = 64_000_000
+"""Of a result file and of what it holds unpacked, bytes."""
 
 _UNREADABLE = (
     OSError,
@@ -85,7 +87,7 @@ def read_result(path: Path) -> Content:
         The file is missing, broken or of another schema version, or its parts do not fit each other.
     """
     try:
-        with path.open("rb") as stream:
+        with open_file(path, LARGEST) as stream:
             meta, arrays = _parts(stream)
     except FileNotFoundError as error:
         raise ResultFileError("the result file does not exist", where=str(path)) from error
@@ -93,7 +95,7 @@ def read_result(path: Path) -> Content:
         raise ResultFileError(
             "the file is not a brachis result",
             where=str(path),
-            found=str(error) or type(error).__name__,
+            found=getattr(error, "strerror", None) or str(error) or type(error).__name__,
             allowed="a file written by brachis plan",
         ) from error
     if meta.get("schema") != SCHEMA:
@@ -113,6 +115,8 @@ def _parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     if not isinstance(archive, np.lib.npyio.NpzFile):
         raise ValueError("a single array")  # noqa: TRY004  (a wrong file, not a wrong call)
     with archive:
+        if sum(member.file_size for member in archive.zip.infolist()) > LARGEST:
+            raise ValueError(f"an archive of more than {LARGEST / 1e6:g} MB unpacked")
         meta = json.loads(str(archive["meta"]))
         arrays = {name: archive[name] for name in ARRAYS}
     if not isinstance(meta, dict):
