@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import redirect_stdout
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TextIO, cast
 
 import typer
 from typer.core import TyperGroup
 
 from brachis.cli.composition import VectorCommand, compose_command
-from brachis.cli.output import open_streams, print_failure, written_out
+from brachis.cli.output import StandardOutput, open_streams, print_failure
 from brachis.errors import BrachisError
 
 
@@ -260,11 +261,13 @@ def schema(
 def main() -> None:
     """Run the command line; no exception leaves it as a traceback."""
     open_streams()
-    code = _run(as_json="--json" in sys.argv[1:])
-    sys.exit(code if written_out() else 1)
+    output = StandardOutput(sys.stdout)
+    with redirect_stdout(cast(TextIO, output)):
+        code = _run(output, as_json="--json" in sys.argv[1:])
+    sys.exit(code if output.finish() else 1)
 
 
-def _run(*, as_json: bool) -> int | str | None:
+def _run(output: StandardOutput, *, as_json: bool) -> int | str | None:
     """Run a command and return its exit code."""
     try:
         app()
@@ -274,10 +277,10 @@ def _run(*, as_json: bool) -> int | str | None:
         print_failure(str(error), error.exit_code, as_json=as_json)
         return error.exit_code
     except Exception as error:
+        if error is output.failure:
+            return 1
         if os.environ.get("BRACHIS_DEBUG"):
             raise
-        if isinstance(error, OSError) and not written_out():
-            return 1
         message = (
             f"internal error: {type(error).__name__}: {error}. This is a fault of brachis; "
             "run again with BRACHIS_DEBUG=1 for the traceback and report it"

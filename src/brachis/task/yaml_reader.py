@@ -43,7 +43,7 @@ class _Loader(yaml.SafeLoader):
                 seen.add(key.value)
         return super().construct_mapping(node, deep=deep)
 
-    def get_single_node(self) -> yaml.Node | None:  # type: ignore[override]
+    def get_single_node(self) -> yaml.Node | None:
         """Parse the document, unless its aliases make it endless or far too long (ComposerError)."""
         node = super().get_single_node()
         if node is not None and (size := _size(node, {})) > _LARGEST:

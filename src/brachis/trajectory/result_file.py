@@ -111,12 +111,15 @@ def _parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     if not zipfile.is_zipfile(stream):
         raise ValueError("no npz archive")
     stream.seek(0)
+    with zipfile.ZipFile(stream) as archive:
+        unpacked = sum(member.file_size for member in archive.infolist())
+    if unpacked > LARGEST:
+        raise ValueError(f"an archive of {unpacked / 1e6:.3g} MB unpacked, at most {LARGEST / 1e6:g} MB are read")
+    stream.seek(0)
     archive = np.load(stream, allow_pickle=False)
     if not isinstance(archive, np.lib.npyio.NpzFile):
         raise ValueError("a single array")  # noqa: TRY004  (a wrong file, not a wrong call)
     with archive:
-        if sum(member.file_size for member in archive.zip.infolist()) > LARGEST:
-            raise ValueError(f"an archive of more than {LARGEST / 1e6:g} MB unpacked")
         meta = json.loads(str(archive["meta"]))
         arrays = {name: archive[name] for name in ARRAYS}
     if not isinstance(meta, dict):
