@@ -193,7 +193,7 @@ def transcription(setting: Setting, decomposition: Decomposition, intervals: int
         decomposition,
         degree=spline.degree,
         knots=clamped_uniform_knots(spline.degree, intervals),
-        derivatives_at_rest=2 if spline.rest == "full" else 1,
+        derivatives_at_rest=derivatives_at_rest(setting.task),
         tau=np.linspace(0.0, 1.0, spline.points_per_interval * intervals + 1),
         end=setting.end,
         start_free=setting.start is None,
@@ -203,3 +203,8 @@ def transcription(setting: Setting, decomposition: Decomposition, intervals: int
 def intervals_of(task: Task) -> int:
     """Return the task's number of intervals; of the first mesh where it is left open."""
     return COARSE_INTERVALS if task.spline.intervals == "auto" else task.spline.intervals
+
+
+def derivatives_at_rest(task: Task) -> int:
+    """Return how many time derivatives of the joint positions vanish at both ends."""
+    return 2 if task.spline.rest == "full" else 1

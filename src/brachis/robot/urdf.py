@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from brachis import files
 from brachis.errors import UnknownNameError, UrdfError
 from brachis.robot.limits import UrdfLimit
 from brachis.robot.urdf_checks import MOVING_TYPES, check_inertias, check_joints
@@ -143,14 +144,16 @@ def read_file(path: Path) -> str:
     Raises
     ------
     UrdfError
-        The file is missing or not text.
+        The file is missing, not text, or no regular file of a size that a URDF may have.
     """
-    if not path.is_file():
-        raise UrdfError("the URDF file does not exist", where=str(path))
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        return files.read_file(path).decode()
+    except FileNotFoundError as error:
+        raise UrdfError("the URDF file does not exist", where=str(path)) from error
+    except UnicodeDecodeError as error:
         raise UrdfError("the URDF file cannot be read", where=str(path), found=str(error)) from error
+    except OSError as error:
+        raise UrdfError(f"the URDF file cannot be read: {error.strerror}", where=str(path)) from error
 
 
 def _parse(text: str | bytes, where: str) -> yourdfpy.URDF:
