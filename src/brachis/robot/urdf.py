@@ -86,7 +86,7 @@ def read_chain(
     UnknownNameError
         A frame or joint does not exist.
     """
-    tree, urdf = _parse(text, where)
+    tree, urdf = parse_urdf(text, where)
     parents = {joint.child: joint for joint in urdf.robot.joints}
     links = list(tree.links)
     tool = _tool(urdf, tool_frame, where)
@@ -123,7 +123,7 @@ def last_common_link(text: str, where: str) -> tuple[str, tuple[str, ...]]:
     UrdfError
         The text is broken, or the chains part before a joint moves.
     """
-    tree, urdf = _parse(text, where)
+    tree, urdf = parse_urdf(text, where)
     parents = {joint.child: joint for joint in urdf.robot.joints}
     inner = {joint.parent for joint in urdf.robot.joints}
     leaves = tuple(name for name in tree.links if name not in inner)
@@ -162,8 +162,14 @@ def read_file(path: Path) -> str:
         raise UrdfError("the URDF file cannot be read", where=str(path), found=str(error)) from error
 
 
-def _parse(text: str, where: str) -> tuple[UrdfTree, yourdfpy.URDF]:
-    """Read the checked elements of the text, and have yourdfpy read what of them is needed."""
+def parse_urdf(text: str, where: str) -> tuple[UrdfTree, yourdfpy.URDF]:
+    """Read the checked elements of a URDF, and have yourdfpy read what of them is needed.
+
+    Raises
+    ------
+    UrdfError
+        See `read_tree` and `check_numbers`.
+    """
     import yourdfpy  # noqa: PLC0415  (imports trimesh: one second that only this stage needs)
 
     tree = read_tree(text, where)
