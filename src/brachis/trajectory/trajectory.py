@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.arrays import freeze
 from brachis.errors import InputError, UnknownNameError
 from brachis.robot import Robot, dynamics
 from brachis.task import Task
 from brachis.trajectory.pieces import relative_coefficients
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
-from brachis.trajectory.samples import Samples, freeze
+from brachis.trajectory.samples import Samples
 
 if TYPE_CHECKING:
     from scipy.interpolate import BPoly, BSpline
