@@ -15,6 +15,8 @@ SOURCE = Path(__file__).parents[1] / "src/brachis"
 ORDER = (
     "errors",
     "files",
+    "deadline",
+    "interrupts",
     "task",
     "robot",
     "compose",

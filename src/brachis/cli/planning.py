@@ -12,7 +12,7 @@ from brachis import planner
 from brachis.cli.folder import Writer, make_folder, write_files, write_text
 from brachis.cli.output import json_text, print_error, print_json, progress, result_console, verification_table
 from brachis.result import Result
-from brachis.search.portfolio import SAME_MOTION
+from brachis.search.book import SAME_MOTION
 
 _FILES = {
     True: ("result.npz", "result.json", "overview.png", "candidates.png"),

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.deadline import NEVER, Deadline
 from brachis.robot import dynamics
 from brachis.search.cells import Cells, unique
 from brachis.search.course import (
@@ -58,10 +59,19 @@ class Lattice:
         Nodes that a layer keeps where there are several redundant joints.
     seed : int, optional
         Of the random neighbours and starts with several redundant joints.
+    deadline : Deadline, optional
+        No layer is begun after it.
     """
 
     def __init__(
-        self, choice: Choice, *, cells_per_turn: int = 72, density: float = 1.0, nodes: int = 120, seed: int = 0
+        self,
+        choice: Choice,
+        *,
+        cells_per_turn: int = 72,
+        density: float = 1.0,
+        nodes: int = 120,
+        seed: int = 0,
+        deadline: Deadline = NEVER,
     ) -> None:
         given = choice.setting
         self.choice = choice
@@ -71,7 +81,7 @@ class Lattice:
         self._rest = np.array([i for i in range(given.robot.n) if i not in choice.redundant], dtype=int)
         self._turning = np.array([unit == "rad" for unit in given.robot.position_units])
         self._cells = Cells.of(choice, cells_per_turn)
-        self._nodes, self._seed = nodes, seed
+        self._nodes, self._seed, self._deadline = nodes, seed, deadline
         labels = self._solver.branches
         self._slots = [[b for b, label in enumerate(labels) if label == labels[first]] for first in choice.branches]
         self._first = {slot: slots[0] for slots in self._slots for slot in slots}
@@ -94,11 +104,13 @@ class Lattice:
         Returns
         -------
         list of Course or DeadEnd
-            Distinct ones, the shortest first; where the lattice ends, if there is none.
+            Distinct ones, the shortest first; none where the time was up; where the lattice ends, if there is none.
         """
         rng = np.random.default_rng(self._seed)
         layers: list[Layer] = []
         for station, s in enumerate(self.s):
+            if self._deadline.passed:
+                return []
             layer = self._next(layers[-1], station, rng) if layers else self._first_layer(rng)
             if not isinstance(layer, Layer):
                 return DeadEnd(float(s), layer)
