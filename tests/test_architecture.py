@@ -16,6 +16,8 @@ ORDER = (
     "errors",
     "files",
     "arrays",
+    "deadline",
+    "interrupts",
     "task",
     "robot",
     "compose",

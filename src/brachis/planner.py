@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from threadpoolctl import ThreadpoolController
 
 from brachis import ik
+from brachis.deadline import Deadline
 from brachis.nlp import Transcription
 from brachis.result import Result
 from brachis.robot import Robot
@@ -68,12 +69,12 @@ def _plan(
     robot: str | os.PathLike[str] | Robot | None, task: Task, families: Sequence[ik.Family], listener: Listener
 ) -> Result:
     """Run the pipeline stage by stage."""
-    began = time.perf_counter()
+    began, deadline = time.perf_counter(), Deadline.after(task.search.time_limit)
     robot = robot_for(robot, task.robot)
     task = task.model_copy(update={"robot": robot.settings})
     loaded = time.perf_counter()
     setting = Setting.of(robot, task)
-    found = find_fastest(choices(setting, families), listener)
+    found = find_fastest(choices(setting, families), deadline, listener)
     trajectory, verification = found.motion
     return Result(
         task=task,
@@ -85,6 +86,7 @@ def _plan(
         timing={"load": loaded - began, "total": time.perf_counter() - began},
         candidates=found.candidates,
         interrupted=found.interrupted,
+        undone=found.undone,
     )
 
 

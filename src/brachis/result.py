@@ -34,6 +34,8 @@ class Attempt:
         In plain words.
     refined : Refined or None
         The last problem, its answer and its multipliers; None where nothing was solved.
+    undone : str
+        What the time, or a solve that failed, left undone, in words; empty where nothing.
     """
 
     solver: str
@@ -45,6 +47,7 @@ class Attempt:
     collocation_points: int
     outcome: str
     refined: Refined | None = None
+    undone: str = ""
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,8 @@ class Result:
         All that the search looked at, the fastest verified one first.
     interrupted : bool
         True where Ctrl-C or ``search.time_limit`` ended the search: a faster motion may have been missed.
+    undone : tuple of str
+        What was left undone, in plain words.
     """
 
     task: Task
@@ -119,6 +124,7 @@ class Result:
     timing: dict[str, float] = field(default_factory=dict)
     candidates: tuple[Candidate, ...] = ()
     interrupted: bool = False
+    undone: tuple[str, ...] = ()
 
     @property
     def t_end(self) -> float:
@@ -161,6 +167,7 @@ class Result:
             "attempts": [attempt.outcome for attempt in self.attempts],
             "candidates": [candidate.to_dict() for candidate in self.candidates],
             "interrupted": self.interrupted,
+            "undone": list(self.undone),
             "wall_time_s": self.timing["total"],
             "timing_s": self.timing,
             "verified": self.verified,

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis.deadline import Deadline
 from brachis.mesh import MeshOptions, coarsest, free_knots, freeing, grow, refine_mesh, settle_knots
 from brachis.nlp.guess import guesses
 from brachis.refine import RefinementOptions, refine
@@ -50,7 +51,7 @@ def solved():
 
 def failing(problem, x):
     """A solver that breaks down."""
-    return dataclasses.replace(solve(problem, x), status=SolveStatus.FAILED)
+    return dataclasses.replace(solve(problem, x), status=SolveStatus.FAILED, violation=np.inf)
 
 
 @pytest.mark.parametrize(("joint", "intervals", "longest"), [("j1", 8, 2.285), ("j1", 12, 2.185), ("j3", 12, 2.38)])
@@ -77,7 +78,7 @@ def test_auto_is_within_half_a_percent_of_a_fine_mesh(rest):
 
 def test_intervals_are_refined_where_the_motion_switches(solved):
     problem, report = solved
-    finer, _ = refine_mesh(problem, report, solve, MeshOptions(tolerance=0.02), RefinementOptions())
+    finer, *_ = refine_mesh(problem, report, solve, MeshOptions(tolerance=0.02), RefinementOptions())
     lengths = np.diff(finer.breaks)
     assert len(lengths) < 60
     assert lengths.max() >= 4.0 * lengths.min()
@@ -87,8 +88,8 @@ def test_intervals_are_refined_where_the_motion_switches(solved):
 
 def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
     problem, report = solved
-    rough, reports = refine_mesh(problem, report, solve, MeshOptions(tolerance=0.1), RefinementOptions())
-    fine, more = refine_mesh(problem, report, solve, MeshOptions(tolerance=0.01), RefinementOptions())
+    rough, reports, _ = refine_mesh(problem, report, solve, MeshOptions(tolerance=0.1), RefinementOptions())
+    fine, more, _ = refine_mesh(problem, report, solve, MeshOptions(tolerance=0.01), RefinementOptions())
     assert len(problem.breaks) < len(rough.breaks) < len(fine.breaks)
     assert more[-1].objective < reports[-1].objective < report.objective
     assert reports[0] is report
@@ -99,33 +100,33 @@ def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
 def test_the_gain_of_a_doubling_ends_it(solved):
     problem, report = solved
     tolerance = 0.02
-    mesh, reports = refine_mesh(problem, report, solve, MeshOptions(tolerance), RefinementOptions())
-    again, further = refine_mesh(mesh, reports[-1], solve, MeshOptions(tolerance), RefinementOptions())
+    mesh, reports, _ = refine_mesh(problem, report, solve, MeshOptions(tolerance), RefinementOptions())
+    again, further, _ = refine_mesh(mesh, reports[-1], solve, MeshOptions(tolerance), RefinementOptions())
     assert len(again.breaks) > len(mesh.breaks)
     assert further[-1].objective > (1.0 - tolerance) * reports[-1].objective
 
 
 def test_what_cannot_be_solved_is_left_as_it_was(solved):
     problem, report = solved
-    mesh, reports = refine_mesh(problem, report, failing, MeshOptions(), RefinementOptions())
+    mesh, reports, _ = refine_mesh(problem, report, failing, MeshOptions(), RefinementOptions())
     assert mesh is problem
     assert reports[-1] is report
     assert len(reports) == 2
-    same, reports = free_knots(problem, report, failing, 0.1, RefinementOptions())
+    same, reports, _ = free_knots(problem, report, failing, 0.1, RefinementOptions())
     assert same is problem
     assert reports[-1] is report
 
 
 def test_no_interval_is_so_short_that_points_fall_together(solved):
     problem, report = solved
-    moved, _ = free_knots(problem, report, solve, 1e-9, RefinementOptions())
+    moved, *_ = free_knots(problem, report, solve, 1e-9, RefinementOptions())
     assert np.diff(moved.breaks).min() == pytest.approx(5e-5, rel=1e-3)
 
 
 def test_free_knots_without_a_motion_within_the_limits_are_given_up(solved, monkeypatch):
     problem, report = solved
     monkeypatch.setattr(freeing, "refine", lambda *given: dataclasses.replace(refine(*given), excess=0.5))
-    kept, reports = free_knots(problem, report, solve, 0.1, RefinementOptions())
+    kept, reports, _ = free_knots(problem, report, solve, 0.1, RefinementOptions())
     assert kept is problem
     assert reports[-1] is report
     assert len(reports) > 2
@@ -139,7 +140,7 @@ def test_a_free_solve_that_stalls_still_gives_good_knots(solved):
         free = len(tried.grid.lower) > 0
         return dataclasses.replace(answer, status=SolveStatus.STALLED) if free else answer
 
-    moved, reports = free_knots(problem, report, stalling, 0.1, RefinementOptions())
+    moved, reports, _ = free_knots(problem, report, stalling, 0.1, RefinementOptions())
     assert reports[-1].status.usable
     assert reports[-1].objective < 0.95 * report.objective
     assert moved.variables == problem.variables, "the knots should be fixed again"
@@ -162,7 +163,8 @@ def test_growing_gives_the_answer_of_a_cold_solve_in_a_few_iterations(intervals)
     problem, _ = brachis.transcribe(robot(), task(intervals=intervals))
     coarse = coarsest(problem).with_margin(0.05)
     report = solve(coarse, next(guesses(coarse)))
-    grown, reports = grow(problem, coarse, report, solve)
+    grown, reports, undone = grow(problem, coarse, report, solve)
+    assert not undone
     np.testing.assert_array_equal(grown.knots, problem.knots)
     np.testing.assert_array_equal(grown.tau, problem.tau)
     assert grown.guards == coarse.guards
@@ -171,15 +173,41 @@ def test_growing_gives_the_answer_of_a_cold_solve_in_a_few_iterations(intervals)
     assert reports[-1].objective == pytest.approx(solve(problem, next(guesses(problem))).objective, rel=1e-4)
 
 
-def test_growing_tells_of_a_level_that_cannot_be_solved():
-    problem, _ = brachis.transcribe(robot(), task(intervals=60))
+def test_growing_keeps_the_last_level_that_was_solved_and_tells_so():
+    problem, _ = brachis.transcribe(robot(), task(intervals=100))
     coarse = coarsest(problem)
     report = solve(coarse, next(guesses(coarse)))
-    grown, reports = grow(problem, coarse, report, failing)
-    assert not reports[-1].status.usable
+
+    def small_ones_only(tried, x):
+        return solve(tried, x) if tried.variables < 150 else failing(tried, x)
+
+    grown, reports, undone = grow(problem, coarse, report, small_ones_only)
+    assert len(grown.breaks) == 51
+    assert [later.status for later in reports] == [SolveStatus.OPTIMAL, SolveStatus.FAILED, SolveStatus.OPTIMAL]
     assert reports[-1].x.shape == (grown.variables,)
-    _, settled = settle_knots(coarse, (report,), failing, SplineSettings(), RefinementOptions(), target=problem)
-    assert [later.status for later in settled] == [SolveStatus.OPTIMAL, SolveStatus.FAILED]
+    assert undone == "the motion has 50 of 100 intervals, of which more were not solved"
+    settled = settle_knots(coarse, (report,), failing, SplineSettings(), RefinementOptions(), target=problem)
+    assert settled.reports[-1] is report
+    assert settled.undone == "the motion has 25 of 100 intervals, of which more were not solved"
+
+
+def test_no_level_is_begun_after_the_deadline(solved):
+    problem, report = solved
+
+    def never(*_arguments):
+        raise AssertionError("solved after the deadline")
+
+    target, _ = brachis.transcribe(robot(), task(intervals=60))
+    coarse = coarsest(target)
+    first = solve(coarse, next(guesses(coarse)))
+    over = RefinementOptions(deadline=Deadline(0.0))
+    assert grow(target, coarse, first, never, over.deadline).undone
+    for spline in (SplineSettings(knots="free", intervals=10), SplineSettings(intervals="auto")):
+        kept, reports, undone = settle_knots(problem, (report,), never, spline, over)
+        assert kept is problem
+        assert reports == (report,)
+        assert undone
+    assert refine(problem, report, never, over).reports == (report,)
 
 
 def test_many_intervals_are_planned_from_few():
@@ -194,15 +222,17 @@ def test_many_intervals_are_planned_from_few():
 def test_settings_choose_what_is_done(solved):
     problem, report = solved
     options = RefinementOptions()
-    assert settle_knots(problem, (report,), solve, SplineSettings(), options) == (problem, (report,))
+    assert settle_knots(problem, (report,), solve, SplineSettings(), options) == (problem, (report,), "")
     unusable = (report, failing(problem, report.x))
-    assert settle_knots(problem, unusable, solve, SplineSettings(knots="free"), options) == (problem, unusable)
+    assert settle_knots(problem, unusable, solve, SplineSettings(knots="free"), options) == (problem, unusable, "")
     before = dataclasses.replace(report)
-    free, reports = settle_knots(problem, (before, report), solve, SplineSettings(knots="free", intervals=10), options)
+    free, reports, _ = settle_knots(
+        problem, (before, report), solve, SplineSettings(knots="free", intervals=10), options
+    )
     assert reports[0] is before
     assert len(free.breaks) == len(problem.breaks)
     auto = SplineSettings(intervals="auto", tolerance=0.1)
-    mesh, _ = settle_knots(problem, (before, report), solve, auto, options)
+    mesh, *_ = settle_knots(problem, (before, report), solve, auto, options)
     assert len(mesh.breaks) > len(problem.breaks)
 
 

@@ -6,10 +6,10 @@ import importlib.util
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import brachis
+from brachis.deadline import NEVER
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.ways import waves
 from brachis.setting import Setting, choices
@@ -50,7 +50,7 @@ def test_thorough_looks_at_polynomials_too():
     for effort in ("fast", "thorough"):
         asked = task.model_copy(update={"search": task.search.model_copy(update={"effort": effort})})
         allowed = choices(Setting.of(robot_from_settings(task.robot), asked))
-        planned = waves(allowed, np.inf, lambda _text: None, lambda *_dead_end: None)
+        planned = waves(allowed, NEVER, lambda _text: None, lambda *_dead_end: None)
         seeds = [way.seed for wave in planned if not wave.last_resort for way in wave.ways]
         names[effort] = {seed.choice.name for seed in seeds}
     assert names["fast"] == {"rail", "joint_1", "joint_2", "joint_3"}

@@ -7,13 +7,13 @@ a few iterations, since the start is an optimum already, and ends at the same on
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from brachis.bspline import spread
+from brachis.deadline import Deadline
 from brachis.errors import PlanningError, UnreachableError
 from brachis.nlp import Motion, Transcription
 from brachis.refine import Refined, RefinementOptions, refine
@@ -93,7 +93,7 @@ def _answers(problem: Transcription, x: np.ndarray, trajectory: Trajectory) -> I
     task = trajectory.task
     options = RefinementOptions(task.refinement.tolerance, task.refinement.density, task.refinement.max_rounds)
     for backend in solver_named(task.solver.name):
-        deadline = time.monotonic() + task.search.time_limit
+        deadline = Deadline.after(task.search.time_limit)
         solve = solve_with(backend, task.solver, problem.decomposition.r, deadline, lambda _text: None)
         try:
             refined = refine(problem, solve(problem, x), solve, options)

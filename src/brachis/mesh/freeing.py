@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from brachis.mesh.judgement import SHORTEST, Answer, accepted, end_time, ending_with, gain
@@ -22,7 +20,6 @@ def free_knots(
     solve: Solve,
     shortest: float,
     refinement: RefinementOptions,
-    time_limit: float = np.inf,
 ) -> Answer:
     """Optimise the interval lengths of a solved problem together with the motion.
 
@@ -41,21 +38,19 @@ def free_knots(
     shortest : float
         Least length of an interval, in mean intervals; 5e-5 t_E at least is taken.
     refinement : RefinementOptions
-    time_limit : float, optional
-        Time after which the knots are not freed again, s.
+        After its deadline the knots are not freed again.
 
     Returns
     -------
-    problem : Transcription
-        With its knots fixed where they are best; the given one if freeing them led to no motion within the limits.
-    reports : tuple of SolverReport
-        Of all solves, `first` included; the last one belongs to `problem`.
+    Answer
+        With knots fixed where they are best; the given problem if freeing them led to no motion within the limits.
     """
     given = problem
     reports, best, x = [first], None, first.x
     shortest = max(shortest, SHORTEST * (len(problem.breaks) - 1))
-    deadline = time.perf_counter() + time_limit
     for _ in range(_ROUNDS):
+        if refinement.deadline.passed:
+            break
         free = problem.with_free_knots(shortest)
         moved = solve(free, free.variables_from(problem.motion(x)))
         fixed, start = free.frozen(moved.x)
@@ -69,9 +64,10 @@ def free_knots(
         gained = np.inf if best is None else gain(best, refined, refinement)
         if best is None or gained > 0.0:
             best = refined
-        if not gained > _WORTH_IT or time.perf_counter() > deadline:
+        if not gained > _WORTH_IT:
             break
         problem, x = refined.problem, refined.x
+    undone = "the knots were not moved as far as that pays" if refinement.deadline.passed else ""
     if best is None or not np.isfinite(end_time(best, refinement)):
-        return given, ending_with(first, reports)
-    return best.problem, ending_with(best.reports[-1], reports)
+        return Answer(given, ending_with(first, reports), undone)
+    return Answer(best.problem, ending_with(best.reports[-1], reports), undone)

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from brachis.bspline import clamped_knots
-from brachis.mesh.judgement import Answer, accepted
+from brachis.deadline import NEVER, Deadline
+from brachis.mesh.judgement import Answer, accepted, ending_with
 from brachis.nlp import Transcription
 from brachis.refine import Solve
 from brachis.solvers import SolverReport
@@ -25,7 +26,9 @@ def coarsest(problem: Transcription) -> Transcription:
     return next(_levels(problem))
 
 
-def grow(target: Transcription, coarse: Transcription, report: SolverReport, solve: Solve) -> Answer:
+def grow(
+    target: Transcription, coarse: Transcription, report: SolverReport, solve: Solve, deadline: Deadline = NEVER
+) -> Answer:
     """Solve a problem from the answer of its coarsest one, level by level.
 
     Parameters
@@ -38,25 +41,30 @@ def grow(target: Transcription, coarse: Transcription, report: SolverReport, sol
     solve : callable
         ``solve(problem, x)`` returns a `SolverReport`.
 
+    deadline : Deadline, optional
+        No level is begun after it.
+
     Returns
     -------
-    problem : Transcription
-        Over the target's knots; over those of the level whose solve failed, if one did.
-    reports : tuple of SolverReport
-        Of all solves, `report` included; the last one belongs to `problem`.
+    Answer
+        Over the target's knots; over those of the last level that was solved, where one could not be.
     """
-    reports = [report]
+    reports, solved = [report], report
     for level in _levels(target):
         if len(level.knots) <= len(coarse.knots):
             continue
+        if deadline.passed:
+            break
         finer = coarse.with_knots(level.knots, level.tau)
-        start = finer.variables_from(coarse.motion(reports[-1].x).over(finer.knots))
-        report = accepted(solve(finer, start), reports[-1])
-        coarse = finer
+        start = finer.variables_from(coarse.motion(solved.x).over(finer.knots))
+        report = accepted(solve(finer, start), solved)
         reports.append(report)
         if not report.status.usable:
             break
-    return coarse, tuple(reports)
+        coarse, solved = finer, report
+    reached, asked = len(coarse.breaks) - 1, len(target.breaks) - 1
+    undone = f"the motion has {reached} of {asked} intervals, of which more were not solved" if reached < asked else ""
+    return Answer(coarse, ending_with(solved, reports), undone)
 
 
 def _levels(problem: Transcription) -> Iterator[Transcription]:

@@ -7,7 +7,6 @@ most are halved.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +29,7 @@ _MOST_INTERVALS = 300
 _MOST_ROUNDS = 20
 _GROWTH = 3.0
 """So many times as long as a round the next one may take."""
+_UNDONE = "the mesh is coarser than spline.tolerance asks for"
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,10 @@ class MeshOptions:
         Gain of halving every interval, as a fraction of t_E, that ends the refinement.
     points_per_interval : int
         Collocation points of every interval.
-    time_limit : float
-        Time after which no round is begun, s; nor is one that looks as if it would end later.
     """
 
     tolerance: float = 1e-3
     points_per_interval: int = 3
-    time_limit: float = np.inf
 
 
 def refine_mesh(
@@ -69,19 +66,18 @@ def refine_mesh(
         ``solve(problem, x)`` returns a `SolverReport`.
     options : MeshOptions
     refinement : RefinementOptions
+        After its deadline no round is begun; nor is one that looks as if it would end later.
 
     Returns
     -------
-    problem : Transcription
+    Answer
         With all knots and collocation points.
-    reports : tuple of SolverReport
-        Of all solves, `first` included; the last one belongs to `problem`.
     """
-    reports, last = [first], first
+    reports, last, undone = [first], first, ""
     held: list[Refined] = []
-    deadline = time.perf_counter() + options.time_limit
     for _ in range(_MOST_ROUNDS):
-        if time.perf_counter() + _GROWTH * last.wall_time > deadline:
+        if _GROWTH * last.wall_time > refinement.deadline.left:
+            undone = _UNDONE
             break
         finer, x = _halved(problem, last.x, _losers(problem, last.x), options)
         if finer.variables == problem.variables or len(finer.breaks) > _MOST_INTERVALS:
@@ -101,9 +97,11 @@ def refine_mesh(
         if not gain(settled, doubled, refinement) >= options.tolerance:
             break
     best = min(held, key=lambda refined: end_time(refined, refinement), default=None)
+    if refinement.deadline.passed:
+        undone = _UNDONE
     if best is None or last.objective < end_time(best, refinement):
-        return problem, ending_with(last, reports)
-    return best.problem, ending_with(best.reports[-1], reports)
+        return Answer(problem, ending_with(last, reports), undone)
+    return Answer(best.problem, ending_with(best.reports[-1], reports), undone)
 
 
 def _losers(problem: Transcription, x: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,14 +14,32 @@ from brachis.solvers import SolverReport, SolveStatus
 SHORTEST = 5e-5
 """No interval gets shorter than this part of t_E: collocation points would fall together."""
 
-Answer = tuple[Transcription, tuple[SolverReport, ...]]
-"""A problem and the reports of all solves, of which the last one belongs to it."""
+
+class Answer(NamedTuple):
+    """What came of the knots.
+
+    Attributes
+    ----------
+    problem : Transcription
+    reports : tuple of SolverReport
+        Of all solves; the last one belongs to `problem`.
+    undone : str
+        What the time, or a solve that failed, left undone, in words; empty where nothing.
+    """
+
+    problem: Transcription
+    reports: tuple[SolverReport, ...]
+    undone: str = ""
+
+
+_EARLY = (SolveStatus.ITERATION_LIMIT, SolveStatus.TIME_LIMIT, SolveStatus.STALLED, SolveStatus.FAILED)
+"""How a solve ends that is not done; a solver that breaks down at last may have come far."""
 
 
 def accepted(report: SolverReport, before: SolverReport) -> SolverReport:
     """Accept a solve that ended early with a feasible motion faster than the one that it began with."""
     better = report.feasible and report.objective < before.objective
-    early = report.status in (SolveStatus.ITERATION_LIMIT, SolveStatus.TIME_LIMIT, SolveStatus.STALLED)
+    early = report.status in _EARLY
     return replace(report, status=SolveStatus.ACCEPTABLE) if better and early else report
 
 

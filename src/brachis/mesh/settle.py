@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from brachis.mesh.freeing import free_knots
 from brachis.mesh.growing import grow
 from brachis.mesh.halving import MeshOptions, refine_mesh
@@ -22,7 +20,6 @@ def settle_knots(
     refinement: RefinementOptions,
     *,
     target: Transcription | None = None,
-    time_limit: float = np.inf,
 ) -> Answer:
     """Do with the knots of a solved problem what a task's ``spline`` part asks for: nothing, free them, or refine.
 
@@ -35,28 +32,27 @@ def settle_knots(
         ``solve(problem, x)`` returns a `SolverReport`.
     spline : SplineSettings
     refinement : RefinementOptions
+        After its deadline no further round is begun.
     target : Transcription, optional
         The problem over all its knots, where the solved one is its coarsest (see `grow`).
-    time_limit : float, optional
-        Time after which no further round is begun, s.
 
     Returns
     -------
-    problem : Transcription
-        With fixed knots.
-    reports : tuple of SolverReport
-        Those given, and those of further solves.
+    Answer
+        With fixed knots; the reports are those given, and those of further solves.
     """
-    if target is not None and reports[-1].status.usable:
-        problem, further = grow(target, problem, reports[-1], solve)
-        reports = (*reports[:-1], *further)
     if not reports[-1].status.usable:
-        return problem, reports
+        return Answer(problem, reports)
+    grown = Answer(problem, reports[-1:])
+    if target is not None:
+        grown = grow(target, problem, reports[-1], solve, refinement.deadline)
+    last = grown.reports[-1]
     if spline.knots == "free":
-        problem, further = free_knots(problem, reports[-1], solve, spline.shortest_interval, refinement, time_limit)
+        settled = free_knots(grown.problem, last, solve, spline.shortest_interval, refinement)
     elif spline.intervals == "auto":
-        options = MeshOptions(spline.tolerance, spline.points_per_interval, time_limit)
-        problem, further = refine_mesh(problem, reports[-1], solve, options, refinement)
+        options = MeshOptions(spline.tolerance, spline.points_per_interval)
+        settled = refine_mesh(grown.problem, last, solve, options, refinement)
     else:
-        return problem, reports
-    return problem, (*reports[:-1], *further)
+        settled = Answer(grown.problem, (last,))
+    undone = "; ".join(filter(None, (grown.undone, settled.undone)))
+    return Answer(settled.problem, (*reports[:-1], *grown.reports[:-1], *settled.reports), undone)

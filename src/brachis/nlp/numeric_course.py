@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.deadline import NEVER, Deadline
 from brachis.ik import margin_gradient
 from brachis.kinematics import Decomposition
 
@@ -58,12 +59,14 @@ STRATEGIES = (
 )
 
 
-def numeric_courses(decomposition: Decomposition) -> Iterator[np.ndarray]:
+def numeric_courses(decomposition: Decomposition, deadline: Deadline = NEVER) -> Iterator[np.ndarray]:
     """Yield courses one after the other; where the first one comes near a branch boundary, the roomiest ones first.
 
     Parameters
     ----------
     decomposition : Decomposition
+    deadline : Deadline, optional
+        Courses that are not complete by then are left out.
 
     Yields
     ------
@@ -71,7 +74,7 @@ def numeric_courses(decomposition: Decomposition) -> Iterator[np.ndarray]:
         See `numeric_course`.
     """
     strategies = STRATEGIES if decomposition.r else STRATEGIES[:1]
-    courses = (numeric_course(decomposition, strategy) for strategy in strategies)
+    courses = (numeric_course(decomposition, strategy, deadline) for strategy in strategies)
     found = (course for course in courses if course is not None)
     first = next(found, None)
     if first is None:
@@ -91,7 +94,7 @@ def _room(decomposition: Decomposition, course: np.ndarray) -> float:
     return float(decomposition.solver.branch_margins(q, decomposition.branch).min(initial=np.inf))
 
 
-def numeric_course(decomposition: Decomposition, strategy: Strategy) -> np.ndarray | None:
+def numeric_course(decomposition: Decomposition, strategy: Strategy, deadline: Deadline = NEVER) -> np.ndarray | None:
     """Redundant joints along the path by numeric inverse kinematics from the start posture.
 
     Near a branch boundary the posture is unfolded first, while the tool stays where it is: there any motion of the tool
@@ -101,11 +104,12 @@ def numeric_course(decomposition: Decomposition, strategy: Strategy) -> np.ndarr
     ----------
     decomposition : Decomposition
     strategy : Strategy
+    deadline : Deadline, optional
 
     Returns
     -------
     (steps, 1 + r) ndarray or None
-        Successive values of s and the redundant joints; None where the target cannot be followed.
+        Successive values of s and the redundant joints; None where the target cannot be followed, or not in time.
     """
     if decomposition.r == 0:
         return np.array([[0.0], [1.0]])
@@ -128,7 +132,7 @@ def numeric_course(decomposition: Decomposition, strategy: Strategy) -> np.ndarr
         course.append(np.append(0.0, q[decomposition.redundant]))
     for station, target in zip(s[1:], targets[1:], strict=True):
         moved = _follow(decomposition, strategy, q, previous, target, step_s=1.0 / steps)
-        if moved is None:
+        if moved is None or deadline.passed:
             return None
         q, previous = moved
         course.append(np.append(station, q[decomposition.redundant]))

@@ -3,7 +3,7 @@
 After a solve the limits are evaluated on a grid many times denser. Where one is exceeded between collocation points,
 points are added around the worst place of each stretch and the problem is solved again from where it stands, until the
 worst ratio is within the tolerance. A last excess of the tolerance's own size is met by lengthening t_E by as little,
-and by up to one per cent once the rounds are used up.
+and by up to one per cent once the rounds, or the time, are used up.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.deadline import NEVER, Deadline
 from brachis.nlp import Transcription
 from brachis.refine.excesses import dense_grid, merged, violations
 from brachis.solvers import SolverReport
@@ -35,11 +36,14 @@ class RefinementOptions:
         Grid points per collocation point of the first solve.
     max_rounds : int
         Solves after the first one; with 0 the first answer is left as it is.
+    deadline : Deadline
+        No solve is begun after it.
     """
 
     tolerance: float = 1e-4
     density: int = 10
     max_rounds: int = 10
+    deadline: Deadline = NEVER
 
 
 @dataclass(frozen=True)
@@ -100,7 +104,7 @@ def refine(problem: Transcription, first: SolverReport, solve: Solve, options: R
         if remaining <= goal:
             return Refined(problem, tuple(reports), x, remaining, float(x[0] / answer[0]))
         tau = merged(problem, places)
-        if len(tau) == len(problem.tau):
+        if len(tau) == len(problem.tau) or options.deadline.passed:
             break
         finer = problem.resampled(tau)
         report = solve(finer, answer)

@@ -45,7 +45,7 @@ def refined_until_verified(
     refined = refine(problem, report, solve, options)
     motion = _judged(judge, refined)
     for _ in range(_SECOND_LOOKS if options.max_rounds else 0):
-        finer = None if motion is None else _where_it_failed(refined, motion)
+        finer = None if motion is None or options.deadline.passed else _where_it_failed(refined, motion)
         if finer is None:
             break
         report = solve(finer, refined.x)
@@ -78,7 +78,12 @@ def _where_it_failed(refined: Refined, motion: Motion) -> Transcription | None:
 
 
 def attempt_of(
-    refined: Refined, before: Sequence[SolverReport], number: int, tolerance: float, motion: Motion | None
+    refined: Refined,
+    before: Sequence[SolverReport],
+    number: int,
+    tolerance: float,
+    motion: Motion | None,
+    undone: str,
 ) -> Attempt:
     """Put down what became of a plan, in words too.
 
@@ -92,6 +97,8 @@ def attempt_of(
     tolerance : float
         Largest excess over a limit, as a fraction of it.
     motion : tuple of Trajectory, Verification, or None
+    undone : str
+        What was left undone, in words; empty where nothing.
 
     Returns
     -------
@@ -112,5 +119,15 @@ def attempt_of(
             found = "verified" if motion[1].passed else "the verification fails"
         outcome = f"{last.solver}: t_E = {refined.x[0]:.4f} s after {rounds} refinement rounds, {found}"
     reports = (*before, *refined.reports)
-    points = len(refined.problem.tau)
-    return Attempt(last.solver, number, reports, rounds, refined.excess, refined.stretched, points, outcome, refined)
+    return Attempt(
+        solver=last.solver,
+        guess=number,
+        reports=reports,
+        refinement_rounds=rounds,
+        excess=refined.excess,
+        stretched=refined.stretched,
+        collocation_points=len(refined.problem.tau),
+        outcome=outcome,
+        refined=refined,
+        undone=undone,
+    )

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.deadline import NEVER, Deadline
 from brachis.robot import dynamics
 from brachis.search.cells import Cells, unique
 from brachis.search.course import (
@@ -62,10 +63,19 @@ class Lattice:
         Nodes that a layer keeps where there are several redundant joints.
     seed : int, optional
         Of the random neighbours and starts with several redundant joints.
+    deadline : Deadline, optional
+        No layer is begun after it.
     """
 
     def __init__(
-        self, choice: Choice, *, cells_per_turn: int = 72, density: float = 1.0, nodes: int = 120, seed: int = 0
+        self,
+        choice: Choice,
+        *,
+        cells_per_turn: int = 72,
+        density: float = 1.0,
+        nodes: int = 120,
+        seed: int = 0,
+        deadline: Deadline = NEVER,
     ) -> None:
         given = choice.setting
         self.choice = choice
@@ -74,7 +84,7 @@ class Lattice:
         self._redundant = list(choice.redundant)
         self._rest = np.array([i for i in range(given.robot.n) if i not in choice.redundant], dtype=int)
         self._turning = np.array([unit == "rad" for unit in given.robot.position_units])
-        self._nodes, self._seed = nodes, seed
+        self._nodes, self._seed, self._deadline = nodes, seed, deadline
         self._turns = self._rest[self._turning[self._rest]]
         self._backwards = given.start is None and given.end is not None
         self._origin = given.end if self._backwards else given.start
@@ -106,12 +116,14 @@ class Lattice:
         Returns
         -------
         list of Course or DeadEnd
-            Distinct ones, the shortest first; where the lattice ends, if there is none.
+            Distinct ones, the shortest first; none where the time was up; where the lattice ends, if there is none.
         """
         rng = np.random.default_rng(self._seed)
         layers: list[Layer] = []
         stations = range(len(self.s))
         for station in reversed(stations) if self._backwards else stations:
+            if self._deadline.passed:
+                return []
             layer = self._next(layers[-1], station, rng) if layers else self._first_layer(rng)
             if not isinstance(layer, Layer):
                 return DeadEnd(float(self.s[station]), layer, backwards=self._backwards)

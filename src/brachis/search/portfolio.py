@@ -12,37 +12,30 @@ What comes out does not depend on the number of processes: work that one process
 
 from __future__ import annotations
 
-import dataclasses
-import time
 from collections.abc import Iterable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 
-import numpy as np
-
+from brachis import interrupts
+from brachis.deadline import Deadline
 from brachis.errors import PlanningError
 from brachis.result import Attempt, Candidate
-from brachis.search.course import DeadEnd
+from brachis.search.book import Book, Numbered, rounded
 from brachis.search.explain import no_motion, refuse_what_is_out_of_reach
 from brachis.search.finishing import Motion
 from brachis.search.solving import Listener
 from brachis.search.ways import Wave, waves
-from brachis.search.work import NOT_TRIED, Coarse, each, finish, plan_coarse, processes
+from brachis.search.work import each, finish, plan_coarse, processes
 from brachis.setting import Choice
 
-SAME_MOTION = "same motion as another"
-"""Status of a plan that agrees with one that ranks before it."""
-_WORTH_IT = 2e-4
-"""A plan is finished if it may be faster than the best one by more than this fraction."""
-_SAME_TIME = 1e-4
-_SAME_MOTION = 0.1  # rad or m
-_GAIN_SLACK = 0.005
-"""By which other plans may gain more from better knots than those finished."""
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no coarse plan is begun while nothing is verified."""
 _LEAST_SHARE, _LARGEST_SHARE = 2.0, 0.15
 """Seconds that every coarse plan may take, and part of the time limit that none may exceed."""
 _GRACE = 1.0
 """Seconds to finish the best plan where the time is up and nothing is verified."""
+_LAST_CHANCES = 3
+"""Plans of which one becomes the unverified motion where none could be finished."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +55,8 @@ class Found:
         The fastest verified one first.
     interrupted : bool
         Whether Ctrl-C or the time limit ended the search.
+    undone : tuple of str
+        What was left undone, in plain words.
     """
 
     attempts: tuple[Attempt, ...]
@@ -70,15 +65,18 @@ class Found:
     family: str
     candidates: tuple[Candidate, ...]
     interrupted: bool
+    undone: tuple[str, ...]
 
 
-def find_fastest(choices: Sequence[Choice], listener: Listener) -> Found:
+def find_fastest(choices: Sequence[Choice], deadline: Deadline, listener: Listener) -> Found:
     """Search for the fastest verified motion.
 
     Parameters
     ----------
     choices : sequence of Choice
         At least one, the most promising first.
+    deadline : Deadline
+        When to return the best motion so far; one that is not verified where none is.
     listener : callable
 
     Returns
@@ -92,160 +90,107 @@ def find_fastest(choices: Sequence[Choice], listener: Listener) -> Found:
     PlanningError
         No motion was found.
     KeyboardInterrupt
-        Ctrl-C before any motion was verified.
+        Ctrl-C before any motion was verified; its text tells of the best one, if there is one.
     """
-    search = _Search(choices, listener)
+    search = _Search(choices, deadline, listener)
     try:
-        search.run(waves(choices, search.deadline, listener, search.note_dead_end))
+        search.run(waves(choices, deadline, listener, search.book.note_choice))
     except KeyboardInterrupt:
-        if not search.content:
-            raise
-        search.interrupted = True
+        interrupts.forget()
+        search.book.interrupted = True
+        search.take_what_there_is()
+        if not search.book.content:
+            raise KeyboardInterrupt(str(search.book.best or "no motion was found before")) from None
     return search.found()
 
 
 class _Search:
     """A search on its way."""
 
-    def __init__(self, choices: Sequence[Choice], listener: Listener) -> None:
-        self._choices, self._listener = choices, listener
+    def __init__(self, choices: Sequence[Choice], deadline: Deadline, listener: Listener) -> None:
+        self._choices, self._deadline, self._listener = choices, deadline, listener
         self._task = choices[0].setting.task
         self._jobs = processes(self._task.search.jobs)
-        self.deadline = time.monotonic() + self._task.search.time_limit
-        self._candidates: list[Candidate] = []
-        self._attempts: list[Attempt] = []
-        self._dead_ends: dict[str, DeadEnd] = {}
-        self._best: tuple[tuple[float, float], int, Motion, str] | None = None
-        self._known: list[Coarse] = []
-        self._gain = 1.0
-        self.interrupted = False
+        self.book = Book(refined=self._task.refinement.max_rounds > 0)
 
     @property
-    def content(self) -> bool:
-        """Whether a verified motion is known; without refinement any motion will do."""
-        return self._best is not None and self._best[0][0] == -np.inf
-
-    def note_dead_end(self, choice: Choice, dead_end: DeadEnd) -> None:
-        """Put down that a choice has no course."""
-        self._dead_ends[choice.name] = dead_end
-        self._candidates.append(
-            Candidate(choice.match.redundant_joints, "", "lattice", "", np.inf, np.inf, np.inf, status=str(dead_end))
-        )
+    def _latest(self) -> Deadline:
+        """When the last work ends: later while nothing is verified."""
+        return self._deadline if self.book.content else self._deadline.extended(_GRACE)
 
     def run(self, plan: Iterable[Wave]) -> None:
         """Try wave after wave."""
         refused = False
         for wave in plan:
-            if wave.last_resort and self.content:
-                self.interrupted |= time.monotonic() > self.deadline  # lattices were left out
+            if self._deadline.passed:
+                self.book.interrupted = True
+                break
+            if wave.last_resort and self.book.content:
                 return
             if wave.last_resort and not refused:
-                refuse_what_is_out_of_reach(self._choices, self._candidates)
+                refuse_what_is_out_of_reach(self._choices, self.book.candidates)
                 refused = True
-            if time.monotonic() > self.deadline:
-                self.interrupted = True
-                return
             self._finish(self._plan(wave), wave.refined)
+        if self.book.interrupted:
+            self.take_what_there_is()
 
-    def _plan(self, wave: Wave) -> list[tuple[int, Coarse]]:
+    def _plan(self, wave: Wave) -> list[Numbered]:
         """Plan the ways of a wave coarsely, and rank those that differ."""
-        now = time.monotonic()
-        limit = self.deadline if self.content else now + _COARSE_SHARE * (self.deadline - now)
+        book, known = self.book, len(self.book.plans)
+        book.begin(len(wave.ways))
+        limit = self._deadline if book.content else self._deadline.part(_COARSE_SHARE)
         share = self._task.search.time_limit * min(_LARGEST_SHARE, _COARSE_SHARE / max(1, len(wave.ways)))
         share = max(_LEAST_SHARE, share)
-        plans: list[tuple[int, Coarse]] = []
-        for plan in each(plan_coarse, wave.ways, limit, share, jobs=self._jobs, listener=self._listener):
-            plans.append((len(self._candidates), plan))
-            self._candidates.append(_candidate(plan))
-            self.interrupted |= plan.status == NOT_TRIED
-        usable = [item for item in plans if item[1].usable]
+        with closing(each(plan_coarse, wave.ways, limit, share, jobs=self._jobs, listener=self._listener)) as outcomes:
+            for plan in outcomes:
+                book.add(plan)
         # In the last resort a motion that could not be verified gets another chance, with another solver.
-        known = [] if wave.last_resort else self._known
-        ranked: list[tuple[int, Coarse]] = []
-        for number, plan in sorted(usable, key=lambda item: (_rounded(item[1].t_end), item[0])):
-            if any(_agree(plan, other) for other in known):
-                self._note(number, status=SAME_MOTION)
-            else:
-                known.append(plan)
-                ranked.append((number, plan))
-        return ranked
+        return book.ranked(book.plans[known:], again=wave.last_resort)
 
-    def _finish(self, ranked: Sequence[tuple[int, Coarse]], most: int) -> None:
+    def _finish(self, ranked: Sequence[Numbered], most: int) -> None:
         """Refine and verify plans in the order of their end times while they may be the fastest."""
         jobs, left = self._jobs, most
         for first in range(0, len(ranked), jobs):
             batch = ranked[first : first + jobs]
-            if not self._may_win(batch[0][1], left):
+            if not self._goes_on(ranked[first:], left):
                 return
-            deadline = self.deadline if self.content else self.deadline + _GRACE
-            outcomes = each(finish, batch, deadline, jobs=jobs, listener=self._listener)
-            for (number, plan), (attempt, motion) in zip(batch, outcomes, strict=True):
-                if not self._may_win(plan, left):
-                    return
-                left -= 1
-                self._record(number, plan, attempt, motion)
+            with closing(each(finish, batch, self._latest, jobs=jobs, listener=self._listener)) as outcomes:
+                for place, (attempt, motion) in enumerate(outcomes):
+                    if place and not self._goes_on(ranked[first + place :], left):
+                        return
+                    left -= 1
+                    self._listener(attempt.outcome)
+                    self.book.record(*batch[place], attempt, motion)
 
-    def _may_win(self, plan: Coarse, left: int) -> bool:
-        """Tell whether a plan is worth finishing."""
-        if time.monotonic() > self.deadline + (0.0 if self.content else _GRACE):
-            self.interrupted = True
+    def _goes_on(self, ranked: Sequence[Numbered], left: int) -> bool:
+        """Tell whether the first one of the plans that are left is worth finishing."""
+        if not self.book.may_win(ranked[0][1]) or (self.book.content and left <= 0):
+            self.book.drop(ranked)
             return False
-        if self._best is None or not self.content:
-            return True
-        return left > 0 and plan.t_end * self._gain < (1.0 - _WORTH_IT) * self._best[0][1]
+        if self._latest.passed:
+            self.book.interrupted = True
+            return False
+        return True
 
-    def _record(self, number: int, plan: Coarse, attempt: Attempt, motion: Motion | None) -> None:
-        """Put down what became of a plan, and keep the best one."""
-        self._listener(attempt.outcome)
-        self._attempts.append(attempt)
-        t_end = np.inf if motion is None else motion[0].t_end
-        passed = motion is not None and motion[1].passed
-        self._note(number, status="verified" if passed else attempt.outcome, t_end=t_end, verified=passed)
-        if motion is None:
-            return
-        if not plan.keeps_knots:
-            self._gain = min(self._gain, (1.0 - _GAIN_SLACK) * t_end / plan.t_end)
-        will_do = motion[1].passed or self._task.refinement.max_rounds == 0
-        merit = (-np.inf if will_do else motion[1].worst_ratio - 1.0), t_end
-        if self._best is None or merit < self._best[0]:
-            self._best = merit, len(self._attempts) - 1, motion, plan.family
-
-    def _note(self, number: int, **news: object) -> None:
-        self._candidates[number] = dataclasses.replace(self._candidates[number], **news)  # type: ignore[arg-type]
+    def take_what_there_is(self) -> None:
+        """Verify the best plans as they are until one gives a motion, where none is known."""
+        over = Deadline(0.0)
+        for number, plan in sorted(self.book.plans, key=lambda item: rounded(item[1].t_end))[:_LAST_CHANCES]:
+            if self.book.best is not None:
+                return
+            self.book.record(number, plan, *finish((number, plan), over, lambda _text: None))
 
     def found(self) -> Found:
         """Return the best motion, or say why there is none."""
-        if self._best is None:
-            if self.interrupted:
+        book, best = self.book, self.book.best
+        if best is None:
+            if book.interrupted:
                 limit = self._task.search.time_limit
-                problem = f"no motion was found within the time limit of {limit:g} s"
+                left = "; ".join(book.undone())
+                problem = f"no motion was found within the time limit of {limit:g} s: {left}"
                 raise PlanningError(problem, hint="Raise search.time_limit")
-            raise no_motion(self._choices, self._candidates, self._dead_ends)
-        _, chosen, motion, family = self._best
-        order = sorted(
-            self._candidates, key=lambda c: (not c.verified, *map(_rounded, (c.t_end, c.coarse, c.estimate)))
+            raise no_motion(self._choices, book.candidates, book.dead_ends)
+        order = sorted(book.candidates, key=lambda c: (not c.verified, *map(rounded, (c.t_end, c.coarse, c.estimate))))
+        return Found(
+            tuple(book.attempts), best.attempt, best.motion, best.family, tuple(order), book.interrupted, book.undone()
         )
-        return Found(tuple(self._attempts), chosen, motion, family, tuple(order), self.interrupted)
-
-
-def _rounded(time: float) -> float:
-    """Leave out the digits in which processes differ, so that these do not choose."""
-    return float(f"{time:.6g}")
-
-
-def _candidate(plan: Coarse) -> Candidate:
-    """Put a coarse plan down."""
-    seed = plan.way.seed
-    branch = seed.choice.match.solver.branches[seed.branch]
-    names = seed.choice.match.redundant_joints
-    return Candidate(names, branch, seed.origin, plan.way.solver, seed.estimate, plan.t_end, np.inf, status=plan.status)
-
-
-def _agree(first: Coarse, second: Coarse) -> bool:
-    """Tell whether two plans of a choice are the same motion."""
-    one, other = first.way.seed, second.way.seed
-    same = (one.choice.redundant, one.branch) == (other.choice.redundant, other.branch)
-    if not same or abs(first.t_end - second.t_end) > _SAME_TIME * second.t_end:
-        return False
-    postures = [plan.problem.state(plan.reports[-1].x).q for plan in (first, second) if plan.problem is not None]
-    return bool(np.abs(postures[0] - postures[1]).max() < _SAME_MOTION)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.deadline import NEVER, Deadline
 from brachis.errors import PathError
 from brachis.kinematics import Decomposition
 from brachis.nlp.numeric_course import numeric_courses
@@ -53,7 +54,7 @@ class Seed:
         return self.choice.decomposition(self.start, self.branch)
 
 
-def lattice_seeds(choice: Choice, effort: Effort, seed: int) -> list[Seed] | DeadEnd:
+def lattice_seeds(choice: Choice, effort: Effort, seed: int, deadline: Deadline = NEVER) -> list[Seed] | DeadEnd:
     """Take the shortest distinct courses from the lattice of a choice; from a finer one where the first one ends.
 
     Parameters
@@ -62,19 +63,28 @@ def lattice_seeds(choice: Choice, effort: Effort, seed: int) -> list[Seed] | Dea
     effort : Effort
     seed : int
         Of what is drawn at random with several redundant joints.
+    deadline : Deadline, optional
 
     Returns
     -------
     list of Seed or DeadEnd
+        Empty where the time was up.
     """
     cells, nodes, most = (
         effort.cells_per_turn,
         effort.nodes,
         max(1, effort.seeds // max(1, len(choice.redundant))) * len(choice.branches),
     )
-    found = Lattice(choice, cells_per_turn=cells, nodes=nodes, seed=seed).courses(most)
+    found = Lattice(choice, cells_per_turn=cells, nodes=nodes, seed=seed, deadline=deadline).courses(most)
     if isinstance(found, DeadEnd):
-        finer = Lattice(choice, cells_per_turn=_FINER * cells, density=_DENSER, nodes=_FINER * nodes, seed=seed)
+        finer = Lattice(
+            choice,
+            cells_per_turn=_FINER * cells,
+            density=_DENSER,
+            nodes=_FINER * nodes,
+            seed=seed,
+            deadline=deadline,
+        )
         found = finer.courses(most)
     if isinstance(found, DeadEnd):
         return found
@@ -113,7 +123,7 @@ def _clear(decomposition: Decomposition, q: np.ndarray) -> bool:
     return bool(margins.min(initial=np.inf) > 0.5 * min(0.02, float(margins[0].min(initial=np.inf))))
 
 
-def numeric_seeds(choice: Choice, most: int) -> list[Seed]:
+def numeric_seeds(choice: Choice, most: int, deadline: Deadline) -> list[Seed]:
     """Carry the given start posture along the path by numeric inverse kinematics, in up to `most` ways.
 
     Parameters
@@ -121,6 +131,7 @@ def numeric_seeds(choice: Choice, most: int) -> list[Seed]:
     choice : Choice
         With a given start posture.
     most : int
+    deadline : Deadline
 
     Returns
     -------
@@ -131,7 +142,7 @@ def numeric_seeds(choice: Choice, most: int) -> list[Seed]:
         return []
     decomposition = choice.decomposition(start, choice.branches[0])
     seeds: list[Seed] = []
-    for course in numeric_courses(decomposition):
+    for course in numeric_courses(decomposition, deadline):
         if len(seeds) == most:
             break
         seeds.append(Seed(choice, choice.branches[0], start, course, np.inf, f"numeric {len(seeds) + 1}"))

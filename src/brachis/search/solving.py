@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from brachis.deadline import Deadline
 from brachis.nlp import Transcription
 from brachis.nlp.constraints.branch_margin import MARGIN
 from brachis.refine import Solve
@@ -81,7 +81,9 @@ def continued(
     return order[-1][0], tuple(report for _, report in order)
 
 
-def solve_with(solver: Solver, settings: SolverSettings, redundancy: int, deadline: float, listener: Listener) -> Solve:
+def solve_with(
+    solver: Solver, settings: SolverSettings, redundancy: int, deadline: Deadline, listener: Listener
+) -> Solve:
     """Make a function that runs one backend under the task's bounds.
 
     Parameters
@@ -90,8 +92,7 @@ def solve_with(solver: Solver, settings: SolverSettings, redundancy: int, deadli
     settings : SolverSettings
     redundancy : int
         Degree of redundancy r.
-    deadline : float
-        When to end, by the monotonic clock, s.
+    deadline : Deadline
     listener : callable
 
     Returns
@@ -106,7 +107,7 @@ def solve_with(solver: Solver, settings: SolverSettings, redundancy: int, deadli
         listener(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s")
 
     def solve(problem: Transcription, x: np.ndarray) -> SolverReport:
-        remaining = max(min(deadline - time.monotonic(), settings.time_limit), _LEAST_TIME)
+        remaining = max(min(deadline.left, settings.time_limit), _LEAST_TIME)
         return solver.solve(problem, x, SolverOptions(settings.tolerance, patience, remaining), progress)
 
     return solve

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from brachis.deadline import Deadline
 from brachis.nlp.numeric_course import STRATEGIES
 from brachis.search.course import DeadEnd
 from brachis.search.efforts import EFFORTS, Effort
@@ -19,6 +19,8 @@ from brachis.solvers import solver_named
 
 _WAVE = 12
 _CRAMPED = 0.1
+Note = Callable[[Choice, DeadEnd | None], None]
+"""Told why a choice gives no seeds: where its lattice ends, or None where the time was up."""
 
 
 @dataclass(frozen=True)
@@ -39,19 +41,17 @@ class Wave:
     last_resort: bool = False
 
 
-def waves(
-    choices: Sequence[Choice], deadline: float, listener: Listener, note: Callable[[Choice, DeadEnd], None]
-) -> Iterator[Wave]:
+def waves(choices: Sequence[Choice], deadline: Deadline, listener: Listener, note: Note) -> Iterator[Wave]:
     """Yield waves: level by level the most promising seeds with the first solver, then what is tried where all fail.
 
     Parameters
     ----------
     choices : sequence of Choice
-    deadline : float
-        By the monotonic clock, s; no lattice is begun after it.
+    deadline : Deadline
+        Courses that are not found by then are left out.
     listener : callable
     note : callable
-        Told of choices whose lattice has no course.
+        Told of choices whose lattice has no course, and of those for which there was no time.
 
     Yields
     ------
@@ -69,7 +69,7 @@ def waves(
         while rest and not seeds:  # choices without a course make room for others
             batch, rest = rest[: effort.choices], rest[effort.choices :]
             if task.search.guesses == "numeric":
-                seeds = [seed for choice in batch for seed in numeric_seeds(choice, effort.seeds)]
+                seeds = [seed for choice in batch for seed in numeric_seeds(choice, effort.seeds, deadline)]
             else:
                 seeds = _from_lattices(batch, effort, deadline, listener, note)
         known += seeds
@@ -82,7 +82,7 @@ def waves(
     many, tried = len(known) + len(STRATEGIES), {(seed.choice.name, seed.origin) for seed in known}
     yield Wave(tuple(Way(seed, solver) for seed in known[:_WAVE] for solver in solvers[1:2]), many, last_resort=True)
     for choice in (allowed or choices)[: effort.choices]:
-        for seed in numeric_seeds(choice, len(STRATEGIES)):
+        for seed in numeric_seeds(choice, len(STRATEGIES), deadline):
             if (choice.name, seed.origin) not in tried:
                 yield Wave(tuple(Way(seed, solver) for solver in solvers[:2]), many, last_resort=True)
     yield Wave(tuple(Way(seed, solver) for solver in solvers[2:] for seed in known[:2]), many, last_resort=True)
@@ -102,28 +102,33 @@ def looked_at(choices: Sequence[Choice], effort: Effort) -> list[Choice]:
 def _from_lattices(
     choices: Sequence[Choice],
     effort: Effort,
-    deadline: float,
+    deadline: Deadline,
     listener: Listener,
-    note: Callable[[Choice, DeadEnd], None],
+    note: Note,
 ) -> list[Seed]:
     """Take one seed of every choice after the other, of each those with the least estimated times first."""
     search = choices[0].setting.task.search
     redundancy = max(1, len(choices[0].redundant))
     ranked: list[tuple[int, float, int, Seed]] = []
     number = itertools.count()
-    outcomes = each(_seeds_of, choices, effort, search.seed, deadline, jobs=processes(search.jobs), listener=listener)
+    jobs = processes(search.jobs)
+    outcomes = list(each(_seeds_of, choices, effort, search.seed, deadline, jobs=jobs, listener=listener))
     for choice, outcome in zip(choices, outcomes, strict=True):
         if isinstance(outcome, DeadEnd):
             note(choice, outcome)
             continue
+        if not outcome:
+            note(choice, None)
         own = [dataclasses.replace(seed, choice=choice) for seed in outcome]  # not another process's copy
-        own = sorted(own, key=lambda seed: seed.estimate) + numeric_seeds(choice, effort.numeric)
+        own = sorted(own, key=lambda seed: seed.estimate) + numeric_seeds(choice, effort.numeric, deadline)
         ranked += [(place, seed.estimate, next(number), seed) for place, seed in enumerate(own)]
     return [seed for *_, seed in sorted(ranked, key=lambda item: item[:-1])[: max(1, effort.plans // redundancy)]]
 
 
-def _seeds_of(choice: Choice, effort: Effort, seed: int, deadline: float, listener: Listener) -> list[Seed] | DeadEnd:
-    if time.monotonic() > deadline:
+def _seeds_of(
+    choice: Choice, effort: Effort, seed: int, deadline: Deadline, listener: Listener
+) -> list[Seed] | DeadEnd:
+    if deadline.passed:
         return []
     listener(f"looking for courses on the lattice of {choice.name}")
-    return lattice_seeds(choice, effort, seed)
+    return lattice_seeds(choice, effort, seed, deadline)

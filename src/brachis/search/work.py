@@ -8,15 +8,16 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+from brachis import interrupts
+from brachis.deadline import Deadline
 from brachis.mesh import coarsest, settle_knots
 from brachis.nlp import Transcription
 from brachis.nlp.guess import starting_point
@@ -102,14 +103,13 @@ class Coarse:
         return self.way.seed.choice.match.family
 
 
-def plan_coarse(way: Way, deadline: float, share: float, listener: Listener) -> Coarse:
+def plan_coarse(way: Way, deadline: Deadline, share: float, listener: Listener) -> Coarse:
     """Solve the NLP from a seed.
 
     Parameters
     ----------
     way : Way
-    deadline : float
-        When to end, by the monotonic clock, s.
+    deadline : Deadline
     share : float
         Time that this plan may take at most, s.
     listener : callable
@@ -118,9 +118,8 @@ def plan_coarse(way: Way, deadline: float, share: float, listener: Listener) -> 
     -------
     Coarse
     """
-    if time.monotonic() > deadline:
+    if deadline.passed:
         return Coarse(way, None, (), NOT_TRIED)
-    deadline = min(deadline, time.monotonic() + share)
     seed, setting = way.seed, way.seed.choice.setting
     target = transcription(setting, seed.decomposition, intervals_of(setting.task))
     problem = coarsest(target) if target.variables > _MANY_VARIABLES else target
@@ -128,21 +127,20 @@ def plan_coarse(way: Way, deadline: float, share: float, listener: Listener) -> 
     if x is None:
         return Coarse(way, None, (), "the splines through the course leave the branch")
     try:
-        problem, reports = continued(problem, x, _solve(way, deadline, listener), MARGINS)
+        problem, reports = continued(problem, x, _solve(way, deadline.within(share), listener), MARGINS)
     except ImportError as error:
         return Coarse(way, None, (), f"{way.solver}: not installed ({error})")
     return Coarse(way, problem, reports, _in_words(reports[-1].status), target)
 
 
-def finish(numbered: tuple[int, Coarse], deadline: float, listener: Listener) -> tuple[Attempt, Motion | None]:
-    """Refine and verify a coarse plan.
+def finish(numbered: tuple[int, Coarse], deadline: Deadline, listener: Listener) -> tuple[Attempt, Motion | None]:
+    """Refine and verify a coarse plan; only verify it where the time is up.
 
     Parameters
     ----------
     numbered : tuple of int, Coarse
         Number of the candidate, and its usable plan.
-    deadline : float
-        When to end, by the monotonic clock, s.
+    deadline : Deadline
     listener : callable
 
     Returns
@@ -155,17 +153,24 @@ def finish(numbered: tuple[int, Coarse], deadline: float, listener: Listener) ->
     assert coarse.problem is not None  # noqa: S101  (it is usable)
     task = coarse.way.seed.choice.setting.task
     settings = task.refinement
-    options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds)
-    solve = _solve(coarse.way, deadline, listener)
-    budget = _KNOT_TIME * max(deadline - time.monotonic(), 0.0)
-    problem, reports = settle_knots(
-        coarse.problem, coarse.reports, solve, task.spline, options, target=coarse.target, time_limit=budget
+    options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, deadline.part(_KNOT_TIME))
+    problem, reports, undone = settle_knots(
+        coarse.problem,
+        coarse.reports,
+        _solve(coarse.way, options.deadline, listener),
+        task.spline,
+        options,
+        target=coarse.target,
     )
     decomposition = problem.decomposition
     refined, motion = refined_until_verified(
-        problem, reports[-1], solve, options, lambda answer: judge(decomposition, answer, task)
+        problem,
+        reports[-1],
+        _solve(coarse.way, deadline, listener),
+        replace(options, deadline=deadline),
+        lambda answer: judge(decomposition, answer, task),
     )
-    return attempt_of(refined, reports[:-1], number, settings.tolerance, motion), motion
+    return attempt_of(refined, reports[:-1], number, settings.tolerance, motion, undone), motion
 
 
 def _in_words(status: SolveStatus) -> str:
@@ -175,7 +180,7 @@ def _in_words(status: SolveStatus) -> str:
     return "planned" if status is SolveStatus.OPTIMAL else f"planned, {name}"
 
 
-def _solve(way: Way, deadline: float, listener: Listener) -> Solve:
+def _solve(way: Way, deadline: Deadline, listener: Listener) -> Solve:
     """Make a function that solves with the way's solver."""
     seed = way.seed
     (solver,) = solver_named(way.solver)
@@ -184,7 +189,7 @@ def _solve(way: Way, deadline: float, listener: Listener) -> Solve:
 
 def each(
     function: Callable[..., _Made], given: Sequence[_Given], *others: object, jobs: int, listener: Listener
-) -> Iterator[_Made]:
+) -> Generator[_Made, None, None]:
     """Do a piece of work for every item, in up to `jobs` processes.
 
     Parameters
@@ -217,7 +222,7 @@ def each(
     try:
         yield from made
     finally:
-        with warnings.catch_warnings():  # that work is thrown away is meant
+        with interrupts.postponed(), warnings.catch_warnings():  # that work is thrown away is meant
             warnings.simplefilter("ignore")
             made.close()
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.errors import UnreachableError
+from brachis.solvers.apart import apart_if_large
 from brachis.solvers.one_at_a_time import one_at_a_time
 from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
-from brachis.solvers.watch import Watch
+from brachis.solvers.watch import Watch, from_finite_numbers
 
 name = "ipopt"
 
@@ -27,7 +28,9 @@ _STATUS = {
 _INFINITY = 2e19  # IPOPT takes bounds beyond 1e19 for none
 
 
+@from_finite_numbers
 @one_at_a_time
+@apart_if_large
 def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
     """See `brachis.solvers.protocol.Solver`."""
     import ipyopt  # noqa: PLC0415  (a solver is imported when it is used)

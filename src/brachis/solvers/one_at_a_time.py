@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import functools
 import threading
-from collections.abc import Callable
 
-from brachis.solvers.protocol import SolverReport
+import numpy as np
+
+from brachis.solvers.protocol import Problem, Progress, Solve, SolverOptions, SolverReport
 
 _LOCK = threading.RLock()
 """Uno's BQPD and IPOPT's MUMPS keep their state in memory that all threads share: two solves at once crash."""
 
 
-def one_at_a_time(solve: Callable[..., SolverReport]) -> Callable[..., SolverReport]:
+def one_at_a_time(solve: Solve) -> Solve:
     """Let a solve wait until no other thread is in one (decorator)."""
 
     @functools.wraps(solve)
-    def waiting(*arguments: object, **options: object) -> SolverReport:
+    def waiting(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
         with _LOCK:
-            return solve(*arguments, **options)
+            return solve(problem, x, options, progress)
 
     return waiting

@@ -120,6 +120,10 @@ Progress = Callable[[int, float], None]
 """Called between iterations with the iteration's number and the objective in seconds; may raise KeyboardInterrupt."""
 
 
+Solve = Callable[[Problem, np.ndarray, SolverOptions, Progress | None], SolverReport]
+"""What a backend does; see `Solver`."""
+
+
 class Solver(Protocol):
     """A backend."""
 

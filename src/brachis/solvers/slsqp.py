@@ -6,8 +6,9 @@ import numpy as np
 from scipy import sparse
 
 from brachis.errors import UnreachableError
+from brachis.solvers.apart import apart_if_large
 from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
-from brachis.solvers.watch import Watch
+from brachis.solvers.watch import Watch, from_finite_numbers
 
 name = "slsqp"
 
@@ -23,6 +24,8 @@ class _StopSolveError(Exception):
     """Leaves SciPy's loop when the solve has to stop."""
 
 
+@from_finite_numbers
+@apart_if_large
 def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
     """See `brachis.solvers.protocol.Solver`."""
     from scipy.optimize import Bounds, minimize  # noqa: PLC0415  (a solver is imported when it is used)

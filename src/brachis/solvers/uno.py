@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from brachis.solvers.apart import apart_if_large
 from brachis.solvers.one_at_a_time import one_at_a_time
 from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
-from brachis.solvers.watch import Watch
+from brachis.solvers.watch import Watch, from_finite_numbers
 
 name = "uno"
 
@@ -36,7 +37,9 @@ _STOPPED = {
 }
 
 
+@from_finite_numbers
 @one_at_a_time
+@apart_if_large
 def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
     """See `brachis.solvers.protocol.Solver`."""
     with Watch(problem, options, progress) as watch:

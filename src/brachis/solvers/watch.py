@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import signal
 import threading
 import time
@@ -10,12 +11,15 @@ from typing import Any, Self
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
+from brachis.interrupts import Presses
+from brachis.solvers.protocol import Problem, Progress, Solve, SolverOptions, SolverReport, SolveStatus
 
 _EVALUATIONS = 10
 """Evaluations for each iteration allowed, on average: a solver that needs more cannot leave a point out of reach."""
 _SETTLED_ITERATIONS = 15
 _SETTLED_PROGRESS = 1e-6
+_LARGEST = 1e30
+"""Backends multiply what they get: the square of a larger number may overflow, and end the interpreter."""
 _FEASIBLE = 10.0
 """An answer counts as feasible up to this many times the solver's tolerance."""
 
@@ -46,12 +50,17 @@ class Watch:
         self._feasible: list[float] = []
         self._progress = progress
         self._handler: Any = None
+        self._during: Any = None
         self._began = time.perf_counter()
 
     def __enter__(self) -> Self:
-        """Take over SIGINT where this thread may."""
+        """Take over SIGINT where this thread may, and where it is not ignored."""
+        ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
         if threading.current_thread() is threading.main_thread():
-            self._handler = signal.signal(signal.SIGINT, self._keep_interrupt)
+            self._during = signal.SIG_IGN if ignored else self._keep_interrupt
+            self._handler = signal.signal(signal.SIGINT, self._during)
+            if isinstance(self._handler, Presses) and self._handler.pending:  # it went unheard until now
+                self.interrupt = KeyboardInterrupt()
         return self
 
     def __exit__(self, *_exception: object) -> None:
@@ -61,6 +70,8 @@ class Watch:
 
     def _keep_interrupt(self, _signal: int, _frame: object) -> None:
         self.interrupt = KeyboardInterrupt()
+        if isinstance(self._handler, Presses):
+            self._handler.remember()
 
     @property
     def elapsed(self) -> float:
@@ -96,7 +107,7 @@ class Watch:
         return self.timed_out or self.exhausted or self.interrupt is not None
 
     def rows(self, x: np.ndarray) -> np.ndarray:
-        """Rows at x; raises UnreachableError there, and everywhere once the solve has to stop."""
+        """Rows at x, all finite; raises UnreachableError else, and everywhere once the solve has to stop."""
         return self._evaluate(self.problem.rows, x)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
@@ -105,15 +116,21 @@ class Watch:
 
     def _evaluate(self, function: object, x: np.ndarray) -> np.ndarray:
         if self._handler is not None:  # a backend may have put a handler of its own in place since
-            signal.signal(signal.SIGINT, self._keep_interrupt)
+            signal.signal(signal.SIGINT, self._during)
         if self.must_stop():
             raise UnreachableError("the solve has to stop")
         self._evaluations += 1
+        if not _usable(x):
+            raise UnreachableError("the solver asked for a point that is not finite")
         try:
-            return np.asarray(function(np.array(x)))  # type: ignore[operator]
+            with np.errstate(over="ignore", invalid="ignore"):  # what comes of it is looked at
+                values = np.asarray(function(np.array(x)))  # type: ignore[operator]
         except KeyboardInterrupt as interrupt:
             self.interrupt = interrupt
             raise UnreachableError("the solve has to stop") from interrupt
+        if not _usable(values):
+            raise UnreachableError("a row or a slope is not a finite number there")
+        return values
 
     def report(
         self, solver: str, status: SolveStatus, x: np.ndarray, multipliers: np.ndarray | None, message: str
@@ -137,6 +154,8 @@ class Watch:
             status = SolveStatus.TIME_LIMIT
         elif self.exhausted and not status.usable:
             status = SolveStatus.ITERATION_LIMIT
+        elif violation == np.inf:
+            status = SolveStatus.EVALUATION_ERROR
         return SolverReport(
             solver=solver,
             status=status,
@@ -148,6 +167,58 @@ class Watch:
             wall_time=self.elapsed,
             message=message,
         )
+
+
+def ended(
+    solver: str, problem: Problem, x: np.ndarray, status: SolveStatus, message: str, wall_time: float = 0.0
+) -> SolverReport:
+    """Report of a solve that gave no answer: the start `x`, (v,), stays.
+
+    Parameters
+    ----------
+    solver : str
+    problem : Problem
+    x : (v,) ndarray
+    status : SolveStatus
+    message : str
+    wall_time : float, optional
+        s.
+
+    Returns
+    -------
+    SolverReport
+    """
+    none = np.zeros(len(problem.lower))
+    return SolverReport(
+        solver,
+        status,
+        x,
+        problem.objective(x),
+        residual(problem, x),
+        none,
+        iterations=0,
+        wall_time=wall_time,
+        message=message,
+    )
+
+
+def from_finite_numbers(solve: Solve) -> Solve:
+    """Refuse a start or bounds that are not numbers, which a backend could not be trusted with (decorator)."""
+
+    @functools.wraps(solve)
+    def checked(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
+        bounds = (problem.lower, problem.upper, problem.x_lower, problem.x_upper)
+        if _usable(x) and not any(np.isnan(bound).any() for bound in bounds):
+            return solve(problem, x, options, progress)
+        name = solve.__module__.rpartition(".")[2]
+        return ended(name, problem, x, SolveStatus.EVALUATION_ERROR, "the start or a bound is not a finite number")
+
+    return checked
+
+
+def _usable(values: np.ndarray) -> bool:
+    """Tell whether all values are finite, and not so large that products of them are not; NaN is neither."""
+    return bool(np.abs(values).max(initial=0.0) <= _LARGEST)
 
 
 def residual(problem: Problem, x: np.ndarray) -> float:

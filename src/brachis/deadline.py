@@ -1,0 +1,50 @@
+"""When to end."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """A moment by the monotonic clock, which all processes of a machine share; never, unless said otherwise.
+
+    Attributes
+    ----------
+    at : float
+        s.
+    """
+
+    at: float = math.inf
+
+    @classmethod
+    def after(cls, seconds: float) -> Deadline:
+        """Return the moment so many seconds from now."""
+        return cls(time.monotonic() + seconds)
+
+    @property
+    def left(self) -> float:
+        """Time until then, s; not negative."""
+        return max(self.at - time.monotonic(), 0.0)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the time is up."""
+        return time.monotonic() > self.at
+
+    def within(self, seconds: float) -> Deadline:
+        """Return the earlier one of this moment and so many seconds from now."""
+        return Deadline(min(self.at, time.monotonic() + seconds))
+
+    def part(self, share: float) -> Deadline:
+        """Return the moment at which a part of the time that is left is over."""
+        return self.within(share * self.left)
+
+    def extended(self, seconds: float) -> Deadline:
+        """Return a moment so many seconds later."""
+        return Deadline(self.at + seconds)
+
+
+NEVER = Deadline()

@@ -1,0 +1,132 @@
+"""Ctrl-C that is never lost.
+
+Python raises KeyboardInterrupt wherever the program happens to be. A compiled library that is being imported may
+swallow it, or turn it into an ImportError; a finaliser may only print it. The command line therefore remembers every
+press (`Presses`), and looks between its stages whether one went unheard.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from types import FrameType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
+
+INTERRUPTED = 130
+"""Exit code."""
+
+
+class Presses:
+    """A handler of SIGINT that remembers a press until it is heard; a second one ends the program at once.
+
+    Attributes
+    ----------
+    pending : bool
+        Whether a press was not yet heard.
+    raising : bool
+        Whether a press also raises KeyboardInterrupt.
+    """
+
+    def __init__(self) -> None:
+        self.pending = False
+        self.raising = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Remember a press, and interrupt the program where that may be."""
+        del number, frame
+        self.remember()
+        if self.raising:
+            raise KeyboardInterrupt
+
+    def remember(self) -> None:
+        """Remember a press; end the program if one is pending already."""
+        if self.pending:
+            os.write(2, b"\x1b[?25h\nbrachis: interrupted\n" if os.isatty(2) else b"brachis: interrupted\n")
+            os._exit(INTERRUPTED)
+        self.pending = True
+
+
+def listen() -> None:
+    """Remember presses from now on; where SIGINT is ignored, it stays so."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, Presses())
+        sys.unraisablehook = _quiet(sys.unraisablehook)
+
+
+def presses() -> Presses | None:
+    """Return the handler that remembers presses; None where there is none, within another program for example."""
+    handler = signal.getsignal(signal.SIGINT)
+    return handler if isinstance(handler, Presses) else None
+
+
+def check() -> None:
+    """Raise KeyboardInterrupt if a press went unheard."""
+    handler = presses()
+    if handler is not None and handler.pending:
+        raise KeyboardInterrupt
+
+
+def forget() -> None:
+    """Put down that the press was heard."""
+    handler = presses()
+    if handler is not None:
+        handler.pending = False
+
+
+@contextlib.contextmanager
+def heard() -> Iterator[None]:
+    """Let presses interrupt the program within this block, one before it included."""
+    handler = presses()
+    if handler is None:
+        yield
+        return
+    handler.raising = True
+    try:
+        check()
+        yield
+    finally:
+        handler.raising = False
+
+
+@contextlib.contextmanager
+def postponed() -> Iterator[None]:
+    """Let a press wait for the end of this block, which raises KeyboardInterrupt then.
+
+    For what must not be broken off, or might swallow it: imports of compiled libraries, finalisers.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):  # ignored, or not Python's
+        yield
+        return
+    pressed = False
+
+    def keep(_number: int, _frame: FrameType | None) -> None:
+        nonlocal pressed
+        pressed = True
+        if isinstance(before, Presses):
+            before.remember()
+
+    signal.signal(signal.SIGINT, keep)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if pressed:
+            raise KeyboardInterrupt
+
+
+def _quiet(hook: Callable[[UnraisableHookArgs], object]) -> Callable[[UnraisableHookArgs], object]:
+    """Say nothing of a KeyboardInterrupt in a finaliser: the press is remembered."""
+
+    def quiet(unraisable: UnraisableHookArgs) -> None:
+        if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+            hook(unraisable)
+
+    return quiet
