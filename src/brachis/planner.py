@@ -69,10 +69,10 @@ def _plan(
     robot: str | os.PathLike[str] | Robot | None, task: Task, families: Sequence[ik.Family], listener: Listener
 ) -> Result:
     """Run the pipeline stage by stage."""
-    began, deadline = time.perf_counter(), Deadline.after(task.search.time_limit)
+    began = time.perf_counter()
     robot = robot_for(robot, task.robot)
     task = task.model_copy(update={"robot": robot.settings})
-    loaded = time.perf_counter()
+    loaded, deadline = time.perf_counter(), Deadline.after(task.search.time_limit)
     setting = Setting.of(robot, task)
     found = find_fastest(choices(setting, families), deadline, listener)
     trajectory, verification = found.motion

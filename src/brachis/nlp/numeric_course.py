@@ -74,7 +74,7 @@ def numeric_courses(decomposition: Decomposition, deadline: Deadline = NEVER) ->
         See `numeric_course`.
     """
     strategies = STRATEGIES if decomposition.r else STRATEGIES[:1]
-    courses = (numeric_course(decomposition, strategy, deadline) for strategy in strategies)
+    courses = (numeric_course(decomposition, strategy, deadline) for strategy in strategies if not deadline.passed)
     found = (course for course in courses if course is not None)
     first = next(found, None)
     if first is None:
@@ -126,7 +126,7 @@ def numeric_course(decomposition: Decomposition, strategy: Strategy, deadline: D
         ):
             break
         moved = _follow(decomposition, strategy, q, previous, targets[0], step_s=None)
-        if moved is None:
+        if moved is None or deadline.passed:
             break
         q, previous = moved
         course.append(np.append(0.0, q[decomposition.redundant]))

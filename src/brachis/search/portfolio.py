@@ -122,11 +122,12 @@ class _Search:
         """Try wave after wave."""
         refused = False
         for wave in plan:
-            if self._deadline.passed:
-                self.book.interrupted = True
-                break
             if wave.last_resort and self.book.content:
                 return
+            if self._deadline.passed:
+                self.book.begin(len(wave.ways))
+                self.book.interrupted = True
+                break
             if wave.last_resort and not refused:
                 refuse_what_is_out_of_reach(self._choices, self.book.candidates)
                 refused = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -141,12 +142,11 @@ def numeric_seeds(choice: Choice, most: int, deadline: Deadline) -> list[Seed]:
     if start is None:
         return []
     decomposition = choice.decomposition(start, choice.branches[0])
-    seeds: list[Seed] = []
-    for course in numeric_courses(decomposition, deadline):
-        if len(seeds) == most:
-            break
-        seeds.append(Seed(choice, choice.branches[0], start, course, np.inf, f"numeric {len(seeds) + 1}"))
-    return seeds
+    courses = itertools.islice(numeric_courses(decomposition, deadline), most)
+    return [
+        Seed(choice, choice.branches[0], start, course, np.inf, f"numeric {number}")
+        for number, course in enumerate(courses, 1)
+    ]
 
 
 def first_start(choice: Choice) -> tuple[np.ndarray, int]:

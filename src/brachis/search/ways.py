@@ -19,6 +19,8 @@ from brachis.solvers import solver_named
 
 _WAVE = 12
 _CRAMPED = 0.1
+_SEED_SHARE = 0.4
+"""Part of the time that is left in which the seeds of a level are looked for; those found by then are planned."""
 Note = Callable[[Choice, DeadEnd | None], None]
 """Told why a choice gives no seeds: where its lattice ends, or None where the time was up."""
 
@@ -111,7 +113,7 @@ def _from_lattices(
     redundancy = max(1, len(choices[0].redundant))
     ranked: list[tuple[int, float, int, Seed]] = []
     number = itertools.count()
-    jobs = processes(search.jobs)
+    jobs, deadline = processes(search.jobs), deadline.part(_SEED_SHARE)
     outcomes = list(each(_seeds_of, choices, effort, search.seed, deadline, jobs=jobs, listener=listener))
     for choice, outcome in zip(choices, outcomes, strict=True):
         if isinstance(outcome, DeadEnd):
