@@ -19,6 +19,7 @@ ORDER = (
     "task",
     "robot",
     "compose",
+    "plausibility",
     "path",
     "ik",
     "kinematics",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from brachis.plausibility import Remark
 from brachis.refine import Refined
 from brachis.solvers import SolverReport
 from brachis.task import Task
@@ -108,6 +109,8 @@ class Result:
         All that the search looked at, the fastest verified one first.
     interrupted : bool
         True where Ctrl-C or ``search.time_limit`` ended the search: a faster motion may have been missed.
+    warnings : tuple of Remark
+        What of robot, task and motion is hardly meant.
     """
 
     task: Task
@@ -119,6 +122,7 @@ class Result:
     timing: dict[str, float] = field(default_factory=dict)
     candidates: tuple[Candidate, ...] = ()
     interrupted: bool = False
+    warnings: tuple[Remark, ...] = ()
 
     @property
     def t_end(self) -> float:
@@ -161,6 +165,7 @@ class Result:
             "attempts": [attempt.outcome for attempt in self.attempts],
             "candidates": [candidate.to_dict() for candidate in self.candidates],
             "interrupted": self.interrupted,
+            "warnings": [remark.to_dict() for remark in self.warnings],
             "wall_time_s": self.timing["total"],
             "timing_s": self.timing,
             "verified": self.verified,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from brachis import bottleneck, planner
 from brachis.cli.folder import Writer, make_folder, write_files, write_text
-from brachis.cli.output import json_text, print_error, print_json, progress, result_console
+from brachis.cli.output import json_text, print_error, print_json, progress, result_console, shown_warnings
 from brachis.result import Result
 
 _FILES = {
@@ -17,13 +17,13 @@ _FILES = {
 
 
 def bottleneck_command(
-    task: Path, *, urdf: Path | None, check: bool, reference: bool, out: Path | None, as_json: bool
+    task: Path, *, urdf: Path | None, check: bool, reference: bool, out: Path | None, strict: bool, as_json: bool
 ) -> int:
     """Plan, find the bottlenecks, show, write; returns the exit code."""
     if out is not None:
         make_folder(out)
-    with progress() as listener:
-        result = planner.plan(urdf, task, listener=listener)
+    with shown_warnings(), progress() as listener:
+        result = planner.plan(urdf, task, listener=listener, strict=strict)
         listener("looking for what holds the motion back")
         found = bottleneck.report(result, check=check, reference=reference)
     data = {**result.to_dict(), "bottleneck": found.to_dict()}

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import math
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -51,6 +52,25 @@ def _plain(value: object) -> object:
 def result_console() -> Console:
     """Console for results."""
     return Console(highlight=False, markup=False, soft_wrap=not sys.stdout.isatty())
+
+
+@contextmanager
+def shown_warnings() -> Iterator[None]:
+    """Print warnings of implausible figures as messages on standard error, each once."""
+    from brachis.plausibility import PlausibilityWarning  # noqa: PLC0415  (loads Pinocchio)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", PlausibilityWarning)
+        usual = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *where: Any) -> None:  # noqa: ANN401
+            if issubclass(category, PlausibilityWarning):
+                print_error(f"warning: {message}")
+            else:
+                usual(message, category, *where)
+
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield
 
 
 @contextmanager

@@ -10,7 +10,15 @@ from rich.table import Table
 
 from brachis import planner
 from brachis.cli.folder import Writer, make_folder, write_files, write_text
-from brachis.cli.output import json_text, print_error, print_json, progress, result_console, verification_table
+from brachis.cli.output import (
+    json_text,
+    print_error,
+    print_json,
+    progress,
+    result_console,
+    shown_warnings,
+    verification_table,
+)
 from brachis.result import Result
 from brachis.search.portfolio import SAME_MOTION
 
@@ -23,12 +31,12 @@ _MANY = 40
 """Candidates that are listed on the screen."""
 
 
-def plan_command(task: Path, *, urdf: Path | None, out: Path | None, as_json: bool) -> int:
+def plan_command(task: Path, *, urdf: Path | None, out: Path | None, strict: bool, as_json: bool) -> int:
     """Plan, show, write; returns the exit code."""
     if out is not None:
         make_folder(out)
-    with progress() as listener:
-        result = planner.plan(urdf, task, listener=listener)
+    with shown_warnings(), progress() as listener:
+        result = planner.plan(urdf, task, listener=listener, strict=strict)
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
     if out is not None:
         data["files"] = _write(result, data, out)
