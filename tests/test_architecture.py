@@ -21,6 +21,7 @@ ORDER = (
     "task",
     "robot",
     "compose",
+    "plausibility",
     "path",
     "ik",
     "kinematics",

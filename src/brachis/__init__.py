@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from brachis.errors import PlanningError as PlanningError
     from brachis.planner import plan as plan
     from brachis.planner import transcribe as transcribe
+    from brachis.plausibility import PlausibilityWarning as PlausibilityWarning
     from brachis.result import Candidate as Candidate
     from brachis.result import Result as Result
     from brachis.robot import LimitSpec as LimitSpec
@@ -38,6 +39,7 @@ _HOME = {
     "InputError": "brachis.errors",
     "LimitSpec": "brachis.robot",
     "PlanningError": "brachis.errors",
+    "PlausibilityWarning": "brachis.plausibility",
     "Result": "brachis.result",
     "Robot": "brachis.robot",
     "Task": "brachis.task",
@@ -57,6 +59,7 @@ __all__ = [
     "InputError",
     "LimitSpec",
     "PlanningError",
+    "PlausibilityWarning",
     "Result",
     "Robot",
     "Task",

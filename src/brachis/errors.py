@@ -71,6 +71,20 @@ class UrdfError(InputError):
     """A URDF file is missing, broken, or describes a robot that brachis cannot plan for."""
 
 
+class PlausibilityError(InputError):
+    """Figures are hardly meant, and the plan was to be strict about it.
+
+    Attributes
+    ----------
+    remarks : tuple of str
+        One line for each.
+    """
+
+    def __init__(self, remarks: Sequence[str]) -> None:
+        self.remarks = tuple(remarks)
+        super().__init__("not plausible:\n  " + "\n  ".join(self.remarks), hint="Without strict these are warnings")
+
+
 class UnknownNameError(InputError):
     """A name (joint, frame, solver, branch, ...) does not exist.
 

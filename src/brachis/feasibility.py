@@ -7,6 +7,7 @@ import numpy as np
 from brachis.errors import StartError, UnknownNameError
 from brachis.ik import Match
 from brachis.path import Path, check_on_path
+from brachis.plausibility import position_hint
 from brachis.robot import Robot, TaskSpace, dynamics
 
 _RANGE_SLACK = 1e-9
@@ -54,7 +55,8 @@ def _check_range(robot: Robot, posture: np.ndarray, name: str) -> None:
                 where=f"{name}.joints",
                 found=f"{value:.6g} {unit}",
                 allowed=f"{low:.6g} {unit} to {high:.6g} {unit}",
-                hint=f"Change the posture, or the range with robot.limits.position.{joint}",
+                hint=position_hint(value, low, high, unit)
+                or f"Change the posture, or the range with robot.limits.position.{joint}",
             )
 
 

@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 
 from threadpoolctl import ThreadpoolController
 
-from brachis import ik
+from brachis import ik, plausibility
 from brachis.deadline import Deadline
 from brachis.nlp import Transcription
+from brachis.nlp.layout import SHORTEST_TIME
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.combine import robot_for
@@ -25,6 +26,7 @@ def plan(
     *,
     families: Sequence[ik.Family] = (),
     listener: Listener | None = None,
+    strict: bool = False,
 ) -> Result:
     """Plan the minimum-time motion of a robot along a path.
 
@@ -39,6 +41,8 @@ def plan(
         Closed forms to try before the built-in ones.
     listener : callable, optional
         Told what happens.
+    strict : bool, optional
+        Whether figures that are hardly meant (degrees for rad, mm for m) are errors, not warnings.
 
     Returns
     -------
@@ -49,9 +53,15 @@ def plan(
     ------
     InputError
         The task, URDF, path or start posture is wrong (`TaskError`, `UrdfError`, `LimitError`, `PathError`, ...); a
-        `Robot` and the task's ``robot`` part contradict each other (`TaskError`).
+        `Robot` and the task's ``robot`` part contradict each other (`TaskError`); figures are hardly meant and `strict`
+        (`PlausibilityError`).
     PlanningError
         No attempt gave a motion within the limits.
+
+    Warns
+    -----
+    PlausibilityWarning
+        A figure is hardly meant.
 
     Examples
     --------
@@ -62,20 +72,30 @@ def plan(
     """
     # Batches are small: a second BLAS thread costs up to twenty times what it gives where cores are busy.
     with ThreadpoolController().limit(limits=1, user_api="blas"):
-        return _plan(robot, load_task(task), families, listener or (lambda _text: None))
+        return _plan(robot, load_task(task), families, listener or (lambda _text: None), strict=strict)
 
 
 def _plan(
-    robot: str | os.PathLike[str] | Robot | None, task: Task, families: Sequence[ik.Family], listener: Listener
+    robot: str | os.PathLike[str] | Robot | None,
+    task: Task,
+    families: Sequence[ik.Family],
+    listener: Listener,
+    *,
+    strict: bool,
 ) -> Result:
     """Run the pipeline stage by stage."""
     began = time.perf_counter()
     robot = robot_for(robot, task.robot)
     task = task.model_copy(update={"robot": robot.settings})
     loaded, deadline = time.perf_counter(), Deadline.after(task.search.time_limit)
+    remarks = plausibility.tell(plausibility.of_robot(robot), strict=strict, stacklevel=4)
     setting = Setting.of(robot, task)
+    places = plausibility.of_places(setting.robot, setting.task_space, setting.start, setting.end, task.path_start)
+    remarks += plausibility.tell(places, strict=strict, stacklevel=4)
     found = find_fastest(choices(setting, families), deadline, listener)
     trajectory, verification = found.motion
+    end_time = plausibility.of_end_time(trajectory.t_end, SHORTEST_TIME)
+    remarks += plausibility.tell(end_time, strict=strict, stacklevel=4)
     return Result(
         task=task,
         trajectory=trajectory,
@@ -87,6 +107,7 @@ def _plan(
         candidates=found.candidates,
         interrupted=found.interrupted,
         undone=found.undone,
+        warnings=remarks,
     )
 
 

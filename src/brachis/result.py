@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from brachis.plausibility import Remark
 from brachis.refine import Refined
 from brachis.solvers import SolverReport
 from brachis.task import Task
@@ -113,6 +114,8 @@ class Result:
         True where Ctrl-C or ``search.time_limit`` ended the search: a faster motion may have been missed.
     undone : tuple of str
         What was left undone, in plain words.
+    warnings : tuple of Remark
+        What of robot, task and motion is hardly meant.
     """
 
     task: Task
@@ -125,6 +128,7 @@ class Result:
     candidates: tuple[Candidate, ...] = ()
     interrupted: bool = False
     undone: tuple[str, ...] = ()
+    warnings: tuple[Remark, ...] = ()
 
     @property
     def t_end(self) -> float:
@@ -168,6 +172,7 @@ class Result:
             "candidates": [candidate.to_dict() for candidate in self.candidates],
             "interrupted": self.interrupted,
             "undone": list(self.undone),
+            "warnings": [remark.to_dict() for remark in self.warnings],
             "wall_time_s": self.timing["total"],
             "timing_s": self.timing,
             "verified": self.verified,

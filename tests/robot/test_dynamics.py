@@ -149,8 +149,8 @@ def test_brachis_counts_armature_once_and_leaves_the_damping_of_the_urdf_out():
     ("friction", "words"),
     [
         ({"viscous": -1.0}, r"robot\.friction\.viscous: is negative"),
-        ({"armature": [0.0, float("nan"), 0.0]}, r"robot\.friction\.armature: is negative or not a number"),
-        ({"coulomb_velocity": 0.0}, r"robot\.friction\.coulomb_velocity: is not positive"),
+        ({"armature": [0.0, float("nan"), 0.0]}, r"robot\.friction\.armature: is negative, too large or not a number"),
+        ({"coulomb_velocity": 0.0}, r"robot\.friction\.coulomb_velocity: is not a usable speed"),
         ({"coulomb": [1.0]}, r"robot\.friction\.coulomb: has the wrong number of values"),
     ],
 )

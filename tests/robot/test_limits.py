@@ -166,3 +166,63 @@ def test_coulomb_friction_that_no_torque_overcomes_is_refused():
         planar_robot("RR", friction=friction)
     strong = LimitSpec(torque={"j2": 100.0})
     assert planar_robot("RR", friction=friction, limits=strong).friction.coulomb[1] == 90.0
+
+
+@pytest.mark.parametrize("value", [1e-308, 1e-7, 1e13, 1e300])
+@pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration"])
+def test_limits_that_no_drive_has_are_refused(kind, value):
+    with pytest.raises(LimitError, match=f"{kind} limit is none of a real drive; found") as caught:
+        limits_of(**{kind: {"j3": value}})
+    assert caught.value.key == f"robot.limits.{kind}.j3"
+    assert "1e-06 to 1e+12 in SI units" in str(caught.value)
+
+
+@pytest.mark.parametrize("factor", [1e-308, 1e-9, 1e12, 1e308])
+@pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration"])
+def test_scaled_limits_that_no_drive_has_are_refused(kind, factor):
+    with pytest.raises(LimitError, match=f"scaled {kind} limit is none of a real drive") as caught:
+        limits_of(acceleration=9.0, scale={kind: factor})
+    assert caught.value.key == f"robot.limits.scale.{kind}"
+
+
+def test_limits_at_the_bounds_are_taken():
+    limits = limits_of(velocity=1e-6, torque=1e12, position={"j1": [-1e6, 1e6], "j2": [0.2, None]})
+    np.testing.assert_array_equal(limits.velocity, 1e-6)
+    np.testing.assert_array_equal(limits.torque, 1e12)
+    assert limits.position_upper[1] == INF
+
+
+@pytest.mark.parametrize("pair", [[-1e7, 1.0], [0.2, 1e300], [None, 1e16]])
+def test_ranges_that_end_too_far_away_are_refused(pair):
+    with pytest.raises(LimitError, match="position range ends too far away") as caught:
+        limits_of(position={"j1": pair})
+    assert caught.value.key == "robot.limits.position.j1"
+    assert "null for an open end" in str(caught.value)
+
+
+def test_a_range_of_no_width_is_empty():
+    with pytest.raises(LimitError, match="position range is empty"):
+        limits_of(position={"j1": [0.5, 0.5 + 1e-12]})
+
+
+@pytest.mark.parametrize(
+    ("friction", "where"),
+    [
+        ({"coulomb_velocity": 1e-308}, "robot.friction.coulomb_velocity"),
+        ({"armature": 1e300}, "robot.friction.armature"),
+        ({"viscous": float("inf")}, "robot.friction.viscous"),
+    ],
+)
+def test_friction_that_no_drive_has_is_refused(friction, where):
+    with pytest.raises(InputError) as caught:
+        planar_robot("RR", friction=friction)
+    assert caught.value.where == where
+
+
+def test_positions_and_gravity_that_no_robot_has_are_refused():
+    with pytest.raises(InputError, match="is no posture"):
+        planar_robot("CC").posture([1e300, 0.0], "start.joints")
+    with pytest.raises(InputError, match=r"robot\.gravity"):
+        planar_robot("RR", gravity=[0.0, 0.0, -1e300])
+    with pytest.raises(InputError, match=r"robot\.locked_joints\.j2"):
+        planar_robot("RR", locked_joints={"j2": 1e300})

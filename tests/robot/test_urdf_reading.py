@@ -284,5 +284,5 @@ def test_posture_checks():
         robot.posture([1.0, 2.0, 3.0], "start.joints")
     with pytest.raises(UnknownNameError, match="Did you mean 'j1'"):
         robot.posture({"j1x": 1.0}, "start.joints")
-    with pytest.raises(InputError, match="is not finite"):
+    with pytest.raises(InputError, match="is no posture"):
         robot.posture([1.0, float("inf")], "start.joints")

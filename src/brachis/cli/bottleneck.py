@@ -9,7 +9,15 @@ from typing import Any
 
 from brachis import bottleneck, planner
 from brachis.cli.folder import Writer, Written, make_folder, write_files, write_text
-from brachis.cli.output import exit_code, json_text, print_error, print_json, progress, result_console
+from brachis.cli.output import (
+    exit_code,
+    json_text,
+    print_error,
+    print_json,
+    progress,
+    result_console,
+    shown_warnings,
+)
 from brachis.errors import InputError
 from brachis.result import Result
 from brachis.trajectory import Trajectory
@@ -36,13 +44,13 @@ class _Motion:
 
 
 def bottleneck_command(
-    source: Path, *, urdf: Path | None, check: bool, reference: bool, out: Path | None, as_json: bool
+    source: Path, *, urdf: Path | None, check: bool, reference: bool, out: Path | None, strict: bool, as_json: bool
 ) -> int:
     """Plan a task or take a saved motion, find the bottlenecks, show, write; returns the exit code."""
     if out is not None:
         make_folder(out, (*_FILES[True], *_FILES[False]), (source, urdf))
-    with progress() as listener:
-        motion = _saved(source, urdf) if source.suffix == _SAVED else _planned(source, urdf, listener)
+    with shown_warnings(), progress() as listener:
+        motion = _saved(source, urdf) if source.suffix == _SAVED else _planned(source, urdf, listener, strict=strict)
         listener("looking for what holds the motion back")
         found = bottleneck.report(motion.made, check=check, reference=reference)
     data = {**motion.data, "bottleneck": found.to_dict()}
@@ -61,8 +69,8 @@ def bottleneck_command(
     return exit_code(motion.verified, written.failures)
 
 
-def _planned(task: Path, urdf: Path | None, listener: Callable[[str], None]) -> _Motion:
-    result = planner.plan(urdf, task, listener=listener)
+def _planned(task: Path, urdf: Path | None, listener: Callable[[str], None], *, strict: bool) -> _Motion:
+    result = planner.plan(urdf, task, listener=listener, strict=strict)
     return _Motion(result, result.trajectory, result.verified, result.interrupted, result.to_dict())
 
 

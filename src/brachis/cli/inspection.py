@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from rich.table import Table
 from brachis import ik
 from brachis.cli.output import print_json, result_console
 from brachis.errors import InputError
+from brachis.plausibility import of_robot
 from brachis.robot import LimitSpec, Robot, TaskSpace, bind
 from brachis.robot.limits import UrdfLimit
 from brachis.robot.task_space import AXES, POSE_ROWS, YAW
@@ -47,6 +49,7 @@ def inspect_command(
     tool = tool_frame or _tool(urdf, remarks)
     robot = Robot.from_urdf(urdf, tool_frame=tool, base_frame=base_frame, locked_joints=_locks(lock), limits=unlimited)
     robot, rows = bind(robot, _space(task_space) if task_space else _natural_space(robot, remarks))
+    remarks += [f"warning: {remark}" for remark in of_robot(_with_stated_speeds(robot))]
     joints = _joints(robot)
     decompositions = _decompositions(robot, rows)
     if posture is not None:
@@ -119,6 +122,12 @@ def _locks(lock: list[str]) -> dict[str, float]:
         except ValueError as error:
             raise InputError("is not understood", where="--lock", found=text, allowed="name=value, rad or m") from error
     return locked
+
+
+def _with_stated_speeds(robot: Robot) -> Robot:
+    """Return the robot with the velocity limits of its URDF, which need not be usable ones."""
+    stated = [np.inf if limit.velocity is None else limit.velocity for limit in robot.stated_limits]
+    return replace(robot, limits=replace(robot.limits, velocity=np.array(stated)))
 
 
 def _joints(robot: Robot) -> list[dict[str, Any]]:

@@ -52,6 +52,10 @@ TaskFile = Annotated[Path, typer.Argument(help="Task file (YAML).", metavar="TAS
 ResultFile = Annotated[
     Path, typer.Argument(help="Result file (npz) written by 'brachis plan --out'.", metavar="RESULT")
 ]
+Strict = Annotated[
+    bool,
+    typer.Option("--strict", help="Refuse figures that are hardly meant, such as degrees for rad, instead of warning."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 
 
@@ -85,12 +89,13 @@ def plan(
         ),
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
+    strict: Strict = False,
     json: Json = False,
 ) -> None:
     """Plan a task, verify the motion, and show what came out."""
     from brachis.cli import planning  # noqa: PLC0415  (each command imports what it needs)
 
-    raise typer.Exit(planning.plan_command(task, urdf=urdf, out=out, as_json=json))
+    raise typer.Exit(planning.plan_command(task, urdf=urdf, out=out, strict=strict, as_json=json))
 
 
 @app.command()
@@ -120,13 +125,16 @@ def bottleneck(
         ),
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
+    strict: Strict = False,
     json: Json = False,
 ) -> None:
     """Plan a task, or take a saved motion, and say which limits cost how much time, and which is active when."""
     from brachis.cli import bottleneck as command  # noqa: PLC0415
 
     raise typer.Exit(
-        command.bottleneck_command(task, urdf=urdf, check=check, reference=reference, out=out, as_json=json)
+        command.bottleneck_command(
+            task, urdf=urdf, check=check, reference=reference, out=out, strict=strict, as_json=json
+        )
     )
 
 

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -130,6 +131,25 @@ def _plain(value: object) -> object:
 def result_console() -> Console:
     """Console for results."""
     return Console(highlight=False, markup=False, soft_wrap=not sys.stdout.isatty())
+
+
+@contextmanager
+def shown_warnings() -> Iterator[None]:
+    """Print warnings of implausible figures as messages on standard error, each once."""
+    from brachis.plausibility import PlausibilityWarning  # noqa: PLC0415  (loads Pinocchio)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", PlausibilityWarning)
+        usual = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *where: Any) -> None:  # noqa: ANN401
+            if issubclass(category, PlausibilityWarning):
+                print_error(f"warning: {message}")
+            else:
+                usual(message, category, *where)
+
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield
 
 
 @contextmanager

@@ -17,6 +17,7 @@ from brachis.cli.output import (
     print_json,
     progress,
     result_console,
+    shown_warnings,
     verification_table,
 )
 from brachis.errors import InputError
@@ -32,12 +33,12 @@ _MANY = 40
 """Candidates that are listed on the screen."""
 
 
-def plan_command(task: Path, *, urdf: Path | None, out: Path | None, as_json: bool) -> int:
+def plan_command(task: Path, *, urdf: Path | None, out: Path | None, strict: bool, as_json: bool) -> int:
     """Plan, show, write; returns the exit code."""
     if out is not None:
         make_folder(out, (*_FILES[True], *_FILES[False]), (task, urdf))
-    with progress() as listener:
-        result = planner.plan(urdf, task, listener=listener)
+    with shown_warnings(), progress() as listener:
+        result = planner.plan(urdf, task, listener=listener, strict=strict)
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
     failures: tuple[InputError, ...] = ()
     if out is not None:

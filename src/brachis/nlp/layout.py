@@ -24,7 +24,8 @@ from brachis.nlp.constraints import Constraint
 from brachis.nlp.curves import Places, TiedSpline
 from brachis.nlp.grid import Grid
 
-_SHORTEST_TIME = 1e-4
+SHORTEST_TIME = 1e-4
+"""Least end time, s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +64,7 @@ class Layout:
         slices = tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
         x_lower = np.concatenate([np.full(ends[-1], -np.inf), grid.lower])
         x_upper = np.concatenate([np.full(ends[-1], np.inf), grid.upper])
-        x_lower[0] = _SHORTEST_TIME
+        x_lower[0] = SHORTEST_TIME
         x_lower[slices[0]], x_upper[slices[0]] = 0.0, 1.0
         lengths = slice(int(ends[-1]), len(x_lower))
         windows = grid.windows(grid.lengths_of(grid.knots))

@@ -10,6 +10,7 @@ import pinocchio as pin
 from brachis.errors import InputError, StartError
 from brachis.path.build import build_path
 from brachis.path.protocol import Path
+from brachis.plausibility import place_hint
 from brachis.robot import Robot, TaskSpace
 from brachis.robot.task_space import AXES
 from brachis.task import Task
@@ -55,7 +56,8 @@ def check_on_path(robot: Robot, task_space: TaskSpace, posture: np.ndarray, targ
     ------
     StartError
     """
-    miss = np.abs(task_space.difference(task_space.value(robot.tool_placement(posture)), target))
+    place = task_space.value(robot.tool_placement(posture))
+    miss = np.abs(task_space.difference(place, target))
     worst = int(np.argmax(miss))
     if miss[worst] > _ON_PATH:
         raise StartError(
@@ -63,7 +65,8 @@ def check_on_path(robot: Robot, task_space: TaskSpace, posture: np.ndarray, targ
             where=f"{name}.joints",
             found=f"{miss[worst]:.3g} {task_space.units[worst]} off in {task_space.rows[worst]}",
             allowed=f"at most {_ON_PATH:g} {task_space.units[worst]}",
-            hint=f"Choose a posture whose tool is at the path's {'beginning' if name == 'start' else 'end'}",
+            hint=place_hint(task_space, place, target)
+            or f"Choose a posture whose tool is at the path's {'beginning' if name == 'start' else 'end'}",
         )
 
 

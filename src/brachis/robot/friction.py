@@ -9,7 +9,9 @@ import numpy as np
 
 from brachis.arrays import freeze
 from brachis.errors import InputError
-from brachis.robot.limits import per_joint_values
+from brachis.robot.limits import LARGEST, per_joint_values
+
+_LEAST_SPEED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -57,12 +59,14 @@ class Friction:
         for key, value in given.items():
             where = f"robot.friction.{key}"
             spread[key] = np.array(per_joint_values(where, value, list(joint_names), 0.0), dtype=float)
-            if not np.all(spread[key] >= 0.0):
-                raise InputError("is negative or not a number", where=where, found=value, allowed="numbers >= 0")
+            if not np.all((spread[key] >= 0.0) & (spread[key] <= LARGEST)):
+                allowed = f"numbers from 0 to {LARGEST:g}"
+                raise InputError("is negative, too large or not a number", where=where, found=value, allowed=allowed)
         where = "robot.friction.coulomb_velocity"
         v_eps = np.array(per_joint_values(where, coulomb_velocity, list(joint_names), 0.01), dtype=float)
-        if not np.all(v_eps > 0.0):
-            raise InputError("is not positive", where=where, found=coulomb_velocity, allowed="> 0 rad/s or m/s")
+        if not np.all((v_eps >= _LEAST_SPEED) & (v_eps <= LARGEST)):
+            allowed = f"{_LEAST_SPEED:g} to {LARGEST:g} rad/s or m/s"
+            raise InputError("is not a usable speed", where=where, found=coulomb_velocity, allowed=allowed)
         return cls(**spread, v_eps=v_eps)
 
     def check_against(self, joint_names: Sequence[str], limits: np.ndarray) -> None:

@@ -13,6 +13,12 @@ from brachis.errors import InputError, LimitError, UnknownNameError
 _SCALABLE = ("torque", "velocity", "acceleration")
 FROM_URDF = "urdf"
 """Marks a limit that is taken from the URDF (the default of every `LimitSpec` entry)."""
+LEAST, LARGEST = 1e-6, 1e12
+"""No drive has a smaller or larger torque, velocity or acceleration limit, in SI units; products and squares of such
+figures are still numbers."""
+FARTHEST = 1e6
+"""No position is farther from zero, rad or m: there the rounding of numbers is a tenth of a nanometre."""
+_NARROWEST = 1e-9
 
 PerJoint = float | Sequence[float | None] | Mapping[str, float | None] | None | str
 Range = Sequence[float | None] | None
@@ -94,7 +100,8 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
     Raises
     ------
     LimitError
-        A limit is not positive, or a joint has neither a torque nor an acceleration limit.
+        A limit is not positive or, before or after scaling, outside [`LEAST`, `LARGEST`]; a joint has neither a torque
+        nor an acceleration limit; a range is empty or ends beyond `FARTHEST`.
     UnknownNameError
         A limit names a joint that is not of the chain.
     """
@@ -114,9 +121,9 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
     return Limits(
         position_lower=lower,
         position_upper=upper,
-        velocity=velocity * spec.scale.get("velocity", 1.0),
-        acceleration=acceleration * spec.scale.get("acceleration", 1.0),
-        torque=torque * spec.scale.get("torque", 1.0),
+        velocity=_scaled("velocity", velocity, spec.scale, names),
+        acceleration=_scaled("acceleration", acceleration, spec.scale, names),
+        torque=_scaled("torque", torque, spec.scale, names),
     )
 
 
@@ -128,6 +135,27 @@ def _check_scale(scale: Mapping[str, float]) -> None:
             raise InputError(
                 "is not a factor", where=f"robot.limits.scale.{kind}", found=factor, allowed="a finite number > 0"
             )
+
+
+def _scaled(kind: str, limits: np.ndarray, scale: Mapping[str, float], names: Sequence[str]) -> np.ndarray:
+    """Multiply limits, (n,), by their factor."""
+    factor = scale.get(kind, 1.0)
+    for name, limit in zip(names, limits, strict=True):
+        if np.isfinite(limit):
+            _check_size(kind, float(limit) * factor, name, f"robot.limits.scale.{kind}", "scaled ")
+    return np.asarray(limits * factor)
+
+
+def _check_size(kind: str, limit: float, joint: str, key: str, what: str) -> None:
+    """Refuse a limit that no drive has."""
+    if not LEAST <= limit <= LARGEST:
+        raise LimitError(
+            f"{what}{kind} limit is none of a real drive",
+            joint=joint,
+            key=key,
+            found=f"{limit:g}",
+            allowed=f"{LEAST:g} to {LARGEST:g} in SI units, or null for no limit",
+        )
 
 
 def per_joint_values(key: str, value: object, names: Sequence[str], missing: object) -> list[object]:
@@ -176,6 +204,8 @@ def _per_joint(kind: str, value: PerJoint, names: list[str], urdf: Sequence[floa
                 found=f"{number:g}",
                 allowed="a number > 0, or null for no limit",
             )
+        if np.isfinite(number):
+            _check_size(kind, number, name, f"{key}.{name}", "")
         limit[i] = number
     return limit
 
@@ -206,12 +236,16 @@ def _ranges(value: PerJointRange, names: list[str], urdf: Sequence[UrdfLimit]) -
             )
         lower[i] = -np.inf if ends[0] is None else float(ends[0])
         upper[i] = np.inf if ends[1] is None else float(ends[1])
-        if not lower[i] < upper[i]:
-            raise LimitError(
-                "position range is empty",
-                joint=name,
-                key=f"robot.limits.position.{name}",
-                found=f"[{lower[i]:g}, {upper[i]:g}]",
-                allowed="[lower, upper] with lower < upper",
-            )
+        _check_range(lower[i], upper[i], name)
     return lower, upper
+
+
+def _check_range(lower: float, upper: float, joint: str) -> None:
+    """Refuse a range that is empty, or ends where positions are no longer exact."""
+    key, found = f"robot.limits.position.{joint}", f"[{lower:g}, {upper:g}]"
+    if not upper - lower >= _NARROWEST:
+        allowed = f"[lower, upper] with lower < upper, {_NARROWEST:g} rad or m apart at least"
+        raise LimitError("position range is empty", joint=joint, key=key, found=found, allowed=allowed)
+    if any(np.isfinite(end) and abs(end) > FARTHEST for end in (lower, upper)):
+        allowed = f"ends within {FARTHEST:g} rad or m of zero, null for an open end"
+        raise LimitError("position range ends too far away", joint=joint, key=key, found=found, allowed=allowed)

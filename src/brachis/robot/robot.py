@@ -12,7 +12,16 @@ import pinocchio as pin
 
 from brachis.errors import InputError, UrdfError
 from brachis.robot.friction import Friction
-from brachis.robot.limits import FROM_URDF, Limits, LimitSpec, UrdfLimit, per_joint_values, resolve_limits
+from brachis.robot.limits import (
+    FARTHEST,
+    FROM_URDF,
+    LARGEST,
+    Limits,
+    LimitSpec,
+    UrdfLimit,
+    per_joint_values,
+    resolve_limits,
+)
 from brachis.robot.urdf import read_chain, read_file
 from brachis.robot.urdf_bodies import check_bodies
 from brachis.task import RobotSettings, check_robot_settings
@@ -168,8 +177,9 @@ class Robot:
         if missing:
             raise InputError("joints are missing", where=where, found=", ".join(missing), allowed="a position for each")
         q = np.array(values, dtype=float)
-        if not np.all(np.isfinite(q)):
-            raise InputError("is not finite", where=where, found=list(q), allowed="finite numbers, rad or m")
+        if not np.all(np.abs(q) <= FARTHEST):
+            allowed = f"finite numbers, within {FARTHEST:g} rad or m of zero"
+            raise InputError("is no posture", where=where, found=q.tolist(), allowed=allowed)
         return q
 
     def tool_placement(self, q: np.ndarray) -> pin.SE3:
@@ -204,8 +214,9 @@ def _vector(gravity: Sequence[float]) -> np.ndarray:
         vector = np.asarray(gravity, dtype=float)
     except (TypeError, ValueError):
         vector = np.empty(0)
-    if vector.shape != (3,) or not np.all(np.isfinite(vector)):
-        raise InputError("is not a vector", where="robot.gravity", found=gravity, allowed="[x, y, z] in m/s^2")
+    if vector.shape != (3,) or not np.all(np.abs(vector) <= LARGEST):
+        allowed = f"[x, y, z] in m/s^2, finite, at most {LARGEST:g} in size"
+        raise InputError("is not a vector", where="robot.gravity", found=gravity, allowed=allowed)
     return vector
 
 

@@ -14,7 +14,7 @@ from lxml import etree
 
 from brachis import files
 from brachis.errors import UnknownNameError, UrdfError
-from brachis.robot.limits import UrdfLimit
+from brachis.robot.limits import FARTHEST, UrdfLimit
 from brachis.robot.urdf_bodies import Body, stated_bodies
 from brachis.robot.urdf_checks import MOVING_TYPES, check_inertias, check_joints
 from brachis.robot.urdf_numbers import check_numbers
@@ -99,8 +99,13 @@ def read_chain(
     for name in locked_joints:
         if name not in by_name:
             raise UnknownNameError("moving joint", name, by_name, where=f"{where}: locked_joints")
-        if not np.isfinite(locked_joints[name]):
-            raise UrdfError("the position of a locked joint is not finite", where=f"locked_joints.{name}")
+        if not abs(locked_joints[name]) <= FARTHEST:
+            raise UrdfError(
+                "the position of a locked joint is no position",
+                where=f"robot.locked_joints.{name}",
+                found=locked_joints[name],
+                allowed=f"finite, within {FARTHEST:g} rad or m of zero",
+            )
     chain = [joint for joint in path_joints if joint.type != "fixed" and joint.name not in locked_joints]
     check_joints(chain, {joint.name for joint in chain}, by_name, where)
     if not chain:

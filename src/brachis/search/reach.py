@@ -8,6 +8,7 @@ import numpy as np
 
 from brachis.errors import BrachisError, PathError
 from brachis.kinematics import Decomposition
+from brachis.plausibility import path_hint
 from brachis.robot import dynamics
 
 _RANGE_SLACK = 1e-9
@@ -45,7 +46,8 @@ def explain_failure(decomposition: Decomposition, *, any_branch: bool = False) -
         (
             found.exists.any(axis=(1, 2)) | anywhere.exists.any(axis=(1, 2)),
             "the path is out of reach from s = {first:.3g} on (no posture was found)",
-            "Shorten or move the path, or choose another start posture",
+            path_hint(decomposition.robot, decomposition.task_space, decomposition.path.sample(s).target)
+            or "Shorten or move the path, or choose another start posture",
         ),
         (
             within,

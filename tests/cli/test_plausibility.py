@@ -1,0 +1,62 @@
+"""Figures that are hardly meant, on the command line: one message each on standard error, an error with --strict."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
+WARNING = "brachis: warning: robot.limits.scale.velocity: the factor raises limits far beyond what was stated"
+
+
+@pytest.fixture
+def percent(task, write):
+    task["robot"]["limits"] = {"torque": 10, "scale": {"velocity": 80}}
+    task |= {"search": {"effort": "single"}, "spline": {"intervals": 10}}
+    return write(task)
+
+
+@pytest.mark.parametrize("command", ["plan", "bottleneck"])
+def test_warned_once_and_in_the_json(command, run, percent, tmp_path):
+    out = tmp_path / "out"
+    outcome = run(command, percent, "--json", "--out", out)
+    assert outcome.code == 0, outcome.err
+    assert outcome.err.count("warning") == 1
+    assert outcome.err.startswith(WARNING)
+    (warning,) = json.loads(outcome.out)["warnings"]
+    assert warning["where"] == "robot.limits.scale.velocity"
+    (written,) = out.glob("*.json")
+    assert json.loads(written.read_text())["warnings"] == [warning]
+
+
+@pytest.mark.parametrize("command", ["plan", "bottleneck"])
+def test_strict_is_wrong_input(command, run, percent):
+    outcome = run(command, percent, "--strict")
+    assert outcome.code == 2
+    assert outcome.out == ""
+    assert "not plausible" in outcome.err
+    assert "robot.limits.scale.velocity" in outcome.err
+    assert "warning:" not in outcome.err
+
+
+def test_a_failed_plan_shows_its_warnings(run, task, write):
+    task["robot"]["limits"] = {"torque": 10, "scale": {"velocity": 80}}
+    task["path"] = [{"line": {"length": 5.0, "angle_deg": 0}}]
+    outcome = run("plan", write(task))
+    assert outcome.code == 2
+    assert outcome.err.startswith(WARNING)
+    assert "out of reach" in outcome.err
+
+
+def test_inspect_shows_them_as_remarks(run, tmp_path):
+    urdf = tmp_path / "degrees.urdf"
+    text = SCARA.read_text()
+    urdf.write_text(text.replace('velocity="100"', 'velocity="180"', 1))
+    assert urdf.read_text() != text
+    outcome = run("inspect", urdf, "--json")
+    assert outcome.code == 0, outcome.err
+    remarks = json.loads(outcome.out)["remarks"]
+    assert any("warning: robot.limits.velocity.j1" in remark and "180 rad/s" in remark for remark in remarks)
+    assert not any("warning" in remark for remark in json.loads(run("inspect", SCARA, "--json").out)["remarks"])

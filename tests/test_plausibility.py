@@ -1,0 +1,248 @@
+"""Figures that are hardly meant: which are told, how, and that real robots are left in peace."""
+
+from __future__ import annotations
+
+import re
+import sys
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.errors import BrachisError, PathError, PlausibilityError, StartError, UrdfError
+from brachis.plausibility import of_end_time, of_robot
+from brachis.robot import LimitSpec, Robot
+from brachis.robot.urdf import last_common_link, read_file
+from support.chains import Joint, chain_urdf
+
+ROOT = Path(__file__).parents[1]
+SCARA = ROOT / "robots/scara3/robot.urdf"
+RAIL = ROOT / "robots/tx90l_rail/robot.urdf"
+PACKAGE = "cmeel.prefix/share/example-robot-data/robots"
+FOREIGN = sorted(file for folder in map(Path, sys.path) for file in (folder / PACKAGE).rglob("*.urdf"))
+OWN = sorted((ROOT / "robots").rglob("*.urdf"))
+
+
+def task(**changes: object) -> dict:
+    base = {
+        "brachis": 1,
+        "robot": {"urdf": str(SCARA), "gravity": [0, 0, 0], "limits": {"torque": 10, "velocity": None}},
+        "start": {"joints": [np.pi / 6, -2 * np.pi / 3, 2 * np.pi / 3]},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"length": 0.5, "angle_deg": 90}}],
+        "redundant_joints": ["j3"],
+        "spline": {"intervals": 10},
+        "search": {"effort": "single"},
+    }
+    return {**base, **changes}
+
+
+def with_limits(**limits: object) -> dict:
+    return task(robot={**task()["robot"], "limits": {"torque": 10, "velocity": None, **limits}})
+
+
+def arm(*, length: float = 0.4, mass: float = 2.0, inertia: float = 0.01, slide: bool = False) -> Robot:
+    matrix = " ".join(f'{key}="{inertia}"' for key in ("ixx", "iyy", "izz"))
+    inertial = f'<inertial><mass value="{mass}"/><inertia {matrix} ixy="0" ixz="0" iyz="0"/></inertial>'
+    kinds = ("prismatic" if slide else "revolute", "revolute", "revolute")
+    joints = [Joint(kind, xyz=(length, 0.0, 0.0), inertial=inertial) for kind in kinds]
+    return Robot.from_urdf("file.urdf", urdf_text=chain_urdf(joints, tool=(length, 0.0, 0.0)))
+
+
+def told(robot: Robot) -> list[tuple[str, str]]:
+    return [(remark.where, remark.message) for remark in of_robot(robot)]
+
+
+def with_stated_speeds(file: Path) -> Robot | None:
+    """The robot with the URDF's limits but for torques; None for files that hold no arm."""
+    try:
+        tool, _ = last_common_link(read_file(file), file.name)
+        robot = Robot.from_urdf(file, tool_frame=tool, limits=LimitSpec(torque=None, velocity=None, acceleration=1.0))
+    except BrachisError:
+        return None
+    speeds = [np.inf if limit.velocity is None else limit.velocity for limit in robot.stated_limits]
+    return replace(robot, limits=replace(robot.limits, velocity=np.array(speeds)))
+
+
+@pytest.mark.parametrize("file", [*OWN, *FOREIGN], ids=lambda file: f"{file.parent.name}/{file.name}")
+def test_real_robots_are_plausible(file):
+    robot = with_stated_speeds(file)
+    assert robot is None or of_robot(robot) == ()
+
+
+def test_enough_real_robots_are_looked_at():
+    assert sum(with_stated_speeds(file) is not None for file in OWN) >= 6
+
+
+def test_velocities_and_ranges_in_degrees():
+    robot = arm()
+    assert told(robot) == []
+    limits = robot.limits
+    fast = replace(robot, limits=replace(limits, velocity=np.array([180.0, 59.0, 1000.0])))
+    assert told(fast) == [("robot.limits.velocity.j1", "the velocity limit looks like degrees per second")]
+    wide = replace(
+        robot,
+        limits=replace(
+            limits,
+            position_lower=np.array([-180.0, 0.2, -12.0]),
+            position_upper=np.array([180.0, 1e4, 12.0]),
+        ),
+    )
+    assert told(wide) == [("robot.limits.position.j1", "the position range looks like degrees")]
+
+
+def test_rails_in_mm():
+    robot = arm(slide=True)
+    rail = replace(
+        robot,
+        limits=replace(
+            robot.limits,
+            velocity=np.array([1500.0, 3.0, 3.0]),
+            position_lower=np.array([-2000.0, -3.0, -3.0]),
+            position_upper=np.array([2000.0, 3.0, 3.0]),
+        ),
+    )
+    assert told(rail) == [
+        ("robot.limits.velocity.j1", "the velocity limit looks like mm per second"),
+        ("robot.limits.position.j1", "the position range looks like mm"),
+    ]
+
+
+def test_a_placeholder_that_is_scaled_stays_one():
+    robot = Robot.from_urdf(SCARA, limits=LimitSpec(velocity=100.0, scale={"velocity": 0.7}))
+    assert told(robot) == []
+
+
+def test_lengths_in_mm():
+    messages = {message for _, message in told(arm(length=400.0))}
+    assert messages == {"the distance from the joint before looks like mm"}
+    assert [where for where, _ in told(arm(length=400.0))] == [
+        "URDF origin of j2",
+        "URDF origin of j3",
+        "URDF origin of tool",
+    ]
+
+
+def test_masses_in_g_and_inertias_in_kg_mm2():
+    assert {message for _, message in told(arm(mass=2000.0, inertia=10.0))} == {"the mass looks like g"}
+    assert {message for _, message in told(arm(mass=2.0, inertia=1e4))} == {"the inertia looks like kg mm^2"}
+
+
+def test_the_least_end_time():
+    assert of_end_time(1e-4, 1e-4) != ()
+    assert of_end_time(1e-3, 1e-4) == ()
+    limits = {"torque": 1e12}
+    content = task(robot={**task()["robot"], "limits": {**limits, "velocity": None}})
+    with pytest.warns(brachis.PlausibilityWarning, match="the end time is the least that the planner knows"):
+        result = brachis.plan(None, content)
+    assert [remark.where for remark in result.warnings] == ["t_end"]
+
+
+def test_warnings_are_emitted_and_kept_in_the_result():
+    content = with_limits(scale={"velocity": 50})
+    with pytest.warns(brachis.PlausibilityWarning, match=r"robot\.limits\.scale\.velocity.*found 50") as caught:
+        result = brachis.plan(None, content)
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+    assert result.to_dict()["warnings"] == [
+        {
+            "where": "robot.limits.scale.velocity",
+            "message": "the factor raises limits far beyond what was stated",
+            "found": "50",
+            "usual": "0.1 to 1; a percentage is divided by 100",
+        }
+    ]
+
+
+def test_a_plausible_plan_has_no_warnings():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result = brachis.plan(None, task(), strict=True)
+    assert result.warnings == ()
+    assert result.to_dict()["warnings"] == []
+
+
+def test_strict_refuses_before_anything_is_planned(monkeypatch):
+    monkeypatch.setattr("brachis.planner.find_fastest", lambda *_: pytest.fail("planned"))
+    with pytest.raises(PlausibilityError, match=r"scale\.velocity") as caught:
+        brachis.plan(None, with_limits(scale={"velocity": 50}), strict=True)
+    assert caught.value.exit_code == 2
+    assert len(caught.value.remarks) == 1
+
+
+def test_a_posture_in_degrees_where_joints_turn_without_end():
+    # 30, -120 and 120 rad are reached all the same: joints of this arm have no range.
+    with pytest.raises(PlausibilityError) as caught:
+        brachis.plan(None, task(start={"joints": [30.0, -120.0, 120.0]}), strict=True)
+    assert [remark.split(":")[0] for remark in caught.value.remarks] == [f"start.joints.j{i}" for i in (1, 2, 3)]
+
+
+def test_yaw_of_the_path_start_in_degrees():
+    content = task(start="free", path_start=[1.7, 0.0, 90.0], task_space=["x", "y", "yaw"], redundant_joints=[])
+    content["path"] = [{"line": {"by": [0.0, 0.2, 0.0]}}]
+    with pytest.raises(PlausibilityError, match="path_start: yaw looks like degrees; found 90 rad"):
+        brachis.plan(None, content, strict=True)
+
+
+@pytest.mark.parametrize(
+    ("joints", "hint"),
+    [
+        ([0, 17, 11, 86, 11, 69, 6], "It looks like degrees: 17 deg are 0.296706 rad"),
+        ([300, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1], "It looks like mm: 300 mm are 0.3 m"),
+        ([2.5, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1], "Change the posture, or the range with robot.limits.position.rail"),
+        ([0, 4.0, 0.2, 1.5, 0.2, 1.2, 0.1], "Change the posture, or the range with robot.limits.position.joint_1"),
+    ],
+)
+def test_the_hint_of_a_posture_out_of_range(joints, hint):
+    content = task(robot={"urdf": str(RAIL)}, start={"joints": joints}, task_space="pose", redundant_joints=["rail"])
+    content["path"] = [{"line": {"by": [0, 0.2, 0]}}]
+    with pytest.raises(StartError) as caught:
+        brachis.plan(None, content)
+    assert caught.value.hint == hint
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"path": [{"line": {"length": 500.0, "angle_deg": 90}}]},
+        {"path": [{"line": {"to": [1500.0, 300.0]}}]},
+        {"path": [{"line": {"length": 500.0, "angle_deg": 90}}], "start": "free", "path_start": [1732.05, 0.0]},
+    ],
+)
+def test_a_path_in_mm_is_out_of_reach_and_the_hint_says_why(changes):
+    with pytest.raises(PathError, match="out of reach") as caught:
+        brachis.plan(None, task(**changes))
+    assert re.match(r"The path looks like mm: it is \d+ m away from a robot that reaches about 3 m", caught.value.hint)
+
+
+def test_a_path_that_is_too_long_in_metres_has_no_such_hint():
+    with pytest.raises(PathError, match="out of reach") as caught:
+        brachis.plan(None, task(path=[{"line": {"length": 5.0, "angle_deg": 90}}]))
+    assert "mm" not in caught.value.hint
+
+
+def test_a_path_start_in_mm():
+    with pytest.raises(StartError, match="off the path") as caught:
+        brachis.plan(None, task(path_start=[1732.05, 0.0]))
+    assert caught.value.hint == "The path looks like mm: divided by 1000 it is where the tool is"
+    with pytest.raises(StartError, match="off the path") as caught:
+        brachis.plan(None, task(path_start=[1.7, 0.0]))
+    assert "mm" not in caught.value.hint
+
+
+def test_a_robot_in_mm_is_told_before_its_posture_fails():
+    text = SCARA.read_text().replace('xyz="1 0 0"', 'xyz="1000 0 0"')
+    assert text != SCARA.read_text()
+    robot = Robot.from_urdf("mm.urdf", urdf_text=text, gravity=[0, -9.81, 0])
+    content = task(robot={})
+    with pytest.warns(brachis.PlausibilityWarning, match="looks like mm"), pytest.raises(StartError, match="gravity"):
+        brachis.plan(robot, content)
+
+
+def test_errors_stay_errors_of_ours():
+    assert issubclass(PlausibilityError, brachis.InputError)
+    assert not issubclass(PlausibilityError, UrdfError)
+    assert issubclass(brachis.PlausibilityWarning, UserWarning)
