@@ -16,6 +16,7 @@ largest ratios found. Exits with 1 where a motion that was called verified excee
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import sys
 import tempfile
@@ -34,6 +35,9 @@ from brachis.errors import BrachisError
 
 ROOT = Path(__file__).parents[1]
 ROBOTS = ("scara3", "gantry2", "tx90l_rail", "ur10_rail", "iiwa14", "panda")
+TOOLS = {"panda": "panda_hand_tcp"}
+SPACES: dict[str, object] = {"scara3": ["x", "y"], "gantry2": ["x", "y"]}
+"""Task spaces of those that do not follow poses."""
 ALLOWED = 1.1e-4
 """Largest excess of a verified motion: of a ratio, and of a position beyond its range in rad or m."""
 KINDS = ("torque", "velocity", "acceleration", "position")
@@ -136,7 +140,12 @@ def _near_zeros(motion: SavedMotion, piece: np.ndarray, u: np.ndarray) -> tuple[
 
 def _powers(arrays: Mapping[str, np.ndarray], h: np.ndarray) -> np.ndarray:
     """Coefficients (6, L, n) of powers of u, of quintic pieces relative to their first nodes."""
-    way, v, a, b = np.diff(arrays["q"], axis=0), h * arrays["qdot"][:-1], arrays["qddot"][:-1], arrays["qddot_before"][1:]
+    way, v, a, b = (
+        np.diff(arrays["q"], axis=0),
+        h * arrays["qdot"][:-1],
+        arrays["qddot"][:-1],
+        arrays["qddot_before"][1:],
+    )
     w, a, b = h * arrays["qdot"][1:], 0.5 * h**2 * a, 0.5 * h**2 * b
     cubic = 10.0 * way - 6.0 * v - 4.0 * w - 3.0 * a + b
     quartic = -15.0 * way + 8.0 * v + 7.0 * w + 3.0 * a - 2.0 * b
@@ -217,7 +226,7 @@ def urdf_of(name: str) -> Path:
 def random_task(name: str, seed: int, number: int, folder: Path) -> dict[str, object]:
     """Make a task mapping; the same for the same arguments. A CSV file that it needs goes into `folder`."""
     rng = np.random.default_rng([seed, ROBOTS.index(name), number])
-    tool = "panda_hand_tcp" if name == "panda" else None
+    tool, space = TOOLS.get(name), SPACES.get(name, "pose")
     gravity = _tilted(rng, np.zeros(3) if name in ("scara3", "gantry2") else np.array([0.0, 0.0, -9.81]))
     robot = Robot.from_urdf(urdf_of(name), tool_frame=tool, gravity=gravity)
     while True:
@@ -225,7 +234,6 @@ def random_task(name: str, seed: int, number: int, folder: Path) -> dict[str, ob
         tau = np.abs([pin.rnea(robot.model, robot.model.createData(), q, 0.0 * q, 0.0 * q) for q in course]).max(axis=0)
         if np.all(tau < 0.6 * robot.limits.torque) or name == "scara3":
             break
-    space: object = {"scara3": ["x", "y"], "gantry2": ["x", "y"]}.get(name, "pose")
     limits, friction = _random_limits(rng, robot, course, tau)
     free_knots = rng.random() < 0.1
     degree = int(rng.integers(2, 6))
@@ -250,7 +258,7 @@ def random_task(name: str, seed: int, number: int, folder: Path) -> dict[str, ob
             "rest": "velocity" if degree == 2 or rng.random() < 0.3 else "full",
         },
     }
-    task["redundant_joints"] = _redundant(rng, robot, course, space)
+    task["redundant_joints"] = _redundant(rng, name, course, space)
     if rng.random() < 0.15:
         task |= {"start": "free", "path_start": _coordinates(robot, course[0], space)}
     return task
@@ -332,12 +340,19 @@ def _random_path(rng: np.random.Generator, robot: Robot, course: np.ndarray, spa
     return [{"line": {"to": points[-1].tolist()}, **extra}]
 
 
-def _redundant(rng: np.random.Generator, robot: Robot, course: np.ndarray, space: object) -> list[str]:
+@functools.cache
+def _closed_forms(name: str) -> list[ik.Candidate]:
+    """Choices of redundant joints of a robot that have a closed form, whatever its limits."""
+    robot = Robot.from_urdf(urdf_of(name), tool_frame=TOOLS.get(name))
+    found = ik.find_all(robot, TaskSpace.of(robot, SPACES.get(name, "pose")))
+    return [c for c in found if c.solver is not None and c.solver.kind == "closed_form"]
+
+
+def _redundant(rng: np.random.Generator, name: str, course: np.ndarray, space: object) -> list[str]:
     """Redundant joints: of those with a closed form one of the two with the most room along the motion."""
-    found = ik.find_all(robot, TaskSpace.of(robot, space))
-    forms = [c for c in found if c.solver is not None and c.solver.kind == "closed_form"]
+    forms = _closed_forms(name)
     if space == "pose":
-        forms.sort(key=lambda c: -random_poses.room(course, c))
+        forms = sorted(forms, key=lambda c: -random_poses.room(course, c))
     return list(forms[int(rng.integers(0, min(2, len(forms))))].redundant_joints)
 
 
