@@ -15,6 +15,7 @@ SOURCE = Path(__file__).parents[1] / "src/brachis"
 ORDER = (
     "errors",
     "files",
+    "arrays",
     "task",
     "robot",
     "compose",

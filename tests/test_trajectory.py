@@ -288,5 +288,5 @@ def test_file_of_another_kind(spoil, trajectory, tmp_path):
 def test_missing_file_and_folder(tmp_path):
     with pytest.raises(ResultFileError, match="does not exist"):
         Trajectory.load(tmp_path / "gone.npz")
-    with pytest.raises(ResultFileError, match=r"not a brachis result.*directory"):
+    with pytest.raises(ResultFileError, match=r"not a brachis result.*a folder"):
         Trajectory.load(tmp_path)

@@ -75,27 +75,29 @@ def _check_holding(robot: Robot, posture: np.ndarray, name: str) -> None:
             )
 
 
-def start_branch(robot: Robot, task_space: TaskSpace, match: Match, start: np.ndarray, wanted: str) -> int:
-    """Index of the closed form's branch on which the start posture lies.
+def branch_of(
+    robot: Robot, task_space: TaskSpace, match: Match, posture: np.ndarray, wanted: str, *, name: str = "start"
+) -> int:
+    """Index of the closed form's branch on which the given posture, at the path's start or end, lies.
 
     Raises
     ------
     StartError
-        The start posture lies on no branch's inside, or on another than the `wanted` one.
+        The posture lies on no branch's inside, or on another than the `wanted` one.
     UnknownNameError
         There is no branch of the wanted name.
     """
     branches = match.solver.branches
     if wanted != "auto" and wanted not in branches:
         raise UnknownNameError("branch", wanted, dict.fromkeys(branches), where="branch")
-    branch = _branch_of(robot, task_space, match, start, "start")
+    branch = _branch_of(robot, task_space, match, posture, name)
     if wanted != "auto" and branches[branch] != wanted:
         raise StartError(
-            "the start posture is on another branch",
+            f"the {name} posture is on another branch",
             where="branch",
             found=branches[branch],
             allowed=wanted,
-            hint="Leave branch out, or start in a posture of that branch",
+            hint=f"Leave branch out, or {name} in a posture of that branch",
         )
     return branch
 

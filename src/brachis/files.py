@@ -1,10 +1,20 @@
-"""Writing files so that a failure leaves the old file, or none, and never half of the new one."""
+"""Reading files of bounded size, and writing them so that a failure never leaves half of a new one.
+
+What is written has a temporary name first, ``.brachis-<host>-<process>-<random>.part``, which says whose it is: a
+process that was killed cannot remove its own, so that the next one that writes into the folder does.
+"""
 
 from __future__ import annotations
 
+import errno
+import hashlib
 import io
 import os
+import re
 import secrets
+import shutil
+import socket
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -14,6 +24,99 @@ from brachis.errors import InputError
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
+
+LARGEST_TEXT = 16_000_000
+"""Of a text file that is read, bytes."""
+
+_TEMPORARY = re.compile(r"\.brachis-([0-9a-f]{8})-([0-9]+)-[0-9a-f]{16}\.part")
+_KINDS = {
+    stat.S_ISDIR: "a folder",
+    stat.S_ISCHR: "a device",
+    stat.S_ISBLK: "a device",
+    stat.S_ISFIFO: "a pipe",
+    stat.S_ISSOCK: "a socket",
+}
+
+
+def open_file(path: str | os.PathLike[str], largest: int) -> BinaryIO:
+    """Open a regular file of at most `largest` bytes; what would never end is refused at once.
+
+    Raises
+    ------
+    OSError
+        The file is missing, cannot be read, is no regular file, or is longer; ``strerror`` says which.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)  # so as not to wait for a pipe's writer
+    except ValueError as error:
+        raise OSError(errno.EINVAL, f"no name of a file: {error}") from error
+    refusal = _refusal(os.fstat(descriptor), largest)
+    if refusal is not None:
+        os.close(descriptor)
+        raise OSError(*refusal, os.fspath(path))
+    return os.fdopen(descriptor, "rb")
+
+
+def _refusal(status: os.stat_result, largest: int) -> tuple[int, str] | None:
+    """Say why what has this status is not read, as number and text of an `OSError`."""
+    kind = next((name for is_kind, name in _KINDS.items() if is_kind(status.st_mode)), None)
+    if kind is not None:
+        return errno.EINVAL, f"it is {kind}, no file"
+    if status.st_size > largest:
+        return errno.EFBIG, f"it is {status.st_size / 1e6:.1f} MB long, at most {largest / 1e6:g} MB are read"
+    return None
+
+
+def read_file(path: str | os.PathLike[str], largest: int = LARGEST_TEXT) -> bytes:
+    """Read a regular file of at most `largest` bytes.
+
+    Raises
+    ------
+    OSError
+        See `open_file`.
+    """
+    with open_file(path, largest) as stream:
+        content = stream.read(largest + 1)
+    if len(content) > largest:  # files that the kernel makes up as they are read have no size
+        raise OSError(errno.EFBIG, f"it is longer than {largest / 1e6:g} MB", os.fspath(path))
+    return content
+
+
+def temporary_in(folder: Path) -> Path:
+    """Return a new temporary name in a folder, from which what killed processes left there is removed.
+
+    Only names of this program are looked at whose process is of this host and runs no more.
+    """
+    with suppress(OSError):
+        for path in folder.iterdir():
+            found = _TEMPORARY.fullmatch(path.name)
+            if found is not None and found[1] == _host() and not _runs(int(found[2])):
+                _remove(path)
+    return folder / f".brachis-{_host()}-{os.getpid()}-{secrets.token_hex(8)}.part"
+
+
+def _host() -> str:
+    """Tell hosts apart that share a folder: their process numbers say nothing about each other's."""
+    return hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # it is somebody else's, or no number of a process
+        return True
+    return True
+
+
+def _remove(path: Path) -> None:
+    """Remove a temporary file or folder; where that is not possible it stays."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink()
 
 
 @contextmanager
@@ -40,7 +143,7 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         target = Path(path)
         in_place = target.exists() and not target.is_file()
         target = target if in_place else target.resolve()
-        temporary = target if in_place else target.with_name(f".{secrets.token_hex(8)}.part")
+        temporary = target if in_place else temporary_in(target.parent)
         file = _File(temporary, "w" if in_place else "x")  # unlike tempfile's, with the permissions of a new file
     try:
         with io.BufferedWriter(file) as stream:

@@ -12,7 +12,7 @@ from brachis import ik
 from brachis.nlp import Transcription
 from brachis.result import Result
 from brachis.robot import Robot
-from brachis.robot.from_task import robot_from_settings
+from brachis.robot.combine import robot_for
 from brachis.search import Listener, find_fastest, first_start
 from brachis.setting import Setting, choices, intervals_of, transcription
 from brachis.task import Task, load_task
@@ -30,7 +30,8 @@ def plan(
     Parameters
     ----------
     robot : path, Robot or None
-        URDF file; None takes the one that the task names. A `Robot` is used as it is, with its own limits.
+        URDF file, in place of the one that the task names; None takes that one. A `Robot` stands for its URDF and what
+        it was made with; what else the task's ``robot`` part sets (limits, gravity, frames, ...) is added to it.
     task : path, mapping or Task
         Task file, or its content.
     families : sequence of Family, optional
@@ -46,7 +47,8 @@ def plan(
     Raises
     ------
     InputError
-        The task, URDF, path or start posture is wrong (`TaskError`, `UrdfError`, `LimitError`, `PathError`, ...).
+        The task, URDF, path or start posture is wrong (`TaskError`, `UrdfError`, `LimitError`, `PathError`, ...); a
+        `Robot` and the task's ``robot`` part contradict each other (`TaskError`).
     PlanningError
         No attempt gave a motion within the limits.
 
@@ -67,7 +69,7 @@ def _plan(
 ) -> Result:
     """Run the pipeline stage by stage."""
     began = time.perf_counter()
-    robot = robot if isinstance(robot, Robot) else robot_from_settings(task.robot, urdf=robot)
+    robot = robot_for(robot, task.robot)
     task = task.model_copy(update={"robot": robot.settings})
     loaded = time.perf_counter()
     setting = Setting.of(robot, task)
@@ -92,6 +94,7 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
     Parameters
     ----------
     robot : Robot
+        As for `plan`.
     task : Task
     families : sequence of Family, optional
         Closed forms to try before the built-in ones.
@@ -107,7 +110,7 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
     InputError
         See `plan`.
     """
-    setting = Setting.of(robot, task)
+    setting = Setting.of(robot_for(robot, task.robot), task)
     choice = choices(setting, families)[0]
     decomposition = choice.decomposition(*first_start(choice))
     problem = transcription(setting, decomposition, intervals_of(task))

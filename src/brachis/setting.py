@@ -10,7 +10,7 @@ import numpy as np
 from brachis import ik
 from brachis.bspline import clamped_uniform_knots
 from brachis.errors import DecompositionError, StartError, UnknownNameError
-from brachis.feasibility import check_end_branch, check_postures, start_branch
+from brachis.feasibility import branch_of, check_end_branch, check_postures
 from brachis.kinematics import Decomposition
 from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Transcription
@@ -69,7 +69,7 @@ class Choice:
     redundant : tuple of int
         Indices of the redundant joints, ascending.
     branches : tuple of int
-        Indices into ``match.solver.branches``, of each label the first; one where the start posture is given.
+        Indices into ``match.solver.branches``, of each label the first; one where start or end posture is given.
     """
 
     setting: Setting
@@ -84,10 +84,11 @@ class Choice:
 
     @property
     def room(self) -> float:
-        """Least branch margin of the start posture; zero where that is free."""
-        if self.setting.start is None:
+        """Least branch margin of the start posture, of the end posture where the start is free; zero without both."""
+        given = self.setting.end if self.setting.start is None else self.setting.start
+        if given is None:
             return 0.0
-        margins = self.match.solver.branch_margins(self.setting.start[None], self.branches[0])
+        margins = self.match.solver.branch_margins(given[None], self.branches[0])
         return float(margins.min(initial=np.inf))
 
     def decomposition(self, start: np.ndarray, branch: int) -> Decomposition:
@@ -160,9 +161,12 @@ def _choice(setting: Setting, match: ik.Match) -> Choice:
     redundant = tuple(robot.joint_names.index(name) for name in match.redundant_joints)
     labels = match.solver.branches
     if setting.start is not None:
-        branch = start_branch(robot, task_space, match, setting.start, wanted)
+        branch = branch_of(robot, task_space, match, setting.start, wanted)
         if setting.end is not None:
             check_end_branch(robot, task_space, match, setting.end, branch)
+        return Choice(setting, match, redundant, (branch,))
+    if setting.end is not None:
+        branch = branch_of(robot, task_space, match, setting.end, wanted, name="end")
         return Choice(setting, match, redundant, (branch,))
     if wanted != "auto" and wanted not in labels:
         raise UnknownNameError("branch", wanted, dict.fromkeys(labels), where="branch")
@@ -189,7 +193,7 @@ def transcription(setting: Setting, decomposition: Decomposition, intervals: int
         decomposition,
         degree=spline.degree,
         knots=clamped_uniform_knots(spline.degree, intervals),
-        derivatives_at_rest=2 if spline.rest == "full" else 1,
+        derivatives_at_rest=derivatives_at_rest(setting.task),
         tau=np.linspace(0.0, 1.0, spline.points_per_interval * intervals + 1),
         end=setting.end,
         start_free=setting.start is None,
@@ -199,3 +203,8 @@ def transcription(setting: Setting, decomposition: Decomposition, intervals: int
 def intervals_of(task: Task) -> int:
     """Return the task's number of intervals; of the first mesh where it is left open."""
     return COARSE_INTERVALS if task.spline.intervals == "auto" else task.spline.intervals
+
+
+def derivatives_at_rest(task: Task) -> int:
+    """Return how many time derivatives of the joint positions vanish at both ends."""
+    return 2 if task.spline.rest == "full" else 1

@@ -13,6 +13,8 @@ from brachis.errors import InputError
 from brachis.search import motion
 from brachis.verify import VerifyOptions
 
+from .conftest import SCARA
+
 
 def test_in_plain_words(run, task, write):
     outcome = run("bottleneck", write(task))
@@ -91,15 +93,38 @@ def test_a_search_ended_early_is_told(run, task, write, monkeypatch):
     assert "ended early" in outcome.err
 
 
-def test_failure_while_writing_leaves_the_folder_as_it_was(run, task, write, tmp_path, monkeypatch):
+def test_figures_survive_a_drawing_that_cannot_be_written(run, task, write, tmp_path, monkeypatch):
     def full(_figure, path):
         raise InputError("cannot be written", where=str(path), found="No space left on device")
 
     monkeypatch.setattr(plots, "save_figure", full)
     outcome = run("bottleneck", write(task), "--out", tmp_path / "out")
-    assert outcome.code == 2
+    assert outcome.code == 3
     assert "timeline.png: cannot be written" in outcome.err
-    assert not list((tmp_path / "out").iterdir())
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["bottleneck.json"]
+
+
+def test_a_saved_motion(run, task, write, tmp_path):
+    out = tmp_path / "out"
+    assert run("plan", write(task), "--out", out).code == 0
+    fresh = json.loads(run("bottleneck", write(task), "--json").out)
+    outcome = run("bottleneck", out / "result.npz", "--json", "--out", out)
+    assert outcome.code == 0, outcome.err
+    saved = json.loads(outcome.out)
+    assert saved["verified"] is True
+    assert saved["t_end"] == fresh["t_end"]
+    assert saved["bottleneck"]["saturations"] == fresh["bottleneck"]["saturations"]
+    for one, other in zip(*(d["bottleneck"]["sensitivities"]["limits"] for d in (saved, fresh)), strict=True):
+        assert one["joint"] == other["joint"]
+        assert one["change_for_10_percent_s"] == pytest.approx(other["change_for_10_percent_s"], rel=1e-3, abs=1e-6)
+    assert {path.name for path in out.iterdir()} >= {"result.npz", "bottleneck.json", "timeline.png"}
+    assert run("bottleneck", out / "result.npz").out.startswith("end time t_E: 2.47")
+
+
+def test_a_saved_motion_keeps_its_urdf(run, tmp_path):
+    outcome = run("bottleneck", tmp_path / "result.npz", "--urdf", SCARA)
+    assert outcome.code == 2
+    assert "belongs to the URDF that it was planned for" in outcome.err
 
 
 def test_wrong_input(run, task, write, tmp_path):

@@ -15,8 +15,10 @@ import numpy as np
 import pytest
 
 from brachis import __version__, planner, plots
+from brachis.cli import planning
 from brachis.errors import InputError
 from brachis.search import motion, portfolio
+from brachis.trajectory import Trajectory
 from brachis.verify import VerifyOptions
 
 from .conftest import SCARA
@@ -96,17 +98,46 @@ def test_two_motions_do_not_mix_in_one_folder(run, task, write, planned, request
     assert names == {"result.npz", "result.json", "overview.png", "candidates.png", "notes.txt"}
 
 
-def test_failure_while_writing_leaves_the_earlier_result(run, task, write, planned, monkeypatch):
+def no_space(path):
+    return InputError("cannot be written", where=str(path), found="No space left on device")
+
+
+def test_a_result_survives_a_full_disk_while_figures_are_written(run, task, write, planned, monkeypatch):
+    _, out = planned
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    honest = plots.save_figure
+
+    def full(figure, path):
+        if path.name == "overview.png":
+            raise no_space(path)
+        honest(figure, path)
+
+    monkeypatch.setattr(plots, "save_figure", full)
+    task["spline"]["intervals"] = 10
+    outcome = run("plan", write(task), "--out", out, "--json")
+    assert outcome.code == 3
+    words = f"the result is written, this figure is not: {out / 'overview.png'}: cannot be written; found No space left"
+    assert words in outcome.err
+    data = json.loads(outcome.out)
+    assert data["verified"] is True
+    assert {path.name for path in out.iterdir()} == {"result.npz", "result.json", "candidates.png"}
+    assert sorted(data["files"]) == sorted(str(path) for path in out.iterdir())
+    for path in out.iterdir():
+        assert path.read_bytes() != before[path.name], path.name
+    assert Trajectory.load(out / "result.npz").t_end == data["t_end"]
+
+
+def test_failure_while_writing_the_result_leaves_the_earlier_one(run, task, write, planned, monkeypatch):
     _, out = planned
     before = {path.name: path.read_bytes() for path in out.iterdir()}
 
-    def full(_figure, path):
-        raise InputError("cannot be written", where=str(path), found="No space left on device")
+    def full(_text, path):
+        raise no_space(path)
 
-    monkeypatch.setattr(plots, "save_figure", full)
+    monkeypatch.setattr(planning, "write_text", full)
     outcome = run("plan", write(task), "--out", out)
     assert outcome.code == 2
-    assert f"{out / 'overview.png'}: cannot be written; found No space left on device" in outcome.err
+    assert f"{out / 'result.json'}: cannot be written; found No space left on device" in outcome.err
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 
@@ -240,7 +271,7 @@ def test_the_saved_motion_is_not_written_over(run, planned):
     before = saved.read_bytes()
     outcome = run("export", saved, "--csv", saved)
     assert outcome.code == 2
-    assert "would be written over the saved motion" in outcome.err
+    assert "would be written over an input" in outcome.err
     assert run("plot", saved, "--out", saved).code == 2
     assert saved.read_bytes() == before
 

@@ -156,7 +156,6 @@ def inertial(mass: float, moments: tuple[float, float, float]) -> str:
             "link 'link2' has a non-physical inertia; found principal moments 0.1, 0.1, 0.3",
         ),
         (inertial(1.0, (-0.1, 0.1, 0.1)), "link 'link2' has a non-physical inertia"),
-        (inertial(1.0, (float("nan"), 0.1, 0.1)), "link 'link2' has a non-physical inertia"),
     ],
 )
 def test_bodies_that_cannot_be(text, words):

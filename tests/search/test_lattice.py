@@ -10,14 +10,17 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.errors import PathError
+from brachis import ik
+from brachis.errors import PathError, PlanningError
 from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.course import DeadEnd
 from brachis.search.efforts import EFFORTS
+from brachis.search.explain import no_motion
 from brachis.search.lattice import Lattice
 from brachis.search.seeds import lattice_seeds
 from brachis.setting import Setting, choices
+from support.pose_arms import panda
 
 ROOT = Path(__file__).parents[2]
 START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
@@ -110,8 +113,8 @@ REASONS = {
     "joint range": (
         {"limits": {"position": {"j1": [0.3, 0.8], "j2": [-2.2, -1.9]}}},
         {"redundant_joints": ["j1"]},
-        "a joint range ends",
-        r"within the joint ranges .*'j2' is beyond",
+        "the range of joint 'j2' ends",
+        r"within the joint ranges .*joint 'j2' 0.\d+ rad beyond its range, -2.2 to -1.9 rad",
     ),
     "gravity": (
         {"gravity": [0, -9.81, 0], "limits": {"torque": [280.0, 200.0, 100.0]}},
@@ -134,3 +137,38 @@ def test_why_there_is_no_course(case):
     with pytest.raises(PathError, match=message) as caught:
         brachis.plan(given.robot, given.task)
     assert caught.value.s_interval is not None
+
+
+def test_a_narrow_range_of_the_redundant_joint_is_not_called_out_of_reach():
+    """Half the path lies beyond what the arm reaches from the stretch of rail that is left to it."""
+    task = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
+    task["robot"]["limits"]["position"] = {"rail": [-0.01, 0.01]}
+    task["path"] = [{"line": {"by": [0.0, 1.9, 0.0]}}]
+    with pytest.raises(PathError, match=r"within the joint ranges .*joint 'rail' .* beyond its range, -0.01 to 0.01 m"):
+        brachis.plan(None, task)
+
+
+def test_advice_names_what_was_kept_low():
+    given = setting(scara(), solver={"max_iterations": 1, "name": "uno"}, redundant_joints=["j1"])
+    with pytest.raises(PlanningError, match=r"raise solver.max_iterations, which is 1$") as caught:
+        brachis.plan(given.robot, given.task)
+    assert "effort" not in str(caught.value)
+
+
+def test_what_eaik_might_add_is_said_where_it_is_missing(monkeypatch):
+    """With another redundant joint the motion might go on."""
+    monkeypatch.setattr("brachis.ik.eaik.installed", lambda: False)
+    task = {"start": {"joints": [0.3, -0.5, 0.2, -2.2, 0.3, 1.9, 0.8]}, "task_space": "pose"}
+    given = setting(panda(), path=[{"line": {"by": [0.0, 0.05, 0.0]}}], **task)
+    reason = no_motion(choices(given), [], {"panda_joint4": DeadEnd(0.4, {"the branch ends": 1})})
+    assert isinstance(reason, PathError)
+    assert "EAIK is not installed" in str(reason)
+    assert "[panda_joint5], [panda_joint6]" in str(reason)
+
+
+def test_eaik_is_not_promised_where_no_closed_form_can_be(monkeypatch):
+    """Joint 4 of this arm fixes the distance of shoulder and wrist."""
+    monkeypatch.setattr("brachis.ik.eaik.installed", lambda: False)
+    robot = brachis.Robot.from_urdf(ROOT / "robots/iiwa14/robot.urdf", tool_frame="tool")
+    space = brachis.TaskSpace.of(robot, "pose")
+    assert ik.without_eaik(ik.find_all(robot, space)) == ()

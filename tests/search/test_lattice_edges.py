@@ -12,7 +12,6 @@ import brachis
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.course import TOO_HEAVY, DeadEnd
 from brachis.search.lattice import Lattice
-from brachis.search.layer import all_lifts
 from brachis.search.stations import stations
 from brachis.setting import Setting, choices
 
@@ -33,29 +32,29 @@ def rail_task(**changes: object) -> dict[str, object]:
     return brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict() | changes
 
 
-def test_a_free_start_may_be_in_any_turn_of_a_range():
-    """A circle and a half about the base fits into the range only from its lower end on."""
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_free_start_may_be_in_any_turn_of_a_range(way):
+    """A circle and a half about the base fits into the range only from one of its ends on."""
     robot = scara({"j3": 0.4}, position={"j1": [-2 * math.pi, 2 * math.pi]})
-    start = np.array([-2 * math.pi + 0.2, 0.9])
+    start = np.array([way * (-2 * math.pi + 0.2), 0.9])
     here = robot.tool_placement(start).translation[:2]
-    turns = [{"circle": {"center": [0.0, 0.0], "turns": 1.5}}]
+    turns = [{"circle": {"center": [0.0, 0.0], "turns": 1.5 * way}}]
     (choice,) = choices(setting(robot, start="free", path_start=list(here), path=turns))
     courses = Lattice(choice).courses(4)
     assert not isinstance(courses, DeadEnd)
+    assert all(-2 * math.pi <= q <= 2 * math.pi for course in courses for q in course.q[:, 0])
     assert min(abs(course.q[0, 0] - start[0]) for course in courses) < 1e-6
 
 
-def test_all_lifts():
-    q = np.array([[0.5, 0.1], [3.0, 0.2]])
-    which, lifted = all_lifts(q, np.array([0]), np.array([-7.0, -1.0]), np.array([7.0, 1.0]))
-    assert which.tolist() == [0, 0, 0, 1, 1]
-    np.testing.assert_allclose(np.sin(lifted[:, 0]), np.sin(q[which, 0]), atol=1e-12)
-    assert np.all(np.abs(lifted[:, 0]) <= 7.0)
-    which, _ = all_lifts(q, np.array([0]), np.array([1.0, -1.0]), np.array([2.0, 1.0]))
-    assert which.tolist() == []
-    which, lifted = all_lifts(q, np.array([0]), np.array([10.0, -1.0]), np.array([np.inf, 1.0]))
-    assert which.tolist() == [0, 1]
-    assert np.all((lifted[:, 0] >= 10.0) & (lifted[:, 0] < 10.0 + 2 * math.pi))
+def test_a_circle_too_many_for_the_range_is_a_dead_end_at_its_joint():
+    robot = scara({"j3": 0.4}, position={"j1": [-2 * math.pi, 2 * math.pi]})
+    here = robot.tool_placement(np.array([0.2, 0.9])).translation[:2]
+    turns = [{"circle": {"center": [0.0, 0.0], "turns": 2.1}}]
+    (choice,) = choices(setting(robot, start="free", path_start=list(here), path=turns))
+    end = Lattice(choice).courses(4)
+    assert isinstance(end, DeadEnd)
+    assert 1.8 / 2.1 < end.s < 1.0
+    assert "the range of joint 'j1' ends" in end.causes
 
 
 @pytest.mark.parametrize("reach", [None, [-30.0, 30.0], [8.0, None]])
@@ -127,3 +126,71 @@ def test_an_end_posture_without_redundancy_may_be_rounded():
     end = [round(float(value), 7) for value in free.trajectory.position(free.t_end)]
     given = setting(robot, start={"joints": [0.3, 0.9]}, path=line, end={"joints": end})
     assert not isinstance(Lattice(choices(given)[0]).courses(1), DeadEnd)
+
+
+def back_from(end: np.ndarray, robot: brachis.Robot, by: list[float]) -> dict[str, object]:
+    """A task of a line that ends in a posture and may begin in any."""
+    placement = robot.tool_placement(end)
+    return {
+        "start": "free",
+        "path_start": [*(placement.translation - by), *_quaternion(placement.rotation)],
+        "end": {"joints": end.tolist()},
+        "path": [{"line": {"by": by}}],
+        "redundant_joints": "auto",
+        "branch": "auto",
+    }
+
+
+@pytest.mark.parametrize(
+    "turned",
+    [
+        {},
+        {"shoulder_pan_joint": -1},
+        {"wrist_1_joint": 1},
+        {"wrist_3_joint": -1},
+        {"shoulder_lift_joint": 1, "wrist_2_joint": 1},
+        {"wrist_1_joint": 1, "wrist_3_joint": -1},
+    ],
+)
+def test_a_free_start_is_in_the_turn_from_which_the_given_end_is_reached(turned):
+    """Ranges of two turns: whichever turns the end is in, every choice of redundant joints finds its way back."""
+    task = brachis.load_task(ROOT / "examples/04_ur10_rail_weld.yaml").to_dict()
+    robot = robot_from_settings(brachis.load_task(task).robot)
+    end = np.array(task["start"]["joints"])
+    for joint, turns in turned.items():
+        end[robot.joint_names.index(joint)] += 2.0 * math.pi * turns
+    task |= back_from(end, robot, [0.0, 0.4, 0.0])
+    found = 0
+    for choice in choices(Setting.of(robot, brachis.load_task(task))):
+        if choice.match.solver.kind == "closed_form":
+            courses = Lattice(choice).courses(2)
+            assert not isinstance(courses, DeadEnd)
+            assert all(np.abs(course.q[-1] - end).max() < 1e-9 for course in courses)
+            found += 1
+    assert found == 4
+
+
+def test_a_motion_planned_one_way_is_found_the_other_way_round():
+    task = brachis.load_task(ROOT / "examples/04_ur10_rail_weld.yaml").to_dict()
+    robot = robot_from_settings(brachis.load_task(task).robot)
+    begin = np.array(task["start"]["joints"])
+    begin[robot.joint_names.index("wrist_1_joint")] += 2.0 * math.pi
+    task |= {"redundant_joints": ["rail"], "path": [{"line": {"by": [0.0, -0.4, 0.0]}}], "search": {"effort": "single"}}
+    there = brachis.plan(None, task | {"start": {"joints": begin.tolist()}})
+    back = brachis.plan(None, task | back_from(begin, robot, [0.0, 0.4, 0.0]) | {"redundant_joints": ["rail"]})
+    assert there.verified
+    assert back.verified
+    assert back.t_end == pytest.approx(there.t_end, rel=2e-3)
+
+
+def test_a_dead_end_back_from_the_end_says_so():
+    robot = scara()
+    end = np.array([0.5, -2.0, 2.0])
+    x, y, _ = robot.tool_placement(end).translation
+    path = [{"line": {"by": [-4.0, 0.0]}}]
+    given = setting(robot, start="free", path_start=[x + 4.0, y], end={"joints": end.tolist()}, path=path)
+    dead = Lattice(choices(given)[0]).courses(1)
+    assert isinstance(dead, DeadEnd)
+    assert dead.interval[0] == 0.0
+    assert 0.0 < dead.interval[1] < 1.0
+    assert str(dead).startswith("back from the end posture")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from brachis.feasibility import start_branch
+from brachis.feasibility import branch_of
 from brachis.ik import find
 from brachis.kinematics import Decomposition
 from brachis.path import build_path
@@ -25,7 +25,7 @@ def decomposition(
     task = load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": list(rows), "path": list(path)})
     curve = build_path(task.path, space.value(robot.tool_placement(start)), space.rows)
     candidate = find(robot, space, redundant)
-    branch = start_branch(robot, space, candidate, start, "auto")
+    branch = branch_of(robot, space, candidate, start, "auto")
     indices = tuple(robot.joint_names.index(name) for name in candidate.redundant_joints)
     assert candidate.solver is not None
     return Decomposition(robot, space, curve, candidate.solver, indices, branch, start)

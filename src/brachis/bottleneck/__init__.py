@@ -3,6 +3,7 @@
 from brachis.bottleneck.check import CheckedSensitivity, SensitivityCheck, check_sensitivities
 from brachis.bottleneck.reference import Reference, find_reference
 from brachis.bottleneck.saturation import THRESHOLD, Saturation, Stretch, saturations
+from brachis.bottleneck.saved import solved_again
 from brachis.bottleneck.sensitivities import BranchBoundary, Sensitivities, Sensitivity, sensitivities
 from brachis.bottleneck.whole import BottleneckReport, report
 
@@ -22,4 +23,5 @@ __all__ = [
     "report",
     "saturations",
     "sensitivities",
+    "solved_again",
 ]

@@ -8,10 +8,12 @@ from typing import Any
 from brachis.bottleneck.check import SensitivityCheck, check_sensitivities
 from brachis.bottleneck.reference import Reference, find_reference
 from brachis.bottleneck.saturation import THRESHOLD, Saturation, saturations
+from brachis.bottleneck.saved import solved_again
 from brachis.bottleneck.sensitivities import Sensitivities, sensitivities
 from brachis.bottleneck.words import in_words
 from brachis.errors import InputError
 from brachis.result import Result
+from brachis.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
@@ -57,13 +59,13 @@ class BottleneckReport:
         }
 
 
-def report(result: Result, *, check: bool = False, reference: bool = False) -> BottleneckReport:
+def report(motion: Result | Trajectory, *, check: bool = False, reference: bool = False) -> BottleneckReport:
     """Find out what holds a planned motion back.
 
     Parameters
     ----------
-    result : Result
-        Of `brachis.plan`.
+    motion : Result or Trajectory
+        Of `brachis.plan`; or a trajectory, a loaded one for example, whose problem is solved again (`solved_again`).
     check : bool, optional
         Solve again with every limit raised by 1 % and compare with the multipliers' predictions.
     reference : bool, optional
@@ -76,23 +78,27 @@ def report(result: Result, *, check: bool = False, reference: bool = False) -> B
     Raises
     ------
     InputError
-        The result was made without keeping its solved problem.
+        The result was made without keeping its solved problem, or a trajectory's closed form is not known here.
     PlanningError
-        With `check`: no solver could solve the problem again.
+        A trajectory is no optimum of its problem; or, with `check`, no solver could solve the problem again.
 
     Examples
     --------
     >>> import brachis
     >>> print(brachis.bottleneck.report(brachis.plan(None, "examples/01_scara_line.yaml")))  # doctest: +SKIP
+    >>> print(brachis.bottleneck.report(brachis.Trajectory.load("out/result.npz")))  # doctest: +SKIP
     """
-    refined = result.attempt.refined
-    if refined is None:
+    if isinstance(motion, Trajectory):
+        trajectory, refined = motion, solved_again(motion)
+    elif motion.attempt.refined is None:
         raise InputError("the result holds no solved problem", where="result", allowed="a result of brachis.plan")
-    found, tolerance = sensitivities(refined), result.task.refinement.tolerance
+    else:
+        trajectory, refined = motion.trajectory, motion.attempt.refined
+    found, tolerance = sensitivities(refined), trajectory.task.refinement.tolerance
     return BottleneckReport(
-        t_end=result.t_end,
+        t_end=trajectory.t_end,
         sensitivities=found,
-        saturations=saturations(result.trajectory),
+        saturations=saturations(trajectory),
         check=check_sensitivities(refined, found) if check else None,
         reference=find_reference(refined, tolerance=tolerance) if reference else None,
         reference_sought=reference,

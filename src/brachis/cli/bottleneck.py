@@ -2,62 +2,105 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from brachis import bottleneck, planner
-from brachis.cli.folder import Writer, make_folder, write_files, write_text
-from brachis.cli.output import json_text, print_error, print_json, progress, result_console
+from brachis.cli.folder import Writer, Written, make_folder, write_files, write_text
+from brachis.cli.output import exit_code, json_text, print_error, print_json, progress, result_console
+from brachis.errors import InputError
 from brachis.result import Result
+from brachis.trajectory import Trajectory
+from brachis.verify import VerifyOptions, verify_trajectory
 
 _FILES = {
     True: ("bottleneck.json", "timeline.png"),
     False: ("unverified_bottleneck.json", "unverified_timeline.png"),
 }
 """Names of the figures and the drawing, by whether the motion passed the verification."""
+_SAVED = ".npz"
+"""Suffix by which a saved motion is told from a task."""
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """A motion, planned now or before; ``made`` is what the report is made of."""
+
+    made: Result | Trajectory
+    trajectory: Trajectory
+    verified: bool
+    interrupted: bool
+    data: dict[str, Any]
 
 
 def bottleneck_command(
-    task: Path, *, urdf: Path | None, check: bool, reference: bool, out: Path | None, as_json: bool
+    source: Path, *, urdf: Path | None, check: bool, reference: bool, out: Path | None, as_json: bool
 ) -> int:
-    """Plan, find the bottlenecks, show, write; returns the exit code."""
+    """Plan a task or take a saved motion, find the bottlenecks, show, write; returns the exit code."""
     if out is not None:
-        make_folder(out)
+        make_folder(out, (*_FILES[True], *_FILES[False]), (source, urdf))
     with progress() as listener:
-        result = planner.plan(urdf, task, listener=listener)
+        motion = _saved(source, urdf) if source.suffix == _SAVED else _planned(source, urdf, listener)
         listener("looking for what holds the motion back")
-        found = bottleneck.report(result, check=check, reference=reference)
-    data = {**result.to_dict(), "bottleneck": found.to_dict()}
-    files = [] if out is None else _write(result, data, out)
+        found = bottleneck.report(motion.made, check=check, reference=reference)
+    data = {**motion.data, "bottleneck": found.to_dict()}
+    written = Written((), ())
     if out is not None:
-        data["files"] = files
+        written = _write(motion, data, out)
+        data["files"] = list(written.files)
     if as_json:
         print_json(data)
     else:
-        _show(result, found, files)
-    if result.interrupted:
+        _show(motion.trajectory, found, written.files)
+    if motion.interrupted:
         print_error("the search was ended early; this is the best motion verified so far")
-    if not result.verified:
+    if not motion.verified:
         print_error("the motion found did not pass the verification; what is said of it may not hold")
-    return 0 if result.verified else 1
+    return exit_code(motion.verified, written.failures)
 
 
-def _write(result: Result, data: dict[str, object], out: Path) -> list[str]:
+def _planned(task: Path, urdf: Path | None, listener: Callable[[str], None]) -> _Motion:
+    result = planner.plan(urdf, task, listener=listener)
+    return _Motion(result, result.trajectory, result.verified, result.interrupted, result.to_dict())
+
+
+def _saved(path: Path, urdf: Path | None) -> _Motion:
+    """Load a motion and verify it again."""
+    if urdf is not None:
+        raise InputError(
+            "a saved motion belongs to the URDF that it was planned for", where="--urdf", found=urdf, allowed="a task"
+        )
+    trajectory = Trajectory.load(path)
+    verification = verify_trajectory(trajectory, VerifyOptions(ratio_tolerance=trajectory.task.refinement.tolerance))
+    data = {
+        "t_end": trajectory.t_end,
+        "redundant_joints": list(trajectory.redundant_joints),
+        "branch": trajectory.branch,
+        "joint_names": list(trajectory.joint_names),
+        "verified": verification.passed,
+        "worst_ratio": verification.worst_ratio,
+        "path_error": verification.path_error,
+    }
+    return _Motion(trajectory, trajectory, verification.passed, interrupted=False, data=data)
+
+
+def _write(motion: _Motion, data: dict[str, Any], out: Path) -> Written:
     """Write the figures and the drawing; those of an unverified motion get names that say so."""
     from brachis.plots import plot_timeline, save_figure  # noqa: PLC0415  (matplotlib takes 0.7 s)
 
-    writers: tuple[Writer, ...] = (
-        lambda path: write_text(json_text(data), path),
-        lambda path: save_figure(plot_timeline(result.trajectory), path),
-    )
-    files = dict(zip(_FILES[result.verified], writers, strict=True))
-    return write_files(out, files, stale=_FILES[not result.verified])
+    figures_of_merit, timeline = _FILES[motion.verified]
+    results: dict[str, Writer] = {figures_of_merit: lambda path: write_text(json_text(data), path)}
+    figures: dict[str, Writer] = {timeline: lambda path: save_figure(plot_timeline(motion.trajectory), path)}
+    return write_files(out, results, figures, stale=_FILES[not motion.verified])
 
 
-def _show(result: Result, found: bottleneck.BottleneckReport, files: list[str]) -> None:
+def _show(trajectory: Trajectory, found: bottleneck.BottleneckReport, files: tuple[str, ...]) -> None:
     """Print the report for a person."""
     console = result_console()
-    redundant = ", ".join(result.trajectory.redundant_joints) or "none"
-    console.print(f"end time t_E: {result.t_end:.4f} s, redundant joints: {redundant}")
+    redundant = ", ".join(trajectory.redundant_joints) or "none"
+    console.print(f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}")
     console.print(str(found))
     for name in files:
         console.print(f"wrote {name}")

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import typer
 from typer.core import TyperCommand
 
+from brachis.cli.folder import write_one
 from brachis.cli.output import print_json, result_console
 
 Triple = tuple[float, float, float]
@@ -61,7 +63,8 @@ def compose_command(
     """Write the URDF of an arm on a rail."""
     from brachis.compose import on_rail  # noqa: PLC0415  (loads Pinocchio, which no help needs)
 
-    on_rail(
+    compose = partial(
+        on_rail,
         arm,
         axis=axis,
         range=travel,
@@ -73,8 +76,8 @@ def compose_command(
         name=name,
         root=root,
         meshes=meshes,
-        output=out,
     )
+    write_one(out, lambda path: compose(output=path), (".urdf",), (arm,))
     if as_json:
         print_json({"urdf": str(out), "arm": str(arm), "joint": name, "root": root})
     else:

@@ -1,74 +1,198 @@
-"""Writing several files into a folder, all or none."""
+"""Writing files: the results all or none, figures beside them where they can be, and nothing over other files."""
 
 from __future__ import annotations
 
-import secrets
 import shutil
-from collections.abc import Callable, Iterable, Mapping
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 
 from brachis.errors import InputError
-from brachis.files import atomic_write, writing_errors
+from brachis.files import atomic_write, temporary_in, writing_errors
 
 Writer = Callable[[Path], object]
 """Writes one file to a path."""
 
+BEGINNINGS = {
+    ".csv": (b"t,q_",),
+    ".json": (b'{\n  "t_end"', b'{\n  "$schema"'),
+    ".npz": (b"PK",),
+    ".pdf": (b"%PDF",),
+    ".png": (b"\x89PNG",),
+    ".svg": (b"<?xml", b"<svg"),
+    ".urdf": (b"<?xml", b"<robot"),
+}
+"""How files of our own begin, by suffix; what begins otherwise is somebody else's and is not written over."""
 
-def make_folder(out: Path) -> None:
-    """Make a folder where there is none.
+
+@dataclass(frozen=True)
+class Written:
+    """What became of files.
+
+    Attributes
+    ----------
+    files : tuple of str
+        Paths of those that were written.
+    failures : tuple of InputError
+        One for each figure that could not be written.
+    """
+
+    files: tuple[str, ...]
+    failures: tuple[InputError, ...]
+
+
+def check_output(out: Path, suffixes: Iterable[str], inputs: Iterable[Path | None]) -> None:
+    """Refuse to write over one of the command's inputs, or over a file that is not of the kind that it writes.
+
+    Parameters
+    ----------
+    out : Path
+        What will be written. A new file may have any name, and what is no regular file (``/dev/stdout``) is not looked
+        at.
+    suffixes : iterable of str
+        Those of the format, of `BEGINNINGS`.
+    inputs : iterable of Path or None
+        Files that the command reads.
 
     Raises
     ------
     InputError
-        It cannot be made.
     """
+    if not out.is_file():
+        return
+    for path in inputs:
+        if path is not None and path.exists() and out.samefile(path):
+            raise InputError(
+                "would be written over an input", where=str(out), found="the same file", allowed="another file name"
+            )
+    suffix, allowed = out.suffix.lower(), tuple(suffixes)
+    if suffix not in allowed:
+        raise InputError(
+            "the file exists and is of another kind",
+            where=str(out),
+            found=f"suffix {suffix}" if suffix else "no suffix",
+            allowed=f"a new file, or one that ends in {' or '.join(allowed)}",
+        )
+    with writing_errors(out), out.open("rb") as stream:
+        beginning = stream.read(max(map(len, BEGINNINGS[suffix])))
+    if beginning and not beginning.startswith(BEGINNINGS[suffix]):
+        raise InputError(
+            "the file exists and was not written by brachis",
+            where=str(out),
+            found=f"a file that begins with {beginning!r}",
+            allowed="a new file, or an older one of the same kind",
+        )
+
+
+def make_folder(out: Path, names: Iterable[str], inputs: Iterable[Path | None]) -> None:
+    """Make a folder where there is none, and refuse what `check_output` refuses for files of these names.
+
+    Raises
+    ------
+    InputError
+        It cannot be made, or one of the files is not ours to write.
+    """
+    inputs = tuple(inputs)
+    for name in names:
+        check_output(out / name, (Path(name).suffix,), inputs)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError("the folder cannot be made", where=str(out), found=error.strerror) from error
 
 
-def write_files(out: Path, files: Mapping[str, Writer], *, stale: Iterable[str] = ()) -> list[str]:
-    """Write files into a temporary folder and then move them, so that a failure leaves the folder as it was.
+def write_files(
+    out: Path, results: Mapping[str, Writer], figures: Mapping[str, Writer], *, stale: Iterable[str] = ()
+) -> Written:
+    """Write results, all or none, and then the figures that can be written.
+
+    The results are written into a temporary folder and then moved, so that a failure leaves the folder as it was. Then
+    all older figures are removed before new ones are written: they belong to another result.
 
     Parameters
     ----------
     out : Path
         Folder that exists.
-    files : mapping of str to callable
+    results, figures : mapping of str to callable
         Names, and what writes each.
     stale : iterable of str, optional
-        Files that are removed in the end: the new ones take their place.
+        Files that are removed: the new ones take their place.
 
     Returns
     -------
-    list of str
-        Paths of the files.
+    Written
+
+    Raises
+    ------
+    InputError
+        A result cannot be written.
     """
-    for name in files:
+    for name in (*results, *figures):
         if (out / name).is_dir():
             raise InputError("cannot be written", where=str(out / name), found="a folder of this name")
-    temporary = out / f".{secrets.token_hex(8)}.part"
+    with ended_cleanly():
+        _write_results(out, results, (*stale, *figures))
+        failures = []
+        for name, write in figures.items():
+            try:
+                write(out / name)
+            except InputError as error:
+                failures.append(error)
+    failed = {error.where for error in failures}
+    paths = (str(out / name) for name in (*results, *figures))
+    return Written(tuple(path for path in paths if path not in failed), tuple(failures))
+
+
+def _write_results(out: Path, results: Mapping[str, Writer], others: Iterable[str]) -> None:
+    """Write files aside, remove `others`, and move the new files to their places."""
+    temporary = temporary_in(out)
     with writing_errors(out):
         temporary.mkdir()
     try:
-        for name, write in files.items():
+        for name, write in results.items():
             try:
                 write(temporary / name)
             except InputError as error:  # it names the temporary file
                 raise InputError(error.problem, where=str(out / name), found=error.found) from error
-        for name in files:
+        for name in others:
+            with writing_errors(out / name):
+                (out / name).unlink(missing_ok=True)
+        for name in results:
             with writing_errors(out / name):
                 (temporary / name).replace(out / name)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-    for name in stale:
-        with writing_errors(out / name):
-            (out / name).unlink(missing_ok=True)
-    return [str(out / name) for name in files]
+
+
+def write_one(out: Path, write: Writer, suffixes: Iterable[str], inputs: Iterable[Path | None] = ()) -> None:
+    """Write one file, unless it would take the place of what `check_output` protects."""
+    check_output(out, suffixes, inputs)
+    with ended_cleanly():
+        write(out)
 
 
 def write_text(text: str, path: Path) -> None:
     """Write a text file whole or not at all."""
     with atomic_write(path) as stream:
         stream.write(text.encode())
+
+
+@contextmanager
+def ended_cleanly() -> Iterator[None]:
+    """Let SIGTERM leave the block as an exception does, so that temporary files are removed."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
+
+
+def _leave(number: int, _frame: FrameType | None) -> None:
+    raise SystemExit(128 + number)

@@ -1,6 +1,7 @@
 """The command line: ``brachis plan | bottleneck | verify | export | plot | inspect | compose | schema``.
 
-Exit codes: 0 planned and verified, 1 no verified plan, 2 wrong input. Results go to standard output, everything else to
+Exit codes: 0 planned and verified, 1 no verified plan, 2 wrong input, 3 planned and verified, but not all figures could
+be written. Results go to standard output, everything else to
 standard error. With ``--json`` standard output gets one JSON object, also for an error.
 """
 
@@ -8,14 +9,15 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import redirect_stdout
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TextIO, cast
 
 import typer
 from typer.core import TyperGroup
 
 from brachis.cli.composition import VectorCommand, compose_command
-from brachis.cli.output import print_failure
+from brachis.cli.output import StandardOutput, open_streams, print_failure
 from brachis.errors import BrachisError
 
 
@@ -93,7 +95,12 @@ def plan(
 
 @app.command()
 def bottleneck(
-    task: TaskFile,
+    task: Annotated[
+        Path,
+        typer.Argument(
+            help="Task file (YAML), or result file (npz) of a motion planned before.", metavar="TASK|RESULT"
+        ),
+    ],
     check: Annotated[
         bool, typer.Option("--check", help="Solve again with every limit raised by 1 %, and compare.")
     ] = False,
@@ -115,7 +122,7 @@ def bottleneck(
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
     json: Json = False,
 ) -> None:
-    """Plan a task and say which limits cost how much time, and which is active when."""
+    """Plan a task, or take a saved motion, and say which limits cost how much time, and which is active when."""
     from brachis.cli import bottleneck as command  # noqa: PLC0415
 
     raise typer.Exit(
@@ -140,11 +147,18 @@ def export(
     result: ResultFile,
     csv: Annotated[Path, typer.Option(help="CSV file to write: t, then q_, qd_, qdd_, tau_ of every joint; SI units.")],
     dt: Annotated[float, typer.Option(help="Period of the controller, s.")] = 0.001,
+    last: Annotated[
+        str,
+        typer.Option(
+            help="Where the rows end: exact, at the end time, which need not be a multiple of the period; or hold, at "
+            "the first multiple of it that is not before the end time, with the end posture held at rest."
+        ),
+    ] = "exact",
 ) -> None:
     """Sample a saved motion at a controller's rate."""
     from brachis.cli import results  # noqa: PLC0415
 
-    results.export_command(result, csv, form="csv", dt=dt)
+    results.export_command(result, csv, form="csv", dt=dt, last=last)
 
 
 @app.command()
@@ -246,24 +260,31 @@ def schema(
 
 def main() -> None:
     """Run the command line; no exception leaves it as a traceback."""
-    as_json = "--json" in sys.argv[1:]
+    open_streams()
+    output = StandardOutput(sys.stdout)
+    with redirect_stdout(cast(TextIO, output)):
+        code = _run(output, as_json="--json" in sys.argv[1:])
+    sys.exit(code if output.finish() else 1)
+
+
+def _run(output: StandardOutput, *, as_json: bool) -> int | str | None:
+    """Run a command and return its exit code."""
     try:
-        try:
-            app()
-        except BrachisError as error:
-            print_failure(str(error), error.exit_code, as_json=as_json)
-            sys.exit(error.exit_code)
-        except BrokenPipeError:
+        app()
+    except SystemExit as stop:
+        return stop.code
+    except BrachisError as error:
+        print_failure(str(error), error.exit_code, as_json=as_json)
+        return error.exit_code
+    except Exception as error:
+        if error is output.failure:
+            return 1
+        if os.environ.get("BRACHIS_DEBUG"):
             raise
-        except Exception as error:
-            if os.environ.get("BRACHIS_DEBUG"):
-                raise
-            message = (
-                f"internal error: {type(error).__name__}: {error}. This is a fault of brachis; "
-                "run again with BRACHIS_DEBUG=1 for the traceback and report it"
-            )
-            print_failure(message, 1, as_json=as_json)
-            sys.exit(1)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
+        message = (
+            f"internal error: {type(error).__name__}: {error}. This is a fault of brachis; "
+            "run again with BRACHIS_DEBUG=1 for the traceback and report it"
+        )
+        print_failure(message, 1, as_json=as_json)
+        return 1
+    return 0

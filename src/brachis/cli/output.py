@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
 
 from rich.console import Console
 from rich.table import Table
 
+from brachis.errors import InputError
+
 if TYPE_CHECKING:  # loads Pinocchio, which no error message and no help needs
     from brachis.verify import Verification
 
+_NO_FIGURE = 3
+"""Exit code of a verified motion whose figures could not all be written."""
+
 
 def print_error(message: str) -> None:
-    """One message on standard error."""
-    Console(stderr=True, soft_wrap=True, highlight=False, markup=False).print(f"brachis: {message}")
+    """One message on standard error, where that can be written."""
+    with suppress(OSError):
+        Console(stderr=True, soft_wrap=True, highlight=False, markup=False).print(f"brachis: {message}")
 
 
 def json_text(data: Mapping[str, object]) -> str:
@@ -33,9 +41,80 @@ def print_json(data: Mapping[str, object]) -> None:
 
 def print_failure(message: str, exit_code: int, *, as_json: bool) -> None:
     """Say on standard error what went wrong; with `as_json` also as one JSON object on standard output."""
-    if as_json:
-        print_json({"verified": False, "status": "error", "error": message, "t_end": None, "exit_code": exit_code})
+    with suppress(OSError):  # `StandardOutput.finish` says so
+        if as_json:
+            print_json({"verified": False, "status": "error", "error": message, "t_end": None, "exit_code": exit_code})
     print_error(message)
+
+
+def exit_code(verified: bool, failures: Sequence[InputError]) -> int:  # noqa: FBT001  (what the code is of)
+    """Say which figures could not be written, and return the exit code of a motion."""
+    for failure in failures:
+        print_error(f"the result is written, this figure is not: {failure}")
+    if not verified:
+        return 1
+    return _NO_FIGURE if failures else 0
+
+
+class StandardOutput:
+    """Standard output that remembers why it could not be written.
+
+    Parameters
+    ----------
+    stream : text stream
+        What stands behind it.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self.failure: OSError | None = None
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401  (whatever the stream has)
+        """Pass everything else on."""
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write as the stream does."""
+        with self._remembered():
+            return self._stream.write(text)
+
+    def flush(self) -> None:
+        """Write out what the stream still holds."""
+        with self._remembered():
+            self._stream.flush()
+
+    @contextmanager
+    def _remembered(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            self.failure = error
+            raise
+
+    def finish(self) -> bool:
+        """Write out the rest; False where something could not be written, which is said unless a pipe was closed.
+
+        What is left then is thrown away, lest the interpreter tries again at its end.
+        """
+        with suppress(OSError):
+            self.flush()
+        if self.failure is None:
+            return True
+        with suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
+        if not isinstance(self.failure, BrokenPipeError):
+            print_error(f"standard output cannot be written: {self.failure.strerror}")
+        return False
+
+
+def open_streams() -> None:
+    """See to it that there are streams, and that they take any name of a file."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by whoever started this program
+            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115  (open as long as the program runs)
+        reconfigure = getattr(getattr(sys, name), "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors="backslashreplace")
 
 
 def _plain(value: object) -> object:

@@ -9,8 +9,17 @@ from typing import Any
 from rich.table import Table
 
 from brachis import planner
-from brachis.cli.folder import Writer, make_folder, write_files, write_text
-from brachis.cli.output import json_text, print_error, print_json, progress, result_console, verification_table
+from brachis.cli.folder import Writer, Written, make_folder, write_files, write_text
+from brachis.cli.output import (
+    exit_code,
+    json_text,
+    print_error,
+    print_json,
+    progress,
+    result_console,
+    verification_table,
+)
+from brachis.errors import InputError
 from brachis.result import Result
 from brachis.search.portfolio import SAME_MOTION
 
@@ -26,12 +35,14 @@ _MANY = 40
 def plan_command(task: Path, *, urdf: Path | None, out: Path | None, as_json: bool) -> int:
     """Plan, show, write; returns the exit code."""
     if out is not None:
-        make_folder(out)
+        make_folder(out, (*_FILES[True], *_FILES[False]), (task, urdf))
     with progress() as listener:
         result = planner.plan(urdf, task, listener=listener)
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
+    failures: tuple[InputError, ...] = ()
     if out is not None:
-        data["files"] = _write(result, data, out)
+        written = _write(result, data, out)
+        data["files"], failures = list(written.files), written.failures
     if as_json:
         print_json(data)
     else:
@@ -40,24 +51,26 @@ def plan_command(task: Path, *, urdf: Path | None, out: Path | None, as_json: bo
         print_error("the search was ended early; this is the best motion so far")
     if not result.verified:
         print_error("the motion found did not pass the verification; it is marked unverified")
-    return 0 if result.verified else 1
+    return exit_code(result.verified, failures)
 
 
-def _write(result: Result, data: dict[str, object], out: Path) -> list[str]:
+def _write(result: Result, data: dict[str, object], out: Path) -> Written:
     """Write trajectory, figures of merit and drawing; an unverified motion gets names that say so.
 
     Files of an earlier plan with the other names are removed: they would be another motion's.
     """
     from brachis.plots import plot_candidates, plot_overview, save_figure  # noqa: PLC0415  (matplotlib takes 0.7 s)
 
-    writers: tuple[Writer, ...] = (
-        result.trajectory.save,
-        lambda path: write_text(json_text(data), path),
-        lambda path: save_figure(plot_overview(result.trajectory), path),
-        lambda path: save_figure(plot_candidates(result.candidates), path),
-    )
-    files = dict(zip(_FILES[result.verified], writers, strict=True))
-    return write_files(out, files, stale=_FILES[not result.verified])
+    trajectory, figures_of_merit, overview, candidates = _FILES[result.verified]
+    results: dict[str, Writer] = {
+        trajectory: result.trajectory.save,
+        figures_of_merit: lambda path: write_text(json_text(data), path),
+    }
+    figures: dict[str, Writer] = {
+        overview: lambda path: save_figure(plot_overview(result.trajectory), path),
+        candidates: lambda path: save_figure(plot_candidates(result.candidates), path),
+    }
+    return write_files(out, results, figures, stale=_FILES[not result.verified])
 
 
 def _show(result: Result, data: dict[str, Any]) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from brachis.cli.output import json_text, print_json, result_console, verification_table
-from brachis.errors import InputError, UnknownNameError
-from brachis.files import atomic_write
+from brachis.cli.folder import write_one, write_text
+from brachis.cli.output import json_text, print_error, print_json, result_console, verification_table
+from brachis.errors import UnknownNameError
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import json_schema
 from brachis.trajectory import Trajectory
@@ -27,32 +27,36 @@ def verify_command(result: Path, *, urdf: Path | None, as_json: bool) -> int:
     return 0 if verification.passed else 1
 
 
-def export_command(result: Path, out: Path, *, form: str, dt: float) -> None:
+def export_command(result: Path, out: Path, *, form: str, dt: float, last: str) -> None:
     """Write a saved motion in one of the formats of `brachis.export.FORMATS`."""
     from brachis.export import FORMATS  # noqa: PLC0415
 
-    _keep(result, out)
-    FORMATS[form](Trajectory.load(result), out, dt)
+    trajectory = Trajectory.load(result)
+    write_one(
+        out, lambda path: FORMATS[form](trajectory, path, dt, last=last), (f".{form}",), _sources(result, trajectory)
+    )
+    if dt > trajectory.t_end:
+        print_error(f"the period of {dt:g} s is longer than the motion, which takes {trajectory.t_end:.6g} s")
     result_console().print(f"wrote {out}")
 
 
 def plot_command(result: Path, *, out: Path, kind: str) -> None:
     """Draw a saved motion."""
-    from brachis.plots import PLOTS, save_figure  # noqa: PLC0415
+    from brachis.plots import PLOTS, SUFFIXES, check_suffix, save_figure  # noqa: PLC0415
 
     if kind not in PLOTS:
         raise UnknownNameError("figure", kind, PLOTS, where="--kind")
-    _keep(result, out)
-    save_figure(PLOTS[kind](Trajectory.load(result)), out)
+    check_suffix(out)
+    trajectory = Trajectory.load(result)
+    suffixes = [f".{suffix}" for suffix in SUFFIXES]
+    write_one(out, lambda path: save_figure(PLOTS[kind](trajectory), path), suffixes, _sources(result, trajectory))
     result_console().print(f"wrote {out}")
 
 
-def _keep(result: Path, out: Path) -> None:
-    """Refuse to write over the motion that is read."""
-    if out.resolve() == result.resolve():
-        raise InputError(
-            "would be written over the saved motion", where=str(out), found="the same file", allowed="another file name"
-        )
+def _sources(result: Path, trajectory: Trajectory) -> list[Path | None]:
+    """List the files that a saved motion is read from or was planned for."""
+    urdf = trajectory.task.robot.urdf
+    return [result, None if urdf is None else Path(urdf)]
 
 
 def schema_command(out: Path | None) -> None:
@@ -61,6 +65,5 @@ def schema_command(out: Path | None) -> None:
     if out is None:
         sys.stdout.write(text)
         return
-    with atomic_write(out) as stream:
-        stream.write(text.encode())
+    write_one(out, lambda path: write_text(text, path), (".json",))
     result_console().print(f"wrote {out}")

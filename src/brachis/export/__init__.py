@@ -10,9 +10,9 @@ from brachis.trajectory import Trajectory
 
 
 class Exporter(Protocol):
-    """Writes the samples of a trajectory every `dt` seconds to one file."""
+    """Writes the samples of a trajectory every `dt` seconds to one file; for `last` see `Trajectory.sample`."""
 
-    def __call__(self, trajectory: Trajectory, path: str | os.PathLike[str], dt: float) -> None:
+    def __call__(self, trajectory: Trajectory, path: str | os.PathLike[str], dt: float, *, last: str) -> None:
         """Write the file."""
         ...
 

@@ -15,7 +15,7 @@ QUANTITIES = {"q": "q", "qd": "qdot", "qdd": "qddot", "tau": "tau"}
 """Prefix of the columns and the attribute of `Samples`, in the order of the columns."""
 
 
-def export_csv(trajectory: Trajectory, path: str | os.PathLike[str], dt: float) -> None:
+def export_csv(trajectory: Trajectory, path: str | os.PathLike[str], dt: float, *, last: str = "exact") -> None:
     r"""Write time, joint positions, velocities, accelerations and torques at a controller's rate.
 
     The first line names the columns: ``t``, then ``q_<joint>`` for all joints in chain order, then ``qd_<joint>``,
@@ -28,12 +28,15 @@ def export_csv(trajectory: Trajectory, path: str | os.PathLike[str], dt: float) 
     path : path
         File to write; an older one is replaced, and kept if writing fails.
     dt : float
-        Period, s. Rows are at 0, dt, 2 dt, ... and at t_end exactly; the last period may be shorter.
+        Period, s. Rows are at 0, dt, 2 dt, ...
+    last : {"exact", "hold"}, optional
+        The last row: at t_end exactly, so that the last period may be shorter; or at the first multiple of `dt` that
+        is not before t_end, with the end posture held at rest there. See `Trajectory.sample`.
 
     Raises
     ------
     InputError
-        `dt` is not a usable period, or the file cannot be written.
+        `dt` is not a usable period, `last` is unknown, or the file cannot be written.
 
     Examples
     --------
@@ -42,7 +45,7 @@ def export_csv(trajectory: Trajectory, path: str | os.PathLike[str], dt: float) 
     >>> trajectory = plan(None, "examples/01_scara_line.yaml").trajectory
     >>> export_csv(trajectory, "motion.csv", dt=0.004)  # doctest: +SKIP
     """
-    samples = trajectory.sample(dt)
+    samples = trajectory.sample(dt, last=last)
     header = ["t", *(f"{prefix}_{joint}" for prefix in QUANTITIES for joint in trajectory.joint_names)]
     table = np.column_stack([samples.t, *(getattr(samples, name) for name in QUANTITIES.values())])
     with atomic_write(path) as stream:

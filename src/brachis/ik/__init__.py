@@ -4,7 +4,7 @@ from brachis.ik.check import check_answers
 from brachis.ik.geometry import ChainGeometry, PosedScrews
 from brachis.ik.idealised import Polished
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError, ik_family, margin_gradient
-from brachis.ik.registry import BUILTIN, Candidate, Match, find, find_all
+from brachis.ik.registry import BUILTIN, Candidate, Match, find, find_all, without_eaik
 
 __all__ = [
     "BUILTIN",
@@ -21,4 +21,5 @@ __all__ = [
     "find_all",
     "ik_family",
     "margin_gradient",
+    "without_eaik",
 ]

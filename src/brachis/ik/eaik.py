@@ -28,6 +28,9 @@ from brachis.ik.pose_joints import determinant
 from brachis.ik.protocol import Kind, NotApplicableError, ik_family
 from brachis.robot import TaskSpace
 
+NOT_INSTALLED = 'EAIK is not installed (pip install "brachis[eaik]")'
+"""Why EAIK is not asked, where that is the reason."""
+
 _TURN = 2.0 * np.pi
 _SAMPLES = 64
 _SINGULAR = 1e-9
@@ -63,22 +66,12 @@ class EaikSolver:
         self._tool = Poses.of_tool(geometry.held([], np.empty((1, 0))))
         postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, self._chain.n))
         jacobian = self._jacobian(postures)
-        self._check_rank(jacobian, redundant)
         self._check_decomposition(postures[:, self._held])
         self._scale = float(np.abs(np.linalg.det(jacobian)).max())
 
     def _jacobian(self, q: np.ndarray) -> np.ndarray:
         """J_nr, (K, 6, 6), at postures of the chain in between, up to a change of the frame that leaves det J_nr."""
         return np.moveaxis(self._chain.posed(q).jacobian_columns(self._rest), 2, 0)
-
-    def _check_rank(self, jacobian: np.ndarray, redundant: tuple[int, ...]) -> None:
-        """Refuse a decomposition whose J_nr is singular at all of many random postures."""
-        size = np.abs(jacobian[:, :3]).max()
-        scaled = jacobian / np.array([size, size, size, 1.0, 1.0, 1.0])[:, None]
-        if np.linalg.svd(scaled, compute_uv=False)[:, -1].max() < _SINGULAR:
-            names = ", ".join(self._geometry.joint_names[i] for i in redundant)
-            more = f": there is always a motion of the tool that needs {names}" if names else ""
-            raise NotApplicableError(f"J_nr is singular everywhere{more}")
 
     def _check_decomposition(self, values: np.ndarray) -> None:
         """Refuse axes of which EAIK knows no decomposition."""
@@ -184,6 +177,19 @@ def _repeated(joints: np.ndarray, groups: np.ndarray) -> np.ndarray:
     return repeated
 
 
+def _check_rank(geometry: ChainGeometry, redundant: tuple[int, ...]) -> None:
+    """Refuse a decomposition whose J_nr is singular at all of many random postures."""
+    postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, geometry.n))
+    columns = geometry.posed(postures).jacobian_columns([i for i in range(geometry.n) if i not in redundant])
+    jacobian = np.moveaxis(columns, 2, 0)
+    size = np.abs(jacobian[:, :3]).max()
+    scaled = jacobian / np.array([size, size, size, 1.0, 1.0, 1.0])[:, None]
+    if np.linalg.svd(scaled, compute_uv=False)[:, -1].max() < _SINGULAR:
+        names = ", ".join(geometry.joint_names[i] for i in redundant)
+        more = f": there is always a motion of the tool that needs {names}" if names else ""
+        raise NotApplicableError(f"J_nr is singular everywhere{more}")
+
+
 @ik_family(
     "eaik", source="D. Ostermeier, J. Külz, M. Althoff, Automatic geometric decomposition for analytical IK, 2025"
 )
@@ -194,6 +200,7 @@ def eaik(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, .
     sliding = [geometry.joint_names[i] for i in range(geometry.n) if i not in redundant and not geometry.revolute[i]]
     if sliding:
         raise NotApplicableError(f"{', '.join(sliding)} would be left over and not revolute")
+    _check_rank(geometry, redundant)
     if not installed():
-        raise NotApplicableError('EAIK is not installed (pip install "brachis[eaik]")')
+        raise NotApplicableError(NOT_INSTALLED)
     return EaikSolver(geometry, redundant)

@@ -14,7 +14,7 @@ from brachis.plots.comparison import plot_comparison
 from brachis.plots.motion import plot_motion
 from brachis.plots.overview import plot_overview
 from brachis.plots.postures import plot_postures
-from brachis.plots.save import SUFFIXES, save_figure
+from brachis.plots.save import SUFFIXES, check_suffix, save_figure
 from brachis.plots.timeline import plot_timeline
 from brachis.plots.torques import plot_torques
 from brachis.trajectory import Trajectory
@@ -34,6 +34,7 @@ PLOTS: dict[str, Callable[[Trajectory], Figure]] = {
 __all__ = [
     "PLOTS",
     "SUFFIXES",
+    "check_suffix",
     "plot_candidates",
     "plot_comparison",
     "plot_motion",

@@ -59,7 +59,7 @@ def drawing_plane(robot: Robot, q: np.ndarray, axes: Sequence[int]) -> tuple[int
         World axes of the task space's position rows. Two of them fix the plane; one leaves a choice.
     """
     data = robot.model.createData()
-    columns = np.asarray(pin.computeJointJacobians(robot.model, data, q))
+    columns = np.asarray(pin.computeJointJacobians(robot.model, data, q)).reshape(6, robot.n)  # (6,) for one joint
     revolute = np.array([unit == "rad" for unit in robot.position_units])
     turning, sliding = columns[3:, revolute], columns[:3, ~revolute]
     for normal in (2, 1, 0):

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
+from brachis.arrays import freeze
 from brachis.errors import InputError
 from brachis.robot.limits import per_joint_values
 
 
 @dataclass(frozen=True)
 class Friction:
-    """Armature, viscous and Coulomb terms of every joint.
+    """Armature, viscous and Coulomb terms of every joint. The arrays are read-only.
 
     The joint torque is ``rnea(q, qdot, qddot) + armature * qddot + viscous * qdot + coulomb * tanh(qdot / v_eps)``.
     Pinocchio's ``rnea`` would add ``model.armature``; brachis keeps that at zero and adds the term here. Pinocchio
@@ -35,6 +36,10 @@ class Friction:
     viscous: np.ndarray
     coulomb: np.ndarray
     v_eps: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Take copies that nobody can write to."""
+        freeze(self, *(each.name for each in fields(self)))
 
     @classmethod
     def of(

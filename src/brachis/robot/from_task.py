@@ -7,7 +7,7 @@ import os
 from brachis.errors import TaskError
 from brachis.robot.limits import LimitSpec
 from brachis.robot.robot import Robot
-from brachis.task import RobotSettings
+from brachis.task import LimitSettings, RobotSettings
 
 
 def robot_from_settings(
@@ -34,7 +34,6 @@ def robot_from_settings(
     source = urdf if urdf is not None else settings.urdf
     if source is None and urdf_text is None:
         raise TaskError("no URDF is named", where="robot.urdf", allowed="path of a URDF file")
-    limits = settings.limits
     return Robot.from_urdf(
         source if source is not None else "saved URDF",
         urdf_text=urdf_text,
@@ -42,12 +41,17 @@ def robot_from_settings(
         base_frame=settings.base_frame,
         gravity=settings.gravity,
         locked_joints=settings.locked_joints,
-        limits=LimitSpec(
-            torque=limits.torque,
-            velocity=limits.velocity,
-            acceleration=limits.acceleration,
-            position=limits.position,
-            scale=limits.scale.model_dump(),
-        ),
+        limits=limit_spec(settings.limits),
         friction=settings.friction.model_dump(),
+    )
+
+
+def limit_spec(limits: LimitSettings) -> LimitSpec:
+    """Return the limits of a task as `Robot.from_urdf` takes them."""
+    return LimitSpec(
+        torque=limits.torque,
+        velocity=limits.velocity,
+        acceleration=limits.acceleration,
+        position=limits.position,
+        scale=limits.scale.model_dump(),
     )

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
+from brachis.arrays import freeze
 from brachis.errors import InputError, LimitError, UnknownNameError
 
 _SCALABLE = ("torque", "velocity", "acceleration")
@@ -37,7 +38,7 @@ class LimitSpec:
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of every joint of the chain; infinite where a joint is not limited.
+    """Limits of every joint of the chain; infinite where a joint is not limited. The arrays are read-only.
 
     Attributes
     ----------
@@ -56,6 +57,10 @@ class Limits:
     velocity: np.ndarray
     acceleration: np.ndarray
     torque: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Take copies that nobody can write to."""
+        freeze(self, *(each.name for each in fields(self)))
 
 
 @dataclass(frozen=True)

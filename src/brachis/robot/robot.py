@@ -14,6 +14,7 @@ from brachis.errors import InputError, UrdfError
 from brachis.robot.friction import Friction
 from brachis.robot.limits import FROM_URDF, Limits, LimitSpec, UrdfLimit, per_joint_values, resolve_limits
 from brachis.robot.urdf import read_chain, read_file
+from brachis.robot.urdf_bodies import check_bodies
 from brachis.task import RobotSettings, check_robot_settings
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
@@ -118,6 +119,7 @@ class Robot:
             raise UrdfError(
                 "the chain is not serial", where=str(path), found=list(names), allowed=list(chain.joint_names)
             )
+        check_bodies(model, chain.bodies, str(path))
         resolved, terms = resolve_limits(spec, names, chain.limits), Friction.of(names, **dict(friction or {}))
         terms.check_against(names, resolved.torque)
         return cls(
@@ -141,7 +143,8 @@ class Robot:
     @property
     def frame_id(self) -> int:
         """Pinocchio's index of the tool frame."""
-        return int(self.model.getFrameId(self.tool_frame))
+        kind = pin.FrameType.OP_FRAME if self.rolls_freely else pin.FrameType.BODY
+        return int(self.model.getFrameId(self.tool_frame, kind))
 
     @property
     def position_units(self) -> tuple[str, ...]:
@@ -249,10 +252,14 @@ def _build_model(xml: str, locked: Mapping[str, float], where: str) -> pin.Model
     """Let Pinocchio parse the plain URDF and lock the joints off the chain."""
     try:
         full = pin.buildModelFromXML(xml)
+        return _locked(full, {name: value for name, value in locked.items() if full.existJointName(name)})
     except (ValueError, RuntimeError) as error:
         raise UrdfError("Pinocchio cannot build the model", where=where, found=str(error)) from error
-    present = {name: value for name, value in locked.items() if full.existJointName(name)}
+
+
+def _locked(full: pin.Model, locked: Mapping[str, float]) -> pin.Model:
+    """Hold joints at positions, rad or m."""
     reference = pin.neutral(full)
-    for name, value in present.items():
+    for name, value in locked.items():
         reference[full.idx_qs[full.getJointId(name)]] = value
-    return pin.buildReducedModel(full, [full.getJointId(name) for name in present], reference)
+    return pin.buildReducedModel(full, [full.getJointId(name) for name in locked], reference)

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import copy
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from lxml import etree
 
+from brachis import files
 from brachis.errors import UnknownNameError, UrdfError
 from brachis.robot.limits import UrdfLimit
+from brachis.robot.urdf_bodies import Body, stated_bodies
 from brachis.robot.urdf_checks import MOVING_TYPES, check_inertias, check_joints
+from brachis.robot.urdf_numbers import check_numbers
+from brachis.robot.urdf_tree import UrdfTree, read_tree
 
 if TYPE_CHECKING:
     import yourdfpy
+
+_NEEDED = ("inertial", "parent", "child", "origin", "axis", "limit", "dynamics", "mimic")
+"""Parts of links and joints that say how the robot moves and what it weighs."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +44,8 @@ class UrdfChain:
     xml : str
         The URDF that Pinocchio reads: ``continuous`` joints have become ``revolute`` ones without range, so that
         every joint has one coordinate, and unsupported joints off the chain have become fixed.
+    bodies : tuple of Body
+        What each joint of the chain moves, summed up from the file.
     """
 
     joint_names: tuple[str, ...]
@@ -43,10 +54,11 @@ class UrdfChain:
     tool_frame: str
     base_frame: str
     xml: str
+    bodies: tuple[Body, ...]
 
 
 def read_chain(
-    text: str | bytes,
+    text: str,
     where: str,
     *,
     tool_frame: str | None,
@@ -57,7 +69,7 @@ def read_chain(
 
     Parameters
     ----------
-    text : str or bytes
+    text : str
         The URDF.
     where : str
         Name of the file, for messages.
@@ -75,12 +87,11 @@ def read_chain(
     UnknownNameError
         A frame or joint does not exist.
     """
-    urdf = _parse(text, where)
+    tree, urdf = parse_urdf(text, where)
     parents = {joint.child: joint for joint in urdf.robot.joints}
-    links = [link.name for link in urdf.robot.links]
+    links = list(tree.links)
     tool = _tool(urdf, tool_frame, where)
-    root = _root(links, parents, where)
-    base = base_frame if base_frame is not None else root
+    base = base_frame if base_frame is not None else tree.root
     if base not in links:
         raise UnknownNameError("frame", base, links, where=f"{where}: base_frame")
     path_joints = _joints_between(base, tool, parents, where)
@@ -99,10 +110,11 @@ def read_chain(
     }
     check_inertias(urdf, chain, parents, where)
     limits = tuple(_limit_of(joint) for joint in chain)
-    return UrdfChain(tuple(j.name for j in chain), limits, locked, tool, base, _plain_xml(urdf))
+    names = tuple(joint.name for joint in chain)
+    return UrdfChain(names, limits, locked, tool, base, _plain_xml(urdf), stated_bodies(tree, names, locked))
 
 
-def last_common_link(text: str | bytes, where: str) -> tuple[str, tuple[str, ...]]:
+def last_common_link(text: str, where: str) -> tuple[str, tuple[str, ...]]:
     """Return the last link before a URDF's longest moving chains part, and the links at their ends.
 
     For an arm with a gripper that is the link to which the fingers are attached; for a single chain its end.
@@ -112,13 +124,11 @@ def last_common_link(text: str | bytes, where: str) -> tuple[str, tuple[str, ...
     UrdfError
         The text is broken, or the chains part before a joint moves.
     """
-    urdf = _parse(text, where)
+    tree, urdf = parse_urdf(text, where)
     parents = {joint.child: joint for joint in urdf.robot.joints}
-    links = [link.name for link in urdf.robot.links]
-    root = _root(links, parents, where)
     inner = {joint.parent for joint in urdf.robot.joints}
-    leaves = tuple(name for name in links if name not in inner)
-    chains = {leaf: _joints_between(root, leaf, parents, where) for leaf in leaves}
+    leaves = tuple(name for name in tree.links if name not in inner)
+    chains = {leaf: _joints_between(tree.root, leaf, parents, where) for leaf in leaves}
     counts = {leaf: sum(joint.type in MOVING_TYPES for joint in chain) for leaf, chain in chains.items()}
     # Frames half way up the arm are no tools: the chains of most joints count.
     moving = {leaf: chain for leaf, chain in chains.items() if counts[leaf] == max(counts.values())}
@@ -143,43 +153,46 @@ def read_file(path: Path) -> str:
     Raises
     ------
     UrdfError
-        The file is missing or not text.
+        The file is missing, not text, or no regular file of a size that a URDF may have.
     """
-    if not path.is_file():
-        raise UrdfError("the URDF file does not exist", where=str(path))
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        return files.read_file(path).decode()
+    except FileNotFoundError as error:
+        raise UrdfError("the URDF file does not exist", where=str(path)) from error
+    except UnicodeDecodeError as error:
         raise UrdfError("the URDF file cannot be read", where=str(path), found=str(error)) from error
+    except OSError as error:
+        raise UrdfError(f"the URDF file cannot be read: {error.strerror}", where=str(path)) from error
 
 
-def _parse(text: str | bytes, where: str) -> yourdfpy.URDF:
-    """Parse the text, or say why it is not a URDF."""
+def parse_urdf(text: str, where: str) -> tuple[UrdfTree, yourdfpy.URDF]:
+    """Read the checked elements of a URDF, and have yourdfpy read what of them is needed.
+
+    Raises
+    ------
+    UrdfError
+        See `read_tree` and `check_numbers`.
+    """
     import yourdfpy  # noqa: PLC0415  (imports trimesh: one second that only this stage needs)
-    from lxml import etree  # noqa: PLC0415  (comes with yourdfpy)
 
-    data = text.encode() if isinstance(text, str) else text
-    try:
-        root = etree.fromstring(data)
-    except etree.XMLSyntaxError as error:
-        raise UrdfError("the URDF file is not well-formed XML", where=where, found=str(error)) from error
-    if root.tag != "robot":
-        raise UrdfError(
-            "the file is not a URDF",
-            where=where,
-            found=f"root element <{root.tag}>",
-            allowed="<robot>",
-            hint="Expand xacro files first",
-        )
+    tree = read_tree(text, where)
+    check_numbers(tree, where)
     try:
         urdf = yourdfpy.URDF.load(
-            io.BytesIO(data), build_scene_graph=False, build_collision_scene_graph=False, load_meshes=False
+            io.BytesIO(_needed(tree)), build_scene_graph=False, build_collision_scene_graph=False, load_meshes=False
         )
     except (ValueError, TypeError, KeyError, AttributeError, IndexError) as error:
         raise UrdfError("the URDF cannot be read", where=where, found=f"{type(error).__name__}: {error}") from error
-    if not urdf.robot.links:
-        raise UrdfError("the URDF has no links", where=where)
-    return urdf
+    return tree, urdf
+
+
+def _needed(tree: UrdfTree) -> bytes:
+    """Write links and joints without what does not move or weigh: shapes, drives, plugins."""
+    robot = etree.Element("robot", name="robot")
+    for owner in (*tree.links.values(), *tree.joints.values()):
+        kept = etree.SubElement(robot, owner.tag, {key: owner.get(key) for key in ("name", "type") if owner.get(key)})
+        kept.extend(copy.deepcopy(part) for part in owner if part.tag in _NEEDED)
+    return bytes(etree.tostring(robot))
 
 
 def _tool(urdf: yourdfpy.URDF, tool_frame: str | None, where: str) -> str:
@@ -199,22 +212,6 @@ def _tool(urdf: yourdfpy.URDF, tool_frame: str | None, where: str) -> str:
             hint="Set robot.tool_frame to one of the robot's links",
         )
     return leaves[0]
-
-
-def _root(links: Sequence[str], parents: Mapping[str, Any], where: str) -> str:
-    """Find the only link without a parent."""
-    roots = [name for name in links if name not in parents]
-    if len(roots) != 1:
-        raise UrdfError(
-            "the links do not form one tree", where=where, found=f"root links: {', '.join(roots) or 'none'}"
-        )
-    reached = {roots[0]}
-    while more := {name for name, joint in parents.items() if joint.parent in reached} - reached:
-        reached |= more
-    if len(reached) < len(links):
-        looped = ", ".join(name for name in links if name not in reached)
-        raise UrdfError("the links do not form one tree", where=where, found=f"a loop of links: {looped}")
-    return roots[0]
 
 
 def _joints_between(base: str, tool: str, parents: Mapping[str, Any], where: str) -> list[Any]:
@@ -256,6 +253,7 @@ def _plain_xml(urdf: yourdfpy.URDF) -> str:
     """Write the URDF with one-coordinate joints only; Pinocchio gives a continuous joint two coordinates."""
     from yourdfpy import Limit  # noqa: PLC0415
 
+    taken = {link.name for link in urdf.robot.links}
     for joint in urdf.robot.joints:
         joint.mimic = None
         if joint.type == "continuous":
@@ -265,6 +263,9 @@ def _plain_xml(urdf: yourdfpy.URDF) -> str:
             joint.type = "fixed"
         elif joint.type != "fixed":
             joint.limit = Limit(effort=0.0, velocity=0.0, lower=-1e9, upper=1e9)
+        while joint.type == "fixed" and joint.name in taken:  # Pinocchio looks frames up by name
+            joint.name += "_joint"
+        taken.add(joint.name)
     for link in urdf.robot.links:
         link.visuals, link.collisions = [], []
     xml = urdf.write_xml_string()

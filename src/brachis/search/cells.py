@@ -41,18 +41,18 @@ class Cells:
     window: int
 
     @classmethod
-    def of(cls, choice: Choice, cells_per_turn: int) -> Cells:
+    def of(cls, choice: Choice, cells_per_turn: int, posture: np.ndarray | None) -> Cells:
         """Lay out the cells of a choice of redundant joints.
 
-        A start posture is the middle of a cell. With a free one the cells cover closed ranges, a turn of an open
-        revolute joint, and what of an open prismatic joint is near the path's beginning.
+        The posture, (n,), from which courses begin is the middle of a cell. Where none is given, the cells cover closed
+        ranges, a turn of an open revolute joint, and what of an open prismatic joint is near the path's beginning.
         """
         given, joints = choice.setting, list(choice.redundant)
         turning = np.array([given.robot.position_units[joint] == "rad" for joint in joints], dtype=bool)
         low, high = given.robot.limits.position_lower[joints], given.robot.limits.position_upper[joints]
         size = np.where(turning, _TURN, 1.0 / _CELLS_PER_METRE) / cells_per_turn
-        if given.start is not None:
-            origin = given.start[joints]
+        if posture is not None:
+            origin = posture[joints]
         else:
             places = [0.0 if turns else _nearby(given, joint) for joint, turns in zip(joints, turning, strict=True)]
             origin = np.clip(places, low, high)

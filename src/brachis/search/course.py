@@ -15,7 +15,6 @@ _TINY = 1e-9
 
 NO_ANSWER = "it is out of reach"
 OTHER_BRANCH = "the branch ends"
-OUT_OF_RANGE = "a joint range ends"
 TOO_HEAVY = "the torque limits cannot hold the arm against gravity"
 JUMPS = "no posture is near enough to continue"
 
@@ -58,14 +57,23 @@ class DeadEnd:
         Path coordinate of the first station that no node reaches.
     causes : dict of str to int
         Why, and how many edges say so; the cause of those that came nearest to being possible first.
+    backwards : bool
+        Whether the lattice begins at the given end posture.
     """
 
     s: float
     causes: dict[str, int]
+    backwards: bool = False
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Part of the path, in s, that is not reached."""
+        return (0.0, self.s) if self.backwards else (self.s, 1.0)
 
     def __str__(self) -> str:
         """Return the place and its first cause, in words."""
-        return f"from s = {self.s:.3g} on {next(iter(self.causes))}"
+        place = f"back from the end posture, at s = {self.s:.3g}" if self.backwards else f"from s = {self.s:.3g} on"
+        return f"{place} {next(iter(self.causes))}"
 
 
 def distinct(courses: Sequence[Course], most: int) -> list[Course]:
@@ -113,17 +121,26 @@ def weights_near(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 
 def causes_of(
-    exists: np.ndarray, where: np.ndarray, found: np.ndarray, in_range: np.ndarray, near: np.ndarray
+    robot: Robot, exists: np.ndarray, where: np.ndarray, found: np.ndarray, inside: np.ndarray, near: np.ndarray
 ) -> dict[str, int]:
     """Count why edges, (E,), are impossible, those first that came nearest to being possible.
 
-    `exists` tells of cells (C, B) which branches have an answer, `where` the cells of the edges.
+    `exists` tells of cells (C, B) which branches have an answer, `where` the cells of the edges, `inside`, (E, n),
+    which joints stay within their ranges.
     """
     anywhere = np.asarray(exists.any(axis=1))
     counts = {
-        OUT_OF_RANGE: found & ~in_range & near,
         OTHER_BRANCH: anywhere[where] & ~found,
         JUMPS: found & ~near,
         NO_ANSWER: ~anywhere[where],
     }
-    return {cause: int(those.sum()) for cause, those in counts.items() if those.any()}
+    others = {cause: int(those.sum()) for cause, those in counts.items() if those.any()}
+    return beyond_ranges(robot, inside[found & near]) | others
+
+
+def beyond_ranges(robot: Robot, inside: np.ndarray) -> dict[str, int]:
+    """Name the joint that most often leaves its range in K postures, and count these; `inside` is (K, n) bool."""
+    outside = int((~inside.all(axis=1)).sum())
+    if not outside:
+        return {}
+    return {f"the range of joint {robot.joint_names[int(np.argmin(inside.sum(axis=0)))]!r} ends": outside}

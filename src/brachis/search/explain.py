@@ -7,18 +7,17 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from brachis import ik
 from brachis.errors import BrachisError, PathError, PlanningError
 from brachis.result import Candidate
 from brachis.search.course import DeadEnd
 from brachis.search.reach import explain_failure
 from brachis.setting import Choice
+from brachis.task import SolverSettings, Task
 
 _GOOD_PART = 0.1
 _LOOKED_AT = 2
-_THERE_IS_A_COURSE = (
-    "There is a course along the path within reach, but no motion along it was found; raise search.effort, or try "
-    "another start posture"
-)
+_MOST_EFFORT = "exhaustive"
 
 
 def refuse_what_is_out_of_reach(choices: Sequence[Choice], candidates: Sequence[Candidate]) -> None:
@@ -67,23 +66,55 @@ def no_motion(
     PathError or PlanningError
     """
     course = _some_course(candidates)
-    reason = _THERE_IS_A_COURSE if course else _reason(choices[0])
+    reason = _advice(choices[0].setting.task, candidates) if course else _reason(choices[0])
     if isinstance(reason, BrachisError):
         return reason
     if dead_ends and not course:
-        name, furthest = max(dead_ends.items(), key=lambda item: item[1].s)
+        name, furthest = min(dead_ends.items(), key=lambda item: np.diff(item[1].interval)[0])
         others = (
             f" (redundant joints {name}; {len(dead_ends) - 1} other choices end sooner)" if len(dead_ends) > 1 else ""
         )
         start = "" if choices[0].setting.start is None else "start in another posture, "
         return PathError(
             f"no course along the path was found: {furthest}{others}",
-            s_interval=(furthest.s, 1.0),
-            hint=f"{start}shorten or move the path, or widen the joint ranges".capitalize(),
+            s_interval=furthest.interval,
+            hint=f"{start}shorten or move the path, or widen the joint ranges".capitalize()
+            + _what_is_missing(choices[0]),
         )
     counts = Counter(candidate.status for candidate in candidates)
     outcomes = "; ".join(status if n == 1 else f"{status} ({n} times)" for status, n in counts.items())
-    return PlanningError(f"no motion within the limits was found: {outcomes or 'no initial guess'}", hint=reason)
+    return PlanningError(
+        f"no motion within the limits was found: {outcomes or 'no initial guess'}",
+        hint=reason + _what_is_missing(choices[0]),
+    )
+
+
+def _advice(task: Task, candidates: Sequence[Candidate]) -> str:
+    """Say what may help where there are courses, but no motion along them: only what has not been tried."""
+    statuses = " ".join(candidate.status for candidate in candidates)
+    few = SolverSettings.model_fields
+    tried = []
+    if "iteration limit" in statuses and task.solver.max_iterations < few["max_iterations"].default:
+        tried.append(f"raise solver.max_iterations, which is {task.solver.max_iterations}")
+    if "time limit" in statuses and task.solver.time_limit < few["time_limit"].default:
+        tried.append(f"raise solver.time_limit, which is {task.solver.time_limit:g} s")
+    if not tried and task.search.effort != _MOST_EFFORT:
+        tried.append(f"raise search.effort, which is {task.search.effort}")
+    if not tried:
+        tried.append("raise the limits, or try another start posture")
+    return f"There is a course along the path within reach, but no motion along it was found; {', or '.join(tried)}"
+
+
+def _what_is_missing(choice: Choice) -> str:
+    """Say which further choices of redundant joints EAIK might add where it is not installed."""
+    setting = choice.setting
+    if setting.task.redundant_joints != "auto":
+        return ""
+    further = ik.without_eaik(ik.find_all(setting.robot, setting.task_space))
+    if not further:
+        return ""
+    names = ", ".join("[" + ", ".join(joints) + "]" for joints in further)
+    return f'. EAIK is not installed (pip install "brachis[eaik]"); it might add the redundant joints {names}'
 
 
 def _lattices(candidates: Sequence[Candidate]) -> list[Candidate]:

@@ -1,10 +1,14 @@
 """Courses of the redundant joints along the path, from a lattice of closed-form postures.
 
-The path is cut into stations, the redundant joints into cells. Layer by layer from the start, every node (a cell, a
-branch and the posture that the closed form gives there) is joined to the cells around it at the next station, where
+The path is cut into stations, the redundant joints into cells. Layer by layer from the given start, every node (a cell,
+a branch and the posture that the closed form gives there) is joined to the cells around it at the next station, where
 the posture exists, is within the joint ranges, clear of the branch boundary and can be held against gravity, and no
-joint jumps. Of all edges into a node the one with the least total length stays (dynamic programming); lifts of angles
-by 2 pi follow the course. The length of an edge,
+joint jumps. Of all edges into a node the one with the least total length stays (dynamic programming). Where the end
+posture is given and the start is not, the layers run backwards from the end.
+
+Turns of angles by 2 pi follow the course. From a given posture, nodes of one cell in different turns are different
+nodes. Where neither end is given, all turns of a course exist at once: a node keeps how far its joints have gone, and
+is within the ranges as long as some multiple of 2 pi brings the whole course there. The length of an edge,
 
     max_j |M(q) dq|_j / tau_max_j  +  T max_j |dq_j| / v_max_j
 
@@ -24,14 +28,14 @@ from brachis.search.course import (
     JUMPS,
     NO_ANSWER,
     OTHER_BRANCH,
-    OUT_OF_RANGE,
     TOO_HEAVY,
     Course,
     DeadEnd,
+    beyond_ranges,
     causes_of,
     distinct,
 )
-from brachis.search.layer import Layer, all_lifts
+from brachis.search.layer import Layer
 from brachis.search.stations import stations
 from brachis.setting import Choice
 
@@ -70,18 +74,26 @@ class Lattice:
         self._redundant = list(choice.redundant)
         self._rest = np.array([i for i in range(given.robot.n) if i not in choice.redundant], dtype=int)
         self._turning = np.array([unit == "rad" for unit in given.robot.position_units])
-        self._cells = Cells.of(choice, cells_per_turn)
         self._nodes, self._seed = nodes, seed
+        self._turns = self._rest[self._turning[self._rest]]
+        self._backwards = given.start is None and given.end is not None
+        self._origin = given.end if self._backwards else given.start
+        self._cells = Cells.of(choice, cells_per_turn, self._origin)
         labels = self._solver.branches
         self._slots = [[b for b, label in enumerate(labels) if label == labels[first]] for first in choice.branches]
         self._first = {slot: slots[0] for slots in self._slots for slot in slots}
         self._targets = given.path.sample(self.s).target
         limits = given.robot.limits
         self._lower, self._upper = limits.position_lower - _SLACK, limits.position_upper + _SLACK
+        self._loose = np.zeros(given.robot.n, dtype=bool)  # which joints may begin in any turn
+        self._loose[self._turns] = self._origin is None
+        # Turns of a free origin exist all at once, and nobody asks which turn an angle without a range is in.
+        ranged = np.isfinite(self._lower) | np.isfinite(self._upper) | (given.end is not None)
+        self._telling = (ranged & ~self._loose)[self._turns]
         self._clear = _CLEAR
-        if given.start is not None:
-            at_start = self._solver.branch_margins(given.start[None], choice.branches[0])[0]
-            self._clear = float(np.minimum(_CLEAR, 0.5 * at_start.min(initial=np.inf)))
+        if self._origin is not None:
+            at_origin = self._solver.branch_margins(self._origin[None], choice.branches[0])[0]
+            self._clear = float(np.minimum(_CLEAR, 0.5 * at_origin.min(initial=np.inf)))
 
     def courses(self, most: int) -> list[Course] | DeadEnd:
         """Find courses along the path.
@@ -98,55 +110,71 @@ class Lattice:
         """
         rng = np.random.default_rng(self._seed)
         layers: list[Layer] = []
-        for station, s in enumerate(self.s):
+        stations = range(len(self.s))
+        for station in reversed(stations) if self._backwards else stations:
             layer = self._next(layers[-1], station, rng) if layers else self._first_layer(rng)
             if not isinstance(layer, Layer):
-                return DeadEnd(float(s), layer)
+                return DeadEnd(float(self.s[station]), layer, backwards=self._backwards)
             layers.append(layer)
-        ends, shifts = self._ends(layers[-1])
+        ends = self._ends(layers[-1])
         if not len(ends):
             return DeadEnd(1.0, {JUMPS: 1})
         q, slots = self._traced(layers, ends)
         lengths = layers[-1].length[ends]
         found = [
-            Course(self.choice, self._first[int(slot)], self.s, course + shift, float(length))
-            for slot, course, shift, length in zip(slots, q, shifts, lengths, strict=True)
+            Course(self.choice, self._first[int(slot)], self.s, course, float(length))
+            for slot, course, length in zip(slots, q, lengths, strict=True)
         ]
         return distinct(found, most)
 
-    def _ends(self, last: Layer) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes at which courses may end, (E,), the nearest first, and by how much their courses are lifted, (E, n).
-
-        With a free start and an open range the end posture decides which turn an angle is in.
-        """
+    def _ends(self, last: Layer) -> np.ndarray:
+        """Nodes at which courses may end, (E,), the nearest first."""
         order = np.argsort(last.length, kind="stable")
-        shifts = np.zeros_like(last.q)
         given = self.choice.setting
-        if given.end is not None:
-            if given.start is None:
-                loose = self._turning & ~np.isfinite(self._lower) & ~np.isfinite(self._upper)
-                shifts[:, loose] = _TURN * np.round((given.end - last.q)[:, loose] / _TURN)
+        if given.end is not None and not self._backwards:
             allowed = np.full(self._robot.n, _LARGEST_STEP)
             allowed[self._redundant] = self._cells.size
-            order = order[np.all(np.abs(last.q + shifts - given.end)[order] <= allowed, axis=1)]
-        order = order[last.length[order] <= _LONGEST * last.length[order[:1]] + _SLACK]
-        return order, shifts[order]
+            order = order[np.all(np.abs(last.q - given.end)[order] <= allowed, axis=1)]
+        return order[last.length[order] <= _LONGEST * last.length[order[:1]] + _SLACK]
 
     def _traced(self, layers: list[Layer], ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Trace courses back from their ends, (E,): postures (E, S + 1, n) and first slots (E,)."""
+        """Trace courses back from their ends, (E,): postures (E, S + 1, n), in their turns, and first slots (E,)."""
         nodes, q = ends, []
         for layer in reversed(layers):
             q.append(layer.q[nodes])
             slots, nodes = layer.slot[nodes], layer.parent[nodes]
-        return np.array(q[::-1]).swapaxes(0, 1), slots
+        courses = np.array(q if self._backwards else q[::-1]).swapaxes(0, 1)
+        return courses + _TURN * self._turn_of(layers[-1][ends])[:, None], slots
+
+    def _turn_of(self, nodes: Layer) -> np.ndarray:
+        """Multiples of 2 pi, (E, n), that bring the courses to nodes into the ranges, in the middle if closed."""
+        first, last = self._turns_within(nodes.low, nodes.high)
+        with np.errstate(invalid="ignore"):  # inf - inf
+            middle = 0.5 * (self._lower + self._upper - nodes.low - nodes.high) / _TURN
+        wanted = np.where(self._loose & np.isfinite(middle), np.round(middle), 0.0)
+        return np.clip(wanted, first, last)
+
+    def _turns_within(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest multiples of 2 pi, (E, n), that bring courses within low and high into the ranges.
+
+        Joints that are in a turn already have the multiple 0 or, where it is not within the range, none at all: the
+        least is then above the largest.
+        """
+        first = np.where(self._loose, np.ceil((self._lower - low) / _TURN), low < self._lower)
+        last = np.where(self._loose, np.floor((self._upper - high) / _TURN), -1.0 * (high > self._upper))
+        return first, last
+
+    def _inside(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """Which joints of courses, (E, n), can be brought into their ranges; see `_turns_within`."""
+        first, last = self._turns_within(low, high)
+        return np.asarray(first <= last)
 
     def _first_layer(self, rng: np.random.Generator) -> Layer | dict[str, int]:
-        """Make the node of the start posture, or nodes all over the ranges where it is free, or say why not."""
-        given, r = self.choice.setting, self._cells.r
-        if given.start is not None:
-            none = np.zeros(1, dtype=int)
-            start = given.start[None].astype(float)
-            return Layer(np.zeros((1, r), dtype=int), none + self.choice.branches[0], start, np.zeros(1), none)
+        """Make the node of the given posture, or nodes all over the ranges where none is given, or say why not."""
+        r = self._cells.r
+        if self._origin is not None:
+            none, q = np.zeros(1, dtype=int), self._origin[None].astype(float)
+            return Layer(np.zeros((1, r), dtype=int), none + self.choice.branches[0], q, q, q, np.zeros(1), none)
         cells = self._cells.everywhere(_STARTS * self._nodes, rng)
         answers = self._answers(cells, 0)
         slots = np.array(sorted(self._first))
@@ -157,21 +185,19 @@ class Lattice:
         exists = np.isfinite(q).all(axis=1)
         if not exists.any():
             return {NO_ANSWER: len(cells)}
-        which, q = all_lifts(q[exists], self._rest[self._turning[self._rest]], self._lower, self._upper)
-        inside = self._in_range(q)
+        cell, slot, q = cell[exists], slot[exists], q[exists]
+        within = self._inside(q, q)
+        inside = within.all(axis=1)
         if not inside.any():
-            return {OUT_OF_RANGE: int(exists.sum())}
-        chosen = np.flatnonzero(exists)[which[inside]]
-        nothing = np.zeros(len(chosen))
-        return self._kept(Layer(cell[chosen], slot[chosen], q[inside], nothing, nothing.astype(int)))
+            return beyond_ranges(self._robot, within)
+        cell, slot, q = cell[inside], slot[inside], q[inside]
+        nothing = np.zeros(len(q))
+        return self._kept(Layer(cell, slot, q, q, q, nothing, nothing.astype(int)))
 
     def _answers(self, cells: np.ndarray, station: int) -> np.ndarray:
         """Non-redundant joints of all branches, (C, B, m)."""
         target = np.repeat(self._targets[station][None], len(cells), axis=0)
         return self._solver.solve(target, self._cells.positions(cells))
-
-    def _in_range(self, q: np.ndarray) -> np.ndarray:
-        return np.all((q >= self._lower) & (q <= self._upper), axis=-1)
 
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         """Pairs of parents, (E,), and cells, (E, r), that may be joined; at the very end the given end's, too."""
@@ -179,7 +205,7 @@ class Lattice:
         parent = np.repeat(np.arange(len(before.slot)), len(offsets))
         edges = before.cell[parent] + np.tile(offsets, (len(before.slot), 1))
         end = self.choice.setting.end
-        if end is not None and station == len(self.s) - 1:
+        if end is not None and not self._backwards and station == len(self.s) - 1:
             aim = np.tile(self._cells.near(end[self._redundant]), (len(before.slot), 1))
             parent = np.append(parent, np.arange(len(before.slot)))
             edges = np.vstack([edges, aim])
@@ -199,22 +225,22 @@ class Lattice:
         q[:, self._redundant] = self._cells.positions(cells)[where]
         q[:, self._rest] = answers[where, slot]
         step = q - before.q[parent]
-        turns = self._rest[self._turning[self._rest]]
-        step[:, turns] -= _TURN * np.round(step[:, turns] / _TURN)
+        turn = -np.round(step[:, self._turns] / _TURN)
+        step[:, self._turns] += _TURN * turn
         q = before.q[parent] + step
+        low, high = np.minimum(before.low[parent], q), np.maximum(before.high[parent], q)
         found = exists[where, slot]
         with np.errstate(invalid="ignore"):
-            in_range = self._in_range(q)
+            inside = self._inside(low, high)
             near = np.all(np.abs(step) <= _LARGEST_STEP, axis=1)
-        good = found & in_range & near
+        good = found & inside.all(axis=1) & near
         if not good.any():
-            return causes_of(exists, where, found, in_range, near)
-        parent, slot, where, q, step = parent[good], slot[good], where[good], q[good], step[good]
+            return causes_of(self._robot, exists, where, found, inside, near)
+        parent, where, step = parent[good], where[good], step[good]
         length = before.length[parent] + self._lengths(before.q, step, parent)
-        order = np.lexsort((length, slot, where))
-        key = where[order] * len(self._solver.branches) + slot[order]
-        best = order[np.append(True, key[1:] != key[:-1])]
-        return self._kept(Layer(cells[where[best]], slot[best], q[best], length[best], parent[best]))
+        layer = Layer(cells[where], slot[good], q[good], low[good], high[good], length, parent)
+        turn = np.where(self._telling, turn[good], 0.0)
+        return self._kept(layer[_shortest(length, np.column_stack([where, layer.slot, turn]))])
 
     def _lengths(self, q: np.ndarray, step: np.ndarray, origin: np.ndarray) -> np.ndarray:
         """Lengths of steps, (E, n), from the postures q[origin]; see the module."""
@@ -238,3 +264,10 @@ class Lattice:
             return {cause: count for cause, count in counts.items() if count}
         kept = layer[clear & held]
         return kept if self._cells.r <= 1 else kept.bounded(self._nodes, self._robot)
+
+
+def _shortest(length: np.ndarray, keys: np.ndarray) -> np.ndarray:
+    """Return where each different row of `keys`, (E, k), has its least `length`, (E,)."""
+    order = np.lexsort((length, *keys.T[::-1]))
+    rows = keys[order]
+    return order[np.append(True, np.any(rows[1:] != rows[:-1], axis=1))]

@@ -14,6 +14,7 @@ _RANGE_SLACK = 1e-9
 _SEARCHED = 400
 _STATIONS = 101
 _HELD_CHECKS = 60
+_FAR = 10.0  # m
 
 
 def explain_failure(decomposition: Decomposition, *, any_branch: bool = False) -> BrachisError | str:
@@ -33,22 +34,23 @@ def explain_failure(decomposition: Decomposition, *, any_branch: bool = False) -
     BrachisError or str
     """
     s = np.linspace(0.0, 1.0, _STATIONS)
-    found = _answers_along(decomposition, s)
+    found = _answers_along(decomposition, s, opened=False)
     slots = list(range(found.q.shape[2])) if any_branch else decomposition.slots
     own = _Answers(found.q[:, :, slots], found.exists[:, :, slots], found.inside[:, :, slots])
-    if not any_branch and not found.within[0].any():
-        # The start posture itself was not hit: the ranges are too narrow for a random search to tell.
-        return "Why not could not be told; widen narrow joint ranges, or raise solver.max_iterations and time_limit"
+    # Where the redundant joints' ranges leave no answer, wider ones tell whether the ranges or the arm are to blame.
+    anywhere = found if found.exists.any(axis=(1, 2)).all() else _answers_along(decomposition, s, opened=True)
+    within = np.asarray(found.within.any(axis=(1, 2)))
     label = decomposition.solver.branches[decomposition.branch]
     reasons = (
         (
-            found.exists.any(axis=(1, 2)),
+            found.exists.any(axis=(1, 2)) | anywhere.exists.any(axis=(1, 2)),
             "the path is out of reach from s = {first:.3g} on (no posture was found)",
             "Shorten or move the path, or choose another start posture",
         ),
         (
-            found.within.any(axis=(1, 2)),
-            f"no posture within the joint ranges was found from s = {{first:.3g}} on{_narrowest(decomposition, found)}",
+            within,
+            "no posture within the joint ranges was found from s = {first:.3g} on"
+            + _beyond(decomposition, within, found, anywhere),
             "Shorten or move the path, or widen the joint ranges",
         ),
         (
@@ -92,15 +94,21 @@ class _Answers:
         return np.asarray(self.exists & self.inside.all(axis=3))
 
 
-def _answers_along(decomposition: Decomposition, s: np.ndarray) -> _Answers:
-    """Postures that reach stations s, (S,), with random redundant joints, angles lifted into their ranges."""
+def _answers_along(decomposition: Decomposition, s: np.ndarray, *, opened: bool) -> _Answers:
+    """Postures that reach stations s, (S,), with random redundant joints, angles turned into their ranges.
+
+    `opened` takes the ranges of the redundant joints for open ones; otherwise the start posture's are tried as well.
+    """
     robot, redundant, rest = decomposition.robot, decomposition.redundant, decomposition.rest
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
     turning = np.array([unit == "rad" for unit in robot.position_units])
-    low = np.where(np.isfinite(lower), lower, np.where(turning, -np.pi, decomposition.start - 10.0))
-    high = np.where(np.isfinite(upper), upper, np.where(turning, np.pi, decomposition.start + 10.0))
+    wide = np.isin(np.arange(robot.n), redundant) & opened
+    low = np.where(np.isfinite(lower) & ~wide, lower, np.where(turning, -np.pi, decomposition.start - _FAR))
+    high = np.where(np.isfinite(upper) & ~wide, upper, np.where(turning, np.pi, decomposition.start + _FAR))
     tries = _SEARCHED * len(redundant) ** 2 if redundant else 1
     q_r = np.random.default_rng(0).uniform(low[redundant], high[redundant], (tries, len(redundant)))
+    if not opened:
+        q_r[0] = np.clip(decomposition.start, low, high)[redundant]
     targets = decomposition.path.sample(s).target
     answers = decomposition.solver.solve(np.repeat(targets, tries, axis=0), np.tile(q_r, (len(s), 1)))
     postures = np.empty((len(s), tries, answers.shape[1], robot.n))
@@ -112,13 +120,30 @@ def _answers_along(decomposition: Decomposition, s: np.ndarray) -> _Answers:
     return _Answers(lifted, np.asarray(np.isfinite(lifted).all(axis=3)), inside)
 
 
-def _narrowest(decomposition: Decomposition, found: _Answers) -> str:
-    """Name the joint that is most often beyond its range at the first station without a posture, in words."""
-    blocked = np.flatnonzero(~found.within.any(axis=(1, 2)) & found.exists.any(axis=(1, 2)))
-    if not len(blocked):
+def _beyond(decomposition: Decomposition, within: np.ndarray, *found: _Answers) -> str:
+    """Say in words which joint the posture that is nearest to the ranges has beyond its own, and by how much.
+
+    At the first station without a posture within them, `within` is (S,) bool.
+    """
+    robot = decomposition.robot
+    if within.all():
         return ""
-    beyond = (~found.inside[blocked[0]])[found.exists[blocked[0]]].mean(axis=0)
-    return f" ({decomposition.robot.joint_names[int(np.argmax(beyond))]!r} is beyond its own most often)"
+    station = int(np.argmin(within))
+    q = np.concatenate([answers.q[station][answers.exists[station]] for answers in found])
+    if not len(q):
+        return ""
+    beyond = np.maximum(np.maximum(robot.limits.position_lower - q, q - robot.limits.position_upper), 0.0)
+    nearest = beyond[np.argmin(beyond.max(axis=1))]
+    joint = int(np.argmax(nearest))
+    unit, low, high = (
+        robot.position_units[joint],
+        robot.limits.position_lower[joint],
+        robot.limits.position_upper[joint],
+    )
+    return (
+        f" (the nearest one has joint {robot.joint_names[joint]!r} {nearest[joint]:.2g} {unit} beyond its range, "
+        f"{low:.4g} to {high:.4g} {unit})"
+    )
 
 
 def _held(decomposition: Decomposition, found: _Answers) -> np.ndarray:

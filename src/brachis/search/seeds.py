@@ -150,5 +150,5 @@ def first_start(choice: Choice) -> tuple[np.ndarray, int]:
         return choice.setting.start, choice.branches[0]
     found = lattice_seeds(choice, EFFORTS["fast"][0], choice.setting.task.search.seed)
     if isinstance(found, DeadEnd):
-        raise PathError(f"no course along the path was found: {found}", s_interval=(found.s, 1.0))
+        raise PathError(f"no course along the path was found: {found}", s_interval=found.interval)
     return found[0].start, found[0].branch

@@ -16,6 +16,9 @@ from brachis.task.robot_models import RobotSettings
 from brachis.task.text_file import read_text
 from brachis.task.yaml_reader import read_yaml
 
+_LARGEST_TASK = 1_000_000
+"""Bytes of YAML, which take some 20 s to read."""
+
 
 def load_task(source: str | os.PathLike[str] | Mapping[str, object] | Task) -> Task:
     """Return the task that a file or a mapping describes.
@@ -59,7 +62,8 @@ def load_task(source: str | os.PathLike[str] | Mapping[str, object] | Task) -> T
         problem = "a task is loaded from a file or a mapping"
         raise TaskError(problem, found=type(source).__name__, allowed="a file name, a mapping, or a Task")
     path = Path(source)
-    text = read_text(path, where=str(path), folder=Path.cwd())
+    hint = "Long lists of waypoints belong in a CSV file"
+    text = read_text(path, where=str(path), folder=Path.cwd(), largest=_LARGEST_TASK, hint=hint)
     task = _task_from(read_yaml(text, str(path)), str(path), path.absolute().parent)
     if task.robot.urdf is None:
         problem = "this key is required in a task file, and missing"

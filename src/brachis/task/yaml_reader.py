@@ -1,7 +1,8 @@
-"""Reading YAML strictly: no duplicate keys, numbers as in YAML 1.2, errors with line and column."""
+"""Reading YAML strictly: no duplicate keys, numbers as in YAML 1.2, bounded size, errors with line and column."""
 
 from __future__ import annotations
 
+import math
 import re
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,19 @@ from brachis.errors import TaskError
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
+
+_LARGEST = 1_000_000
+"""Of a document with all its aliases written out, nodes."""
+_BROKEN = (
+    yaml.YAMLError,
+    ValueError,
+    RecursionError,
+    # What PyYAML raises for values that do not fit an explicit tag, such as ``!!int ""`` and ``!!bool x``.
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    TypeError,
+)
 
 
 class _Loader(yaml.SafeLoader):
@@ -28,6 +42,27 @@ class _Loader(yaml.SafeLoader):
                     )
                 seen.add(key.value)
         return super().construct_mapping(node, deep=deep)
+
+    def get_single_node(self) -> yaml.Node | None:
+        """Parse the document, unless its aliases make it endless or far too long (ComposerError)."""
+        node = super().get_single_node()
+        if node is not None and (size := _size(node, {})) > _LARGEST:
+            problem = f"{size:.3g} values with all aliases written out, at most {_LARGEST} are read"
+            if size == math.inf:
+                problem = "the task contains itself (an alias inside its own anchor)"
+            raise yaml.composer.ComposerError(None, None, problem, node.start_mark)
+        return node
+
+
+def _size(node: yaml.Node, known: dict[int, float]) -> float:
+    """Count the nodes of a document with all its aliases written out; infinite where it contains itself."""
+    if isinstance(node, yaml.ScalarNode):
+        return 1.0
+    if id(node) not in known:
+        known[id(node)] = math.inf  # while inside
+        parts = node.value if isinstance(node, yaml.SequenceNode) else [each for pair in node.value for each in pair]
+        known[id(node)] = 1.0 + sum(_size(part, known) for part in parts)
+    return known[id(node)]
 
 
 # PyYAML reads YAML 1.1, where 1e-6, without a point or without the exponent's sign, is a string; everybody means the
@@ -54,7 +89,7 @@ def read_yaml(text: str, source: str) -> object:
         mark = error.problem_mark or error.context_mark
         where = f"{source}: line {mark.line + 1}, column {mark.column + 1}" if mark else source
         message = error.problem or "not valid YAML"
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        where, message = source, str(error).splitlines()[0]
+    except _BROKEN as error:
+        where, message = source, (str(error) or type(error).__name__).splitlines()[0]
     problem = f"not valid YAML: {message}"
     raise TaskError(problem, where=where)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.robot import dynamics
-from brachis.trajectory.samples import freeze
+from brachis.arrays import freeze
 from brachis.trajectory.trajectory import Trajectory
 
 _POINTS_PER_INTERVAL = 40

@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from brachis.errors import InputError, ResultFileError
-from brachis.files import atomic_write
+from brachis.files import atomic_write, open_file
 from brachis.robot import Robot, bind
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import Task, load_task
@@ -22,6 +22,8 @@ from brachis.task import Task, load_task
 SCHEMA = 1
 ARRAYS = ("times", "q", "qdot", "qddot", "qddot_before", "knots", "control_points")
 """Names of the arrays in the file; as in `Trajectory`."""
+LARGEST = 64_000_000
+"""Of a result file and of what it holds unpacked, bytes."""
 
 _UNREADABLE = (
     OSError,
@@ -85,7 +87,7 @@ def read_result(path: Path) -> Content:
         The file is missing, broken or of another schema version, or its parts do not fit each other.
     """
     try:
-        with path.open("rb") as stream:
+        with open_file(path, LARGEST) as stream:
             meta, arrays = _parts(stream)
     except FileNotFoundError as error:
         raise ResultFileError("the result file does not exist", where=str(path)) from error
@@ -93,7 +95,7 @@ def read_result(path: Path) -> Content:
         raise ResultFileError(
             "the file is not a brachis result",
             where=str(path),
-            found=str(error) or type(error).__name__,
+            found=getattr(error, "strerror", None) or str(error) or type(error).__name__,
             allowed="a file written by brachis plan",
         ) from error
     if meta.get("schema") != SCHEMA:
@@ -108,6 +110,11 @@ def _parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Read the metadata and the arrays, unchecked but for their types."""
     if not zipfile.is_zipfile(stream):
         raise ValueError("no npz archive")
+    stream.seek(0)
+    with zipfile.ZipFile(stream) as archive:
+        unpacked = sum(member.file_size for member in archive.infolist())
+    if unpacked > LARGEST:
+        raise ValueError(f"an archive of {unpacked / 1e6:.3g} MB unpacked, at most {LARGEST / 1e6:g} MB are read")
     stream.seek(0)
     archive = np.load(stream, allow_pickle=False)
     if not isinstance(archive, np.lib.npyio.NpzFile):

@@ -1,11 +1,12 @@
-"""A trajectory at given times, and arrays that cannot be written to."""
+"""A trajectory at given times."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
+
+from brachis.arrays import freeze
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +33,3 @@ class Samples:
     def __post_init__(self) -> None:
         """Take copies that nobody can write to."""
         freeze(self, *(field.name for field in fields(self)))
-
-
-def freeze(owner: Any, *names: str) -> None:  # noqa: ANN401  (any frozen dataclass)
-    """Replace arrays of a frozen dataclass by read-only copies of its own."""
-    for name in names:
-        own = np.array(getattr(owner, name), dtype=float)
-        own.setflags(write=False)
-        object.__setattr__(owner, name, own)

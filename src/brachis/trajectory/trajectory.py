@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.errors import InputError
+from brachis.arrays import freeze
+from brachis.errors import InputError, UnknownNameError
 from brachis.robot import Robot, dynamics
 from brachis.task import Task
 from brachis.trajectory.pieces import relative_coefficients
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
-from brachis.trajectory.samples import Samples, freeze
+from brachis.trajectory.samples import Samples
 
 if TYPE_CHECKING:
     from scipy.interpolate import BPoly, BSpline
 
 CONTINUOUS_TORQUE = 3
 """Least B-spline degree that gives continuous acceleration, and so torque."""
+ENDINGS = ("exact", "hold")
+"""What the last sample of a motion may be; see `Trajectory.sample`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,30 +146,45 @@ class Trajectory:
         q, qdot, qddot = self.position(t), self.velocity(t), self.acceleration(t)
         return Samples(t, self.path_coordinate(t), q, qdot, qddot, dynamics.torque(self.robot, q, qdot, qddot))
 
-    def sample(self, dt: float) -> Samples:
+    def sample(self, dt: float, *, last: str = "exact") -> Samples:
         """Sample at a controller's rate.
 
         Parameters
         ----------
         dt : float
             Period, s.
+        last : {"exact", "hold"}, optional
+            What follows the last multiple of `dt` before t_end. ``exact``: one sample at t_end itself, so that the last
+            period may be shorter. ``hold``: one at the next multiple of `dt`, at or after t_end, where the end posture
+            is held at rest: velocity and acceleration are zero, and the torque is what holds the posture.
 
         Returns
         -------
         Samples
-            At 0, dt, 2 dt, ... and at t_end exactly; the last period may be shorter.
+            At 0, dt, 2 dt, ... and the last one.
 
         Raises
         ------
         InputError
             `dt` is not positive, or so small that there would be more than ten million samples.
+        UnknownNameError
+            `last` is neither.
         """
+        if last not in ENDINGS:
+            raise UnknownNameError("ending", last, ENDINGS, where="last")
         if not (np.isfinite(dt) and dt > 0.0 and self.t_end / dt < 1e7):  # noqa: PLR2004
             raise InputError(
                 "is not a usable period", where="dt", found=f"{dt} s", allowed="> 0 s, at most 1e7 samples"
             )
         whole = int(np.ceil(self.t_end / dt * (1.0 - 1e-12)))
-        return self.at(np.append(np.arange(whole) * dt, self.t_end))
+        before = np.arange(whole) * dt
+        if last == "exact":
+            return self.at(np.append(before, self.t_end))
+        moving, rest = self.at(before), np.zeros((1, self.robot.n))
+        end = self.position(self.t_end)[None]
+        held = (np.array([whole * dt]), np.ones(1), end, rest, rest, dynamics.torque(self.robot, end, rest, rest))
+        parts = (getattr(moving, field.name) for field in fields(moving))
+        return Samples(*(np.concatenate(pair) for pair in zip(parts, held, strict=True)))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file with all that is needed to load and verify the trajectory.

@@ -1,0 +1,170 @@
+"""A robot that is given together with a task that has a ``robot`` part of its own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from brachis.errors import InputError, TaskError
+from brachis.robot.free_roll import with_free_roll
+from brachis.robot.friction import Friction
+from brachis.robot.from_task import limit_spec, robot_from_settings
+from brachis.robot.limits import Limits, per_joint_values, resolve_limits
+from brachis.robot.robot import ROLL_JOINT, Robot
+from brachis.robot.urdf import read_chain
+from brachis.task import FrictionSettings, LimitSettings, RobotSettings
+from brachis.task.fields import Model
+
+_FRAMES = ("tool_frame", "base_frame", "locked_joints")
+"""Settings that decide which joints the chain has."""
+_PER_JOINT = (
+    *(f"robot.limits.{kind}" for kind in ("torque", "velocity", "acceleration", "position")),
+    *(f"robot.friction.{kind}" for kind in FrictionSettings.model_fields),
+)
+"""Settings with a value for each joint, which may be written as one value, a list or a mapping."""
+
+
+def robot_for(robot: str | os.PathLike[str] | Robot | None, settings: RobotSettings) -> Robot:
+    """Return the robot that a task is planned for; its `Robot.settings` make it again.
+
+    Parameters
+    ----------
+    robot : path, Robot or None
+        URDF file to use in place of the one that the task names, or a robot to use in place of it. What the task's
+        ``robot`` part sets beside the URDF holds for a robot too: it is added to what the robot was made with.
+    settings : RobotSettings
+        The task's ``robot`` part.
+
+    Raises
+    ------
+    TaskError
+        Robot and task contradict each other; or no URDF is named.
+    InputError
+        See `Robot.from_urdf`.
+    """
+    if not isinstance(robot, Robot):
+        return robot_from_settings(settings, urdf=robot)
+    given = _stated(robot)
+    wanted = _combined(robot, given, settings)
+    if wanted == given:
+        return robot if given is robot.settings else replace(robot, settings=given)
+    same = robot_from_settings(given, urdf_text=robot.urdf)
+    if (with_free_roll(same) if robot.rolls_freely else same).model != robot.model:
+        raise InputError(
+            "the robot's model is not the one of its URDF and settings, so the task's robot part cannot be added",
+            where="robot",
+            found="a model that was changed",
+            hint="Leave the robot part of the task away, or give the robot by its URDF",
+        )
+    return robot_from_settings(wanted, urdf_text=robot.urdf)
+
+
+def _stated(robot: Robot) -> RobotSettings:
+    """Return settings that make the robot; they spell out limits, friction and gravity that were replaced later."""
+    settings = robot.settings
+    names = _own_joints(robot)
+    n = len(names)
+    changes: dict[str, object] = {}
+    spec = limit_spec(settings.limits)
+    if not _same(resolve_limits(spec, names, robot.stated_limits[:n]), robot.limits, n):
+        changes["limits"] = _limits(robot.limits, names)
+    if not _same(Friction.of(names, **settings.friction.model_dump()), robot.friction, n):
+        changes["friction"] = _friction(robot.friction, names)
+    gravity = tuple(float(component) for component in robot.model.gravity.linear)
+    if gravity != settings.gravity:
+        changes["gravity"] = gravity
+    return settings.model_copy(update=changes) if changes else settings
+
+
+def _own_joints(robot: Robot) -> list[str]:
+    """Joints of the URDF; the virtual one by which a tool rolls is not among them."""
+    return [name for name in robot.joint_names if not (robot.rolls_freely and name == ROLL_JOINT)]
+
+
+def _same(first: Limits | Friction, second: Limits | Friction, n: int) -> bool:
+    """Compare all arrays at the first n joints."""
+    return all(
+        np.array_equal(getattr(first, field.name)[:n], getattr(second, field.name)[:n]) for field in fields(first)
+    )
+
+
+def _limits(limits: Limits, names: Sequence[str]) -> LimitSettings:
+    """Spell limits out joint by joint."""
+
+    def finite(values: np.ndarray) -> list[float | None]:
+        return [float(value) if np.isfinite(value) else None for value in values[: len(names)]]
+
+    ranges = zip(finite(limits.position_lower), finite(limits.position_upper), strict=True)
+    return LimitSettings(
+        torque=dict(zip(names, finite(limits.torque), strict=True)),
+        velocity=dict(zip(names, finite(limits.velocity), strict=True)),
+        acceleration=dict(zip(names, finite(limits.acceleration), strict=True)),
+        position=dict(zip(names, ranges, strict=True)),
+    )
+
+
+def _friction(friction: Friction, names: Sequence[str]) -> FrictionSettings:
+    """Spell friction out joint by joint."""
+    columns = {
+        "armature": friction.armature,
+        "viscous": friction.viscous,
+        "coulomb": friction.coulomb,
+        "coulomb_velocity": friction.v_eps,
+    }
+    return FrictionSettings(**{key: tuple(values[: len(names)].tolist()) for key, values in columns.items()})
+
+
+def _combined(robot: Robot, given: RobotSettings, asked: RobotSettings) -> RobotSettings:
+    """Put the settings of the robot and of the task together; the URDF is the robot's."""
+    asked = asked.model_copy(update={"urdf": given.urdf})
+    defaults = RobotSettings(urdf=given.urdf)
+    if asked in (given, defaults):
+        return given
+    frames = _merged("robot", _only(given, _FRAMES), _only(asked, _FRAMES), RobotSettings(), ())
+    names = _own_joints(robot)
+    if frames != _only(given, _FRAMES):
+        chosen = {name: getattr(frames, name) for name in _FRAMES}
+        names = list(read_chain(robot.urdf, robot.source, **chosen).joint_names)
+    combined: RobotSettings = _merged("robot", given, asked, defaults, names)
+    return combined
+
+
+def _only(settings: RobotSettings, names: Sequence[str]) -> RobotSettings:
+    """Keep some of the settings, and leave the others at their defaults."""
+    return RobotSettings(**{name: getattr(settings, name) for name in names})
+
+
+def _merged(key: str, given: Any, asked: Any, default: Any, names: Sequence[str]) -> Any:  # noqa: ANN401
+    """Take what is set on one side or, alike, on both; a value that differs from the default counts as set."""
+    if asked in (default, given):
+        return given
+    if given == default:
+        return asked
+    if isinstance(given, Model):
+        parts = {
+            name: _merged(f"{key}.{name}", getattr(given, name), getattr(asked, name), getattr(default, name), names)
+            for name in type(given).model_fields
+        }
+        return given.model_copy(update=parts)
+    own, other = given, asked
+    if key in _PER_JOINT:
+        own, other = (
+            dict(zip(names, per_joint_values(key, side, names, default), strict=True)) for side in (given, asked)
+        )
+    if not (isinstance(own, Mapping) and isinstance(other, Mapping)):
+        raise TaskError(
+            "the task and the robot that is given with it contradict each other",
+            where=key,
+            found=f"{asked} in the task, {given} in the robot",
+            allowed="the same in both, or set in one of them",
+        )
+    absent = default if key in _PER_JOINT else None
+    merged = {
+        name: _merged(f"{key}.{name}", own.get(name, absent), other.get(name, absent), absent, ())
+        for name in {**own, **other}
+    }
+    return given if merged == own else {name: value for name, value in merged.items() if value != absent}

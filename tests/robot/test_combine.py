@@ -1,0 +1,177 @@
+"""A robot and a task that has a robot part: what is combined, what is refused, what is kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.errors import InputError, TaskError, UnknownNameError
+from brachis.robot import Robot, bind
+from brachis.robot.combine import robot_for
+from brachis.task import RobotSettings, check_robot_settings
+
+ROOT = Path(__file__).parents[2]
+SCARA = ROOT / "robots/scara3/robot.urdf"
+RAIL = ROOT / "robots/tx90l_rail/robot.urdf"
+
+
+def scara(torque: object = 10.0, **options: object) -> Robot:
+    spec = brachis.LimitSpec(torque=torque, velocity=None)
+    return Robot.from_urdf(SCARA, **{"gravity": [0, 0, 0], "limits": spec, **options})
+
+
+def asked(**settings: object) -> RobotSettings:
+    return check_robot_settings(settings)
+
+
+def line(**robot: object) -> dict:
+    return {
+        "brachis": 1,
+        "robot": robot,
+        "start": {"joints": [np.pi / 6, -2 * np.pi / 3, 2 * np.pi / 3]},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"length": 0.5, "angle_deg": 90}}],
+        "redundant_joints": ["j3"],
+        "spline": {"intervals": 10},
+        "search": {"effort": "single"},
+    }
+
+
+def test_limits_that_a_task_scales_hold_for_a_given_robot():
+    task = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
+    task["robot"]["limits"]["scale"]["velocity"] = 0.5
+    task |= {"spline": {"intervals": 10}, "search": {"effort": "single"}}
+    from_file = brachis.plan(None, task)
+    given = brachis.plan(Robot.from_urdf(RAIL), task)
+    assert given.t_end == from_file.t_end
+    assert given.t_end > 0.5  # 0.427 s without the scale
+    assert brachis.plan(None, given.task).t_end == given.t_end
+    assert brachis.plan(Robot.from_urdf(RAIL), given.task).t_end == given.t_end
+
+
+def test_every_part_of_the_task_counts():
+    settings = asked(
+        gravity=[0, -9.81, 0],
+        limits={"torque": 7, "velocity": 3, "acceleration": 20, "position": [[-3, 3]] * 3, "scale": {"torque": 0.5}},
+        friction={"armature": 0.1, "viscous": [1, 2, 3], "coulomb": {"j2": 0.5}, "coulomb_velocity": 0.02},
+    )
+    made = robot_for(Robot.from_urdf(SCARA), settings)
+    alone = robot_for(SCARA, settings)
+    assert made.settings == alone.settings
+    assert made.model == alone.model
+    np.testing.assert_array_equal(made.limits.torque, 3.5)
+    for part in ("limits", "friction"):
+        for name, values in vars(getattr(alone, part)).items():
+            np.testing.assert_array_equal(getattr(getattr(made, part), name), values)
+
+
+def test_frames_and_locked_joints_of_the_task_count():
+    plain = Robot.from_urdf(RAIL)
+    made = robot_for(
+        plain, asked(base_frame="base_link", locked_joints={"joint_6": 0.3}, limits={"torque": {"joint_1": 5}})
+    )
+    assert made.joint_names == plain.joint_names[1:-1]
+    assert made.limits.torque[0] == 5.0
+    also = robot_for(Robot.from_urdf(RAIL, locked_joints={"joint_6": 0.3}), asked(locked_joints={"joint_5": 0.2}))
+    assert also.joint_names == plain.joint_names[:-2]
+
+
+def test_a_robot_stays_as_it_is_where_the_task_adds_nothing():
+    robot = scara()
+    assert robot_for(robot, RobotSettings()) is robot
+    assert robot_for(robot, asked(urdf="another.urdf")) is robot
+    assert robot_for(robot, robot.settings) is robot
+    same = asked(gravity=[0, 0, 0], limits={"torque": [10, 10, 10], "velocity": None})
+    assert robot_for(robot, same) is robot
+
+
+def test_limits_are_combined_joint_by_joint():
+    robot = scara({"j1": 5.0})
+    made = robot_for(robot, asked(limits={"torque": {"j2": 6}}))
+    np.testing.assert_array_equal(made.limits.torque, [5.0, 6.0, robot.limits.torque[2]])
+    assert made.settings.limits.torque == {"j1": 5.0, "j2": 6.0}
+    assert np.isinf(made.limits.velocity).all()
+
+
+@pytest.mark.parametrize(
+    ("settings", "key"),
+    [
+        ({"gravity": [0, 0, -1.6]}, "robot.gravity"),
+        ({"tool_frame": "link2"}, "robot.tool_frame"),
+        ({"limits": {"torque": {"j2": 20}}}, "robot.limits.torque.j2"),
+        ({"limits": {"torque": 20}}, "robot.limits.torque.j1"),
+        ({"limits": {"velocity": 20}}, "robot.limits.velocity.j1"),
+        ({"limits": {"scale": {"torque": 0.5}}}, "robot.limits.scale.torque"),
+        ({"friction": {"coulomb": {"j3": 1.0}}}, "robot.friction.coulomb.j3"),
+        ({"locked_joints": {"j3": 0.5}}, "robot.locked_joints.j3"),
+    ],
+)
+def test_a_contradiction_is_refused_with_its_key(settings, key):
+    options = {
+        "robot.tool_frame": {"tool_frame": "tool"},
+        "robot.limits.scale.torque": {"limits": brachis.LimitSpec(scale={"torque": 0.25})},
+        "robot.friction.coulomb.j3": {"friction": {"coulomb": 0.5}},
+        "robot.locked_joints.j3": {"locked_joints": {"j3": 0.4}},
+    }
+    with pytest.raises(TaskError, match="contradict") as caught:
+        robot_for(scara(**options.get(key, {})), asked(**settings))
+    assert caught.value.where == key
+
+
+def test_unknown_joints_of_the_task_are_named():
+    with pytest.raises(UnknownNameError, match="'j9'"):
+        robot_for(scara({"j1": 5.0}), asked(limits={"torque": {"j9": 6}}))
+    with pytest.raises(UnknownNameError, match="'j9'"):
+        robot_for(Robot.from_urdf(SCARA), asked(limits={"torque": {"j9": 6}}))
+
+
+def test_replaced_limits_are_kept_and_the_task_of_the_result_has_them():
+    robot = scara()
+    weak = replace(robot, limits=replace(robot.limits, torque=np.array([4.0, 5.0, 90.0])))
+    result = brachis.plan(weak, line())
+    assert result.task.robot.limits.torque == {"j1": 4.0, "j2": 5.0, "j3": 90.0}
+    assert result.t_end > brachis.plan(robot, line()).t_end
+    assert brachis.plan(None, result.task).t_end == result.t_end
+    assert brachis.plan(weak, result.task).t_end == result.t_end
+    made = robot_for(weak, asked(limits={"acceleration": 50}))
+    np.testing.assert_array_equal(made.limits.torque, [4.0, 5.0, 90.0])
+    np.testing.assert_array_equal(made.limits.acceleration, 50.0)
+    with pytest.raises(TaskError, match="contradict") as caught:
+        robot_for(weak, asked(limits={"torque": 10}))
+    assert caught.value.where == "robot.limits.torque.j1"
+
+
+def test_replaced_friction_is_kept():
+    robot = scara()
+    stiff = replace(robot, friction=replace(robot.friction, viscous=np.array([1.0, 0.0, 2.0])))
+    made = robot_for(stiff, asked(limits={"acceleration": 50}))
+    np.testing.assert_array_equal(made.friction.viscous, [1.0, 0.0, 2.0])
+    np.testing.assert_array_equal(made.friction.v_eps, 0.01)
+
+
+def test_a_changed_model_is_not_lost():
+    robot = scara()
+    model = robot.model.copy()
+    model.inertias[3].mass = 5.0
+    loaded = replace(robot, model=model)
+    assert robot_for(loaded, RobotSettings()) is loaded
+    with pytest.raises(InputError, match="model"):
+        robot_for(loaded, asked(limits={"acceleration": 50}))
+
+
+def test_a_robot_whose_tool_rolls_freely_is_made_anew_without_the_virtual_joint():
+    rolling, _ = bind(Robot.from_urdf(RAIL), "pose_free_roll")
+    assert robot_for(rolling, RobotSettings()) is rolling
+    made = robot_for(rolling, asked(limits={"torque": {"joint_1": 5}}))
+    assert made.joint_names == rolling.joint_names[:-1]
+    assert made.limits.torque[1] == 5.0
+
+
+def test_transcribe_combines_as_well():
+    task = brachis.load_task(line(gravity=[0, 0, 0], limits={"torque": 3, "velocity": None}))
+    problem, _ = brachis.transcribe(Robot.from_urdf(SCARA), task)
+    np.testing.assert_array_equal(problem.decomposition.robot.limits.torque, 3.0)

@@ -1,0 +1,199 @@
+"""Numbers of a URDF: each is checked where it stands, and the model weighs what the file says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from brachis.errors import UrdfError
+from brachis.robot import LimitSpec, Robot
+from brachis.robot.urdf_bodies import check_bodies, stated_bodies
+from brachis.robot.urdf_numbers import check_numbers
+from brachis.robot.urdf_tree import read_tree
+from support.chains import INERTIAL, Joint, chain_urdf, planar_urdf
+
+TURN = Joint("revolute", xyz=(0.4, 0.0, 0.0))
+TEXT = chain_urdf(
+    [TURN, Joint("revolute", xyz=(0.4, 0.0, 0.0), rpy=(0.1, 0.2, 0.3))],
+    tool=(0.3, 0.0, 0.0),
+    more="<link name='aside'>" + INERTIAL.format(mass=1.5) + "</link>"
+    "<joint name='flap' type='revolute'><parent link='link1'/><child link='aside'/><origin xyz='0.1 0.2 0.3'/>"
+    "<axis xyz='0 1 1'/><limit lower='0.3' upper='0.9' effort='10' velocity='1'/></joint>",
+)
+
+
+def refused(text: str) -> str:
+    with pytest.raises(UrdfError) as caught:
+        Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool", limits=LimitSpec(torque=1.0))
+    return str(caught.value)
+
+
+def changed(old: str, new: str, text: str = TEXT) -> str:
+    assert old in text
+    return text.replace(old, new, 1)
+
+
+@pytest.mark.parametrize("bad", ["nan", "inf", "-Infinity", "1e999", "", "1_0", "0x1", "five"])
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('xyz="0.21 0.02 0.01"', 'xyz="0.21 {} 0.01"', "link 'link1': <origin xyz>"),
+        ('rpy="0.1 0.2 0.3"', 'rpy="{} 0.2 0.3"', "link 'link1': <origin rpy>"),
+        ('<mass value="2.0"/>', '<mass value="{}"/>', "link 'link1': <mass value>"),
+        ('ixy="0.002"', 'ixy="{}"', "link 'link1': <inertia ixy>"),
+        ("xyz='0.4 0.0 0.0'", "xyz='0.4 0.0 {}'", "joint 'j1': <origin xyz>"),
+        ("<axis xyz='0.0 0.0 1.0'/>", "<axis xyz='0.0 {} 1.0'/>", "joint 'j1': <axis xyz>"),
+        ("velocity='3.0'", "velocity='{}'", "joint 'j1': <limit velocity>"),
+        ("lower='0.3'", "lower='{}'", "joint 'flap': <limit lower>"),
+        ('<mass value="1.5"/>', '<mass value="{}"/>', "link 'aside': <mass value>"),
+    ],
+)
+def test_what_is_no_finite_number_is_refused_with_its_place(old, new, words, bad):
+    message = refused(changed(old, new.format(bad)))
+    assert f"{words} is wrong" in message
+    assert "file.urdf, line " in message
+
+
+def test_an_inertia_that_parsers_drop_in_silence_is_refused():
+    dropped = changed('xyz="0.21 0.02 0.01"', 'xyz="nan 0 0"', chain_urdf([TURN]))
+    assert pin.buildModelFromXML(dropped).inertias[1].mass == 0.0
+    assert "link 'link1': <origin xyz>" in refused(dropped)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "hint"),
+    [
+        ('value="2.0"', 'value="1,5"', 'Write value="1.5"'),
+        ("effort='60.0'", "effort='10 Nm'", 'Write numbers alone, in Nm or N, such as effort="10"'),
+        ("effort='60.0'", "effort='10Nm'", 'Write numbers alone, in Nm or N, such as effort="10"'),
+        ("<axis xyz='0.0 0.0 1.0'/>", "<axis xyz='0, 0, 1'/>", 'Write xyz="0 0 1"'),
+        ("<axis xyz='0.0 0.0 1.0'/>", "<axis xyz='0,0 0,0 1,0'/>", 'Write xyz="0.0 0.0 1.0"'),
+        ("xyz='0.4 0.0 0.0'", "xyz='0.4m 0.0m 0.0m'", 'Write numbers alone, in m, such as xyz="0.4 0.0 0.0"'),
+    ],
+)
+def test_the_message_says_what_to_write_instead(old, new, hint):
+    assert refused(changed(old, new)).endswith(hint)
+
+
+def test_missing_and_repeated_figures():
+    assert "link 'link1': <mass value> is missing" in refused(changed('<mass value="2.0"/>', "<mass/>"))
+    assert "link 'link1': <inertia izz> is missing" in refused(changed('izz="0.055"', ""))
+    assert "link 'link1': <mass> is there twice" in refused(changed("<mass", '<mass value="1"/><mass'))
+    assert "3 finite numbers" in refused(changed("xyz='0.4 0.0 0.0'", "xyz='0.4 0.0'"))
+    assert "at most 1e+12" in refused(changed('<mass value="2.0"/>', '<mass value="1e13"/>'))
+
+
+def test_numbers_that_do_not_count_are_not_read():
+    plugin = "<gazebo reference='base'><kp>a lot</kp></gazebo><transmission name='t'><joint name='j1'/></transmission>"
+    shape = "<link name='base'><visual><origin xyz='1,5'/><geometry><box size='big'/></geometry></visual>"
+    text = changed("<link name='base'/>", f"{plugin}{shape}</link>")
+    assert Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool").n == 2
+
+
+@pytest.mark.parametrize(
+    "text",
+    [TEXT, planar_urdf("RPC", "tilted")],
+)
+def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
+    robot = Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool", locked_joints={})
+    bodies = stated_bodies(read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.3})
+    assert [body.joint for body in bodies] == list(robot.joint_names)
+    for body, inertia in zip(bodies, list(robot.model.inertias)[1:], strict=True):
+        assert body.mass == pytest.approx(inertia.mass, rel=1e-14)
+        np.testing.assert_allclose(body.com, inertia.lever, atol=1e-14)
+        np.testing.assert_allclose(body.inertia, inertia.inertia, atol=1e-14)
+    if text is TEXT:
+        assert bodies[0].links == ("link1", "aside")
+        assert bodies[0].mass == 3.5
+        # The held flap counts where it is held: another position is another body.
+        other = stated_bodies(read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.4})
+        assert np.abs(other[0].com - bodies[0].com).max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"), [("mass", (0.5, 0, 0)), ("centre of mass", (0, 0.1, 0)), ("inertia", (0, 0, 0.1))]
+)
+def test_a_model_that_weighs_something_else_is_refused(kind, change):
+    robot = Robot.from_urdf("file.urdf", urdf_text=TEXT, tool_frame="tool")
+    bodies = stated_bodies(read_tree(TEXT, "file.urdf"), robot.joint_names, {"flap": 0.3})
+    model, old = robot.model.copy(), robot.model.inertias[2]
+    mass, lever, moment = change
+    model.inertias[2] = pin.Inertia(old.mass + mass, old.lever + lever, old.inertia + moment * np.eye(3))
+    with pytest.raises(UrdfError, match=f"moved by joint 'j2' has another {kind} in the model") as caught:
+        check_bodies(model, bodies, "file.urdf")
+    assert "of links tool, link2" in str(caught.value)
+    check_bodies(robot.model, bodies, "file.urdf")
+
+
+def test_long_chains_are_summed_up_without_recursion():
+    links = "".join(f"<link name='l{i}'/>" for i in range(3000))
+    joints = "".join(
+        f"<joint name='f{i}' type='fixed'><parent link='l{i}'/><child link='l{i + 1}'/></joint>" for i in range(2999)
+    )
+    tree = read_tree(f"<robot name='long'>{links}{joints}</robot>", "file.urdf")
+    check_numbers(tree, "file.urdf")
+    assert stated_bodies(tree, (), {}) == ()
+
+
+def test_ghost_links_are_named():
+    message = refused(changed("<parent link='link1'/>", "<parent link='ghost'/>"))
+    assert "the parent of joint 'j2' is not a link of the robot; found ghost; allowed: world, base, " in message
+    assert message.endswith("Add <link name='ghost'/>")
+    assert "Did you mean 'link1'?" in refused(changed("<parent link='link1'/>", "<parent link='lnik1'/>"))
+    assert "the child of joint 'j2' is not a link of the robot" in refused(
+        changed("<child link='link2'/>", "<child link='ghost'/>")
+    )
+    assert "the parent of joint 'j2' is not a link of the robot; found none" in refused(
+        changed("<parent link='link1'/>", "")
+    )
+
+
+def test_xacro_that_is_left_is_named():
+    include = '<xacro:include filename="$(find arm)/arm.xacro"/>'
+    declared = changed("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
+    assert Robot.from_urdf("file.urdf", urdf_text=declared, tool_frame="tool").n == 2
+    for text in (changed("</robot>", include + "</robot>", declared), changed("</robot>", include + "</robot>")):
+        message = refused(text)
+        assert "xacro" in message
+        assert "include" in message
+        assert message.endswith("Expand the file with xacro first: xacro robot.xacro > robot.urdf")
+    message = refused(changed('<mass value="2.0"/>', '<mass value="${mass}"/>'))
+    assert "link 'link1': the URDF has xacro macros; found <mass value='${mass}'>" in message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("<link name='link2'>", "<link name='link1'>", "links share a name; found link1"),
+        ("<joint name='j2'", "<joint name='j1'", "joints share a name; found j1"),
+        ("<link name='link2'>", "<link>", "a <link> has no name"),
+        ("type='revolute'", "type='revolut'", "joint 'j1' has no known type; found 'revolut'"),
+        ("type='revolute'", "", "joint 'j1' has no known type; found none"),
+        ("<child link='link2'/>", "<child link='link1'/>", "link 'link1' is the child of two joints, 'j1' and 'j2'"),
+    ],
+)
+def test_names_and_types(old, new, words):
+    assert words in refused(changed(old, new))
+
+
+def test_joints_may_have_the_names_of_links():
+    plain = Robot.from_urdf("file.urdf", urdf_text=TEXT, tool_frame="tool")
+    for name in ("tool_mount", "mount", "flap", "j2"):
+        text = changed(f"name='{name}'", "name='aside'")
+        robot = Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool", locked_joints={})
+        assert [inertia.mass for inertia in robot.model.inertias] == [inertia.mass for inertia in plain.model.inertias]
+
+
+def test_a_locked_joint_with_the_name_of_an_inner_link_is_an_error_of_ours():
+    held = changed("name='j1'", "name='link1'")
+    with pytest.raises(UrdfError, match="Pinocchio cannot build the model; found Several frames"):
+        Robot.from_urdf("file.urdf", urdf_text=held, tool_frame="tool", locked_joints={"link1": 0.0})
+
+
+def test_a_tool_frame_with_the_name_of_a_joint_is_found():
+    text = TEXT.replace("name='j2'", "name='tool'")
+    robot = Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool")
+    plain = Robot.from_urdf("file.urdf", urdf_text=TEXT, tool_frame="tool")
+    q = np.array([0.3, -0.4])
+    np.testing.assert_array_equal(robot.tool_placement(q).homogeneous, plain.tool_placement(q).homogeneous)
