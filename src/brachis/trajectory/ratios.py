@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.robot import dynamics
 from brachis.arrays import freeze
+from brachis.robot import dynamics
 from brachis.trajectory.trajectory import Trajectory
 
 _POINTS_PER_INTERVAL = 40
