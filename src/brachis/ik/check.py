@@ -11,6 +11,8 @@ from brachis.robot import Robot, TaskSpace
 _CHECKED_POSTURES = 100
 _INSIDE = 1e-2
 _POSE_TOLERANCE = 1e-8
+_FAR = 20.0
+"""m."""
 
 
 def check_answers(
@@ -64,9 +66,14 @@ def check_answers(
 
 
 def _checked_ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Whole turns of angles, and what prismatic joints can reach: a boom need not know what a negative length is."""
+    """Whole turns of angles, and what prismatic joints can reach: a boom need not know what a negative length is.
+
+    Of far ranges what is near zero: positions in kilometres are not precise to the tolerances.
+    """
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
     ranged = (np.array(robot.position_units) == "m") & np.isfinite(lower) & np.isfinite(upper)
+    near = np.clip(0.0, lower, upper)
+    lower, upper = np.maximum(lower, near - _FAR), np.minimum(upper, near + _FAR)
     return np.where(ranged, lower, -np.pi), np.where(ranged, upper, np.pi)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from brachis.bspline import spread
 from brachis.errors import UnreachableError
 from brachis.nlp import Transcription
+from brachis.refine.reversals import reversals
 
 _NEAR = 0.005
 """An excess may hide between grid points where the motion comes so near a limit, as a part of it."""
@@ -56,7 +57,7 @@ def violations(dense: Transcription, x: np.ndarray, goal: float) -> tuple[float,
             centres, heights = _zoomed(dense, x, centres, reach)
             kept = heights > goal - 0.1 * _NEAR
             centres, heights, reach = centres[kept], heights[kept], reach[kept] * 2.0 / (_FINE - 1)
-        places = _within_pieces(dense, x)
+        places = np.union1d(_within_pieces(dense, x), _within_friction(dense, x))
         worst = dense.excess_at(x, places).max(axis=1) if len(places) else places
     except UnreachableError:
         return np.inf, _unreachable(dense, x)
@@ -70,6 +71,12 @@ def _within_pieces(dense: Transcription, x: np.ndarray) -> np.ndarray:
     if len(breaks) == 2:  # noqa: PLR2004  (a single piece, which the grid sees)
         return np.empty(0)
     return motion.times_of(spread(breaks, _PIECE_POINTS - 1)) / motion.t_end
+
+
+def _within_friction(dense: Transcription, x: np.ndarray) -> np.ndarray:
+    """List times tau at which a joint with Coulomb friction reverses, or nearly so: a peak as narrow as the friction."""
+    t_end, friction = dense.motion(x).t_end, dense.decomposition.robot.friction
+    return reversals(friction, dense.tau * t_end, dense.state(x)) / t_end
 
 
 def _spacing(tau: np.ndarray, times: np.ndarray) -> np.ndarray:

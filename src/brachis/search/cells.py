@@ -11,6 +11,7 @@ from brachis.setting import Choice, Setting
 _TURN = 2.0 * np.pi
 _CELLS_PER_METRE = 1.0 / 3.0  # of those of a turn
 _REACH = 2.0  # m
+_FAR = 20.0  # rad or m: nobody goes further, and every cell takes memory
 _WINDOW = 1.0 / 8.0  # of a turn
 _RANDOM = 24
 _SPREAD = 2.5
@@ -57,8 +58,8 @@ class Cells:
             origin = np.clip(places, low, high)
         closed = np.isfinite(low) & np.isfinite(high)
         reach = np.where(turning, 0.5 * _TURN, _REACH + given.path.length)
-        lowest = np.where(closed, low, np.maximum(low, origin - reach))
-        highest = np.where(closed, high, np.minimum(high, origin + reach))
+        reach = np.where(closed, np.maximum(reach, _FAR), reach)
+        lowest, highest = np.maximum(low, origin - reach), np.minimum(high, origin + reach)
         first, last = np.ceil((lowest - origin) / size), np.floor((highest - origin) / size)
         return cls(origin, size, first.astype(int), last.astype(int), round(_WINDOW * cells_per_turn))
 
