@@ -113,8 +113,15 @@ def chord_knots(chords: Array, otherwise: Array, shape: SplineThrough, site: Sit
     Raises
     ------
     PathError
-        Nothing moves, or a waypoint repeats its predecessor.
+        Nothing moves, a waypoint repeats its predecessor, or the length cannot be represented.
     """
+    if not np.isfinite(chords.sum() + otherwise.sum()):
+        raise PathError(
+            "the waypoints are so far apart that their distance cannot be represented",
+            found=f"coordinates up to {max(abs(value) for point in shape.through for value in point):.3g}",
+            allowed="m and rad",
+            where=f"{site.key}.through",
+        )
     if np.all(chords < ZERO_LENGTH):
         chords = otherwise
     if np.all(chords < ZERO_LENGTH):

@@ -122,6 +122,9 @@ def _parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     with archive:
         meta = json.loads(str(archive["meta"]))
         arrays = {name: archive[name] for name in ARRAYS}
+    foreign = [name for name, array in arrays.items() if not isinstance(array, np.ndarray)]
+    if foreign:  # a member without the suffix .npy is read as bytes
+        raise ValueError(f"{foreign[0]} is no array")
     if not isinstance(meta, dict):
         raise ValueError("metadata that are no mapping")  # noqa: TRY004
     return meta, arrays

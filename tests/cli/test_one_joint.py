@@ -1,0 +1,77 @@
+"""A robot with one joint through every command."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+import yaml
+
+import brachis
+from brachis.plots import PLOTS
+from support.chains import Joint, chain_urdf
+
+LIMIT = {"lower": -1.0, "upper": 1.0, "velocity": 3.0, "effort": 20.0}
+ROBOTS = {"prismatic": ((1.0, 0.0, 0.0), "x", 0.5), "revolute": ((0.0, 0.0, 1.0), "y", 0.2)}
+
+
+@pytest.fixture(scope="module", params=ROBOTS)
+def files(request, tmp_path_factory):
+    """Task and URDF of a robot with one joint, and its saved motion."""
+    folder = tmp_path_factory.mktemp(request.param)
+    axis, row, length = ROBOTS[request.param]
+    joint = Joint(request.param, axis=axis, limit=LIMIT)
+    (folder / "robot.urdf").write_text(chain_urdf([joint], tool=(0.5, 0.0, 0.0)))
+    task = {
+        "brachis": 1,
+        "robot": {"urdf": "robot.urdf", "gravity": [0, 0, 0]},
+        "start": {"joints": [0.1]},
+        "task_space": [row],
+        "path": [{"line": {"by": [length]}}],
+        "spline": {"intervals": 10},
+    }
+    (folder / "task.yaml").write_text(yaml.safe_dump(task))
+    result = brachis.plan(None, folder / "task.yaml")
+    assert result.verified
+    result.trajectory.save(folder / "result.npz")
+    return folder
+
+
+def test_plan(run, files, tmp_path):
+    outcome = run("plan", files / "task.yaml", "--out", tmp_path)
+    assert outcome.code == 0, outcome.err
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"result.npz", "result.json", "overview.png", "candidates.png"}
+
+
+@pytest.mark.parametrize("kind", PLOTS)
+def test_plot(kind, run, files, tmp_path):
+    outcome = run("plot", files / "result.npz", "--kind", kind, "--out", tmp_path / "figure.svg")
+    assert outcome.code == 0, outcome.err
+    assert b"<svg" in (tmp_path / "figure.svg").read_bytes()
+
+
+def test_export_verify_inspect(run, files, tmp_path):
+    outcome = run("export", files / "result.npz", "--csv", tmp_path / "motion.csv", "--dt", 0.01)
+    assert outcome.code == 0, outcome.err
+    with (tmp_path / "motion.csv").open() as stream:
+        rows = list(csv.reader(stream))
+    assert [len(row) for row in rows] == [5] * len(rows)
+    outcome = run("verify", files / "result.npz", "--json")
+    assert outcome.code == 0, outcome.err
+    assert json.loads(outcome.out)["passed"] is True
+    outcome = run("inspect", files / "robot.urdf", "--posture", "0.2", "--json")
+    assert outcome.code == 0, outcome.err
+    (found,) = json.loads(outcome.out)["decompositions"]
+    assert found["kind"] == "closed_form"
+
+
+@pytest.mark.parametrize("name", ["task.yaml", "result.npz"])
+def test_bottleneck(name, run, files, tmp_path):
+    outcome = run("bottleneck", files / name, "--check", "--out", tmp_path, "--json")
+    assert outcome.code == 0, outcome.err
+    found = json.loads(outcome.out)["bottleneck"]["sensitivities"]
+    assert found["reliable"] is True
+    assert sum(entry["change_for_10_percent_s"] for entry in found["limits"]) < -1e-3
+    assert (tmp_path / "timeline.png").exists()

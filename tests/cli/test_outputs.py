@@ -1,0 +1,192 @@
+"""What commands may not write over, standard output that cannot be written, and inputs that never end."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import brachis
+
+from .conftest import SCARA
+
+FULL = Path("/dev/full")
+COMMAND = (sys.executable, "-m", "brachis")
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    """A saved motion with the task and the URDF that it was planned for, in one folder."""
+    folder = tmp_path_factory.mktemp("saved")
+    (folder / "robot.urdf").write_text(SCARA.read_text())
+    (folder / "points.csv").write_text("x,y\n0,0\n0,0.1\n0,0.3\n")
+    task = {
+        "brachis": 1,
+        "robot": {"urdf": "robot.urdf", "gravity": [0, 0, 0]},
+        "start": {"joints": [0.5236, -2.0944, 2.0944]},
+        "task_space": ["x", "y"],
+        "path": [{"csv": {"file": "points.csv", "relative": True}}],
+        "redundant_joints": ["j3"],
+        "spline": {"intervals": 6},
+    }
+    (folder / "task.yaml").write_text(yaml.safe_dump(task))
+    brachis.plan(None, folder / "task.yaml").trajectory.save(folder / "result.npz")
+    return folder
+
+
+def contents(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+OVER = {
+    "the task": ("export", "result.npz", "--csv", "task.yaml"),
+    "the waypoints": ("export", "result.npz", "--csv", "points.csv"),
+    "the motion": ("export", "result.npz", "--csv", "result.npz"),
+    "a figure over the task": ("plot", "result.npz", "--out", "task.yaml"),
+    "a figure that is none": ("plot", "result.npz", "--out", "notes.png"),
+    "the schema over the task": ("schema", "--out", "task.yaml"),
+    "the schema over data": ("schema", "--out", "data.json"),
+    "the schema over a task in JSON": ("schema", "--out", "result.json"),
+    "a URDF over the arm": ("compose", "robot.urdf", "--out", "robot.urdf"),
+    "a URDF over the task": ("compose", "robot.urdf", "--out", "task.yaml"),
+    "a plan over its task": ("plan", "result.json", "--out", "."),
+    "a report over its task": ("bottleneck", "bottleneck.json", "--out", "."),
+}
+RAIL = ("--range", "-1", "1", "--velocity", "1", "--force", "100", "--mass", "5")
+
+
+@pytest.mark.parametrize("case", OVER)
+def test_nothing_is_written_over_other_files(case, run, saved, monkeypatch):
+    (saved / "notes.png").write_text("no figure")
+    (saved / "data.json").write_text('{"a": 1}')
+    task = yaml.safe_load((saved / "task.yaml").read_text())
+    for name in ("result.json", "bottleneck.json"):
+        (saved / name).write_text(json.dumps(task))
+    monkeypatch.chdir(saved)
+    before = contents(saved)
+    command = OVER[case]
+    outcome = run(*command, *(RAIL if command[0] == "compose" else ()))
+    assert outcome.code == 2, outcome.err
+    assert any(part in outcome.err for part in ("over an input", "of another kind", "not written by", "the format"))
+    assert contents(saved) == before
+
+
+def test_a_link_to_an_input_is_that_input(run, saved, tmp_path):
+    (tmp_path / "new.csv").symlink_to(saved / "points.csv")
+    (tmp_path / "new.urdf").symlink_to(saved / "robot.urdf")
+    before = contents(saved)
+    assert run("export", saved / "result.npz", "--csv", tmp_path / "new.csv").code == 2
+    assert run("compose", saved / "robot.urdf", *RAIL, "--out", tmp_path / "new.urdf").code == 2
+    assert contents(saved) == before
+
+
+def test_older_files_of_the_same_kind_are_written_over(run, saved, tmp_path):
+    (tmp_path / "empty.csv").touch()  # as mktemp makes it
+    for _ in range(2):
+        for command in (
+            ("export", saved / "result.npz", "--csv", tmp_path / "motion.csv", "--dt", 0.1),
+            ("export", saved / "result.npz", "--csv", tmp_path / "empty.csv", "--dt", 0.1),
+            ("plot", saved / "result.npz", "--kind", "torques", "--out", tmp_path / "figure.svg"),
+            ("plot", saved / "result.npz", "--kind", "torques", "--out", tmp_path / "figure.pdf"),
+            ("schema", "--out", tmp_path / "schema.json"),
+            ("compose", saved / "robot.urdf", *RAIL, "--out", tmp_path / "cell.urdf"),
+        ):
+            outcome = run(*command)
+            assert outcome.code == 0, outcome.err
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="only Linux has /dev/full")
+@pytest.mark.parametrize(
+    "arguments", [("schema",), ("--help",), ("inspect", SCARA, "--json"), ("verify", "gone", "--json")]
+)
+def test_a_full_disk_behind_standard_output_is_no_fault(arguments):
+    with FULL.open("w") as full:
+        done = subprocess.run([*COMMAND, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 1
+    assert "brachis: standard output cannot be written: No space left on device\n" in done.stderr
+    assert "fault of brachis" not in done.stderr
+    assert "Exception ignored" not in done.stderr
+
+
+def test_a_closed_pipe_is_quiet():
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run([*COMMAND, "schema"], stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writing)
+    assert done.returncode == 1
+    assert done.stderr == ""
+
+
+def test_closed_standard_output_is_no_fault():
+    done = subprocess.run(
+        ["/bin/sh", "-c", 'exec "$0" "$@" >&-', *COMMAND, "schema"], stderr=subprocess.PIPE, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("end", ["exact", "hold"])
+def test_the_last_row(end, run, saved, tmp_path):
+    table = tmp_path / "motion.csv"
+    trajectory = brachis.Trajectory.load(saved / "result.npz")
+    dt = trajectory.t_end / 7.5
+    assert run("export", saved / "result.npz", "--csv", table, "--dt", dt, "--last", end).code == 0
+    with table.open() as stream:
+        rows = [[float(cell) for cell in row] for row in list(csv.reader(stream))[1:]]
+    assert len(rows) == 9
+    assert rows[-1][0] == (trajectory.t_end if end == "exact" else 8 * dt)
+    np.testing.assert_array_equal(rows[-1][1:4], trajectory.position(trajectory.t_end))
+    if end == "hold":
+        np.testing.assert_array_equal(rows[-1][4:], np.zeros(9))  # no gravity: nothing holds the posture
+    outcome = run("export", saved / "result.npz", "--csv", table, "--last", "held")
+    assert outcome.code == 2
+    assert "Did you mean 'hold'?" in outcome.err
+
+
+def test_a_period_longer_than_the_motion_is_warned_of(run, saved, tmp_path):
+    outcome = run("export", saved / "result.npz", "--csv", tmp_path / "motion.csv", "--dt", 4)
+    assert outcome.code == 0
+    assert "the period of 4 s is longer than the motion, which takes" in outcome.err
+    assert len((tmp_path / "motion.csv").read_text().splitlines()) == 3
+
+
+@pytest.fixture(params=["pipe", "folder", "/dev/zero", "huge"])
+def endless(request, tmp_path):
+    path = tmp_path / request.param.strip("/")
+    if request.param == "pipe":
+        os.mkfifo(path)
+    elif request.param == "folder":
+        path.mkdir()
+    elif request.param == "huge":
+        with path.open("wb") as stream:
+            stream.truncate(10**12)  # takes no room
+    else:
+        path = Path(request.param)
+    return path
+
+
+def test_endless_inputs_are_refused(endless, run, saved, tmp_path):
+    task = yaml.safe_load((saved / "task.yaml").read_text())
+    task["robot"]["urdf"] = str(saved / "robot.urdf")
+    by_csv = {**task, "path": [{"csv": {"file": str(endless), "relative": True}}]}
+    by_urdf = {**task, "robot": {"urdf": str(endless)}}
+    (tmp_path / "csv.yaml").write_text(yaml.safe_dump(by_csv))
+    (tmp_path / "urdf.yaml").write_text(yaml.safe_dump({**by_urdf, "path": [{"line": {"by": [0.1, 0.0]}}]}))
+    for command in (
+        ("plan", endless),
+        ("plan", tmp_path / "csv.yaml"),
+        ("plan", tmp_path / "urdf.yaml"),
+        ("inspect", endless),
+        ("verify", endless),
+        ("compose", endless, *RAIL, "--out", tmp_path / "new.urdf"),
+    ):
+        outcome = run(*command)
+        assert outcome.code == 2, command
+        assert str(endless) in outcome.err
+        assert any(what in outcome.err for what in ("a pipe", "a folder", "a device", "MB"))
