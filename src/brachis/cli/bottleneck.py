@@ -6,7 +6,14 @@ from pathlib import Path
 
 from brachis import bottleneck, planner
 from brachis.cli.folder import Writer, make_folder, write_files, write_text
-from brachis.cli.output import json_text, print_error, print_json, progress, result_console
+from brachis.cli.output import (
+    json_text,
+    print_error,
+    print_json,
+    print_what_was_left,
+    progress,
+    result_console,
+)
 from brachis.result import Result
 
 _FILES = {
@@ -34,8 +41,7 @@ def bottleneck_command(
         print_json(data)
     else:
         _show(result, found, files)
-    if result.interrupted:
-        print_error("the search was ended early; this is the best motion verified so far")
+    print_what_was_left(result)
     if not result.verified:
         print_error("the motion found did not pass the verification; what is said of it may not hold")
     return 0 if result.verified else 1

@@ -12,7 +12,10 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
+from brachis import interrupts
+
 if TYPE_CHECKING:  # loads Pinocchio, which no error message and no help needs
+    from brachis.result import Result
     from brachis.verify import Verification
 
 
@@ -38,6 +41,14 @@ def print_failure(message: str, exit_code: int, *, as_json: bool) -> None:
     print_error(message)
 
 
+def print_what_was_left(result: Result) -> None:
+    """Say on standard error that the search was ended early, and what was left undone."""
+    if result.interrupted:
+        print_error("the search was ended early; this is the best motion so far")
+    for undone in result.undone:
+        print_error(f"left undone: {undone}")
+
+
 def _plain(value: object) -> object:
     if isinstance(value, Mapping):
         return {str(key): _plain(each) for key, each in value.items()}
@@ -55,13 +66,18 @@ def result_console() -> Console:
 
 @contextmanager
 def progress() -> Iterator[Callable[[str], None]]:
-    """Give a listener that shows what the planner does on a terminal, and nothing in a pipe."""
+    """Give a listener that shows what the planner does on a terminal, and nothing in a pipe; it hears lost Ctrl-C."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield lambda _text: None
+        yield lambda _text: interrupts.check()
         return
     with console.status("reading the task") as status:
-        yield lambda text: status.update(text, spinner=None)
+
+        def show(text: str) -> None:
+            interrupts.check()
+            status.update(text, spinner=None)
+
+        yield show
 
 
 def verification_table(verification: Verification) -> Table:

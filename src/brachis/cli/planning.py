@@ -10,7 +10,15 @@ from rich.table import Table
 
 from brachis import planner
 from brachis.cli.folder import Writer, make_folder, write_files, write_text
-from brachis.cli.output import json_text, print_error, print_json, progress, result_console, verification_table
+from brachis.cli.output import (
+    json_text,
+    print_error,
+    print_json,
+    print_what_was_left,
+    progress,
+    result_console,
+    verification_table,
+)
 from brachis.result import Result
 from brachis.search.book import SAME_MOTION
 
@@ -36,8 +44,7 @@ def plan_command(task: Path, *, urdf: Path | None, out: Path | None, as_json: bo
         print_json(data)
     else:
         _show(result, data)
-    if result.interrupted:
-        print_error("the search was ended early; this is the best motion so far")
+    print_what_was_left(result)
     if not result.verified:
         print_error("the motion found did not pass the verification; it is marked unverified")
     return 0 if result.verified else 1

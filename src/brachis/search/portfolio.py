@@ -100,7 +100,7 @@ def find_fastest(choices: Sequence[Choice], deadline: Deadline, listener: Listen
         search.book.interrupted = True
         search.take_what_there_is()
         if not search.book.content:
-            raise KeyboardInterrupt(str(search.book.best or "no motion was found before")) from None
+            raise KeyboardInterrupt(str(search.book.best or "")) from None
     return search.found()
 
 
