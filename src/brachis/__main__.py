@@ -1,5 +1,17 @@
-"""``python -m brachis``."""
+"""The command ``brachis`` and ``python -m brachis``: Ctrl-C is heard before anything else is imported."""
 
-from brachis.cli.main import main
+from __future__ import annotations
 
-main()
+from brachis import interrupts
+
+
+def main() -> None:
+    """Run the command line."""
+    interrupts.listen()
+    from brachis.cli.main import main as run  # noqa: PLC0415  (a third of a second in which Ctrl-C may come)
+
+    run()
+
+
+if __name__ == "__main__":
+    main()

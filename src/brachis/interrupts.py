@@ -82,7 +82,10 @@ def forget() -> None:
 
 @contextlib.contextmanager
 def heard() -> Iterator[None]:
-    """Let presses interrupt the program within this block, one before it included."""
+    """Let presses interrupt the program within this block, one before it included.
+
+    A press that was swallowed within ends the block with KeyboardInterrupt, whatever came of it otherwise.
+    """
     handler = presses()
     if handler is None:
         yield
@@ -93,6 +96,7 @@ def heard() -> Iterator[None]:
         yield
     finally:
         handler.raising = False
+        check()
 
 
 @contextlib.contextmanager
@@ -120,6 +124,16 @@ def postponed() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
         if pressed:
             raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
+def blocked() -> Iterator[None]:
+    """Let processes that are started within this block never hear Ctrl-C; this one hears a press at its end."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _quiet(hook: Callable[[UnraisableHookArgs], object]) -> Callable[[UnraisableHookArgs], object]:

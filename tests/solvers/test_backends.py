@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from brachis.errors import UnknownNameError
+from brachis.errors import UnknownNameError, UnreachableError
 from brachis.solvers import AUTO_ORDER, NAMES, SolverOptions, SolveStatus, residual, solver_named
 from brachis.solvers.registry import TABLE
+from brachis.solvers.watch import Watch
 from support.programs import bounded, corner, disc, impossible
 
 OPTIONS = SolverOptions()
@@ -43,7 +46,7 @@ def test_known_optima(name, make, start, optimum, multipliers):
     assert report.objective == problem.objective(report.x)
     assert report.violation == residual(problem, report.x) <= 1e-5
     assert report.iterations >= 1
-    assert 0.0 < report.wall_time < OPTIONS.time_limit
+    assert report.wall_time > 0.0
     if name in MULTIPLIERS:
         np.testing.assert_allclose(report.multipliers, multipliers, atol=1e-4)
     else:
@@ -113,7 +116,8 @@ def test_time_limit(name):
     problem = disc(pause=0.03)
     report = solve(name, problem, [40.0, -30.0], SolverOptions(time_limit=0.1))
     assert report.status is SolveStatus.TIME_LIMIT
-    assert 0.1 <= report.wall_time < 0.5
+    assert report.wall_time >= 0.1
+    assert len(problem.evaluations) <= 8, "it went on after its time"
     assert "time_limit" in report.status.value
 
 
@@ -190,3 +194,49 @@ def test_residual_of_what_is_not_a_number():
 
 def test_residual_where_rows_cannot_be_evaluated():
     assert residual(disc(reachable=lambda _x: False), np.array([3.0, 1.0])) == np.inf
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e200])
+def test_backends_get_finite_numbers_only(bad):
+    for wrong in ({"row_values": lambda _x: np.array([bad])}, {"row_slopes": lambda _x: np.array([[1.0, bad]])}):
+        watch = Watch(dataclasses.replace(disc(), **wrong), OPTIONS, None)
+        with pytest.raises(UnreachableError, match="not a finite number"):
+            _ = watch.rows(np.zeros(2)), watch.jacobian(np.zeros(2))
+    with pytest.raises(UnreachableError, match="not finite"):
+        Watch(disc(), OPTIONS, None).rows(np.array([bad, 0.0]))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("backing", ["uno", "ipopt"])
+def test_trial_points_whose_rows_are_not_finite_are_left(backing, bad):
+    seen = []
+
+    def rows(x):
+        seen.append(x[0] < 0.9)
+        return np.array([bad if seen[-1] else (x[0] - 3.0) ** 2 + (x[1] - 1.0) ** 2])
+
+    for start in ([4.9, 1.2], [1.5, 1.3], [2.0, 2.6], [1.2, 1.05], [1.2, 0.3]):
+        report = solve(backing, dataclasses.replace(disc(), row_values=rows), start)
+        assert report.status.usable
+        np.testing.assert_allclose(report.x, [1.0, 1.0], atol=1e-3)
+    assert any(seen), "no trial point was bad: the test shows nothing"
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
+def test_a_start_that_is_not_finite_is_not_given_to_a_backend(name, bad):
+    report = solve(name, disc(), [bad, 0.5])
+    assert report.status is SolveStatus.EVALUATION_ERROR
+    assert report.iterations == 0
+    assert report.solver == name
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_rows_that_are_not_finite_at_the_start(name, bad):
+    report = solve(name, dataclasses.replace(disc(), row_values=lambda _x: np.array([bad])), [4.0, 0.5])
+    assert report.status is SolveStatus.EVALUATION_ERROR
+    assert report.violation == np.inf
+
+
+def test_bounds_that_are_not_numbers(name):
+    report = solve(name, dataclasses.replace(disc(), upper=np.array([np.nan])), [4.0, 0.5])
+    assert report.status is SolveStatus.EVALUATION_ERROR

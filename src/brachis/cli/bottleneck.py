@@ -14,6 +14,7 @@ from brachis.cli.output import (
     json_text,
     print_error,
     print_json,
+    print_what_was_left,
     progress,
     result_console,
     shown_warnings,
@@ -39,8 +40,9 @@ class _Motion:
     made: Result | Trajectory
     trajectory: Trajectory
     verified: bool
-    interrupted: bool
     data: dict[str, Any]
+    interrupted: bool = False
+    undone: tuple[str, ...] = ()
 
 
 def bottleneck_command(
@@ -62,8 +64,7 @@ def bottleneck_command(
         print_json(data)
     else:
         _show(motion.trajectory, found, written.files)
-    if motion.interrupted:
-        print_error("the search was ended early; this is the best motion verified so far")
+    print_what_was_left(motion.undone, interrupted=motion.interrupted)
     if not motion.verified:
         print_error("the motion found did not pass the verification; what is said of it may not hold")
     return exit_code(motion.verified, written.failures)
@@ -71,7 +72,7 @@ def bottleneck_command(
 
 def _planned(task: Path, urdf: Path | None, listener: Callable[[str], None], *, strict: bool) -> _Motion:
     result = planner.plan(urdf, task, listener=listener, strict=strict)
-    return _Motion(result, result.trajectory, result.verified, result.interrupted, result.to_dict())
+    return _Motion(result, result.trajectory, result.verified, result.to_dict(), result.interrupted, result.undone)
 
 
 def _saved(path: Path, urdf: Path | None) -> _Motion:
@@ -91,7 +92,7 @@ def _saved(path: Path, urdf: Path | None) -> _Motion:
         "worst_ratio": verification.worst_ratio,
         "path_error": verification.path_error,
     }
-    return _Motion(trajectory, trajectory, verification.passed, interrupted=False, data=data)
+    return _Motion(trajectory, trajectory, verification.passed, data)
 
 
 def _write(motion: _Motion, data: dict[str, Any], out: Path) -> Written:

@@ -16,26 +16,30 @@ from typing import Annotated, TextIO, cast
 import typer
 from typer.core import TyperGroup
 
+from brachis import interrupts
 from brachis.cli.composition import VectorCommand, compose_command
 from brachis.cli.output import StandardOutput, open_streams, print_failure
 from brachis.errors import BrachisError
+from brachis.interrupts import INTERRUPTED
 
 
 class InterruptedByUserError(BrachisError):
     """The user pressed Ctrl-C."""
 
-    exit_code = 130
+    exit_code = INTERRUPTED
 
 
 class _Commands(TyperGroup):
     """Commands that the user may interrupt."""
 
     def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override]
-        """Run a command, its imports included."""
+        """Run a command, its imports included; however it ends, a press that nobody heard ends it."""
         try:
-            return super().invoke(ctx)
+            with interrupts.heard():
+                return super().invoke(ctx)
         except KeyboardInterrupt as interrupt:
-            raise InterruptedByUserError("interrupted") from interrupt
+            told = str(interrupt)
+            raise InterruptedByUserError(f"interrupted; {told}" if told else "interrupted") from interrupt
 
 
 app = typer.Typer(
@@ -93,7 +97,8 @@ def plan(
     json: Json = False,
 ) -> None:
     """Plan a task, verify the motion, and show what came out."""
-    from brachis.cli import planning  # noqa: PLC0415  (each command imports what it needs)
+    with interrupts.postponed():
+        from brachis.cli import planning  # noqa: PLC0415  (each command imports what it needs)
 
     raise typer.Exit(planning.plan_command(task, urdf=urdf, out=out, strict=strict, as_json=json))
 
@@ -129,7 +134,8 @@ def bottleneck(
     json: Json = False,
 ) -> None:
     """Plan a task, or take a saved motion, and say which limits cost how much time, and which is active when."""
-    from brachis.cli import bottleneck as command  # noqa: PLC0415
+    with interrupts.postponed():
+        from brachis.cli import bottleneck as command  # noqa: PLC0415
 
     raise typer.Exit(
         command.bottleneck_command(
@@ -145,7 +151,8 @@ def verify(
     json: Json = False,
 ) -> None:
     """Check a saved motion again: path, limits, start and end, continuity."""
-    from brachis.cli import results  # noqa: PLC0415
+    with interrupts.postponed():
+        from brachis.cli import results  # noqa: PLC0415
 
     raise typer.Exit(results.verify_command(result, urdf=urdf, as_json=json))
 
@@ -164,7 +171,8 @@ def export(
     ] = "exact",
 ) -> None:
     """Sample a saved motion at a controller's rate."""
-    from brachis.cli import results  # noqa: PLC0415
+    with interrupts.postponed():
+        from brachis.cli import results  # noqa: PLC0415
 
     results.export_command(result, csv, form="csv", dt=dt, last=last)
 
@@ -178,7 +186,8 @@ def plot(
     ] = "overview",
 ) -> None:
     """Draw a saved motion."""
-    from brachis.cli import results  # noqa: PLC0415
+    with interrupts.postponed():
+        from brachis.cli import results  # noqa: PLC0415
 
     results.plot_command(result, out=out, kind=kind)
 
@@ -202,7 +211,8 @@ def inspect(
     json: Json = False,
 ) -> None:
     """List a robot's joints, and which choices of redundant joints have a closed form."""
-    from brachis.cli import inspection  # noqa: PLC0415
+    with interrupts.postponed():
+        from brachis.cli import inspection  # noqa: PLC0415
 
     inspection.inspect_command(
         urdf,
@@ -261,7 +271,8 @@ def schema(
     out: Annotated[Path | None, typer.Option(help="File to write instead of standard output.")] = None,
 ) -> None:
     """Print the JSON schema of task files, for editors."""
-    from brachis.cli import results  # noqa: PLC0415
+    with interrupts.postponed():
+        from brachis.cli import results  # noqa: PLC0415
 
     results.schema_command(out)
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from rich.console import Console
 from rich.table import Table
 
+from brachis import interrupts
 from brachis.errors import InputError
 
 if TYPE_CHECKING:  # loads Pinocchio, which no error message and no help needs
@@ -118,6 +119,14 @@ def open_streams() -> None:
             reconfigure(errors="backslashreplace")
 
 
+def print_what_was_left(undone: Sequence[str], *, interrupted: bool) -> None:
+    """Say on standard error that the search was ended early, where it was, and what was left undone."""
+    if interrupted:
+        print_error("the search was ended early; this is the best motion so far")
+    for each in undone:
+        print_error(f"left undone: {each}")
+
+
 def _plain(value: object) -> object:
     if isinstance(value, Mapping):
         return {str(key): _plain(each) for key, each in value.items()}
@@ -154,13 +163,18 @@ def shown_warnings() -> Iterator[None]:
 
 @contextmanager
 def progress() -> Iterator[Callable[[str], None]]:
-    """Give a listener that shows what the planner does on a terminal, and nothing in a pipe."""
+    """Give a listener that shows what the planner does on a terminal, and nothing in a pipe; it hears lost Ctrl-C."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield lambda _text: None
+        yield lambda _text: interrupts.check()
         return
     with console.status("reading the task") as status:
-        yield lambda text: status.update(text, spinner=None)
+
+        def show(text: str) -> None:
+            interrupts.check()
+            status.update(text, spinner=None)
+
+        yield show
 
 
 def verification_table(verification: Verification) -> Table:

@@ -15,6 +15,7 @@ from brachis.cli.output import (
     json_text,
     print_error,
     print_json,
+    print_what_was_left,
     progress,
     result_console,
     shown_warnings,
@@ -48,8 +49,7 @@ def plan_command(task: Path, *, urdf: Path | None, out: Path | None, strict: boo
         print_json(data)
     else:
         _show(result, data)
-    if result.interrupted:
-        print_error("the search was ended early; this is the best motion so far")
+    print_what_was_left(result.undone, interrupted=result.interrupted)
     if not result.verified:
         print_error("the motion found did not pass the verification; it is marked unverified")
     return exit_code(result.verified, failures)

@@ -100,7 +100,7 @@ def find_fastest(choices: Sequence[Choice], deadline: Deadline, listener: Listen
         search.book.interrupted = True
         search.take_what_there_is()
         if not search.book.content:
-            raise KeyboardInterrupt(str(search.book.best or "no motion was found before")) from None
+            raise KeyboardInterrupt(str(search.book.best or "")) from None
     return search.found()
 
 
@@ -160,8 +160,8 @@ class _Search:
                     if place and not self._goes_on(ranked[first + place :], left):
                         return
                     left -= 1
-                    self._listener(attempt.outcome)
                     self.book.record(*batch[place], attempt, motion)
+                    self._listener(attempt.outcome)
 
     def _goes_on(self, ranked: Sequence[Numbered], left: int) -> bool:
         """Tell whether the first one of the plans that are left is worth finishing."""

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import warnings
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
@@ -212,19 +211,25 @@ def each(
     """
     if jobs == 1 or len(given) <= 1 or _within_a_worker():
         for item in given:
+            interrupts.check()
             yield function(item, *others, listener)
         return
+    interrupts.check()
     from joblib import Parallel, delayed  # noqa: PLC0415  (a fifth of a second that a single process need not wait)
 
-    made = Parallel(n_jobs=jobs, backend="loky", return_as="generator")(
-        delayed(_apart)(function, item, *others) for item in given
-    )
+    made: Any = None
     try:
-        yield from made
+        with interrupts.blocked():  # joblib would lose a press while its processes start, and they would die of it
+            made = Parallel(n_jobs=jobs, backend="loky", return_as="generator")(
+                delayed(_apart)(function, item, *others) for item in given
+            )
+        for one in made:  # noqa: UP028  ("yield from" would close `made` before the lines below)
+            yield one
     finally:
         with interrupts.postponed(), warnings.catch_warnings():  # that work is thrown away is meant
             warnings.simplefilter("ignore")
-            made.close()
+            if made is not None:
+                made.close()
 
 
 def processes(jobs: int) -> int:
@@ -240,9 +245,7 @@ def _within_a_worker() -> bool:
 
 
 def _apart(function: Callable[..., _Made], *arguments: object) -> _Made:
-    """Run in a process of its own: one thread for linear algebra, nobody listening, Ctrl-C left to the main process."""
-    if multiprocessing.current_process().name != _MAIN:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Run in a process of its own: one thread for linear algebra, nobody listening."""
     with ThreadpoolController().limit(limits=1, user_api="blas"):
         return function(*arguments, _deaf)
 

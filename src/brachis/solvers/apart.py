@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+from brachis import interrupts
 from brachis.solvers.protocol import Problem, Progress, Solve, SolverOptions, SolverReport, SolveStatus
 from brachis.solvers.watch import ended
 
@@ -57,7 +58,10 @@ def _solve_apart(
     context: Any = multiprocessing.get_context(_METHOD)
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_work, args=(sender, module, problem, x, options), daemon=True)
-    with warnings.catch_warnings():  # the fork solves, and touches nothing that other threads may hold
+    with (
+        interrupts.blocked(),
+        warnings.catch_warnings(),
+    ):  # the fork touches nothing that threads may hold
         warnings.filterwarnings("ignore", message=".*multi-threaded", category=DeprecationWarning)
         process.start()
     sender.close()
@@ -97,7 +101,6 @@ def _work(sender: Connection, module: str, problem: Problem, x: np.ndarray, opti
 
     The system ends it when its time is up, wherever it is then, even if nobody waits for it any more.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.setitimer(signal.ITIMER_REAL, options.time_limit + _GRACE)
     solve = inspect.unwrap(importlib.import_module(module).solve)

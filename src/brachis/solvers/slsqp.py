@@ -56,6 +56,7 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
 
     try:
         with watch:
+            watch.rows(x)  # from a start that cannot be evaluated there is nothing to back off to
             result = minimize(  # type: ignore[call-overload]  # the stubs know neither Bounds nor this callback
                 problem.objective,
                 x,

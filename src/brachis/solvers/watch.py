@@ -224,7 +224,8 @@ def _usable(values: np.ndarray) -> bool:
 def residual(problem: Problem, x: np.ndarray) -> float:
     """Largest violation of rows and bounds at x; infinite where x cannot be evaluated."""
     try:
-        rows = problem.rows(x)
+        with np.errstate(over="ignore", invalid="ignore"):
+            rows = problem.rows(x)
     except UnreachableError:
         return np.inf
     gaps = (problem.lower - rows, rows - problem.upper, problem.x_lower - x, x - problem.x_upper)

@@ -1,0 +1,92 @@
+"""Large solves in a process of their own, which is ended when its time is up."""
+
+from __future__ import annotations
+
+import dataclasses
+import multiprocessing
+import os
+import signal
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from brachis.solvers import SolverOptions, SolveStatus, apart, solver_named, uno
+from support.programs import disc
+
+pytestmark = pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="what is patched here is only forked there"
+)
+START, OPTIONS = np.array([4.0, 0.5]), SolverOptions()
+
+
+@pytest.fixture(autouse=True)
+def everything_is_large(monkeypatch):
+    monkeypatch.setattr(apart, "ENTRIES", 0)
+
+
+def solve(options=OPTIONS, progress=None, name="uno"):
+    return solver_named(name)[0].solve(disc(), START, options, progress)
+
+
+@pytest.mark.parametrize("name", ["uno", "ipopt", "slsqp"])
+def test_the_answer_and_the_progress_are_those_of_a_solve_here(name, monkeypatch):
+    calls: dict[str, list] = {"apart": [], "here": []}
+    far = solve(progress=lambda *call: calls["apart"].append(call), name=name)
+    monkeypatch.setattr(apart, "ENTRIES", 10)
+    near = solve(progress=lambda *call: calls["here"].append(call), name=name)
+    assert calls["apart"] == calls["here"] != []
+    for entry in dataclasses.fields(far):
+        if entry.name != "wall_time":
+            np.testing.assert_array_equal(getattr(far, entry.name), getattr(near, entry.name))
+
+
+def test_a_solver_that_does_not_come_back_is_ended(monkeypatch):
+    monkeypatch.setattr(uno, "_run", lambda *_: time.sleep(1e6))
+    report = solve(SolverOptions(time_limit=0.1))
+    assert report.status is SolveStatus.TIME_LIMIT
+    assert report.message == "ended: it did not come back in time"
+    np.testing.assert_array_equal(report.x, START)
+    assert report.violation == 0.0, "the start is feasible, and stays"
+    assert multiprocessing.active_children() == []
+
+
+def test_the_system_ends_it_even_if_nobody_waits(monkeypatch):
+    monkeypatch.setattr(uno, "_run", lambda *_: time.sleep(1e6))
+    context = multiprocessing.get_context("fork")
+    _, sender = context.Pipe(duplex=False)
+    process = context.Process(
+        target=apart._work, args=(sender, "brachis.solvers.uno", disc(), START, SolverOptions(time_limit=0.05))
+    )
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGALRM
+
+
+def test_a_solver_that_crashes_is_told(monkeypatch):
+    monkeypatch.setattr(uno, "_run", lambda *_: os.kill(os.getpid(), signal.SIGKILL))
+    report = solve()
+    assert (report.status, report.message) == (SolveStatus.FAILED, "crashed")
+
+
+def test_errors_are_raised_here(monkeypatch):
+    monkeypatch.setitem(sys.modules, "unopy", None)
+    with pytest.raises(ImportError, match="unopy"):
+        solve()
+
+
+def test_ctrl_c_ends_it():
+    def progress(_iteration, _objective):
+        os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        solve(progress=progress)
+    assert multiprocessing.active_children() == []
+
+
+def test_within_a_process_that_may_start_none(monkeypatch):
+    monkeypatch.setitem(multiprocessing.current_process()._config, "daemon", 1)
+    report = solve()
+    assert report.status is SolveStatus.FAILED
+    assert "may not start another one" in report.message

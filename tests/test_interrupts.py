@@ -1,0 +1,141 @@
+"""Ctrl-C that is never lost."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from brachis import interrupts
+
+
+@pytest.fixture
+def presses(monkeypatch):
+    """The command line's handler, in place for the test."""
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr(sys, "unraisablehook", lambda _unraisable: None)
+    interrupts.listen()
+    yield interrupts.presses()
+    signal.signal(signal.SIGINT, before)
+
+
+def press() -> None:
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_a_press_is_only_remembered_until_it_may_be_heard(presses):
+    press()
+    assert presses.pending
+    with pytest.raises(KeyboardInterrupt), interrupts.heard():
+        pytest.fail("a press before should be heard first")
+    assert not presses.raising
+
+
+def test_a_press_interrupts(presses):
+    with pytest.raises(KeyboardInterrupt), interrupts.heard():
+        press()
+        pytest.fail("not interrupted")
+
+
+class Finaliser:
+    def __del__(self) -> None:
+        press()
+
+
+def swallowed_by_a_finaliser() -> None:
+    Finaliser()
+
+
+def swallowed_by_a_library() -> None:
+    try:
+        press()
+    except BaseException as error:
+        raise ImportError("could not be imported") from error
+
+
+@pytest.mark.parametrize("lose", [swallowed_by_a_finaliser, swallowed_by_a_library])
+def test_a_press_that_is_swallowed_is_heard_in_the_end(presses, lose):
+    after = []
+
+    def command():
+        with interrupts.heard():
+            lose()
+            after.append(1)
+            interrupts.check()
+            after.append(2)
+
+    with pytest.raises(KeyboardInterrupt):
+        command()
+    assert 2 not in after
+    assert presses.pending
+
+
+def test_what_was_heard_is_forgotten(presses):
+    with interrupts.heard():
+        with pytest.raises(KeyboardInterrupt):
+            press()
+        interrupts.forget()
+    interrupts.check()
+    assert not presses.pending
+
+
+@pytest.mark.parametrize("listening", [True, False])
+def test_a_press_waits_for_the_end_of_a_block(request, listening):
+    handler = request.getfixturevalue("presses") if listening else signal.getsignal(signal.SIGINT)
+    done = []
+
+    def work():
+        with interrupts.postponed():
+            press()
+            done.append("the block")
+        done.append("what follows")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["the block"]
+    assert signal.getsignal(signal.SIGINT) is handler
+
+
+def test_a_block_ends_with_the_press_whatever_it_raises():
+    with pytest.raises(KeyboardInterrupt), interrupts.postponed():
+        press()
+        raise ImportError("could not be imported")
+
+
+def test_other_threads_postpone_nothing():
+    seen = []
+
+    def work():
+        with interrupts.postponed():
+            seen.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [signal.getsignal(signal.SIGINT)]
+
+
+def test_processes_begun_in_a_blocked_block_do_not_hear_a_press():
+    code = "import signal; print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))"
+    for block in (True, False):
+        with interrupts.blocked() if block else interrupts.postponed():
+            done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        assert done.stdout.strip() == str(block)
+
+
+def test_a_press_in_a_blocked_block_comes_at_its_end():
+    done = []
+
+    def work():
+        with interrupts.blocked():
+            press()
+            done.append("the block")
+        done.append("what follows")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["the block"]
