@@ -249,7 +249,7 @@ def random_task(name: str, seed: int, number: int, folder: Path) -> dict[str, ob
         "start": {"joints": course[0].tolist()},
         "task_space": space,
         "path": _random_path(rng, robot, course, space, folder / f"{name}_{number}.csv"),
-        "search": {"effort": "single", "time_limit": 8.0},
+        "search": {"effort": "single", "time_limit": 15.0},
         "solver": {"time_limit": 3.0},
         "spline": {
             "degree": degree,
@@ -276,7 +276,7 @@ def _joint_motion(rng: np.random.Generator, robot: Robot) -> np.ndarray:
     middle, half = 0.5 * (lower + upper), 0.4 * (upper - lower)
     s = np.linspace(0.0, 1.0, 50)[:, None]
     first = middle + half * rng.uniform(-0.8, 0.8, robot.n)
-    way, bow = rng.uniform(-0.5, 0.5, robot.n), rng.uniform(-0.15, 0.15, robot.n)
+    way, bow = rng.uniform(-0.4, 0.4, robot.n), rng.uniform(-0.1, 0.1, robot.n)
     return np.clip(first + way * s + bow * np.sin(np.pi * s), middle - half, middle + half)
 
 
@@ -295,7 +295,7 @@ def _random_limits(
     }
     ranges: dict[str, list[float | None]] = {}
     for name, low, high in zip(names, course.min(axis=0), course.max(axis=0), strict=True):
-        room = rng.uniform(0.02, 0.4, 2)
+        room = rng.uniform(0.05, 0.5, 2)
         ends = [float(low - room[0]), float(high + room[1])]
         kind = rng.integers(0, 8)
         forms = {0: [ends[0], None], 1: [None, ends[1]], 2: [ends[0], 1e4], 3: [-1e4, ends[1]], 4: ends}

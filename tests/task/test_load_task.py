@@ -185,6 +185,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ({"robot": {"limits": {"scale": {"torque": 0}}}}, ["robot.limits.scale.torque: out of range", "> 0"]),
     ({"robot": {"gravity": [0, 0]}}, ["robot.gravity[2]: the list is too short"]),
     ({"robot": {"gravity": [0, 0, float("inf")]}}, ["robot.gravity[2]: not a finite number; found inf"]),
+    ({"refinement": {"tolerance": 1e-6}}, ["refinement.tolerance: out of range; found 1e-06; allowed: >= 1e-05"]),
     ({"robot": {"friction": {"viscous": -1}}}, ["robot.friction.viscous: out of range; found -1; allowed: >= 0"]),
     ({"robot": {"friction": {"coulomb_velocity": 0}}}, ["coulomb_velocity: out of range; found 0; allowed: > 0"]),
     ({"robot": 3}, ["task: robot: wrong type; found 3; allowed: a mapping"]),

@@ -74,7 +74,7 @@ def _within_pieces(dense: Transcription, x: np.ndarray) -> np.ndarray:
 
 
 def _within_friction(dense: Transcription, x: np.ndarray) -> np.ndarray:
-    """List times tau at which a joint with Coulomb friction reverses, or nearly so: a peak as narrow as the friction."""
+    """List times tau at which a joint with Coulomb friction reverses, or nearly so: peaks as narrow as the friction."""
     t_end, friction = dense.motion(x).t_end, dense.decomposition.robot.friction
     return reversals(friction, dense.tau * t_end, dense.state(x)) / t_end
 

@@ -151,7 +151,13 @@ class SolverSettings(Model):
 class RefinementSettings(Model):
     """Adding collocation points until the limits hold in between them as well."""
 
-    tolerance: Positive = Field(default=1.0e-4, le=0.01, description="Largest relative excess over a limit, anywhere.")
+    tolerance: Positive = Field(
+        default=1.0e-4,
+        ge=1.0e-5,
+        le=0.01,
+        description="Largest relative excess over a limit, anywhere; of a position, beyond its range, in rad (m), or "
+        "in half ranges where these are shorter. What is less than 1e-5 the checks do not show.",
+    )
     density: Count = Field(default=10, ge=10, description="Grid points for checking limits, per collocation point.")
     max_rounds: Count = Field(default=10, ge=0, description="Largest number of rounds; 0 switches refinement off.")
 
