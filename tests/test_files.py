@@ -81,13 +81,13 @@ def dead_process() -> int:
 
 def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path):
     host, dead = files._host(), dead_process()
-    token = "0123456789abcdef"
-    ours = [f".brachis-{host}-{dead}-{token}.part", f".brachis-{host}-{dead}-{token[::-1]}.part"]
+    tail = "0123456789abcdef"
+    ours = [f".brachis-{host}-{dead}-{tail}.part", f".brachis-{host}-{dead}-{tail[::-1]}.part"]
     others = [
-        f".brachis-{host}-{os.getpid()}-{token}.part",  # of a process that runs
-        f".brachis-00000000-{dead}-{token}.part",  # of another host
-        f".brachis-{host}-{dead}-{token}.part.bak",
-        f".{token}.part",
+        f".brachis-{host}-{os.getpid()}-{tail}.part",  # of a process that runs
+        f".brachis-00000000-{dead}-{tail}.part",  # of another host
+        f".brachis-{host}-{dead}-{tail}.part.bak",
+        f".{tail}.part",
         "download.part",
     ]
     (tmp_path / ours[0]).mkdir()

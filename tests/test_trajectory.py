@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import zipfile
 from dataclasses import fields, replace
@@ -13,10 +14,12 @@ import yaml
 
 from brachis.errors import InputError, ResultFileError
 from brachis.planner import plan
+from brachis.robot import Robot, dynamics
 from brachis.trajectory import Trajectory
 from brachis.trajectory.pieces import one_sided_derivatives, relative_coefficients
 
 ROOT = Path(__file__).parents[1]
+SCARA = ROOT / "robots/scara3/robot.urdf"
 
 
 def task_of_length(length):
@@ -95,6 +98,34 @@ def test_periods_that_divide_the_end_time(divisor, trajectory):
     samples = trajectory.sample(trajectory.t_end / divisor)
     assert len(samples.t) == divisor + 1
     assert (np.diff(samples.t) > 0.0).all()
+
+
+@pytest.mark.parametrize("periods", [0.4, 1.0, 2.5, 3.0, 999.7])
+def test_the_end_posture_is_held_at_the_first_period_that_is_not_before_the_end(periods, trajectory):
+    dt = trajectory.t_end / periods
+    exact, held = trajectory.sample(dt), trajectory.sample(dt, last="hold")
+    assert len(held.t) == int(np.ceil(periods)) + 1
+    np.testing.assert_array_equal(held.t, dt * np.arange(len(held.t)))
+    assert held.t[-1] >= trajectory.t_end * (1.0 - 1e-12)
+    for field in fields(held):
+        np.testing.assert_array_equal(getattr(held, field.name)[:-1], getattr(exact, field.name)[:-1])
+    assert held.s[-1] == 1.0
+    np.testing.assert_array_equal(held.q[-1], trajectory.position(trajectory.t_end))
+    assert not held.qdot[-1].any()
+    assert not held.qddot[-1].any()
+
+
+def test_the_torque_that_holds_the_end_posture_is_the_static_one(trajectory):
+    heavy = replace(trajectory, robot=Robot.from_urdf(SCARA, gravity=[0.0, -9.81, 0.0]))
+    held = heavy.sample(0.3, last="hold")
+    lever = dynamics.rigid_torque(heavy.robot, held.q[-1:], np.zeros((1, 3)), np.zeros((1, 3)))[0]
+    assert np.abs(lever).max() > 10.0
+    np.testing.assert_array_equal(held.tau[-1], lever)
+
+
+def test_unknown_ending(trajectory):
+    with pytest.raises(InputError, match=r"no ending named 'held'.*allowed: exact, hold.*Did you mean 'hold'"):
+        trajectory.sample(0.1, last="held")
 
 
 @pytest.mark.parametrize("dt", [0.0, -1.0, np.nan, np.inf, 1e-9])
@@ -275,7 +306,26 @@ def zip_of_text(path):
         archive.writestr("meta", "{}")
 
 
-@pytest.mark.parametrize("spoil", [cut, flipped, single_array, zip_of_text, lambda p: p.write_bytes(b"")])
+def member_without_suffix(path):
+    with np.load(path) as archive:
+        contents = dict(archive)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, array in contents.items():
+            stream = io.BytesIO()
+            np.save(stream, array)
+            archive.writestr("q" if name == "q" else f"{name}.npy", stream.getvalue())
+
+
+def blown_up(path):
+    with zipfile.ZipFile(path, "a", compression=zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("zeros.npy", bytes(70_000_000))
+    assert path.stat().st_size < 1_000_000
+
+
+BROKEN_FILES = [cut, flipped, single_array, zip_of_text, member_without_suffix, blown_up, lambda p: p.write_bytes(b"")]
+
+
+@pytest.mark.parametrize("spoil", BROKEN_FILES)
 def test_file_of_another_kind(spoil, trajectory, tmp_path):
     path = tmp_path / "result.npz"
     trajectory.save(path)

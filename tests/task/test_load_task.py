@@ -264,6 +264,9 @@ def test_all_mistakes_are_in_one_message(tmp_path: Path) -> None:
     assert [line.startswith(f"  {file}: {key}: ") for line, key in zip(lines[1:], keys, strict=True)] == [True] * 3
 
 
+LAUGHS = "a0: &a0 [1]\n" + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 10))
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -277,6 +280,14 @@ def test_all_mistakes_are_in_one_message(tmp_path: Path) -> None:
         ("when: 2024-13-45", ["not valid YAML"]),
         ("\x07", ["not valid YAML"]),
         ("a: &a [*a]", ["contains itself"]),
+        ("a: &a {<<: *a}", ["contains itself"]),
+        (LAUGHS, ["not valid YAML", "1.11e+09 values with all aliases written out, at most 1000000 are read"]),
+        ("a: " + "[" * 5000, ["not valid YAML"]),
+        ('a: !!int ""', ["not valid YAML"]),
+        ("a: !!bool x", ["not valid YAML"]),
+        ("a: !!timestamp x", ["not valid YAML"]),
+        ("a: " + "1" * 5000, ["not valid YAML"]),
+        ("#" * 1_000_001, ["it is 1.0 MB long, at most 1 MB are read", "waypoints belong in a CSV file"]),
     ],
 )
 def test_broken_files(tmp_path: Path, text: str, expected: list[str]) -> None:

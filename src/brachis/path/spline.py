@@ -159,6 +159,15 @@ def _natural(knots: Array, waypoints: Array) -> BSpline:
     else:
         zero = np.zeros(waypoints.shape[1])
         ends = [(3, zero), (4, zero)]
-        # The stubs do not know conditions on chosen derivatives, which SciPy documents.
-        spline = make_interp_spline(unit, waypoints, k=_DEGREE, bc_type=(ends, ends))  # type: ignore[arg-type]
+        try:
+            # The stubs do not know conditions on chosen derivatives, which SciPy documents.
+            spline = make_interp_spline(unit, waypoints, k=_DEGREE, bc_type=(ends, ends))  # type: ignore[arg-type]
+        except np.linalg.LinAlgError as error:
+            distances = np.diff(knots)
+            raise PathError(
+                "no spline goes through the waypoints: their distances differ too much",
+                found=f"distances from {distances.min():.3g} to {distances.max():.3g} (m; rad where nothing shifts)",
+                allowed="waypoints of like distances",
+                where="path",
+            ) from error
     return type(spline)(spline.t * knots[-1], spline.c, spline.k)

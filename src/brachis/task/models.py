@@ -68,7 +68,7 @@ RedundantJoints = Annotated[
     by_form("auto, or a list of joint names", "auto"),
 ]
 Intervals = Annotated[
-    Annotated[Literal["auto"], Tag("<word>")] | Annotated[Annotated[Count, Field(ge=4)], Tag("<number>")],
+    Annotated[Literal["auto"], Tag("<word>")] | Annotated[Annotated[Count, Field(ge=4, le=10_000)], Tag("<number>")],
     by_form("auto, or a whole number", "auto"),
 ]
 
@@ -98,7 +98,7 @@ class SplineSettings(Model):
     rest: Literal["full", "velocity"] = Field(
         default="full", description="What vanishes at both ends: velocity and acceleration (full), or velocity alone."
     )
-    points_per_interval: Count = Field(default=3, ge=1, description="Collocation points per knot interval.")
+    points_per_interval: Count = Field(default=3, ge=1, le=100, description="Collocation points per knot interval.")
 
     @model_validator(mode="after")
     def _rest_needs_degree(self) -> SplineSettings:
@@ -141,7 +141,7 @@ class SolverSettings(Model):
     """The solver of the optimisation problem and its bounds."""
 
     name: Name = Field(default="auto", description="Solver; auto takes the best one installed.")
-    max_iterations: Count = Field(default=300, ge=1, description="Largest number of iterations.")
+    max_iterations: Count = Field(default=300, ge=1, le=1_000_000, description="Largest number of iterations.")
     time_limit: Positive = Field(
         default=20.0, description="Largest time of one solve, s; search.time_limit bounds the whole plan."
     )
@@ -158,8 +158,12 @@ class RefinementSettings(Model):
         description="Largest relative excess over a limit, anywhere; of a position, beyond its range, in rad (m), or "
         "in half ranges where these are shorter. What is less than 1e-5 the checks do not show.",
     )
-    density: Count = Field(default=10, ge=10, description="Grid points for checking limits, per collocation point.")
-    max_rounds: Count = Field(default=10, ge=0, description="Largest number of rounds; 0 switches refinement off.")
+    density: Count = Field(
+        default=10, ge=10, le=1000, description="Grid points for checking limits, per collocation point."
+    )
+    max_rounds: Count = Field(
+        default=10, ge=0, le=1000, description="Largest number of rounds; 0 switches refinement off."
+    )
 
 
 class Task(Model):
