@@ -62,7 +62,15 @@ JSON schema that editors use for completion: put `# yaml-language-server: $schem
 file, with the schema saved beside it by `brachis schema --out task.schema.json`.
 
 Limits: an absent key takes the URDF's limit, `null` removes it, a number holds for all joints, a list is in the order
-of the chain, a mapping names joints (others keep the URDF's).
+of the chain, a mapping names joints (others keep the URDF's). Torque, velocity and acceleration limits lie between 1e-6
+and 1e12 in SI units, scaled ones too; ends of position ranges within 1e6 rad or m of zero, or open (`null`).
+
+`brachis.plan(robot, task)` with a `Robot` adds what the task's `robot` part sets to what the robot was made with; the
+robot stands for the `urdf` key, and what contradicts it is refused with its key.
+
+Figures that are allowed and hardly meant (degrees for rad, mm for m, g for kg, factors above 10, an end time at the
+planner's least) are warned of on standard error and listed as `warnings` in the JSON and as `result.warnings`; with
+`--strict`, or `brachis.plan(..., strict=True)`, they are errors.
 """
 
 PATH = """

@@ -15,8 +15,9 @@ from brachis.robot import Robot, TaskSpace
 _TURN = 2.0 * math.pi
 _FASTEST = {"rad": 60.0, "m": 50.0}
 """The quickest axes of small SCARA and delta robots turn at 50 rad/s; rails move at 10 m/s. In degrees and mm: more."""
-_WIDEST = {"rad": 4.0 * _TURN, "m": 50.0}
-"""Cables allow two turns either way; few rails are longer than 30 m."""
+_WIDEST = {"rad": 120.0, "m": 50.0}
+"""Joints with cables make two turns either way, others may be given a dozen turns; in degrees, few ranges are narrower
+than 120. Few rails are longer than 30 m."""
 _OPEN_END = {"rad": 800.0, "m": 1e5}
 """A range end beyond this is written for "no limit": in degrees, ranges end at two turns, 720."""
 _FAR_POSTURE = 2.0 * _TURN
