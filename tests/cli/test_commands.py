@@ -169,6 +169,27 @@ def test_interrupt(run, task, write, tmp_path, monkeypatch):
     assert not list((tmp_path / "out").iterdir())
 
 
+def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monkeypatch):
+    honest, now = portfolio.plan_coarse, [0.0]
+
+    def slow(*arguments):
+        made = honest(*arguments)
+        now[0] += 90.0
+        return made
+
+    monkeypatch.setattr(portfolio, "plan_coarse", slow)
+    monkeypatch.setattr("brachis.deadline.time.monotonic", lambda: now[0])
+    task["spline"] = {"intervals": 10, "points_per_interval": 1}
+    outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
+    assert outcome.code == 1
+    assert (tmp_path / "out/unverified.npz").exists()
+    data = json.loads(outcome.out)
+    assert data["interrupted"]
+    assert data["undone"][-1] == "what search.effort asks for was not tried to its end"
+    assert "brachis: the search was ended early; this is the best motion so far\n" in outcome.err
+    assert all(f"brachis: left undone: {undone}\n" in outcome.err for undone in data["undone"])
+
+
 @pytest.mark.parametrize("command", [("verify", "gone.npz"), ("plan", "gone.yaml"), ("inspect", "gone.urdf")])
 def test_interrupt_while_importing(command, run, monkeypatch):
     def interrupt(name, *_arguments):

@@ -15,7 +15,9 @@ import pytest
 from brachis.solvers import SolverOptions, SolveStatus, apart, solver_named, uno
 from support.programs import disc
 
-pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what is patched here is only forked there")
+pytestmark = pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="what is patched here is only forked there"
+)
 START, OPTIONS = np.array([4.0, 0.5]), SolverOptions()
 
 
