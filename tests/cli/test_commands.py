@@ -75,6 +75,7 @@ def too_strict(monkeypatch):
 
 
 def test_unverified_plan_says_so(run, task, write, tmp_path, too_strict):  # noqa: ARG001
+    task["search"] = {"time_limit": 1.0}  # nothing will ever be verified
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
     assert outcome.code == 1
     assert json.loads(outcome.out)["verified"] is False
@@ -87,6 +88,7 @@ def test_two_motions_do_not_mix_in_one_folder(run, task, write, planned, request
     _, out = planned
     (out / "notes.txt").write_text("mine")
     request.getfixturevalue("too_strict")
+    task["search"] = {"time_limit": 1.0}
     assert run("plan", write(task), "--out", out).code == 1
     names = {path.name for path in out.iterdir()}
     assert names == {"unverified.npz", "unverified.json", "unverified.png", "unverified_candidates.png", "notes.txt"}
