@@ -35,10 +35,15 @@ def test_a_press_is_only_remembered_until_it_may_be_heard(presses):
     assert not presses.raising
 
 
-def test_a_press_interrupts(presses):
-    with pytest.raises(KeyboardInterrupt), interrupts.heard():
-        press()
-        pytest.fail("not interrupted")
+@pytest.mark.usefixtures("presses")
+def test_a_press_interrupts():
+    def command():
+        with interrupts.heard():
+            press()
+            pytest.fail("not interrupted")
+
+    with pytest.raises(KeyboardInterrupt):
+        command()
 
 
 class Finaliser:
@@ -101,9 +106,13 @@ def test_a_press_waits_for_the_end_of_a_block(request, listening):
 
 
 def test_a_block_ends_with_the_press_whatever_it_raises():
-    with pytest.raises(KeyboardInterrupt), interrupts.postponed():
-        press()
-        raise ImportError("could not be imported")
+    def work():
+        with interrupts.postponed():
+            press()
+            raise ImportError("could not be imported")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
 
 
 def test_other_threads_postpone_nothing():

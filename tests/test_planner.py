@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
-import threading
-import time
 from pathlib import Path
 
 import numpy as np
@@ -160,35 +157,17 @@ def test_ctrl_c_reaches_the_user(name):
     x = next(guesses(problem))
     solver = solver_named(name)[0]
     handler = signal.getsignal(signal.SIGINT)
-    timer = threading.Timer(0.15, os.kill, (os.getpid(), signal.SIGINT))
-    timer.start()
-    began = time.perf_counter()
+    iterations = []
 
-    def solve_again_and_again():
-        for _ in range(1000):
-            solver.solve(problem, x, SolverOptions(), None)
+    def progress(iteration, _objective):
+        iterations.append(iteration)
+        if iteration == 3:
+            os.kill(os.getpid(), signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
-        solve_again_and_again()
-    assert time.perf_counter() - began < 10.0
+        solver.solve(problem, x, SolverOptions(), progress)
+    assert iterations == [1, 2, 3]
     assert signal.getsignal(signal.SIGINT) is handler
-
-
-def test_ctrl_c_on_the_command_line(tmp_path):
-    text = (ROOT / "examples/01_scara_line.yaml").read_text()
-    text = text.replace("../robots", str(ROOT / "robots")).replace("intervals: 20", "intervals: 300")
-    (tmp_path / "task.yaml").write_text(text)
-    command = [sys.executable, "-m", "brachis", "plan", str(tmp_path / "task.yaml"), "--out", str(tmp_path / "out")]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(4.0)
-    assert process.poll() is None, "the plan ended before it could be interrupted"
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "interrupted" in err
-    assert "Traceback" not in err
-    assert out == ""
-    assert not list((tmp_path / "out").iterdir())
 
 
 def test_statuses_carry_advice():

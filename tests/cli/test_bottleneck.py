@@ -72,7 +72,7 @@ def test_files(run, task, write, tmp_path):
 
 def test_unverified_motion(run, task, write, tmp_path, monkeypatch):
     out = tmp_path / "out"
-    task["solver"] = {"time_limit": 1.0}
+    task["search"] = {"time_limit": 1.0}  # nothing will ever be verified
     run("bottleneck", write(task), "--out", out)
     honest = motion.verify_trajectory
     strict = VerifyOptions(ratio_tolerance=-0.5)

@@ -77,6 +77,7 @@ def too_strict(monkeypatch):
 
 
 def test_unverified_plan_says_so(run, task, write, tmp_path, too_strict):  # noqa: ARG001
+    task["search"] = {"time_limit": 1.0}  # nothing will ever be verified
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
     assert outcome.code == 1
     assert json.loads(outcome.out)["verified"] is False
@@ -89,6 +90,7 @@ def test_two_motions_do_not_mix_in_one_folder(run, task, write, planned, request
     _, out = planned
     (out / "notes.txt").write_text("mine")
     request.getfixturevalue("too_strict")
+    task["search"] = {"time_limit": 1.0}
     assert run("plan", write(task), "--out", out).code == 1
     names = {path.name for path in out.iterdir()}
     assert names == {"unverified.npz", "unverified.json", "unverified.png", "unverified_candidates.png", "notes.txt"}
@@ -198,6 +200,27 @@ def test_interrupt(run, task, write, tmp_path, monkeypatch):
     assert outcome.code == 130
     assert "interrupted" in outcome.err
     assert not list((tmp_path / "out").iterdir())
+
+
+def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monkeypatch):
+    honest, now = portfolio.plan_coarse, [0.0]
+
+    def slow(*arguments):
+        made = honest(*arguments)
+        now[0] += 90.0
+        return made
+
+    monkeypatch.setattr(portfolio, "plan_coarse", slow)
+    monkeypatch.setattr("brachis.deadline.time.monotonic", lambda: now[0])
+    task["spline"] = {"intervals": 10, "points_per_interval": 1}
+    outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
+    assert outcome.code == 1
+    assert (tmp_path / "out/unverified.npz").exists()
+    data = json.loads(outcome.out)
+    assert data["interrupted"]
+    assert data["undone"][-1] == "what search.effort asks for was not tried to its end"
+    assert "brachis: the search was ended early; this is the best motion so far\n" in outcome.err
+    assert all(f"brachis: left undone: {undone}\n" in outcome.err for undone in data["undone"])
 
 
 @pytest.mark.parametrize("command", [("verify", "gone.npz"), ("plan", "gone.yaml"), ("inspect", "gone.urdf")])
