@@ -223,7 +223,7 @@ def urdf_of(name: str) -> Path:
     return random_poses.panda_urdf() if name == "panda" else ROOT / f"robots/{name}/robot.urdf"
 
 
-def random_task(name: str, seed: int, number: int, folder: Path) -> dict[str, object]:
+def random_task(name: str, seed: int, number: int, folder: Path, time_limit: float = 15.0) -> dict[str, object]:
     """Make a task mapping; the same for the same arguments. A CSV file that it needs goes into `folder`."""
     rng = np.random.default_rng([seed, ROBOTS.index(name), number])
     tool, space = TOOLS.get(name), SPACES.get(name, "pose")
@@ -249,8 +249,8 @@ def random_task(name: str, seed: int, number: int, folder: Path) -> dict[str, ob
         "start": {"joints": course[0].tolist()},
         "task_space": space,
         "path": _random_path(rng, robot, course, space, folder / f"{name}_{number}.csv"),
-        "search": {"effort": "single", "time_limit": 15.0},
-        "solver": {"time_limit": 3.0},
+        "search": {"effort": "single", "time_limit": time_limit},
+        "solver": {"time_limit": 0.2 * time_limit},
         "spline": {
             "degree": degree,
             "intervals": 8 if free_knots else int(rng.integers(8, 21)),
@@ -364,11 +364,13 @@ def _coordinates(robot: Robot, q: np.ndarray, space: object) -> list[float]:
     return [*placement.translation.tolist(), *pin.Quaternion(placement.rotation).coeffs()[[3, 0, 1, 2]].tolist()]
 
 
-def planned(name: str, seed: int, number: int, folder: Path) -> tuple[str, str, dict[str, float], float]:
+def planned(
+    name: str, seed: int, number: int, folder: Path, time_limit: float = 15.0
+) -> tuple[str, str, dict[str, float], float]:
     """Plan one task: robot, outcome in words (verified, unverified or the error), excesses and seconds."""
     began = time.perf_counter()
     try:
-        result = plan(None, random_task(name, seed, number, folder))
+        result = plan(None, random_task(name, seed, number, folder, time_limit))
     except BrachisError as error:
         return name, f"{type(error).__name__}: {error}", {}, time.perf_counter() - began
     seconds = time.perf_counter() - began
