@@ -59,11 +59,10 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
     ({"spline": {"through": [[0, 0], [1, 1]]}}, XY, ["spline.through[0]: the first waypoint is the segment's start"]),
     ({"spline": {"through": [[0, 0]]}}, XY, ["path[0].spline.through: the segment has zero length"]),
     ({"spline": {"through": [[1, 0, 0], [1, 0, 2]]}}, XYW, ["spline.through[1]: a waypoint repeats"]),
-    ({"spline": {"through": [[1, 1], [1e308, 0], [-1e308, 0]]}}, XY, ["so far apart that", "found coordinates up to"]),
     (
-        {"spline": {"through": [[1e-8 * 2**i, 0] for i in range(3)] + [[1e12, 0], [1e12, 1e-3], [2e12, 0]]}},
+        {"spline": {"through": [[1e12, 0], [1e12, 1e-6], [1e12, 2e-6], [0, 0]]}},
         XY,
-        ["no spline goes through the waypoints", "found distances from 1e-08 to 1e+12", "like distances"],
+        ["no spline goes through the waypoints", "found distances from 1e-06 to 1e+12", "like distances"],
     ),
     (
         {"spline": {"through": [[1, 1]], "starts_at": [0, 2e-4]}},

@@ -170,6 +170,7 @@ MISTAKES: list[tuple[str, list[str]]] = [
     ("x,y,z\n\n0,0,0\n1,1,one\n", ["line 4: the value of column z is not a finite number; found 'one'"]),
     ("x,y,z\n0,0,0\n1,,1\n", ["line 3: the value of column y is not a finite number; found ''"]),
     ("x,y,z\n0,0,nan\n1,1,1\n", ["line 2: the value of column z is not a finite number; found 'nan'"]),
+    ("x,y,z\n0,0,1e308\n1,1,1\n", ["line 2: the value of column z is out of range", "'1e308'", "-1e+12 to 1e+12"]),
     ("x,y,z\n0,0,0\n1,1,1\n1,1,1\n", ["line 4: the row repeats line 3; found x = 1, y = 1, z = 1"]),
     ("x,y,z\n0,0,0\n0,0,0\n1,1,1\n", ["line 3: the row repeats line 2"]),
     ("x,y,z,rx,ry,rz\n0,0,0,0,0,0\n1,1,1,0,0,0\n1,1,1,0,0,1\n", ["line 4: the row repeats line 3", "in x, y, z"]),

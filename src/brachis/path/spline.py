@@ -113,15 +113,8 @@ def chord_knots(chords: Array, otherwise: Array, shape: SplineThrough, site: Sit
     Raises
     ------
     PathError
-        Nothing moves, a waypoint repeats its predecessor, or the length cannot be represented.
+        Nothing moves, or a waypoint repeats its predecessor.
     """
-    if not np.isfinite(chords.sum() + otherwise.sum()):
-        raise PathError(
-            "the waypoints are so far apart that their distance cannot be represented",
-            found=f"coordinates up to {max(abs(value) for point in shape.through for value in point):.3g}",
-            allowed="m and rad",
-            where=f"{site.key}.through",
-        )
     if np.all(chords < ZERO_LENGTH):
         chords = otherwise
     if np.all(chords < ZERO_LENGTH):
@@ -141,10 +134,25 @@ def chord_knots(chords: Array, otherwise: Array, shape: SplineThrough, site: Sit
 
 
 def interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
-    """Return the natural quintic spline, or the line, through waypoints of shape (n, m) at knots of shape (n,)."""
+    """Return the natural quintic spline, or the line, through waypoints of shape (n, m) at knots of shape (n,).
+
+    Raises
+    ------
+    PathError
+        The distances of the waypoints differ so much that no spline can be computed.
+    """
     if len(waypoints) < _FEWEST_WAYPOINTS:
         return LineCurve(waypoints[0], (waypoints[1] - waypoints[0]) / knots[1], float(knots[1]))
-    return SplineCurve(_natural(knots, waypoints), float(knots[-1]), knots)
+    try:
+        return SplineCurve(_natural(knots, waypoints), float(knots[-1]), knots)
+    except ValueError as error:  # knots that fall together, or singular equations
+        distances = np.linalg.norm(np.diff(waypoints, axis=0), axis=1)
+        raise PathError(
+            "no spline goes through the waypoints: their distances differ too much",
+            found=f"distances from {distances.min():.3g} to {distances.max():.3g} (m or rad)",
+            allowed="waypoints of like distances",
+            where="path",
+        ) from error
 
 
 def _natural(knots: Array, waypoints: Array) -> BSpline:
@@ -159,15 +167,6 @@ def _natural(knots: Array, waypoints: Array) -> BSpline:
     else:
         zero = np.zeros(waypoints.shape[1])
         ends = [(3, zero), (4, zero)]
-        try:
-            # The stubs do not know conditions on chosen derivatives, which SciPy documents.
-            spline = make_interp_spline(unit, waypoints, k=_DEGREE, bc_type=(ends, ends))  # type: ignore[arg-type]
-        except np.linalg.LinAlgError as error:
-            distances = np.diff(knots)
-            raise PathError(
-                "no spline goes through the waypoints: their distances differ too much",
-                found=f"distances from {distances.min():.3g} to {distances.max():.3g} (m; rad where nothing shifts)",
-                allowed="waypoints of like distances",
-                where="path",
-            ) from error
+        # The stubs do not know conditions on chosen derivatives, which SciPy documents.
+        spline = make_interp_spline(unit, waypoints, k=_DEGREE, bc_type=(ends, ends))  # type: ignore[arg-type]
     return type(spline)(spline.t * knots[-1], spline.c, spline.k)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from brachis.errors import TaskError
+from brachis.task.fields import LARGEST
 from brachis.task.models import Task
 from brachis.task.orientation import Attitude, Quaternion, RotationVector
 from brachis.task.segments import CsvFile, CsvSegment, SplineSegment, SplineThrough
@@ -143,6 +144,9 @@ def _numbers(cells: list[str], header: list[str], where: str) -> dict[str, float
         if not math.isfinite(value):
             problem = f"the value of column {column} is not a finite number"
             raise TaskError(problem, found=repr(cell), allowed="a number, with a decimal point", where=where)
+        if abs(value) > LARGEST:
+            problem = f"the value of column {column} is out of range"
+            raise TaskError(problem, found=repr(cell), allowed=f"{-LARGEST:g} to {LARGEST:g}", where=where)
         values[column] = value
     return values
 

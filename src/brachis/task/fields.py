@@ -20,6 +20,9 @@ WRONG_FORM = "brachis_form"
 WRONG_KEYS = "brachis_keys"
 """Error type of a mapping whose keys do not select one member of a union; see `by_key`."""
 
+LARGEST = 1e12
+"""Of a coordinate or angle: beyond it squares and differences lose their meaning or overflow."""
+
 
 class Model(BaseModel):
     """Base class of all parts of a task: frozen, without unknown keys, without NaN or infinity."""
@@ -29,7 +32,7 @@ class Model(BaseModel):
 
 # Strict: the string "3" or the boolean true where a number belongs is a slip of the user's, not a number. Whole numbers
 # are accepted as real ones.
-Number = Annotated[float, Strict()]
+Number = Annotated[float, Strict(), Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Strict(), Field(gt=0)]
 NonNegative = Annotated[float, Strict(), Field(ge=0)]
 Count = Annotated[int, Strict()]
