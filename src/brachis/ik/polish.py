@@ -23,7 +23,7 @@ from brachis.ik.geometry import ChainGeometry, PosedScrews
 from brachis.ik.vectors import apply, apply_inverse, cross
 from brachis.robot import TaskSpace
 
-EXACT = 1e-11
+EXACT = 1e-13
 """A gap that needs no polishing, m or rad, for joints near zero."""
 _ROUNDS = 4
 _FAR = 0.2
