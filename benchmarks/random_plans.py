@@ -21,6 +21,7 @@ import json
 import sys
 import tempfile
 import time
+import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
@@ -30,7 +31,7 @@ import numpy as np
 import pinocchio as pin
 
 import random_poses
-from brachis import Robot, TaskSpace, ik, plan
+from brachis import PlausibilityWarning, Robot, TaskSpace, ik, plan
 from brachis.errors import BrachisError
 
 ROOT = Path(__file__).parents[1]
@@ -370,7 +371,9 @@ def planned(
     """Plan one task: robot, outcome in words (verified, unverified or the error), excesses and seconds."""
     began = time.perf_counter()
     try:
-        result = plan(None, random_task(name, seed, number, folder, time_limit))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PlausibilityWarning)  # far ranges look like mm and degrees
+            result = plan(None, random_task(name, seed, number, folder, time_limit))
     except BrachisError as error:
         return name, f"{type(error).__name__}: {error}", {}, time.perf_counter() - began
     seconds = time.perf_counter() - began

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
+import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +23,15 @@ class Outcome:
     code: int
     out: str
     err: str
+
+
+@pytest.fixture(autouse=True)
+def own_interrupts(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """The command line takes over SIGINT for good; the next test gets it back."""
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture

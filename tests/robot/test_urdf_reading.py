@@ -236,7 +236,7 @@ def test_broken_files(tmp_path, text, words):
 def test_missing_file_and_binary_file(tmp_path):
     with pytest.raises(UrdfError, match="does not exist"):
         Robot.from_urdf(tmp_path / "none.urdf")
-    with pytest.raises(UrdfError, match="does not exist"):
+    with pytest.raises(UrdfError, match="it is a folder"):
         Robot.from_urdf(tmp_path)
     binary = tmp_path / "binary.urdf"
     binary.write_bytes(b"\xff\xfe\x00\x80")
