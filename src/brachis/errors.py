@@ -46,6 +46,10 @@ class BrachisError(Exception):
         self.hint = hint
         super().__init__(self._message())
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Be sent to other processes with all data, whatever a subclass takes to be made."""
+        return _restored, (type(self), self.args, self.__dict__)
+
     def _message(self) -> str:
         text = f"{self.where}: {self.problem}" if self.where else self.problem
         if self.found is not None:
@@ -55,6 +59,13 @@ class BrachisError(Exception):
         if self.hint is not None:
             text += f". {self.hint}"
         return text
+
+
+def _restored(kind: type[BrachisError], args: tuple[object, ...], data: dict[str, object]) -> BrachisError:
+    """Make an error again that another process raised."""
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(data)
+    return error
 
 
 class InputError(BrachisError):

@@ -122,6 +122,28 @@ def test_a_contradiction_is_refused_with_its_key(settings, key):
     assert caught.value.where == key
 
 
+@pytest.mark.parametrize(
+    ("settings", "key"),
+    [
+        ({"gravity": [0, 0, -9.81]}, "robot.gravity"),
+        ({"limits": {"velocity": "urdf"}}, "robot.limits.velocity"),
+        ({"limits": {"scale": {"torque": 1.0}}}, "robot.limits.scale.torque"),
+    ],
+)
+def test_what_a_task_writes_counts_even_where_it_is_the_default(settings, key):
+    robot = Robot.from_urdf(
+        SCARA,
+        gravity=[0, 0, 0],
+        limits=brachis.LimitSpec(torque=10.0, velocity={"j1": 3.0, "j2": 3.0, "j3": 3.0}, scale={"torque": 0.5}),
+    )
+    if key == "robot.limits.velocity":  # joint by joint, "as in the URDF" is what is not said
+        assert robot_for(robot, asked(**settings)) is robot
+        return
+    with pytest.raises(TaskError, match="contradict") as caught:
+        robot_for(robot, asked(**settings))
+    assert caught.value.where == key
+
+
 def test_unknown_joints_of_the_task_are_named():
     with pytest.raises(UnknownNameError, match="'j9'"):
         robot_for(scara({"j1": 5.0}), asked(limits={"torque": {"j9": 6}}))

@@ -91,9 +91,11 @@ def _problem(trajectory: Trajectory) -> tuple[Transcription, np.ndarray]:
 def _answers(problem: Transcription, x: np.ndarray, trajectory: Trajectory) -> Iterator[Refined]:
     """Solve and refine with one backend after the other, until one comes back to the motion."""
     task = trajectory.task
-    options = RefinementOptions(task.refinement.tolerance, task.refinement.density, task.refinement.max_rounds)
+    deadline, settings = Deadline.after(task.search.time_limit), task.refinement
+    options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, deadline)
     for backend in solver_named(task.solver.name):
-        deadline = Deadline.after(task.search.time_limit)
+        if deadline.passed:
+            return
         solve = solve_with(backend, task.solver, problem.decomposition.r, deadline, lambda _text: None)
         try:
             refined = refine(problem, solve(problem, x), solve, options)

@@ -52,7 +52,9 @@ def bottleneck_command(
     if out is not None:
         make_folder(out, (*_FILES[True], *_FILES[False]), (source, urdf))
     with shown_warnings(), progress() as listener:
-        motion = _saved(source, urdf) if source.suffix == _SAVED else _planned(source, urdf, listener, strict=strict)
+        motion = (
+            _saved(source, urdf) if source.suffix.lower() == _SAVED else _planned(source, urdf, listener, strict=strict)
+        )
         listener("looking for what holds the motion back")
         found = bottleneck.report(motion.made, check=check, reference=reference)
     data = {**motion.data, "bottleneck": found.to_dict()}

@@ -62,10 +62,11 @@ def check_output(out: Path, suffixes: Iterable[str], inputs: Iterable[Path | Non
     ------
     InputError
     """
-    if not out.is_file():
-        return
+    with writing_errors(out):
+        if not out.is_file():
+            return
     for path in inputs:
-        if path is not None and path.exists() and out.samefile(path):
+        if path is not None and _same(out, path):
             raise InputError(
                 "would be written over an input", where=str(out), found="the same file", allowed="another file name"
             )
@@ -86,6 +87,14 @@ def check_output(out: Path, suffixes: Iterable[str], inputs: Iterable[Path | Non
             found=f"a file that begins with {beginning!r}",
             allowed="a new file, or an older one of the same kind",
         )
+
+
+def _same(out: Path, path: Path) -> bool:
+    """Tell whether two names are of one file; one that cannot be looked at is not the one that we can write."""
+    try:
+        return out.samefile(path)
+    except OSError:
+        return False
 
 
 def make_folder(out: Path, names: Iterable[str], inputs: Iterable[Path | None]) -> None:

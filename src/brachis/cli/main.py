@@ -1,8 +1,8 @@
 """The command line: ``brachis plan | bottleneck | verify | export | plot | inspect | compose | schema``.
 
 Exit codes: 0 planned and verified, 1 no verified plan, 2 wrong input, 3 planned and verified, but not all figures could
-be written. Results go to standard output, everything else to
-standard error. With ``--json`` standard output gets one JSON object, also for an error.
+be written, 130 interrupted. Results go to standard output, everything else to standard error. With ``--json`` standard
+output gets one JSON object, also for an error.
 """
 
 from __future__ import annotations

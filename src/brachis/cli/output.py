@@ -144,7 +144,7 @@ def result_console() -> Console:
 
 @contextmanager
 def shown_warnings() -> Iterator[None]:
-    """Print warnings of implausible figures as messages on standard error, each once."""
+    """Print warnings of implausible figures as messages on standard error."""
     from brachis.plausibility import PlausibilityWarning  # noqa: PLC0415  (loads Pinocchio)
 
     with warnings.catch_warnings():

@@ -122,7 +122,7 @@ def _combined(robot: Robot, given: RobotSettings, asked: RobotSettings) -> Robot
     """Put the settings of the robot and of the task together; the URDF is the robot's."""
     asked = asked.model_copy(update={"urdf": given.urdf})
     defaults = RobotSettings(urdf=given.urdf)
-    if asked in (given, defaults):
+    if asked == given:
         return given
     frames = _merged("robot", _only(given, _FRAMES), _only(asked, _FRAMES), RobotSettings(), ())
     names = _own_joints(robot)
@@ -135,21 +135,24 @@ def _combined(robot: Robot, given: RobotSettings, asked: RobotSettings) -> Robot
 
 def _only(settings: RobotSettings, names: Sequence[str]) -> RobotSettings:
     """Keep some of the settings, and leave the others at their defaults."""
-    return RobotSettings(**{name: getattr(settings, name) for name in names})
+    return RobotSettings(**{name: getattr(settings, name) for name in names if name in settings.model_fields_set})
 
 
 def _merged(key: str, given: Any, asked: Any, default: Any, names: Sequence[str]) -> Any:  # noqa: ANN401
-    """Take what is set on one side or, alike, on both; a value that differs from the default counts as set."""
-    if asked in (default, given):
+    """Take what is set on one side or, alike, on both.
+
+    In the task a key that is written counts as set, in the robot a value that differs from the default.
+    """
+    if asked == given:
         return given
-    if given == default:
-        return asked
     if isinstance(given, Model):
         parts = {
             name: _merged(f"{key}.{name}", getattr(given, name), getattr(asked, name), getattr(default, name), names)
-            for name in type(given).model_fields
+            for name in asked.model_fields_set
         }
         return given.model_copy(update=parts)
+    if given == default:
+        return asked
     own, other = given, asked
     if key in _PER_JOINT:
         own, other = (
@@ -163,8 +166,8 @@ def _merged(key: str, given: Any, asked: Any, default: Any, names: Sequence[str]
             allowed="the same in both, or set in one of them",
         )
     absent = default if key in _PER_JOINT else None
-    merged = {
-        name: _merged(f"{key}.{name}", own.get(name, absent), other.get(name, absent), absent, ())
-        for name in {**own, **other}
+    said = {name: value for name, value in other.items() if value != absent}
+    merged = dict(own) | {
+        name: _merged(f"{key}.{name}", own.get(name, absent), value, absent, ()) for name, value in said.items()
     }
     return given if merged == own else {name: value for name, value in merged.items() if value != absent}

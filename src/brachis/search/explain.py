@@ -127,6 +127,11 @@ def _some_course(candidates: Sequence[Candidate]) -> bool:
 
 
 def _reason(choice: Choice) -> BrachisError | str:
-    start = choice.setting.start
-    given = np.zeros(choice.setting.robot.n) if start is None else start
-    return explain_failure(choice.decomposition(given, choice.branches[0]), any_branch=start is None)
+    setting = choice.setting
+    given = setting.end if setting.start is None else setting.start
+    posture = np.zeros(setting.robot.n) if given is None else given
+    return explain_failure(
+        choice.decomposition(posture, choice.branches[0]),
+        any_branch=given is None,
+        given="end" if setting.start is None else "start",
+    )

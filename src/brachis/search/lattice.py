@@ -97,8 +97,9 @@ class Lattice:
         self._lower, self._upper = limits.position_lower - _SLACK, limits.position_upper + _SLACK
         self._loose = np.zeros(given.robot.n, dtype=bool)  # which joints may begin in any turn
         self._loose[self._turns] = self._origin is None
-        # Turns of a free origin exist all at once, and nobody asks which turn an angle without a range is in.
-        ranged = np.isfinite(self._lower) | np.isfinite(self._upper) | (given.end is not None)
+        # Turns of a free origin exist all at once, and nobody asks which turn an angle without a range is in, unless a
+        # given end has to be met.
+        ranged = np.isfinite(self._lower) | np.isfinite(self._upper) | (given.end is not None and not self._backwards)
         self._telling = (ranged & ~self._loose)[self._turns]
         self._clear = _CLEAR
         if self._origin is not None:

@@ -18,7 +18,9 @@ _HELD_CHECKS = 60
 _FAR = 10.0  # m
 
 
-def explain_failure(decomposition: Decomposition, *, any_branch: bool = False) -> BrachisError | str:
+def explain_failure(
+    decomposition: Decomposition, *, any_branch: bool = False, given: str = "start"
+) -> BrachisError | str:
     """Why no motion was found: an error where the path is out of reach or too heavy to hold, else advice.
 
     Redundant joints are searched at random at stations along the path, so "out of reach" means that none of many
@@ -29,6 +31,8 @@ def explain_failure(decomposition: Decomposition, *, any_branch: bool = False) -
     decomposition : Decomposition
     any_branch : bool, optional
         Whether a motion may be on any branch, not the decomposition's alone.
+    given : {"start", "end"}, optional
+        Whose posture the decomposition's branch is of.
 
     Returns
     -------
@@ -57,8 +61,8 @@ def explain_failure(decomposition: Decomposition, *, any_branch: bool = False) -
         ),
         (
             own.within.any(axis=(1, 2)),
-            f"the branch {label!r} of the start posture does not reach beyond s = {{first:.3g}}",
-            "Start in a posture of another branch, or leave redundant_joints: auto",
+            f"the branch {label!r} of the {given} posture does not reach s = {{first:.3g}}",
+            f"Choose a {given} posture of another branch, or leave redundant_joints: auto",
         ),
         (
             _held(decomposition, own),
@@ -70,7 +74,7 @@ def explain_failure(decomposition: Decomposition, *, any_branch: bool = False) -
         if not possible.all():
             first, last = float(s[int(np.argmin(possible))]), float(s[np.flatnonzero(~possible)[-1]])
             return PathError(problem.format(first=first), s_interval=(first, last), hint=hint)
-    others = "try other redundant joints, another start posture" if decomposition.r else "try another start posture"
+    others = f"try {'other redundant joints, ' if decomposition.r else ''}another {given} posture"
     return f"Every point of the path is within reach of this branch, but no course along it was found; {others}"
 
 
@@ -105,8 +109,11 @@ def _answers_along(decomposition: Decomposition, s: np.ndarray, *, opened: bool)
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
     turning = np.array([unit == "rad" for unit in robot.position_units])
     wide = np.isin(np.arange(robot.n), redundant) & opened
-    low = np.where(np.isfinite(lower) & ~wide, lower, np.where(turning, -np.pi, decomposition.start - _FAR))
-    high = np.where(np.isfinite(upper) & ~wide, upper, np.where(turning, np.pi, decomposition.start + _FAR))
+    near = np.clip(decomposition.start, lower, upper)
+    low = np.where(turning, -np.pi, near - _FAR)
+    high = np.where(turning, np.pi, near + _FAR)
+    low = np.where(np.isfinite(lower) & ~wide, np.where(turning, lower, np.maximum(lower, low)), low)
+    high = np.where(np.isfinite(upper) & ~wide, np.where(turning, upper, np.minimum(upper, high)), high)
     tries = _SEARCHED * len(redundant) ** 2 if redundant else 1
     q_r = np.random.default_rng(0).uniform(low[redundant], high[redundant], (tries, len(redundant)))
     if not opened:

@@ -93,10 +93,11 @@ def waves(choices: Sequence[Choice], deadline: Deadline, listener: Listener, not
 def looked_at(choices: Sequence[Choice], effort: Effort) -> list[Choice]:
     """Return the choices that a level looks at: closed forms, and polynomials where asked for, or where all is cramped.
 
-    That is where a given start posture is near the branch boundary of every closed form.
+    That is where the given start, or else end, posture is near the branch boundary of every closed form.
     """
     closed = [choice for choice in choices if choice.match.solver.kind == "closed_form"]
-    given = choices[0].setting.start is not None
+    setting = choices[0].setting
+    given = setting.start is not None or setting.end is not None
     cramped = given and max((choice.room for choice in closed), default=0.0) < _CRAMPED
     return list(choices) if effort.polynomial or cramped else closed
 

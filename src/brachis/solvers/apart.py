@@ -40,11 +40,10 @@ def apart_if_large(solve: Solve) -> Solve:
 
     @functools.wraps(solve)
     def solved(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
-        if len(x) * len(problem.lower) <= ENTRIES:
+        # A daemonic process may have none of its own; the backend's limit then holds between its iterations alone.
+        if len(x) * len(problem.lower) <= ENTRIES or multiprocessing.current_process().daemon:
             return solve(problem, x, options, progress)
         name = solve.__module__.rpartition(".")[2]
-        if multiprocessing.current_process().daemon:  # may have no processes of its own
-            return ended(name, problem, x, SolveStatus.FAILED, "too large for a process that may not start another one")
         return _solve_apart(solve.__module__, name, problem, x, options, progress)
 
     return solved
@@ -58,18 +57,17 @@ def _solve_apart(
     context: Any = multiprocessing.get_context(_METHOD)
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_work, args=(sender, module, problem, x, options), daemon=True)
-    with (
-        interrupts.blocked(),
-        warnings.catch_warnings(),
-    ):  # the fork touches nothing that threads may hold
-        warnings.filterwarnings("ignore", message=".*multi-threaded", category=DeprecationWarning)
-        process.start()
-    sender.close()
     try:
+        with interrupts.blocked(), warnings.catch_warnings():  # the fork touches nothing that threads may hold
+            warnings.filterwarnings("ignore", message=".*multi-threaded", category=DeprecationWarning)
+            process.start()
+        sender.close()
         answer = _heard(receiver, began + options.time_limit + _GRACE, progress)
     finally:
-        process.kill()
-        process.join()
+        if process.pid is not None:
+            process.kill()
+            process.join()
+        sender.close()
         receiver.close()
     if isinstance(answer, Exception):
         raise answer

@@ -132,7 +132,7 @@ class SearchSettings(Model):
         default=1, ge=1, description="Processes that plan at the same time; no more than there are processors are used."
     )
     time_limit: Positive = Field(
-        default=60.0, description="Time after which the best motion verified so far is returned, s."
+        default=60.0, le=1e6, description="Time after which the best motion verified so far is returned, s."
     )
     seed: Count = Field(default=0, ge=0, description="Seed of what is drawn at random.")
 
@@ -143,7 +143,7 @@ class SolverSettings(Model):
     name: Name = Field(default="auto", description="Solver; auto takes the best one installed.")
     max_iterations: Count = Field(default=300, ge=1, le=1_000_000, description="Largest number of iterations.")
     time_limit: Positive = Field(
-        default=20.0, description="Largest time of one solve, s; search.time_limit bounds the whole plan."
+        default=20.0, le=1e6, description="Largest time of one solve, s; search.time_limit bounds the whole plan."
     )
     tolerance: Positive = Field(default=1.0e-6, description="Tolerance of the optimality conditions.")
 

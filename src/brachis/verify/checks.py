@@ -6,7 +6,7 @@ import numpy as np
 
 from brachis.robot import Robot
 from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
-from brachis.verify.motion import States
+from brachis.verify.motion import Pieces, States
 from brachis.verify.options import VerifyOptions
 from brachis.verify.report import Check
 
@@ -61,10 +61,11 @@ def spline_checks(trajectory: Trajectory, robot: Robot, states: States, options:
     return [_worst_joint("redundant joints' splines", misses[worst], allowed, "rad, m", robot, time)]
 
 
-def continuity_checks(trajectory: Trajectory, states: States, options: VerifyOptions) -> list[Check]:
+def continuity_checks(trajectory: Trajectory, pieces: Pieces, robot: Robot, options: VerifyOptions) -> list[Check]:
     """Jumps of position, velocity, acceleration and torque where polynomial pieces join, relative to their size."""
-    before = states.only(np.flatnonzero(states.u == 1.0)[:-1])
-    after = states.only(np.flatnonzero(states.u == 0.0)[1:])
+    behind = np.arange(1, len(pieces.lengths))
+    before = States.at(pieces, robot, behind - 1, np.ones(len(behind)))
+    after = States.at(pieces, robot, behind, np.zeros(len(behind)))
     names = {"position": "q", "velocity": "qdot", "acceleration": "qddot", "torque": "tau"}
     if trajectory.degree < CONTINUOUS_TORQUE:  # the asked degree has them jump
         del names["acceleration"], names["torque"]

@@ -65,7 +65,6 @@ def verify_trajectory(
     places = (np.concatenate(part) for part in zip(*parts, strict=True))
     states = States.at(pieces, robot, *places)
     path_check = _path_error(trajectory, robot, path, task_space, states, options)
-    joins = continuity_checks(trajectory, states, options)
     states = with_peaks(states, pieces, robot)
     limits = limit_checks(robot, pieces, states, options)
     checks = [
@@ -74,7 +73,7 @@ def verify_trajectory(
         *progress_checks(trajectory, states.t, options),
         *end_checks(trajectory, robot, options),
         *spline_checks(trajectory, robot, states, options),
-        *joins,
+        *continuity_checks(trajectory, pieces, robot, options),
     ]
     worst = max((check.value for check in limits), default=0.0)
     return Verification(tuple(checks), len(states.t), worst, path_check.value)

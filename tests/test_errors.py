@@ -1,0 +1,26 @@
+"""Errors reach the caller whole, from other processes as well."""
+
+from __future__ import annotations
+
+import pickle
+
+import pytest
+
+from brachis import errors
+
+ERRORS = [
+    errors.InputError("wrong", where="a key", found=3, allowed="2", hint="Try 2"),
+    errors.UnknownNameError("joint", "j9", ["j1", "j2"], where="start"),
+    errors.LimitError("is missing", joint="j1", key="robot.limits.torque.j1"),
+    errors.PathError("out of reach", s_interval=(0.2, 1.0)),
+    errors.DecompositionError("none", redundant_joints=["j1"], reasons={"planar": "no"}, available=[("j2",)]),
+    errors.PlausibilityError(["one remark", "another one"]),
+]
+
+
+@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
+def test_errors_survive_pickling(error):
+    again = pickle.loads(pickle.dumps(error))  # noqa: S301  (our own)
+    assert type(again) is type(error)
+    assert str(again) == str(error)
+    assert vars(again) == vars(error)
