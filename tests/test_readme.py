@@ -96,6 +96,7 @@ def table():
     return module, module.plan_all()
 
 
+@pytest.mark.xdist_group("example 02")
 def test_example_02_every_plan_is_verified(table):
     _, results = table
     assert len(results) == 24
@@ -104,6 +105,7 @@ def test_example_02_every_plan_is_verified(table):
     assert max(result.verification.path_error for result in results.values()) <= 1e-9
 
 
+@pytest.mark.xdist_group("example 02")
 def test_example_02_reaches_the_reference_figures(table):
     _, results = table
     assert results[90, "j1"].t_end <= 2.260
@@ -120,6 +122,7 @@ def check_table(name: str, made: str) -> None:
     assert ours == pytest.approx(theirs, abs=0.003)
 
 
+@pytest.mark.xdist_group("example 02")
 def test_table_of_the_readme_is_what_example_02_prints(table):
     module, results = table
     check_table("examples/02_scara_table.py", module.markdown_table(results))
@@ -131,6 +134,7 @@ def rail_table():
     return module, module.plan_all()
 
 
+@pytest.mark.xdist_group("example 03")
 def test_example_03_every_plan_is_verified_and_as_fast_as_it_should_be(rail_table):
     _, results = rail_table
     assert len(results) == 12
@@ -140,6 +144,7 @@ def test_example_03_every_plan_is_verified_and_as_fast_as_it_should_be(rail_tabl
     assert results["rail", 40].t_end <= 0.3913
 
 
+@pytest.mark.xdist_group("example 03")
 def test_table_of_the_readme_is_what_example_03_prints(rail_table):
     module, results = rail_table
     check_table("examples/03_tx90l_rail_line.py", module.markdown_table(results))
@@ -177,6 +182,7 @@ def fastest_table():
     return module, module.plan_all()
 
 
+@pytest.mark.xdist_group("example 07")
 def test_example_07_auto_is_never_slower_than_one_guess(fastest_table):
     module, results = fastest_table
     assert all(result.verified for result in results.values())
@@ -187,6 +193,7 @@ def test_example_07_auto_is_never_slower_than_one_guess(fastest_table):
     assert results[180, "auto"].t_end <= 2.10
 
 
+@pytest.mark.xdist_group("example 07")
 def test_a_free_start_makes_mirror_images_equally_fast(fastest_table):
     """The path begins on the x axis: a line and its mirror image only differ by the start posture."""
     _, results = fastest_table
@@ -195,6 +202,7 @@ def test_a_free_start_makes_mirror_images_equally_fast(fastest_table):
         assert results[angle, "free start"].t_end == pytest.approx(mirrored, rel=2e-3)
 
 
+@pytest.mark.xdist_group("example 07")
 def test_table_of_the_readme_is_what_example_07_prints(fastest_table):
     module, results = fastest_table
     check_table("examples/07_find_the_fastest.py", module.markdown_table(results))
