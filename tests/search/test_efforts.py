@@ -36,10 +36,14 @@ def test_the_documented_efforts_are_the_real_ones():
         ([], [0.0], ["polynomial"]),
     ],
 )
-def test_polynomials_are_looked_at_where_every_closed_form_is_cramped(rooms, start, expected):
+@pytest.mark.parametrize("given", ["start", "end"])
+def test_polynomials_are_looked_at_where_every_closed_form_is_cramped(rooms, start, expected, given):
+    start, end = (start, None) if given == "start" else (None, start)
+
     def choice(kind, room):
         solver = SimpleNamespace(kind=kind)
-        return SimpleNamespace(match=SimpleNamespace(solver=solver), room=room, setting=SimpleNamespace(start=start))
+        setting = SimpleNamespace(start=start, end=end)
+        return SimpleNamespace(match=SimpleNamespace(solver=solver), room=room, setting=setting)
 
     choices = [*(choice("closed_form", room) for room in rooms), choice("polynomial", 0.6)]
     (fast,) = EFFORTS["fast"]
