@@ -132,7 +132,9 @@ class SearchSettings(Model):
         default=1, ge=1, description="Processes that plan at the same time; no more than there are processors are used."
     )
     time_limit: Positive = Field(
-        default=60.0, le=1e6, description="Time after which the best motion verified so far is returned, s."
+        default=60.0,
+        le=1e6,
+        description="Time after which the best motion so far is returned, s; one that is not verified where none is.",
     )
     seed: Count = Field(default=0, ge=0, description="Seed of what is drawn at random.")
 
