@@ -13,7 +13,7 @@ import pytest
 import brachis
 
 ROOT = Path(__file__).parents[1]
-COUNT = 12
+COUNT = 5
 
 
 @pytest.fixture(scope="module")

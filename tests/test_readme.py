@@ -90,7 +90,7 @@ def test_example_01_python(capsys):
     assert "end time 2.47" in capsys.readouterr().out
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def table():
     module = load(ROOT / "examples/02_scara_table.py")
     return module, module.plan_all()
@@ -128,7 +128,7 @@ def test_table_of_the_readme_is_what_example_02_prints(table):
     check_table("examples/02_scara_table.py", module.markdown_table(results))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def rail_table():
     module = load(ROOT / "examples/03_tx90l_rail_line.py")
     return module, module.plan_all()
@@ -176,7 +176,7 @@ def test_example_06():
     assert results["free roll"].trajectory.joint_names[-1] == "tool_roll"
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def fastest_table():
     module = load(ROOT / "examples/07_find_the_fastest.py")
     return module, module.plan_all()

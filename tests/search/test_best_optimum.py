@@ -15,7 +15,7 @@ from brachis.setting import Setting, choices, transcription
 from brachis.solvers import SolverOptions, solver_named
 
 ROOT = Path(__file__).parents[2]
-RESTARTS = 20
+RESTARTS = 12
 spec = importlib.util.spec_from_file_location("scara_table", ROOT / "examples/02_scara_table.py")
 table = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(table)

@@ -77,7 +77,7 @@ def least_time_by_trial(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> f
         low, high = np.sort([(-limit - b[k] * x) / a[k], (limit - b[k] * x) / a[k]], axis=0)
         return float(low.max()), float(high.min())
 
-    grid = np.linspace(0.0, 4.0, 4001)
+    grid = np.linspace(0.0, 4.0, 1001)
     reach = 0.0
     highest = np.zeros(len(s))
     for k in range(len(s) - 2, -1, -1):
