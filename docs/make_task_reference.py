@@ -19,6 +19,7 @@ from brachis.task import (
     SolverSettings,
     SplineSettings,
     Task,
+    ToolLimits,
 )
 from brachis.task.orientation import Quaternion, RollPitchYaw, Rotation, RotationVector, Tangent, ToQuaternion
 from brachis.task.segments import (
@@ -40,6 +41,7 @@ PARTS: dict[str, type[BaseModel]] = {
     "robot.limits": LimitSettings,
     "robot.limits.scale": LimitScale,
     "robot.friction": FrictionSettings,
+    "tool_limits": ToolLimits,
     "spline": SplineSettings,
     "search": SearchSettings,
     "solver": SolverSettings,

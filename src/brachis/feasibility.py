@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from brachis.errors import StartError, UnknownNameError
 from brachis.ik import Match
+from brachis.limits import Limit, Moments
 from brachis.path import Path, check_on_path
 from brachis.plausibility import position_hint
-from brachis.robot import Robot, TaskSpace, dynamics
+from brachis.robot import Robot, TaskSpace
 
 _RANGE_SLACK = 1e-9
 _SAME_POSTURE = 1e-5
@@ -16,16 +19,18 @@ _SAME_POSTURE = 1e-5
 
 def check_postures(
     robot: Robot,
+    limits: Sequence[Limit],
     start: np.ndarray | None,
     end: np.ndarray | None,
     path: Path,
     task_space: TaskSpace,
 ) -> None:
-    """Refuse start and end postures out of range, off the path, or too heavy to hold.
+    """Refuse start and end postures out of range, beyond a limit that holds at rest, or off the path.
 
     Parameters
     ----------
     robot : Robot
+    limits : sequence of Limit
     start, end : (n,) ndarray or None
         None where free.
     path : Path
@@ -37,10 +42,10 @@ def check_postures(
     """
     if start is not None:
         _check_range(robot, start, "start")
-        _check_holding(robot, start, "start")
+        _check_at_rest(limits, start, "start")
     if end is not None:
         _check_range(robot, end, "end")
-        _check_holding(robot, end, "end")
+        _check_at_rest(limits, end, "end")
         check_on_path(robot, task_space, end, path.sample(np.array([1.0])).target[0], "end")
 
 
@@ -60,20 +65,22 @@ def _check_range(robot: Robot, posture: np.ndarray, name: str) -> None:
             )
 
 
-def _check_holding(robot: Robot, posture: np.ndarray, name: str) -> None:
-    still = np.zeros((1, robot.n))
-    tau = dynamics.torque(robot, posture[None], still, still)[0]
-    for joint, value, limit, unit in zip(
-        robot.joint_names, tau, robot.limits.torque, robot.position_units, strict=True
-    ):
-        if abs(value) > limit:
-            nm = "Nm" if unit == "rad" else "N"
+def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str) -> None:
+    """Refuse a posture in which a limit is exceeded although the arm stands still."""
+    still = Moments.at_rest(posture[None])
+    for limit in limits:
+        if not limit.static:
+            continue
+        ratios = np.abs(limit.ratio(limit.values(still))[0])
+        worst = int(np.argmax(ratios))
+        if ratios[worst] > 1.0 + _RANGE_SLACK:
+            label = limit.labels[worst]
             raise StartError(
-                f"joint {joint!r} cannot hold the arm against gravity",
+                f"{label.subject!r} {limit.refusal}",
                 where=f"{name}.joints",
-                found=f"{abs(value):.4g} {nm} needed at rest",
-                allowed=f"{limit:.4g} {nm}",
-                hint=f"Raise robot.limits.torque.{joint}, or choose another posture",
+                found=f"{ratios[worst]:.4g} times the {label.kind} limit at rest",
+                allowed="no more than the limit",
+                hint=f"Choose another posture{f', or raise {label.key}' if label.key else ''}",
             )
 
 

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from threadpoolctl import ThreadpoolController
 
 from brachis import ik, plausibility
+from brachis.custom_limits import LimitModel
 from brachis.deadline import Deadline
 from brachis.nlp import Transcription
 from brachis.nlp.layout import SHORTEST_TIME
@@ -25,6 +26,7 @@ def plan(
     task: str | os.PathLike[str] | Mapping[str, object] | Task,
     *,
     families: Sequence[ik.Family] = (),
+    limits: Sequence[LimitModel] = (),
     listener: Listener | None = None,
     strict: bool = False,
 ) -> Result:
@@ -39,6 +41,9 @@ def plan(
         Task file, or its content.
     families : sequence of Family, optional
         Closed forms to try before the built-in ones.
+    limits : sequence of LimitModel, optional
+        Limits of your own beside those of the task: objects whose ``bind(robot)`` returns a `brachis.limits.Limit`.
+        They are not saved with the motion; those of installed packages are named in the task (``custom_limits``).
     listener : callable, optional
         Told what happens.
     strict : bool, optional
@@ -72,13 +77,14 @@ def plan(
     """
     # Batches are small: a second BLAS thread costs up to twenty times what it gives where cores are busy.
     with ThreadpoolController().limit(limits=1, user_api="blas"):
-        return _plan(robot, load_task(task), families, listener or (lambda _text: None), strict=strict)
+        return _plan(robot, load_task(task), families, limits, listener or (lambda _text: None), strict=strict)
 
 
 def _plan(
     robot: str | os.PathLike[str] | Robot | None,
     task: Task,
     families: Sequence[ik.Family],
+    limits: Sequence[LimitModel],
     listener: Listener,
     *,
     strict: bool,
@@ -89,7 +95,7 @@ def _plan(
     task = task.model_copy(update={"robot": robot.settings})
     loaded, deadline = time.perf_counter(), Deadline.after(task.search.time_limit)
     remarks = plausibility.tell(plausibility.of_robot(robot), strict=strict, stacklevel=4)
-    setting = Setting.of(robot, task)
+    setting = Setting.of(robot, task, limits)
     places = plausibility.of_places(setting.robot, setting.task_space, setting.start, setting.end, task.path_start)
     remarks += plausibility.tell(places, strict=strict, stacklevel=4)
     found = find_fastest(choices(setting, families), deadline, listener)
@@ -111,7 +117,9 @@ def _plan(
     )
 
 
-def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) -> tuple[Transcription, str]:
+def transcribe(
+    robot: Robot, task: Task, *, families: Sequence[ik.Family] = (), limits: Sequence[LimitModel] = ()
+) -> tuple[Transcription, str]:
     """Turn a task into an NLP that can be inspected and solved.
 
     Parameters
@@ -121,6 +129,8 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
     task : Task
     families : sequence of Family, optional
         Closed forms to try before the built-in ones.
+    limits : sequence of LimitModel, optional
+        As for `plan`.
 
     Returns
     -------
@@ -133,7 +143,7 @@ def transcribe(robot: Robot, task: Task, *, families: Sequence[ik.Family] = ()) 
     InputError
         See `plan`.
     """
-    setting = Setting.of(robot_for(robot, task.robot), task)
+    setting = Setting.of(robot_for(robot, task.robot), task, limits)
     choice = choices(setting, families)[0]
     decomposition = choice.decomposition(*first_start(choice))
     problem = transcription(setting, decomposition, intervals_of(task))

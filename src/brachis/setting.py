@@ -9,9 +9,11 @@ import numpy as np
 
 from brachis import ik
 from brachis.bspline import clamped_uniform_knots
+from brachis.custom_limits import LimitModel
 from brachis.errors import DecompositionError, StartError, UnknownNameError
 from brachis.feasibility import branch_of, check_end_branch, check_postures
 from brachis.kinematics import Decomposition
+from brachis.limits import Limit, limits_of
 from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Transcription
 from brachis.path import Path, path_of
@@ -32,6 +34,9 @@ class Setting:
     path : Path
     start, end : (n,) ndarray or None
         Postures, None where free.
+    limits : tuple of Limit
+    further : tuple of LimitModel
+        Those of the limits that are not in the task, as the user gave them.
     """
 
     task: Task
@@ -40,22 +45,32 @@ class Setting:
     path: Path
     start: np.ndarray | None
     end: np.ndarray | None
+    limits: tuple[Limit, ...]
+    further: tuple[LimitModel, ...] = ()
 
     @classmethod
-    def of(cls, robot: Robot, task: Task) -> Setting:
+    def of(cls, robot: Robot, task: Task, further: Sequence[LimitModel] = ()) -> Setting:
         """Bind robot and task, and check the postures that the task gives.
+
+        Parameters
+        ----------
+        robot : Robot
+        task : Task
+        further : sequence of LimitModel, optional
+            Limits of the user's own.
 
         Raises
         ------
         InputError
-            Task space, postures or path do not fit the robot.
+            Task space, postures, path or a limit of the user's do not fit the robot.
         """
         robot, task_space = bind(robot, task.task_space)
         start = None if task.start == "free" else robot.posture(task.start.joints, "start.joints")
         end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
         path = path_of(robot, task_space, task)
-        check_postures(robot, start, end, path, task_space)
-        return cls(task, robot, task_space, path, start, end)
+        limits = limits_of(robot, task, further)
+        check_postures(robot, limits, start, end, path, task_space)
+        return cls(task, robot, task_space, path, start, end, limits, tuple(further))
 
 
 @dataclass(frozen=True)
@@ -191,6 +206,7 @@ def transcription(setting: Setting, decomposition: Decomposition, intervals: int
     spline = setting.task.spline
     return Transcription(
         decomposition,
+        setting.limits,
         degree=spline.degree,
         knots=clamped_uniform_knots(spline.degree, intervals),
         derivatives_at_rest=derivatives_at_rest(setting.task),

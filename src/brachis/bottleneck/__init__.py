@@ -1,6 +1,7 @@
 """What holds a motion back: what every limit costs, which limit is active when, and the distance to a reference."""
 
 from brachis.bottleneck.check import CheckedSensitivity, SensitivityCheck, check_sensitivities
+from brachis.bottleneck.ratios import LimitRatios, limit_ratios
 from brachis.bottleneck.reference import Reference, find_reference
 from brachis.bottleneck.saturation import THRESHOLD, Saturation, Stretch, saturations
 from brachis.bottleneck.saved import solved_again
@@ -12,6 +13,7 @@ __all__ = [
     "BottleneckReport",
     "BranchBoundary",
     "CheckedSensitivity",
+    "LimitRatios",
     "Reference",
     "Saturation",
     "Sensitivities",
@@ -20,6 +22,7 @@ __all__ = [
     "Stretch",
     "check_sensitivities",
     "find_reference",
+    "limit_ratios",
     "report",
     "saturations",
     "sensitivities",

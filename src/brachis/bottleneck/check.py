@@ -79,9 +79,9 @@ class CheckedSensitivity:
         """Return the figures as plain data for JSON."""
         entry = self.sensitivity
         return {
-            "joint": entry.joint,
-            "kind": entry.kind,
-            "end": entry.end,
+            "subject": entry.label.subject,
+            "kind": entry.label.kind,
+            "end": entry.bound.end,
             "predicted_s": self.predicted,
             "linearised_s": self.linearised,
             "re_solved_s": self.re_solved,
@@ -169,7 +169,7 @@ def check_sensitivities(
 def _checked(refined: Refined, predictions: Sensitivities, step: float) -> SensitivityCheck:
     """Compare limit by limit."""
     began = time.perf_counter()
-    problem, robot = refined.problem, refined.problem.decomposition.robot
+    problem = refined.problem
     base = refined.reports[-1].x
     if residual(problem, base) > _EXACT or _unbalanced(problem, base) > _EXACT:
         base, _ = _solved_again(problem, base)
@@ -178,8 +178,8 @@ def _checked(refined: Refined, predictions: Sensitivities, step: float) -> Sensi
         if abs(entry.change(step)) <= _NO_CHANGE * base[0]:
             checked.append(CheckedSensitivity(entry, 0.0, 0.0, 0.0, 0.0, optimal=True))
         else:
-            limits = entry.raised(robot.limits, robot.joint_names.index(entry.joint), step)
-            checked.append(_compared(entry, entry.change(step), problem, problem.with_limits(limits), base))
+            raised = problem.relaxed(entry.limit, entry.bound, step * entry.bound.whole)
+            checked.append(_compared(entry, entry.change(step), problem, raised, base))
     return SensitivityCheck(step, float(base[0]), tuple(checked), time.perf_counter() - began)
 
 

@@ -20,8 +20,9 @@ from threadpoolctl import ThreadpoolController
 
 from brachis.bspline import clamped_uniform_knots
 from brachis.errors import UnreachableError
+from brachis.limits import Role
 from brachis.nlp import Motion, Transcription
-from brachis.nlp.guess import fitted, stretched, worst_timed_ratio
+from brachis.nlp.guess import fitted, stretched, worst_time_scaling_ratio
 from brachis.refine import Refined, RefinementOptions, Solve, refine
 from brachis.solvers import SolverOptions, SolverReport, SolveStatus, solver_named
 
@@ -149,8 +150,10 @@ def _on_mesh(problem: Transcription, degree: int, intervals: int) -> Transcripti
     tau = np.linspace(0.0, 1.0, _POINTS * intervals + 1)
     if degree == _PARABOLAS:
         tau = np.union1d(tau, np.arange(1, intervals) / intervals - _BESIDE)
+    own = [limit for limit in problem.limits if limit.role is not Role.SAFEGUARD]
     fine = Transcription(
         problem.decomposition,
+        own,
         degree=degree,
         knots=clamped_uniform_knots(degree, intervals),
         derivatives_at_rest=1,
@@ -169,7 +172,7 @@ def _planned(problem: Transcription, motion: Motion, tolerance: float, deadline:
     try:
         tau = np.linspace(0.0, 1.0, _FIT_DENSITY * len(problem.knots))
         x = fitted(problem, motion.t_end, tau, motion.at(tau * motion.t_end)[0])
-        if worst_timed_ratio(problem, x) > _AS_GOOD:
+        if worst_time_scaling_ratio(problem, x) > _AS_GOOD:
             x = stretched(problem, x)
     except UnreachableError:
         return None
@@ -201,6 +204,6 @@ def _excess(problem: Transcription, x: np.ndarray) -> float:
     grid = np.linspace(0.0, 1.0, _DENSE * (len(knots) - 1) + 1)
     tau = np.unique(np.concatenate([grid, knots, knots[1:] - 1e-9, knots[:-1] + 1e-9]))
     try:
-        return float(problem.excess_at(x, tau).max())
+        return float(problem.violation_at(x, tau).max())
     except UnreachableError:
         return np.inf

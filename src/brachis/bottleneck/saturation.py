@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from brachis.trajectory import LimitRatios, Trajectory, limit_ratios
+from brachis.bottleneck.ratios import LimitRatios, limit_ratios
+from brachis.limits import Label, Limit
+from brachis.trajectory import Trajectory
 
 THRESHOLD = 0.999
 """A limit is active where the motion is at this part of it or beyond."""
@@ -32,12 +35,12 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Saturation:
-    """How long one limit of one joint is active.
+    """How long one value of a limit is at it.
 
     Attributes
     ----------
-    joint : str
-    kind : {"torque", "velocity", "acceleration", "position"}
+    label : Label
+        What is limited.
     share : float
         Part of the time, 0 to 1.
     peak : float
@@ -46,8 +49,7 @@ class Saturation:
         When, in the order of time.
     """
 
-    joint: str
-    kind: str
+    label: Label
     share: float
     peak: float
     active: tuple[Stretch, ...]
@@ -55,36 +57,40 @@ class Saturation:
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
         return {
-            "joint": self.joint,
-            "kind": self.kind,
+            "subject": self.label.subject,
+            "kind": self.label.kind,
             "share": self.share,
             "peak_ratio": self.peak,
             "active_s": [[stretch.begin, stretch.end, stretch.side] for stretch in self.active],
         }
 
 
-def saturations(trajectory: Trajectory, *, threshold: float = THRESHOLD) -> tuple[Saturation, ...]:
+def saturations(
+    trajectory: Trajectory, limits: Sequence[Limit] | None = None, *, threshold: float = THRESHOLD
+) -> tuple[Saturation, ...]:
     """Find when every limit is active.
 
     Parameters
     ----------
     trajectory : Trajectory
         Any one, a saved one for example.
+    limits : sequence of Limit, optional
+        Those of the trajectory's task if left out.
     threshold : float, optional
         Part of the limit from which on it counts as active.
 
     Returns
     -------
     tuple of Saturation
-        Of all limits of the robot, those active longest first.
+        Of all limits, those active longest first.
     """
-    return saturations_of(limit_ratios(trajectory), threshold=threshold)
+    return saturations_of(limit_ratios(trajectory, limits), threshold=threshold)
 
 
 def saturations_of(ratios: LimitRatios, *, threshold: float = THRESHOLD) -> tuple[Saturation, ...]:
     """As `saturations`, from ratios already computed."""
     found = []
-    for (kind, joint), column in zip(ratios.names, ratios.values.T, strict=True):
+    for label, column in zip(ratios.labels, ratios.values.T, strict=True):
         active = [
             Stretch(begin, end, side)
             for side, sign in (("lower", -1.0), ("upper", 1.0))
@@ -93,7 +99,7 @@ def saturations_of(ratios: LimitRatios, *, threshold: float = THRESHOLD) -> tupl
         active.sort(key=lambda stretch: stretch.begin)
         duration = sum(stretch.end - stretch.begin for stretch in active)
         peak = float(np.abs(column).max())
-        found.append(Saturation(joint, kind, float(duration / ratios.t[-1]), peak, tuple(active)))
+        found.append(Saturation(label, float(duration / ratios.t[-1]), peak, tuple(active)))
     return tuple(sorted(found, key=lambda entry: (-entry.share, -entry.peak)))
 
 

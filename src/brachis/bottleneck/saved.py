@@ -73,6 +73,7 @@ def _problem(trajectory: Trajectory) -> tuple[Transcription, np.ndarray]:
     knots, degree = trajectory.knots, trajectory.degree
     problem = Transcription(
         decomposition,
+        choice.setting.limits,
         degree=degree,
         knots=knots,
         derivatives_at_rest=derivatives_at_rest(task),

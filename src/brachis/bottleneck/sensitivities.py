@@ -1,13 +1,11 @@
 """What a limit costs: the derivative of t_E with respect to every limit, from the multipliers.
 
-Torque, velocity and acceleration enter as ratios to their limits, held in [-1, 1]: a limit that rises by the fraction
-e lets the bounds of its rows out by e, so that with the multipliers w of the joint's active rows
+Every limit tells which figures a user could change, and at which rate d the bounds of its rows move outwards when one
+of them gives way (`brachis.limits.Bound`): with the multipliers w of these rows
 
-    dt_E / d(ln limit) = -sum w.
+    dt_E / d(figure) = -sum w d.
 
-Positions are measured in half ranges about the middle of the range, or in rad or m where it is wide or open; an end
-that moves outwards lets out the rows at that end alone. See `multipliers` for w, and for what holds where it is not
-unique.
+See `multipliers` for w, and for what holds where it is not unique.
 """
 
 from __future__ import annotations
@@ -18,69 +16,54 @@ from typing import Any
 import numpy as np
 
 from brachis.bottleneck.multipliers import Multipliers, multipliers_of_answer
+from brachis.limits import Bound, Label, Limit, Role
 from brachis.nlp import Transcription
-from brachis.nlp.constraints.position import WIDE
 from brachis.refine import Refined
-from brachis.robot import Limits, Robot
 
 STATIONARY = 1e-3
 """With a larger residual the answer is not an optimum, and its multipliers say little."""
-RATE_UNITS = {"velocity": "/s", "acceleration": "/s^2"}
-"""Added to the unit of the position; torques have their own."""
 _SMALLEST = 1e-9
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What one limit of one joint costs.
+    """What one figure of a limit costs.
 
     Attributes
     ----------
-    joint : str
-    kind : {"torque", "velocity", "acceleration", "position"}
-    end : {"lower", "upper"} or None
-        End of the range; None where the limit holds in both directions.
-    limit : float
-        In `unit`.
-    whole : float
-        What a change by 100 % means, in `unit`: the limit; of a position the range, or 1 where it is open.
-    unit : str
+    limit : Limit
+    bound : Bound
+        The figure.
     derivative : float
-        Derivative of t_E with respect to the limit, s per `unit`; <= 0 but at a lower end, which is raised by it.
+        Derivative of t_E with respect to the figure, s per unit; <= 0 but at a lower end, which is raised by it.
     """
 
-    joint: str
-    kind: str
-    end: str | None
-    limit: float
-    whole: float
-    unit: str
+    limit: Limit
+    bound: Bound
     derivative: float
 
     @property
+    def label(self) -> Label:
+        """What is limited, and the figure's unit."""
+        return self.limit.labels[self.bound.column]
+
+    @property
     def outwards(self) -> float:
-        """Sign of a change of the limit that leaves more room."""
-        return -1.0 if self.end == "lower" else 1.0
+        """Sign of a change of the figure that leaves more room."""
+        return -1.0 if self.bound.end == "lower" else 1.0
 
     def change(self, fraction: float) -> float:
         """Predict the change of t_E, s, for a limit that leaves more room by a fraction; 0.01 is +1 %."""
-        return self.outwards * self.derivative * self.whole * fraction
-
-    def raised(self, limits: Limits, joint: int, fraction: float) -> Limits:
-        """Return limits with this one, of the joint with this index, leaving more room by a fraction."""
-        name = self.kind if self.end is None else f"position_{self.end}"
-        values = {field: getattr(limits, field).copy() for field in limits.__dataclass_fields__}
-        values[name][joint] += self.outwards * self.whole * fraction
-        return Limits(**values)
+        return self.outwards * self.derivative * self.bound.whole * fraction
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
         return {
-            "joint": self.joint,
-            "kind": self.kind,
-            "end": self.end,
-            "limit": self.limit,
-            "unit": self.unit,
+            "subject": self.label.subject,
+            "kind": self.label.kind,
+            "end": self.bound.end,
+            "limit": self.bound.figure,
+            "unit": self.label.unit,
             "derivative_s_per_unit": self.derivative,
             "change_for_1_percent_s": self.change(0.01),
             "change_for_10_percent_s": self.change(0.1),
@@ -117,7 +100,7 @@ class Sensitivities:
     Attributes
     ----------
     limits : tuple of Sensitivity
-        All limits of the robot, the costliest first.
+        All figures of all limits but safeguards, the costliest first.
     boundaries : tuple of BranchBoundary
         Branch margins that hold the motion back.
     source : str
@@ -139,12 +122,12 @@ class Sensitivities:
         """True where the answer is an optimum as far as the multipliers tell."""
         return self.residual <= STATIONARY
 
-    def of(self, joint: str, kind: str, end: str | None = None) -> Sensitivity:
-        """Sensitivity to one limit; KeyError where there is no such limit."""
+    def of(self, subject: str, kind: str, end: str | None = None) -> Sensitivity:
+        """Sensitivity to one figure, such as ``of("j1", "torque")``; KeyError where there is none."""
         for entry in self.limits:
-            if (entry.joint, entry.kind, entry.end) == (joint, kind, end):
+            if (entry.label.subject, entry.label.kind, entry.bound.end) == (subject, kind, end):
                 return entry
-        raise KeyError((joint, kind, end))
+        raise KeyError((subject, kind, end))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -176,40 +159,26 @@ def sensitivities(refined: Refined) -> Sensitivities:
 
 def sensitivities_at(problem: Transcription, multipliers: Multipliers) -> Sensitivities:
     """As `sensitivities`, from a problem and the multipliers of its answer."""
-    robot, count = problem.decomposition.robot, len(problem.tau)
-    limits: list[Sensitivity] = []
+    count, first = len(problem.tau), 0
+    found: list[Sensitivity] = []
     boundaries: list[BranchBoundary] = []
-    first = 0
-    for constraint in problem.constraints:
-        size = len(constraint.lower)
-        for column, label in enumerate(constraint.labels):
-            rows = np.zeros(len(problem.lower))
-            rows[first + column + size * np.arange(count)] = 1.0
-            if constraint.physical:
-                limits += _of_joint(robot, constraint.kind, label, rows, multipliers)
-            elif (slope := -multipliers.change(rows)) > _SMALLEST:
-                boundaries.append(BranchBoundary(label, float(constraint.lower[column]), slope))
+    for limit in problem.limits:
+        size = len(limit.lower)
+        for bound in limit.bounds:
+            rates = np.zeros(len(problem.lower))
+            rates[first + bound.column + size * np.arange(count)] = bound.per_unit
+            if limit.role is not Role.SAFEGUARD:
+                found.append(_sensitivity(limit, bound, rates, multipliers))
+            elif (slope := -multipliers.change(rates)) > _SMALLEST:
+                boundaries.append(BranchBoundary(limit.labels[bound.column].subject, bound.figure, slope))
         first += count * size
-    limits.sort(key=lambda entry: entry.change(1.0))
-    return Sensitivities(tuple(limits), tuple(boundaries), multipliers.source, multipliers.residual, multipliers.unique)
+    found.sort(key=lambda entry: entry.change(1.0))
+    return Sensitivities(tuple(found), tuple(boundaries), multipliers.source, multipliers.residual, multipliers.unique)
 
 
-def _of_joint(robot: Robot, kind: str, joint: str, rows: np.ndarray, multipliers: Multipliers) -> list[Sensitivity]:
-    """Sensitivities to one kind of limit of one joint, whose rows are marked by 1."""
-    index = robot.joint_names.index(joint)
-    length = robot.position_units[index]
-    if kind != "position":
-        limit = float(getattr(robot.limits, kind)[index])
-        unit = {"rad": "Nm", "m": "N"}[length] if kind == "torque" else length + RATE_UNITS[kind]
-        return [Sensitivity(joint, kind, None, limit, limit, unit, multipliers.change(rows) / limit)]
-    ends = {"lower": float(robot.limits.position_lower[index]), "upper": float(robot.limits.position_upper[index])}
-    closed = np.isfinite(list(ends.values())).all()
-    whole = ends["upper"] - ends["lower"] if closed else 1.0
-    per_unit = 2.0 / whole if closed and 0.5 * whole <= WIDE else 1.0  # rows count half ranges, or rad or m
-    found = []
-    for end, limit in ends.items():
-        if np.isfinite(limit):
-            sign = 1.0 if end == "lower" else -1.0
-            derivative = -sign * multipliers.change(rows * per_unit, sign)
-            found.append(Sensitivity(joint, kind, end, limit, whole, length, derivative))
-    return found
+def _sensitivity(limit: Limit, bound: Bound, rates: np.ndarray, multipliers: Multipliers) -> Sensitivity:
+    """Sensitivity to a figure that moves the bounds of the rows outwards at `rates`, (c,)."""
+    if bound.end is None:
+        return Sensitivity(limit, bound, multipliers.change(rates))
+    sign = 1.0 if bound.end == "lower" else -1.0
+    return Sensitivity(limit, bound, -sign * multipliers.change(rates, sign))

@@ -12,6 +12,7 @@ from brachis.bottleneck.saved import solved_again
 from brachis.bottleneck.sensitivities import Sensitivities, sensitivities
 from brachis.bottleneck.words import in_words
 from brachis.errors import InputError
+from brachis.limits import Role
 from brachis.result import Result
 from brachis.trajectory import Trajectory
 
@@ -95,10 +96,11 @@ def report(motion: Result | Trajectory, *, check: bool = False, reference: bool 
     else:
         trajectory, refined = motion.trajectory, motion.attempt.refined
     found, tolerance = sensitivities(refined), trajectory.task.refinement.tolerance
+    limits = [limit for limit in refined.problem.limits if limit.role is not Role.SAFEGUARD]
     return BottleneckReport(
         t_end=trajectory.t_end,
         sensitivities=found,
-        saturations=saturations(trajectory),
+        saturations=saturations(trajectory, limits),
         check=check_sensitivities(refined, found) if check else None,
         reference=find_reference(refined, tolerance=tolerance) if reference else None,
         reference_sought=reference,

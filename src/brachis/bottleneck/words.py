@@ -59,11 +59,12 @@ def _costs(found: Sensitivities, t_end: float) -> list[str]:
 def _saving(entry: Sensitivity, t_end: float) -> str:
     """Say what more room at one limit saves."""
     saved = -entry.change(_FRACTION)
-    amount = f"{_FRACTION * entry.whole:.3g} {entry.unit}"
-    if entry.end is None:
-        more = f"{100.0 * _FRACTION:.0f} % more {entry.kind} at {entry.joint} ({amount})"
+    label, end = entry.label, entry.bound.end
+    amount = f"{_FRACTION * entry.bound.whole:.3g} {label.unit}"
+    if end is None:
+        more = f"{100.0 * _FRACTION:.0f} % more {label.kind} at {label.subject} ({amount})"
     else:
-        more = f"{amount} more range at the {entry.end} end of {entry.joint}"
+        more = f"{amount} more room at the {end} end of {label}"
     return f"{more} saves {_figures(100.0 * saved / t_end)} % ({_figures(1e3 * saved)} ms)"
 
 
@@ -82,7 +83,7 @@ def _checked(check: SensitivityCheck) -> list[str]:
     for entry in check.entries:
         if not entry.predicted:
             continue
-        what = " ".join(filter(None, (entry.sensitivity.joint, entry.sensitivity.kind, entry.sensitivity.end)))
+        what = " ".join(filter(None, (str(entry.sensitivity.label), entry.sensitivity.bound.end)))
         line = (
             f"checked, {what} +{percent}: predicted {1e3 * entry.predicted:+.4f} ms, solved again "
             f"{1e3 * entry.re_solved:+.4f} ms, off by {100.0 * entry.deviation:.2g} %"
@@ -112,9 +113,9 @@ def _active(found: tuple[Saturation, ...]) -> list[str]:
         if entry.share >= _MOMENT:
             times = "once" if len(entry.active) == 1 else f"in {len(entry.active)} stretches"
             share = f"{100.0 * entry.share:.1f} % of the time"
-            lines.append(f"{entry.joint} is at its {entry.kind} limit for {share}, {times}")
+            lines.append(f"{entry.label.subject} is at its {entry.label.kind} limit for {share}, {times}")
     if not lines:
-        lines = ["no joint stays at a limit"]
+        lines = ["nothing stays at a limit"]
     return [*lines, f"(at its limit: at {100.0 * THRESHOLD:g} % of it or beyond)"]
 
 

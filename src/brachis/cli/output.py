@@ -181,7 +181,7 @@ def verification_table(verification: Verification) -> Table:
     """Lay out the checks, one a row."""
     title = "verification: passed" if verification.passed else "verification: FAILED"
     table = Table(title=f"{title} (checked at {verification.points} instants)", title_justify="left")
-    for column in ("check", "worst", "allowed", "unit", "joint", "time [s]", ""):
+    for column in ("check", "worst", "allowed", "unit", "of", "time [s]", ""):
         table.add_column(column, justify="right" if column in ("worst", "allowed", "time [s]") else "left")
     for check in verification.checks:
         ratio = check.unit == "-" and check.allowed > 1.0
@@ -190,8 +190,8 @@ def verification_table(verification: Verification) -> Table:
             f"{check.value:.6f}" if ratio else f"{check.value:.1e}",
             f"{check.allowed:.6g}",
             check.unit,
-            check.joint or "",
+            check.subject or "",
             "" if check.time is None else f"{check.time:.4f}",
-            "ok" if check.passed else "FAILED",
+            ("ok" if check.passed else "FAILED") + (f" ({check.remark})" if check.remark else ""),
         )
     return table

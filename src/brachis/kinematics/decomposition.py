@@ -19,7 +19,6 @@ constant: their derivatives vanish.
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +27,7 @@ from brachis.errors import UnreachableError
 from brachis.ik import ChainGeometry, IKSolver, Polished
 from brachis.kinematics.task_kinematics import TaskKinematics
 from brachis.path import Path, PathSample
-from brachis.robot import Limits, Robot, TaskSpace
+from brachis.robot import Robot, TaskSpace
 
 _TURN = 2.0 * np.pi
 _SURE = 0.25
@@ -127,12 +126,6 @@ class Decomposition:
     def r(self) -> int:
         """Degree of redundancy."""
         return len(self.redundant)
-
-    def with_limits(self, limits: Limits) -> Decomposition:
-        """Return the same decomposition of a robot with other limits."""
-        robot = dataclasses.replace(self.robot, limits=limits)
-        redundant = tuple(self.redundant)
-        return Decomposition(robot, self.task_space, self.path, self.solver, redundant, self.branch, self.start)
 
     def postures(
         self, y: np.ndarray, sample: PathSample | None = None, *, near: np.ndarray | None = None

@@ -108,10 +108,9 @@ def _losers(problem: Transcription, x: np.ndarray) -> np.ndarray:
     """Intervals that lose most time, ascending: how far the 1 + r limits that press most swing, times the length."""
     lengths = np.diff(problem.breaks)
     try:
-        state = problem.resampled(spread(problem.breaks, _SAMPLES)).state(x)
+        ratios = np.abs(problem.resampled(spread(problem.breaks, _SAMPLES)).time_scaling_ratios(x))
     except UnreachableError:  # between the collocation points
         return np.arange(len(lengths))
-    ratios = np.concatenate([np.abs(c.values(state)) for c in problem.constraints if c.timed], axis=1)
     slack = 1.0 - np.sort(ratios, axis=1)[:, -(1 + problem.decomposition.r) :].clip(max=1.0)
     within = np.lib.stride_tricks.sliding_window_view(slack, _SAMPLES + 1, axis=0)[::_SAMPLES]
     lost = np.ptp(within, axis=2).sum(axis=1) * lengths

@@ -1,15 +1,15 @@
-"""From a constraint's partials with respect to the joints to its derivatives with respect to curves and end time."""
+"""From a limit's partials with respect to the joints to its derivatives with respect to curves and end time."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from brachis.kinematics import JointDerivatives, JointState
-from brachis.nlp.constraints import Partials
+from brachis.limits import Partials
 
 
 def chain(partials: Partials, state: JointState, exact: JointDerivatives) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Differentiate a constraint with respect to y, ydot and yddot, each (K, c, 1 + r), from its partials."""
+    """Differentiate a limit with respect to y, ydot and yddot, each (K, c, 1 + r), from its partials."""
     given = next(part for part in (partials.q, partials.qdot, partials.qddot) if part is not None)
     zeros = np.zeros((*given.shape[:2], state.y.shape[1]))
     by_y, by_ydot, by_yddot = zeros, zeros, zeros
@@ -26,7 +26,7 @@ def chain(partials: Partials, state: JointState, exact: JointDerivatives) -> tup
 
 
 def by_time(by: tuple[np.ndarray, np.ndarray, np.ndarray], state: JointState) -> np.ndarray:
-    """Add up what `chain` found to -t_E d/dt_E of the constraint, (K, c): a longer time slows the curves down."""
+    """Add up what `chain` found to -t_E d/dt_E of the limit, (K, c): a longer time slows the curves down."""
     of_rates = np.einsum("kcj,kj->kc", by[1], state.ydot)
     return np.asarray(of_rates + 2.0 * np.einsum("kcj,kj->kc", by[2], state.yddot))
 

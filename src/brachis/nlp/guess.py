@@ -111,7 +111,7 @@ def stretched(problem: Transcription, x: np.ndarray) -> np.ndarray:
     """
     x = x.copy()
     while x[0] < _LONGEST_TIME:
-        excess = worst_timed_ratio(problem, x)
+        excess = worst_time_scaling_ratio(problem, x)
         if excess <= 1.0:
             break
         # Without gravity and friction, torque falls with the square of the time.
@@ -119,14 +119,12 @@ def stretched(problem: Transcription, x: np.ndarray) -> np.ndarray:
     shorter = x.copy()
     while shorter[0] > _SHORTEST_TIME:
         shorter[0] *= _SHRINKAGE
-        if worst_timed_ratio(problem, shorter) > 1.0:
+        if worst_time_scaling_ratio(problem, shorter) > 1.0:
             break
         x[0] = shorter[0]
     return x
 
 
-def worst_timed_ratio(problem: Transcription, x: np.ndarray) -> float:
-    """Largest ratio to a limit that a longer time relieves: velocity, acceleration, torque."""
-    state = problem.state(x)
-    timed = [c.values(state) for c in problem.constraints if c.timed]
-    return float(max(np.abs(values).max() for values in timed))
+def worst_time_scaling_ratio(problem: Transcription, x: np.ndarray) -> float:
+    """Largest ratio to a limit that a longer time relieves, such as those of velocity, acceleration and torque."""
+    return float(np.abs(problem.time_scaling_ratios(x)).max())

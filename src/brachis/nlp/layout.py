@@ -4,11 +4,11 @@ Variables: the end time t_E in seconds, then the free control points (see `curve
 redundant joint in chain order. s(0) = 0, s(t_E) = 1, the start posture and rest at both ends are built into the control
 points and have no rows. Where the knots are free, the interval lengths h in normalised time come last (see `grid`).
 
-Rows: for each constraint of `constraints.TABLE` that applies, in the table's order, its c values at collocation point
+Rows: for each limit, in the order of the list, its c values at collocation point
 0, then at point 1, and so on; then the differences of successive control points of s, which are >= 0 so that
 ds/dt >= 0 holds at all times; where the knots are free, last the sum of h, which is 1. All rows are dimensionless.
 
-Entries of the Jacobian: for each constraint those by t_E, by the variables of each curve and by h, all points of a
+Entries of the Jacobian: for each limit those by t_E, by the variables of each curve and by h, all points of a
 place together; then -1 and 1 for each difference; last 1 for each of h.
 """
 
@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.nlp.constraints import Constraint
+from brachis.limits import Limit
 from brachis.nlp.curves import Places, TiedSpline
 from brachis.nlp.grid import Grid
 
@@ -58,7 +58,7 @@ class Layout:
     jacobian_columns: np.ndarray
 
     @classmethod
-    def of(cls, grid: Grid, splines: Sequence[TiedSpline], constraints: Sequence[Constraint]) -> Layout:
+    def of(cls, grid: Grid, splines: Sequence[TiedSpline], limits: Sequence[Limit]) -> Layout:
         """Lay out the program of s and the redundant joints, `splines`, over a grid."""
         ends = np.cumsum([1, *(spline.free for spline in splines)])
         slices = tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
@@ -70,20 +70,20 @@ class Layout:
         windows = grid.windows(grid.lengths_of(grid.knots))
         places = tuple(Places.of(windows.columns, spline) for spline in splines)
         steps = splines[0].free - 1
-        pattern = _pattern(grid, constraints, slices, lengths, places)
-        return cls(slices, lengths, places, x_lower, x_upper, *_bounds(grid, constraints, steps), *pattern)
+        pattern = _pattern(grid, limits, slices, lengths, places)
+        return cls(slices, lengths, places, x_lower, x_upper, *_bounds(grid, limits, steps), *pattern)
 
 
-def _bounds(grid: Grid, constraints: Sequence[Constraint], steps: int) -> tuple[np.ndarray, np.ndarray]:
+def _bounds(grid: Grid, limits: Sequence[Limit], steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Bounds of the rows, (c,) each, with `steps` differences of control points of s."""
     count = len(grid.tau)
-    lower = [*(np.tile(each.lower, count) for each in constraints), np.zeros(steps), grid.total]
-    upper = [*(np.tile(each.upper, count) for each in constraints), np.full(steps, np.inf), grid.total]
+    lower = [*(np.tile(each.lower, count) for each in limits), np.zeros(steps), grid.total]
+    upper = [*(np.tile(each.upper, count) for each in limits), np.full(steps, np.inf), grid.total]
     return np.concatenate(lower), np.concatenate(upper)
 
 
 def _pattern(
-    grid: Grid, constraints: Sequence[Constraint], slices: Sequence[slice], lengths: slice, places: Sequence[Places]
+    grid: Grid, limits: Sequence[Limit], slices: Sequence[slice], lengths: slice, places: Sequence[Places]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows and columns of the Jacobian's entries, (nnz,) each."""
     count = len(grid.tau)
@@ -92,8 +92,8 @@ def _pattern(
     patterns.append((grid.point, grid.variable + lengths.start))
     rows, columns = [], []
     first = 0
-    for constraint in constraints:
-        size = len(constraint.lower)
+    for limit in limits:
+        size = len(limit.lower)
         numbers = first + np.arange(count * size).reshape(count, size)
         rows += [numbers[point].ravel() for point, _ in patterns]
         columns += [np.repeat(variable, size) for _, variable in patterns]

@@ -9,26 +9,25 @@ See `layout` for the variables and rows. With y = (s, q_r) and basis matrices B,
     dy/dc = B,  dydot/dc = B' / t_E,  dyddot/dc = B'' / t_E^2,  dydot/dt_E = -ydot / t_E,  dyddot/dt_E = -2 yddot / t_E
     dy/dh = dB/dh c,  dydot/dh = dB'/dh c / t_E,  dyddot/dh = dB''/dh c / t_E^2
 
-and a constraint with partials (p_q, p_v, p_a) has d/dy = p_q G + p_v dqdot/dy + p_a dqddot/dy,
+and a limit with partials (p_q, p_v, p_a) has d/dy = p_q G + p_v dqdot/dy + p_a dqddot/dy,
 d/dydot = p_v G + p_a dqddot/dydot and d/dyddot = p_a G, with G and the rest from `kinematics.decomposition`.
 """
 
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 
 import numpy as np
 
 from brachis.kinematics import Decomposition, JointState
-from brachis.nlp import constraints
+from brachis.limits import Bound, Limit, Role, branch_margin, moved
+from brachis.limits.branch_margin import MARGIN
 from brachis.nlp.chain import by_time, chain, timed
-from brachis.nlp.constraints import Constraint
-from brachis.nlp.constraints.branch_margin import MARGIN
 from brachis.nlp.curves import TiedSpline, Windows
 from brachis.nlp.grid import FixedGrid, FreeGrid, Grid
 from brachis.nlp.layout import Layout
 from brachis.nlp.motion import Motion
-from brachis.robot import Limits
 
 
 class Transcription:
@@ -37,6 +36,8 @@ class Transcription:
     Parameters
     ----------
     decomposition : Decomposition
+    limits : sequence of Limit
+        Of robot, process and scene; safeguards of the decomposition are added.
     degree : int
     knots : (N + 2 d + 1,) ndarray
         Clamped knot vector in normalised time.
@@ -60,6 +61,8 @@ class Transcription:
         How often states and Jacobians were computed.
     grid : Grid
         Knots and collocation points.
+    limits : tuple of Limit
+        Those given, then the safeguards.
     end, start_free
         As given.
     """
@@ -67,6 +70,7 @@ class Transcription:
     def __init__(
         self,
         decomposition: Decomposition,
+        limits: Sequence[Limit],
         *,
         degree: int,
         knots: np.ndarray,
@@ -76,7 +80,7 @@ class Transcription:
         start_free: bool = False,
     ) -> None:
         self.decomposition = decomposition
-        self.constraints = _constraints(decomposition, MARGIN)
+        self.limits = (*limits, *safeguards_of(decomposition, MARGIN))
         self._derivatives_at_rest = derivatives_at_rest
         self.end, self.start_free = end, start_free
         self._lay_out(FixedGrid(knots, degree, tau))
@@ -85,7 +89,7 @@ class Transcription:
         """Set the grid and all that depends on it."""
         self.grid = grid
         self.splines = self._make_splines()
-        layout = Layout.of(grid, self.splines, self.constraints)
+        layout = Layout.of(grid, self.splines, self.limits)
         self.slices, self._lengths, self._places = layout.slices, layout.lengths, layout.places
         self.x_lower, self.x_upper = layout.x_lower, layout.x_upper
         self.lower, self.upper = layout.lower, layout.upper
@@ -164,26 +168,30 @@ class Transcription:
 
     def with_margin(self, margin: float) -> Transcription:
         """Return the same problem with another least branch margin; x keeps its meaning."""
-        return self._guarded(self.decomposition, margin)
+        own = tuple(limit for limit in self.limits if limit.role is not Role.SAFEGUARD)
+        return self._under((*own, *safeguards_of(self.decomposition, margin)))
 
-    def with_limits(self, limits: Limits) -> Transcription:
-        """Return the same problem for a robot with other limits; x and the branch margins keep their meaning."""
-        return self._guarded(self.decomposition.with_limits(limits), max(self.guards, default=MARGIN))
+    def relaxed(self, limit: Limit, bound: Bound, amount: float) -> Transcription:
+        """Return the same problem with a figure of one of its limits giving way by `amount`, in the figure's unit."""
+        return self._under(moved(self.limits, limit, bound, amount))
 
-    def _guarded(self, decomposition: Decomposition, margin: float) -> Transcription:
+    def _under(self, limits: tuple[Limit, ...]) -> Transcription:
         other = copy.copy(self)
-        other.decomposition = decomposition
-        other.constraints = _constraints(decomposition, margin)
+        other.limits = limits
         other._lay_out(self.grid)  # noqa: SLF001  (its own class)
         return other
 
     @property
+    def _safeguards(self) -> list[Limit]:
+        return [limit for limit in self.limits if limit.role is Role.SAFEGUARD]
+
+    @property
     def guards(self) -> tuple[float, ...]:
-        """Lower bounds of the constraints that guard the computation: the branch margins in force."""
-        return tuple(float(bound) for c in self.constraints if not c.physical for bound in c.lower)
+        """Least values of the safeguards in force: branch margins."""
+        return tuple(float(bound) for limit in self._safeguards for bound in limit.lower)
 
     def guard_slack(self, x: np.ndarray) -> float:
-        """Smallest distance of a guard from its bound; infinite where there is none.
+        """Smallest distance of a safeguard from its bound; infinite where there is none.
 
         Raises
         ------
@@ -191,7 +199,7 @@ class Transcription:
             See `state`.
         """
         state = self.state(x)
-        slacks = [(c.values(state) - c.lower).min() for c in self.constraints if not c.physical]
+        slacks = [(limit.values(state) - limit.lower).min() for limit in self._safeguards]
         return float(min(slacks, default=np.inf))
 
     @property
@@ -252,33 +260,44 @@ class Transcription:
             See `state`.
         """
         state = self.state(x)
-        values = [constraint.values(state).ravel() for constraint in self.constraints]
+        values = [limit.values(state).ravel() for limit in self.limits]
         totals = np.full(len(self.grid.total), x[self._lengths].sum())
         return np.concatenate([*values, np.diff(x[self.slices[0]]), totals])
 
-    def excess(self, x: np.ndarray) -> np.ndarray:
-        """How far the physical limits are exceeded at every collocation point, (K, c); negative inside.
+    def violation(self, x: np.ndarray) -> np.ndarray:
+        """How far the limits are exceeded at every collocation point, (K, c); negative inside.
 
-        Branch margins are left out: they guard the computation, and falling a little short of one harms nobody.
+        Safeguards are left out: falling a little short of one harms nobody.
 
         Raises
         ------
         UnreachableError
             See `state`.
         """
-        return self._excess(self.state(x))
+        return self._violation(self.state(x))
 
-    def excess_at(self, x: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """As `excess`, at other normalised times `tau`, (K,); 2 pi lifts follow the nearest collocation point."""
+    def violation_at(self, x: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """As `violation`, at other normalised times `tau`, (K,); 2 pi lifts follow the nearest collocation point."""
         motion, known, at = self.motion(x), self.state(x), self.grid.tau_at(x[self._lengths])
         place = np.clip(np.searchsorted(at, tau), 0, len(at) - 1)
         near = known.q[place] + known.qdot[place] * ((tau - at[place]) * motion.t_end)[:, None]
-        return self._excess(self.decomposition.state(*motion.at(tau * motion.t_end), near=near))
+        return self._violation(self.decomposition.state(*motion.at(tau * motion.t_end), near=near))
 
-    def _excess(self, state: JointState) -> np.ndarray:
-        limits = [c for c in self.constraints if c.physical]
-        values = [(constraint.values(state), constraint) for constraint in limits]
-        return np.concatenate([np.maximum(v - c.upper, c.lower - v) * c.excess_scale for v, c in values], axis=1)
+    def _violation(self, state: JointState) -> np.ndarray:
+        own = [limit for limit in self.limits if limit.role is not Role.SAFEGUARD]
+        return np.concatenate([limit.violation(limit.values(state)) for limit in own], axis=1)
+
+    def time_scaling_ratios(self, x: np.ndarray) -> np.ndarray:
+        """Ratios, (K, c), to the limits that a longer time relieves; see `Limit.ratio`.
+
+        Raises
+        ------
+        UnreachableError
+            See `state`.
+        """
+        state = self.state(x)
+        scaling = [limit for limit in self.limits if limit.time_scaling]
+        return np.concatenate([limit.ratio(limit.values(state)) for limit in scaling], axis=1)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,).
@@ -294,8 +313,8 @@ class Transcription:
         bases = [timed(basis, x[0]) for basis in self._bases(x)]
         slopes = np.hstack(timed(self.grid.slopes(x[self._lengths], self._control_points(x)), x[0]))
         entries: list[np.ndarray] = []
-        for constraint in self.constraints:
-            by = chain(constraint.partials(state), state, exact)
+        for limit in self.limits:
+            by = chain(limit.partials(state), state, exact)
             entries.append(by_time(by, state).ravel() / -x[0])
             for j, (places, basis) in enumerate(zip(self._places, bases, strict=True)):
                 parts = (part[places.point, :, j] * values[:, None] for part, values in zip(by, basis, strict=True))
@@ -313,7 +332,7 @@ class Transcription:
         return self._entries[1]
 
 
-def _constraints(decomposition: Decomposition, margin: float) -> tuple[Constraint, ...]:
-    """Build those of the table that apply, with a least branch margin."""
-    built = (build(decomposition, margin) for build in constraints.TABLE.values())
-    return tuple(c for c in built if c is not None)
+def safeguards_of(decomposition: Decomposition, margin: float) -> tuple[Limit, ...]:
+    """Build what keeps the motion where the decomposition can be computed."""
+    built = branch_margin.build(decomposition, margin)
+    return () if built is None else (built,)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.bottleneck.ratios import LimitRatios, limit_ratios
 from brachis.bottleneck.saturation import THRESHOLD, Saturation, saturations_of
+from brachis.limits import Label, Limit
 from brachis.plots import style
 from brachis.plots.curves import knot_times
-from brachis.trajectory import LimitRatios, Trajectory, limit_ratios
+from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,18 +27,20 @@ _FRAME_MM = 26.0
 _THICK = 0.84
 
 
-def plot_timeline(trajectory: Trajectory) -> Figure:
+def plot_timeline(trajectory: Trajectory, limits: Sequence[Limit] | None = None) -> Figure:
     """Plot how near the motion is to each limit over time.
 
     Parameters
     ----------
     trajectory : Trajectory
         Any one, a saved one for example.
+    limits : sequence of Limit, optional
+        Those of the trajectory's task if left out.
 
     Returns
     -------
     Figure
-        Two columns wide; a row for each joint and kind of limit of which the motion ever uses more than half. The
+        Two columns wide; a row for each value of a limit of which the motion ever uses more than half. The
         deeper the blue the nearer to the limit; orange where the limit is active, from 99.9 % of it on. The faint ticks
         are the knots of the splines.
 
@@ -45,14 +50,14 @@ def plot_timeline(trajectory: Trajectory) -> Figure:
     >>> from brachis.plots import plot_timeline, save_figure
     >>> save_figure(plot_timeline(Trajectory.load("out/result.npz")), "timeline.pdf")  # doctest: +SKIP
     """
-    ratios = limit_ratios(trajectory)
-    found = {(entry.kind, entry.joint): entry for entry in saturations_of(ratios)}
-    shown = [column for column, name in enumerate(ratios.names) if found[name].peak > _SHOWN]
+    ratios = limit_ratios(trajectory, limits)
+    found = {entry.label: entry for entry in saturations_of(ratios)}
+    shown = [column for column, label in enumerate(ratios.labels) if found[label].peak > _SHOWN]
     figure = style.new_figure(style.PAGE_WIDTH, _FRAME_MM + _ROW_MM * max(len(shown), 1))
     ax = figure.add_subplot()
     for row, column in enumerate(shown):
-        _draw_row(ax, row, ratios, column, found[ratios.names[column]])
-    _dress(figure, ax, trajectory, [ratios.names[column] for column in shown])
+        _draw_row(ax, row, ratios, column, found[ratios.labels[column]])
+    _dress(figure, ax, trajectory, [ratios.labels[column] for column in shown])
     return figure
 
 
@@ -66,18 +71,18 @@ def _draw_row(ax: Axes, row: int, ratios: LimitRatios, column: int, entry: Satur
     ax.broken_barh(spans, (edges[0], _THICK), facecolor=_ACTIVE, edgecolor=_ACTIVE, linewidth=0.8, label="active")
 
 
-def _dress(figure: Figure, ax: Axes, trajectory: Trajectory, names: list[tuple[str, str]]) -> None:
+def _dress(figure: Figure, ax: Axes, trajectory: Trajectory, labels: list[Label]) -> None:
     """Label rows, time and colours."""
     from matplotlib.cm import ScalarMappable  # noqa: PLC0415
     from matplotlib.colors import Normalize  # noqa: PLC0415
     from matplotlib.patches import Patch  # noqa: PLC0415
 
     style.dress(ax, r"$t$ (s)", "")
-    ax.set_ylim(max(len(names), 1) - 0.5, -0.5)
-    ax.set_yticks(range(len(names)), [f"{style.plain(joint)} {kind}" for kind, joint in names])
+    ax.set_ylim(max(len(labels), 1) - 0.5, -0.5)
+    ax.set_yticks(range(len(labels)), [f"{style.plain(label.subject)} {label.kind}" for label in labels])
     ax.tick_params(axis="y", length=0.0)
     style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
-    if not names:
+    if not labels:
         text = "no limit is ever used by half"
         ax.text(0.5, 0.5, text, transform=ax.transAxes, fontsize=style.TICK_SIZE, ha="center", va="center")
     bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), _COLOURS), ax=ax, pad=0.01, fraction=0.03)

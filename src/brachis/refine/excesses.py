@@ -45,7 +45,7 @@ def violations(dense: Transcription, x: np.ndarray, goal: float) -> tuple[float,
     """
     tau = dense.tau
     try:
-        table = dense.excess(x)
+        table = dense.violation(x)
         centres = _suspects(tau, table, dense.knots, goal - _NEAR)
         heights = table.max(axis=1)[np.searchsorted(tau, centres - _SAME_TIME).clip(max=len(tau) - 1)]
         if table.max() > _COARSE * goal:  # the grid's own peaks will do until they are nearly held down
@@ -58,7 +58,7 @@ def violations(dense: Transcription, x: np.ndarray, goal: float) -> tuple[float,
             kept = heights > goal - 0.1 * _NEAR
             centres, heights, reach = centres[kept], heights[kept], reach[kept] * 2.0 / (_FINE - 1)
         places = np.union1d(_within_pieces(dense, x), _within_friction(dense, x))
-        worst = dense.excess_at(x, places).max(axis=1) if len(places) else places
+        worst = dense.violation_at(x, places).max(axis=1) if len(places) else places
     except UnreachableError:
         return np.inf, _unreachable(dense, x)
     largest = max(table.max(), heights.max(initial=-np.inf), worst.max(initial=-np.inf))
@@ -125,7 +125,7 @@ def _zoomed(
     fine = np.clip(centres[:, None] + reach[:, None] * np.linspace(-1.0, 1.0, _FINE), 0.0, 1.0)
     order = np.argsort(fine.ravel(), kind="stable")
     worst = np.empty(fine.size)
-    worst[order] = dense.excess_at(x, fine.ravel()[order]).max(axis=1)
+    worst[order] = dense.violation_at(x, fine.ravel()[order]).max(axis=1)
     best = np.argmax(worst.reshape(fine.shape), axis=1)
     chosen = np.arange(len(centres)), best
     return fine[chosen], worst.reshape(fine.shape)[chosen]

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.robot import Robot, dynamics
+from brachis.limits import Limit
+from brachis.robot import Robot
 from brachis.setting import Choice
 
 _APART = 0.02
@@ -15,7 +16,6 @@ _TINY = 1e-9
 
 NO_ANSWER = "it is out of reach"
 OTHER_BRANCH = "the branch ends"
-TOO_HEAVY = "the torque limits cannot hold the arm against gravity"
 JUMPS = "no posture is near enough to continue"
 
 
@@ -94,7 +94,8 @@ def distinct(courses: Sequence[Course], most: int) -> list[Course]:
     """
     branches, q = np.array([course.branch for course in courses]), np.array([course.q for course in courses])
     length = np.array([course.length for course in courses])
-    weights = weights_near(courses[0].choice.setting.robot, q[0, q.shape[1] // 2])
+    setting = courses[0].choice.setting
+    weights = weights_near(setting.robot, setting.limits, q[0, q.shape[1] // 2])
     distance = np.full(len(courses), np.inf)
     chosen: list[int] = []
     best = 0
@@ -108,16 +109,19 @@ def distinct(courses: Sequence[Course], most: int) -> list[Course]:
     return [courses[one] for one in chosen]
 
 
-def weights_near(robot: Robot, q: np.ndarray) -> np.ndarray:
+def weights_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> np.ndarray:
     """Weights of the joints, (n,), with which postures near `q`, (n,), are compared.
 
-    The reciprocal of the largest acceleration that torque and acceleration limits allow a joint alone; where there are
-    no such limits, that of its velocity limit.
+    The reciprocal of the largest acceleration that a joint's own limits allow it alone; where there are none, that of
+    the largest velocity.
     """
-    limits = robot.limits
-    inertia = np.diag(dynamics.mass_matrices(robot, q[None])[0])
-    weights = np.maximum(inertia / limits.torque, 1.0 / limits.acceleration)
-    return weights if weights.any() else np.asarray(1.0 / limits.velocity)
+    by_acceleration, by_velocity = np.zeros(robot.n), np.zeros(robot.n)
+    for limit in limits:
+        own = np.array([[label.subject == name for name in robot.joint_names] for label in limit.labels])
+        for weights, rows in zip((by_acceleration, by_velocity), limit.step_rows(q[None]), strict=True):
+            if rows is not None:
+                np.maximum(weights, np.abs(np.where(own, rows[0], 0.0)).max(axis=0), out=weights)
+    return by_acceleration if by_acceleration.any() else by_velocity
 
 
 def causes_of(

@@ -132,6 +132,7 @@ def _reason(choice: Choice) -> BrachisError | str:
     posture = np.zeros(setting.robot.n) if given is None else given
     return explain_failure(
         choice.decomposition(posture, choice.branches[0]),
+        setting.limits,
         any_branch=given is None,
         given="end" if setting.start is None else "start",
     )

@@ -2,20 +2,20 @@
 
 The path is cut into stations, the redundant joints into cells. Layer by layer from the given start, every node (a cell,
 a branch and the posture that the closed form gives there) is joined to the cells around it at the next station, where
-the posture exists, is within the joint ranges, clear of the branch boundary and can be held against gravity, and no
-joint jumps. Of all edges into a node the one with the least total length stays (dynamic programming). Where the end
-posture is given and the start is not, the layers run backwards from the end.
+the posture exists, is within the joint ranges, clear of the branch boundary and allowed at rest (the torque limits hold
+the arm against gravity), and no joint jumps. Of all edges into a node the one with the least total length stays
+(dynamic programming). Where the end posture is given and the start is not, the layers run backwards from the end.
 
 Turns of angles by 2 pi follow the course. From a given posture, nodes of one cell in different turns are different
 nodes. Where neither end is given, all turns of a course exist at once: a node keeps how far its joints have gone, and
 is within the ranges as long as some multiple of 2 pi brings the whole course there. The length of an edge,
 
-    max_j |M(q) dq|_j / tau_max_j  +  T max_j |dq_j| / v_max_j
+    max |A(q) dq|  +  T max |B(q) dq|
 
-does not depend on how fast the course is followed: with the first term alone the time of a straight course is
-2 sqrt(length). One redundant joint is searched completely at the lattice's spacing. Of several, all neighbours along
-one joint at a time and random ones, and a layer keeps a bounded number of nodes, half of them the nearest and half far
-from each other.
+with the rows A (M / tau_max, 1 / a_max) and B (1 / v_max) of `Limit.step_rows`, does not depend on how fast the course
+is followed: with the first term alone the time of a straight course is 2 sqrt(length). One redundant joint is searched
+completely at the lattice's spacing. Of several, all neighbours along one joint at a time and random ones, and a layer
+keeps a bounded number of nodes, half of them the nearest and half far from each other.
 """
 
 from __future__ import annotations
@@ -23,13 +23,12 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.deadline import NEVER, Deadline
-from brachis.robot import dynamics
+from brachis.limits import Moments
 from brachis.search.cells import Cells, unique
 from brachis.search.course import (
     JUMPS,
     NO_ANSWER,
     OTHER_BRANCH,
-    TOO_HEAVY,
     Course,
     DeadEnd,
     beyond_ranges,
@@ -93,6 +92,9 @@ class Lattice:
         self._slots = [[b for b, label in enumerate(labels) if label == labels[first]] for first in choice.branches]
         self._first = {slot: slots[0] for slots in self._slots for slot in slots}
         self._targets = given.path.sample(self.s).target
+        self._limits = given.limits
+        # In which turn the angles of a free origin are is open until the course is known.
+        self._static = [limit for limit in given.limits if limit.static and not limit.whole_turns]
         limits = given.robot.limits
         self._lower, self._upper = limits.position_lower - _SLACK, limits.position_upper + _SLACK
         self._loose = np.zeros(given.robot.n, dtype=bool)  # which joints may begin in any turn
@@ -257,11 +259,13 @@ class Lattice:
 
     def _lengths(self, q: np.ndarray, step: np.ndarray, origin: np.ndarray) -> np.ndarray:
         """Lengths of steps, (E, n), from the postures q[origin]; see the module."""
-        limits = self._robot.limits
-        masses = dynamics.mass_matrices(self._robot, q) / limits.torque[:, None]
-        effort = np.abs(np.einsum("eij,ej->ei", masses[origin], step)).max(axis=1)
-        effort = np.maximum(effort, (np.abs(step) / limits.acceleration).max(axis=1))
-        return np.asarray(effort + _TYPICAL_TIME * (np.abs(step) / limits.velocity).max(axis=1))
+        by_acceleration, by_velocity = np.zeros(len(step)), np.zeros(len(step))
+        for limit in self._limits:
+            for length, rows in zip((by_acceleration, by_velocity), limit.step_rows(q), strict=True):
+                if rows is not None:
+                    parts = np.abs(np.einsum("eij,ej->ei", rows[origin], step))
+                    np.maximum(length, parts.max(axis=1), out=length)
+        return by_acceleration + _TYPICAL_TIME * by_velocity
 
     def _kept(self, layer: Layer) -> Layer | dict[str, int]:
         """Keep nodes clear of the branch boundary that can be held against gravity, not too many of them."""
@@ -270,13 +274,17 @@ class Lattice:
             own = layer.slot == slot
             margins = self._solver.branch_margins(layer.q[own], self._first[int(slot)])
             clear[own] = margins.min(axis=1, initial=np.inf) >= self._clear
-        still = np.zeros_like(layer.q)
-        held = np.all(np.abs(dynamics.torque(self._robot, layer.q, still, still)) <= self._robot.limits.torque, axis=1)
+        still, held = Moments.at_rest(layer.q), np.ones(len(layer.slot), dtype=bool)
+        refused: dict[str, int] = {}
+        for limit in self._static:
+            allowed = np.all(limit.violation(limit.values(still)) <= _SLACK, axis=1)
+            refused[f"the {limit.kind} limit {limit.refusal}"] = int((clear & ~allowed).sum())
+            held &= allowed
         if not (clear & held).any():
-            counts = {TOO_HEAVY: int((clear & ~held).sum()), OTHER_BRANCH: int((~clear).sum())}
-            return {cause: count for cause, count in counts.items() if count}
+            refused[OTHER_BRANCH] = int((~clear).sum())
+            return {cause: count for cause, count in refused.items() if count}
         kept = layer[clear & held]
-        return kept if self._cells.r <= 1 else kept.bounded(self._nodes, self._robot)
+        return kept if self._cells.r <= 1 else kept.bounded(self._nodes, self._robot, self._limits)
 
 
 def _shortest(length: np.ndarray, keys: np.ndarray) -> np.ndarray:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
 
+from brachis.limits import Limit
 from brachis.robot import Robot
 from brachis.search.course import weights_near
 
@@ -41,7 +43,7 @@ class Layer:
         """Return some of the nodes, by index or mask."""
         return Layer(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
-    def bounded(self, most: int, robot: Robot) -> Layer:
+    def bounded(self, most: int, robot: Robot, limits: Sequence[Limit]) -> Layer:
         """Keep `most` nodes: half of them the nearest, the others far from each other and from those."""
         if len(self.slot) <= most:
             return self
@@ -49,7 +51,7 @@ class Layer:
         half = most // 2
         nearest, others = self[order[:half]], self[order[half:]]
         # Farthest points: each further node is the one that is farthest from all that are kept.
-        weights = weights_near(robot, self.q[order[0]])
+        weights = weights_near(robot, limits, self.q[order[0]])
         places, kept = others.q * weights, nearest.q * weights
         distance = np.abs(places[:, None] - kept[None]).max(axis=2).min(axis=1)
         chosen: list[int] = []

@@ -6,6 +6,7 @@ import numpy as np
 
 from brachis.kinematics import Decomposition, interpolate
 from brachis.refine import Refined
+from brachis.setting import Setting
 from brachis.task import Task
 from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
 from brachis.verify import Verification, VerifyOptions, verify_trajectory
@@ -13,14 +14,14 @@ from brachis.verify import Verification, VerifyOptions, verify_trajectory
 _SAME_TIME = 1e-7
 
 
-def judge(decomposition: Decomposition, refined: Refined, task: Task) -> tuple[Trajectory, Verification]:
+def judge(decomposition: Decomposition, refined: Refined, setting: Setting) -> tuple[Trajectory, Verification]:
     """Make the trajectory of an answer, and verify it.
 
     Parameters
     ----------
     decomposition : Decomposition
     refined : Refined
-    task : Task
+    setting : Setting
 
     Returns
     -------
@@ -32,8 +33,9 @@ def judge(decomposition: Decomposition, refined: Refined, task: Task) -> tuple[T
     UnreachableError
         The motion leaves the branch between the collocation points.
     """
-    trajectory = _trajectory(decomposition, refined, task)
-    return trajectory, verify_trajectory(trajectory, VerifyOptions(ratio_tolerance=task.refinement.tolerance))
+    trajectory = _trajectory(decomposition, refined, setting.task)
+    options = VerifyOptions(ratio_tolerance=setting.task.refinement.tolerance)
+    return trajectory, verify_trajectory(trajectory, options, further=setting.further)
 
 
 def _trajectory(decomposition: Decomposition, refined: Refined, task: Task) -> Trajectory:

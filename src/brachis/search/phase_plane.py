@@ -1,12 +1,11 @@
 """Least time along a fixed course: the phase plane of s and ds/dt.
 
-On a course q(s) the velocity, acceleration and torque limits read, with u = d2s/dt2 and x = (ds/dt)^2,
+With u = d2s/dt2 and x = (ds/dt)^2, limits along a course q(s) are lines in (u, x) (`Limit.lines`):
 
-    qdot^2  = q_ds^2 x                           <= v_max^2
-    qddot   = q_ds u + q_dds x                   in [-a_max, a_max]
-    tau     = a(s) u + b(s) x + g(s)             in [-tau_max, tau_max]
+    a(s) u + b(s) x + c(s)   in [-1, 1],
 
-with a = M q_ds, b = M q_dds + C(q, q_ds) q_ds and g the torque at rest: lines in (u, x). Backwards along the course,
+for torques a = M q_ds / tau_max, b = (M q_dds + C(q, q_ds) q_ds) / tau_max and c the torque at rest; those that do not
+ask for u are ceilings for x. Backwards along the course,
 the largest x from which the next station's interval can be reached is kept; forwards, the largest u that stays within
 is taken (Pham, Pham, IEEE Trans. Robotics 34(3), 2018). Torque may jump here, and viscous and Coulomb friction are left
 out, so the time is an estimate by which courses are ranked, no bound.
@@ -14,20 +13,22 @@ out, so the time is an estimate by which courses are ranked, no bound.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from brachis.robot import Robot, dynamics
+from brachis.limits import Limit
 
 _SLOWEST = 1e-9
 _STANDING = 1e-3
 
 
-def least_time(robot: Robot, s: np.ndarray, q: np.ndarray) -> float:
+def least_time(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> float:
     """Estimate the least time along a course from rest to rest.
 
     Parameters
     ----------
-    robot : Robot
+    limits : sequence of Limit
     s : (S,) ndarray
         Path coordinates, ascending, evenly spaced.
     q : (S, n) ndarray
@@ -39,7 +40,7 @@ def least_time(robot: Robot, s: np.ndarray, q: np.ndarray) -> float:
         s; infinite where the course cannot be followed at any speed.
     """
     step = s[1] - s[0]
-    slope, offset, ceiling = _lines(robot, q, np.gradient(q, step, axis=0, edge_order=2), step)
+    slope, offset, ceiling = _lines(limits, q, np.gradient(q, step, axis=0, edge_order=2), step)
     intervals = _controllable(slope, offset, ceiling, step)
     if intervals is None or intervals[0][0] > 0.0:
         return np.inf
@@ -51,25 +52,24 @@ def least_time(robot: Robot, s: np.ndarray, q: np.ndarray) -> float:
 
 
 def _lines(
-    robot: Robot, q: np.ndarray, q_ds: np.ndarray, step: float
+    limits: Sequence[Limit], q: np.ndarray, q_ds: np.ndarray, step: float
 ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray], np.ndarray]:
     """Bounds on u as lines in x, slope and offset of the upper and the lower ones, each (S, c), and largest x, (S,)."""
-    limits = robot.limits
-    q_dds = np.gradient(q_ds, step, axis=0, edge_order=2)
-    still = np.zeros_like(q)
-    rest = dynamics.rigid_torque(robot, q, still, still)
-    by_u = dynamics.rigid_torque(robot, q, still, q_ds) - rest + robot.friction.armature * q_ds
-    by_x = dynamics.rigid_torque(robot, q, q_ds, q_dds) - rest + robot.friction.armature * q_dds
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ceiling = np.nanmin((limits.velocity / np.abs(q_ds)) ** 2, axis=1)
-    torque, acceleration = np.isfinite(limits.torque), np.isfinite(limits.acceleration)
-    a = np.concatenate([by_u[:, torque], q_ds[:, acceleration]], axis=1)
-    b = np.concatenate([by_x[:, torque], q_dds[:, acceleration]], axis=1)
-    bound = np.concatenate([limits.torque[torque], limits.acceleration[acceleration]])
-    at_rest = np.concatenate([rest[:, torque], np.zeros((len(q), int(acceleration.sum())))], axis=1)
+    lines = [limit.lines(q, q_ds, np.gradient(q_ds, step, axis=0, edge_order=2)) for limit in limits]
+    ceiling = np.full(len(q), np.inf)
+    sloped = []
+    for line in lines:
+        if line is None:
+            continue
+        if line.u is None:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                ceiling = np.fmin(ceiling, np.fmin.reduce((1.0 - line.constant) / line.x, axis=1))
+        else:
+            sloped.append((line.u, line.x, line.constant))
+    a, b, c = (np.concatenate(parts, axis=1) for parts in zip(*sloped, strict=True))
     # A coefficient of zero would make a vertical line; a tiny one gives bounds far out that do no harm.
-    a = np.where(np.abs(a) < _SLOWEST * bound, _SLOWEST * bound, a)
-    first, second = (bound - at_rest) / a, (-bound - at_rest) / a
+    a = np.where(np.abs(a) < _SLOWEST, _SLOWEST, a)
+    first, second = (1.0 - c) / a, (-1.0 - c) / a
     return (-b / a, -b / a), (np.maximum(first, second), np.minimum(first, second)), ceiling
 
 

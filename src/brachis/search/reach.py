@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from brachis.errors import BrachisError, PathError
 from brachis.kinematics import Decomposition
+from brachis.limits import Limit, Moments
 from brachis.plausibility import path_hint
-from brachis.robot import dynamics
 
 _RANGE_SLACK = 1e-9
 _SEARCHED = 400
@@ -19,7 +20,7 @@ _FAR = 10.0  # m
 
 
 def explain_failure(
-    decomposition: Decomposition, *, any_branch: bool = False, given: str = "start"
+    decomposition: Decomposition, limits: Sequence[Limit], *, any_branch: bool = False, given: str = "start"
 ) -> BrachisError | str:
     """Why no motion was found: an error where the path is out of reach or too heavy to hold, else advice.
 
@@ -29,6 +30,7 @@ def explain_failure(
     Parameters
     ----------
     decomposition : Decomposition
+    limits : sequence of Limit
     any_branch : bool, optional
         Whether a motion may be on any branch, not the decomposition's alone.
     given : {"start", "end"}, optional
@@ -64,10 +66,14 @@ def explain_failure(
             f"the branch {label!r} of the {given} posture does not reach s = {{first:.3g}}",
             f"Choose a {given} posture of another branch, or leave redundant_joints: auto",
         ),
-        (
-            _held(decomposition, own),
-            "the torque limits cannot hold the arm against gravity from s = {first:.3g} on",
-            "Raise robot.limits.torque, or lead the path where the arm reaches less far",
+        *(
+            (
+                _allowed(limit, own),
+                f"the {limit.kind} limit {limit.refusal} from s = {{first:.3g}} on",
+                f"Raise the {limit.kind} limit, or lead the path elsewhere",
+            )
+            for limit in limits
+            if limit.static and not limit.whole_turns
         ),
     )
     for possible, problem, hint in reasons:
@@ -155,13 +161,10 @@ def _beyond(decomposition: Decomposition, within: np.ndarray, *found: _Answers) 
     )
 
 
-def _held(decomposition: Decomposition, found: _Answers) -> np.ndarray:
-    """At which stations some posture is held by the torque limits, (S,) bool."""
-    robot = decomposition.robot
-    held = np.zeros(len(found.q), dtype=bool)
+def _allowed(limit: Limit, found: _Answers) -> np.ndarray:
+    """At which stations a limit allows some posture at rest, (S,) bool."""
+    allowed = np.zeros(len(found.q), dtype=bool)
     for station, (choices, exist) in enumerate(zip(found.q, found.within, strict=True)):
-        q = choices[exist][:_HELD_CHECKS]
-        still = np.zeros_like(q)
-        tau = np.abs(dynamics.torque(robot, q, still, still))
-        held[station] = bool(np.any(np.all(tau <= robot.limits.torque, axis=1)))
-    return held
+        still = Moments.at_rest(choices[exist][:_HELD_CHECKS])
+        allowed[station] = bool(np.any(np.all(limit.violation(limit.values(still)) <= 0.0, axis=1)))
+    return allowed

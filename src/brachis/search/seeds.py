@@ -101,8 +101,10 @@ def _seed(course: Course, origin: str) -> Seed:
         stations = np.column_stack([fine, _smoothed(s, course.stations[:, 1:], fine, pieces)])
         q = decomposition.postures(stations)
         if np.isfinite(q).all() and _clear(decomposition, q):
-            return Seed(choice, course.branch, course.q[0], stations, least_time(choice.setting.robot, fine, q), origin)
-    estimate = least_time(choice.setting.robot, s, course.q)
+            return Seed(
+                choice, course.branch, course.q[0], stations, least_time(choice.setting.limits, fine, q), origin
+            )
+    estimate = least_time(choice.setting.limits, s, course.q)
     return Seed(choice, course.branch, course.q[0], course.stations, estimate, origin)
 
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from brachis.deadline import Deadline
+from brachis.limits.branch_margin import MARGIN
 from brachis.nlp import Transcription
-from brachis.nlp.constraints.branch_margin import MARGIN
 from brachis.refine import Solve
 from brachis.solvers import Solver, SolverOptions, SolverReport, SolveStatus
 from brachis.task import SolverSettings

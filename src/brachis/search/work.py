@@ -150,8 +150,8 @@ def finish(numbered: tuple[int, Coarse], deadline: Deadline, listener: Listener)
     """
     number, coarse = numbered
     assert coarse.problem is not None  # noqa: S101  (it is usable)
-    task = coarse.way.seed.choice.setting.task
-    settings = task.refinement
+    setting = coarse.way.seed.choice.setting
+    task, settings = setting.task, setting.task.refinement
     options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, deadline.part(_KNOT_TIME))
     problem, reports, undone = settle_knots(
         coarse.problem,
@@ -167,7 +167,7 @@ def finish(numbered: tuple[int, Coarse], deadline: Deadline, listener: Listener)
         reports[-1],
         _solve(coarse.way, deadline, listener),
         replace(options, deadline=deadline),
-        lambda answer: judge(decomposition, answer, task),
+        lambda answer: judge(decomposition, answer, setting),
     )
     return attempt_of(refined, reports[:-1], number, settings.tolerance, motion, undone), motion
 

@@ -45,6 +45,7 @@ from brachis.task.segments import (
     SplineThrough,
     TurnSegment,
 )
+from brachis.task.tool_limits import ToolLimits
 
 __all__ = [
     "FROM_URDF",
@@ -86,6 +87,7 @@ __all__ = [
     "ToQuaternion",
     "ToRollPitchYaw",
     "ToRotationVector",
+    "ToolLimits",
     "TurnSegment",
     "TurnTo",
     "check_robot_settings",

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, Field, Tag, field_validator, model_validator
+from pydantic import AfterValidator, Field, JsonValue, Tag, field_validator, model_validator
 
 from brachis.task.fields import Count, Model, Name, Number, Positive, by_form, refuse
 from brachis.task.robot_models import JointValues, RobotSettings
 from brachis.task.segments import Segment
+from brachis.task.tool_limits import ToolLimits
 
 Row = Literal["x", "y", "z", "yaw"]
 _Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll"]
@@ -193,6 +194,11 @@ class Task(Model):
         "of x, y, z); pose; or pose_free_roll, a pose that may roll about the tool frame's z axis."
     )
     path: Annotated[tuple[Segment, ...], Field(min_length=1)] = Field(description="Segments of the path, in order.")
+    tool_limits: ToolLimits = Field(default_factory=ToolLimits, description="Limits on the motion of the tool.")
+    custom_limits: dict[Name, dict[str, JsonValue]] = Field(
+        default={},
+        description="Limits of kinds that installed packages add (see docs/own_limit.md): their parameters, by kind.",
+    )
     redundant_joints: RedundantJoints = Field(
         default="auto",
         description="Joints that are free along the path; auto tries every choice that has a closed form. With "

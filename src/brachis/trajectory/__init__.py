@@ -1,7 +1,6 @@
 """The trajectory: immutable, evaluated at any time, saved and loaded with all that is needed to verify it again."""
 
 from brachis.trajectory.pieces import one_sided_derivatives
-from brachis.trajectory.ratios import LimitRatios, limit_ratios
 from brachis.trajectory.result_file import SCHEMA
 from brachis.trajectory.samples import Samples
 from brachis.trajectory.trajectory import CONTINUOUS_TORQUE, Trajectory
@@ -9,9 +8,7 @@ from brachis.trajectory.trajectory import CONTINUOUS_TORQUE, Trajectory
 __all__ = [
     "CONTINUOUS_TORQUE",
     "SCHEMA",
-    "LimitRatios",
     "Samples",
     "Trajectory",
-    "limit_ratios",
     "one_sided_derivatives",
 ]

@@ -93,9 +93,10 @@ class States:
         parts = (self.piece, self.u, self.t, self.q, self.qdot, self.qddot, self.tau)
         return States(*(part[chosen] for part in parts))
 
-    def merged(self, other: States) -> States:
-        """Return these states and others, ascending."""
+    def merged(self, other: States) -> tuple[States, np.ndarray]:
+        """Return these states and others, ascending, and where each one was among those put one after the other."""
         mine = (self.piece, self.u, self.t, self.q, self.qdot, self.qddot, self.tau)
         theirs = (other.piece, other.u, other.t, other.q, other.qdot, other.qddot, other.tau)
         both = States(*(np.concatenate(parts) for parts in zip(mine, theirs, strict=True)))
-        return both.only(np.lexsort((both.u, both.piece)))
+        order = np.lexsort((both.u, both.piece))
+        return both.only(order), order

@@ -21,10 +21,12 @@ class Check:
     unit : str
         ``-`` for ratios.
     passed : bool
-    joint : str or None
-        Where a joint is to blame.
+    subject : str or None
+        Where a joint, or the tool, is to blame.
     time : float or None
         When, s.
+    remark : str
+        What there is to know of the check itself; empty where there is nothing.
     """
 
     name: str
@@ -32,8 +34,9 @@ class Check:
     allowed: float
     unit: str
     passed: bool
-    joint: str | None = None
+    subject: str | None = None
     time: float | None = None
+    remark: str = ""
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class Verification:
     points : int
         Number of times at which the trajectory was evaluated.
     worst_ratio : float
-        Largest ratio of any quantity to its limit (torque, velocity, acceleration, position).
+        Largest ratio of any quantity to its limit.
     path_error : float
         Largest distance from the path: m for position rows, rad for yaw, whichever is larger.
     """

@@ -7,23 +7,29 @@ polynomials. What is judged is the file that a controller would execute, not the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from brachis.custom_limits import LimitModel
 from brachis.errors import InputError
 from brachis.path import Path, path_of
 from brachis.robot import Robot, TaskSpace, bind
 from brachis.trajectory import Trajectory
 from brachis.verify.checks import continuity_checks, end_checks, progress_checks, spline_checks
-from brachis.verify.limits import limit_checks
+from brachis.verify.limits import Given, limit_checks
 from brachis.verify.motion import Pieces, States
 from brachis.verify.options import VerifyOptions
-from brachis.verify.peaks import with_peaks
 from brachis.verify.places import reversals, sharpest, spread_out, within_path_pieces
 from brachis.verify.report import Check, Verification
 
 
 def verify_trajectory(
-    trajectory: Trajectory, options: VerifyOptions | None = None, *, robot: Robot | None = None
+    trajectory: Trajectory,
+    options: VerifyOptions | None = None,
+    *,
+    robot: Robot | None = None,
+    further: Sequence[LimitModel] = (),
 ) -> Verification:
     """Check path, limits, progress, start and end, splines, and continuity of a trajectory.
 
@@ -34,6 +40,8 @@ def verify_trajectory(
     robot : Robot, optional
         Check against this robot and not the saved one, for example a newer URDF; its joints must have the same names
         in the same order.
+    further : sequence of LimitModel, optional
+        Limits of the user's own with which the trajectory was planned, beside those that its task names.
 
     Returns
     -------
@@ -65,8 +73,7 @@ def verify_trajectory(
     places = (np.concatenate(part) for part in zip(*parts, strict=True))
     states = States.at(pieces, robot, *places)
     path_check = _path_error(trajectory, robot, path, task_space, states, options)
-    states = with_peaks(states, pieces, robot)
-    limits = limit_checks(robot, pieces, states, options)
+    limits = limit_checks(Given(robot, trajectory.task, pieces, states), further, options)
     checks = [
         path_check,
         *limits,

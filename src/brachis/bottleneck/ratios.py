@@ -1,0 +1,69 @@
+"""How near a motion is to its limits over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.arrays import freeze
+from brachis.limits import Label, Limit, Moments, limits_of
+from brachis.robot import bind
+from brachis.trajectory import Trajectory
+
+_POINTS_PER_INTERVAL = 40
+
+
+@dataclass(frozen=True, eq=False)
+class LimitRatios:
+    """Ratios of the motion to all limits of its task. The arrays are read-only.
+
+    Attributes
+    ----------
+    t : (K,) ndarray
+        Ascending, s; a time at which the acceleration jumps occurs twice, before and after the jump.
+    labels : tuple of Label
+        What every column is.
+    values : (K, c) ndarray
+        1 at the upper limit, -1 at the lower one. Positions count by their distance from an end, so that 0.9 is
+        0.1 rad or m away; in half ranges where these are shorter than that, and 0 where both ends are further away.
+    """
+
+    t: np.ndarray
+    labels: tuple[Label, ...]
+    values: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Take copies that nobody can write to."""
+        freeze(self, "t", "values")
+
+
+def limit_ratios(trajectory: Trajectory, limits: Sequence[Limit] | None = None) -> LimitRatios:
+    """Compare a trajectory with every limit at its nodes, its knots and densely between.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    limits : sequence of Limit, optional
+        Those of the trajectory's task if left out.
+
+    Returns
+    -------
+    LimitRatios
+    """
+    if limits is None:
+        robot, _ = bind(trajectory.robot, trajectory.task.task_space)
+        limits = limits_of(robot, trajectory.task)
+    knots = np.unique(trajectory.knots) * trajectory.t_end
+    steps = np.arange(_POINTS_PER_INTERVAL) / _POINTS_PER_INTERVAL
+    grid = (knots[:-1, None] + np.diff(knots)[:, None] * steps).ravel()
+    samples = trajectory.at(np.clip(np.union1d(grid, trajectory.times), 0.0, trajectory.t_end))
+    jumps = np.any(trajectory.qddot_before != trajectory.qddot, axis=1)
+    before = (trajectory.times, trajectory.q, trajectory.qdot, trajectory.qddot_before)
+    behind = (samples.t, samples.q, samples.qdot, samples.qddot)
+    t, *motion = (np.concatenate([first[jumps], then]) for first, then in zip(before, behind, strict=True))
+    order = np.argsort(t, kind="stable")
+    moments = Moments(*(part[order] for part in motion))
+    values = [limit.ratio(limit.values(moments)) for limit in limits]
+    return LimitRatios(t[order], tuple(label for limit in limits for label in limit.labels), np.hstack(values))

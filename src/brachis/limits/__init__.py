@@ -1,0 +1,78 @@
+"""Limits on the motion: one kind per file, listed in `TABLE`.
+
+A new kind is its model in `task`, its file here with a line in `TABLE`, and a file in `verify.limits` with a line in
+the table there. Everything else takes the objects as they are and names no kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from brachis.custom_limits import LimitModel, custom_limits
+from brachis.limits import branch_margin, joint_rate, position, tool_speed, torque
+from brachis.limits.protocol import (
+    Bound,
+    JointMotion,
+    Label,
+    Limit,
+    Moments,
+    Partials,
+    PhaseLines,
+    Role,
+    moved,
+)
+from brachis.robot import Robot
+from brachis.task import Task
+
+Build = Callable[[Robot, Task], Limit | None]
+"""Makes the limit of a kind for a task on a robot; None where nothing is limited."""
+
+TABLE: dict[str, Build] = {
+    "torque": torque.build,
+    "velocity": joint_rate.build_velocity,
+    "acceleration": joint_rate.build_acceleration,
+    "position": position.build,
+    "tool_speed": tool_speed.build,
+}
+
+
+def limits_of(robot: Robot, task: Task, further: Sequence[LimitModel] = ()) -> tuple[Limit, ...]:
+    """List the limits of a task on a robot.
+
+    Parameters
+    ----------
+    robot : Robot
+    task : Task
+    further : sequence of LimitModel, optional
+        A user's own, beside those of the table and of the task's ``custom_limits``.
+
+    Returns
+    -------
+    tuple of Limit
+        In the order of the table, then the user's.
+
+    Raises
+    ------
+    InputError
+        A limit of the user's own does not fit the robot.
+    """
+    built = (build(robot, task) for build in TABLE.values())
+    own = [model.bind(robot) for model in (*custom_limits(task), *further)]
+    return (*(limit for limit in built if limit is not None), *own)
+
+
+__all__ = [
+    "TABLE",
+    "Bound",
+    "JointMotion",
+    "Label",
+    "Limit",
+    "LimitModel",
+    "Moments",
+    "Partials",
+    "PhaseLines",
+    "Role",
+    "branch_margin",
+    "limits_of",
+    "moved",
+]

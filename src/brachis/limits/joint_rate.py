@@ -1,0 +1,104 @@
+"""|qdot| <= v_max and |qddot| <= a_max, as ratios in [-1, 1]."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials, PhaseLines
+from brachis.robot import Robot
+from brachis.task import Task
+
+
+class _JointRateLimit(Limit):
+    """Joint velocities or accelerations over their limits.
+
+    Parameters
+    ----------
+    robot : Robot
+    joints : (c,) int ndarray
+        The limited joints.
+    figures : (c,) ndarray
+        Their limits.
+    """
+
+    time_scaling = True
+    _per_time: str
+
+    def __init__(self, robot: Robot, joints: np.ndarray, figures: np.ndarray) -> None:
+        self._joints, self._scale = joints, 1.0 / figures
+        self._selection = np.eye(robot.n)[joints] * self._scale[:, None]
+        self.labels = tuple(
+            Label(name, self.kind, robot.position_units[i] + self._per_time, f"robot.limits.{self.kind}.{name}")
+            for i, name in ((i, robot.joint_names[i]) for i in joints)
+        )
+        self.lower, self.upper = -np.ones(len(joints)), np.ones(len(joints))
+        self._bounds = tuple(Bound(c, limit, limit, 1.0 / limit) for c, limit in enumerate(figures.tolist()))
+
+    @property
+    def bounds(self) -> tuple[Bound, ...]:
+        """See `Limit`."""
+        return self._bounds
+
+    def _rows(self, count: int) -> np.ndarray:
+        """Constant partials at `count` moments, (K, c, n)."""
+        return np.broadcast_to(self._selection, (count, *self._selection.shape))
+
+
+class VelocityLimit(_JointRateLimit):
+    """Joint velocities over their limits; see `_JointRateLimit`."""
+
+    kind = "velocity"
+    _per_time = "/s"
+
+    def values(self, motion: JointMotion) -> np.ndarray:
+        """See `Limit.values`."""
+        return motion.qdot[:, self._joints] * self._scale
+
+    def partials(self, motion: JointMotion) -> Partials:
+        """See `Limit.partials`."""
+        return Partials(qdot=self._rows(len(motion.q)))
+
+    def lines(self, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
+        """See `Limit.lines`: the square of the ratio, q_ds^2 x / v_max^2."""
+        squares = (q_ds[:, self._joints] * self._scale) ** 2
+        return PhaseLines(None, squares, np.zeros((len(q), len(self.lower))))
+
+    def step_rows(self, q: np.ndarray) -> tuple[None, np.ndarray]:
+        """See `Limit.step_rows`."""
+        return None, self._rows(len(q))
+
+
+class AccelerationLimit(_JointRateLimit):
+    """Joint accelerations over their limits; see `_JointRateLimit`."""
+
+    kind = "acceleration"
+    _per_time = "/s^2"
+
+    def values(self, motion: JointMotion) -> np.ndarray:
+        """See `Limit.values`."""
+        return motion.qddot[:, self._joints] * self._scale
+
+    def partials(self, motion: JointMotion) -> Partials:
+        """See `Limit.partials`."""
+        return Partials(qddot=self._rows(len(motion.q)))
+
+    def lines(self, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:
+        """See `Limit.lines`."""
+        by_u, by_x = (part[:, self._joints] * self._scale for part in (q_ds, q_dds))
+        return PhaseLines(by_u, by_x, np.zeros((len(q), len(self.lower))))
+
+    def step_rows(self, q: np.ndarray) -> tuple[np.ndarray, None]:
+        """See `Limit.step_rows`."""
+        return self._rows(len(q)), None
+
+
+def build_velocity(robot: Robot, _task: Task) -> VelocityLimit | None:
+    """Build the limit for the joints with a finite velocity limit."""
+    joints = np.flatnonzero(np.isfinite(robot.limits.velocity))
+    return VelocityLimit(robot, joints, robot.limits.velocity[joints]) if len(joints) else None
+
+
+def build_acceleration(robot: Robot, _task: Task) -> AccelerationLimit | None:
+    """Build the limit for the joints with a finite acceleration limit."""
+    joints = np.flatnonzero(np.isfinite(robot.limits.acceleration))
+    return AccelerationLimit(robot, joints, robot.limits.acceleration[joints]) if len(joints) else None

@@ -1,0 +1,241 @@
+"""What a limit on the motion is: one object, which everything that plans, refines and reports takes as it is.
+
+A limit has c values at every moment of the motion, held between `lower` and `upper`. Most are ratios to a figure, so
+that their bounds are -1 and 1. How far a value v is beyond its bounds is its *violation*, and how near it is its
+*ratio*, 1 at the upper bound, -1 at the lower one, with the limit's own scale k:
+
+    violation = k max(v - upper, lower - v)
+    ratio     = max(1 + k (v - upper), 0) - max(1 + k (lower - v), 0)
+"""
+
+from __future__ import annotations
+
+import copy
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol, Self
+
+import numpy as np
+
+
+class JointMotion(Protocol):
+    """Joint motion at K moments; states of the optimiser and samples of a trajectory are such.
+
+    Attributes
+    ----------
+    q, qdot, qddot : (K, n) ndarray
+        rad or m, and per second.
+    """
+
+    @property
+    def q(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def qdot(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def qddot(self) -> np.ndarray: ...  # noqa: D102
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Joint motion at K moments, made from arrays; see `JointMotion`."""
+
+    q: np.ndarray
+    qdot: np.ndarray
+    qddot: np.ndarray
+
+    @classmethod
+    def at_rest(cls, q: np.ndarray) -> Moments:
+        """Stand still in postures, (K, n)."""
+        still = np.zeros_like(q)
+        return cls(q, still, still)
+
+
+class Role(Enum):
+    """Whose limit it is."""
+
+    ROBOT = "robot"
+    PROCESS = "process"
+    SCENE = "scene"
+    SAFEGUARD = "safeguard"
+    """Guards the computation alone: falling short of it harms nobody, and the verification does not know it."""
+
+
+@dataclass(frozen=True)
+class Label:
+    """What one value of a limit is.
+
+    Attributes
+    ----------
+    subject : str
+        Of what: a joint's name, ``tool``, a pair of joints, ...
+    kind : str
+        What is limited, in words, for example ``torque``.
+    unit : str
+        Of the limit that the user gives.
+    key : str
+        Key of the task that sets it; empty where there is none.
+    """
+
+    subject: str
+    kind: str
+    unit: str
+    key: str = ""
+
+    def __str__(self) -> str:
+        """Return subject and kind."""
+        return f"{self.subject} {self.kind}"
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A figure that the user could change, and how it moves the bounds of one value.
+
+    Attributes
+    ----------
+    column : int
+        Of the value, among the limit's c.
+    figure : float
+        In the unit of the value's label.
+    whole : float
+        What a change by 100 % means: of most limits the figure itself, of a position the width of its range.
+    per_unit : float
+        By how much the bounds of the value move outwards when the figure gives way by one unit.
+    end : {"lower", "upper"} or None
+        Which of the bounds moves; None: both.
+    """
+
+    column: int
+    figure: float
+    whole: float
+    per_unit: float
+    end: str | None = None
+
+
+@dataclass(frozen=True)
+class Partials:
+    """Partial derivatives of a limit's c values at K moments, each (K, c, n), or None where they vanish."""
+
+    q: np.ndarray | None = None
+    qdot: np.ndarray | None = None
+    qddot: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class PhaseLines:
+    """A limit along a fixed joint path q(s): a u + b x + c in [-1, 1], with u = d2s/dt2 and x = (ds/dt)^2.
+
+    Attributes
+    ----------
+    u : (S, c) ndarray or None
+        a; None where the limit does not ask for the acceleration, so that it is a ceiling for x.
+    x, constant : (S, c) ndarray
+        b and c.
+    """
+
+    u: np.ndarray | None
+    x: np.ndarray
+    constant: np.ndarray
+
+
+class Limit(ABC):
+    """c values of the joint motion at every moment, held between bounds.
+
+    Attributes
+    ----------
+    kind : str
+        Name of the kind, unique.
+    role : Role
+    labels : tuple of Label
+        Of each of the c values.
+    lower, upper : (c,) ndarray
+        Bounds of the values; -inf and inf where open. Values should be of the size of 1.
+    time_scaling : bool
+        Whether a longer end time relieves it: velocity, acceleration, torque.
+    static : bool
+        Whether it says something about an arm that stands still: position, torque against gravity.
+    whole_turns : bool
+        Whether it asks in which turn (multiple of 2 pi) an angle is.
+    violation_scale : (c,) ndarray
+        See the module.
+    bounds : tuple of Bound
+        The figures that the user could change.
+    refusal : str
+        What is said of a posture that it does not allow, after the subject.
+    """
+
+    kind: str
+    role: Role = Role.ROBOT
+    labels: tuple[Label, ...]
+    lower: np.ndarray
+    upper: np.ndarray
+    time_scaling: bool = False
+    static: bool = False
+    whole_turns: bool = False
+    refusal: str = "is beyond its limit"
+
+    @abstractmethod
+    def values(self, motion: JointMotion) -> np.ndarray:
+        """Values (K, c)."""
+
+    @abstractmethod
+    def partials(self, motion: JointMotion) -> Partials:
+        """Differentiate `values` with respect to q, qdot, qddot, each taken as independent."""
+
+    @property
+    def violation_scale(self) -> np.ndarray:
+        """See the attributes."""
+        return np.ones(len(self.lower))
+
+    @property
+    def bounds(self) -> tuple[Bound, ...]:
+        """See the attributes; by default every finite bound by itself."""
+        ends = (("lower", self.lower), ("upper", self.upper))
+        return tuple(
+            Bound(column, float(level), max(abs(float(level)), 1.0), 1.0, end)
+            for end, levels in ends
+            for column, level in enumerate(levels)
+            if np.isfinite(level)
+        )
+
+    def lines(self, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines | None:  # noqa: ARG002
+        """Write the limit in the phase plane, along a joint path whose postures, (S, n), and derivatives are given.
+
+        None where it says nothing there.
+        """
+        return None
+
+    def step_rows(self, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:  # noqa: ARG002
+        """Rows A, (K, c, n), by which |A qddot| and |A qdot| from postures (K, n) count as parts of the limit.
+
+        The first for accelerations, the second for velocities; None where the limit does not mind. Paths through joint
+        space are compared by them.
+        """
+        return None, None
+
+    def relaxed(self, bound: Bound, amount: float) -> Self:
+        """Return the limit with one figure giving way by `amount`, in its unit."""
+        other = copy.copy(self)
+        step = np.zeros(len(self.lower))
+        step[bound.column] = bound.per_unit * amount
+        if bound.end != "upper":
+            other.lower = self.lower - step
+        if bound.end != "lower":
+            other.upper = self.upper + step
+        return other
+
+    def violation(self, values: np.ndarray) -> np.ndarray:
+        """How far values, (K, c), are beyond their bounds; negative inside. See the module."""
+        return np.maximum(values - self.upper, self.lower - values) * self.violation_scale
+
+    def ratio(self, values: np.ndarray) -> np.ndarray:
+        """How near values, (K, c), are to their bounds; see the module."""
+        scale = self.violation_scale
+        above = np.maximum(1.0 + (values - self.upper) * scale, 0.0)
+        return np.asarray(above - np.maximum(1.0 + (self.lower - values) * scale, 0.0))
+
+
+def moved(limits: Sequence[Limit], limit: Limit, bound: Bound, amount: float) -> tuple[Limit, ...]:
+    """Return limits of which one has a figure that gives way by `amount`."""
+    return tuple(each.relaxed(bound, amount) if each is limit else each for each in limits)

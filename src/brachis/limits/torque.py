@@ -1,0 +1,70 @@
+"""|tau| <= tau_max, as tau / tau_max in [-1, 1]."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials, PhaseLines
+from brachis.robot import Robot, dynamics
+from brachis.task import Task
+
+
+class TorqueLimit(Limit):
+    """Joint torques over their limits.
+
+    Parameters
+    ----------
+    robot : Robot
+    joints : (c,) int ndarray
+        The limited joints.
+    """
+
+    kind = "torque"
+    time_scaling = True
+    static = True
+    refusal = "cannot hold the arm against gravity"
+
+    def __init__(self, robot: Robot, joints: np.ndarray) -> None:
+        self._robot, self._joints = robot, joints
+        figures = robot.limits.torque[joints]
+        self._scale = 1.0 / figures
+        units = {"rad": "Nm", "m": "N"}
+        self.labels = tuple(
+            Label(name, "torque", units[robot.position_units[i]], f"robot.limits.torque.{name}")
+            for i, name in ((i, robot.joint_names[i]) for i in joints)
+        )
+        self.lower, self.upper = -np.ones(len(joints)), np.ones(len(joints))
+        self._bounds = tuple(Bound(c, limit, limit, 1.0 / limit) for c, limit in enumerate(figures.tolist()))
+
+    @property
+    def bounds(self) -> tuple[Bound, ...]:
+        """See `Limit`."""
+        return self._bounds
+
+    def values(self, motion: JointMotion) -> np.ndarray:
+        """See `Limit.values`."""
+        return dynamics.torque(self._robot, motion.q, motion.qdot, motion.qddot)[:, self._joints] * self._scale
+
+    def partials(self, motion: JointMotion) -> Partials:
+        """See `Limit.partials`."""
+        exact = dynamics.torque_derivatives(self._robot, motion.q, motion.qdot, motion.qddot)
+        parts = (part[:, self._joints] * self._scale[:, None] for part in (exact.q, exact.qdot, exact.qddot))
+        return Partials(*parts)
+
+    def lines(self, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:
+        """See `Limit.lines`: a = M q_ds, b = M q_dds + C(q, q_ds) q_ds, c the torque at rest; no velocity friction."""
+        robot, still = self._robot, np.zeros_like(q)
+        held = dynamics.rigid_torque(robot, q, still, still)
+        by_u = dynamics.rigid_torque(robot, q, still, q_ds) - held + robot.friction.armature * q_ds
+        by_x = dynamics.rigid_torque(robot, q, q_ds, q_dds) - held + robot.friction.armature * q_dds
+        return PhaseLines(*(part[:, self._joints] * self._scale for part in (by_u, by_x, held)))
+
+    def step_rows(self, q: np.ndarray) -> tuple[np.ndarray, None]:
+        """See `Limit.step_rows`: M / tau_max."""
+        return dynamics.mass_matrices(self._robot, q)[:, self._joints] * self._scale[:, None], None
+
+
+def build(robot: Robot, _task: Task) -> TorqueLimit | None:
+    """Build the limit for the joints with a finite torque limit."""
+    joints = np.flatnonzero(np.isfinite(robot.limits.torque))
+    return TorqueLimit(robot, joints) if len(joints) else None

@@ -1,0 +1,36 @@
+"""Ratios to limits by formulas of the verification's own, which share nothing with `brachis.limits`: a kind a file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from brachis.custom_limits import LimitModel, custom_limits
+from brachis.verify.limits import joint_rate, position, tool_speed, torque
+from brachis.verify.limits.own import check_own
+from brachis.verify.limits.protocol import Given, LimitCheck, Worst
+from brachis.verify.options import VerifyOptions
+from brachis.verify.report import Check
+
+TABLE: dict[str, LimitCheck] = {
+    "torque": torque.worst,
+    "velocity": joint_rate.worst_velocity,
+    "acceleration": joint_rate.worst_acceleration,
+    "position": position.worst,
+    "tool speed": tool_speed.worst,
+}
+
+
+def limit_checks(given: Given, further: Sequence[LimitModel], options: VerifyOptions) -> list[Check]:
+    """Check every kind of limit that there is, then those of the task's ``custom_limits`` and the `further` ones."""
+    found = [(name, worst) for name, find in TABLE.items() if (worst := find(given)) is not None]
+    found += [check_own(model, given) for model in (*custom_limits(given.task), *further)]
+    allowed = 1.0 + options.ratio_tolerance
+    return [
+        Check(
+            f"{name} ratio", worst.ratio, allowed, "-", worst.ratio <= allowed, worst.subject, worst.time, worst.remark
+        )
+        for name, worst in found
+    ]
+
+
+__all__ = ["TABLE", "Given", "LimitCheck", "Worst", "limit_checks"]
