@@ -277,7 +277,7 @@ def test_export(run, planned, tmp_path):
     np.testing.assert_allclose(np.diff(times)[:-1], 0.01)
 
 
-@pytest.mark.parametrize("kind", ["torques", "postures", "motion", "overview", "timeline"])
+@pytest.mark.parametrize("kind", ["torques", "postures", "motion", "overview", "timeline", "limits"])
 def test_plot(kind, run, planned, tmp_path):
     _, out = planned
     figure = tmp_path / f"{kind}.svg"
