@@ -54,7 +54,7 @@ def print_case(name: str, result: Result) -> SensitivityCheck:
     for entry, near in zip(check.entries, smaller.entries, strict=True):
         if not entry.predicted:
             continue
-        limit = " ".join(filter(None, (entry.sensitivity.joint, entry.sensitivity.kind, entry.sensitivity.end)))
+        limit = " ".join(filter(None, (str(entry.sensitivity.label), entry.sensitivity.bound.end)))
         mark = "" if abs(entry.re_solved) <= LARGE or entry.deviation <= REQUIRED else " > 5 %"
         mark += "" if entry.optimal else " not optimal"
         mark += f" other optimum {1e3 * entry.other_optimum:+.2f} ms" if entry.other_optimum else ""

@@ -20,11 +20,13 @@ ORDER = (
     "interrupts",
     "task",
     "robot",
+    "custom_limits",
     "compose",
     "plausibility",
     "path",
     "ik",
     "kinematics",
+    "limits",
     "bspline",
     "nlp",
     "solvers",
@@ -42,7 +44,7 @@ ORDER = (
     "export",
     "cli",
 )
-VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "bspline", "nlp", "solvers", "refine", "mesh"}
+VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "limits", "bspline", "nlp", "solvers", "refine", "mesh"}
 HEAVY = {"matplotlib", "viser", "yourdfpy", "unopy", "ipyopt"}
 
 

@@ -62,10 +62,10 @@ def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_ref
     problem, _ = brachis.transcribe(robot(), brachis.load_task(task(redundant_joints=["j1"])))
     first = solve_with_uno(problem, next(guesses(problem)))
     dense = problem.resampled(np.linspace(0.0, 1.0, 2001))
-    assert problem.excess(first.x).max() < 1e-6
-    assert dense.excess(first.x).max() > 0.01
+    assert problem.violation(first.x).max() < 1e-6
+    assert dense.violation(first.x).max() > 0.01
     refined = refine(problem, first, solve_with_uno, RefinementOptions())
-    assert dense.excess(refined.x).max() <= 1e-4
+    assert dense.violation(refined.x).max() <= 1e-4
     assert refined.x[0] > first.x[0]
 
 

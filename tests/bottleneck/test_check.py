@@ -36,14 +36,14 @@ def test_planar_line(scara, joint):
 def test_arm_on_a_rail():
     task = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
     found = holds(brachis.plan(None, {**task, "redundant_joints": ["rail"]}), 3)
-    assert {entry.sensitivity.kind for entry in found.entries[:3]} == {"torque", "velocity"}
+    assert {entry.sensitivity.label.kind for entry in found.entries[:3]} == {"torque", "velocity"}
 
 
 def test_range_of_a_joint(slide):
     limits = {"torque": {"j1": 30.0}, "position": {"j1": [-0.05, 0.05]}}
     result = slide(((1.0, 0.0, 0.0),) * 2, ("x",), (1.2,), redundant=["j1"], robot={"limits": limits})
     found = holds(result, 2)
-    assert any(entry.sensitivity.kind == "position" and entry.re_solved < -LARGE for entry in found.entries)
+    assert any(entry.sensitivity.label.kind == "position" and entry.re_solved < -LARGE for entry in found.entries)
 
 
 def test_a_wrong_prediction_is_found(scara):
@@ -54,19 +54,18 @@ def test_a_wrong_prediction_is_found(scara):
     assert found.worst_deviation(LARGE) == pytest.approx(1.0, abs=0.05)
 
 
-def test_other_limits_are_the_robots_own(scara):
+def test_a_relaxed_limit_leaves_all_others_as_they_are(scara):
     refined = scara("j1").attempt.refined
     problem, x = refined.problem, refined.x
-    robot = problem.decomposition.robot
     entry = sensitivities(refined).of("j2", "torque")
-    other = problem.with_limits(entry.raised(robot.limits, 1, 0.25))
-    rows, weaker = problem.rows(x), other.rows(x)
+    other = problem.relaxed(entry.limit, entry.bound, 0.25 * entry.bound.whole)
+    np.testing.assert_array_equal(other.rows(x), problem.rows(x))
     torque = slice(0, 3 * len(problem.tau))
-    expected = rows[torque].reshape(-1, 3) * [1.0, 0.8, 1.0]
-    np.testing.assert_allclose(weaker[torque].reshape(-1, 3), expected, atol=1e-12)
-    np.testing.assert_array_equal(weaker[torque.stop :], rows[torque.stop :])
+    for mine, theirs, bound in ((problem.lower, other.lower, -1.0), (problem.upper, other.upper, 1.0)):
+        np.testing.assert_allclose(theirs[torque].reshape(-1, 3) / bound, [[1.0, 1.25, 1.0]] * len(problem.tau))
+        np.testing.assert_array_equal(theirs[torque.stop :], mine[torque.stop :])
     assert other.guards == problem.guards
-    assert robot.limits.torque[1] == 10.0, "the robot itself keeps its limits"
+    assert problem.upper[torque].max() == 1.0, "the problem itself keeps its limits"
 
 
 def test_report_needs_the_solved_problem(scara):
@@ -126,7 +125,7 @@ def test_a_raised_limit_that_no_solver_copes_with_leaves_the_answer(scara, monke
         @staticmethod
         def solve(problem, x, options, progress):
             answer = solver_named("uno")[0].solve(problem, x, options, progress)
-            broken = problem.decomposition.robot is not refined.problem.decomposition.robot
+            broken = problem.limits is not refined.problem.limits
             return dataclasses.replace(answer, violation=np.inf) if broken else answer
 
     monkeypatch.setattr(check, "solver_named", lambda _name: (Broken,))

@@ -23,7 +23,7 @@ def assert_same(saved, fresh):
     costly = [entry for entry in fresh.sensitivities.limits if entry.change(0.1) < -1e-5]
     assert costly
     for entry in fresh.sensitivities.limits:
-        other = saved.sensitivities.of(entry.joint, entry.kind, entry.end)
+        other = saved.sensitivities.of(entry.label.subject, entry.label.kind, entry.bound.end)
         assert other.change(0.1) == pytest.approx(entry.change(0.1), rel=1e-3, abs=1e-6)
 
 

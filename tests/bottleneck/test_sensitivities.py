@@ -30,8 +30,8 @@ def test_time_falls_with_the_root_of_the_force(slide, rest, degree):
     found, answer = found_of(result), result.report.objective
     assert found.of("j1", "torque").change(1.0) == pytest.approx(-0.5 * answer, rel=1e-5)
     assert found.of("j1", "torque").derivative == pytest.approx(-0.5 * answer / FORCE, rel=1e-5)
-    assert [entry.change(1.0) for entry in found.limits if (entry.joint, entry.kind) != ("j1", "torque")] == [0.0] * 7
-    assert found.limits[0].joint == "j1"
+    assert [entry.change(1.0) for entry in found.limits if str(entry.label) != "j1 torque"] == [0.0] * 7
+    assert found.limits[0].label.subject == "j1"
     assert found.reliable
 
 
@@ -45,14 +45,14 @@ def test_trapezoid(slide):
     assert speed == pytest.approx(ramp - LENGTH / limit, rel=0.1)
     # The same motion k times as fast needs k times the velocity and k^2 times the force.
     assert 2.0 * force + speed == pytest.approx(-result.report.objective, rel=1e-4)
-    assert found.of("j1", "velocity").unit == "m/s"
+    assert found.of("j1", "velocity").label.unit == "m/s"
 
 
 def test_acceleration_limit(slide):
     result = slide(robot={"limits": {"acceleration": 6.0, "torque": None}})
     found = found_of(result)
     assert found.of("j1", "acceleration").change(1.0) == pytest.approx(-0.5 * result.report.objective, rel=1e-5)
-    assert found.of("j1", "acceleration").unit == "m/s^2"
+    assert found.of("j1", "acceleration").label.unit == "m/s^2"
 
 
 def test_lifting_against_gravity(slide):
@@ -67,7 +67,7 @@ def test_lifting_against_gravity(slide):
 
     exact = (best(force + 1e-4) - best(force - 1e-4)) / 2e-4
     assert found.of("j2", "torque").derivative == pytest.approx(exact, rel=0.02)
-    assert found.of("j2", "torque").unit == "N"
+    assert found.of("j2", "torque").label.unit == "N"
 
 
 def held(slide, half):
@@ -83,13 +83,12 @@ def test_ends_of_a_range(slide):
     ends = {end: found.of("j1", "position", end) for end in ("lower", "upper")}
     assert ends["lower"].derivative >= 0.0 >= ends["upper"].derivative
     assert min(entry.change(1.0) for entry in ends.values()) < -1e-3, "a wider range saves time"
-    assert ends["lower"].whole == pytest.approx(2.0 * half)
-    assert ends["lower"].unit == "m"
+    assert ends["lower"].bound.whole == pytest.approx(2.0 * half)
+    assert ends["lower"].label.unit == "m"
     for entry in ends.values():
-        wider = entry.raised(result.trajectory.robot.limits, 0, 0.5)
-        lower, upper = wider.position_lower[0], wider.position_upper[0]
-        expected = (-2.0 * half, half) if entry.end == "lower" else (-half, 2.0 * half)
-        assert (lower, upper) == pytest.approx(expected)
+        wider, column = entry.limit.relaxed(entry.bound, 0.5 * entry.bound.whole), entry.bound.column
+        ends_now = half * wider.lower[column], half * wider.upper[column]  # the rows count half ranges
+        assert ends_now == pytest.approx((-2.0 * half, half) if entry.bound.end == "lower" else (-half, 2.0 * half))
 
 
 @pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
@@ -134,7 +133,7 @@ def test_least_squares_agree_with_the_solver(scara, joint):
     assert (own.source, fitted.source) == ("solver", "least squares")
     assert max(own.residual, fitted.residual) < 1e-5
     for entry in sensitivities_at(problem, own).limits:
-        other = sensitivities_at(problem, fitted).of(entry.joint, entry.kind, entry.end)
+        other = sensitivities_at(problem, fitted).of(entry.label.subject, entry.label.kind, entry.bound.end)
         assert other.change(1.0) == pytest.approx(entry.change(1.0), rel=1e-4, abs=1e-6)
 
 
@@ -186,4 +185,4 @@ def test_branch_boundary_is_told_apart(scara):
     (boundary,) = found.boundaries
     wider = solver_named("uno")[0].solve(problem.with_margin(0.198), answer.x, SolverOptions(), None)
     assert boundary.derivative * 0.002 == pytest.approx(answer.objective - wider.objective, rel=0.1)
-    assert {entry.kind for entry in found.limits} <= {"torque", "velocity", "acceleration", "position"}
+    assert {entry.label.kind for entry in found.limits} <= {"torque", "velocity", "acceleration", "position"}

@@ -94,7 +94,7 @@ def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
     assert more[-1].objective < reports[-1].objective < report.objective
     assert reports[0] is report
     assert reports[-1].x.shape == (rough.variables,)
-    assert rough.excess(reports[-1].x).max() < 1e-5
+    assert rough.violation(reports[-1].x).max() < 1e-5
 
 
 def test_the_gain_of_a_doubling_ends_it(solved):

@@ -90,7 +90,7 @@ def test_resampled_keeps_the_meaning_of_x():
     matching = np.flatnonzero(np.isclose(problem.tau[:, None], tau[None], atol=1e-12).any(axis=1))
     assert len(shared) >= 2
     np.testing.assert_allclose(other.state(x).q[shared], problem.state(x).q[matching], atol=1e-12)
-    np.testing.assert_allclose(problem.excess_at(x, tau), other.excess(x), atol=1e-9)
+    np.testing.assert_allclose(problem.violation_at(x, tau), other.violation(x), atol=1e-9)
     assert len(other.rows(x)) == len(other.lower) == len(other.upper)
     assert len(other.jacobian(x)) == len(other.jacobian_rows)
     assert other.jacobian_rows.max() == len(other.lower) - 1

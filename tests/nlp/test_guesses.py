@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.nlp.guess import guesses, stretched, worst_timed_ratio
+from brachis.nlp.guess import guesses, stretched, worst_time_scaling_ratio
 from brachis.nlp.numeric_course import STRATEGIES, numeric_course
 from support.chains import planar_robot, transcription
 from support.transcriptions import CASES, problem_of
@@ -21,8 +21,8 @@ def test_guesses_are_reachable_and_slow_enough(case, intervals):
         assert x.shape == (problem.variables,)
         state = problem.state(x)
         for kind in ("torque", "velocity", "acceleration"):
-            (constraint,) = (c for c in problem.constraints if c.kind == kind)
-            assert np.abs(constraint.values(state)).max() <= 1.0
+            (limit,) = (each for each in problem.limits if each.kind == kind)
+            assert np.abs(limit.values(state)).max() <= 1.0
         part = problem.slices[0]
         assert np.all(np.diff(x[part]) >= 0.0)
         assert np.all((x[part] >= 0.0) & (x[part] <= 1.0))
@@ -63,14 +63,14 @@ def test_stretching_stops_at_the_limits():
     x = next(guesses(problem))
     fast = x.copy()
     fast[0] = 0.05
-    assert worst_timed_ratio(problem, fast) > 2.0
+    assert worst_time_scaling_ratio(problem, fast) > 2.0
     slow = stretched(problem, fast)
-    assert worst_timed_ratio(problem, slow) <= 1.0
+    assert worst_time_scaling_ratio(problem, slow) <= 1.0
     assert slow[0] > fast[0]
     # Not longer than about one step of the stretching beyond need.
     barely = slow.copy()
     barely[0] /= 1.5
-    assert worst_timed_ratio(problem, barely) > 1.0
+    assert worst_time_scaling_ratio(problem, barely) > 1.0
     np.testing.assert_array_equal(slow[1:], fast[1:])
     assert fast[0] == 0.05
 

@@ -48,7 +48,7 @@ def test_insertion_keeps_the_motion_and_rest(case, degree, rest):
         np.testing.assert_allclose(fine.motion(there).control_points, inserted.control_points, atol=1e-14)
         assert there[0] == x[0]
         between = 0.5 * (fine.tau[1:] + fine.tau[:-1])  # at knots a spline of degree 2 has two accelerations
-        np.testing.assert_allclose(fine.excess_at(there, between), problem.excess_at(x, between), atol=1e-9)
+        np.testing.assert_allclose(fine.violation_at(there, between), problem.violation_at(x, between), atol=1e-9)
 
 
 def test_a_feasible_motion_stays_feasible_at_old_points():
@@ -86,7 +86,7 @@ def test_points_move_with_the_knots():
     state = free.state(there)
     for mine, theirs in zip((state.y, state.ydot, state.yddot), motion.at(tau * motion.t_end), strict=True):
         np.testing.assert_allclose(mine, theirs, atol=1e-11 * max(1.0, np.abs(theirs).max()))
-    np.testing.assert_allclose(free.excess_at(there, tau), free.excess(there), atol=1e-9)
+    np.testing.assert_allclose(free.violation_at(there, tau), free.violation(there), atol=1e-9)
 
 
 def test_frozen():
@@ -96,7 +96,7 @@ def test_frozen():
     fixed, same = free.frozen(there)
     assert fixed.variables == problem.variables
     assert_same_motion(fixed.motion(same), free.motion(there))
-    np.testing.assert_allclose(fixed.excess(same), free.excess(there), atol=1e-9)
+    np.testing.assert_allclose(fixed.violation(same), free.violation(there), atol=1e-9)
     assert problem.frozen(x) == (problem, x)
 
 

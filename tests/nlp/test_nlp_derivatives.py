@@ -1,22 +1,22 @@
-"""The whole Jacobian of the nonlinear program against central differences, and its sparsity pattern."""
+"""The whole Jacobian of a program with every kind of limit, against central differences, and its sparsity pattern."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from brachis.nlp import constraints
+from brachis import limits
 from support.transcriptions import CASES, problem_of, reachable_points
 
-KINDS = ["torque", "velocity", "acceleration", "position", "branch_margin"]
+KINDS = ["torque", "velocity", "acceleration", "position", "tool_speed", "branch_margin"]
 
 
 def blocks(problem) -> dict[str, slice]:
-    """Rows of every kind of constraint, in the documented order."""
+    """Rows of every kind of limit, in the documented order."""
     result, first = {}, 0
-    for constraint in problem.constraints:
-        size = len(constraint.lower) * len(problem.tau)
-        result[constraint.kind] = slice(first, first + size)
+    for limit in problem.limits:
+        size = len(limit.lower) * len(problem.tau)
+        result[limit.kind] = slice(first, first + size)
         first += size
     result["progress"] = slice(first, first + problem.splines[0].free - 1)
     if len(problem.grid.total):
@@ -55,16 +55,20 @@ def test_jacobian_equals_differences(problem):
     parts = blocks(problem)
     assert list(parts) == [*KINDS, "progress", *(["lengths"] if len(problem.grid.total) else [])]
     assert list(parts.values())[-1].stop == len(problem.lower)
-    assert list(constraints.TABLE) == KINDS
+    assert list(limits.TABLE) == KINDS[:-1]
     for x in reachable_points(problem, 2):
         exact, expected = dense(problem, x), differences(problem, x)
         for kind, rows in parts.items():
             assert np.count_nonzero(exact[rows]) > 0, f"{kind} has no entries"
             scale = np.abs(expected[rows]).max()
-            error = np.abs(exact[rows] - expected[rows]).max() / scale
+            wrong = np.abs(exact[rows] - expected[rows]).max(axis=1)
+            if kind == "tool_speed":  # the direction of a tool that hardly moves turns within the difference's step
+                wrong = wrong[problem.rows(x)[rows] > 0.05]
+                assert len(wrong) > 0.4 * len(problem.tau)
+            error = wrong.max() / scale
             assert error <= 1e-6, f"{kind}: relative error {error:.1e}"
             # Every kind but positions and margins sees the end time.
-            timed = kind in ("torque", "velocity", "acceleration")
+            timed = kind in ("torque", "velocity", "acceleration", "tool_speed")
             assert bool(np.abs(exact[rows, 0]).max() > 1e-3) == timed
 
 
@@ -117,15 +121,15 @@ def test_rows_are_ratios_to_the_limits(problem):
 
 def test_one_sided_ranges_are_gaps_in_the_joints_own_unit():
     problem = problem_of("r1", position={"j1": [None, 2.9], "j2": [-3.0, None], "j3": None})
-    (constraint,) = (c for c in problem.constraints if c.kind == "position")
-    assert constraint.labels == ("j1", "j2")
+    (limit,) = (each for each in problem.limits if each.kind == "position")
+    assert [label.subject for label in limit.labels] == ["j1", "j2"]
     x = reachable_points(problem_of("r1"), 1)[0]
     state = problem.state(x)
-    values = constraint.values(state)
-    np.testing.assert_allclose(constraint.upper[0] - values[:, 0], 2.9 - state.q[:, 0], atol=1e-14)
-    np.testing.assert_allclose(values[:, 1] - constraint.lower[1], state.q[:, 1] + 3.0, atol=1e-14)
-    assert constraint.lower[0] == -np.inf
-    assert constraint.upper[1] == np.inf
+    values = limit.values(state)
+    np.testing.assert_allclose(limit.upper[0] - values[:, 0], 2.9 - state.q[:, 0], atol=1e-14)
+    np.testing.assert_allclose(values[:, 1] - limit.lower[1], state.q[:, 1] + 3.0, atol=1e-14)
+    assert limit.lower[0] == -np.inf
+    assert limit.upper[1] == np.inf
     rows = blocks(problem)["position"]
     np.testing.assert_allclose(dense(problem, x)[rows], differences(problem, x)[rows], atol=1e-9)
 

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 import brachis
+from brachis.limits.position import PositionLimit
 from support.transcriptions import problem_of, reachable_points
 
 NEAR = 2.0944 - 0.05  # rad; without a range joint 3 goes further
@@ -56,15 +57,14 @@ def test_a_range_of_a_micrometre(scara_urdf, half):
 
 
 @pytest.mark.parametrize("far", [1e4, 1e6, np.inf])
-def test_excess_is_in_rad_or_m_beyond_either_end(far):
+def test_violation_is_in_rad_or_m_beyond_either_end(far):
     problem = problem_of("r1")
-    x, limits = reachable_points(problem, 1)[0], problem.decomposition.robot.limits
-    q = problem.state(x).q
+    state, robot = problem.state(reachable_points(problem, 1)[0]), problem.decomposition.robot
+    q = state.q
     lower = np.array([q[:, 0].max() + 0.25, -np.inf, -3.0])
-    limited = problem.with_limits(replace(limits, position_lower=lower, position_upper=np.array([far, np.inf, 3.0])))
-    (constraint,) = (c for c in limited.constraints if c.kind == "position")
-    assert constraint.labels == ("j1", "j3")
-    place = sum(len(c.labels) for c in limited.constraints[: limited.constraints.index(constraint)])
-    excess = limited.excess(x)[:, place : place + 2]
-    np.testing.assert_allclose(excess[:, 0], lower[0] - q[:, 0], atol=1e-12)
-    np.testing.assert_allclose(excess[:, 1], np.maximum(-3.0 - q[:, 2], q[:, 2] - 3.0), atol=1e-12)
+    ranges = replace(robot.limits, position_lower=lower, position_upper=np.array([far, np.inf, 3.0]))
+    limit = PositionLimit(replace(robot, limits=ranges), np.array([0, 2]))
+    assert [label.subject for label in limit.labels] == ["j1", "j3"]
+    violation = limit.violation(limit.values(state))
+    np.testing.assert_allclose(violation[:, 0], lower[0] - q[:, 0], atol=1e-12)
+    np.testing.assert_allclose(violation[:, 1], np.maximum(-3.0 - q[:, 2], q[:, 2] - 3.0), atol=1e-12)

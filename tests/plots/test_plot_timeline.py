@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection, QuadMesh
 
-from brachis.bottleneck import saturations
+from brachis.bottleneck import limit_ratios, saturations
 from brachis.plots import plot_timeline
-from brachis.trajectory import limit_ratios
 
 
 def rows(ax):
@@ -23,8 +22,8 @@ def spans(ax):
 
 def test_a_row_for_every_limit_that_comes_near(line_trajectory):
     ax = plot_timeline(line_trajectory).axes[0]
-    peaks = {(entry.joint, entry.kind): entry.peak for entry in saturations(line_trajectory)}
-    expected = {f"{joint} {kind}" for (joint, kind), peak in peaks.items() if peak > 0.5}
+    peaks = {entry.label: entry.peak for entry in saturations(line_trajectory)}
+    expected = {str(label) for label, peak in peaks.items() if peak > 0.5}
     assert {"j1 torque", "j2 torque"} <= expected
     assert set(rows(ax)) == expected
     assert len(meshes(ax)) == len(expected)
@@ -40,7 +39,7 @@ def test_a_limit_that_stays_far_off_is_left_out(line_trajectory, with_limits):
 def test_colours_are_the_ratios(line_trajectory):
     ax = plot_timeline(line_trajectory).axes[0]
     ratios = limit_ratios(line_trajectory)
-    column = ratios.names.index(("torque", "j1"))
+    column = [str(label) for label in ratios.labels].index("j1 torque")
     drawn = meshes(ax)[rows(ax).index("j1 torque")].get_array().ravel()
     used = np.abs(ratios.values[:, column])
     np.testing.assert_allclose(drawn, 0.5 * (used[1:] + used[:-1]))
@@ -48,7 +47,7 @@ def test_colours_are_the_ratios(line_trajectory):
 
 def test_active_stretches_are_marked_where_they_are(line_trajectory):
     ax = plot_timeline(line_trajectory).axes[0]
-    (entry,) = [each for each in saturations(line_trajectory) if (each.joint, each.kind) == ("j1", "torque")]
+    (entry,) = [each for each in saturations(line_trajectory) if str(each.label) == "j1 torque"]
     assert entry.active
     drawn = spans(ax)[rows(ax).index("j1 torque")]
     np.testing.assert_allclose(sorted(drawn), [(stretch.begin, stretch.end) for stretch in entry.active])

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis.limits.joint_rate import build_acceleration, build_velocity
+from brachis.limits.torque import build as build_torque
 from brachis.robot import dynamics
-from brachis.search.phase_plane import least_time
+from brachis.search import phase_plane
 
 GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
 SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
@@ -19,6 +21,11 @@ S = np.linspace(0.0, 1.0, 201)
 def gantry(**limits: object) -> brachis.Robot:
     spec = {"torque": None, "velocity": None, "acceleration": None} | limits
     return brachis.Robot.from_urdf(GANTRY, gravity=[0, 0, 0], limits=brachis.LimitSpec(**spec))
+
+
+def least_time(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> float:
+    built = (build(robot, None) for build in (build_torque, build_velocity, build_acceleration))
+    return phase_plane.least_time([limit for limit in built if limit is not None], s, q)
 
 
 def course(distance: float) -> np.ndarray:

@@ -114,6 +114,7 @@ def transcription(
     redundant: Sequence[str],
     *,
     end: Sequence[float] | None = None,
+    tool_speed: float | None = None,
     **spline: Any,
 ) -> Transcription:
     """Problem of a task for a given robot; `spline` is the task's ``spline`` part."""
@@ -126,6 +127,7 @@ def transcription(
             "path": list(path),
             "redundant_joints": list(redundant),
             "spline": spline,
+            "tool_limits": {"speed": tool_speed},
         }
     )
     return transcribe(robot, task)[0]

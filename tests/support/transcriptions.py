@@ -1,4 +1,4 @@
-"""Transcriptions with every kind of constraint at once, for tests of the nonlinear program."""
+"""Transcriptions with every kind of limit at once, for tests of the nonlinear program."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def problem_of(case: str, *, end: list[float] | None = None, position: Any = FRO
     through = [[-0.05, 0.05, 0.1], [-0.1, 0.06, 0.15], [-0.13, 0.03, 0.2]]
     path = [{"spline": {"through": [point[: len(rows)] for point in through], "relative": True}}]
     settings = {"degree": 3, "intervals": 5, "points_per_interval": 2, **spline}
-    return transcription(robot, rows, path, start, redundant, end=end, **settings)
+    return transcription(robot, rows, path, start, redundant, end=end, tool_speed=2.0, **settings)
 
 
 def reachable_points(problem: Transcription, count: int, spread: float = 0.01) -> list[np.ndarray]:

@@ -115,7 +115,7 @@ def test_a_position_beyond_the_near_end_of_a_far_range(planned, joint, upper, fa
     limited = with_limits(planned, position_lower=low, position_upper=high)
     assert failed(limited) == {"position ratio"}
     check = ratio(limited, "position")
-    assert check.joint == planned.joint_names[joint]
+    assert check.subject == planned.joint_names[joint]
     assert check.value == pytest.approx(1.0 + beyond, abs=1e-6)
     assert not failed(with_limits(planned, position_lower=low - beyond, position_upper=high + beyond))
 

@@ -130,7 +130,7 @@ def test_limit(kind, quantity, sign, planned):
     verification = verify_trajectory(with_limits(mirrored, **{kind: limit}))
     check = next(check for check in verification.checks if check.name == f"{kind} ratio")
     assert not check.passed
-    assert check.joint == "j2"
+    assert check.subject == "j2"
     assert check.value == pytest.approx(1.001, abs=1e-4)
     assert verification.worst_ratio == check.value
     assert check.time == pytest.approx(np.argmax(values) / 5000 * planned.t_end, abs=0.02)
@@ -155,7 +155,7 @@ def test_position_limit(side, one_sided, planned):
     verification = verify_trajectory(with_limits(planned, **limits))
     assert failed(verification) == {"position ratio"}
     check = next(check for check in verification.checks if check.name == "position ratio")
-    assert check.joint == "j3"
+    assert check.subject == "j3"
     assert check.value == pytest.approx(1.0 + beyond, abs=1e-6)  # in rad, though the range is several rad wide
 
 

@@ -1,0 +1,115 @@
+"""The tool's speed, through all of it: task key, plan, refinement, verification, bottleneck, timeline."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import brachis
+from brachis.errors import TaskError
+from brachis.plots import plot_timeline
+from brachis.verify import verify_trajectory
+
+ROOT = Path(__file__).parents[2]
+CAP = 1.0
+
+
+@pytest.fixture(scope="module")
+def task():
+    found = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
+    return {**found, "tool_limits": {"speed": CAP}, "search": {"effort": "single"}}
+
+
+@pytest.fixture(scope="module")
+def result(task):
+    return brachis.plan(None, task)
+
+
+def speeds(trajectory, count=20_000):
+    """Speed of the tool by differences of its position over the saved motion, m/s."""
+    t = np.linspace(0.0, trajectory.t_end, count)
+    positions, _ = trajectory.robot.tool_placements(trajectory.at(t).q)
+    return np.linalg.norm(np.diff(positions, axis=0), axis=1) / np.diff(t)
+
+
+def test_the_cap_holds_everywhere_and_is_used(task, result):
+    free = brachis.plan(None, {**task, "tool_limits": {"speed": None}})
+    assert speeds(free.trajectory).max() > 2.0 * CAP, "without the cap the tool is much faster"
+    assert result.verified
+    assert speeds(result.trajectory).max() == pytest.approx(CAP, rel=1e-4)
+    assert result.t_end > free.t_end
+    ends, _ = result.trajectory.robot.tool_placements(result.trajectory.q[[0, -1]])
+    assert result.t_end > np.linalg.norm(ends[1] - ends[0]) / CAP
+
+
+def test_verification_finds_a_tool_that_is_too_fast_by_pinocchios_own_velocity(result):
+    check = {each.name: each for each in result.verification.checks}["tool speed ratio"]
+    assert (check.subject, check.unit, check.remark) == ("tool", "-", "")
+    assert check.value == pytest.approx(1.0, abs=1e-4)
+    tighter = result.task.model_copy(update={"tool_limits": brachis.task.ToolLimits(speed=CAP / 1.001)})
+    verification = verify_trajectory(dataclasses.replace(result.trajectory, task=tighter))
+    failed = [each for each in verification.checks if not each.passed]
+    assert [each.name for each in failed] == ["tool speed ratio"]
+    assert failed[0].value == pytest.approx(1.001, abs=1e-4)
+    model, data = result.trajectory.robot.model, result.trajectory.robot.model.createData()
+    state = result.trajectory.at(np.array([failed[0].time]))
+    pin.forwardKinematics(model, data, state.q[0], state.qdot[0])
+    frame = result.trajectory.robot.frame_id
+    velocity = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).linear
+    assert np.linalg.norm(velocity) * 1.001 / CAP == pytest.approx(failed[0].value, rel=1e-9)
+
+
+def test_sensitivity_is_within_5_percent_of_solving_again(result):
+    report = brachis.bottleneck.report(result, check=True)
+    entry = report.sensitivities.of("tool", "speed")
+    assert entry.change(0.1) < -0.03 * result.t_end
+    (checked,) = [each for each in report.check.entries if each.sensitivity.label.subject == "tool"]
+    assert checked.optimal
+    assert checked.deviation < 0.05
+    assert "10 % more speed at tool (0.1 m/s) saves" in str(report)
+    assert "tool is at its speed limit for" in str(report)
+
+
+def test_the_timeline_has_a_row(result):
+    labels = [label.get_text() for label in plot_timeline(result.trajectory).axes[0].get_yticklabels()]
+    assert "tool speed" in labels
+
+
+def test_a_saved_motion_remembers(result, tmp_path):
+    result.trajectory.save(tmp_path / "motion.npz")
+    loaded = brachis.Trajectory.load(tmp_path / "motion.npz")
+    assert loaded.task.tool_limits.speed == CAP
+    assert verify_trajectory(loaded).passed
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0, "fast", 1e-9, [1.0]])
+def test_what_is_no_speed_is_refused(task, wrong):
+    with pytest.raises(TaskError) as caught:
+        brachis.load_task({**task, "tool_limits": {"speed": wrong}})
+    assert "tool_limits.speed" in str(caught.value)
+
+
+@pytest.mark.parametrize("rows", [["x", "y"], ["x"]])
+def test_rows_that_leave_a_direction_free_count_the_whole_speed(rows):
+    """With only x prescribed the tool may move along y; the cap is on its speed in space."""
+    task = {
+        "brachis": 1,
+        "robot": {
+            "urdf": str(ROOT / "robots/scara3/robot.urdf"),
+            "tool_frame": "tool",
+            "gravity": [0, 0, 0],
+            "limits": {"torque": 10, "velocity": None},
+        },
+        "start": {"joints": [0.5, -2.0, 2.0]},
+        "task_space": rows,
+        "path": [{"line": {"by": [-0.5, 0.3][: len(rows)]}}],
+        "tool_limits": {"speed": 0.4},
+        "search": {"effort": "single"},
+    }
+    result = brachis.plan(None, task)
+    assert result.verified
+    assert speeds(result.trajectory).max() <= 0.4 * (1.0 + 1e-4)
