@@ -49,7 +49,7 @@ class BranchMargin(Limit):
         return Partials(q=self._joint_map.branch_margin_gradient(motion.q))
 
 
-def build(joint_map: JointMap, margin: float = MARGIN) -> BranchMargin | None:
-    """Build the limit where the joint map has margins."""
+def build(joint_map: JointMap, margin: float = MARGIN) -> tuple[BranchMargin, ...]:
+    """Build the limit, where the joint map has margins: what keeps the motion where it can be computed."""
     at_start = joint_map.branch_margins(joint_map.start[None])[0]
-    return BranchMargin(joint_map, at_start, margin) if len(at_start) else None
+    return (BranchMargin(joint_map, at_start, margin),) if len(at_start) else ()

@@ -60,7 +60,7 @@ class Phase:
 
     def __init__(self, joint_map: JointMap, limits: Sequence[Limit], grid: Grid, boundary: Boundary) -> None:
         self.joint_map = joint_map
-        self.limits = (*limits, *safeguards_of(joint_map, MARGIN))
+        self.limits = (*limits, *branch_margin.build(joint_map, MARGIN))
         self._lay_out(grid, boundary)
 
     def _lay_out(self, grid: Grid, boundary: Boundary) -> None:
@@ -117,7 +117,12 @@ class Phase:
     def with_margin(self, margin: float) -> Phase:
         """Return the same phase with another least branch margin; x keeps its meaning."""
         own = tuple(limit for limit in self.limits if limit.role is not Role.SAFEGUARD)
-        return self.with_limits((*own, *safeguards_of(self.joint_map, margin)))
+        return self.with_limits((*own, *branch_margin.build(self.joint_map, margin)))
+
+    @property
+    def variables(self) -> int:
+        """Number of variables."""
+        return len(self.x_lower)
 
     @property
     def degree(self) -> int:
@@ -249,9 +254,3 @@ class Phase:
         if self._entries is None or self._entries[0] is not basis:
             self._entries = basis, [places.entries(basis.values) for places in self._places]
         return self._entries[1]
-
-
-def safeguards_of(joint_map: JointMap, margin: float) -> tuple[Limit, ...]:
-    """Build what keeps the motion where the joint map can be computed."""
-    built = branch_margin.build(joint_map, margin)
-    return () if built is None else (built,)

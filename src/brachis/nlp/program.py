@@ -43,7 +43,7 @@ class Program:
 
     def __init__(self, phases: Iterable[Phase], links: Sequence[Link] = ()) -> None:
         self.phases, self.links = tuple(phases), tuple(links)
-        first = np.cumsum([0, *(len(phase.x_lower) for phase in self.phases)]).tolist()
+        first = np.cumsum([0, *(phase.variables for phase in self.phases)]).tolist()
         self._parts = [slice(a, b) for a, b in itertools.pairwise(first)]
         self._durations = first[:-1]
         self.x_lower = np.concatenate([phase.x_lower for phase in self.phases])
@@ -51,9 +51,8 @@ class Program:
         joined = np.zeros(sum(len(link.joints) for link in self.links))
         self.lower = np.concatenate([*(phase.lower for phase in self.phases), joined])
         self.upper = np.concatenate([*(phase.upper for phase in self.phases), joined])
-        patterns = [
-            (phase.jacobian_rows, phase.jacobian_columns + a) for phase, a in zip(self.phases, first[:-1], strict=True)
-        ]
+        pairs = zip(self.phases, first[:-1], strict=True)
+        patterns = [(phase.jacobian_rows, phase.jacobian_columns + a) for phase, a in pairs]
         patterns += [link.pattern(self.phases, first) for link in self.links]
         heights = [*(len(phase.lower) for phase in self.phases), *(len(link.joints) for link in self.links)]
         self._first_rows = np.cumsum([0, *heights[:-1]]).tolist()
