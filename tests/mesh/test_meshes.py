@@ -239,4 +239,4 @@ def test_settings_choose_what_is_done(solved):
 
 def test_auto_begins_coarse():
     program, _ = brachis.transcribe(robot(), task(intervals="auto"))
-    assert len(program.breaks) - 1 == 10
+    assert program.intervals == 10
