@@ -9,11 +9,17 @@ import math
 from pathlib import Path
 
 from brachis import LimitSpec, Robot, load_task, transcribe
-from brachis.nlp.guess import guesses
+from brachis.nlp.guess import starting_point
+from brachis.nlp.numeric_course import numeric_courses
 from brachis.solvers import SolverOptions, solver_named
 
 ROOT = Path(__file__).parents[1]
 INTERVALS = (10, 20, 50, 100, 200)
+
+
+def first_point(program):
+    """Start from the first course of numeric inverse kinematics."""
+    return starting_point(program, [next(numeric_courses(program.phases[0].joint_map))])
 
 
 def main() -> None:
@@ -35,13 +41,14 @@ def main() -> None:
             }
         )
         for name in ("uno", "ipopt"):
-            problem, _ = transcribe(robot, task)
-            x = next(guesses(problem))
-            before = problem.evaluations["states"]
-            report = solver_named(name)[0].solve(problem, x, SolverOptions(time_limit=120.0), None)
+            program, _ = transcribe(robot, task)
+            x = first_point(program)
+            counts = program.phases[0].evaluations
+            before = counts["states"]
+            report = solver_named(name)[0].solve(program, x, SolverOptions(time_limit=120.0), None)
             print(
-                f"| {intervals} | {problem.variables} | {len(problem.lower)} | {name} | {report.objective:.4f} s "
-                f"| {report.iterations} | {problem.evaluations['states'] - before} | {1e3 * report.wall_time:.0f} ms "
+                f"| {intervals} | {program.variables} | {len(program.lower)} | {name} | {report.objective:.4f} s "
+                f"| {report.iterations} | {counts['states'] - before} | {1e3 * report.wall_time:.0f} ms "
                 f"| {report.status.name.lower()} |",
                 flush=True,
             )

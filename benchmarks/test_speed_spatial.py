@@ -13,11 +13,17 @@ import pytest
 
 from brachis import Robot, TaskSpace, ik, load_task, plan, transcribe
 from brachis.ik.eaik import eaik
-from brachis.nlp.guess import guesses
+from brachis.nlp.guess import starting_point
+from brachis.nlp.numeric_course import numeric_courses
 from brachis.solvers import SolverOptions, solver_named
 
 ROOT = Path(__file__).parents[1]
 POSES = 2000
+
+
+def first_point(program):
+    """Start from the first course of numeric inverse kinematics."""
+    return starting_point(program, [next(numeric_courses(program.phases[0].joint_map))])
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +40,8 @@ def test_plan_solved_once(benchmark, tx90l, task):
     """Transcribe, guess and solve at N = 20: no refinement, no verification."""
 
     def solve():
-        problem, _ = transcribe(tx90l, task)
-        return solver_named("uno")[0].solve(problem, next(guesses(problem)), SolverOptions(), None)
+        program, _ = transcribe(tx90l, task)
+        return solver_named("uno")[0].solve(program, first_point(program), SolverOptions(), None)
 
     assert benchmark(solve).status.usable
 
@@ -52,16 +58,16 @@ def test_plan_refined_and_verified(benchmark, tx90l, task, joint, effort):
 @pytest.mark.parametrize("part", ["rows", "Jacobian"])
 def test_evaluation(benchmark, tx90l, task, part):
     """Rows, or the whole Jacobian once the rows are known, at K = 61."""
-    problem, _ = transcribe(tx90l, task)
-    assert len(problem.tau) == 61
-    x = next(guesses(problem))
+    program, _ = transcribe(tx90l, task)
+    assert program.collocation_points == 61
+    x = first_point(program)
 
     def another():
         x[0] += 1e-9  # another x every time, so that nothing is reused
         if part == "Jacobian":
-            problem.rows(x)
+            program.rows(x)
 
-    benchmark.pedantic(lambda: problem.rows(x) if part == "rows" else problem.jacobian(x), setup=another, rounds=200)
+    benchmark.pedantic(lambda: program.rows(x) if part == "rows" else program.jacobian(x), setup=another, rounds=200)
 
 
 def poses(robot, task_space):

@@ -12,10 +12,10 @@ import pytest
 
 import brachis
 from brachis.errors import StartError
-from brachis.nlp.guess import guesses
 from brachis.refine import RefinementOptions, refine
 from brachis.search.solving import MARGINS, continued
 from brachis.solvers import SolverOptions, SolveStatus, solver_named
+from support.starts import starting_points
 
 ROOT = Path(__file__).parents[1]
 SCARA = ROOT / "robots/scara3/robot.urdf"
@@ -38,8 +38,8 @@ def robot(torque: float = 10.0, **options) -> brachis.Robot:
     return brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=limits, **options)
 
 
-def solve_with_uno(problem, x):
-    return solver_named("uno")[0].solve(problem, x, SolverOptions(), None)
+def solve_with_uno(program, x):
+    return solver_named("uno")[0].solve(program, x, SolverOptions(), None)
 
 
 def test_saved_result_keeps_the_robot_that_was_planned_for(tmp_path):
@@ -59,35 +59,36 @@ def test_task_of_the_result_repeats_the_plan():
 
 
 def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_refined_one_does_not():
-    problem, _ = brachis.transcribe(robot(), brachis.load_task(task(redundant_joints=["j1"])))
-    first = solve_with_uno(problem, next(guesses(problem)))
-    dense = problem.resampled(np.linspace(0.0, 1.0, 2001))
-    assert problem.violation(first.x).max() < 1e-6
+    program, _ = brachis.transcribe(robot(), brachis.load_task(task(redundant_joints=["j1"])))
+    first = solve_with_uno(program, next(starting_points(program)))
+    (phase,) = program.phases
+    dense = phase.resampled(np.linspace(0.0, 1.0, 2001))
+    assert phase.violation(first.x).max() < 1e-6
     assert dense.violation(first.x).max() > 0.01
-    refined = refine(problem, first, solve_with_uno, RefinementOptions())
+    refined = refine(program, first, solve_with_uno, RefinementOptions())
     assert dense.violation(refined.x).max() <= 1e-4
-    assert refined.x[0] > first.x[0]
+    assert refined.t_end > first.objective
 
 
 def test_without_refinement_the_answer_is_left_as_it_is():
     result = brachis.plan(robot(), task(redundant_joints=["j1"], refinement={"max_rounds": 0}))
     assert not result.verified
     assert result.verification.worst_ratio > 1.01
-    assert result.attempt.stretched == 1.0
+    assert result.attempt.time_scaled == 1.0
     assert len(result.attempts) == 1
 
 
 def test_margins_that_change_nothing_are_not_solved_again():
     gantry = brachis.Robot.from_urdf(ROOT / "robots/gantry2/robot.urdf")
     line = {"path": [{"line": {"by": [0.5, 0.2]}}], "start": {"joints": [0.0, 0.0]}, "redundant_joints": []}
-    problem, _ = brachis.transcribe(gantry, brachis.load_task(task(**line)))
+    program, _ = brachis.transcribe(gantry, brachis.load_task(task(**line)))
     solves = []
 
     def fail(tried, x):
         solves.append(tried)
         return solver_named("uno")[0].solve(tried, x, SolverOptions(max_iterations=1), None)
 
-    continued(problem, next(guesses(problem)), fail, MARGINS)
+    continued(program, next(starting_points(program)), fail, MARGINS)
     assert len(solves) == 1
 
 
@@ -153,8 +154,8 @@ def test_full_turns_are_counted_even_between_few_points(lower):
 @pytest.mark.parametrize("name", ["uno", "ipopt", "slsqp"])
 def test_ctrl_c_reaches_the_user(name):
     """A real signal while the solver works."""
-    problem, _ = brachis.transcribe(robot(), brachis.load_task(task(spline={"intervals": 60})))
-    x = next(guesses(problem))
+    program, _ = brachis.transcribe(robot(), brachis.load_task(task(spline={"intervals": 60})))
+    x = next(starting_points(program))
     solver = solver_named(name)[0]
     handler = signal.getsignal(signal.SIGINT)
     iterations = []
@@ -165,7 +166,7 @@ def test_ctrl_c_reaches_the_user(name):
             os.kill(os.getpid(), signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
-        solver.solve(problem, x, SolverOptions(), progress)
+        solver.solve(program, x, SolverOptions(), progress)
     assert iterations == [1, 2, 3]
     assert signal.getsignal(signal.SIGINT) is handler
 
@@ -187,5 +188,5 @@ def test_a_blend_of_millimetres_is_not_stepped_over(scara_urdf, size):
     }
     result = brachis.plan(scara_urdf, task)
     assert result.verified
-    breaks = brachis.transcribe(result.trajectory.robot, result.task)[0].decomposition.path.breaks
+    breaks = brachis.transcribe(result.trajectory.robot, result.task)[0].phases[0].joint_map.path.breaks
     assert np.diff(breaks).min() < size / 0.3

@@ -81,7 +81,7 @@ def test_task_file_of_the_readme_is_planned(clone):
     result = brachis.plan(None, clone / "task.yaml")
     assert result.verified
     # The corner of 90 degrees is rounded: the path is shorter than its two legs.
-    assert 0.9 < brachis.transcribe(result.trajectory.robot, result.task)[0].decomposition.path.length < 1.0
+    assert 0.9 < brachis.transcribe(result.trajectory.robot, result.task)[0].phases[0].joint_map.path.length < 1.0
 
 
 def test_example_01_python(capsys):

@@ -11,13 +11,13 @@ from threadpoolctl import ThreadpoolController
 from brachis import ik, plausibility
 from brachis.custom_limits import LimitModel
 from brachis.deadline import Deadline
-from brachis.nlp import Transcription
+from brachis.nlp import Program
 from brachis.nlp.layout import SHORTEST_TIME
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.combine import robot_for
 from brachis.search import Listener, find_fastest, first_start
-from brachis.setting import Setting, choices, intervals_of, transcription
+from brachis.setting import Setting, breaks_of, choices, program_of
 from brachis.task import Task, load_task
 
 
@@ -119,7 +119,7 @@ def _plan(
 
 def transcribe(
     robot: Robot, task: Task, *, families: Sequence[ik.Family] = (), limits: Sequence[LimitModel] = ()
-) -> tuple[Transcription, str]:
+) -> tuple[Program, str]:
     """Turn a task into an NLP that can be inspected and solved.
 
     Parameters
@@ -134,7 +134,7 @@ def transcribe(
 
     Returns
     -------
-    problem : Transcription
+    program : Program
     family : str
         Family of the closed form.
 
@@ -146,5 +146,5 @@ def transcribe(
     setting = Setting.of(robot_for(robot, task.robot), task, limits)
     choice = choices(setting, families)[0]
     decomposition = choice.decomposition(*first_start(choice))
-    problem = transcription(setting, decomposition, intervals_of(task))
-    return problem, choice.match.family
+    program = program_of(setting, decomposition, breaks_of(task))
+    return program, choice.match.family

@@ -26,15 +26,15 @@ class Attempt:
         Of all solves: with ever smaller branch margins, then of the refinement rounds.
     refinement_rounds : int
         How many of them were refinement rounds.
-    excess : float
-        Largest excess over a limit on the dense grid, as a fraction.
-    stretched : float
+    violation : float
+        Largest violation of a limit on the dense grid, as a fraction.
+    time_scaled : float
         Factor by which the end time was lengthened at the very end.
     collocation_points : int
     outcome : str
         In plain words.
     refined : Refined or None
-        The last problem, its answer and its multipliers; None where nothing was solved.
+        The last program, its answer and its multipliers; None where nothing was solved.
     undone : str
         What the time, or a solve that failed, left undone, in words; empty where nothing.
     """
@@ -43,8 +43,8 @@ class Attempt:
     guess: int
     reports: tuple[SolverReport, ...]
     refinement_rounds: int
-    excess: float
-    stretched: float
+    violation: float
+    time_scaled: float
     collocation_points: int
     outcome: str
     refined: Refined | None = None
@@ -167,7 +167,7 @@ class Result:
             "iterations": sum(report.iterations for report in last.reports),
             "refinement_rounds": last.refinement_rounds,
             "collocation_points": last.collocation_points,
-            "stretched": last.stretched,
+            "time_scaled": last.time_scaled,
             "attempts": [attempt.outcome for attempt in self.attempts],
             "candidates": [candidate.to_dict() for candidate in self.candidates],
             "interrupted": self.interrupted,

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis import ik
-from brachis.bspline import clamped_uniform_knots
+from brachis.bspline import clamped_knots, spread
 from brachis.custom_limits import LimitModel
 from brachis.errors import DecompositionError, StartError, UnknownNameError
 from brachis.feasibility import branch_of, check_end_branch, check_postures
 from brachis.kinematics import Decomposition
 from brachis.limits import Limit, limits_of
 from brachis.mesh import COARSE_INTERVALS
-from brachis.nlp import Transcription
+from brachis.nlp import Boundary, FixedGrid, Phase, Program
 from brachis.path import Path, path_of
 from brachis.robot import ROLL_JOINT, Robot, TaskSpace, bind
 from brachis.task import Task
@@ -189,38 +189,31 @@ def _choice(setting: Setting, match: ik.Match) -> Choice:
     return Choice(setting, match, redundant, first)
 
 
-def transcription(setting: Setting, decomposition: Decomposition, intervals: int) -> Transcription:
-    """Write the NLP of a decomposition down, with uniform knots.
+def program_of(setting: Setting, decomposition: Decomposition, breaks: np.ndarray) -> Program:
+    """Write the NLP of a decomposition down: one phase, along the path.
 
     Parameters
     ----------
     setting : Setting
     decomposition : Decomposition
         Beginning at the task's start posture, or at a first guess of it where that is free.
-    intervals : int
+    breaks : (N + 1,) ndarray
+        Ends of the knot intervals in normalised time.
 
     Returns
     -------
-    Transcription
+    Program
     """
-    spline = setting.task.spline
-    return Transcription(
-        decomposition,
-        setting.limits,
-        degree=spline.degree,
-        knots=clamped_uniform_knots(spline.degree, intervals),
-        derivatives_at_rest=derivatives_at_rest(setting.task),
-        tau=np.linspace(0.0, 1.0, spline.points_per_interval * intervals + 1),
-        end=setting.end,
-        start_free=setting.start is None,
+    spline, free = setting.task.spline, np.full(setting.robot.n, np.nan)
+    start, end = (free if posture is None else posture for posture in (setting.start, setting.end))
+    boundary = Boundary(
+        decomposition.coordinates(0.0, start), decomposition.coordinates(1.0, end), 2 if spline.rest == "full" else 1
     )
+    grid = FixedGrid(clamped_knots(spline.degree, breaks), spline.degree, spread(breaks, spline.points_per_interval))
+    return Program([Phase(decomposition, setting.limits, grid, boundary)])
 
 
-def intervals_of(task: Task) -> int:
-    """Return the task's number of intervals; of the first mesh where it is left open."""
-    return COARSE_INTERVALS if task.spline.intervals == "auto" else task.spline.intervals
-
-
-def derivatives_at_rest(task: Task) -> int:
-    """Return how many time derivatives of the joint positions vanish at both ends."""
-    return 2 if task.spline.rest == "full" else 1
+def breaks_of(task: Task) -> np.ndarray:
+    """Return the ends of the task's uniform intervals, (N + 1,); of the first mesh where their number is left open."""
+    intervals = COARSE_INTERVALS if task.spline.intervals == "auto" else task.spline.intervals
+    return np.linspace(0.0, 1.0, intervals + 1)

@@ -56,16 +56,17 @@ def test_a_wrong_prediction_is_found(scara):
 
 def test_a_relaxed_limit_leaves_all_others_as_they_are(scara):
     refined = scara("j1").attempt.refined
-    problem, x = refined.problem, refined.x
+    program, x = refined.program, refined.x
     entry = sensitivities(refined).of("j2", "torque")
-    other = problem.relaxed(entry.limit, entry.bound, 0.25 * entry.bound.whole)
-    np.testing.assert_array_equal(other.rows(x), problem.rows(x))
-    torque = slice(0, 3 * len(problem.tau))
-    for mine, theirs, bound in ((problem.lower, other.lower, -1.0), (problem.upper, other.upper, 1.0)):
-        np.testing.assert_allclose(theirs[torque].reshape(-1, 3) / bound, [[1.0, 1.25, 1.0]] * len(problem.tau))
+    other = program.relaxed(entry.limit, entry.bound, 0.25 * entry.bound.whole)
+    np.testing.assert_array_equal(other.rows(x), program.rows(x))
+    count = program.collocation_points
+    torque = slice(0, 3 * count)
+    for mine, theirs, bound in ((program.lower, other.lower, -1.0), (program.upper, other.upper, 1.0)):
+        np.testing.assert_allclose(theirs[torque].reshape(-1, 3) / bound, [[1.0, 1.25, 1.0]] * count)
         np.testing.assert_array_equal(theirs[torque.stop :], mine[torque.stop :])
-    assert other.guards == problem.guards
-    assert problem.upper[torque].max() == 1.0, "the problem itself keeps its limits"
+    assert other.safeguard_bounds == program.safeguard_bounds
+    assert program.upper[torque].max() == 1.0, "the program itself keeps its limits"
 
 
 def test_report_needs_the_solved_problem(scara):
@@ -100,10 +101,10 @@ def test_a_step_into_another_valley_is_no_change_by_the_limit(scara, monkeypatch
     refined = scara("j3").attempt.refined
     honest, valley = check._solved_again, 2e-3
 
-    def wandering(problem, x):
+    def wandering(program, x):
         """Find an optimum that is faster by `valley`, whatever the limits, once a limit has been raised."""
-        answer, optimal = honest(problem, x)
-        if problem is not refined.problem or x[0] < refined.reports[-1].x[0] - valley:
+        answer, optimal = honest(program, x)
+        if program is not refined.program or x[0] < refined.reports[-1].x[0] - valley:
             answer = answer.copy()
             answer[0] -= valley
         return answer, optimal
@@ -123,9 +124,9 @@ def test_a_raised_limit_that_no_solver_copes_with_leaves_the_answer(scara, monke
         name = "broken"
 
         @staticmethod
-        def solve(problem, x, options, progress):
-            answer = solver_named("uno")[0].solve(problem, x, options, progress)
-            broken = problem.limits is not refined.problem.limits
+        def solve(program, x, options, progress):
+            answer = solver_named("uno")[0].solve(program, x, options, progress)
+            broken = program.limits != refined.program.limits
             return dataclasses.replace(answer, violation=np.inf) if broken else answer
 
     monkeypatch.setattr(check, "solver_named", lambda _name: (Broken,))

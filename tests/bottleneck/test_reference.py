@@ -27,8 +27,8 @@ def test_planar_line(scara):
     reference = report.reference
     assert 2.32 < reference.t_end < 2.34
     assert reference.intervals == 100
-    motion, decomposition = reference.refined.problem.motion(reference.refined.x), scara("j3").attempt.refined.problem
-    decomposition = decomposition.decomposition
+    (motion,) = reference.refined.program.motions(reference.refined.x)
+    decomposition = scara("j3").attempt.refined.program.phases[0].joint_map
     t = np.sort(np.random.default_rng(3).uniform(0.0, motion.t_end, 4000))
     state = decomposition.state(*motion.at(t), t=t)
     torque = dynamics.torque(decomposition.robot, state.q, state.qdot, state.qddot)
@@ -53,9 +53,9 @@ def test_end_posture_is_kept(slide):
     from brachis.bottleneck.reference import _on_mesh  # noqa: PLC0415
 
     free = slide(((1.0, 0.0, 0.0),) * 2, ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits})
-    assert free.attempt.refined.problem.end is None
+    np.testing.assert_array_equal(free.attempt.refined.program.phases[0].boundary.end, [1.0, np.nan])
     task = free.task.to_dict()
     task["end"] = {"joints": [0.1, LENGTH - 0.1]}
     given, _ = brachis.transcribe(free.trajectory.robot, brachis.load_task(task))
-    fine = _on_mesh(given, 3, 40)
+    fine = _on_mesh(given.phases[0], 3, 40)
     assert fine.motion(np.zeros(fine.variables) + 0.5).control_points[1, -1] == 0.1

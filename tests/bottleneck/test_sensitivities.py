@@ -106,8 +106,8 @@ def test_control_points_near_zero_on_a_fine_mesh_do_not_press(scara):
     task["spline"]["intervals"] = "auto"
     result = brachis.plan(scara("j1").trajectory.robot, task)
     refined = result.attempt.refined
-    problem, x = refined.problem, refined.reports[-1].x
-    assert 0.0 < x[problem.slices[0]][0] < 1e-5, "else this tests nothing"
+    program, x = refined.program, refined.reports[-1].x
+    assert 0.0 < x[program.phases[0].slices[0]][0] < 1e-5, "else this tests nothing"
     found = sensitivities(refined)
     assert sum(entry.change(1.0) for entry in found.limits) == pytest.approx(-0.5 * x[0], rel=1e-4)
 
@@ -118,22 +118,22 @@ def test_rows_that_nothing_can_change_do_not_press(slide, end):
     lower, upper = sorted((0.0, end * 0.5))
     limits = {"torque": {"j1": 30.0}, "position": {"j1": [lower, upper]}}
     refined = slide((X, X), ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits}).attempt.refined
-    problem, x = refined.problem, refined.reports[-1].x
-    pushes = Pushes.at(problem, x, 1e-5)
+    program, x = refined.program, refined.reports[-1].x
+    pushes = Pushes.at(program, x, 1e-5)
     assert np.abs(pushes.slopes).max(axis=1).min() > 0.0
-    at_start = np.flatnonzero(np.minimum(problem.rows(x) - problem.lower, problem.upper - problem.rows(x)) == 0.0)
+    at_start = np.flatnonzero(np.minimum(program.rows(x) - program.lower, program.upper - program.rows(x)) == 0.0)
     assert set(at_start) - set(pushes.rows), "some row should hold without pressing"
 
 
 @pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
 def test_least_squares_agree_with_the_solver(scara, joint):
     refined = scara(joint).attempt.refined
-    problem, report = refined.problem, refined.reports[-1]
-    own, fitted = multipliers_of(problem, report.x, report.multipliers), multipliers_of(problem, report.x)
+    program, report = refined.program, refined.reports[-1]
+    own, fitted = multipliers_of(program, report.x, report.multipliers), multipliers_of(program, report.x)
     assert (own.source, fitted.source) == ("solver", "least squares")
     assert max(own.residual, fitted.residual) < 1e-5
-    for entry in sensitivities_at(problem, own).limits:
-        other = sensitivities_at(problem, fitted).of(entry.label.subject, entry.label.kind, entry.bound.end)
+    for entry in sensitivities_at(program, own).limits:
+        other = sensitivities_at(program, fitted).of(entry.label.subject, entry.label.kind, entry.bound.end)
         assert other.change(1.0) == pytest.approx(entry.change(1.0), rel=1e-4, abs=1e-6)
 
 
@@ -158,7 +158,7 @@ def test_an_answer_that_is_no_optimum_is_told(scara):
 def test_multipliers_of_wrong_sign_are_not_believed(scara):
     refined = scara("j3").attempt.refined
     report = refined.reports[-1]
-    wrong = multipliers_of(refined.problem, report.x, -report.multipliers)
+    wrong = multipliers_of(refined.program, report.x, -report.multipliers)
     assert wrong.source == "least squares"
     assert wrong.residual < 1e-5
 
@@ -177,12 +177,12 @@ def test_two_rows_that_hold_alike_give_way_together_only():
 
 def test_branch_boundary_is_told_apart(scara):
     refined = scara("j3").attempt.refined
-    problem, report = refined.problem, refined.reports[-1]
-    tight = problem.with_margin(0.2)
+    program, report = refined.program, refined.reports[-1]
+    tight = program.with_margin(0.2)
     answer = solver_named("uno")[0].solve(tight, report.x, SolverOptions(), None)
     assert answer.objective > report.objective + 1e-4
     found = sensitivities_at(tight, multipliers_of(tight, answer.x, answer.multipliers))
     (boundary,) = found.boundaries
-    wider = solver_named("uno")[0].solve(problem.with_margin(0.198), answer.x, SolverOptions(), None)
+    wider = solver_named("uno")[0].solve(program.with_margin(0.198), answer.x, SolverOptions(), None)
     assert boundary.derivative * 0.002 == pytest.approx(answer.objective - wider.objective, rel=0.1)
     assert {entry.label.kind for entry in found.limits} <= {"torque", "velocity", "acceleration", "position"}

@@ -170,13 +170,13 @@ def test_json_knows_no_nan(run, task, write, tmp_path, monkeypatch):
 def test_lengthened_end_time_is_said(run, task, write, monkeypatch):
     honest = planner.plan
 
-    def lengthened(*arguments, stretched, **options):
+    def lengthened(*arguments, time_scaled, **options):
         result = honest(*arguments, **options)
-        attempts = tuple(replace(attempt, stretched=stretched) for attempt in result.attempts)
+        attempts = tuple(replace(attempt, time_scaled=time_scaled) for attempt in result.attempts)
         return replace(result, attempts=attempts)
 
-    for stretched, expected in ((1.0, False), (1.00004, True)):
-        monkeypatch.setattr(planner, "plan", partial(lengthened, stretched=stretched))
+    for time_scaled, expected in ((1.0, False), (1.00004, True)):
+        monkeypatch.setattr(planner, "plan", partial(lengthened, time_scaled=time_scaled))
         text = run("plan", write(task)).out
         assert ("end time lengthened by" in text) is expected
         assert ("0.004 % to meet the limits between collocation points" in text) is expected

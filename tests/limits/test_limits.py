@@ -10,7 +10,7 @@ import pytest
 
 from brachis.limits import TABLE, Moments, limits_of
 from support.chains import planar_robot
-from support.transcriptions import FRICTION
+from support.phases import FRICTION
 
 ROBOT = planar_robot("RRP", "xz", friction={**FRICTION, "viscous": 1.0})
 TASK = SimpleNamespace(tool_limits=SimpleNamespace(speed=0.7), custom_limits={})

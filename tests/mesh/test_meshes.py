@@ -11,10 +11,10 @@ import pytest
 import brachis
 from brachis.deadline import Deadline
 from brachis.mesh import MeshOptions, coarsest, free_knots, freeing, grow, refine_mesh, settle_knots
-from brachis.nlp.guess import guesses
 from brachis.refine import RefinementOptions, refine
 from brachis.solvers import SolverOptions, SolveStatus, solver_named
 from brachis.task import SplineSettings
+from support.starts import starting_points
 
 SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
 FINE = {("j1", "velocity"): 2.1207, ("j1", "full"): 2.1309}
@@ -38,20 +38,20 @@ def robot() -> brachis.Robot:
     return brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=brachis.LimitSpec(torque=10.0, velocity=None))
 
 
-def solve(problem, x):
-    return solver_named("uno")[0].solve(problem, x, SolverOptions(), None)
+def solve(program, x):
+    return solver_named("uno")[0].solve(program, x, SolverOptions(), None)
 
 
 @pytest.fixture
 def solved():
     """Problem of 10 even intervals, and its solve."""
-    problem, _ = brachis.transcribe(robot(), task(intervals=10))
-    return problem, solve(problem, next(guesses(problem)))
+    program, _ = brachis.transcribe(robot(), task(intervals=10))
+    return program, solve(program, next(starting_points(program)))
 
 
-def failing(problem, x):
+def failing(program, x):
     """A solver that breaks down."""
-    return dataclasses.replace(solve(problem, x), status=SolveStatus.FAILED, violation=np.inf)
+    return dataclasses.replace(solve(program, x), status=SolveStatus.FAILED, violation=np.inf)
 
 
 @pytest.mark.parametrize(("joint", "intervals", "longest"), [("j1", 8, 2.285), ("j1", 12, 2.185), ("j3", 12, 2.38)])
@@ -77,137 +77,138 @@ def test_auto_is_within_half_a_percent_of_a_fine_mesh(rest):
 
 
 def test_intervals_are_refined_where_the_motion_switches(solved):
-    problem, report = solved
-    finer, *_ = refine_mesh(problem, report, solve, MeshOptions(tolerance=0.02), RefinementOptions())
-    lengths = np.diff(finer.breaks)
+    program, report = solved
+    finer, *_ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.02), RefinementOptions())
+    lengths = np.diff(finer.phases[0].breaks)
     assert len(lengths) < 60
     assert lengths.max() >= 4.0 * lengths.min()
     np.testing.assert_allclose(lengths[[0, -1]], lengths.min(), rtol=1e-9)
-    assert set(np.round(problem.breaks, 12)) <= set(np.round(finer.breaks, 12))
+    assert set(np.round(program.phases[0].breaks, 12)) <= set(np.round(finer.phases[0].breaks, 12))
 
 
 def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
-    problem, report = solved
-    rough, reports, _ = refine_mesh(problem, report, solve, MeshOptions(tolerance=0.1), RefinementOptions())
-    fine, more, _ = refine_mesh(problem, report, solve, MeshOptions(tolerance=0.01), RefinementOptions())
-    assert len(problem.breaks) < len(rough.breaks) < len(fine.breaks)
+    program, report = solved
+    rough, reports, _ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.1), RefinementOptions())
+    fine, more, _ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.01), RefinementOptions())
+    assert program.intervals < rough.intervals < fine.intervals
     assert more[-1].objective < reports[-1].objective < report.objective
     assert reports[0] is report
     assert reports[-1].x.shape == (rough.variables,)
-    assert rough.violation(reports[-1].x).max() < 1e-5
+    assert rough.phases[0].violation(reports[-1].x).max() < 1e-5
 
 
 def test_the_gain_of_a_doubling_ends_it(solved):
-    problem, report = solved
+    program, report = solved
     tolerance = 0.02
-    mesh, reports, _ = refine_mesh(problem, report, solve, MeshOptions(tolerance), RefinementOptions())
+    mesh, reports, _ = refine_mesh(program, report, solve, MeshOptions(tolerance), RefinementOptions())
     again, further, _ = refine_mesh(mesh, reports[-1], solve, MeshOptions(tolerance), RefinementOptions())
-    assert len(again.breaks) > len(mesh.breaks)
+    assert again.intervals > mesh.intervals
     assert further[-1].objective > (1.0 - tolerance) * reports[-1].objective
 
 
 def test_what_cannot_be_solved_is_left_as_it_was(solved):
-    problem, report = solved
-    mesh, reports, _ = refine_mesh(problem, report, failing, MeshOptions(), RefinementOptions())
-    assert mesh is problem
+    program, report = solved
+    mesh, reports, _ = refine_mesh(program, report, failing, MeshOptions(), RefinementOptions())
+    assert mesh is program
     assert reports[-1] is report
     assert len(reports) == 2
-    same, reports, _ = free_knots(problem, report, failing, 0.1, RefinementOptions())
-    assert same is problem
+    same, reports, _ = free_knots(program, report, failing, 0.1, RefinementOptions())
+    assert same is program
     assert reports[-1] is report
 
 
 def test_no_interval_is_so_short_that_points_fall_together(solved):
-    problem, report = solved
-    moved, *_ = free_knots(problem, report, solve, 1e-9, RefinementOptions())
-    assert np.diff(moved.breaks).min() == pytest.approx(5e-5, rel=1e-3)
+    program, report = solved
+    moved, *_ = free_knots(program, report, solve, 1e-9, RefinementOptions())
+    assert np.diff(moved.phases[0].breaks).min() == pytest.approx(5e-5, rel=1e-3)
 
 
 def test_free_knots_without_a_motion_within_the_limits_are_given_up(solved, monkeypatch):
-    problem, report = solved
-    monkeypatch.setattr(freeing, "refine", lambda *given: dataclasses.replace(refine(*given), excess=0.5))
-    kept, reports, _ = free_knots(problem, report, solve, 0.1, RefinementOptions())
-    assert kept is problem
+    program, report = solved
+    monkeypatch.setattr(freeing, "refine", lambda *given: dataclasses.replace(refine(*given), violation=0.5))
+    kept, reports, _ = free_knots(program, report, solve, 0.1, RefinementOptions())
+    assert kept is program
     assert reports[-1] is report
     assert len(reports) > 2
 
 
 def test_a_free_solve_that_stalls_still_gives_good_knots(solved):
-    problem, report = solved
+    program, report = solved
 
     def stalling(tried, x):
         answer = solve(tried, x)
-        free = len(tried.grid.lower) > 0
+        free = len(tried.phases[0].grid.lower) > 0
         return dataclasses.replace(answer, status=SolveStatus.STALLED) if free else answer
 
-    moved, reports, _ = free_knots(problem, report, stalling, 0.1, RefinementOptions())
+    moved, reports, _ = free_knots(program, report, stalling, 0.1, RefinementOptions())
     assert reports[-1].status.usable
     assert reports[-1].objective < 0.95 * report.objective
-    assert moved.variables == problem.variables, "the knots should be fixed again"
+    assert moved.variables == program.variables, "the knots should be fixed again"
 
 
 @pytest.mark.parametrize("intervals", [20, 53, 100])
 def test_coarsest_problem(intervals):
-    problem, _ = brachis.transcribe(robot(), task(intervals=intervals))
-    coarse = coarsest(problem)
-    assert 12 <= len(coarse.breaks) - 1 < 26
-    assert (intervals > 24) == (coarse.variables < problem.variables)
-    for fine, rough in ((problem.breaks, coarse.breaks), (problem.tau, coarse.tau)):
+    program, _ = brachis.transcribe(robot(), task(intervals=intervals))
+    coarse = coarsest(program)
+    assert 12 <= coarse.intervals < 26
+    assert (intervals > 24) == (coarse.variables < program.variables)
+    (whole,), (part,) = program.phases, coarse.phases
+    for fine, rough in ((whole.breaks, part.breaks), (whole.t_norm, part.t_norm)):
         assert np.isin(rough, fine).all()
         assert (rough[0], rough[-1]) == (0.0, 1.0)
-    assert np.diff(coarse.tau).max() == pytest.approx(np.diff(coarse.breaks).max() / 3.0), "3 points an interval"
+    assert np.diff(part.t_norm).max() == pytest.approx(np.diff(part.breaks).max() / 3.0), "3 points an interval"
 
 
 @pytest.mark.parametrize("intervals", [53, 100])
 def test_growing_gives_the_answer_of_a_cold_solve_in_a_few_iterations(intervals):
-    problem, _ = brachis.transcribe(robot(), task(intervals=intervals))
-    coarse = coarsest(problem).with_margin(0.05)
-    report = solve(coarse, next(guesses(coarse)))
-    grown, reports, undone = grow(problem, coarse, report, solve)
+    program, _ = brachis.transcribe(robot(), task(intervals=intervals))
+    coarse = coarsest(program).with_margin(0.05)
+    report = solve(coarse, next(starting_points(coarse)))
+    grown, reports, undone = grow(program, coarse, report, solve)
     assert not undone
-    np.testing.assert_array_equal(grown.knots, problem.knots)
-    np.testing.assert_array_equal(grown.tau, problem.tau)
-    assert grown.guards == coarse.guards
+    np.testing.assert_array_equal(grown.phases[0].knots, program.phases[0].knots)
+    np.testing.assert_array_equal(grown.phases[0].t_norm, program.phases[0].t_norm)
+    assert grown.safeguard_bounds == coarse.safeguard_bounds
     assert reports[0] is report
     assert max(later.iterations for later in reports[1:]) <= 10
-    assert reports[-1].objective == pytest.approx(solve(problem, next(guesses(problem))).objective, rel=1e-4)
+    assert reports[-1].objective == pytest.approx(solve(program, next(starting_points(program))).objective, rel=1e-4)
 
 
 def test_growing_keeps_the_last_level_that_was_solved_and_tells_so():
-    problem, _ = brachis.transcribe(robot(), task(intervals=100))
-    coarse = coarsest(problem)
-    report = solve(coarse, next(guesses(coarse)))
+    program, _ = brachis.transcribe(robot(), task(intervals=100))
+    coarse = coarsest(program)
+    report = solve(coarse, next(starting_points(coarse)))
 
     def small_ones_only(tried, x):
         return solve(tried, x) if tried.variables < 150 else failing(tried, x)
 
-    grown, reports, undone = grow(problem, coarse, report, small_ones_only)
-    assert len(grown.breaks) == 51
+    grown, reports, undone = grow(program, coarse, report, small_ones_only)
+    assert grown.intervals == 50
     assert [later.status for later in reports][-2:] == [SolveStatus.FAILED, SolveStatus.OPTIMAL]
     assert reports[-1].x.shape == (grown.variables,)
     assert undone == "the motion has 50 of 100 intervals, of which more were not solved"
-    settled = settle_knots(coarse, (report,), failing, SplineSettings(), RefinementOptions(), target=problem)
+    settled = settle_knots(coarse, (report,), failing, SplineSettings(), RefinementOptions(), target=program)
     assert settled.reports[-1] is report
     assert settled.undone == "the motion has 13 of 100 intervals, of which more were not solved"
 
 
 def test_no_level_is_begun_after_the_deadline(solved):
-    problem, report = solved
+    program, report = solved
 
     def never(*_arguments):
         raise AssertionError("solved after the deadline")
 
     target, _ = brachis.transcribe(robot(), task(intervals=60))
     coarse = coarsest(target)
-    first = solve(coarse, next(guesses(coarse)))
+    first = solve(coarse, next(starting_points(coarse)))
     over = RefinementOptions(deadline=Deadline(0.0))
     assert grow(target, coarse, first, never, over.deadline).undone
     for spline in (SplineSettings(knots="free", intervals=10), SplineSettings(intervals="auto")):
-        kept, reports, undone = settle_knots(problem, (report,), never, spline, over)
-        assert kept is problem
+        kept, reports, undone = settle_knots(program, (report,), never, spline, over)
+        assert kept is program
         assert reports == (report,)
         assert undone
-    assert refine(problem, report, never, over).reports == (report,)
+    assert refine(program, report, never, over).reports == (report,)
 
 
 def test_many_intervals_are_planned_from_few():
@@ -220,22 +221,22 @@ def test_many_intervals_are_planned_from_few():
 
 
 def test_settings_choose_what_is_done(solved):
-    problem, report = solved
+    program, report = solved
     options = RefinementOptions()
-    assert settle_knots(problem, (report,), solve, SplineSettings(), options) == (problem, (report,), "")
-    unusable = (report, failing(problem, report.x))
-    assert settle_knots(problem, unusable, solve, SplineSettings(knots="free"), options) == (problem, unusable, "")
+    assert settle_knots(program, (report,), solve, SplineSettings(), options) == (program, (report,), "")
+    unusable = (report, failing(program, report.x))
+    assert settle_knots(program, unusable, solve, SplineSettings(knots="free"), options) == (program, unusable, "")
     before = dataclasses.replace(report)
     free, reports, _ = settle_knots(
-        problem, (before, report), solve, SplineSettings(knots="free", intervals=10), options
+        program, (before, report), solve, SplineSettings(knots="free", intervals=10), options
     )
     assert reports[0] is before
-    assert len(free.breaks) == len(problem.breaks)
+    assert free.intervals == program.intervals
     auto = SplineSettings(intervals="auto", tolerance=0.1)
-    mesh, *_ = settle_knots(problem, (before, report), solve, auto, options)
-    assert len(mesh.breaks) > len(problem.breaks)
+    mesh, *_ = settle_knots(program, (before, report), solve, auto, options)
+    assert mesh.intervals > program.intervals
 
 
 def test_auto_begins_coarse():
-    problem, _ = brachis.transcribe(robot(), task(intervals="auto"))
-    assert len(problem.breaks) - 1 == 10
+    program, _ = brachis.transcribe(robot(), task(intervals="auto"))
+    assert program.intervals == 10

@@ -5,38 +5,40 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.nlp.guess import guesses, stretched, worst_time_scaling_ratio
+from brachis.nlp import Program
+from brachis.nlp.guess import shortest_time, worst_time_scaling_ratio
 from brachis.nlp.numeric_course import STRATEGIES, numeric_course
-from support.chains import planar_robot, transcription
-from support.transcriptions import CASES, problem_of
+from support.chains import planar_robot, program_of
+from support.phases import CASES, phase_of
+from support.starts import starting_points
 
 
 @pytest.mark.parametrize("intervals", [5, 20])
 @pytest.mark.parametrize("case", CASES)
 def test_guesses_are_reachable_and_slow_enough(case, intervals):
-    problem = problem_of(case, intervals=intervals, points_per_interval=3)
-    found = list(guesses(problem))
-    assert len(found) >= (3 if problem.decomposition.r else 1)
+    phase = phase_of(case, intervals=intervals, points_per_interval=3)
+    found = list(starting_points(Program([phase])))
+    assert len(found) >= (3 if phase.joint_map.r else 1)
     for x in found:
-        assert x.shape == (problem.variables,)
-        state = problem.state(x)
+        assert x.shape == (phase.variables,)
+        state = phase.state(x)
         for kind in ("torque", "velocity", "acceleration"):
-            (limit,) = (each for each in problem.limits if each.kind == kind)
+            (limit,) = (each for each in phase.limits if each.kind == kind)
             assert np.abs(limit.values(state)).max() <= 1.0
-        part = problem.slices[0]
+        part = phase.slices[0]
         assert np.all(np.diff(x[part]) >= 0.0)
         assert np.all((x[part] >= 0.0) & (x[part] <= 1.0))
 
 
 def test_guesses_differ():
-    found = list(guesses(problem_of("r2")))
+    found = list(starting_points(Program([phase_of("r2")])))
     shapes = {tuple(np.round(x[1:], 3)) for x in found}
     assert len(shapes) >= 3
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_numeric_course_is_one_that_the_closed_form_can_follow(case):
-    chain = problem_of(case).decomposition
+    chain = phase_of(case).joint_map
     course = numeric_course(chain, STRATEGIES[0])
     assert course.shape[1] == 1 + chain.r
     if chain.r == 0:
@@ -53,24 +55,24 @@ def test_numeric_course_is_one_that_the_closed_form_can_follow(case):
 # Half of an open range is infinite; a push away from its ends must not become so.
 @pytest.mark.parametrize("j2", [None, [None, 2.9], [-3.0, None]], ids=str)
 def test_open_ranges(j2):
-    found = list(guesses(problem_of("r1", position={"j2": j2})))
+    found = list(starting_points(Program([phase_of("r1", position={"j2": j2})])))
     assert len(found) >= 3
     assert np.isfinite(found).all()
 
 
-def test_stretching_stops_at_the_limits():
-    problem = problem_of("r1")
-    x = next(guesses(problem))
+def test_time_scaling_stops_at_the_limits():
+    program = Program([phase_of("r1")])
+    x = next(starting_points(program))
     fast = x.copy()
     fast[0] = 0.05
-    assert worst_time_scaling_ratio(problem, fast) > 2.0
-    slow = stretched(problem, fast)
-    assert worst_time_scaling_ratio(problem, slow) <= 1.0
+    assert worst_time_scaling_ratio(program, fast) > 2.0
+    slow = shortest_time(program, fast)
+    assert worst_time_scaling_ratio(program, slow) <= 1.0
     assert slow[0] > fast[0]
-    # Not longer than about one step of the stretching beyond need.
+    # Not longer than about one step of the scaling beyond need.
     barely = slow.copy()
     barely[0] /= 1.5
-    assert worst_time_scaling_ratio(problem, barely) > 1.0
+    assert worst_time_scaling_ratio(program, barely) > 1.0
     np.testing.assert_array_equal(slow[1:], fast[1:])
     assert fast[0] == 0.05
 
@@ -84,9 +86,10 @@ def test_yaw_may_turn_past_half_a_turn(redundant, yaw):
     rotation = robot.tool_placement(start).rotation
     start[-1] = np.remainder(yaw - np.arctan2(rotation[1, 0], rotation[0, 0]) + np.pi, 2.0 * np.pi) - np.pi
     path = [{"line": {"by": [-0.05, 0.03, 0.4]}}]
-    problem = transcription(robot, ["x", "y", "yaw"], path, start, redundant, intervals=8)
-    assert problem.decomposition.path.sample(np.array([0.0, 1.0])).target[:, 2] == pytest.approx([yaw, yaw + 0.4])
-    found = list(guesses(problem))
+    program = program_of(robot, ["x", "y", "yaw"], path, start, redundant, intervals=8)
+    (phase,) = program.phases
+    assert phase.joint_map.path.sample(np.array([0.0, 1.0])).target[:, 2] == pytest.approx([yaw, yaw + 0.4])
+    found = list(starting_points(program))
     assert found, "no guess"
     for x in found:
-        assert np.abs(np.diff(problem.state(x).q, axis=0)).max() < 1.0
+        assert np.abs(np.diff(phase.state(x).q, axis=0)).max() < 1.0

@@ -1,4 +1,4 @@
-"""The whole Jacobian of a program with every kind of limit, against central differences, and its sparsity pattern."""
+"""The whole Jacobian of a phase with every kind of limit, against central differences, and its sparsity pattern."""
 
 from __future__ import annotations
 
@@ -6,36 +6,36 @@ import numpy as np
 import pytest
 
 from brachis import limits
-from support.transcriptions import CASES, problem_of, reachable_points
+from support.phases import CASES, phase_of, reachable_points
 
 KINDS = ["torque", "velocity", "acceleration", "position", "tool_speed", "branch_margin"]
 
 
-def blocks(problem) -> dict[str, slice]:
+def blocks(phase) -> dict[str, slice]:
     """Rows of every kind of limit, in the documented order."""
     result, first = {}, 0
-    for limit in problem.limits:
-        size = len(limit.lower) * len(problem.tau)
+    for limit in phase.limits:
+        size = len(limit.lower) * len(phase.t_norm)
         result[limit.kind] = slice(first, first + size)
         first += size
-    result["progress"] = slice(first, first + problem.splines[0].free - 1)
-    if len(problem.grid.total):
-        result["lengths"] = slice(result["progress"].stop, len(problem.lower))
+    result["progress"] = slice(first, first + phase.splines[0].free - 1)
+    if len(phase.grid.total):
+        result["lengths"] = slice(result["progress"].stop, len(phase.lower))
     return result
 
 
-def dense(problem, x) -> np.ndarray:
-    matrix = np.zeros((len(problem.lower), problem.variables))
-    np.add.at(matrix, (problem.jacobian_rows, problem.jacobian_columns), problem.jacobian(x))
+def dense(phase, x) -> np.ndarray:
+    matrix = np.zeros((len(phase.lower), phase.variables))
+    np.add.at(matrix, (phase.jacobian_rows, phase.jacobian_columns), phase.jacobian(x))
     return matrix
 
 
-def differences(problem, x, h=1e-4) -> np.ndarray:
+def differences(phase, x, h=1e-4) -> np.ndarray:
     """Central differences of fourth order, column by column."""
     columns = []
     for unit in np.eye(len(x)):
-        near = problem.rows(x + h * unit) - problem.rows(x - h * unit)
-        far = problem.rows(x + 2.0 * h * unit) - problem.rows(x - 2.0 * h * unit)
+        near = phase.rows(x + h * unit) - phase.rows(x - h * unit)
+        far = phase.rows(x + 2.0 * h * unit) - phase.rows(x - 2.0 * h * unit)
         columns.append((8.0 * near - far) / (12.0 * h))
     return np.stack(columns, axis=1)
 
@@ -45,26 +45,26 @@ FREE = [(case, degree, "free") for case in ("r0", "r1", "r2") for degree in (2, 
 
 
 @pytest.fixture(params=[*UNIFORM, *FREE], ids=str, scope="module")
-def problem(request):
+def phase(request):
     case, degree, knots = request.param
-    fixed = problem_of(case, degree=degree, rest="velocity" if degree == 2 else "full")
+    fixed = phase_of(case, degree=degree, rest="velocity" if degree == 2 else "full")
     return fixed if knots == "uniform" else fixed.with_free_knots(0.1)
 
 
-def test_jacobian_equals_differences(problem):
-    parts = blocks(problem)
-    assert list(parts) == [*KINDS, "progress", *(["lengths"] if len(problem.grid.total) else [])]
-    assert list(parts.values())[-1].stop == len(problem.lower)
+def test_jacobian_equals_differences(phase):
+    parts = blocks(phase)
+    assert list(parts) == [*KINDS, "progress", *(["lengths"] if len(phase.grid.total) else [])]
+    assert list(parts.values())[-1].stop == len(phase.lower)
     assert list(limits.TABLE) == KINDS[:-1]
-    for x in reachable_points(problem, 2):
-        exact, expected = dense(problem, x), differences(problem, x)
+    for x in reachable_points(phase, 2):
+        exact, expected = dense(phase, x), differences(phase, x)
         for kind, rows in parts.items():
             assert np.count_nonzero(exact[rows]) > 0, f"{kind} has no entries"
             scale = np.abs(expected[rows]).max()
             wrong = np.abs(exact[rows] - expected[rows]).max(axis=1)
             if kind == "tool_speed":  # the direction of a tool that hardly moves turns within the difference's step
-                wrong = wrong[problem.rows(x)[rows] > 0.05]
-                assert len(wrong) > 0.4 * len(problem.tau)
+                wrong = wrong[phase.rows(x)[rows] > 0.05]
+                assert len(wrong) > 0.4 * len(phase.t_norm)
             error = wrong.max() / scale
             assert error <= 1e-6, f"{kind}: relative error {error:.1e}"
             # Every kind but positions and margins sees the end time.
@@ -72,74 +72,68 @@ def test_jacobian_equals_differences(problem):
             assert bool(np.abs(exact[rows, 0]).max() > 1e-3) == timed
 
 
-def test_pattern_is_fixed_has_no_place_twice_and_covers_all(problem):
-    places = problem.jacobian_rows * problem.variables + problem.jacobian_columns
+def test_pattern_is_fixed_has_no_place_twice_and_covers_all(phase):
+    places = phase.jacobian_rows * phase.variables + phase.jacobian_columns
     assert len(np.unique(places)) == len(places)
-    assert problem.jacobian_rows.max() < len(problem.lower)
-    assert problem.jacobian_columns.max() < problem.variables
-    pattern = np.zeros((len(problem.lower), problem.variables), dtype=bool)
-    pattern[problem.jacobian_rows, problem.jacobian_columns] = True
-    for x in reachable_points(problem, 2):
-        assert len(problem.jacobian(x)) == len(places)
-        wrong = np.abs(differences(problem, x)) > 1e-7
+    assert phase.jacobian_rows.max() < len(phase.lower)
+    assert phase.jacobian_columns.max() < phase.variables
+    pattern = np.zeros((len(phase.lower), phase.variables), dtype=bool)
+    pattern[phase.jacobian_rows, phase.jacobian_columns] = True
+    for x in reachable_points(phase, 2):
+        assert len(phase.jacobian(x)) == len(places)
+        wrong = np.abs(differences(phase, x)) > 1e-7
         assert not np.any(wrong & ~pattern)
     # Each row touches the end time, at most degree + 1 control points of every curve, and free lengths nearby; the
     # very last row of free knots is the sum of them.
-    lengths = len(problem.grid.lower)
-    widest = np.bincount(problem.jacobian_rows)[: len(problem.lower) - len(problem.grid.total)].max()
-    nearby = min(lengths, 2 * problem.degree - 1)
-    assert widest <= 1 + (problem.degree + 1) * (1 + problem.decomposition.r) + nearby
+    lengths = len(phase.grid.lower)
+    widest = np.bincount(phase.jacobian_rows)[: len(phase.lower) - len(phase.grid.total)].max()
+    nearby = min(lengths, 2 * phase.degree - 1)
+    assert widest <= 1 + (phase.degree + 1) * (1 + phase.joint_map.r) + nearby
 
 
-def test_gradient_of_the_objective(problem):
-    x = reachable_points(problem, 1)[0]
-    assert problem.objective(x) == x[0]
-    np.testing.assert_array_equal(problem.gradient(), np.eye(problem.variables)[0])
-
-
-def test_rows_are_ratios_to_the_limits(problem):
-    x = reachable_points(problem, 1)[0]
-    robot, state, parts = problem.decomposition.robot, problem.state(x), blocks(problem)
-    values = problem.rows(x)
+def test_rows_are_ratios_to_the_limits(phase):
+    x = reachable_points(phase, 1)[0]
+    robot, state, parts = phase.joint_map.robot, phase.state(x), blocks(phase)
+    values = phase.rows(x)
     n = robot.n
     np.testing.assert_allclose(values[parts["velocity"]].reshape(-1, n), state.qdot / robot.limits.velocity)
     np.testing.assert_allclose(values[parts["acceleration"]].reshape(-1, n), state.qddot / 20.0)
     for kind in ("torque", "velocity", "acceleration"):
-        np.testing.assert_array_equal(problem.upper[parts[kind]], 1.0)
-        np.testing.assert_array_equal(problem.lower[parts[kind]], -1.0)
+        np.testing.assert_array_equal(phase.upper[parts[kind]], 1.0)
+        np.testing.assert_array_equal(phase.lower[parts[kind]], -1.0)
     low, high = robot.limits.position_lower, robot.limits.position_upper
     ratio = values[parts["position"]].reshape(-1, n)
     np.testing.assert_allclose(low + (ratio + 1.0) * (high - low) / 2.0, state.q, atol=1e-12)
-    assert np.all(problem.lower[parts["branch_margin"]] > 0.0)
+    assert np.all(phase.lower[parts["branch_margin"]] > 0.0)
     # Full rest ties three control points of s at each end to 0 and 1, which the bounds 0 <= s <= 1 take care of; rest
     # in velocity, all that degree 2 can do, ties two.
-    tied = 2 if problem.degree == 2 else 3
-    free = problem.motion(x).control_points[0, tied:-tied]
+    tied = 2 if phase.degree == 2 else 3
+    free = phase.motion(x).control_points[0, tied:-tied]
     np.testing.assert_allclose(values[parts["progress"]], np.diff(free), atol=1e-15)
-    np.testing.assert_array_equal(problem.lower[parts["progress"]], 0.0)
+    np.testing.assert_array_equal(phase.lower[parts["progress"]], 0.0)
 
 
 def test_one_sided_ranges_are_gaps_in_the_joints_own_unit():
-    problem = problem_of("r1", position={"j1": [None, 2.9], "j2": [-3.0, None], "j3": None})
-    (limit,) = (each for each in problem.limits if each.kind == "position")
+    phase = phase_of("r1", position={"j1": [None, 2.9], "j2": [-3.0, None], "j3": None})
+    (limit,) = (each for each in phase.limits if each.kind == "position")
     assert [label.subject for label in limit.labels] == ["j1", "j2"]
-    x = reachable_points(problem_of("r1"), 1)[0]
-    state = problem.state(x)
+    x = reachable_points(phase_of("r1"), 1)[0]
+    state = phase.state(x)
     values = limit.values(state)
     np.testing.assert_allclose(limit.upper[0] - values[:, 0], 2.9 - state.q[:, 0], atol=1e-14)
     np.testing.assert_allclose(values[:, 1] - limit.lower[1], state.q[:, 1] + 3.0, atol=1e-14)
     assert limit.lower[0] == -np.inf
     assert limit.upper[1] == np.inf
-    rows = blocks(problem)["position"]
-    np.testing.assert_allclose(dense(problem, x)[rows], differences(problem, x)[rows], atol=1e-9)
+    rows = blocks(phase)["position"]
+    np.testing.assert_allclose(dense(phase, x)[rows], differences(phase, x)[rows], atol=1e-9)
 
 
 def test_state_is_computed_once_for_rows_and_jacobian():
-    problem = problem_of("r1")
-    first, second = reachable_points(problem, 2)
-    problem.evaluations.update(states=0, jacobians=0)
-    problem.rows(first)
-    problem.jacobian(first)
-    assert problem.evaluations == {"states": 1, "jacobians": 1}
-    problem.rows(second)
-    assert problem.evaluations["states"] == 2
+    phase = phase_of("r1")
+    first, second = reachable_points(phase, 2)
+    phase.evaluations.update(states=0, jacobians=0)
+    phase.rows(first)
+    phase.jacobian(first)
+    assert phase.evaluations == {"states": 1, "jacobians": 1}
+    phase.rows(second)
+    assert phase.evaluations["states"] == 2

@@ -10,7 +10,7 @@ import yaml
 
 import brachis
 from brachis.limits.position import PositionLimit
-from support.transcriptions import problem_of, reachable_points
+from support.phases import phase_of, reachable_points
 
 NEAR = 2.0944 - 0.05  # rad; without a range joint 3 goes further
 
@@ -58,8 +58,8 @@ def test_a_range_of_a_micrometre(scara_urdf, half):
 
 @pytest.mark.parametrize("far", [1e4, 1e6, np.inf])
 def test_violation_is_in_rad_or_m_beyond_either_end(far):
-    problem = problem_of("r1")
-    state, robot = problem.state(reachable_points(problem, 1)[0]), problem.decomposition.robot
+    phase = phase_of("r1")
+    state, robot = phase.state(reachable_points(phase, 1)[0]), phase.joint_map.robot
     q = state.q
     lower = np.array([q[:, 0].max() + 0.25, -np.inf, -3.0])
     ranges = replace(robot.limits, position_lower=lower, position_upper=np.array([far, np.inf, 3.0]))

@@ -70,4 +70,4 @@ def test_plans_under_narrow_friction_are_verified_by_refinement_alone(scara_urdf
     result = brachis.plan(None, task)
     assert result.verified
     assert result.attempt.refinement_rounds >= 2
-    assert result.verification.worst_ratio - 1.0 <= result.attempt.excess + 1e-5
+    assert result.verification.worst_ratio - 1.0 <= result.attempt.violation + 1e-5

@@ -11,7 +11,7 @@ import pytest
 import brachis
 from brachis.nlp.guess import starting_point
 from brachis.search.solving import MARGINS, continued
-from brachis.setting import Setting, choices, transcription
+from brachis.setting import Setting, choices, program_of
 from brachis.solvers import SolverOptions, solver_named
 
 ROOT = Path(__file__).parents[2]
@@ -34,13 +34,14 @@ def restarts(setting: Setting) -> dict[str, np.ndarray]:
     rng = np.random.default_rng(0)
     times = {}
     for choice in choices(setting):
-        problem = transcription(setting, choice.decomposition(setting.start, choice.branches[0]), 20)
+        decomposition = choice.decomposition(setting.start, choice.branches[0])
+        program = program_of(setting, decomposition, np.linspace(0.0, 1.0, 21))
         found = []
         for _ in range(4000):
-            x = starting_point(problem, random_course(rng, setting.start[choice.redundant[0]]))
+            x = starting_point(program, [random_course(rng, setting.start[choice.redundant[0]])])
             if x is None:
                 continue
-            _, reports = continued(problem, x, solve, MARGINS)
+            _, reports = continued(program, x, solve, MARGINS)
             found.append(reports[-1].objective if reports[-1].status.usable else np.inf)
             if len(found) == RESTARTS:
                 break
@@ -48,8 +49,8 @@ def restarts(setting: Setting) -> dict[str, np.ndarray]:
     return times
 
 
-def solve(problem, x):
-    return solver_named("uno")[0].solve(problem, x, SolverOptions(max_iterations=100, time_limit=5.0), None)
+def solve(program, x):
+    return solver_named("uno")[0].solve(program, x, SolverOptions(max_iterations=100, time_limit=5.0), None)
 
 
 @pytest.mark.parametrize("angle", table.ANGLES_DEG)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from brachis.nlp import Transcription
+from brachis.nlp import Program
 from brachis.planner import transcribe
 from brachis.robot import Robot
 from brachis.task import load_task
@@ -106,7 +106,7 @@ def gantry_robot(axes: Sequence[Vector], **options: Any) -> Robot:
     return Robot.from_urdf("gantry", urdf_text=text, **options)
 
 
-def transcription(
+def program_of(
     robot: Robot,
     rows: Sequence[str],
     path: Sequence[Mapping[str, Any]],
@@ -116,8 +116,8 @@ def transcription(
     end: Sequence[float] | None = None,
     tool_speed: float | None = None,
     **spline: Any,
-) -> Transcription:
-    """Problem of a task for a given robot; `spline` is the task's ``spline`` part."""
+) -> Program:
+    """Program of a task for a given robot; `spline` is the task's ``spline`` part."""
     task = load_task(
         {
             "brachis": 1,

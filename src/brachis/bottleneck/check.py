@@ -19,7 +19,7 @@ from brachis.bottleneck.linearised import linearised_change
 from brachis.bottleneck.multipliers import multipliers_of
 from brachis.bottleneck.sensitivities import Sensitivities, Sensitivity, sensitivities
 from brachis.errors import PlanningError, UnreachableError
-from brachis.nlp import Transcription
+from brachis.nlp import Program
 from brachis.refine import Refined
 from brachis.solvers import SolverOptions, residual, solver_named
 
@@ -142,7 +142,7 @@ class SensitivityCheck:
 def check_sensitivities(
     refined: Refined, predictions: Sensitivities | None = None, *, step: float = STEP
 ) -> SensitivityCheck:
-    """Solve the refined problem again with every limit raised, and compare with what the multipliers predict.
+    """Solve the refined program again with every limit raised, and compare with what the multipliers predict.
 
     Parameters
     ----------
@@ -169,43 +169,44 @@ def check_sensitivities(
 def _checked(refined: Refined, predictions: Sensitivities, step: float) -> SensitivityCheck:
     """Compare limit by limit."""
     began = time.perf_counter()
-    problem = refined.problem
-    base = refined.reports[-1].x
-    if residual(problem, base) > _EXACT or _unbalanced(problem, base) > _EXACT:
-        base, _ = _solved_again(problem, base)
+    program = refined.program
+    base, t_end = refined.reports[-1].x, program.end_time
+    if residual(program, base) > _EXACT or _unbalanced(program, base) > _EXACT:
+        base, _ = _solved_again(program, base)
     checked = []
     for entry in predictions.limits:
-        if abs(entry.change(step)) <= _NO_CHANGE * base[0]:
+        if abs(entry.change(step)) <= _NO_CHANGE * t_end(base):
             checked.append(CheckedSensitivity(entry, 0.0, 0.0, 0.0, 0.0, optimal=True))
         else:
-            raised = problem.relaxed(entry.limit, entry.bound, step * entry.bound.whole)
-            checked.append(_compared(entry, entry.change(step), problem, raised, base))
-    return SensitivityCheck(step, float(base[0]), tuple(checked), time.perf_counter() - began)
+            raised = program.relaxed(entry.limit, entry.bound, step * entry.bound.whole)
+            checked.append(_compared(entry, entry.change(step), program, raised, base))
+    return SensitivityCheck(step, t_end(base), tuple(checked), time.perf_counter() - began)
 
 
 def _compared(
-    entry: Sensitivity, predicted: float, problem: Transcription, raised: Transcription, base: np.ndarray
+    entry: Sensitivity, predicted: float, program: Program, raised: Program, base: np.ndarray
 ) -> CheckedSensitivity:
     """Solve with one limit raised, and back where the change is suspicious."""
     linearised = linearised_change(raised, base)
     answer, optimal = _solved_again(raised, base)
-    before, off = base, abs(predicted - (answer[0] - base[0]))
-    if off > _SUSPICIOUS * abs(predicted) and off > _SAME * base[0]:
-        before, sure = _solved_again(problem, answer)
+    t_end = program.end_time
+    before, off = base, abs(predicted - (t_end(answer) - t_end(base)))
+    if off > _SUSPICIOUS * abs(predicted) and off > _SAME * t_end(base):
+        before, sure = _solved_again(program, answer)
         optimal = optimal and sure
-        if abs(before[0] - base[0]) <= _SAME * base[0]:
+        if abs(t_end(before) - t_end(base)) <= _SAME * t_end(base):
             before = base
     return CheckedSensitivity(
         sensitivity=entry,
         predicted=predicted,
         linearised=predicted if linearised is None else linearised,
-        re_solved=float(answer[0] - before[0]),
-        other_optimum=float(before[0] - base[0]),
+        re_solved=t_end(answer) - t_end(before),
+        other_optimum=t_end(before) - t_end(base),
         optimal=optimal,
     )
 
 
-def _solved_again(problem: Transcription, x: np.ndarray) -> tuple[np.ndarray, bool]:
+def _solved_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
     """Solve to a tight tolerance from x with one backend after the other; tell whether it is an optimum.
 
     Raises
@@ -216,28 +217,23 @@ def _solved_again(problem: Transcription, x: np.ndarray) -> tuple[np.ndarray, bo
     answers: list[np.ndarray] = []
     for solver in solver_named("auto"):
         try:
-            report = solver.solve(problem, x, SolverOptions(_TOLERANCE, _ITERATIONS, _SECONDS), None)
+            report = solver.solve(program, x, SolverOptions(_TOLERANCE, _ITERATIONS, _SECONDS), None)
         except ImportError:
             continue
         if report.violation > _FEASIBLE:
             continue
-        if _unbalanced(problem, report.x) <= _OPTIMAL:
+        if _unbalanced(program, report.x) <= _OPTIMAL:
             return report.x, True
         answers.append(report.x)
-    if residual(problem, x) <= _FEASIBLE:
+    if residual(program, x) <= _FEASIBLE:
         answers.append(x)
     if not answers:
         raise PlanningError("the answer could not be solved again", hint="Plan with a smaller solver.tolerance.")
-    return min(answers, key=_first), False
+    return min(answers, key=program.end_time), False
 
 
-def _unbalanced(problem: Transcription, x: np.ndarray) -> float:
+def _unbalanced(program: Program, x: np.ndarray) -> float:
     try:
-        return multipliers_of(problem, x).residual
+        return multipliers_of(program, x).residual
     except UnreachableError:
         return np.inf
-
-
-def _first(x: np.ndarray) -> float:
-    """Return the end time, s."""
-    return float(x[0])

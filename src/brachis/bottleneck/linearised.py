@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.nlp import Transcription
+from brachis.nlp import Program
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -26,8 +26,8 @@ _LARGEST_STEP = 1.0
 _TOUCHED = 1e-9
 
 
-def rows_and_jacobian(problem: Transcription, x: np.ndarray) -> tuple[np.ndarray, sparse.csr_array]:
-    """Evaluate the rows of a problem, (c,), and their Jacobian, (c, v).
+def rows_and_jacobian(program: Program, x: np.ndarray) -> tuple[np.ndarray, sparse.csr_array]:
+    """Evaluate the rows of a program, (c,), and their Jacobian, (c, v).
 
     Raises
     ------
@@ -36,17 +36,17 @@ def rows_and_jacobian(problem: Transcription, x: np.ndarray) -> tuple[np.ndarray
     """
     from scipy import sparse  # noqa: PLC0415
 
-    places = (problem.jacobian_rows, problem.jacobian_columns)
-    shape = (len(problem.lower), len(x))
-    return problem.rows(x), sparse.coo_array((problem.jacobian(x), places), shape=shape).tocsr()
+    places = (program.jacobian_rows, program.jacobian_columns)
+    shape = (len(program.lower), len(x))
+    return program.rows(x), sparse.coo_array((program.jacobian(x), places), shape=shape).tocsr()
 
 
-def linearised_change(problem: Transcription, x: np.ndarray) -> float | None:
+def linearised_change(program: Program, x: np.ndarray) -> float | None:
     """Predict the change of t_E from the answer to a problem with less strict limits.
 
     Parameters
     ----------
-    problem : Transcription
+    program : Program
         With the raised limit.
     x : (v,) ndarray
         Answer to the problem before.
@@ -63,20 +63,20 @@ def linearised_change(problem: Transcription, x: np.ndarray) -> float | None:
     """
     from scipy import sparse  # noqa: PLC0415
 
-    rows, jacobian = rows_and_jacobian(problem, x)
-    below, above = np.isfinite(problem.lower), np.isfinite(problem.upper)
+    rows, jacobian = rows_and_jacobian(program, x)
+    below, above = np.isfinite(program.lower), np.isfinite(program.upper)
     slopes = sparse.vstack([-jacobian[np.flatnonzero(below)], jacobian[np.flatnonzero(above)]], format="csr")
-    room = np.concatenate([(rows - problem.lower)[below], (problem.upper - rows)[above]])
-    lowest = np.clip(problem.x_lower - x, -_LARGEST_STEP, 0.0)
-    highest = np.clip(problem.x_upper - x, 0.0, _LARGEST_STEP)
+    room = np.concatenate([(rows - program.lower)[below], (program.upper - rows)[above]])
+    lowest = np.clip(program.x_lower - x, -_LARGEST_STEP, 0.0)
+    highest = np.clip(program.x_upper - x, 0.0, _LARGEST_STEP)
     kept = room < _NEAR
     while True:
-        step = _solved(problem.gradient(), slopes[np.flatnonzero(kept)].toarray(), room[kept], lowest, highest)
+        step = _solved(program.gradient(), slopes[np.flatnonzero(kept)].toarray(), room[kept], lowest, highest)
         if step is None:
             return None
         overrun = slopes @ step > room + _TOUCHED
         if not (overrun & ~kept).any():
-            return float(step[0])
+            return float(program.gradient() @ step)
         kept |= overrun
 
 

@@ -1,4 +1,4 @@
-"""Multipliers of a solved problem: the solver's where they balance the gradient, otherwise least squares.
+"""Multipliers of a solved program: the solver's where they balance the gradient, otherwise least squares.
 
 At an optimum the gradient of t_E is a combination of the slopes of the active rows and variable bounds,
 
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.bottleneck.linearised import rows_and_jacobian
-from brachis.nlp import Transcription
+from brachis.nlp import Program
 from brachis.refine import Refined
 
 ACTIVE = (1e-8, 1e-7, 1e-6, 1e-5)
@@ -49,7 +49,7 @@ class Pushes:
     signs: np.ndarray
 
     @classmethod
-    def at(cls, problem: Transcription, x: np.ndarray, near: float) -> Pushes:
+    def at(cls, program: Program, x: np.ndarray, near: float) -> Pushes:
         """Collect what presses on x, (v,): what is nearer to its bound than `near`, dimensionless.
 
         Raises
@@ -57,14 +57,14 @@ class Pushes:
         UnreachableError
             A collocation point is out of the branch's reach.
         """
-        values, jacobian = rows_and_jacobian(problem, x)
-        low = np.flatnonzero(values <= problem.lower + near)
-        high = np.flatnonzero(values >= problem.upper - near)
+        values, jacobian = rows_and_jacobian(program, x)
+        low = np.flatnonzero(values <= program.lower + near)
+        high = np.flatnonzero(values >= program.upper - near)
         rows, signs = np.concatenate([low, high]), np.repeat([1.0, -1.0], [len(low), len(high)])
         slopes = signs[:, None] * jacobian[rows].toarray()
         pressing = slopes.any(axis=1)  # what holds at the given start posture holds whatever x
         unit = np.eye(len(x))
-        bounds = unit[x <= problem.x_lower + near], -unit[x >= problem.x_upper - near]
+        bounds = unit[x <= program.x_lower + near], -unit[x >= program.x_upper - near]
         return cls(np.vstack([slopes[pressing], *bounds]), rows[pressing], signs[pressing])
 
     @property
@@ -145,12 +145,12 @@ class Multipliers:
         return float(rates @ best)
 
 
-def multipliers_of(problem: Transcription, x: np.ndarray, given: np.ndarray | None = None) -> Multipliers:
+def multipliers_of(program: Program, x: np.ndarray, given: np.ndarray | None = None) -> Multipliers:
     """Find the multipliers at an answer.
 
     Parameters
     ----------
-    problem : Transcription
+    program : Program
     x : (v,) ndarray
     given : (c,) ndarray, optional
         The solver's own multipliers of the rows; L = t_E - given . rows.
@@ -166,7 +166,7 @@ def multipliers_of(problem: Transcription, x: np.ndarray, given: np.ndarray | No
     """
     tried: list[Multipliers] = []
     for near in ACTIVE:
-        tried.append(_balancing(Pushes.at(problem, x, near), problem.gradient(), given))
+        tried.append(_balancing(Pushes.at(program, x, near), program.gradient(), given))
         if tried[-1].residual <= _GOOD:
             break
     return min(tried, key=lambda multipliers: multipliers.residual)
@@ -185,4 +185,4 @@ def _balancing(pushes: Pushes, gradient: np.ndarray, given: np.ndarray | None) -
 def multipliers_of_answer(refined: Refined) -> Multipliers:
     """Find the multipliers of a refined answer, before its end time was lengthened."""
     report = refined.reports[-1]
-    return multipliers_of(refined.problem, report.x, report.multipliers)
+    return multipliers_of(refined.program, report.x, report.multipliers)

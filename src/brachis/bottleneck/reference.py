@@ -20,9 +20,8 @@ from threadpoolctl import ThreadpoolController
 
 from brachis.bspline import clamped_uniform_knots
 from brachis.errors import UnreachableError
-from brachis.limits import Role
-from brachis.nlp import Motion, Transcription
-from brachis.nlp.guess import fitted, stretched, worst_time_scaling_ratio
+from brachis.nlp import FixedGrid, Motion, Phase, Program
+from brachis.nlp.guess import fitted, shortest_time, worst_time_scaling_ratio
 from brachis.refine import Refined, RefinementOptions, Solve, refine
 from brachis.solvers import SolverOptions, SolverReport, SolveStatus, solver_named
 
@@ -58,8 +57,8 @@ class Reference:
         How much longer the motion takes, as a fraction of `t_end`.
     degree, intervals : int
         Of the splines that gave it.
-    excess : float
-        Largest excess over a limit on a dense grid, as a fraction of it.
+    violation : float
+        Largest violation of a limit on a dense grid, as a fraction of it.
     wall_time : float
         s.
     refined : Refined
@@ -70,7 +69,7 @@ class Reference:
     distance: float
     degree: int
     intervals: int
-    excess: float
+    violation: float
     wall_time: float
     refined: Refined
 
@@ -82,7 +81,7 @@ class Reference:
             "distance": self.distance,
             "degree": self.degree,
             "intervals": self.intervals,
-            "excess": self.excess,
+            "violation": self.violation,
             "wall_time_s": self.wall_time,
         }
 
@@ -97,7 +96,7 @@ def find_reference(
     refined : Refined
         ``result.attempt.refined``.
     tolerance : float, optional
-        Largest excess over a limit, as a fraction of it.
+        Largest violation of a limit, as a fraction of it.
     intervals : int, optional
         Of the fine mesh, about; a multiple of the answer's own number is taken, so that its mesh is contained in it.
     time_limit : float, optional
@@ -115,28 +114,26 @@ def find_reference(
 def _found(refined: Refined, tolerance: float, intervals: int, time_limit: float) -> Reference | None:
     """Try one mesh after the other."""
     began = time.perf_counter()
-    problem = refined.problem
-    own = len(np.unique(problem.knots)) - 1
-    slowest, motion = float(refined.x[0]), problem.motion(refined.x)
+    (phase,), (motion,) = refined.program.phases, refined.program.motions(refined.x)
     best: Reference | None = None
-    for degree, count in _meshes(own, _fine(problem, own, intervals)):
+    for degree, count in _meshes(phase.intervals, _fine(phase, intervals)):
         if best is not None and time.perf_counter() > began + time_limit:
             break
-        answer = _planned(_on_mesh(problem, degree, count), motion, tolerance, began + time_limit)
-        excess = np.inf if answer is None else _excess(answer.problem, answer.x)
-        if answer is None or excess > tolerance or answer.x[0] >= motion.t_end:
+        answer = _planned(_on_mesh(phase, degree, count), motion, tolerance, began + time_limit)
+        violation = np.inf if answer is None else _violation(answer)
+        if answer is None or violation > tolerance or answer.t_end >= motion.t_end:
             continue
-        motion = answer.problem.motion(answer.x)
-        best = Reference(motion.t_end, slowest / motion.t_end - 1.0, degree, count, excess, 0.0, answer)
+        (motion,) = answer.program.motions(answer.x)
+        best = Reference(motion.t_end, refined.t_end / motion.t_end - 1.0, degree, count, violation, 0.0, answer)
     return None if best is None else dataclasses.replace(best, wall_time=time.perf_counter() - began)
 
 
-def _fine(problem: Transcription, own: int, intervals: int) -> int:
+def _fine(phase: Phase, intervals: int) -> int:
     """Return a multiple of the answer's number of intervals, at least twice; fewer with several redundant joints.
 
     A step of the active-set method takes seconds where there are many more variables.
     """
-    return own * max(2, intervals // (own * max(1, problem.decomposition.r)))
+    return phase.intervals * max(2, intervals // (phase.intervals * max(1, phase.joint_map.r)))
 
 
 def _meshes(own: int, fine: int) -> tuple[tuple[int, int], ...]:
@@ -145,65 +142,55 @@ def _meshes(own: int, fine: int) -> tuple[tuple[int, int], ...]:
     return (*((_CUBICS, count) for count in cubics), (_PARABOLAS, fine))
 
 
-def _on_mesh(problem: Transcription, degree: int, intervals: int) -> Transcription:
-    """Return the problem on a uniform mesh, with rest in velocity alone and the same branch margins."""
-    tau = np.linspace(0.0, 1.0, _POINTS * intervals + 1)
+def _on_mesh(phase: Phase, degree: int, intervals: int) -> Phase:
+    """Return the phase on a uniform mesh, with rest in velocity alone."""
+    t_norm = np.linspace(0.0, 1.0, _POINTS * intervals + 1)
     if degree == _PARABOLAS:
-        tau = np.union1d(tau, np.arange(1, intervals) / intervals - _BESIDE)
-    own = [limit for limit in problem.limits if limit.role is not Role.SAFEGUARD]
-    fine = Transcription(
-        problem.decomposition,
-        own,
-        degree=degree,
-        knots=clamped_uniform_knots(degree, intervals),
-        derivatives_at_rest=1,
-        tau=tau,
-        end=problem.end,
-        start_free=problem.start_free,
-    )
-    return fine.with_margin(max(problem.guards)) if problem.guards else fine
+        t_norm = np.union1d(t_norm, np.arange(1, intervals) / intervals - _BESIDE)
+    grid = FixedGrid(clamped_uniform_knots(degree, intervals), degree, t_norm)
+    return phase.over(grid, dataclasses.replace(phase.boundary, derivatives=1))
 
 
-def _planned(problem: Transcription, motion: Motion, tolerance: float, deadline: float) -> Refined | None:
+def _planned(phase: Phase, motion: Motion, tolerance: float, deadline: float) -> Refined | None:
     """Solve from a motion and refine, with one backend after the other, until one gives a motion within the rows.
 
     It need not be an optimum: any motion within the limits is as good a reference as it is fast.
     """
+    program, t_norm = Program([phase]), np.linspace(0.0, 1.0, _FIT_DENSITY * len(phase.knots))
     try:
-        tau = np.linspace(0.0, 1.0, _FIT_DENSITY * len(problem.knots))
-        x = fitted(problem, motion.t_end, tau, motion.at(tau * motion.t_end)[0])
-        if worst_time_scaling_ratio(problem, x) > _AS_GOOD:
-            x = stretched(problem, x)
+        x = fitted(phase, motion.t_end, t_norm, motion.at(t_norm * motion.t_end)[0])
+        if worst_time_scaling_ratio(program, x) > _AS_GOOD:
+            x = shortest_time(program, x)
     except UnreachableError:
         return None
     backends = solver_named("auto")[:_BACKENDS]
-    for backend in reversed(backends) if problem.degree == _PARABOLAS else backends:
+    for backend in reversed(backends) if phase.degree == _PARABOLAS else backends:
         solve = _bounded(backend.solve, deadline)
         try:
-            first = solve(problem, x)
+            first = solve(program, x)
         except ImportError:
             continue
-        if not first.status.usable and first.feasible and first.x[0] < motion.t_end:
+        if not first.status.usable and first.feasible and first.objective < motion.t_end:
             first = dataclasses.replace(first, status=SolveStatus.ACCEPTABLE)
         if first.status.usable:
-            return refine(problem, first, solve, RefinementOptions(tolerance=tolerance, max_rounds=_ROUNDS))
+            return refine(program, first, solve, RefinementOptions(tolerance=tolerance, max_rounds=_ROUNDS))
     return None
 
 
 def _bounded(backend: Callable[..., SolverReport], deadline: float) -> Solve:
-    def solve(problem: Transcription, x: np.ndarray) -> SolverReport:
+    def solve(program: Program, x: np.ndarray) -> SolverReport:
         seconds = float(np.clip(deadline - time.perf_counter(), _LEAST_SECONDS, _SECONDS))
-        return backend(problem, x, SolverOptions(max_iterations=_ITERATIONS, time_limit=seconds), None)
+        return backend(program, x, SolverOptions(max_iterations=_ITERATIONS, time_limit=seconds), None)
 
     return solve
 
 
-def _excess(problem: Transcription, x: np.ndarray) -> float:
-    """Largest excess over a limit on a dense grid and on both sides of every knot; infinite where out of reach."""
-    knots = np.unique(problem.knots)
-    grid = np.linspace(0.0, 1.0, _DENSE * (len(knots) - 1) + 1)
-    tau = np.unique(np.concatenate([grid, knots, knots[1:] - 1e-9, knots[:-1] + 1e-9]))
+def _violation(answer: Refined) -> float:
+    """Largest violation of a limit on a dense grid and on both sides of every knot; infinite where out of reach."""
+    ((phase, x),) = answer.program.split(answer.x)
+    grid = np.linspace(0.0, 1.0, _DENSE * phase.intervals + 1)
+    t_norm = np.unique(np.concatenate([grid, phase.breaks, phase.breaks[1:] - 1e-9, phase.breaks[:-1] + 1e-9]))
     try:
-        return float(problem.violation_at(x, tau).max())
+        return float(phase.violation_at(x, t_norm).max())
     except UnreachableError:
         return np.inf

@@ -12,14 +12,13 @@ from collections.abc import Iterator
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from brachis.bspline import spread
 from brachis.deadline import Deadline
 from brachis.errors import PlanningError, UnreachableError
-from brachis.nlp import Motion, Transcription
+from brachis.nlp import Motion, Program
 from brachis.refine import Refined, RefinementOptions, refine
 from brachis.robot import ROLL_JOINT
 from brachis.search.solving import MARGINS, solve_with
-from brachis.setting import Setting, choices, derivatives_at_rest
+from brachis.setting import Setting, choices, program_of
 from brachis.solvers import solver_named
 from brachis.trajectory import Trajectory
 
@@ -50,12 +49,12 @@ def solved_again(trajectory: Trajectory) -> Refined:
         The motion is no optimum of its problem: no solver that the task allows came back to it.
     """
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # as in `plan`: batches are small
-        problem, x = _problem(trajectory)
-        found = list(_answers(problem, x, trajectory))
+        program, x = _problem(trajectory)
+        found = list(_answers(program, x, trajectory))
     for refined in found:
-        if abs(refined.x[0] / trajectory.t_end - 1.0) <= _SAME:
+        if abs(refined.t_end / trajectory.t_end - 1.0) <= _SAME:
             return refined
-    ends = ", ".join(f"{refined.reports[-1].solver}: {refined.x[0]:.6g} s" for refined in found)
+    ends = ", ".join(f"{refined.reports[-1].solver}: {refined.t_end:.6g} s" for refined in found)
     raise PlanningError(
         "solving again does not come back to the saved motion, so that its multipliers are not known",
         found=ends or "no answer",
@@ -64,32 +63,23 @@ def solved_again(trajectory: Trajectory) -> Refined:
     )
 
 
-def _problem(trajectory: Trajectory) -> tuple[Transcription, np.ndarray]:
+def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
     """Lay the problem down over the saved knots; the motion is its point x."""
     names = tuple(name for name in trajectory.redundant_joints if name != ROLL_JOINT)
     task = trajectory.task.model_copy(update={"redundant_joints": names, "branch": trajectory.branch})
     (choice,) = choices(Setting.of(trajectory.robot, task))
     decomposition = choice.decomposition(trajectory.q[0], choice.branches[0])
-    knots, degree = trajectory.knots, trajectory.degree
-    problem = Transcription(
-        decomposition,
-        choice.setting.limits,
-        degree=degree,
-        knots=knots,
-        derivatives_at_rest=derivatives_at_rest(task),
-        tau=spread(np.unique(knots), task.spline.points_per_interval),
-        end=choice.setting.end,
-        start_free=choice.setting.start is None,
-    )
-    x = problem.variables_from(Motion(trajectory.t_end, knots, degree, trajectory.control_points))
+    program = program_of(choice.setting, decomposition, np.unique(trajectory.knots))
+    motion = Motion(trajectory.t_end, trajectory.knots, trajectory.degree, trajectory.control_points)
+    x = program.variables_from([motion])
     for margin in MARGINS:
-        problem = problem.with_margin(margin)
-        if problem.guard_slack(x) >= -_KEPT:
+        program = program.with_margin(margin)
+        if program.safeguard_slack(x) >= -_KEPT:
             break
-    return problem, x
+    return program, x
 
 
-def _answers(problem: Transcription, x: np.ndarray, trajectory: Trajectory) -> Iterator[Refined]:
+def _answers(program: Program, x: np.ndarray, trajectory: Trajectory) -> Iterator[Refined]:
     """Solve and refine with one backend after the other, until one comes back to the motion."""
     task = trajectory.task
     deadline, settings = Deadline.after(task.search.time_limit), task.refinement
@@ -97,12 +87,12 @@ def _answers(problem: Transcription, x: np.ndarray, trajectory: Trajectory) -> I
     for backend in solver_named(task.solver.name):
         if deadline.passed:
             return
-        solve = solve_with(backend, task.solver, problem.decomposition.r, deadline, lambda _text: None)
+        solve = solve_with(backend, task.solver, program.phases[0].joint_map.r, deadline, lambda _text: None)
         try:
-            refined = refine(problem, solve(problem, x), solve, options)
+            refined = refine(program, solve(program, x), solve, options)
         except (ImportError, UnreachableError):
             continue
         if refined.converged:
             yield refined
-            if abs(refined.x[0] / trajectory.t_end - 1.0) <= _SAME:
+            if abs(refined.t_end / trajectory.t_end - 1.0) <= _SAME:
                 return

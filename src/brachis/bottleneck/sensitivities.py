@@ -17,7 +17,7 @@ import numpy as np
 
 from brachis.bottleneck.multipliers import Multipliers, multipliers_of_answer
 from brachis.limits import Bound, Label, Limit, Role
-from brachis.nlp import Transcription
+from brachis.nlp import Program
 from brachis.refine import Refined
 
 STATIONARY = 1e-3
@@ -154,24 +154,22 @@ def sensitivities(refined: Refined) -> Sensitivities:
     Sensitivities
         Of the answer before its end time was lengthened to meet the limits between collocation points.
     """
-    return sensitivities_at(refined.problem, multipliers_of_answer(refined))
+    return sensitivities_at(refined.program, multipliers_of_answer(refined))
 
 
-def sensitivities_at(problem: Transcription, multipliers: Multipliers) -> Sensitivities:
+def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivities:
     """As `sensitivities`, from a problem and the multipliers of its answer."""
-    count, first = len(problem.tau), 0
     found: list[Sensitivity] = []
     boundaries: list[BranchBoundary] = []
-    for limit in problem.limits:
-        size = len(limit.lower)
+    for limit in program.limits:
+        rows = program.rows_of(limit)
         for bound in limit.bounds:
-            rates = np.zeros(len(problem.lower))
-            rates[first + bound.column + size * np.arange(count)] = bound.per_unit
+            rates = np.zeros(len(program.lower))
+            rates[rows[:, bound.column]] = bound.per_unit
             if limit.role is not Role.SAFEGUARD:
                 found.append(_sensitivity(limit, bound, rates, multipliers))
             elif (slope := -multipliers.change(rates)) > _SMALLEST:
                 boundaries.append(BranchBoundary(limit.labels[bound.column].subject, bound.figure, slope))
-        first += count * size
     found.sort(key=lambda entry: entry.change(1.0))
     return Sensitivities(tuple(found), tuple(boundaries), multipliers.source, multipliers.residual, multipliers.unique)
 

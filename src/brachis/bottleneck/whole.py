@@ -79,7 +79,7 @@ def report(motion: Result | Trajectory, *, check: bool = False, reference: bool 
     Raises
     ------
     InputError
-        The result was made without keeping its solved problem, or a trajectory's closed form is not known here.
+        The result was made without keeping its solved program, or a trajectory's closed form is not known here.
     PlanningError
         A trajectory is no optimum of its problem; or, with `check`, no solver could solve the problem again.
 
@@ -96,7 +96,7 @@ def report(motion: Result | Trajectory, *, check: bool = False, reference: bool 
     else:
         trajectory, refined = motion.trajectory, motion.attempt.refined
     found, tolerance = sensitivities(refined), trajectory.task.refinement.tolerance
-    limits = [limit for limit in refined.problem.limits if limit.role is not Role.SAFEGUARD]
+    limits = [limit for limit in refined.program.limits if limit.role is not Role.SAFEGUARD]
     return BottleneckReport(
         t_end=trajectory.t_end,
         sensitivities=found,

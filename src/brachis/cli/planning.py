@@ -93,8 +93,8 @@ def _show(result: Result, data: dict[str, Any]) -> None:
         "path error": f"{result.verification.path_error:.1e} m or rad",
         "verified": "yes" if result.verified else "NO",
     }
-    if attempt.stretched > 1.0:
-        lengthened = f"{100.0 * (attempt.stretched - 1.0):.2g} % to meet the limits between collocation points"
+    if attempt.time_scaled > 1.0:
+        lengthened = f"{100.0 * (attempt.time_scaled - 1.0):.2g} % to meet the limits between collocation points"
         rows["end time lengthened by"] = lengthened
     for name, value in rows.items():
         table.add_row(name, value)

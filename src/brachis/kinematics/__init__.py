@@ -1,12 +1,16 @@
-"""Decomposition kinematics: joint motion and its derivatives from y = (s, q_r)."""
+"""Joint maps: joint motion and its derivatives from curves y, such as (s, q_r)."""
 
-from brachis.kinematics.decomposition import Decomposition, JointDerivatives, JointState
+from brachis.kinematics.decomposition import Decomposition
+from brachis.kinematics.direct import DirectJointMap
 from brachis.kinematics.interpolation import Nodes, interpolate
+from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
 from brachis.kinematics.task_kinematics import TaskDerivatives, TaskKinematics
 
 __all__ = [
     "Decomposition",
+    "DirectJointMap",
     "JointDerivatives",
+    "JointMap",
     "JointState",
     "Nodes",
     "TaskDerivatives",

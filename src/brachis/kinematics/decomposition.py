@@ -24,7 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.ik import ChainGeometry, IKSolver, Polished
+from brachis.ik import ChainGeometry, IKSolver, Polished, margin_gradient
+from brachis.kinematics.joint_map import JointDerivatives, JointState
 from brachis.kinematics.task_kinematics import TaskKinematics
 from brachis.path import Path, PathSample
 from brachis.robot import Robot, TaskSpace
@@ -35,51 +36,25 @@ _SURE = 0.25
 
 
 @dataclass(frozen=True)
-class JointState:
-    """Motion of all joints at K times.
+class PathState(JointState):
+    """Motion of all joints along a path at K times.
 
     Attributes
     ----------
-    y, ydot, yddot : (K, 1 + r) ndarray
-        Path coordinate and redundant joints, and their time derivatives.
-    q, qdot, qddot : (K, n) ndarray
     path : PathSample
     twists : (6, K, n) ndarray
         Columns of the tool frame's Jacobian; see `TaskKinematics.twists`.
-    gradient : (K, n, 1 + r) ndarray
-        G = dq/dy.
     inverse : (K, m, m) ndarray
         J_nr^-1.
     """
 
-    y: np.ndarray
-    ydot: np.ndarray
-    yddot: np.ndarray
-    q: np.ndarray
-    qdot: np.ndarray
-    qddot: np.ndarray
     path: PathSample
     twists: np.ndarray
-    gradient: np.ndarray
     inverse: np.ndarray
 
 
-@dataclass(frozen=True)
-class JointDerivatives:
-    """Derivatives of a `JointState`, each (K, n, 1 + r); dqdot/dydot = dqddot/dyddot = G are not repeated.
-
-    Attributes
-    ----------
-    qdot_y, qddot_y, qddot_ydot : (K, n, 1 + r) ndarray
-    """
-
-    qdot_y: np.ndarray
-    qddot_y: np.ndarray
-    qddot_ydot: np.ndarray
-
-
 class Decomposition:
-    """Robot, path, closed form and branch, put together.
+    """Robot, path, closed form and branch, put together: the `JointMap` with y = (s, q_r).
 
     Parameters
     ----------
@@ -110,14 +85,14 @@ class Decomposition:
         self.path = path
         self.solver = solver
         self.redundant = list(redundant)
-        self.rest = [i for i in range(robot.n) if i not in redundant]
+        self.nonredundant = [i for i in range(robot.n) if i not in redundant]
         self.branch = branch
-        self.slots = [i for i, label in enumerate(solver.branches) if label == solver.branches[branch]]
-        self._own = solver.only(self.slots) if isinstance(solver, Polished) else solver
+        self.alternatives = [i for i, label in enumerate(solver.branches) if label == solver.branches[branch]]
+        self._own = solver.only(self.alternatives) if isinstance(solver, Polished) else solver
         self.start = start
         self.kinematics = TaskKinematics(robot, task_space)
-        self._turning = ChainGeometry.of(robot).revolute[self.rest]
-        self._turns = [joint for joint, turning in zip(self.rest, self._turning, strict=True) if turning]
+        self._turning = ChainGeometry.of(robot).revolute[self.nonredundant]
+        self._turns = [joint for joint, turning in zip(self.nonredundant, self._turning, strict=True) if turning]
         limits = robot.limits
         ranged = np.isfinite(limits.position_lower) | np.isfinite(limits.position_upper)
         self._ranged = ranged[self._turns]
@@ -126,6 +101,23 @@ class Decomposition:
     def r(self) -> int:
         """Degree of redundancy."""
         return len(self.redundant)
+
+    @property
+    def branch_label(self) -> str:
+        """Label of the branch."""
+        return self.solver.branches[self.branch]
+
+    def branch_margins(self, q: np.ndarray) -> np.ndarray:
+        """Margins of the branch, (K, b), in postures (K, n)."""
+        return self.solver.branch_margins(q, self.branch)
+
+    def branch_margin_gradient(self, q: np.ndarray) -> np.ndarray:
+        """Differentiate `branch_margins` with respect to q, (K, b, n)."""
+        return margin_gradient(self.solver, q, self.branch)
+
+    def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
+        """Value of y = (s, q_r), (1 + r,), in a posture, (n,)."""
+        return np.append(s, q[self.redundant])
 
     def postures(
         self, y: np.ndarray, sample: PathSample | None = None, *, near: np.ndarray | None = None
@@ -149,18 +141,18 @@ class Decomposition:
             NaN in the non-redundant joints where the branch has no answer.
         """
         sample = sample or self.path.sample(y[:, 0])
-        answers = self._own.solve(sample.target, y[:, 1:])[:, self.slots]
-        if len(self.slots) == 1:
+        answers = self._own.solve(sample.target, y[:, 1:])[:, self.alternatives]
+        if len(self.alternatives) == 1:
             answers = answers[:, 0]
         else:
-            answers = self._tracked(answers) if near is None else self._nearest(answers, near[:, self.rest])
+            answers = self._tracked(answers) if near is None else self._nearest(answers, near[:, self.nonredundant])
         turning = self._turning
         if turning.any() and np.all(np.isfinite(answers)):
-            turns = np.vstack([self.start[self.rest][None, turning], answers[:, turning]])
+            turns = np.vstack([self.start[self.nonredundant][None, turning], answers[:, turning]])
             answers[:, turning] = np.unwrap(turns, axis=0)[1:]
         q = np.empty((len(y), self.robot.n))
         q[:, self.redundant] = y[:, 1:]
-        q[:, self.rest] = answers
+        q[:, self.nonredundant] = answers
         return q
 
     def _nearest(self, answers: np.ndarray, near: np.ndarray) -> np.ndarray:
@@ -173,8 +165,8 @@ class Decomposition:
 
     def _tracked(self, answers: np.ndarray) -> np.ndarray:
         """Choose from answers (K, c, m) at successive times a course, each nearest to its predecessor."""
-        course = np.empty((len(answers), len(self.rest)))
-        previous = self.start[self.rest]
+        course = np.empty((len(answers), len(self.nonredundant)))
+        previous = self.start[self.nonredundant]
         for k in range(len(answers)):
             course[k] = self._nearest(answers[k : k + 1], previous[None])[0]
             if np.isfinite(course[k]).all():
@@ -189,7 +181,7 @@ class Decomposition:
         *,
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
-    ) -> JointState:
+    ) -> PathState:
         """Joint motion at K times.
 
         Parameters
@@ -216,7 +208,7 @@ class Decomposition:
         twists = self.kinematics.twists(q)
         jacobian = self.kinematics.rows(twists)
         try:
-            inverse = np.linalg.inv(jacobian[:, :, self.rest])
+            inverse = np.linalg.inv(jacobian[:, :, self.nonredundant])
         except np.linalg.LinAlgError as error:
             raise UnreachableError("J_nr is singular") from error
         gradient = self._gradient(sample, jacobian, inverse)
@@ -224,12 +216,12 @@ class Decomposition:
         # What the redundant joints and the path leave to the non-redundant ones.
         wanted = sample.xi_ds * ydot[:, :1] ** 2 - self.kinematics.bias(twists, qdot)
         qddot = np.einsum("kij,kj->ki", gradient, yddot)
-        qddot[:, self.rest] += np.einsum("kij,kj->ki", inverse, wanted)
+        qddot[:, self.nonredundant] += np.einsum("kij,kj->ki", inverse, wanted)
         if near is not None:
             q[:, self._turns] += _TURN * np.round((near - q)[:, self._turns] / _TURN)
         elif t is not None and self._ranged.any():  # otherwise no limit asks which turn an angle is in
             self._follow(q, qdot, qddot, t)
-        return JointState(y, ydot, yddot, q, qdot, qddot, sample, twists, gradient, inverse)
+        return PathState(y, ydot, yddot, q, qdot, qddot, gradient, sample, twists, inverse)
 
     def _follow(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, t: np.ndarray) -> None:
         """Lift angles in place so that they follow their velocities; the quintic's rule predicts each step."""
@@ -249,10 +241,10 @@ class Decomposition:
         gradient = np.zeros((len(jacobian), self.robot.n, 1 + self.r))
         gradient[:, self.redundant, np.arange(1, 1 + self.r)] = 1.0
         columns = np.concatenate([sample.xi[:, :, None], -jacobian[:, :, self.redundant]], axis=2)
-        gradient[:, self.rest] = inverse @ columns
+        gradient[:, self.nonredundant] = inverse @ columns
         return gradient
 
-    def derivatives(self, state: JointState) -> JointDerivatives:
+    def derivatives(self, state: PathState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""
         task = self.kinematics.derivatives(state.twists, state.qdot, state.qddot)
         sdot, sddot = state.ydot[:, :1], state.yddot[:, :1]
@@ -260,11 +252,11 @@ class Decomposition:
         qdot_y, qddot_y, qddot_ydot = zeros, zeros.copy(), zeros.copy()
         right = -task.velocity_q @ state.gradient
         right[:, :, 0] += sample.xi_ds * sdot
-        qdot_y[:, self.rest] = state.inverse @ right
+        qdot_y[:, self.nonredundant] = state.inverse @ right
         right = -task.acceleration_qdot @ state.gradient
         right[:, :, 0] += 2.0 * sample.xi_ds * sdot
-        qddot_ydot[:, self.rest] = state.inverse @ right
+        qddot_ydot[:, self.nonredundant] = state.inverse @ right
         right = -task.acceleration_q @ state.gradient - task.acceleration_qdot @ qdot_y
         right[:, :, 0] += sample.xi_dds * sdot**2 + sample.xi_ds * sddot
-        qddot_y[:, self.rest] = state.inverse @ right
+        qddot_y[:, self.nonredundant] = state.inverse @ right
         return JointDerivatives(qdot_y, qddot_y, qddot_ydot)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.kinematics.decomposition import Decomposition, JointState
+from brachis.kinematics.joint_map import JointMap, JointState
 
 Curves = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
@@ -49,12 +49,12 @@ class Nodes:
     position_error: float
 
 
-def interpolate(decomposition: Decomposition, curves: Curves, breaks: np.ndarray, *, jumps: bool) -> Nodes:
+def interpolate(joint_map: JointMap, curves: Curves, breaks: np.ndarray, *, jumps: bool) -> Nodes:
     """Place nodes so densely that quintic pieces stand for the closed form.
 
     Parameters
     ----------
-    decomposition : Decomposition
+    joint_map : JointMap
     curves : callable
         ``curves(t)`` returns y, ydot, yddot, each (K, 1 + r), at times (K,) in seconds.
     breaks : (N + 1,) ndarray
@@ -77,11 +77,11 @@ def interpolate(decomposition: Decomposition, curves: Curves, breaks: np.ndarray
     for _ in range(_ROUNDS):
         middle = 0.5 * (times[1:] + times[:-1])
         merged = np.sort(np.concatenate([times, middle]))
-        state = decomposition.state(*curves(merged), t=merged)
+        state = joint_map.state(*curves(merged), t=merged)
         before = state.qddot
         if jumps:
             shift = _JUST_BEFORE * breaks[-1] * (np.arange(len(merged)) > 0)
-            before = decomposition.state(*curves(merged - shift), near=state.q).qddot
+            before = joint_map.state(*curves(merged - shift), near=state.q).qddot
         gap_q, gap_qddot = _middle_gaps(times, state, before)
         error = float(gap_q.max())
         bad = (gap_q > _POSITION_TOLERANCE) | (gap_qddot > _ACCELERATION_TOLERANCE * (1.0 + np.abs(state.qddot).max()))

@@ -19,7 +19,6 @@ from brachis.limits.protocol import (
     Partials,
     PhaseLines,
     Role,
-    moved,
 )
 from brachis.robot import Robot
 from brachis.task import Task
@@ -74,5 +73,4 @@ __all__ = [
     "Role",
     "branch_margin",
     "limits_of",
-    "moved",
 ]

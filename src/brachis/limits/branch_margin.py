@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.ik import margin_gradient
-from brachis.kinematics import Decomposition
+from brachis.kinematics import JointMap
 from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials, Role
 
 MARGIN = 5e-3
@@ -14,11 +13,11 @@ Where the start posture is nearer, half of its own margin is the least one."""
 
 
 class BranchMargin(Limit):
-    """Margins of the branch that a decomposition is on.
+    """Margins of the branch that a joint map is on.
 
     Parameters
     ----------
-    decomposition : Decomposition
+    joint_map : JointMap
     at_start : (c,) ndarray
         Margins of the start posture.
     margin : float
@@ -29,9 +28,9 @@ class BranchMargin(Limit):
     role = Role.SAFEGUARD
     static = True
 
-    def __init__(self, decomposition: Decomposition, at_start: np.ndarray, margin: float) -> None:
-        self._solver, self._branch = decomposition.solver, decomposition.branch
-        label, count = decomposition.solver.branches[decomposition.branch], len(at_start)
+    def __init__(self, joint_map: JointMap, at_start: np.ndarray, margin: float) -> None:
+        self._joint_map = joint_map
+        label, count = joint_map.branch_label, len(at_start)
         names = [f"{label} {i}" for i in range(count)] if count > 1 else [label]
         self.labels = tuple(Label(name, "branch margin", "-") for name in names)
         self.lower, self.upper = np.minimum(margin, 0.5 * at_start), np.full(count, np.inf)
@@ -43,14 +42,14 @@ class BranchMargin(Limit):
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        return self._solver.branch_margins(motion.q, self._branch)
+        return self._joint_map.branch_margins(motion.q)
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
-        return Partials(q=margin_gradient(self._solver, motion.q, self._branch))
+        return Partials(q=self._joint_map.branch_margin_gradient(motion.q))
 
 
-def build(decomposition: Decomposition, margin: float = MARGIN) -> BranchMargin | None:
-    """Build the limit where the closed form has margins."""
-    at_start = decomposition.solver.branch_margins(decomposition.start[None], decomposition.branch)[0]
-    return BranchMargin(decomposition, at_start, margin) if len(at_start) else None
+def build(joint_map: JointMap, margin: float = MARGIN) -> tuple[BranchMargin, ...]:
+    """Build the limit, where the joint map has margins: what keeps the motion where it can be computed."""
+    at_start = joint_map.branch_margins(joint_map.start[None])[0]
+    return (BranchMargin(joint_map, at_start, margin),) if len(at_start) else ()

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol, Self
@@ -239,8 +238,3 @@ class Limit(ABC):
         scale = self.violation_scale
         above = np.maximum(1.0 + (values - self.upper) * scale, 0.0)
         return np.asarray(above - np.maximum(1.0 + (self.lower - values) * scale, 0.0))
-
-
-def moved(limits: Sequence[Limit], limit: Limit, bound: Bound, amount: float) -> tuple[Limit, ...]:
-    """Return limits of which one has a figure that gives way by `amount`."""
-    return tuple(each.relaxed(bound, amount) if each is limit else each for each in limits)

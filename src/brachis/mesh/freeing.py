@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.mesh.judgement import SHORTEST, Answer, accepted, end_time, ending_with, gain
-from brachis.nlp import Transcription
+from brachis.nlp import Program
 from brachis.refine import RefinementOptions, Solve, refine
 from brachis.solvers import SolverReport
 
@@ -15,13 +15,13 @@ _WORTH_IT = 2e-4
 
 
 def free_knots(
-    problem: Transcription,
+    program: Program,
     first: SolverReport,
     solve: Solve,
     shortest: float,
     refinement: RefinementOptions,
 ) -> Answer:
-    """Optimise the interval lengths of a solved problem together with the motion.
+    """Optimise the interval lengths of a solved program together with the motion.
 
     Collocation points keep their places within their intervals while the knots move. The knots are then fixed and the
     limits made to hold in between (`refine`); from there, with the points that this added, the knots are freed again,
@@ -29,12 +29,12 @@ def free_knots(
 
     Parameters
     ----------
-    problem : Transcription
+    program : Program
         With fixed knots.
     first : SolverReport
-        Of the problem's solve.
+        Of the program's solve.
     solve : callable
-        ``solve(problem, x)`` returns a `SolverReport`.
+        ``solve(program, x)`` returns a `SolverReport`.
     shortest : float
         Least length of an interval, in mean intervals; 5e-5 t_E at least is taken.
     refinement : RefinementOptions
@@ -43,16 +43,16 @@ def free_knots(
     Returns
     -------
     Answer
-        With knots fixed where they are best; the given problem if freeing them led to no motion within the limits.
+        With knots fixed where they are best; the given program if freeing them led to no motion within the limits.
     """
-    given = problem
+    given = program
     reports, best, x = [first], None, first.x
-    shortest = max(shortest, SHORTEST * (len(problem.breaks) - 1))
+    shortest = max(shortest, SHORTEST * max(phase.intervals for phase in program.phases))
     for _ in range(_ROUNDS):
         if refinement.deadline.passed:
             break
-        free = problem.with_free_knots(shortest)
-        moved = solve(free, free.variables_from(problem.motion(x)))
+        free = program.with_free_knots(shortest)
+        moved = solve(free, free.variables_from(program.motions(x)))
         fixed, start = free.frozen(moved.x)
         # A few iterations, where the solver stalled before the knots came to rest.
         report = accepted(solve(fixed, start), reports[-1])
@@ -66,8 +66,8 @@ def free_knots(
             best = refined
         if not gained > _WORTH_IT:
             break
-        problem, x = refined.problem, refined.x
+        program, x = refined.program, refined.x
     undone = "the knots were not moved as far as that pays" if refinement.deadline.passed else ""
     if best is None or not np.isfinite(end_time(best, refinement)):
         return Answer(given, ending_with(first, reports), undone)
-    return Answer(best.problem, ending_with(best.reports[-1], reports), undone)
+    return Answer(best.program, ending_with(best.reports[-1], reports), undone)

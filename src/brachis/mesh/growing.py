@@ -13,7 +13,7 @@ import numpy as np
 from brachis.bspline import clamped_knots
 from brachis.deadline import NEVER, Deadline
 from brachis.mesh.judgement import Answer, accepted, ending_with
-from brachis.nlp import Transcription
+from brachis.nlp import Phase, Program
 from brachis.refine import Solve
 from brachis.solvers import SolverReport
 
@@ -21,25 +21,23 @@ _FEWEST = 12
 """Intervals of the coarsest level, at least."""
 
 
-def coarsest(problem: Transcription) -> Transcription:
-    """Return the problem over every 2^k-th of its knots, k as large as leaves a dozen intervals."""
-    return next(_levels(problem))
+def coarsest(program: Program) -> Program:
+    """Return the program over every 2^k-th of its knots, k as large as leaves a dozen intervals."""
+    return next(_levels(program))
 
 
-def grow(
-    target: Transcription, coarse: Transcription, report: SolverReport, solve: Solve, deadline: Deadline = NEVER
-) -> Answer:
-    """Solve a problem from the answer of its coarsest one, level by level.
+def grow(target: Program, coarse: Program, report: SolverReport, solve: Solve, deadline: Deadline = NEVER) -> Answer:
+    """Solve a program from the answer of its coarsest one, level by level.
 
     Parameters
     ----------
-    target : Transcription
-    coarse : Transcription
+    target : Program
+    coarse : Program
         ``coarsest(target)``, perhaps with another branch margin, which is kept.
     report : SolverReport
-        Of the coarse problem's solve.
+        Of the coarse program's solve.
     solve : callable
-        ``solve(problem, x)`` returns a `SolverReport`.
+        ``solve(program, x)`` returns a `SolverReport`.
 
     deadline : Deadline, optional
         No level is begun after it.
@@ -51,28 +49,37 @@ def grow(
     """
     reports, solved = [report], report
     for level in _levels(target):
-        if len(level.knots) <= len(coarse.knots):
+        if level.intervals <= coarse.intervals:
             continue
         if deadline.passed:
             break
-        finer = coarse.with_knots(level.knots, level.tau)
-        start = finer.variables_from(coarse.motion(solved.x).over(finer.knots))
+        pairs = list(zip(coarse.split(solved.x), level.phases, strict=True))
+        finer = coarse.with_phases(own.with_knots(fine.knots, fine.t_norm) for (own, _), fine in pairs)
+        start = finer.variables_from([own.motion(part).over(fine.knots) for (own, part), fine in pairs])
         report = accepted(solve(finer, start), solved)
         reports.append(report)
         if not report.status.usable:
             break
         coarse, solved = finer, report
-    reached, asked = len(coarse.breaks) - 1, len(target.breaks) - 1
+    reached, asked = coarse.intervals, target.intervals
     undone = f"the motion has {reached} of {asked} intervals, of which more were not solved" if reached < asked else ""
     return Answer(coarse, ending_with(solved, reports), undone)
 
 
-def _levels(problem: Transcription) -> Iterator[Transcription]:
-    """Problems over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
-    breaks = problem.breaks
-    steps = int(np.log2(max((len(breaks) - 1) / _FEWEST, 1.0)))
-    for k in range(steps, 0, -1):
-        chosen = np.unique(np.append(np.arange(0, len(breaks), 2**k), len(breaks) - 1))
-        points = problem.tau[np.unique(np.append(np.arange(0, len(problem.tau), 2**k), len(problem.tau) - 1))]
-        yield problem.with_knots(clamped_knots(problem.degree, breaks[chosen]), points)
-    yield problem
+def _levels(program: Program) -> Iterator[Program]:
+    """Programs over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
+    steps = [int(np.log2(max(phase.intervals / _FEWEST, 1.0))) for phase in program.phases]
+    for k in range(max(steps), 0, -1):
+        pairs = zip(program.phases, steps, strict=True)
+        yield program.with_phases(_thinned(phase, 2 ** min(k, own)) for phase, own in pairs)
+    yield program
+
+
+def _thinned(phase: Phase, every: int) -> Phase:
+    """Keep every so many-th knot and collocation point, and the last ones."""
+    breaks, t_norm = (values[_every(len(values), every)] for values in (phase.breaks, phase.t_norm))
+    return phase.with_knots(clamped_knots(phase.degree, breaks), t_norm)
+
+
+def _every(count: int, step: int) -> np.ndarray:
+    return np.unique(np.append(np.arange(0, count, step), count - 1))

@@ -14,7 +14,7 @@ import numpy as np
 from brachis.bspline import clamped_knots, spread
 from brachis.errors import UnreachableError
 from brachis.mesh.judgement import SHORTEST, Answer, accepted, end_time, ending_with, gain
-from brachis.nlp import Transcription
+from brachis.nlp import Phase, Program
 from brachis.refine import Refined, RefinementOptions, Solve, merged, refine
 from brachis.solvers import SolverReport
 
@@ -49,9 +49,9 @@ class MeshOptions:
 
 
 def refine_mesh(
-    problem: Transcription, first: SolverReport, solve: Solve, options: MeshOptions, refinement: RefinementOptions
+    program: Program, first: SolverReport, solve: Solve, options: MeshOptions, refinement: RefinementOptions
 ) -> Answer:
-    """Insert knots into a solved problem until halving every interval gains less than the tolerance.
+    """Insert knots into a solved program until halving every interval gains less than the tolerance.
 
     Rounds that halve the intervals that lose most go on until one of them gains little. Then the limits are made to
     hold in between (`refine`), every interval is halved, and the limits are made to hold again: the gain of that is
@@ -59,11 +59,11 @@ def refine_mesh(
 
     Parameters
     ----------
-    problem : Transcription
+    program : Program
     first : SolverReport
-        Of the problem's solve.
+        Of the program's solve.
     solve : callable
-        ``solve(problem, x)`` returns a `SolverReport`.
+        ``solve(program, x)`` returns a `SolverReport`.
     options : MeshOptions
     refinement : RefinementOptions
         After its deadline no round is begun; nor is one that looks as if it would end later.
@@ -79,18 +79,18 @@ def refine_mesh(
         if _GROWTH * last.wall_time > refinement.deadline.left:
             undone = _UNDONE
             break
-        finer, x = _halved(problem, last.x, _losers(problem, last.x), options)
-        if finer.variables == problem.variables or len(finer.breaks) > _MOST_INTERVALS:
+        finer, x = _halved(program, last.x, _losers(program, last.x), options)
+        if finer.variables == program.variables or finer.intervals >= _MOST_INTERVALS:
             break
         report = accepted(solve(finer, x), last)
         reports.append(report)
         if not report.status.usable:
             break
         worth_it = report.objective < last.objective * (1.0 - options.tolerance)
-        problem, last = finer, report
+        program, last = finer, report
         if worth_it:
             continue
-        settled = refine(problem, last, solve, refinement)
+        settled = refine(program, last, solve, refinement)
         doubled = _doubled(settled, solve, options, refinement)
         reports += [*settled.reports[1:], *doubled.reports]
         held += [settled, doubled]
@@ -100,40 +100,58 @@ def refine_mesh(
     if refinement.deadline.passed:
         undone = _UNDONE
     if best is None or last.objective < end_time(best, refinement):
-        return Answer(problem, ending_with(last, reports), undone)
-    return Answer(best.problem, ending_with(best.reports[-1], reports), undone)
+        return Answer(program, ending_with(last, reports), undone)
+    return Answer(best.program, ending_with(best.reports[-1], reports), undone)
 
 
-def _losers(problem: Transcription, x: np.ndarray) -> np.ndarray:
-    """Intervals that lose most time, ascending: how far the 1 + r limits that press most swing, times the length."""
-    lengths = np.diff(problem.breaks)
+def _losers(program: Program, x: np.ndarray) -> list[np.ndarray]:
+    """Intervals of every phase that lose most time, ascending."""
+    whole = program.end_time(x)
     try:
-        ratios = np.abs(problem.resampled(spread(problem.breaks, _SAMPLES)).time_scaling_ratios(x))
+        lost = [_lost(phase, part) * (part[0] / whole) for phase, part in program.split(x)]
     except UnreachableError:  # between the collocation points
-        return np.arange(len(lengths))
-    slack = 1.0 - np.sort(ratios, axis=1)[:, -(1 + problem.decomposition.r) :].clip(max=1.0)
+        return _every(program)
+    together = np.concatenate(lost)
+    order = np.argsort(-together, kind="stable")
+    most = np.searchsorted(np.cumsum(together[order]), _SHARE * together.sum()) + 1
+    chosen = np.isin(np.arange(len(together)), order[:most])
+    return [np.flatnonzero(own) for own in np.split(chosen, np.cumsum([len(own) for own in lost])[:-1])]
+
+
+def _lost(phase: Phase, x: np.ndarray) -> np.ndarray:
+    """Part of the duration that each interval loses, (N,): how far as many limits as there are curves swing."""
+    breaks = phase.breaks
+    ratios = np.abs(phase.resampled(spread(breaks, _SAMPLES)).time_scaling_ratios(x))
+    slack = 1.0 - np.sort(ratios, axis=1)[:, -len(phase.splines) :].clip(max=1.0)
     within = np.lib.stride_tricks.sliding_window_view(slack, _SAMPLES + 1, axis=0)[::_SAMPLES]
-    lost = np.ptp(within, axis=2).sum(axis=1) * lengths
-    order = np.argsort(-lost, kind="stable")
-    most = np.searchsorted(np.cumsum(lost[order]), _SHARE * lost.sum()) + 1
-    return np.sort(order[:most])
+    return np.asarray(np.ptp(within, axis=2).sum(axis=1) * np.diff(breaks))
+
+
+def _every(program: Program) -> list[np.ndarray]:
+    return [np.arange(phase.intervals) for phase in program.phases]
 
 
 def _halved(
-    problem: Transcription, x: np.ndarray, intervals: np.ndarray, options: MeshOptions
-) -> tuple[Transcription, np.ndarray]:
-    """Halve intervals of a problem: the finer problem, and the same motion as its point."""
-    breaks = problem.breaks
+    program: Program, x: np.ndarray, intervals: list[np.ndarray], options: MeshOptions
+) -> tuple[Program, np.ndarray]:
+    """Halve intervals of every phase: the finer program, and the same motion as its point."""
+    pairs = zip(program.phases, intervals, strict=True)
+    finer = program.with_phases(_with_halves(phase, own, options) for phase, own in pairs)
+    motions = zip(program.motions(x), finer.phases, strict=True)
+    return finer, finer.variables_from([motion.over(phase.knots) for motion, phase in motions])
+
+
+def _with_halves(phase: Phase, intervals: np.ndarray, options: MeshOptions) -> Phase:
+    breaks = phase.breaks
     shortest = max(_SHORTEST * options.tolerance, SHORTEST)
     intervals = intervals[np.diff(breaks)[intervals] >= 2.0 * shortest]
     finer = np.union1d(breaks, 0.5 * (breaks[intervals] + breaks[intervals + 1]))
-    knots = clamped_knots(problem.degree, finer)
-    other = problem.with_knots(knots, merged(problem, spread(finer, options.points_per_interval)))
-    return other, other.variables_from(problem.motion(x).over(knots))
+    return phase.with_knots(
+        clamped_knots(phase.degree, finer), merged(phase, spread(finer, options.points_per_interval))
+    )
 
 
 def _doubled(settled: Refined, solve: Solve, options: MeshOptions, refinement: RefinementOptions) -> Refined:
-    """Halve every interval of a refined problem, solve and refine again."""
-    every = np.arange(len(settled.problem.breaks) - 1)
-    finer, x = _halved(settled.problem, settled.x, every, options)
+    """Halve every interval of a refined program, solve and refine again."""
+    finer, x = _halved(settled.program, settled.x, _every(settled.program), options)
     return refine(finer, accepted(solve(finer, x), settled.reports[-1]), solve, refinement)

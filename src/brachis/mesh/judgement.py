@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brachis.nlp import Transcription
+from brachis.nlp import Program
 from brachis.refine import Refined, RefinementOptions
 from brachis.solvers import SolverReport, SolveStatus
 
@@ -20,14 +20,14 @@ class Answer(NamedTuple):
 
     Attributes
     ----------
-    problem : Transcription
+    program : Program
     reports : tuple of SolverReport
-        Of all solves; the last one belongs to `problem`.
+        Of all solves; the last one belongs to `program`.
     undone : str
         What the time, or a solve that failed, left undone, in words; empty where nothing.
     """
 
-    problem: Transcription
+    program: Program
     reports: tuple[SolverReport, ...]
     undone: str = ""
 
@@ -45,8 +45,8 @@ def accepted(report: SolverReport, before: SolverReport) -> SolverReport:
 
 def end_time(refined: Refined, refinement: RefinementOptions) -> float:
     """End time of a motion that holds the limits, infinite for others."""
-    holds = refined.converged and (refined.excess <= refinement.tolerance or not refinement.max_rounds)
-    return float(refined.x[0]) if holds else np.inf
+    holds = refined.converged and (refined.violation <= refinement.tolerance or not refinement.max_rounds)
+    return refined.t_end if holds else np.inf
 
 
 def gain(before: Refined, after: Refined, refinement: RefinementOptions) -> float:

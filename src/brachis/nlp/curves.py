@@ -18,7 +18,7 @@ ORDERS = 3
 
 
 @dataclass(frozen=True)
-class TiedSpline:
+class BoundarySpline:
     """A scalar spline over normalised time with boundary conditions built in.
 
     Attributes
@@ -38,9 +38,7 @@ class TiedSpline:
     fixed: np.ndarray
 
     @classmethod
-    def resting(
-        cls, knots: np.ndarray, degree: int, *, derivatives: int, start: float | None, end: float | None
-    ) -> TiedSpline:
+    def resting(cls, knots: np.ndarray, degree: int, *, derivatives: int, start: float, end: float) -> BoundarySpline:
         """Build a spline at rest at both ends.
 
         Parameters
@@ -49,15 +47,15 @@ class TiedSpline:
             See the attributes.
         derivatives : int
             How many derivatives vanish at each end: 1 for velocity, 2 for acceleration too.
-        start, end : float or None
-            Value at the end in question, None where free.
+        start, end : float
+            Value at the end in question, NaN where free.
         """
         count = len(knots) - degree - 1
         still = derivatives + 1
         group = np.clip(np.arange(count), still - 1, count - still)
         fixed = np.zeros(count)
         for value, ends in ((start, slice(None, still)), (end, slice(count - still, None))):
-            if value is not None:
+            if not np.isnan(value):
                 fixed[ends] = value
                 group[ends] = -1
         variable = np.full(count, -1)
@@ -87,7 +85,32 @@ class TiedSpline:
 
 
 @dataclass(frozen=True)
-class Windows:
+class Boundary:
+    """Boundary conditions of curves that rest at both ends.
+
+    Attributes
+    ----------
+    start, end : (c,) ndarray
+        Values of the curves there, NaN where free.
+    derivatives : int
+        How many derivatives vanish at each end: 1 for velocity, 2 for acceleration too.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    derivatives: int
+
+    def splines(self, knots: np.ndarray, degree: int) -> tuple[BoundarySpline, ...]:
+        """Build the conditions into splines."""
+        pairs = zip(self.start, self.end, strict=True)
+        return tuple(
+            BoundarySpline.resting(knots, degree, derivatives=self.derivatives, start=start, end=end)
+            for start, end in pairs
+        )
+
+
+@dataclass(frozen=True)
+class LocalBasis:
     """Basis functions of value and two derivatives at K times.
 
     Attributes
@@ -102,10 +125,10 @@ class Windows:
     values: np.ndarray
 
     @classmethod
-    def of(cls, knots: np.ndarray, degree: int, tau: np.ndarray) -> Windows:
-        """Sample the basis at normalised times `tau`, (K,)."""
-        first, value = basis_windows(knots, degree, tau)
-        derivatives = [basis_windows(knots, degree, tau, order)[1] for order in range(1, ORDERS)]
+    def of(cls, knots: np.ndarray, degree: int, t_norm: np.ndarray) -> LocalBasis:
+        """Sample the basis at normalised times `t_norm`, (K,)."""
+        first, value = basis_windows(knots, degree, t_norm)
+        derivatives = [basis_windows(knots, degree, t_norm, order)[1] for order in range(1, ORDERS)]
         return cls(first[:, None] + np.arange(degree + 1), np.array([value, *derivatives]))
 
     def curves(self, control_points: np.ndarray) -> np.ndarray:
@@ -114,7 +137,7 @@ class Windows:
 
 
 @dataclass(frozen=True)
-class Places:
+class SparsityPattern:
     """Where the free variables of a spline matter: each pair of a time and a variable once.
 
     Attributes
@@ -128,8 +151,8 @@ class Places:
     _place: np.ndarray
 
     @classmethod
-    def of(cls, columns: np.ndarray, spline: TiedSpline) -> Places:
-        """Find the places of a spline's windows, whose `columns` are (K, d + 1)."""
+    def of(cls, columns: np.ndarray, spline: BoundarySpline) -> SparsityPattern:
+        """Find the places of a spline's local basis, whose `columns` are (K, d + 1)."""
         variable = spline.variable[columns]
         kept = variable >= 0
         numbers = (np.arange(len(variable))[:, None] * spline.free + variable)[kept]
@@ -137,5 +160,5 @@ class Places:
         return cls(unique // spline.free, unique % spline.free, kept, place)
 
     def entries(self, values: np.ndarray) -> np.ndarray:
-        """Differentiate value and two derivatives by the free variables, (3, z); `values` are windows (3, K, d + 1)."""
-        return np.array([np.bincount(self._place, weights=window[self._kept]) for window in values])
+        """Differentiate value and two derivatives by the free variables, (3, z); `values` are (3, K, d + 1)."""
+        return np.array([np.bincount(self._place, weights=value[self._kept]) for value in values])

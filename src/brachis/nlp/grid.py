@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from brachis.bspline import clamped_knots, window_derivatives, windows_of_lengths
-from brachis.nlp.curves import ORDERS, Windows
+from brachis.nlp.curves import ORDERS, LocalBasis
 
 
 class Grid(Protocol):
@@ -24,7 +24,7 @@ class Grid(Protocol):
     degree : int
     knots : (N + 2 d + 1,) ndarray
         In normalised time; where they are variables, at the lengths that the grid was made with.
-    tau : (K,) ndarray
+    t_norm : (K,) ndarray
         Collocation points in normalised time, ascending, from 0 to 1; as `knots`.
     lower, upper : (v,) ndarray
         Bounds on h.
@@ -36,7 +36,7 @@ class Grid(Protocol):
 
     degree: int
     knots: np.ndarray
-    tau: np.ndarray
+    t_norm: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
     total: np.ndarray
@@ -47,7 +47,7 @@ class Grid(Protocol):
         """Knots, in units of h."""
         ...
 
-    def tau_at(self, h: np.ndarray) -> np.ndarray:
+    def t_norm_at(self, h: np.ndarray) -> np.ndarray:
         """Collocation points, in units of h."""
         ...
 
@@ -55,7 +55,7 @@ class Grid(Protocol):
         """Variables h that belong to given knots."""
         ...
 
-    def windows(self, h: np.ndarray) -> Windows:
+    def basis(self, h: np.ndarray) -> LocalBasis:
         """Basis functions at the collocation points; the same object as long as they are the same."""
         ...
 
@@ -74,25 +74,25 @@ class FixedGrid:
     lower = upper = total = np.empty(0)
     point = variable = np.empty(0, dtype=int)
 
-    def __init__(self, knots: np.ndarray, degree: int, tau: np.ndarray) -> None:
-        self.knots, self.degree, self.tau = knots, degree, tau
-        self._windows = Windows.of(knots, degree, tau)
+    def __init__(self, knots: np.ndarray, degree: int, t_norm: np.ndarray) -> None:
+        self.knots, self.degree, self.t_norm = knots, degree, t_norm
+        self._basis = LocalBasis.of(knots, degree, t_norm)
 
     def knots_at(self, _h: np.ndarray) -> np.ndarray:
         """See `Grid`."""
         return self.knots
 
-    def tau_at(self, _h: np.ndarray) -> np.ndarray:
+    def t_norm_at(self, _h: np.ndarray) -> np.ndarray:
         """See `Grid`."""
-        return self.tau
+        return self.t_norm
 
     def lengths_of(self, _knots: np.ndarray) -> np.ndarray:
         """See `Grid`."""
         return np.empty(0)
 
-    def windows(self, _h: np.ndarray) -> Windows:
+    def basis(self, _h: np.ndarray) -> LocalBasis:
         """See `Grid`."""
-        return self._windows
+        return self._basis
 
     def slopes(self, _h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
         """See `Grid`."""
@@ -108,7 +108,7 @@ class FreeGrid:
 
     Parameters
     ----------
-    knots, degree, tau
+    knots, degree, t_norm
         See `Grid`.
     shortest : float
         Least length of an interval, in normalised time.
@@ -116,27 +116,27 @@ class FreeGrid:
 
     total = np.ones(1)
 
-    def __init__(self, knots: np.ndarray, degree: int, tau: np.ndarray, shortest: float) -> None:
-        self.knots, self.degree, self.tau = knots, degree, tau
+    def __init__(self, knots: np.ndarray, degree: int, t_norm: np.ndarray, shortest: float) -> None:
+        self.knots, self.degree, self.t_norm = knots, degree, t_norm
         breaks = knots[degree : len(knots) - degree]
         count = len(breaks) - 1
         self.lower, self.upper = np.full(count, shortest), np.ones(count)
-        self._interval = np.clip(np.searchsorted(breaks, tau, side="right") - 1, 0, count - 1)
-        self._fraction = (tau - breaks[self._interval]) / np.diff(breaks)[self._interval]
+        self._interval = np.clip(np.searchsorted(breaks, t_norm, side="right") - 1, 0, count - 1)
+        self._fraction = (t_norm - breaks[self._interval]) / np.diff(breaks)[self._interval]
         around = self._interval[:, None] + np.arange(1 - degree, degree)
         self._inside = (around >= 0) & (around < count)
         self._around = np.where(self._inside, around, count)  # beyond the ends: an interval without length
         self._columns = self._interval[:, None] + np.arange(degree + 1)
         self.point, _ = np.nonzero(self._inside)
         self.variable = around[self._inside]
-        self._last: tuple[bytes, Windows] | None = None
+        self._last: tuple[bytes, LocalBasis] | None = None
 
     def knots_at(self, h: np.ndarray) -> np.ndarray:
         """See `Grid`."""
         breaks = np.concatenate([[0.0], np.cumsum(np.maximum(h, self.lower))])
         return clamped_knots(self.degree, breaks / breaks[-1])
 
-    def tau_at(self, h: np.ndarray) -> np.ndarray:
+    def t_norm_at(self, h: np.ndarray) -> np.ndarray:
         """See `Grid`."""
         return (np.cumsum(h) - h)[self._interval] + self._fraction * h[self._interval]
 
@@ -147,12 +147,12 @@ class FreeGrid:
     def _lengths_around(self, h: np.ndarray) -> np.ndarray:
         return np.append(h, 0.0)[self._around]
 
-    def windows(self, h: np.ndarray) -> Windows:
+    def basis(self, h: np.ndarray) -> LocalBasis:
         """See `Grid`."""
         key = h.tobytes()
         if self._last is None or self._last[0] != key:
             values = windows_of_lengths(self._lengths_around(h), self._fraction)
-            self._last = key, Windows(self._columns, values)
+            self._last = key, LocalBasis(self._columns, values)
         return self._last[1]
 
     def slopes(self, h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
@@ -163,5 +163,5 @@ class FreeGrid:
 
     def frozen(self, h: np.ndarray) -> FixedGrid:
         """See `Grid`."""
-        tau = self.tau_at(h)
-        return FixedGrid(self.knots_at(h), self.degree, tau / tau[-1])
+        t_norm = self.t_norm_at(h)
+        return FixedGrid(self.knots_at(h), self.degree, t_norm / t_norm[-1])

@@ -1,4 +1,4 @@
-"""A point of the NLP as curves over time."""
+"""A point of a phase as curves over time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.bspline import insert_knots
-from brachis.nlp.curves import Windows
+from brachis.nlp.curves import LocalBasis
 
 _BISECTIONS = 45
 _SAME_TIME = 1e-13
@@ -16,7 +16,7 @@ _SAME_TIME = 1e-13
 
 @dataclass(frozen=True)
 class Motion:
-    """A point x of the NLP as curves.
+    """A point x of a phase as curves.
 
     Attributes
     ----------
@@ -25,8 +25,8 @@ class Motion:
     knots : ndarray
         In normalised time.
     degree : int
-    control_points : (1 + r, N + d) ndarray
-        Of s, then of each redundant joint in chain order.
+    control_points : (c, N + d) ndarray
+        Of each curve: along a path of s, then of each redundant joint in chain order.
     """
 
     t_end: float
@@ -40,12 +40,12 @@ class Motion:
         return np.unique(self.knots) * self.t_end
 
     def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """y, ydot and yddot, each (K, 1 + r), at times t, (K,), in seconds; at knots the values behind them."""
-        tau, breaks = t / self.t_end, np.unique(self.knots)
-        behind = breaks[np.searchsorted(breaks, tau - _SAME_TIME).clip(max=len(breaks) - 1)]
+        """y, ydot and yddot, each (K, c), at times t, (K,), in seconds; at knots the values behind them."""
+        t_norm, breaks = t / self.t_end, np.unique(self.knots)
+        behind = breaks[np.searchsorted(breaks, t_norm - _SAME_TIME).clip(max=len(breaks) - 1)]
         # Rounding must not choose the side of a knot: splines of degree 2 jump in acceleration there.
-        windows = Windows.of(self.knots, self.degree, np.where(np.abs(behind - tau) <= _SAME_TIME, behind, tau))
-        y, ydot, yddot = windows.curves(self.control_points)
+        basis = LocalBasis.of(self.knots, self.degree, np.where(np.abs(behind - t_norm) <= _SAME_TIME, behind, t_norm))
+        y, ydot, yddot = basis.curves(self.control_points)
         return y, ydot / self.t_end, yddot / self.t_end**2
 
     def over(self, knots: np.ndarray) -> Motion:

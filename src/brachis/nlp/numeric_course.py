@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.deadline import NEVER, Deadline
-from brachis.ik import margin_gradient
 from brachis.kinematics import Decomposition
 
 _FEWEST_STEPS, _MOST_STEPS, _STEP_LENGTH = 24, 1000, 0.05  # metres a step
@@ -91,7 +90,7 @@ def _room(decomposition: Decomposition, course: np.ndarray) -> float:
     q = decomposition.postures(course)
     if not np.isfinite(q).all():
         return -np.inf
-    return float(decomposition.solver.branch_margins(q, decomposition.branch).min(initial=np.inf))
+    return float(decomposition.branch_margins(q).min(initial=np.inf))
 
 
 def numeric_course(decomposition: Decomposition, strategy: Strategy, deadline: Deadline = NEVER) -> np.ndarray | None:
@@ -120,10 +119,7 @@ def numeric_course(decomposition: Decomposition, strategy: Strategy, deadline: D
     previous = np.zeros_like(q)
     course = [np.append(0.0, q[decomposition.redundant])]
     for _ in range(_UNFOLDING_STEPS):
-        if (
-            decomposition.solver.branch_margins(q[None], decomposition.branch).min(initial=1.0)
-            > 0.5 * strategy.threshold
-        ):
+        if decomposition.branch_margins(q[None]).min(initial=1.0) > 0.5 * strategy.threshold:
             break
         moved = _follow(decomposition, strategy, q, previous, targets[0], step_s=None)
         if moved is None or deadline.passed:
@@ -176,9 +172,9 @@ def _wish(decomposition: Decomposition, strategy: Strategy, q: np.ndarray, previ
     """Joint motion per unit s that the null space may realise, (n,)."""
     limits = decomposition.robot.limits
     wish = np.zeros_like(q)
-    margins = decomposition.solver.branch_margins(q[None], decomposition.branch)[0]
+    margins = decomposition.branch_margins(q[None])[0]
     if np.any(margins < strategy.threshold):
-        gradients = margin_gradient(decomposition.solver, q[None], decomposition.branch)[0]
+        gradients = decomposition.branch_margin_gradient(q[None])[0]
         shortfall = np.clip(strategy.threshold - margins, 0.0, 2.0 * strategy.threshold)
         wish += strategy.push * shortfall @ gradients
     # A tenth of the range, or of a radian or metre where it is open, is kept clear at each end.

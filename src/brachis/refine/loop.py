@@ -1,9 +1,9 @@
 """Refinement to truth: from limits at collocation points to limits everywhere.
 
-After a solve the limits are evaluated on a grid many times denser. Where one is exceeded between collocation points,
+After a solve the limits are evaluated on a grid many times denser. Where one is violated between collocation points,
 points are added around the worst place of each stretch and the problem is solved again from where it stands, until the
-worst ratio is within the tolerance. A last excess of the tolerance's own size is met by lengthening t_E by as little,
-and by up to one per cent once the rounds, or the time, are used up.
+worst ratio is within the tolerance. A last violation of the tolerance's own size is met by lengthening t_E by as
+little, and by up to one per cent once the rounds, or the time, are used up.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.deadline import NEVER, Deadline
-from brachis.nlp import Transcription
-from brachis.refine.excesses import dense_grid, merged, violations
+from brachis.nlp import Program
+from brachis.refine.violations import dense_grid, merged, violations
 from brachis.solvers import SolverReport
 
-Solve = Callable[[Transcription, np.ndarray], SolverReport]
-_LARGEST_STRETCH = 0.01
+Solve = Callable[[Program, np.ndarray], SolverReport]
+_LONGEST = 0.01
 _GOAL = 0.5
 """Refinement aims at this part of the tolerance: the verification's grid is another one."""
 
@@ -31,7 +31,7 @@ class RefinementOptions:
     Attributes
     ----------
     tolerance : float
-        Largest excess over a limit, as a fraction of it.
+        Largest violation of a limit, as a fraction of it.
     density : int
         Grid points per collocation point of the first solve.
     max_rounds : int
@@ -52,23 +52,28 @@ class Refined:
 
     Attributes
     ----------
-    problem : Transcription
+    program : Program
         With all collocation points.
     reports : tuple of SolverReport
         Of every round, the first one included.
     x : (v,) ndarray
         The answer.
-    excess : float
-        Largest excess over a limit on the dense grid, as a fraction of it; infinite where out of reach.
-    stretched : float
+    violation : float
+        Largest violation of a limit on the dense grid, as a fraction of it; infinite where out of reach.
+    time_scaled : float
         Factor by which t_E was lengthened at the very end, 1 if not at all.
     """
 
-    problem: Transcription
+    program: Program
     reports: tuple[SolverReport, ...]
     x: np.ndarray
-    excess: float
-    stretched: float
+    violation: float
+    time_scaled: float
+
+    @property
+    def t_end(self) -> float:
+        """End time of the answer, s."""
+        return self.program.end_time(self.x)
 
     @property
     def converged(self) -> bool:
@@ -76,68 +81,68 @@ class Refined:
         return self.reports[0].status.usable
 
 
-def refine(problem: Transcription, first: SolverReport, solve: Solve, options: RefinementOptions) -> Refined:
-    """Add collocation points to a solved problem until the limits hold on the dense grid.
+def refine(program: Program, first: SolverReport, solve: Solve, options: RefinementOptions) -> Refined:
+    """Add collocation points to a solved program until the limits hold on the dense grid.
 
     Parameters
     ----------
-    problem : Transcription
+    program : Program
     first : SolverReport
-        Of the problem's solve.
+        Of the program's solve.
     solve : callable
-        ``solve(problem, x)`` returns a `SolverReport`.
+        ``solve(program, x)`` returns a `SolverReport`.
     options : RefinementOptions
 
     Returns
     -------
     Refined
     """
-    dense = problem.resampled(dense_grid(problem, options.density))
+    dense = program.resampled([dense_grid(phase, options.density) for phase in program.phases])
     goal = options.tolerance * _GOAL
     reports = [first]
     if not first.status.usable:
-        return Refined(problem, (first,), first.x, np.inf, 1.0)
+        return Refined(program, (first,), first.x, np.inf, 1.0)
     for _ in range(options.max_rounds):
         answer = reports[-1].x
-        excess, places = violations(dense, answer, goal)
-        x, remaining = _stretched(dense, answer, excess, goal, options.tolerance)
+        violation, places = violations(dense, answer, goal)
+        x, remaining = _time_scaled(dense, answer, violation, goal, options.tolerance)
         if remaining <= goal:
-            return Refined(problem, tuple(reports), x, remaining, float(x[0] / answer[0]))
-        tau = merged(problem, places)
-        if len(tau) == len(problem.tau) or options.deadline.passed:
+            return Refined(program, tuple(reports), x, remaining, program.end_time(x) / program.end_time(answer))
+        extended = [merged(phase, extra) for phase, extra in zip(program.phases, places, strict=True)]
+        finer = program.resampled(extended)
+        if finer.collocation_points == program.collocation_points or options.deadline.passed:
             break
-        finer = problem.resampled(tau)
         report = solve(finer, answer)
         if not report.status.usable and not _still_good(report, reports[-1]):
             break
-        problem = finer
+        program = finer
         reports.append(report)
     answer = reports[-1].x
-    excess, _ = violations(dense, answer, goal)
-    x, remaining = _stretched(dense, answer, excess, goal, _LARGEST_STRETCH if options.max_rounds else 0.0)
-    return Refined(problem, tuple(reports), x, remaining, float(x[0] / answer[0]))
+    violation, _ = violations(dense, answer, goal)
+    x, remaining = _time_scaled(dense, answer, violation, goal, _LONGEST if options.max_rounds else 0.0)
+    return Refined(program, tuple(reports), x, remaining, program.end_time(x) / program.end_time(answer))
 
 
 def _still_good(report: SolverReport, before: SolverReport) -> bool:
     """Tell whether a solve that ended early left a feasible motion about as fast as the one before it."""
-    return report.feasible and report.objective <= before.objective * (1.0 + _LARGEST_STRETCH)
+    return report.feasible and report.objective <= before.objective * (1.0 + _LONGEST)
 
 
-def _stretched(
-    dense: Transcription, x: np.ndarray, excess: float, goal: float, largest: float
+def _time_scaled(
+    dense: Program, x: np.ndarray, violation: float, goal: float, largest: float
 ) -> tuple[np.ndarray, float]:
-    """Lengthen the time by a fraction of up to `largest` where that brings the excess to the goal.
+    """Lengthen the time by a fraction of up to `largest` where that brings the violation to the goal.
 
     A longer time relieves torques that only accelerate by twice its own fraction, velocities by as much; those that
     gravity or friction add to by less. So this is tried, not trusted.
     """
-    x, first = x.copy(), x[0]
-    while goal < excess:
-        t_end = x[0] * (1.0 + excess - 0.5 * goal)
-        if not t_end <= first * (1.0 + largest):
+    longest = dense.end_time(x) * (1.0 + largest)
+    while goal < violation:
+        factor = 1.0 + violation - 0.5 * goal
+        if not dense.end_time(x) * factor <= longest:
             break
-        x[0] = t_end
-        before, (excess, _) = excess, violations(dense, x, goal)
-        if excess > 0.99 * before:
+        x = dense.time_scaled(x, factor)
+        before, (violation, _) = violation, violations(dense, x, goal)
+        if violation > 0.99 * before:
             break
-    return x, excess
+    return x, violation

@@ -34,7 +34,7 @@ class Best:
     Attributes
     ----------
     merit : tuple of float
-        By which motions are compared: excess over a limit, -inf where it will do, and end time, s.
+        By which motions are compared: violation of a limit, -inf where it will do, and end time, s.
     attempt : int
         Index of the attempt that gave it.
     motion : Motion
@@ -183,5 +183,6 @@ def _agree(first: Coarse, second: Coarse) -> bool:
     same = (one.choice.redundant, one.branch) == (other.choice.redundant, other.branch)
     if not same or abs(first.t_end - second.t_end) > _SAME_TIME * second.t_end:
         return False
-    postures = [plan.problem.state(plan.reports[-1].x).q for plan in (first, second) if plan.problem is not None]
-    return bool(np.abs(postures[0] - postures[1]).max() < _SAME_MOTION)
+    states = [plan.program.states(plan.reports[-1].x) for plan in (first, second) if plan.program is not None]
+    gaps = [np.abs(mine.q - its.q).max() for mine, its in zip(*states, strict=True)]
+    return bool(max(gaps) < _SAME_MOTION)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.nlp import Transcription
+from brachis.nlp import Program
 from brachis.refine import Refined, RefinementOptions, Solve, refine
 from brachis.result import Attempt
 from brachis.solvers import SolverReport
@@ -21,17 +21,17 @@ _BESIDE = 1e-4
 
 
 def refined_until_verified(
-    problem: Transcription, report: SolverReport, solve: Solve, options: RefinementOptions, judge: Judge
+    program: Program, report: SolverReport, solve: Solve, options: RefinementOptions, judge: Judge
 ) -> tuple[Refined, Motion | None]:
-    """Refine a solved problem, and again where the verification finds a limit exceeded between the points.
+    """Refine a solved program, and again where the verification finds a limit exceeded between the points.
 
     Parameters
     ----------
-    problem : Transcription
+    program : Program
     report : SolverReport
-        Of the problem's solve.
+        Of the program's solve.
     solve : callable
-        ``solve(problem, x)`` returns a `SolverReport`.
+        ``solve(program, x)`` returns a `SolverReport`.
     options : RefinementOptions
     judge : callable
         Makes the trajectory of an answer and verifies it; raises `UnreachableError` where it leaves the branch.
@@ -42,7 +42,7 @@ def refined_until_verified(
     motion : tuple of Trajectory, Verification, or None
         None where no trajectory came out.
     """
-    refined = refine(problem, report, solve, options)
+    refined = refine(program, report, solve, options)
     motion = _judged(judge, refined)
     for _ in range(_SECOND_LOOKS if options.max_rounds else 0):
         finer = None if motion is None or options.deadline.passed else _where_it_failed(refined, motion)
@@ -58,7 +58,7 @@ def refined_until_verified(
 
 def _judged(judge: Judge, refined: Refined) -> Motion | None:
     """Return the motion and its verification; None without an answer, or where it leaves the branch in between."""
-    if not (refined.converged and np.isfinite(refined.excess)):
+    if not (refined.converged and np.isfinite(refined.violation)):
         return None
     try:
         return judge(refined)
@@ -66,15 +66,16 @@ def _judged(judge: Judge, refined: Refined) -> Motion | None:
         return None
 
 
-def _where_it_failed(refined: Refined, motion: Motion) -> Transcription | None:
+def _where_it_failed(refined: Refined, motion: Motion) -> Program | None:
     """Add collocation points where the verification found a limit exceeded; None where it found no such place."""
     trajectory, verification = motion
     failed = [check for check in verification.checks if not check.passed]
     if not failed or any(not check.name.endswith("ratio") or check.time is None for check in failed):
         return None
-    tau = np.array([check.time for check in failed]) / trajectory.t_end
-    near = tau[:, None] + _BESIDE * np.array([-1.0, 0.0, 1.0])
-    return refined.problem.resampled(np.union1d(refined.problem.tau, np.clip(near.ravel(), 0.0, 1.0)))
+    t_norm = np.array([check.time for check in failed]) / trajectory.t_end
+    near = t_norm[:, None] + _BESIDE * np.array([-1.0, 0.0, 1.0])
+    (phase,) = refined.program.phases
+    return refined.program.resampled([np.union1d(phase.t_norm, np.clip(near.ravel(), 0.0, 1.0))])
 
 
 def attempt_of(
@@ -95,7 +96,7 @@ def attempt_of(
     number : int
         Of the candidate.
     tolerance : float
-        Largest excess over a limit, as a fraction of it.
+        Largest violation of a limit, as a fraction of it.
     motion : tuple of Trajectory, Verification, or None
     undone : str
         What was left undone, in words; empty where nothing.
@@ -108,25 +109,25 @@ def attempt_of(
     rounds = len(refined.reports) - 1
     if not refined.converged:
         outcome = f"{last.solver}: {last.status.value}"
-    elif not np.isfinite(refined.excess):
+    elif not np.isfinite(refined.violation):
         outcome = f"{last.solver}: the motion leaves the branch between collocation points"
     else:
-        if refined.excess > tolerance:
-            found = f"limits exceeded by {100.0 * refined.excess:.2g} %"
+        if refined.violation > tolerance:
+            found = f"limits exceeded by {100.0 * refined.violation:.2g} %"
         elif motion is None:
             found = "too sharp for a trajectory"
         else:
             found = "verified" if motion[1].passed else "the verification fails"
-        outcome = f"{last.solver}: t_E = {refined.x[0]:.4f} s after {rounds} refinement rounds, {found}"
+        outcome = f"{last.solver}: t_E = {refined.t_end:.4f} s after {rounds} refinement rounds, {found}"
     reports = (*before, *refined.reports)
     return Attempt(
         solver=last.solver,
         guess=number,
         reports=reports,
         refinement_rounds=rounds,
-        excess=refined.excess,
-        stretched=refined.stretched,
-        collocation_points=len(refined.problem.tau),
+        violation=refined.violation,
+        time_scaled=refined.time_scaled,
+        collocation_points=refined.program.collocation_points,
         outcome=outcome,
         refined=refined,
         undone=undone,

@@ -40,7 +40,7 @@ def judge(decomposition: Decomposition, refined: Refined, setting: Setting) -> t
 
 def _trajectory(decomposition: Decomposition, refined: Refined, task: Task) -> Trajectory:
     """Turn the answer into a trajectory that can be evaluated without the closed form."""
-    motion = refined.problem.motion(refined.x)
+    (motion,) = refined.program.motions(refined.x)
     joins = motion.times_of(decomposition.path.breaks[1:-1])
     gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
     breaks = np.union1d(motion.breaks, joins[gaps > _SAME_TIME * motion.t_end])
@@ -51,7 +51,7 @@ def _trajectory(decomposition: Decomposition, refined: Refined, task: Task) -> T
         urdf=robot.urdf,
         robot=robot,
         redundant_joints=tuple(robot.joint_names[i] for i in decomposition.redundant),
-        branch=decomposition.solver.branches[decomposition.branch],
+        branch=decomposition.branch_label,
         times=nodes.times,
         q=nodes.q,
         qdot=nodes.qdot,

@@ -42,12 +42,12 @@ def explain_failure(
     """
     s = np.linspace(0.0, 1.0, _STATIONS)
     found = _answers_along(decomposition, s, opened=False)
-    slots = list(range(found.q.shape[2])) if any_branch else decomposition.slots
+    slots = list(range(found.q.shape[2])) if any_branch else decomposition.alternatives
     own = _Answers(found.q[:, :, slots], found.exists[:, :, slots], found.inside[:, :, slots])
     # Where the redundant joints' ranges leave no answer, wider ones tell whether the ranges or the arm are to blame.
     anywhere = found if found.exists.any(axis=(1, 2)).all() else _answers_along(decomposition, s, opened=True)
     within = np.asarray(found.within.any(axis=(1, 2)))
-    label = decomposition.solver.branches[decomposition.branch]
+    label = decomposition.branch_label
     reasons = (
         (
             found.exists.any(axis=(1, 2)) | anywhere.exists.any(axis=(1, 2)),
@@ -111,7 +111,7 @@ def _answers_along(decomposition: Decomposition, s: np.ndarray, *, opened: bool)
 
     `opened` takes the ranges of the redundant joints for open ones; otherwise the start posture's are tried as well.
     """
-    robot, redundant, rest = decomposition.robot, decomposition.redundant, decomposition.rest
+    robot, redundant, rest = decomposition.robot, decomposition.redundant, decomposition.nonredundant
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
     turning = np.array([unit == "rad" for unit in robot.position_units])
     wide = np.isin(np.arange(robot.n), redundant) & opened

@@ -122,7 +122,7 @@ def _smoothed(s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int) 
 
 def _clear(decomposition: Decomposition, q: np.ndarray) -> bool:
     """Tell whether a course keeps clear of the branch boundary, (K, n)."""
-    margins = decomposition.solver.branch_margins(q, decomposition.branch)
+    margins = decomposition.branch_margins(q)
     return bool(margins.min(initial=np.inf) > 0.5 * min(0.02, float(margins[0].min(initial=np.inf))))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from brachis.deadline import Deadline
 from brachis.limits.branch_margin import MARGIN
-from brachis.nlp import Transcription
+from brachis.nlp import Program
 from brachis.refine import Solve
 from brachis.solvers import Solver, SolverOptions, SolverReport, SolveStatus
 from brachis.task import SolverSettings
@@ -30,8 +30,8 @@ _LEAST_TIME = 0.1
 
 
 def continued(
-    problem: Transcription, x: np.ndarray, solve: Solve, margins: Sequence[float]
-) -> tuple[Transcription, tuple[SolverReport, ...]]:
+    program: Program, x: np.ndarray, solve: Solve, margins: Sequence[float]
+) -> tuple[Program, tuple[SolverReport, ...]]:
     """Solve with ever smaller branch margins, each from the last answer.
 
     Near a branch boundary the problem is badly conditioned, and a solver that meets the boundary early creeps along it.
@@ -40,7 +40,7 @@ def continued(
 
     Parameters
     ----------
-    problem : Transcription
+    program : Program
     x : (v,) ndarray
         Starting point.
     solve : callable
@@ -49,19 +49,19 @@ def continued(
 
     Returns
     -------
-    problem : Transcription
+    program : Program
         With the last margin for which the solve ended well; with the last one tried if none did.
     reports : tuple of SolverReport
-        Of all solves; the last one belongs to `problem`.
+        Of all solves; the last one belongs to `program`.
     """
-    solved: list[tuple[Transcription, SolverReport]] = []
-    failed: list[tuple[Transcription, SolverReport]] = []
+    solved: list[tuple[Program, SolverReport]] = []
+    failed: list[tuple[Program, SolverReport]] = []
     bounds: set[tuple[float, ...]] = set()
     for margin in margins:
-        tried = problem.with_margin(margin)
-        if tried.guards in bounds:  # the closed form has no margins, or the start posture caps them
+        tried = program.with_margin(margin)
+        if tried.safeguard_bounds in bounds:  # the closed form has no margins, or the start posture caps them
             continue
-        bounds.add(tried.guards)
+        bounds.add(tried.safeguard_bounds)
         outcome = tried, solve(tried, x)
         if outcome[1].status.usable:
             if solved and outcome[1].objective > (1.0 - _WORTH_IT) * solved[-1][1].objective:
@@ -69,7 +69,7 @@ def continued(
                 break
             solved.append(outcome)
             x = outcome[1].x
-            if tried.guard_slack(x) > _HELD_BACK:
+            if tried.safeguard_slack(x) > _HELD_BACK:
                 break
         else:
             failed.append(outcome)
@@ -106,8 +106,8 @@ def solve_with(
     def progress(iteration: int, objective: float) -> None:
         listener(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s")
 
-    def solve(problem: Transcription, x: np.ndarray) -> SolverReport:
+    def solve(program: Program, x: np.ndarray) -> SolverReport:
         remaining = max(min(deadline.left, settings.time_limit), _LEAST_TIME)
-        return solver.solve(problem, x, SolverOptions(settings.tolerance, patience, remaining), progress)
+        return solver.solve(program, x, SolverOptions(settings.tolerance, patience, remaining), progress)
 
     return solve

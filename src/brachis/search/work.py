@@ -18,7 +18,7 @@ from threadpoolctl import ThreadpoolController
 from brachis import interrupts
 from brachis.deadline import Deadline
 from brachis.mesh import coarsest, settle_knots
-from brachis.nlp import Transcription
+from brachis.nlp import Program
 from brachis.nlp.guess import starting_point
 from brachis.refine import RefinementOptions, Solve
 from brachis.result import Attempt
@@ -26,7 +26,7 @@ from brachis.search.finishing import Motion, attempt_of, refined_until_verified
 from brachis.search.motion import judge
 from brachis.search.seeds import Seed
 from brachis.search.solving import MARGINS, Listener, continued, solve_with
-from brachis.setting import intervals_of, transcription
+from brachis.setting import breaks_of, program_of
 from brachis.solvers import SolverReport, SolveStatus, solver_named
 
 NOT_TRIED = "not tried: the time was up"
@@ -62,21 +62,21 @@ class Coarse:
     Attributes
     ----------
     way : Way
-    problem : Transcription or None
+    program : Program or None
         None where nothing was solved.
-    target : Transcription or None
-        The problem over all its knots, where `problem` has only some of them.
+    target : Program or None
+        The program over all its knots, where `program` has only some of them.
     reports : tuple of SolverReport
-        Of all solves; the last one belongs to `problem`.
+        Of all solves; the last one belongs to `program`.
     status : str
         In plain words.
     """
 
     way: Way
-    problem: Transcription | None
+    program: Program | None
     reports: tuple[SolverReport, ...]
     status: str
-    target: Transcription | None = None
+    target: Program | None = None
 
     @property
     def usable(self) -> bool:
@@ -92,9 +92,9 @@ class Coarse:
     def keeps_knots(self) -> bool:
         """True where the finished plan has the same knots, so that its end time is no shorter."""
         spline = self.way.seed.choice.setting.task.spline
-        if spline.knots == "free" or spline.intervals == "auto" or self.problem is None or self.target is None:
+        if spline.knots == "free" or spline.intervals == "auto" or self.program is None or self.target is None:
             return False
-        return len(self.problem.knots) == len(self.target.knots)
+        return self.program.intervals == self.target.intervals
 
     @property
     def family(self) -> str:
@@ -120,16 +120,16 @@ def plan_coarse(way: Way, deadline: Deadline, share: float, listener: Listener) 
     if deadline.passed:
         return Coarse(way, None, (), NOT_TRIED)
     seed, setting = way.seed, way.seed.choice.setting
-    target = transcription(setting, seed.decomposition, intervals_of(setting.task))
-    problem = coarsest(target) if target.variables > _MANY_VARIABLES else target
-    x = starting_point(problem, seed.course)
+    target = program_of(setting, seed.decomposition, breaks_of(setting.task))
+    program = coarsest(target) if target.variables > _MANY_VARIABLES else target
+    x = starting_point(program, [seed.course])
     if x is None:
         return Coarse(way, None, (), "the splines through the course leave the branch")
     try:
-        problem, reports = continued(problem, x, _solve(way, deadline.within(share), listener), MARGINS)
+        program, reports = continued(program, x, _solve(way, deadline.within(share), listener), MARGINS)
     except ImportError as error:
         return Coarse(way, None, (), f"{way.solver}: not installed ({error})")
-    return Coarse(way, problem, reports, _in_words(reports[-1].status), target)
+    return Coarse(way, program, reports, _in_words(reports[-1].status), target)
 
 
 def finish(numbered: tuple[int, Coarse], deadline: Deadline, listener: Listener) -> tuple[Attempt, Motion | None]:
@@ -149,21 +149,21 @@ def finish(numbered: tuple[int, Coarse], deadline: Deadline, listener: Listener)
         None where no trajectory came out.
     """
     number, coarse = numbered
-    assert coarse.problem is not None  # noqa: S101  (it is usable)
+    assert coarse.program is not None  # noqa: S101  (it is usable)
     setting = coarse.way.seed.choice.setting
     task, settings = setting.task, setting.task.refinement
     options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, deadline.part(_KNOT_TIME))
-    problem, reports, undone = settle_knots(
-        coarse.problem,
+    program, reports, undone = settle_knots(
+        coarse.program,
         coarse.reports,
         _solve(coarse.way, options.deadline, listener),
         task.spline,
         options,
         target=coarse.target,
     )
-    decomposition = problem.decomposition
+    decomposition = coarse.way.seed.decomposition
     refined, motion = refined_until_verified(
-        problem,
+        program,
         reports[-1],
         _solve(coarse.way, deadline, listener),
         replace(options, deadline=deadline),

@@ -1,4 +1,4 @@
-"""Transcriptions with every kind of limit at once, for tests of the nonlinear program."""
+"""Phases with every kind of limit at once, for tests of the nonlinear program."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from brachis.nlp import Transcription
-from brachis.nlp.guess import guesses
+from brachis.nlp import Phase, Program
 from brachis.robot import FROM_URDF, LimitSpec
-from support.chains import planar_robot, transcription
+from support.chains import planar_robot, program_of
+from support.starts import starting_points
 
 FRICTION = {"armature": 0.2, "viscous": [1.0], "coulomb": 2.0, "coulomb_velocity": 0.5}
 CASES: dict[str, tuple[str, list[str], list[float], list[str]]] = {
@@ -21,7 +21,7 @@ CASES: dict[str, tuple[str, list[str], list[float], list[str]]] = {
 }
 
 
-def problem_of(case: str, *, end: list[float] | None = None, position: Any = FROM_URDF, **spline: Any) -> Transcription:
+def phase_of(case: str, *, end: list[float] | None = None, position: Any = FROM_URDF, **spline: Any) -> Phase:
     """A bent path in the vertical plane under gravity, friction, and limits of every kind."""
     pattern, rows, start, redundant = CASES[case]
     friction = {**FRICTION, "viscous": [1.0 + 0.1 * i for i in range(len(pattern))]}
@@ -29,10 +29,11 @@ def problem_of(case: str, *, end: list[float] | None = None, position: Any = FRO
     through = [[-0.05, 0.05, 0.1], [-0.1, 0.06, 0.15], [-0.13, 0.03, 0.2]]
     path = [{"spline": {"through": [point[: len(rows)] for point in through], "relative": True}}]
     settings = {"degree": 3, "intervals": 5, "points_per_interval": 2, **spline}
-    return transcription(robot, rows, path, start, redundant, end=end, tool_speed=2.0, **settings)
+    (phase,) = program_of(robot, rows, path, start, redundant, end=end, tool_speed=2.0, **settings).phases
+    return phase
 
 
-def reachable_points(problem: Transcription, count: int, spread: float = 0.01) -> list[np.ndarray]:
+def reachable_points(phase: Phase, count: int, spread: float = 0.01) -> list[np.ndarray]:
     """Points x near the first guess, moved at random in every variable."""
-    rng, first = np.random.default_rng(7), next(guesses(problem))
+    rng, first = np.random.default_rng(7), next(starting_points(Program([phase])))
     return [first + spread * rng.uniform(-1.0, 1.0, len(first)) for _ in range(count)]

@@ -1,4 +1,4 @@
-"""Problems over finer, free and frozen knots: x keeps its meaning from one to the other."""
+"""Phases over finer, free and frozen knots: x keeps its meaning from one to the other."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ import numpy as np
 import pytest
 
 from brachis.bspline import clamped_knots, spread
-from support.transcriptions import problem_of, reachable_points
+from support.phases import phase_of, reachable_points
 
 SHORTEST = 0.1
 
 
-def finer(problem):
+def finer(phase):
     """Halve the first interval, the last one and one within, and put collocation points in all."""
-    breaks = problem.breaks
+    breaks = phase.breaks
     some = np.array([0, 2, len(breaks) - 2])
     breaks = np.union1d(breaks, 0.5 * (breaks[some] + breaks[some + 1]))
-    return problem.with_knots(clamped_knots(problem.degree, breaks), spread(breaks, 3))
+    return phase.with_knots(clamped_knots(phase.degree, breaks), spread(breaks, 3))
 
 
-def moved(problem, x, seed=0):
+def moved(phase, x, seed=0):
     """Free knots, and a point with other lengths than even ones."""
-    free = problem.with_free_knots(SHORTEST)
+    free = phase.with_free_knots(SHORTEST)
     rng = np.random.default_rng(seed)
-    lengths = rng.uniform(0.8, 1.2, len(problem.breaks) - 1)
+    lengths = rng.uniform(0.8, 1.2, len(phase.breaks) - 1)
     return free, np.concatenate([x, lengths / lengths.sum()])
 
 
@@ -37,73 +37,75 @@ def assert_same_motion(one, other, tolerance=1e-12):
 @pytest.mark.parametrize(("degree", "rest"), [(2, "velocity"), (3, "full"), (3, "velocity"), (4, "full"), (5, "full")])
 @pytest.mark.parametrize("case", ["r0", "r1", "r2"])
 def test_insertion_keeps_the_motion_and_rest(case, degree, rest):
-    problem = problem_of(case, degree=degree, rest=rest, intervals=6)
-    fine = finer(problem)
-    assert fine.variables == problem.variables + 3 * (1 + problem.decomposition.r)
-    for x in reachable_points(problem, 3):
-        inserted = problem.motion(x).over(fine.knots)
+    phase = phase_of(case, degree=degree, rest=rest, intervals=6)
+    fine = finer(phase)
+    assert fine.variables == phase.variables + 3 * (1 + phase.joint_map.r)
+    for x in reachable_points(phase, 3):
+        inserted = phase.motion(x).over(fine.knots)
         there = fine.variables_from(inserted)
-        assert_same_motion(fine.motion(there), problem.motion(x))
-        # Ties and fixed control points of the finer problem hold exactly: nothing was averaged away.
+        assert_same_motion(fine.motion(there), phase.motion(x))
+        # Ties and fixed control points of the finer phase hold exactly: nothing was averaged away.
         np.testing.assert_allclose(fine.motion(there).control_points, inserted.control_points, atol=1e-14)
         assert there[0] == x[0]
-        between = 0.5 * (fine.tau[1:] + fine.tau[:-1])  # at knots a spline of degree 2 has two accelerations
-        np.testing.assert_allclose(fine.violation_at(there, between), problem.violation_at(x, between), atol=1e-9)
+        between = 0.5 * (fine.t_norm[1:] + fine.t_norm[:-1])  # at knots a spline of degree 2 has two accelerations
+        np.testing.assert_allclose(fine.violation_at(there, between), phase.violation_at(x, between), atol=1e-9)
 
 
 def test_a_feasible_motion_stays_feasible_at_old_points():
-    problem = problem_of("r1", intervals=6)
-    x = reachable_points(problem, 1, spread=0.0)[0]
-    fine = finer(problem).resampled(problem.tau)
-    there = fine.variables_from(problem.motion(x).over(fine.knots))
-    rows = len(problem.lower) - (problem.splines[0].free - 1)
-    np.testing.assert_allclose(fine.rows(there)[:rows], problem.rows(x)[:rows], atol=1e-10)
+    phase = phase_of("r1", intervals=6)
+    x = reachable_points(phase, 1, spread=0.0)[0]
+    fine = finer(phase).resampled(phase.t_norm)
+    there = fine.variables_from(phase.motion(x).over(fine.knots))
+    rows = len(phase.lower) - (phase.splines[0].free - 1)
+    np.testing.assert_allclose(fine.rows(there)[:rows], phase.rows(x)[:rows], atol=1e-10)
     assert np.diff(there[fine.slices[0]]).min() >= -1e-15, "s(t) should still be monotone in its control points"
 
 
 @pytest.mark.parametrize("degree", [2, 3, 5])
 def test_free_knots_where_they_are_given_change_nothing(degree):
-    problem = problem_of("r1", degree=degree, rest="velocity")
-    free = problem.with_free_knots(SHORTEST)
-    (x,) = reachable_points(problem, 1)
-    there = free.variables_from(problem.motion(x))
+    phase = phase_of("r1", degree=degree, rest="velocity")
+    free = phase.with_free_knots(SHORTEST)
+    (x,) = reachable_points(phase, 1)
+    there = free.variables_from(phase.motion(x))
     np.testing.assert_allclose(there[-5:], 0.2, atol=1e-15)
     np.testing.assert_allclose(free.x_lower[-5:], SHORTEST / 5.0)
     rows = free.rows(there)
-    np.testing.assert_allclose(rows[:-1], problem.rows(x), atol=1e-9)
+    np.testing.assert_allclose(rows[:-1], phase.rows(x), atol=1e-9)
     assert rows[-1] == pytest.approx(1.0)
     assert free.lower[-1] == free.upper[-1] == 1.0
 
 
 def test_points_move_with_the_knots():
-    problem = problem_of("r2")
-    (x,) = reachable_points(problem, 1)
-    free, there = moved(problem, x)
+    phase = phase_of("r2")
+    (x,) = reachable_points(phase, 1)
+    free, there = moved(phase, x)
     ends = np.concatenate([[0.0], np.cumsum(there[-5:])])
     motion = free.motion(there)
     np.testing.assert_allclose(motion.breaks / motion.t_end, ends, atol=1e-14)
-    tau = spread(ends, 2)
+    t_norm = spread(ends, 2)
     state = free.state(there)
-    for mine, theirs in zip((state.y, state.ydot, state.yddot), motion.at(tau * motion.t_end), strict=True):
+    for mine, theirs in zip((state.y, state.ydot, state.yddot), motion.at(t_norm * motion.t_end), strict=True):
         np.testing.assert_allclose(mine, theirs, atol=1e-11 * max(1.0, np.abs(theirs).max()))
-    np.testing.assert_allclose(free.violation_at(there, tau), free.violation(there), atol=1e-9)
+    np.testing.assert_allclose(free.violation_at(there, t_norm), free.violation(there), atol=1e-9)
 
 
 def test_frozen():
-    problem = problem_of("r2")
-    (x,) = reachable_points(problem, 1)
-    free, there = moved(problem, x)
-    fixed, same = free.frozen(there)
-    assert fixed.variables == problem.variables
+    phase = phase_of("r2")
+    (x,) = reachable_points(phase, 1)
+    free, there = moved(phase, x)
+    fixed = free.frozen(there)
+    same = fixed.variables_from(free.motion(there))
+    assert fixed.variables == phase.variables
     assert_same_motion(fixed.motion(same), free.motion(there))
     np.testing.assert_allclose(fixed.violation(same), free.violation(there), atol=1e-9)
-    assert problem.frozen(x) == (problem, x)
+    assert phase.frozen(x).grid is phase.grid
+    assert phase.frozen(x).variables == phase.variables
 
 
 def test_lengths_that_do_not_add_up_make_a_longer_motion():
-    problem = problem_of("r1")
-    (x,) = reachable_points(problem, 1)
-    free, there = moved(problem, x)
+    phase = phase_of("r1")
+    (x,) = reachable_points(phase, 1)
+    free, there = moved(phase, x)
     longer = there.copy()
     longer[-5:] *= 1.01
     assert free.motion(longer).t_end == pytest.approx(1.01 * x[0])
@@ -113,10 +115,10 @@ def test_lengths_that_do_not_add_up_make_a_longer_motion():
 
 
 def test_curves_at_knots_are_those_behind_them_whatever_the_rounding():
-    problem = problem_of("r1", degree=2, rest="velocity", intervals=11)
-    (x,) = reachable_points(problem, 1)
+    phase = phase_of("r1", degree=2, rest="velocity", intervals=11)
+    (x,) = reachable_points(phase, 1)
     x[0] = 2.0 / 3.0
-    motion = problem.motion(x)
+    motion = phase.motion(x)
     knots = motion.breaks[1:-1]
     behind = motion.at(knots + 1e-9)[2]
     before = motion.at(knots - 1e-9)[2]

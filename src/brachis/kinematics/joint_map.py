@@ -1,0 +1,124 @@
+"""What a joint map is: curves y(t) in, joint motion and its exact derivatives out.
+
+Along a path y = (s, q_r), and the closed form gives the other joints (`decomposition`). Without a path y = q
+(`direct`). Everything that lays down, solves and refines a program takes any of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from brachis.path import Path
+from brachis.robot import Robot
+
+
+@dataclass(frozen=True)
+class JointState:
+    """Motion of all joints at K times.
+
+    Attributes
+    ----------
+    y, ydot, yddot : (K, c) ndarray
+        The c curves that are chosen freely, and their time derivatives.
+    q, qdot, qddot : (K, n) ndarray
+    gradient : (K, n, c) ndarray
+        G = dq/dy.
+    """
+
+    y: np.ndarray
+    ydot: np.ndarray
+    yddot: np.ndarray
+    q: np.ndarray
+    qdot: np.ndarray
+    qddot: np.ndarray
+    gradient: np.ndarray
+
+
+@dataclass(frozen=True)
+class JointDerivatives:
+    """Derivatives of a `JointState`, each (K, n, c); dqdot/dydot = dqddot/dyddot = G are not repeated.
+
+    Attributes
+    ----------
+    qdot_y, qddot_y, qddot_ydot : (K, n, c) ndarray
+    """
+
+    qdot_y: np.ndarray
+    qddot_y: np.ndarray
+    qddot_ydot: np.ndarray
+
+
+class JointMap(Protocol):
+    """Joint motion as a function of curves y, with c = 1 + r along a path, and c = n without one.
+
+    Attributes
+    ----------
+    robot : Robot
+    start : (n,) ndarray
+        Posture at, or near, the beginning; it decides about turns of 2 pi.
+    path : Path or None
+        The path along which y[0] is the path coordinate s; None where there is none, and no s.
+    r : int
+        Number of joints that are chosen freely.
+    branch_label : str
+        What the branch is called whose margins `branch_margins` gives; empty where there is none.
+    """
+
+    robot: Robot
+    start: np.ndarray
+
+    @property
+    def path(self) -> Path | None: ...  # noqa: D102
+    @property
+    def r(self) -> int: ...  # noqa: D102
+    @property
+    def branch_label(self) -> str: ...  # noqa: D102
+
+    def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
+        """Value of the curves, (c,), in a posture, (n,), at path coordinate s; NaN stays NaN."""
+        ...
+
+    def postures(self, y: np.ndarray) -> np.ndarray:
+        """Joint positions, (K, n), at successive times with curves (K, c); NaN where there is no answer."""
+        ...
+
+    def state(
+        self,
+        y: np.ndarray,
+        ydot: np.ndarray,
+        yddot: np.ndarray,
+        *,
+        t: np.ndarray | None = None,
+        near: np.ndarray | None = None,
+    ) -> JointState:
+        """Joint motion at K times.
+
+        Parameters
+        ----------
+        y, ydot, yddot : (K, c) ndarray
+        t : (K,) ndarray, optional
+            The times, ascending from the start on, s; by them turns are counted.
+        near : (K, n) ndarray, optional
+            Postures known to be near, which decide about turns; the times may then be any.
+
+        Raises
+        ------
+        UnreachableError
+            There is no answer at one of the times.
+        """
+        ...
+
+    def derivatives(self, state: Any) -> JointDerivatives:  # noqa: ANN401  (a subclass of `JointState` of its own)
+        """Exact derivatives of a state that this map gave."""
+        ...
+
+    def branch_margins(self, q: np.ndarray) -> np.ndarray:
+        """Margins, (K, b), of postures (K, n) to where the map ends to be computable; b = 0 where it never does."""
+        ...
+
+    def branch_margin_gradient(self, q: np.ndarray) -> np.ndarray:
+        """Differentiate `branch_margins` with respect to q, (K, b, n)."""
+        ...

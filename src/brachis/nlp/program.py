@@ -1,0 +1,191 @@
+"""The nonlinear program: minimum end time of a motion in phases.
+
+    minimise    t_E = sum of the phases' durations
+    over        x = the variables of the first phase, then of the second, ...
+    subject to  lower <= rows(x) <= upper,   x_lower <= x <= x_upper
+
+Rows are those of the phases, one phase after the other, then those of the links. Most motions have one phase and no
+links. See `phase` for what a phase is.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from brachis.kinematics import JointState
+from brachis.limits import Bound, Limit, Role
+from brachis.nlp.link import Link
+from brachis.nlp.motion import Motion
+from brachis.nlp.phase import Phase
+
+
+class Program:
+    """The NLP as functions of x; what a solver sees.
+
+    Parameters
+    ----------
+    phases : iterable of Phase
+    links : sequence of Link, optional
+
+    Attributes
+    ----------
+    phases : tuple of Phase
+    links : tuple of Link
+    x_lower, x_upper : (v,) ndarray
+    lower, upper : (c,) ndarray
+        Bounds of the rows.
+    jacobian_rows, jacobian_columns : (nnz,) int ndarray
+        Fixed sparsity pattern; each place occurs once.
+    """
+
+    def __init__(self, phases: Iterable[Phase], links: Sequence[Link] = ()) -> None:
+        self.phases, self.links = tuple(phases), tuple(links)
+        first = np.cumsum([0, *(phase.variables for phase in self.phases)]).tolist()
+        self._parts = [slice(a, b) for a, b in itertools.pairwise(first)]
+        self._durations = first[:-1]
+        self.x_lower = np.concatenate([phase.x_lower for phase in self.phases])
+        self.x_upper = np.concatenate([phase.x_upper for phase in self.phases])
+        joined = np.zeros(sum(len(link.joints) for link in self.links))
+        self.lower = np.concatenate([*(phase.lower for phase in self.phases), joined])
+        self.upper = np.concatenate([*(phase.upper for phase in self.phases), joined])
+        pairs = zip(self.phases, first[:-1], strict=True)
+        patterns = [(phase.jacobian_rows, phase.jacobian_columns + a) for phase, a in pairs]
+        patterns += [link.pattern(self.phases, first) for link in self.links]
+        heights = [*(len(phase.lower) for phase in self.phases), *(len(link.joints) for link in self.links)]
+        self._first_rows = np.cumsum([0, *heights[:-1]]).tolist()
+        self.jacobian_rows = np.concatenate([rows + a for (rows, _), a in zip(patterns, self._first_rows, strict=True)])
+        self.jacobian_columns = np.concatenate([columns for _, columns in patterns])
+
+    @property
+    def variables(self) -> int:
+        """Number of variables."""
+        return len(self.x_lower)
+
+    @property
+    def intervals(self) -> int:
+        """Number of knot intervals of all phases."""
+        return sum(phase.intervals for phase in self.phases)
+
+    @property
+    def collocation_points(self) -> int:
+        """Number of collocation points of all phases."""
+        return sum(len(phase.t_norm) for phase in self.phases)
+
+    def split(self, x: np.ndarray) -> list[tuple[Phase, np.ndarray]]:
+        """Every phase, and its part of x."""
+        return [(phase, x[part]) for phase, part in zip(self.phases, self._parts, strict=True)]
+
+    def end_time(self, x: np.ndarray) -> float:
+        """End time t_E, s: the sum of the durations."""
+        return float(sum(x[first] for first in self._durations))
+
+    def time_scaled(self, x: np.ndarray, factor: float) -> np.ndarray:
+        """Return the same motion, every phase longer by a factor."""
+        x = x.copy()
+        x[self._durations] *= factor
+        return x
+
+    def objective(self, x: np.ndarray) -> float:
+        """Value to be minimised: the end time, s."""
+        return self.end_time(x)
+
+    def gradient(self) -> np.ndarray:
+        """Gradient of the objective (constant)."""
+        unit = np.zeros(self.variables)
+        unit[self._durations] = 1.0
+        return unit
+
+    def states(self, x: np.ndarray) -> list[JointState]:
+        """Joint motion of every phase at its collocation points.
+
+        Raises
+        ------
+        UnreachableError
+            A collocation point is out of the branch's reach.
+        """
+        return [phase.state(part) for phase, part in self.split(x)]
+
+    def rows(self, x: np.ndarray) -> np.ndarray:
+        """Values of the rows, (c,); raises UnreachableError as `states` does."""
+        rows = [phase.rows(part) for phase, part in self.split(x)]
+        if self.links:
+            states = self.states(x)
+            rows += [link.rows(states) for link in self.links]
+        return np.concatenate(rows)
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `states` does."""
+        entries = [phase.jacobian(part) for phase, part in self.split(x)]
+        if self.links:
+            states = self.states(x)
+            entries += [link.jacobian(self.phases, states) for link in self.links]
+        return np.concatenate(entries)
+
+    @property
+    def limits(self) -> tuple[Limit, ...]:
+        """The limits of all phases, safeguards included, each once."""
+        return tuple(dict.fromkeys(limit for phase in self.phases for limit in phase.limits))
+
+    def rows_of(self, limit: Limit) -> np.ndarray:
+        """Numbers of the rows of a limit, (K, c), at the collocation points of all phases that have it."""
+        pairs = zip(self.phases, self._first_rows, strict=False)  # the links' rows come behind
+        return np.concatenate([first + phase.rows_of(limit) for phase, first in pairs if limit in phase.limits])
+
+    def motions(self, x: np.ndarray) -> list[Motion]:
+        """Curves of every phase that belong to x."""
+        return [phase.motion(part) for phase, part in self.split(x)]
+
+    def variables_from(self, motions: Sequence[Motion]) -> np.ndarray:
+        """Point x nearest to given curves of every phase; see `Phase.variables_from`."""
+        pairs = zip(self.phases, motions, strict=True)
+        return np.concatenate([phase.variables_from(motion) for phase, motion in pairs])
+
+    def with_phases(self, phases: Iterable[Phase]) -> Program:
+        """Return the program with other phases for the present ones, linked as they are."""
+        return Program(phases, self.links)
+
+    def resampled(self, t_norm: Sequence[np.ndarray]) -> Program:
+        """Return the same program with other collocation points of every phase; see `Phase.resampled`."""
+        return self.with_phases(phase.resampled(own) for phase, own in zip(self.phases, t_norm, strict=True))
+
+    def with_free_knots(self, shortest: float) -> Program:
+        """Return the same program with interval lengths as variables; see `Phase.with_free_knots`."""
+        return self.with_phases(phase.with_free_knots(shortest) for phase in self.phases)
+
+    def frozen(self, x: np.ndarray) -> tuple[Program, np.ndarray]:
+        """Return the program with its knots fixed where they are at x, and the same motion as its point x."""
+        other = self.with_phases(phase.frozen(part) for phase, part in self.split(x))
+        return other, other.variables_from(self.motions(x))
+
+    def with_margin(self, margin: float) -> Program:
+        """Return the same program with another least branch margin; x keeps its meaning."""
+        return self.with_phases(phase.with_margin(margin) for phase in self.phases)
+
+    def relaxed(self, limit: Limit, bound: Bound, amount: float) -> Program:
+        """Return the same program with a figure of one of its limits giving way by `amount`, in the figure's unit."""
+        other = limit.relaxed(bound, amount)
+        return self.with_phases(
+            phase.with_limits(tuple(other if each is limit else each for each in phase.limits)) for phase in self.phases
+        )
+
+    @property
+    def safeguard_bounds(self) -> tuple[float, ...]:
+        """Least values of the safeguards in force: branch margins."""
+        own = (limit for limit in self.limits if limit.role is Role.SAFEGUARD)
+        return tuple(float(bound) for limit in own for bound in limit.lower)
+
+    def safeguard_slack(self, x: np.ndarray) -> float:
+        """Smallest distance of a safeguard from its bound; infinite where there is none.
+
+        Raises UnreachableError as `states` does.
+        """
+        slacks = [
+            (limit.values(phase.state(part)) - limit.lower).min()
+            for phase, part in self.split(x)
+            for limit in phase.limits
+            if limit.role is Role.SAFEGUARD
+        ]
+        return float(min(slacks, default=np.inf))

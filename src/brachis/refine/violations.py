@@ -1,0 +1,144 @@
+"""Where limits are violated between collocation points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.bspline import spread
+from brachis.errors import UnreachableError
+from brachis.nlp import Phase, Program
+from brachis.refine.reversals import reversals
+
+_NEAR = 0.005
+"""A violation may hide between grid points where the motion comes so near a limit, as a part of it."""
+_COARSE = 20.0
+"""Violations of so many times the goal are held down at the grid's points first."""
+_FINE, _ZOOMS = 9, 2
+"""Points of every finer grid around a peak, and how many such grids follow each other."""
+_PIECE_POINTS = 9
+_CLOSEST = 1e-5
+"""Collocation points are at least so far apart, in normalised time."""
+_SAME_TIME = 1e-9
+_JUST_BEFORE = 1e-7
+"""How long before a knot the acceleration before its jump is looked at, in normalised time."""
+_CONTINUOUS_ACCELERATION = 3
+"""Least degree without such jumps."""
+
+
+def dense_grid(phase: Phase, density: int) -> np.ndarray:
+    """Spread times evenly over every knot interval, `density` for each of its collocation points."""
+    breaks = phase.breaks
+    behind = np.searchsorted(phase.t_norm, breaks + _SAME_TIME)
+    grid = spread(breaks, density * np.maximum(np.diff(behind), 1))
+    return np.union1d(grid, _jumps(phase) - _JUST_BEFORE)
+
+
+def _jumps(phase: Phase) -> np.ndarray:
+    """Knots at which the acceleration jumps, so that a limit must hold on both sides."""
+    return phase.breaks[1:-1] if phase.degree < _CONTINUOUS_ACCELERATION else np.empty(0)
+
+
+def violations(dense: Program, x: np.ndarray, goal: float) -> tuple[float, list[np.ndarray]]:
+    """Largest violation, and the normalised times of every phase at which collocation points are missing.
+
+    Around every peak of the grid that comes near a limit ever finer grids look for the true peak.
+    """
+    found = [_of_phase(phase, part, goal) for phase, part in dense.split(x)]
+    return max(largest for largest, _ in found), [places for _, places in found]
+
+
+def _of_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
+    """Largest violation of a phase, and where points are missing."""
+    t_norm = dense.t_norm
+    try:
+        table = dense.violation(x)
+        centres = _suspects(t_norm, table, dense.knots, goal - _NEAR)
+        heights = table.max(axis=1)[np.searchsorted(t_norm, centres - _SAME_TIME).clip(max=len(t_norm) - 1)]
+        if table.max() > _COARSE * goal:  # the grid's own peaks will do until they are nearly held down
+            return float(table.max()), _around(centres[heights > goal], t_norm)
+        reach = _spacing(t_norm, centres)
+        for _ in range(_ZOOMS):
+            if not len(centres):
+                break
+            centres, heights = _zoomed(dense, x, centres, reach)
+            kept = heights > goal - 0.1 * _NEAR
+            centres, heights, reach = centres[kept], heights[kept], reach[kept] * 2.0 / (_FINE - 1)
+        places = np.union1d(_within_pieces(dense, x), _within_friction(dense, x))
+        worst = dense.violation_at(x, places).max(axis=1) if len(places) else places
+    except UnreachableError:
+        return np.inf, _unreachable(dense, x)
+    largest = max(table.max(), heights.max(initial=-np.inf), worst.max(initial=-np.inf))
+    return float(largest), np.union1d(_around(centres[heights > goal], t_norm), places[worst > goal])
+
+
+def _within_pieces(dense: Phase, x: np.ndarray) -> np.ndarray:
+    """Spread points t_norm over every piece of a path of several: a blend of millimetres lies between grid points."""
+    path, motion = dense.joint_map.path, dense.motion(x)
+    breaks = np.empty(0) if path is None else path.breaks
+    if len(breaks) <= 2:  # noqa: PLR2004  (a single piece, which the grid sees)
+        return np.empty(0)
+    return motion.times_of(spread(breaks, _PIECE_POINTS - 1)) / motion.t_end
+
+
+def _within_friction(dense: Phase, x: np.ndarray) -> np.ndarray:
+    """List t_norm at which a joint with Coulomb friction reverses, or nearly so: peaks as narrow as the friction."""
+    t_end, friction = dense.motion(x).t_end, dense.joint_map.robot.friction
+    return reversals(friction, dense.t_norm * t_end, dense.state(x)) / t_end
+
+
+def _spacing(t_norm: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Find the distance between grid times around each of `times`; at a knot the larger one of its two sides."""
+    gaps = np.diff(t_norm)
+    before = np.clip(np.searchsorted(t_norm, times - _SAME_TIME) - 1, 0, len(gaps) - 1)
+    behind = np.clip(np.searchsorted(t_norm, times + _SAME_TIME) - 1, 0, len(gaps) - 1)
+    return np.maximum(gaps[before], gaps[behind])
+
+
+def _around(centres: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
+    """List times at and a grid step beside the centres: a peak moves when it is held down."""
+    steps = _spacing(t_norm, centres)[:, None] * np.array([-1.0, 0.0, 1.0])
+    return np.unique(np.clip(centres[:, None] + steps, 0.0, 1.0))
+
+
+def _unreachable(dense: Phase, x: np.ndarray) -> np.ndarray:
+    """List the middle of every stretch of the dense grid on which the branch has no answer."""
+    motion = dense.motion(x)
+    lost = ~np.all(np.isfinite(dense.joint_map.postures(motion.at(dense.t_norm * motion.t_end)[0])), axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]).astype(int)))
+    if not len(edges):  # reachable, but singular or too far apart to count turns: more points everywhere
+        return dense.t_norm[5::10]
+    return dense.t_norm[(edges[::2] + edges[1::2] - 1) // 2]
+
+
+def _suspects(t_norm: np.ndarray, table: np.ndarray, knots: np.ndarray, near: float) -> np.ndarray:
+    """List times around which a violation may hide: the grid's peaks near a limit, and both sides of knots near one.
+
+    A peak between grid points is higher than its neighbours by an eighth of their second difference; four times that
+    is allowed for. The motion's higher derivatives jump at knots: a peak beside a knot need not show on the grid.
+    """
+    padded = np.pad(table, ((1, 1), (0, 0)), mode="edge")
+    bend = np.abs(padded[:-2] - 2.0 * table + padded[2:])
+    peaks = (table + 0.5 * bend > near + _NEAR) & (table > near) & (table >= padded[:-2]) & (table >= padded[2:])
+    at_knots = np.searchsorted(t_norm, np.unique(knots) - _SAME_TIME)
+    close = t_norm[at_knots[(table[at_knots] > near).any(axis=1)]]
+    half = 0.5 * _spacing(t_norm, close)
+    return np.unique(np.clip(np.concatenate([t_norm[peaks.any(axis=1)], close - half, close + half]), 0.0, 1.0))
+
+
+def _zoomed(dense: Phase, x: np.ndarray, centres: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Look on a fine grid within `reach` of every centre: the places of the largest violation, and its size there."""
+    fine = np.clip(centres[:, None] + reach[:, None] * np.linspace(-1.0, 1.0, _FINE), 0.0, 1.0)
+    order = np.argsort(fine.ravel(), kind="stable")
+    worst = np.empty(fine.size)
+    worst[order] = dense.violation_at(x, fine.ravel()[order]).max(axis=1)
+    best = np.argmax(worst.reshape(fine.shape), axis=1)
+    chosen = np.arange(len(centres)), best
+    return fine[chosen], worst.reshape(fine.shape)[chosen]
+
+
+def merged(phase: Phase, extra: np.ndarray) -> np.ndarray:
+    """Collocation points of a phase with extra ones, without pairs so close that their rows would be the same."""
+    t_norm, jumps = phase.t_norm, _jumps(phase)
+    sides = [np.searchsorted(jumps, times, side="right") for times in (extra, t_norm)]
+    apart = np.where(sides[0][:, None] == sides[1], np.abs(extra[:, None] - t_norm), np.inf)
+    return np.union1d(t_norm, extra[apart.min(axis=1) > _CLOSEST])
