@@ -25,7 +25,7 @@ from brachis.ik.eaik_answers import EaikChain, installed
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.polish import EXACT, Poses, polished
 from brachis.ik.pose_joints import determinant
-from brachis.ik.protocol import Kind, NotApplicableError, ik_family
+from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
 from brachis.robot import TaskSpace
 
 NOT_INSTALLED = 'EAIK is not installed (pip install "brachis[eaik]")'
@@ -42,14 +42,15 @@ _CELLS = 1024
 """Answers are put in order by angles in so many parts of a turn, so that rounding seldom changes it."""
 
 
-class EaikSolver:
+class EaikSolver(IKSolver):
     """Closed form by EAIK; see the module's formulas.
 
     Holds nothing of EAIK's own, which cannot be pickled.
     """
 
     kind: Kind = "closed_form"
-    branches: tuple[str, ...] = ("determinant_positive",) * _PER_SIGN + ("determinant_negative",) * _PER_SIGN
+    branches = ("determinant_positive", "determinant_negative")
+    alternatives = _PER_SIGN
 
     def __init__(self, geometry: ChainGeometry, redundant: tuple[int, ...]) -> None:
         rest = [i for i in range(geometry.n) if i not in redundant]
@@ -80,7 +81,7 @@ class EaikSolver:
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """See `IKSolver.solve`."""
-        joints = np.full((len(q_r), len(self.branches), len(self._rest)), np.nan)
+        joints = np.full((len(q_r), 2, _PER_SIGN, len(self._rest)), np.nan)
         finite = np.flatnonzero(np.isfinite(targets).all(axis=1) & np.isfinite(q_r).all(axis=1))
         if len(finite):
             joints[finite] = self._solve(targets[finite], q_r[finite])
@@ -129,7 +130,7 @@ class EaikSolver:
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """See `IKSolver.branch_margins`: det J_nr, divided by its largest size."""
-        sign = 1.0 if branch < _PER_SIGN else -1.0
+        sign = 1.0 if branch == 0 else -1.0
         return sign * np.linalg.det(self._jacobian(q[:, self._between]))[:, None] / self._scale
 
 
@@ -162,7 +163,7 @@ def _in_slots(joints: np.ndarray, samples: np.ndarray, negative: np.ndarray, cou
     room = places < _PER_SIGN
     slots = np.full((2 * count, _PER_SIGN, joints.shape[1]), np.nan)
     slots[groups[room], places[room]] = joints[room]
-    return slots.reshape(count, 2 * _PER_SIGN, -1)
+    return slots.reshape(count, 2, _PER_SIGN, -1)
 
 
 def _repeated(joints: np.ndarray, groups: np.ndarray) -> np.ndarray:

@@ -47,7 +47,7 @@ from brachis.ik.geometry import ChainGeometry
 from brachis.ik.polynomial_answers import distinct, in_slots, joints_of_roots, put_to_test
 from brachis.ik.polynomial_equations import Equations
 from brachis.ik.pose_joints import PoseJoints, determinant, largest_determinant, random_postures
-from brachis.ik.protocol import Kind, NotApplicableError, ik_family
+from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
 from brachis.ik.trigonometric import real_roots, sample_angles
 from brachis.ik.vectors import dot, wrap
 from brachis.robot import TaskSpace
@@ -58,11 +58,12 @@ _MISS = 2e-9
 _ZERO = 1e-9
 
 
-class PolynomialSolver:
+class PolynomialSolver(IKSolver):
     """Roots of a polynomial of degree twelve, found numerically; see the module's formulas."""
 
     kind: Kind = "polynomial"
-    branches: tuple[str, ...] = ("determinant_positive",) * _EACH + ("determinant_negative",) * _EACH
+    branches = ("determinant_positive", "determinant_negative")
+    alternatives = _EACH
 
     def __init__(self, geometry: ChainGeometry, redundant: tuple[int, ...], six: PoseJoints) -> None:
         self._geometry = geometry
@@ -78,7 +79,7 @@ class PolynomialSolver:
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """See `IKSolver.branch_margins`: det J_nr, divided by its largest size."""
-        sign = 1.0 if branch < _EACH else -1.0
+        sign = 1.0 if branch == 0 else -1.0
         return sign * determinant(self._geometry.posed(q), self._joints)[:, None] / self._scale
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:

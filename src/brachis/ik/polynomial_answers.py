@@ -83,13 +83,13 @@ def distinct(sample: np.ndarray, roots: np.ndarray, negative: np.ndarray, miss: 
 def in_slots(
     count: int, each: int, sample: np.ndarray, angle: np.ndarray, negative: np.ndarray, joints: np.ndarray
 ) -> np.ndarray:
-    """Answers (count, 2 each, 6): those of positive sign before those of negative sign, by ascending angle."""
+    """Answers (count, 2, each, 6): those of positive sign before those of negative sign, by ascending angle."""
     order = np.lexsort((angle, negative, sample))
     sample, negative = sample[order], negative[order]
     rank = _ranks(2 * sample + negative)
     fits = rank < each
-    answers = np.full((count, 2 * each, 6), np.nan)
-    answers[sample[fits], negative[fits] * each + rank[fits]] = joints[:, order[fits]].T
+    answers = np.full((count, 2, each, 6), np.nan)
+    answers[sample[fits], negative[fits].astype(int), rank[fits]] = joints[:, order[fits]].T
     return answers
 
 
