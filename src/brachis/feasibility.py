@@ -102,7 +102,7 @@ def branch_of(
     """
     branches = match.solver.branches
     if wanted != "auto" and wanted not in branches:
-        raise UnknownNameError("branch", wanted, dict.fromkeys(branches), where="branch")
+        raise UnknownNameError("branch", wanted, branches, where="branch")
     branch = _branch_of(robot, task_space, match, posture, name)
     if wanted != "auto" and branches[branch] != wanted:
         raise StartError(
@@ -123,7 +123,7 @@ def check_end_branch(robot: Robot, task_space: TaskSpace, match: Match, end: np.
     StartError
     """
     found = _branch_of(robot, task_space, match, end, "end")
-    if match.solver.branches[found] != match.solver.branches[branch]:
+    if found != branch:
         raise StartError(
             "the end posture is on another branch than the start posture",
             where="end.joints",
@@ -143,7 +143,7 @@ def _branch_of(robot: Robot, task_space: TaskSpace, match: Match, posture: np.nd
     units = np.array(robot.position_units)[rest]
     gap = answers - posture[rest]
     gap = np.where(units == "rad", np.remainder(gap + np.pi, 2.0 * np.pi) - np.pi, gap)
-    gaps = np.where(np.isfinite(gap).all(axis=1), np.abs(gap).max(axis=1), np.inf)
+    gaps = np.where(np.isfinite(gap).all(axis=2), np.abs(gap).max(axis=2), np.inf).min(axis=1)
     branch = int(np.argmin(gaps))
     margins = solver.branch_margins(posture[None], branch)[0]
     if gaps[branch] > _SAME_POSTURE or np.any(margins <= 0.0):

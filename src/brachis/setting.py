@@ -84,7 +84,7 @@ class Choice:
     redundant : tuple of int
         Indices of the redundant joints, ascending.
     branches : tuple of int
-        Indices into ``match.solver.branches``, of each label the first; one where start or end posture is given.
+        Indices into ``match.solver.branches``; one where start or end posture is given.
     """
 
     setting: Setting
@@ -184,9 +184,9 @@ def _choice(setting: Setting, match: ik.Match) -> Choice:
         branch = branch_of(robot, task_space, match, setting.end, wanted, name="end")
         return Choice(setting, match, redundant, (branch,))
     if wanted != "auto" and wanted not in labels:
-        raise UnknownNameError("branch", wanted, dict.fromkeys(labels), where="branch")
-    first = tuple(labels.index(label) for label in dict.fromkeys(labels) if wanted in ("auto", label))
-    return Choice(setting, match, redundant, first)
+        raise UnknownNameError("branch", wanted, labels, where="branch")
+    allowed = tuple(branch for branch, label in enumerate(labels) if wanted in ("auto", label))
+    return Choice(setting, match, redundant, allowed)
 
 
 def program_of(setting: Setting, decomposition: Decomposition, breaks: np.ndarray) -> Program:

@@ -106,5 +106,5 @@ def test_slides_carried_by_turning_joints_have_branches_by_the_sign_of_their_det
     angles = np.linspace(0.1, 6.2, 50)[:, None]
     answers = candidate.solver.solve(np.full((50, 2), 0.4), angles)
     turned_up = np.sin(angles[:, 0]) > 0.0
-    np.testing.assert_array_equal(np.isfinite(answers[:, 0, 0]), turned_up)
-    np.testing.assert_array_equal(np.isfinite(answers[:, 1, 0]), ~turned_up)
+    np.testing.assert_array_equal(np.isfinite(answers[:, 0, 0, 0]), turned_up)
+    np.testing.assert_array_equal(np.isfinite(answers[:, 1, 0, 0]), ~turned_up)

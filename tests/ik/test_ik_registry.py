@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brachis.errors import DecompositionError, UnknownNameError
-from brachis.ik import NotApplicableError, check_answers, find, find_all, ik_family
+from brachis.ik import IKSolver, NotApplicableError, check_answers, find, find_all, ik_family
 from brachis.robot import Robot, TaskSpace
 from support.chains import Joint, chain_urdf, planar_robot
 
@@ -105,7 +105,7 @@ def test_order_of_the_redundant_joints_does_not_matter():
     assert candidate.redundant_joints == ("j1", "j3")
 
 
-class Wrapped:
+class Wrapped(IKSolver):
     """A solver that changes another one's answers."""
 
     kind = "closed_form"
@@ -148,7 +148,7 @@ def test_a_third_party_family_comes_first_where_it_fits(arm, plane):
     ("change", "reason"),
     [
         (lambda answers: answers + 1e-4, "leave out postures"),
-        (lambda answers: answers[:, ::-1] * np.array([1.0, np.nan])[:, None], "leave out postures"),
+        (lambda answers: answers[:, ::-1] * np.array([1.0, np.nan])[:, None, None], "leave out postures"),
         (lambda answers: answers + 3e-7, "miss the target by"),
         (lambda answers: np.concatenate([answers, answers], axis=1), "have the shape"),
         (lambda answers: np.full_like(answers, np.nan), "leave out postures"),
@@ -162,6 +162,13 @@ def test_a_wrong_family_is_rejected_and_the_next_one_taken(arm, plane, change, r
     assert reason in candidate.reasons["third_party"]
     with pytest.raises(NotApplicableError, match=reason):
         check_answers(arm, plane, (2,), Wrapped(find(arm, plane, ["j3"]).solver, change))
+
+
+def test_branches_that_share_a_label_are_rejected(arm, plane):
+    solver = Wrapped(find(arm, plane, ["j3"]).solver, lambda answers: answers)
+    solver.branches = ("elbow", "elbow")
+    with pytest.raises(NotApplicableError, match="its branches share labels: elbow, elbow"):
+        check_answers(arm, plane, (2,), solver)
 
 
 def test_lifted_angles_are_right_answers(arm, plane):

@@ -85,7 +85,7 @@ def test_two_links_reach_the_annulus_between_them_and_nothing_else():
     targets = shoulder + distance[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     inside = (distance > abs(first - second)) & (distance < first + second)
     assert 0.2 < inside.mean() < 0.8
-    finite = np.isfinite(solver.solve(targets, np.empty((2000, 0)))).all(axis=2)
+    finite = np.isfinite(solver.solve(targets, np.empty((2000, 0)))[:, :, 0]).all(axis=2)
     np.testing.assert_array_equal(finite, np.repeat(inside[:, None], 2, axis=1))
 
 
@@ -100,7 +100,7 @@ def test_a_finite_answer_reaches_any_target_and_none_is_left_out(pattern, far, f
     redundant = tuple(range(bench.robot.n - 2))
     q_r = np.array(free)[None, : len(redundant)]
     solver = bench.find(redundant).solver
-    answers = solver.solve(np.array([far]), q_r)[0]
+    answers = solver.solve(np.array([far]), q_r)[0, :, 0]
     for answer in answers[np.isfinite(answers).all(axis=1)]:
         posture = np.concatenate([q_r[0], answer])
         assert bench.miss(posture[None], np.array([far]))[0] < 1e-8 * (1.0 + np.abs(posture).max())
@@ -128,7 +128,7 @@ def test_labels_follow_the_branch_along_smooth_curves(pattern, rows):
     for (redundant, _), _ in itertools.product(bench.decompositions(), range(4)):
         solver, rest = bench.find(redundant).solver, bench.rest(redundant)
         q = rng.uniform(-2.0, 2.0, n) + rng.uniform(0.5, 2.0, n) * np.sin(2.0 * np.pi * t * rng.uniform(0.3, 1.0, n))
-        answers = solver.solve(bench.kinematics.position(q), q[:, list(redundant)])
+        answers = solver.solve(bench.kinematics.position(q), q[:, list(redundant)])[:, :, 0]
         for branch in range(2):
             postures = q.copy()
             postures[:, rest] = answers[:, branch]

@@ -51,7 +51,8 @@ def own_class(bench, solved, q):
 def test_every_answer_is_right_and_none_is_left_out(name):
     bench = bench_of(name)
     assert bench.solver.kind == "polynomial"
-    assert bench.solver.branches == ("determinant_positive",) * 6 + ("determinant_negative",) * 6
+    assert bench.solver.branches == ("determinant_positive", "determinant_negative")
+    assert bench.solver.alternatives == 6
     solved = bench.answers(bench.q)
     _, branch, postures = bench.check_answers(solved)
 
@@ -61,7 +62,7 @@ def test_every_answer_is_right_and_none_is_left_out(name):
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-6)
     signed = bench.solver.branch_margins(postures, 0)[:, 0]
     np.testing.assert_array_equal(signed > 0.0, branch < 6)
-    np.testing.assert_array_equal(bench.solver.branch_margins(postures[:9], 6), -signed[:9, None])
+    np.testing.assert_array_equal(bench.solver.branch_margins(postures[:9], 1), -signed[:9, None])
     assert 0.8 < np.abs(bench.margins(bench.q)).max() < 3.0
 
     # Every pose has as many answers of one sign as of the other.
@@ -73,12 +74,12 @@ def test_every_answer_is_right_and_none_is_left_out(name):
 
 
 @pytest.mark.parametrize("name", FEW)
-def test_answers_of_a_sign_are_distinct_and_in_the_order_of_the_turning_joint(name):
+def test_answers_of_a_sign_are_distinct_and_in_ascending_order(name):
     bench = bench_of(name)
     solved = bench.answers(bench.q).reshape(-1, 6, 6)
     angle = solved[:, :, 1]
     steps = np.diff(angle, axis=1)
-    assert np.all((steps >= 0.0) | np.isnan(steps))
+    assert not np.any(steps < -0.01)
     finite = np.isfinite(angle)
     assert np.all(np.diff(finite.astype(int), axis=1) <= 0), "the first slots are filled"
     assert np.nanmin(np.abs(np.diff(solved, axis=1)).max(axis=2)) > 1e-6
@@ -166,7 +167,7 @@ def test_out_of_reach_is_nan_without_a_warning():
     far[:, 2] += 10.0
     assert np.isnan(bench.solver.solve(far, bench.q[:, [5]])).all()
     assert np.isnan(bench.solver.solve(np.full((2, 12), np.nan), np.zeros((2, 1)))).all()
-    assert bench.solver.solve(far[:0], np.empty((0, 1))).shape == (0, 12, 6)
+    assert bench.solver.solve(far[:0], np.empty((0, 1))).shape == (0, 2, 6, 6)
 
 
 def test_registry_finds_it_and_says_so():

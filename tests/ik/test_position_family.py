@@ -197,7 +197,7 @@ def test_solvers_can_be_sent_to_other_processes():
 
 def test_no_targets_have_no_answers():
     solver = bench(rail_arm(), (0, 4, 5, 6), 1).solver
-    assert solver.solve(np.empty((0, 3)), np.empty((0, 4))).shape == (0, 4, 3)
+    assert solver.solve(np.empty((0, 3)), np.empty((0, 4))).shape == (0, 4, 1, 3)
 
 
 def test_out_of_reach_is_nan():

@@ -205,7 +205,7 @@ def test_solvers_can_be_sent_to_other_processes():
 
 
 def test_no_targets_have_no_answers():
-    assert Bench(rail_arm(), (0,), 1).solver.solve(np.empty((0, 12)), np.empty((0, 1))).shape == (0, 8, 6)
+    assert Bench(rail_arm(), (0,), 1).solver.solve(np.empty((0, 12)), np.empty((0, 1))).shape == (0, 8, 1, 6)
 
 
 def test_it_is_found_by_geometry():

@@ -177,10 +177,10 @@ class PoseBench:
         )
 
     def answers(self, q: np.ndarray) -> np.ndarray:
-        """Non-redundant joints (K, B, 6) that reach the poses of some postures."""
+        """Non-redundant joints (K, B A, 6) that reach the poses of some postures."""
         solved = self.solver.solve(self.poses(q), q[:, self.redundant])
-        assert solved.shape == (len(q), len(self.solver.branches), 6)
-        return solved
+        assert solved.shape == (len(q), len(self.solver.branches), self.solver.alternatives, 6)
+        return solved.reshape(len(q), -1, 6)
 
     def distance(self, solved: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Largest difference (K, ...) of answers from the non-redundant joints of postures; infinite for NaN."""

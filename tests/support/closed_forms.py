@@ -56,7 +56,8 @@ class Bench:
         assert solver is not None
         assert solver.kind == "closed_form"
         answers = solver.solve(self.targets, q[:, list(redundant)])
-        assert answers.shape == (len(q), len(solver.branches), self.space.m)
+        assert answers.shape == (len(q), len(solver.branches), 1, self.space.m)
+        answers = answers[:, :, 0]
         determinant = self.determinant(redundant)
         scale = np.abs(determinant).max()
         regular = np.abs(determinant) > 1e-6 * scale

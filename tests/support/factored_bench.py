@@ -34,9 +34,9 @@ class Bench:
     def answers(self, q):
         """Postures (K, B, n) that reach the targets of the given ones."""
         solved = self.solver.solve(self.targets(q), q[:, self.redundant])
-        assert solved.shape == (len(q), len(self.solver.branches), self.space.m)
+        assert solved.shape == (len(q), len(self.solver.branches), 1, self.space.m)
         postures = np.repeat(q[:, None], solved.shape[1], axis=1)
-        postures[:, :, self.rest] = solved
+        postures[:, :, self.rest] = solved[:, :, 0]
         return postures
 
     def margins(self, q):

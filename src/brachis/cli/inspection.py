@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -170,7 +169,7 @@ def _decompositions(robot: Robot, task_space: TaskSpace) -> list[dict[str, Any]]
                 "solver": candidate.family or "-",
                 "kind": solver.kind if solver else "-",
                 "branches": len(solver.branches) if solver else 0,
-                "labels": ", ".join(_counted(solver.branches)) if solver else "",
+                "labels": _labels(solver) if solver else "",
                 "why not": "" if solver else why,
                 "remark": candidate.remark,
             }
@@ -178,9 +177,10 @@ def _decompositions(robot: Robot, task_space: TaskSpace) -> list[dict[str, Any]]
     return rows
 
 
-def _counted(labels: tuple[str, ...]) -> list[str]:
-    """List labels once each, with their number where several answers share one."""
-    return [label if n == 1 else f"{label} (up to {n})" for label, n in Counter(labels).items()]
+def _labels(solver: ik.IKSolver) -> str:
+    """List the branches, with the number of their alternatives where there are several."""
+    several = f" (up to {solver.alternatives})" if solver.alternatives > 1 else ""
+    return ", ".join(f"{label}{several}" for label in solver.branches)
 
 
 def _print_decompositions(console: Console, rows: list[dict[str, Any]]) -> None:

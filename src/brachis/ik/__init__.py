@@ -2,7 +2,6 @@
 
 from brachis.ik.check import check_answers
 from brachis.ik.geometry import ChainGeometry, PosedScrews
-from brachis.ik.idealised import Polished
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError, ik_family, margin_gradient
 from brachis.ik.registry import BUILTIN, Candidate, Match, find, find_all, without_eaik
 
@@ -14,7 +13,6 @@ __all__ = [
     "IKSolver",
     "Match",
     "NotApplicableError",
-    "Polished",
     "PosedScrews",
     "check_answers",
     "find",

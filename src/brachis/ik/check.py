@@ -39,10 +39,13 @@ def check_answers(
     Raises
     ------
     NotApplicableError
-        An answer misses its target by more than 1e-8 m or rad, or none of the answers is the posture itself.
+        Two branches have one label, an answer misses its target by more than 1e-8 m or rad, or none of the answers is
+        the posture itself.
     """
     low, high = _checked_ranges(robot)
     q = np.random.default_rng(1).uniform(low, high, (postures, robot.n))
+    if len(set(solver.branches)) < len(solver.branches):
+        raise NotApplicableError(f"its branches share labels: {', '.join(solver.branches)}")
     margins = [solver.branch_margins(q, b).min(axis=1, initial=np.inf) for b in range(len(solver.branches))]
     q = q[np.max(margins, axis=0) > _INSIDE]
     if not len(q):
@@ -50,16 +53,17 @@ def check_answers(
     rest = [i for i in range(robot.n) if i not in redundant]
     targets = task_space.values(*robot.tool_placements(q))
     answers = solver.solve(targets, q[:, list(redundant)])
-    expected = (len(q), len(solver.branches), len(rest))
+    expected = (len(q), len(solver.branches), solver.alternatives, len(rest))
     if answers.shape != expected:
         raise NotApplicableError(f"its answers have the shape {answers.shape}, not {expected}")
     turning = ChainGeometry.of(robot).revolute[rest]
-    own = np.abs(_difference(answers, q[:, None, rest], turning)).max(axis=2)
-    if not np.all(np.nanmin(np.where(np.isnan(own), np.inf, own), axis=1) < _POSE_TOLERANCE * 100):
+    own = np.abs(_difference(answers, q[:, None, None, rest], turning)).max(axis=3)
+    if not np.all(np.nanmin(np.where(np.isnan(own), np.inf, own), axis=(1, 2)) < _POSE_TOLERANCE * 100):
         raise NotApplicableError("its answers leave out postures that reach the target")
-    sample, branch = np.nonzero(np.all(np.isfinite(answers), axis=2))
+    exists = np.isfinite(answers).all(axis=3)
+    sample = np.nonzero(exists)[0]
     reached = q[sample]
-    reached[:, rest] = answers[sample, branch]
+    reached[:, rest] = answers[exists]
     miss = np.abs(task_space.difference(task_space.values(*robot.tool_placements(reached)), targets[sample])).max()
     if not miss < _POSE_TOLERANCE:
         raise NotApplicableError(f"its answers miss the target by {miss:.1e}")

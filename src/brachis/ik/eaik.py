@@ -10,9 +10,8 @@ where redundant joints between the six are held at their values: these change th
 looks at every different value anew (about ten microseconds).
 
 EAIK's answers are believed only as far as they reach the target: near misses are polished, wrong and repeated answers
-dropped. EAIK's order of the answers changes along a path; here they are told apart by the sign of det J_nr, which
-changes only where two of them merge. Within a sign only continuity tells them apart. Answers of either sign are equally
-many: the map from postures to poses has degree zero, for there are poses out of reach.
+dropped. EAIK's order of the answers changes along a path; here they are told apart by the sign of det J_nr (`by_sign`).
+Answers of either sign are equally many: the map from postures to poses has degree zero, as some poses are out of reach.
 """
 
 from __future__ import annotations
@@ -21,35 +20,32 @@ from dataclasses import replace
 
 import numpy as np
 
+from brachis.ik.by_sign import SignSolver
 from brachis.ik.eaik_answers import EaikChain, installed
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.polish import EXACT, Poses, polished
 from brachis.ik.pose_joints import determinant
 from brachis.ik.protocol import Kind, NotApplicableError, ik_family
+from brachis.ik.vectors import wrap
 from brachis.robot import TaskSpace
 
 NOT_INSTALLED = 'EAIK is not installed (pip install "brachis[eaik]")'
 """Why EAIK is not asked, where that is the reason."""
 
-_TURN = 2.0 * np.pi
 _SAMPLES = 64
 _SINGULAR = 1e-9
 _REACHED = 1e-9
-_SAME = 1e-5
 _PER_SIGN = 8
 """Six revolute joints reach a pose in at most 16 ways."""
-_CELLS = 1024
-"""Answers are put in order by angles in so many parts of a turn, so that rounding seldom changes it."""
 
 
-class EaikSolver:
+class EaikSolver(SignSolver):
     """Closed form by EAIK; see the module's formulas.
 
     Holds nothing of EAIK's own, which cannot be pickled.
     """
 
     kind: Kind = "closed_form"
-    branches: tuple[str, ...] = ("determinant_positive",) * _PER_SIGN + ("determinant_negative",) * _PER_SIGN
 
     def __init__(self, geometry: ChainGeometry, redundant: tuple[int, ...]) -> None:
         rest = [i for i in range(geometry.n) if i not in redundant]
@@ -59,28 +55,18 @@ class EaikSolver:
         self._behind = [i for i in redundant if i > last]
         self._inner = slice(len(self._before), len(redundant) - len(self._behind))
         self._between = slice(first, last + 1)
-        self._chain = _part(geometry, self._between)
-        self._rest = [i - first for i in rest]
+        chain, six = _part(geometry, self._between), [i - first for i in rest]
         self._held = [i - first for i in redundant[self._inner]]
-        self._eaik = EaikChain(self._chain, self._held)
+        self._eaik = EaikChain(chain, self._held)
         self._tool = Poses.of_tool(geometry.held([], np.empty((1, 0))))
-        postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, self._chain.n))
-        jacobian = self._jacobian(postures)
-        self._check_decomposition(postures[:, self._held])
-        self._scale = float(np.abs(np.linalg.det(jacobian)).max())
-
-    def _jacobian(self, q: np.ndarray) -> np.ndarray:
-        """J_nr, (K, 6, 6), at postures of the chain in between, up to a change of the frame that leaves det J_nr."""
-        return np.moveaxis(self._chain.posed(q).jacobian_columns(self._rest), 2, 0)
-
-    def _check_decomposition(self, values: np.ndarray) -> None:
-        """Refuse axes of which EAIK knows no decomposition."""
-        if not self._eaik.knows(values):
+        postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, chain.n))
+        if not self._eaik.knows(postures[:, self._held]):
             raise NotApplicableError("EAIK knows no decomposition: too few of the six axes are parallel or meet")
+        super().__init__(chain, six, float(np.abs(determinant(chain.posed(postures), six)).max()), _PER_SIGN)
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """See `IKSolver.solve`."""
-        joints = np.full((len(q_r), len(self.branches), len(self._rest)), np.nan)
+        joints = np.full((len(q_r), 2, _PER_SIGN, len(self._joints)), np.nan)
         finite = np.flatnonzero(np.isfinite(targets).all(axis=1) & np.isfinite(q_r).all(axis=1))
         if len(finite):
             joints[finite] = self._solve(targets[finite], q_r[finite])
@@ -91,9 +77,9 @@ class EaikSolver:
         joints, samples, slack = self._eaik.answers(wanted.targets(), values)
         q = np.empty((len(joints), self._chain.n))
         q[:, self._held] = values[samples]
-        q[:, self._rest] = joints
+        q[:, self._joints] = joints
         determinants, right = self._put_to_test(q, wanted[samples], slack)
-        return _in_slots(_wrapped(q[right][:, self._rest]), samples[right], determinants[right] < 0.0, len(q_r))
+        return self._arranged(wrap(q[right][:, self._joints]), samples[right], determinants[right] < 0.0, len(q_r))
 
     def _put_to_test(self, q: np.ndarray, wanted: Poses, slack: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Polish postures (N, n) that miss their poses by less than a slack (N,), in place.
@@ -105,13 +91,13 @@ class EaikSolver:
         right : (R,) int ndarray
             Which postures reach their poses, and are not singular.
         """
-        posed, six = self._chain.posed(q), tuple(self._rest)
+        posed, six = self._chain.posed(q), self._joints
         miss, determinants = wanted.miss(posed), determinant(posed, six)
         near = np.flatnonzero((miss > EXACT) & (miss < slack))
-        joints = polished(self._chain, self._rest, q[near], wanted[near])
+        joints = polished(self._chain, six, q[near], wanted[near])
         converged = np.isfinite(joints[:, 0])
         moved = near[converged]
-        q[moved[:, None], self._rest] = joints[converged]
+        q[moved[:, None], six] = joints[converged]
         posed = self._chain.posed(q[moved])
         miss[moved], determinants[moved] = wanted[moved].miss(posed), determinant(posed, six)
         return determinants, np.flatnonzero((miss < _REACHED) & (determinants != 0.0))
@@ -128,9 +114,8 @@ class EaikSolver:
         return wanted
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
-        """See `IKSolver.branch_margins`: det J_nr, divided by its largest size."""
-        sign = 1.0 if branch < _PER_SIGN else -1.0
-        return sign * np.linalg.det(self._jacobian(q[:, self._between]))[:, None] / self._scale
+        """See `SignSolver.branch_margins`; what moves base or tool alone leaves det J_nr as it is."""
+        return super().branch_margins(q[:, self._between], branch)
 
 
 def _part(geometry: ChainGeometry, joints: slice) -> ChainGeometry:
@@ -142,39 +127,6 @@ def _part(geometry: ChainGeometry, joints: slice) -> ChainGeometry:
         axes=geometry.axes[joints],
         points=geometry.points[joints],
     )
-
-
-def _wrapped(angles: np.ndarray) -> np.ndarray:
-    """Angles in (-pi, pi]."""
-    return angles - _TURN * np.ceil((angles - np.pi) / _TURN)
-
-
-def _in_slots(joints: np.ndarray, samples: np.ndarray, negative: np.ndarray, count: int) -> np.ndarray:
-    """Put answers (N, 6) into the slots of their sign, in ascending order of the angles; NaN in slots left over."""
-    keys = np.zeros(len(joints), dtype=np.int64)
-    for cell in np.floor((joints + np.pi) * (_CELLS / _TURN)).astype(np.int64).T:
-        keys = keys * (_CELLS + 1) + cell
-    groups = 2 * samples + negative
-    order = np.lexsort((keys, groups))
-    order = order[~_repeated(joints[order], groups[order])]
-    joints, groups = joints[order], groups[order]
-    places = np.arange(len(groups)) - np.searchsorted(groups, groups)
-    room = places < _PER_SIGN
-    slots = np.full((2 * count, _PER_SIGN, joints.shape[1]), np.nan)
-    slots[groups[room], places[room]] = joints[room]
-    return slots.reshape(count, 2 * _PER_SIGN, -1)
-
-
-def _repeated(joints: np.ndarray, groups: np.ndarray) -> np.ndarray:
-    """Whether an answer, (N,), is one before it in the same group, modulo 2 pi."""
-    repeated = np.zeros(len(joints), dtype=bool)
-    for behind in range(1, len(joints)):
-        together = np.flatnonzero(groups[behind:] == groups[:-behind])
-        if len(together) == 0:
-            break
-        gap = np.abs(joints[together + behind] - joints[together])
-        repeated[together + behind] |= np.minimum(gap, _TURN - gap).max(axis=1) < _SAME
-    return repeated
 
 
 def _check_rank(geometry: ChainGeometry, redundant: tuple[int, ...]) -> None:

@@ -15,7 +15,7 @@ from brachis.ik.geometry import ChainGeometry, PosedScrews
 from brachis.ik.held_joints import HeldJoints
 from brachis.ik.pose_joints import largest_determinant, random_postures
 from brachis.ik.position_recipes import Recipe
-from brachis.ik.protocol import Kind, NotApplicableError
+from brachis.ik.protocol import IKSolver, Kind, NotApplicableError
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Structure(ABC):
 S = TypeVar("S", bound=Structure)
 
 
-class FactoredSolver(ABC, Generic[S]):
+class FactoredSolver(IKSolver, Generic[S]):
     """Closed form that solves for one joint after the other, with branches told apart by factors of det J_nr.
 
     Parameters
@@ -79,7 +79,7 @@ class FactoredSolver(ABC, Generic[S]):
         """See `IKSolver.solve`."""
         with np.errstate(invalid="ignore", divide="ignore"):
             held, values = self.steps(targets, q_r)
-            return self._branches.answers(values, held)
+            return self._branches.answers(values, held)[:, :, None]
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """See `IKSolver.branch_margins`: the factors of det J_nr that are not constant."""

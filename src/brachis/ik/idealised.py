@@ -19,7 +19,7 @@ import numpy as np
 
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.polish import goal_of, polished
-from brachis.ik.protocol import IKSolver, Kind
+from brachis.ik.protocol import IKSolver
 from brachis.robot import TaskSpace
 
 TOLERANCE = 1e-4
@@ -187,7 +187,7 @@ def _least_rotation(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     return np.eye(3) + skew + skew @ skew / (1.0 + start @ end)
 
 
-class Polished:
+class Polished(IKSolver):
     """Closed form of an ideal chain, made exact for the given one by Newton's method.
 
     Answers are those of the ideal chain as far as the method leads from them to one beside them; labels and margins of
@@ -202,8 +202,6 @@ class Polished:
         The given chain.
     task_space : TaskSpace
     redundant : tuple of int
-    branches : sequence of int, optional
-        Those in which answers are wanted; all unless given.
     """
 
     def __init__(
@@ -212,32 +210,31 @@ class Polished:
         geometry: ChainGeometry,
         task_space: TaskSpace,
         redundant: tuple[int, ...],
-        branches: Sequence[int] | None = None,
     ) -> None:
-        self.branches: tuple[str, ...] = solver.branches
-        self.kind: Kind = solver.kind
+        self.branches, self.alternatives, self.kind = solver.branches, solver.alternatives, solver.kind
         self._solver = solver
         self._geometry = geometry
         self._task_space = task_space
         self._redundant = list(redundant)
         self._rest = [i for i in range(geometry.n) if i not in redundant]
-        every = range(len(self.branches))
-        self._wanted = np.isin(every, every if branches is None else branches)
-
-    def only(self, branches: Sequence[int]) -> Polished:
-        """Return a solver that answers in some branches (indices) alone, which takes less time."""
-        return Polished(self._solver, self._geometry, self._task_space, tuple(self._redundant), branches)
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """See `IKSolver.solve`."""
-        answers = self._solver.solve(targets, q_r)
-        sample, branch = np.nonzero(np.isfinite(answers).all(axis=2) & self._wanted)
+        return self._exact(self._solver.solve(targets, q_r), targets, q_r)
+
+    def solve_branch(self, targets: np.ndarray, q_r: np.ndarray, branch: int) -> np.ndarray:
+        """See `IKSolver.solve_branch`."""
+        return self._exact(self._solver.solve_branch(targets, q_r, branch), targets, q_r)
+
+    def _exact(self, answers: np.ndarray, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
+        """Polish answers (K, ..., m)."""
+        exists = np.isfinite(answers).all(axis=-1)
+        sample = np.nonzero(exists)[0]
         q = np.empty((len(sample), self._geometry.n))
         q[:, self._redundant] = q_r[sample]
-        q[:, self._rest] = answers[sample, branch]
-        goal = goal_of(self._task_space, targets[sample])
+        q[:, self._rest] = answers[exists]
         exact = np.full_like(answers, np.nan)
-        exact[sample, branch] = polished(self._geometry, self._rest, q, goal)
+        exact[exists] = polished(self._geometry, self._rest, q, goal_of(self._task_space, targets[sample]))
         return exact
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:

@@ -50,7 +50,7 @@ from brachis.ik.geometry import ChainGeometry
 from brachis.ik.parallel_chain import ParallelChain
 from brachis.ik.parallel_equations import ParallelEquations
 from brachis.ik.pose_joints import PoseJoints, largest_determinant, random_postures
-from brachis.ik.protocol import Kind, NotApplicableError, ik_family
+from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
 from brachis.ik.vectors import wrap
 from brachis.robot import TaskSpace
 
@@ -63,7 +63,7 @@ _WORDS = {
 _CONSTANT = 1e-9
 
 
-class ParallelAxesSolver:
+class ParallelAxesSolver(IKSolver):
     """Closed form around three parallel axes; see the module's formulas."""
 
     kind: Kind = "closed_form"
@@ -109,7 +109,7 @@ class ParallelAxesSolver:
         joints = joints.reshape(6, len(self.branches), -1)
         joints[equation.revolute] = wrap(joints[equation.revolute])
         joints[:, np.isnan(joints).any(axis=0)] = np.nan
-        return np.moveaxis(joints[::-1] if chain.mirrored else joints, (0, 1, 2), (2, 1, 0))
+        return np.moveaxis(joints[::-1] if chain.mirrored else joints, (0, 1, 2), (2, 1, 0))[:, :, None]
 
 
 @ik_family("parallel_axes", source="Hawkins 2013 and IK-Geo 2022 for six revolute joints; this module's docstring")

@@ -17,14 +17,14 @@ import numpy as np
 
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.planar_chain import PlanarChain
-from brachis.ik.protocol import Kind, NotApplicableError, ik_family
+from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
 from brachis.robot import TaskSpace
 
 _SAMPLES = 64
 _LABELS = {"RR": "elbow", "RP": "reach", "PR": "reach", "PP": "slides", "R": "swing", "P": "slide"}
 
 
-class PlanarSolver:
+class PlanarSolver(IKSolver):
     """Closed form of a planar chain; see the module's formulas."""
 
     kind: Kind = "closed_form"
@@ -69,7 +69,7 @@ class PlanarSolver:
                 roots = self._with_yaw(targets, known)
             else:
                 roots = self._two(self._plane_target(targets), known, self._chain.tool, range(self._n))
-        return self._by_sign(known, roots)
+        return self._by_sign(known, roots)[:, :, None]
 
     def _by_sign(self, known: np.ndarray, roots: np.ndarray) -> np.ndarray:
         """Order the roots (K, 2, m) by the sign of det J_nr; NaN where a sign has none."""

@@ -29,11 +29,11 @@ third equation are linear in the real and the imaginary part of E; Cramer's rule
 
 a trigonometric polynomial of degree six: at most twelve answers. Its real roots (`trigonometric`) are polished
 together with p and theta on the three equations, x and y follow in the plane perpendicular to n, u and v from what is
-left of the rotation, and every answer is put to the test: E_p ... E_v has to be D within 2e-9.
+left of the rotation, and every answer is put to the test: the tool has to reach its target within 2e-9.
 
-No geometric choice tells the answers apart but the sign of det J_nr. A long slide takes the tool far away, so the map
-from joints to poses is proper; it does not reach all poses, so its degree is zero, and a regular pose has as many
-answers with a positive as with a negative determinant: at most six of each.
+No geometric choice tells the answers apart but the sign of det J_nr (`by_sign`). A long slide takes the tool far away,
+so the map from joints to poses is proper; it does not reach all poses, so its degree is zero, and a regular pose has as
+many answers with a positive as with a negative determinant: at most six of each.
 
 The equations are ours; the resultant of two equations that are linear in a cosine and a sine is classical.
 """
@@ -42,9 +42,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.ik.by_sign import SignSolver
 from brachis.ik.displacement import Displacement
 from brachis.ik.geometry import ChainGeometry
-from brachis.ik.polynomial_answers import distinct, in_slots, joints_of_roots, put_to_test
+from brachis.ik.polish import Poses
+from brachis.ik.polynomial_answers import joints_of_roots
 from brachis.ik.polynomial_equations import Equations
 from brachis.ik.pose_joints import PoseJoints, determinant, largest_determinant, random_postures
 from brachis.ik.protocol import Kind, NotApplicableError, ik_family
@@ -58,32 +60,25 @@ _MISS = 2e-9
 _ZERO = 1e-9
 
 
-class PolynomialSolver:
+class PolynomialSolver(SignSolver):
     """Roots of a polynomial of degree twelve, found numerically; see the module's formulas."""
 
     kind: Kind = "polynomial"
-    branches: tuple[str, ...] = ("determinant_positive",) * _EACH + ("determinant_negative",) * _EACH
 
     def __init__(self, geometry: ChainGeometry, redundant: tuple[int, ...], six: PoseJoints) -> None:
-        self._geometry = geometry
-        self._redundant = redundant
+        self._redundant = list(redundant)
         self._mirrored = six.mirrored
         self._turn = 0 if six.revolute[0] else 1
-        self._joints = tuple(sorted(six.joints))
         posed = random_postures(geometry)
         slide, parallel = six.joints[1 - self._turn], six.joints[2]
         if np.abs(dot(posed.axes[:, slide], posed.axes[:, parallel])).max() < _ZERO:
             raise NotApplicableError(f"{six.names[1 - self._turn]} never moves the arm along the parallel axes")
-        self._scale = largest_determinant(posed, self._joints)
-
-    def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
-        """See `IKSolver.branch_margins`: det J_nr, divided by its largest size."""
-        sign = 1.0 if branch < _EACH else -1.0
-        return sign * determinant(self._geometry.posed(q), self._joints)[:, None] / self._scale
+        joints = sorted(six.joints)
+        super().__init__(geometry, joints, largest_determinant(posed, joints), _EACH)
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """See `IKSolver.solve`; answers of one sign are in the order of q_a."""
-        equation = Displacement.of(self._geometry, self._redundant, targets, q_r)
+        """See `IKSolver.solve`."""
+        equation = Displacement.of(self._chain, self._redundant, targets, q_r)
         if self._mirrored:
             equation = equation.reversed()
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -93,19 +88,15 @@ class PolynomialSolver:
             which, roots = equations[sample].guesses(angles[root, sample])
             sample = sample[which]
             roots = equations[sample].polished(roots)
-            equation = equation[sample]
-            joints = joints_of_roots(equation, self._turn, roots)
-            miss, determinants = put_to_test(equation, joints)
-        # Six columns in the reverse order are three exchanges: the determinant changes its sign.
-        negative = (determinants < 0.0) != self._mirrored
-        sound = np.flatnonzero(miss < _MISS * (1.0 + np.abs(roots[1])))
-        sound = sound[distinct(sample[sound], roots[:, sound], negative[sound], miss[sound])]
-        joints = joints[:, sound]
-        joints[equation.revolute] = wrap(joints[equation.revolute])
-        angle = joints[self._turn]
-        if self._mirrored:
-            joints = joints[::-1]
-        return in_slots(len(q_r), _EACH, sample[sound], angle, negative[sound], joints)
+            joints = joints_of_roots(equation[sample], self._turn, roots)
+            joints[equation.revolute] = wrap(joints[equation.revolute])
+            q = np.empty((len(sample), self._chain.n))
+            q[:, self._redundant] = q_r[sample]
+            q[:, self._joints] = (joints[::-1] if self._mirrored else joints).T
+            posed = self._chain.posed(q)
+            sound = Poses.of_targets(targets[sample]).miss(posed) < _MISS * (1.0 + np.abs(roots[1]))
+            negative = determinant(posed, self._joints) < 0.0
+        return self._arranged(q[sound][:, self._joints], sample[sound], negative[sound], len(q_r))
 
 
 def _structure(six: PoseJoints) -> PoseJoints:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,12 +55,12 @@ def random_postures(geometry: ChainGeometry) -> PosedScrews:
     return geometry.posed(np.random.default_rng(1).uniform(-np.pi, np.pi, (_POSTURES, geometry.n)))
 
 
-def determinant(posed: PosedScrews, joints: tuple[int, ...]) -> np.ndarray:
+def determinant(posed: PosedScrews, joints: Sequence[int]) -> np.ndarray:
     """Det J_nr (K,) of six joints for a pose, or of three for a position; real or complex, and analytic."""
     return np.linalg.det(np.moveaxis(posed.jacobian_columns(joints)[: len(joints)], 2, 0))
 
 
-def largest_determinant(posed: PosedScrews, joints: tuple[int, ...]) -> float:
+def largest_determinant(posed: PosedScrews, joints: Sequence[int]) -> float:
     """Largest size of det J_nr.
 
     Raises

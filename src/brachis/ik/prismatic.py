@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.ik.geometry import ChainGeometry
-from brachis.ik.protocol import Kind, NotApplicableError, ik_family
+from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
 from brachis.robot import TaskSpace
 
 _SAMPLES = 64
 
 
-class PrismaticSolver:
+class PrismaticSolver(IKSolver):
     """Linear solver for prismatic non-redundant joints; see the module's formula."""
 
     kind: Kind = "closed_form"
@@ -48,10 +48,10 @@ class PrismaticSolver:
         matrix = np.where(regular[:, None, None], matrix, np.eye(matrix.shape[1]))
         slides = np.linalg.solve(matrix, (targets - start)[:, :, None])[:, :, 0]
         if len(self.branches) == 1:
-            return slides[:, None]
+            return slides[:, None, None]
         signs = np.array([1.0, -1.0])
         exists = regular[:, None] & (np.sign(determinants)[:, None] == signs)
-        return np.where(exists[:, :, None], slides[:, None], np.nan)
+        return np.where(exists[:, :, None], slides[:, None], np.nan)[:, :, None]
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """See `IKSolver.branch_margins`: the determinant of D, none where D is constant."""

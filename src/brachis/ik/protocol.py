@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -14,22 +15,26 @@ from brachis.robot import TaskSpace
 Kind = Literal["closed_form", "polynomial"]
 
 
-class IKSolver(Protocol):
+class IKSolver(ABC):
     """Solves for the non-redundant joints, for a batch of K samples at once.
 
     Attributes
     ----------
     branches : tuple of str
-        Labels of the B branches. A label names a geometric choice (elbow to one side or the other), so that a
-        continuous joint curve keeps its label until a branch margin reaches zero. A label that occurs several times
-        names answers that no geometric choice tells apart; along a curve they are told apart by continuity.
+        Labels of the B branches, each different. A label names a geometric choice (elbow to one side or the other), so
+        that a continuous joint curve keeps its label until a branch margin reaches zero.
+    alternatives : int
+        How many answers a branch may have, A: those that no geometric choice tells apart. Along a curve they are told
+        apart by continuity alone. One, unless a family says otherwise.
     kind : str
         ``closed_form``, or ``polynomial`` where the roots of a polynomial are found numerically.
     """
 
     branches: tuple[str, ...]
+    alternatives: int = 1
     kind: Kind
 
+    @abstractmethod
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """Non-redundant joints of every branch.
 
@@ -42,11 +47,15 @@ class IKSolver(Protocol):
 
         Returns
         -------
-        (K, B, m) ndarray
-            Chain order; angles in (-pi, pi] or any other lift; NaN where a branch does not exist.
+        (K, B, A, m) ndarray
+            Chain order; angles in (-pi, pi] or any other lift; NaN where there is no answer, or no further one.
         """
-        ...
 
+    def solve_branch(self, targets: np.ndarray, q_r: np.ndarray, branch: int) -> np.ndarray:
+        """Non-redundant joints of one branch, (K, A, m); see `solve`. Families to which this saves work override it."""
+        return self.solve(targets, q_r)[:, branch]
+
+    @abstractmethod
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Smooth functions of the posture that are positive inside a branch and zero at its boundary.
 
@@ -64,7 +73,6 @@ class IKSolver(Protocol):
         (K, k) ndarray
             Dimensionless, of the order of one in the middle of the branch.
         """
-        ...
 
 
 class NotApplicableError(Exception):

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.ik import ChainGeometry, IKSolver, Polished, margin_gradient
+from brachis.ik import ChainGeometry, IKSolver, margin_gradient
 from brachis.kinematics.joint_map import JointDerivatives, JointState
 from brachis.kinematics.task_kinematics import TaskKinematics
 from brachis.path import Path, PathSample
@@ -65,7 +65,7 @@ class Decomposition:
     redundant : tuple of int
         Indices of the redundant joints, ascending.
     branch : int
-        Index into ``solver.branches``, the first one of its label.
+        Index into ``solver.branches``.
     start : (n,) ndarray
         Start posture; angles are lifted (by multiples of 2 pi) to begin nearest to it.
     """
@@ -87,8 +87,6 @@ class Decomposition:
         self.redundant = list(redundant)
         self.nonredundant = [i for i in range(robot.n) if i not in redundant]
         self.branch = branch
-        self.alternatives = [i for i, label in enumerate(solver.branches) if label == solver.branches[branch]]
-        self._own = solver.only(self.alternatives) if isinstance(solver, Polished) else solver
         self.start = start
         self.kinematics = TaskKinematics(robot, task_space)
         self._turning = ChainGeometry.of(robot).revolute[self.nonredundant]
@@ -124,7 +122,7 @@ class Decomposition:
     ) -> np.ndarray:
         """Joint positions at K successive times, continuous from the start posture on.
 
-        Where several answers share the branch's label, the one nearest to its predecessor is taken.
+        Of the alternatives in the branch the one nearest to its predecessor is taken.
 
         Parameters
         ----------
@@ -133,7 +131,7 @@ class Decomposition:
         sample : PathSample, optional
             The path at ``y[:, 0]`` if already known.
         near : (K, n) ndarray, optional
-            Postures known to be near; they choose among answers of the same label, and the times may be any.
+            Postures known to be near; they choose among the alternatives, and the times may be any.
 
         Returns
         -------
@@ -141,8 +139,8 @@ class Decomposition:
             NaN in the non-redundant joints where the branch has no answer.
         """
         sample = sample or self.path.sample(y[:, 0])
-        answers = self._own.solve(sample.target, y[:, 1:])[:, self.alternatives]
-        if len(self.alternatives) == 1:
+        answers = self.solver.solve_branch(sample.target, y[:, 1:], self.branch)
+        if self.solver.alternatives == 1:
             answers = answers[:, 0]
         else:
             answers = self._tracked(answers) if near is None else self._nearest(answers, near[:, self.nonredundant])
@@ -156,7 +154,7 @@ class Decomposition:
         return q
 
     def _nearest(self, answers: np.ndarray, near: np.ndarray) -> np.ndarray:
-        """Choose from answers (K, c, m) those nearest to postures (K, m), modulo 2 pi."""
+        """Choose from answers (K, A, m) those nearest to postures (K, m), modulo 2 pi."""
         gap = answers - near[:, None]
         gap = np.where(self._turning, np.remainder(gap + np.pi, _TURN) - np.pi, gap)
         distance = np.linalg.norm(gap, axis=2)
@@ -164,7 +162,7 @@ class Decomposition:
         return answers[np.arange(len(answers)), choice]
 
     def _tracked(self, answers: np.ndarray) -> np.ndarray:
-        """Choose from answers (K, c, m) at successive times a course, each nearest to its predecessor."""
+        """Choose from answers (K, A, m) at successive times a course, each nearest to its predecessor."""
         course = np.empty((len(answers), len(self.nonredundant)))
         previous = self.start[self.nonredundant]
         for k in range(len(answers)):

@@ -125,18 +125,17 @@ def weights_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> np.nda
 
 
 def causes_of(
-    robot: Robot, exists: np.ndarray, where: np.ndarray, found: np.ndarray, inside: np.ndarray, near: np.ndarray
+    robot: Robot, anywhere: np.ndarray, found: np.ndarray, inside: np.ndarray, near: np.ndarray
 ) -> dict[str, int]:
     """Count why edges, (E,), are impossible, those first that came nearest to being possible.
 
-    `exists` tells of cells (C, B) which branches have an answer, `where` the cells of the edges, `inside`, (E, n),
-    which joints stay within their ranges.
+    `anywhere` tells whether there is an answer in any branch, `found` in the edge's own; `inside`, (E, n), which joints
+    stay within their ranges.
     """
-    anywhere = np.asarray(exists.any(axis=1))
     counts = {
-        OTHER_BRANCH: anywhere[where] & ~found,
+        OTHER_BRANCH: anywhere & ~found,
         JUMPS: found & ~near,
-        NO_ANSWER: ~anywhere[where],
+        NO_ANSWER: ~anywhere,
     }
     others = {cause: int(those.sum()) for cause, those in counts.items() if those.any()}
     return beyond_ranges(robot, inside[found & near]) | others

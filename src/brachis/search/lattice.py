@@ -88,9 +88,6 @@ class Lattice:
         self._backwards = given.start is None and given.end is not None
         self._origin = given.end if self._backwards else given.start
         self._cells = Cells.of(choice, cells_per_turn, self._origin)
-        labels = self._solver.branches
-        self._slots = [[b for b, label in enumerate(labels) if label == labels[first]] for first in choice.branches]
-        self._first = {slot: slots[0] for slots in self._slots for slot in slots}
         self._targets = given.path.sample(self.s).target
         self._limits = given.limits
         # In which turn the angles of a free origin are is open until the course is known.
@@ -134,11 +131,11 @@ class Lattice:
         ends = self._ends(layers[-1])
         if not len(ends):
             return DeadEnd(1.0, {JUMPS: 1})
-        q, slots = self._traced(layers, ends)
+        q, branches = self._traced(layers, ends)
         lengths = layers[-1].length[ends]
         found = [
-            Course(self.choice, self._first[int(slot)], self.s, course, float(length))
-            for slot, course, length in zip(slots, q, lengths, strict=True)
+            Course(self.choice, int(branch), self.s, course, float(length))
+            for branch, course, length in zip(branches, q, lengths, strict=True)
         ]
         return distinct(found, most)
 
@@ -153,13 +150,13 @@ class Lattice:
         return order[last.length[order] <= _LONGEST * last.length[order[:1]] + _SLACK]
 
     def _traced(self, layers: list[Layer], ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Trace courses back from their ends, (E,): postures (E, S + 1, n), in their turns, and first slots (E,)."""
+        """Trace courses back from their ends, (E,): postures (E, S + 1, n), in their turns, and branches (E,)."""
         nodes, q = ends, []
         for layer in reversed(layers):
             q.append(layer.q[nodes])
-            slots, nodes = layer.slot[nodes], layer.parent[nodes]
+            nodes = layer.parent[nodes]
         courses = np.array(q if self._backwards else q[::-1]).swapaxes(0, 1)
-        return courses + _TURN * self._turn_of(layers[-1][ends])[:, None], slots
+        return courses + _TURN * self._turn_of(layers[-1][ends])[:, None], layers[-1].branch[ends]
 
     def _turn_of(self, nodes: Layer) -> np.ndarray:
         """Multiples of 2 pi, (E, n), that bring the courses to nodes into the ranges, in the middle if closed."""
@@ -191,38 +188,35 @@ class Lattice:
             none, q = np.zeros(1, dtype=int), self._origin[None].astype(float)
             return Layer(np.zeros((1, r), dtype=int), none + self.choice.branches[0], q, q, q, np.zeros(1), none)
         cells = self._cells.everywhere(_STARTS * self._nodes, rng)
-        answers = self._answers(cells, 0)
-        slots = np.array(sorted(self._first))
-        cell, slot = np.repeat(cells, len(slots), axis=0), np.tile(slots, len(cells))
-        q = np.empty((len(cell), self._robot.n))
-        q[:, self._redundant] = self._cells.positions(cell)
-        q[:, self._rest] = answers[:, slots].reshape(len(cell), len(self._rest))
-        exists = np.isfinite(q).all(axis=1)
-        if not exists.any():
+        answers = self._answers(cells, 0)[:, self.choice.branches]
+        which, branch, alternative = np.nonzero(np.isfinite(answers).all(axis=3))
+        if not len(which):
             return {NO_ANSWER: len(cells)}
-        cell, slot, q = cell[exists], slot[exists], q[exists]
+        q = np.empty((len(which), self._robot.n))
+        q[:, self._redundant] = self._cells.positions(cells[which])
+        q[:, self._rest] = answers[which, branch, alternative]
         within = self._inside(q, q)
         inside = within.all(axis=1)
         if not inside.any():
             return beyond_ranges(self._robot, within)
-        cell, slot, q = cell[inside], slot[inside], q[inside]
+        cell, branch, q = cells[which[inside]], np.array(self.choice.branches)[branch[inside]], q[inside]
         nothing = np.zeros(len(q))
-        return self._kept(Layer(cell, slot, q, q, q, nothing, nothing.astype(int)))
+        return self._kept(Layer(cell, branch, q, q, q, nothing, nothing.astype(int)))
 
     def _answers(self, cells: np.ndarray, station: int) -> np.ndarray:
-        """Non-redundant joints of all branches, (C, B, m)."""
+        """Non-redundant joints of all branches, (C, B, A, m)."""
         target = np.repeat(self._targets[station][None], len(cells), axis=0)
         return self._solver.solve(target, self._cells.positions(cells))
 
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         """Pairs of parents, (E,), and cells, (E, r), that may be joined; at the very end the given end's, too."""
         offsets = self._cells.neighbours(rng)
-        parent = np.repeat(np.arange(len(before.slot)), len(offsets))
-        edges = before.cell[parent] + np.tile(offsets, (len(before.slot), 1))
+        parent = np.repeat(np.arange(len(before.branch)), len(offsets))
+        edges = before.cell[parent] + np.tile(offsets, (len(before.branch), 1))
         end = self.choice.setting.end
         if end is not None and not self._backwards and station == len(self.s) - 1:
-            aim = np.tile(self._cells.near(end[self._redundant]), (len(before.slot), 1))
-            parent = np.append(parent, np.arange(len(before.slot)))
+            aim = np.tile(self._cells.near(end[self._redundant]), (len(before.branch), 1))
+            parent = np.append(parent, np.arange(len(before.branch)))
             edges = np.vstack([edges, aim])
         return parent, edges
 
@@ -231,31 +225,30 @@ class Lattice:
         parent, edges = self._edges(before, station, rng)
         cells, where = unique(edges)
         answers = self._answers(cells, station)
-        exists = np.isfinite(answers).all(axis=2)
-        own = [(np.isin(before.slot[parent], slots), slot) for slots in self._slots for slot in slots]
-        slot = np.concatenate([np.full(int(mine.sum()), one) for mine, one in own])
-        where = np.concatenate([where[mine] for mine, _ in own])
-        parent = np.concatenate([parent[mine] for mine, _ in own])
+        exists, several = np.isfinite(answers).all(axis=3), self._solver.alternatives
+        alternative = np.tile(np.arange(several), len(parent))
+        parent, where = np.repeat(parent, several), np.repeat(where, several)
+        branch = before.branch[parent]
         q = np.empty((len(parent), self._robot.n))
         q[:, self._redundant] = self._cells.positions(cells)[where]
-        q[:, self._rest] = answers[where, slot]
+        q[:, self._rest] = answers[where, branch, alternative]
         step = q - before.q[parent]
         turn = -np.round(step[:, self._turns] / _TURN)
         step[:, self._turns] += _TURN * turn
         q = before.q[parent] + step
         low, high = np.minimum(before.low[parent], q), np.maximum(before.high[parent], q)
-        found = exists[where, slot]
+        found = exists[where, branch, alternative]
         with np.errstate(invalid="ignore"):
             inside = self._inside(low, high)
             near = np.all(np.abs(step) <= _LARGEST_STEP, axis=1)
         good = found & inside.all(axis=1) & near
         if not good.any():
-            return causes_of(self._robot, exists, where, found, inside, near)
+            return causes_of(self._robot, exists.any(axis=(1, 2))[where], found, inside, near)
         parent, where, step = parent[good], where[good], step[good]
         length = before.length[parent] + self._lengths(before.q, step, parent)
-        layer = Layer(cells[where], slot[good], q[good], low[good], high[good], length, parent)
+        layer = Layer(cells[where], branch[good], q[good], low[good], high[good], length, parent)
         turn = np.where(self._telling, turn[good], 0.0)
-        return self._kept(layer[_shortest(length, np.column_stack([where, layer.slot, turn]))])
+        return self._kept(layer[_shortest(length, np.column_stack([where, layer.branch, alternative[good], turn]))])
 
     def _lengths(self, q: np.ndarray, step: np.ndarray, origin: np.ndarray) -> np.ndarray:
         """Lengths of steps, (E, n), from the postures q[origin]; see the module."""
@@ -269,12 +262,12 @@ class Lattice:
 
     def _kept(self, layer: Layer) -> Layer | dict[str, int]:
         """Keep nodes clear of the branch boundary that can be held against gravity, not too many of them."""
-        clear = np.ones(len(layer.slot), dtype=bool)
-        for slot in np.unique(layer.slot):
-            own = layer.slot == slot
-            margins = self._solver.branch_margins(layer.q[own], self._first[int(slot)])
+        clear = np.ones(len(layer.branch), dtype=bool)
+        for branch in np.unique(layer.branch):
+            own = layer.branch == branch
+            margins = self._solver.branch_margins(layer.q[own], int(branch))
             clear[own] = margins.min(axis=1, initial=np.inf) >= self._clear
-        still, held = Moments.at_rest(layer.q), np.ones(len(layer.slot), dtype=bool)
+        still, held = Moments.at_rest(layer.q), np.ones(len(layer.branch), dtype=bool)
         refused: dict[str, int] = {}
         for limit in self._static:
             allowed = np.all(limit.violation(limit.values(still)) <= _SLACK, axis=1)

@@ -19,7 +19,7 @@ class Layer:
     Attributes
     ----------
     cell : (K, r) int ndarray
-    slot : (K,) int ndarray
+    branch : (K,) int ndarray
         Index into the closed form's branches.
     q : (K, n) ndarray
         Postures, rad or m, continuous along the courses there.
@@ -32,7 +32,7 @@ class Layer:
     """
 
     cell: np.ndarray
-    slot: np.ndarray
+    branch: np.ndarray
     q: np.ndarray
     low: np.ndarray
     high: np.ndarray
@@ -45,7 +45,7 @@ class Layer:
 
     def bounded(self, most: int, robot: Robot, limits: Sequence[Limit]) -> Layer:
         """Keep `most` nodes: half of them the nearest, the others far from each other and from those."""
-        if len(self.slot) <= most:
+        if len(self.branch) <= most:
             return self
         order = np.argsort(self.length, kind="stable")
         half = most // 2

@@ -42,15 +42,15 @@ def explain_failure(
     """
     s = np.linspace(0.0, 1.0, _STATIONS)
     found = _answers_along(decomposition, s, opened=False)
-    slots = list(range(found.q.shape[2])) if any_branch else decomposition.alternatives
-    own = _Answers(found.q[:, :, slots], found.exists[:, :, slots], found.inside[:, :, slots])
+    branches = slice(None) if any_branch else slice(decomposition.branch, decomposition.branch + 1)
+    own = _Answers(*(part[:, :, branches] for part in (found.q, found.exists, found.inside)))
     # Where the redundant joints' ranges leave no answer, wider ones tell whether the ranges or the arm are to blame.
-    anywhere = found if found.exists.any(axis=(1, 2)).all() else _answers_along(decomposition, s, opened=True)
-    within = np.asarray(found.within.any(axis=(1, 2)))
+    anywhere = found if found.exists.any(axis=(1, 2, 3)).all() else _answers_along(decomposition, s, opened=True)
+    within = np.asarray(found.within.any(axis=(1, 2, 3)))
     label = decomposition.branch_label
     reasons = (
         (
-            found.exists.any(axis=(1, 2)) | anywhere.exists.any(axis=(1, 2)),
+            found.exists.any(axis=(1, 2, 3)) | anywhere.exists.any(axis=(1, 2, 3)),
             "the path is out of reach from s = {first:.3g} on (no posture was found)",
             path_hint(decomposition.robot, decomposition.task_space, decomposition.path.sample(s).target)
             or "Shorten or move the path, or choose another start posture",
@@ -62,7 +62,7 @@ def explain_failure(
             "Shorten or move the path, or widen the joint ranges",
         ),
         (
-            own.within.any(axis=(1, 2)),
+            own.within.any(axis=(1, 2, 3)),
             f"the branch {label!r} of the {given} posture does not reach s = {{first:.3g}}",
             f"Choose a {given} posture of another branch, or leave redundant_joints: auto",
         ),
@@ -86,13 +86,13 @@ def explain_failure(
 
 @dataclass(frozen=True)
 class _Answers:
-    """Closed-form postures at S stations for T random choices of the redundant joints and B branches.
+    """Closed-form postures at S stations for T random choices of the redundant joints, B branches and A alternatives.
 
     Attributes
     ----------
-    q : (S, T, B, n) ndarray
-    exists : (S, T, B) bool ndarray
-    inside : (S, T, B, n) bool ndarray
+    q : (S, T, B, A, n) ndarray
+    exists : (S, T, B, A) bool ndarray
+    inside : (S, T, B, A, n) bool ndarray
         Which joints are within their ranges.
     """
 
@@ -102,8 +102,8 @@ class _Answers:
 
     @property
     def within(self) -> np.ndarray:
-        """Which postures exist within all joint ranges, (S, T, B)."""
-        return np.asarray(self.exists & self.inside.all(axis=3))
+        """Which postures exist within all joint ranges, (S, T, B, A)."""
+        return np.asarray(self.exists & self.inside.all(axis=4))
 
 
 def _answers_along(decomposition: Decomposition, s: np.ndarray, *, opened: bool) -> _Answers:
@@ -126,13 +126,14 @@ def _answers_along(decomposition: Decomposition, s: np.ndarray, *, opened: bool)
         q_r[0] = np.clip(decomposition.start, low, high)[redundant]
     targets = decomposition.path.sample(s).target
     answers = decomposition.solver.solve(np.repeat(targets, tries, axis=0), np.tile(q_r, (len(s), 1)))
-    postures = np.empty((len(s), tries, answers.shape[1], robot.n))
-    postures[..., redundant] = q_r[None, :, None]
-    postures[..., rest] = answers.reshape(len(s), tries, answers.shape[1], -1)
+    answers = answers.reshape(len(s), tries, *answers.shape[1:])
+    postures = np.empty((*answers.shape[:-1], robot.n))
+    postures[..., redundant] = q_r[:, None, None]
+    postures[..., rest] = answers
     middle = 0.5 * (low + high)
     lifted = np.where(turning, postures - 2.0 * np.pi * np.round((postures - middle) / (2.0 * np.pi)), postures)
     inside = (lifted >= lower - _RANGE_SLACK) & (lifted <= upper + _RANGE_SLACK)
-    return _Answers(lifted, np.asarray(np.isfinite(lifted).all(axis=3)), inside)
+    return _Answers(lifted, np.asarray(np.isfinite(lifted).all(axis=4)), inside)
 
 
 def _beyond(decomposition: Decomposition, within: np.ndarray, *found: _Answers) -> str:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.ik import ChainGeometry, NotApplicableError, PosedScrews, ik_family
+from brachis.ik import ChainGeometry, IKSolver, NotApplicableError, PosedScrews, ik_family
 from brachis.ik.vectors import across, angle_about, cross, dot, meeting_point
 from brachis.robot import TaskSpace
 
@@ -22,7 +22,7 @@ METRE = 1.0
 """Size of the arm, m, by which margins are made dimensionless."""
 
 
-class PolarSolver:
+class PolarSolver(IKSolver):
     """Turn, tilt and reach for batches of targets; see the module's formulas."""
 
     kind = "closed_form"
@@ -37,7 +37,7 @@ class PolarSolver:
         self._offset = float(dot(cross(tilt, turn), shoulder(screws) - screws.points[:, -3])[0])
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """Return (K, 2, 3) for tool positions (K, 3) and redundant joints (K, r)."""
+        """Return (K, 2, 1, 3) for tool positions (K, 3) and redundant joints (K, r)."""
         screws = self._geometry.held(range(q_r.shape[1]), q_r)  # the arm at zero, moved by the joints before it
         turn_axis, tilt_axis, boom = axes(screws)
         lean, flat, offset = self._lean, self._flat, self._offset
@@ -46,14 +46,14 @@ class PolarSolver:
         sideways, height = across(turn_axis, away), dot(turn_axis, away - start)
         with np.errstate(invalid="ignore"):  # out of reach: NaN
             root = np.sqrt(flat * (dot(sideways, sideways) - (lean * offset) ** 2) - (lean * height) ** 2)
-        answers = np.empty((len(targets), 2, 3))
+        answers = np.empty((len(targets), 2, 1, 3))
         for branch, sign in enumerate((1.0, -1.0)):
             forward = sign * root - flat * offset
             reach = np.sqrt((forward**2 + height**2) / flat)
             tilted = front * forward + turn_axis * height + tilt_axis * (lean * reach)
             turn = angle_about(turn_axis, start + tilted, away)
             tilt = angle_about(tilt_axis, boom, tilted)
-            answers[:, branch] = np.stack([turn, tilt, reach - length(screws)], axis=1)
+            answers[:, branch, 0] = np.stack([turn, tilt, reach - length(screws)], axis=1)
         return answers
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
