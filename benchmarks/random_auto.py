@@ -21,7 +21,7 @@ from brachis import LimitSpec, Robot, load_task
 from brachis.errors import BrachisError
 from brachis.search.course import DeadEnd
 from brachis.search.efforts import EFFORTS
-from brachis.search.seeds import lattice_seeds
+from brachis.search.starts import lattice_starts
 from brachis.setting import Setting, choices
 
 
@@ -46,7 +46,7 @@ def has_course(robot: Robot, task: dict[str, object]) -> bool:
         found = choices(Setting.of(robot, load_task(task)))
     except BrachisError:
         return False
-    return any(not isinstance(lattice_seeds(choice, EFFORTS["fast"][0], 0), DeadEnd) for choice in found)
+    return any(not isinstance(lattice_starts(choice, EFFORTS["fast"][0], 0), DeadEnd) for choice in found)
 
 
 def main() -> None:

@@ -75,7 +75,7 @@ def test_without_refinement_the_answer_is_left_as_it_is():
     assert not result.verified
     assert result.verification.worst_ratio > 1.01
     assert result.attempt.time_scaled == 1.0
-    assert len(result.attempts) == 1
+    assert sum(np.isfinite(candidate.t_end) for candidate in result.candidates) == 1
 
 
 def test_margins_that_change_nothing_are_not_solved_again():

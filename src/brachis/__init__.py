@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from brachis import bottleneck as bottleneck
     from brachis import compose as compose
+    from brachis.attempt import Attempt as Attempt
     from brachis.bottleneck import BottleneckReport as BottleneckReport
     from brachis.errors import BrachisError as BrachisError
     from brachis.errors import InputError as InputError
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from brachis.planner import plan as plan
     from brachis.planner import transcribe as transcribe
     from brachis.plausibility import PlausibilityWarning as PlausibilityWarning
-    from brachis.result import Candidate as Candidate
     from brachis.result import Result as Result
     from brachis.robot import LimitSpec as LimitSpec
     from brachis.robot import Robot as Robot
@@ -35,7 +35,7 @@ _STAGES = ("bottleneck", "compose")
 _HOME = {
     "BottleneckReport": "brachis.bottleneck",
     "BrachisError": "brachis.errors",
-    "Candidate": "brachis.result",
+    "Attempt": "brachis.attempt",
     "InputError": "brachis.errors",
     "LimitSpec": "brachis.robot",
     "PlanningError": "brachis.errors",
@@ -53,9 +53,9 @@ _HOME = {
 }
 
 __all__ = [
+    "Attempt",
     "BottleneckReport",
     "BrachisError",
-    "Candidate",
     "InputError",
     "LimitSpec",
     "PlanningError",

@@ -1,24 +1,48 @@
-"""The whole pipeline on one page: task -> robot -> path -> decomposition -> NLP -> solve and refine -> verify."""
+"""The whole pipeline on one page.
+
+task -> robot -> path, limits -> decompositions -> joint paths (search) -> `solved` at the first collocation points
+-> `finished`: mesh, refinement, trajectory, verification -> result.
+
+The search decides what is solved and finished, and in which order; the two functions say how.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 import os
 import time
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from brachis import ik, plausibility
+from brachis.attempt import Attempt, Start
 from brachis.custom_limits import LimitModel
 from brachis.deadline import Deadline
+from brachis.errors import UnreachableError
+from brachis.extract import extract, where_it_failed
+from brachis.mesh import coarsest, settle_knots
 from brachis.nlp import Program
+from brachis.nlp.guess import starting_point
 from brachis.nlp.layout import SHORTEST_TIME
+from brachis.refine import Refined, RefinementOptions, Solve, refine
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.combine import robot_for
-from brachis.search import Listener, find_fastest, first_start
+from brachis.search import MARGINS, Listener, Stages, continued, find_fastest, first_start, solve_with
 from brachis.setting import Setting, breaks_of, choices, program_of
+from brachis.solvers import SolverReport, SolveStatus, solver_named
 from brachis.task import Task, load_task
+from brachis.verify import VerifyOptions, verify_trajectory
+
+_MANY_VARIABLES = 150
+"""Above this a cold solve takes seconds, and the program is first solved over some of its knots."""
+_KNOT_TIME = 0.4
+"""Part of the remaining time that may go into the knots."""
+_SECOND_LOOKS = 4
+"""Times that a motion which the verification refuses is refined again where it failed."""
 
 
 def plan(
@@ -98,23 +122,121 @@ def _plan(
     setting = Setting.of(robot, task, limits)
     places = plausibility.of_places(setting.robot, setting.task_space, setting.start, setting.end, task.path_start)
     remarks += plausibility.tell(places, strict=strict, stacklevel=4)
-    found = find_fastest(choices(setting, families), deadline, listener)
-    trajectory, verification = found.motion
-    end_time = plausibility.of_end_time(trajectory.t_end, SHORTEST_TIME)
+    found = find_fastest(choices(setting, families), Stages(solved, finished), deadline, listener)
+    best = found.best
+    assert best is not None and best.start is not None  # noqa: PT018, S101  (else nothing would have come back)
+    assert best.trajectory is not None and best.verification is not None  # noqa: PT018, S101
+    end_time = plausibility.of_end_time(best.t_end, SHORTEST_TIME)
     remarks += plausibility.tell(end_time, strict=strict, stacklevel=4)
     return Result(
         task=task,
-        trajectory=trajectory,
-        verification=verification,
-        family=found.family,
-        attempts=found.attempts,
-        chosen=found.chosen,
+        trajectory=best.trajectory,
+        verification=best.verification,
+        family=best.start.choice.match.family,
+        attempt=best.without_programs(),
         timing={"load": loaded - began, "total": time.perf_counter() - began},
-        candidates=found.candidates,
+        candidates=found.in_order(),
         interrupted=found.interrupted,
-        undone=found.undone,
+        undone=found.undone(),
         warnings=remarks,
     )
+
+
+def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
+    """Solve from a start, at the first collocation points.
+
+    Parameters
+    ----------
+    start : Start
+    deadline : Deadline
+    listener : callable
+
+    Returns
+    -------
+    Attempt
+    """
+    task = start.choice.setting.task
+    target = program_of(start.choice.setting, start.decomposition, breaks_of(task))
+    program = coarsest(target) if target.variables > _MANY_VARIABLES else target
+    x = starting_point(program, [start.joint_path])
+    if x is None:
+        return Attempt.of(start, "the splines through the joint path leave the branch")
+    try:
+        program, reports = continued(program, x, _solver(start, deadline, listener), MARGINS)
+    except ImportError as error:
+        return Attempt.of(start, f"{start.solver}: not installed ({error})")
+    last = reports[-1]
+    coarse = last.objective if last.status.usable else np.inf
+    return Attempt.of(start, _in_words(last.status), program=program, target=target, reports=reports, coarse=coarse)
+
+
+def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attempt:
+    """Adapt the mesh, refine and verify; only verify where the time is up.
+
+    Parameters
+    ----------
+    attempt : Attempt
+        A usable one.
+    deadline : Deadline
+    listener : callable
+
+    Returns
+    -------
+    Attempt
+    """
+    start, program = attempt.start, attempt.program
+    assert start is not None and program is not None  # noqa: PT018, S101  (it is usable)
+    task = start.choice.setting.task
+    settings, soon = task.refinement, deadline.part(_KNOT_TIME)
+    options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, soon)
+    solve = _solver(start, soon, listener)
+    adapted = settle_knots(program, attempt.reports, solve, task.spline, options, target=attempt.target)
+    attempt = dataclasses.replace(attempt, undone=adapted.undone)
+    options, solve = dataclasses.replace(options, deadline=deadline), _solver(start, deadline, listener)
+    refined = refine(adapted.program, adapted.reports[-1], solve, options)
+    done = _verified(attempt, adapted.reports[:-1], refined)
+    for _ in range(_SECOND_LOOKS if options.max_rounds else 0):
+        finer = None if deadline.passed else where_it_failed(done)
+        if finer is None:
+            break
+        report = solve(finer, refined.x)
+        if not report.status.usable:
+            break
+        refined = refine(finer, report, solve, options)
+        done = _verified(attempt, adapted.reports[:-1], refined)
+    return done
+
+
+def _verified(attempt: Attempt, before: tuple[SolverReport, ...], refined: Refined) -> Attempt:
+    """Make the trajectory of a refined program and verify it; `before` are the reports of earlier solves."""
+    start = attempt.start
+    assert start is not None  # noqa: S101
+    setting, trajectory, verification = start.choice.setting, None, None
+    if refined.converged and np.isfinite(refined.violation):
+        with contextlib.suppress(UnreachableError):
+            trajectory = extract(start, refined)
+            options = VerifyOptions(ratio_tolerance=setting.task.refinement.tolerance)
+            verification = verify_trajectory(trajectory, options, further=setting.further)
+    return attempt.finished(
+        reports=(*before, *refined.reports),
+        refined=refined,
+        trajectory=trajectory,
+        verification=verification,
+        tolerance=setting.task.refinement.tolerance,
+    )
+
+
+def _in_words(status: SolveStatus) -> str:
+    name = status.name.lower().replace("_", " ")
+    if not status.usable:
+        return name
+    return "planned" if status is SolveStatus.OPTIMAL else f"planned, {name}"
+
+
+def _solver(start: Start, deadline: Deadline, listener: Listener) -> Solve:
+    """Make a function that solves with the start's solver."""
+    (solver,) = solver_named(start.solver)
+    return solve_with(solver, start.choice.setting.task.solver, len(start.choice.redundant), deadline, listener)
 
 
 def transcribe(

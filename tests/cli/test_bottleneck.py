@@ -10,7 +10,6 @@ import pytest
 
 from brachis import planner, plots
 from brachis.errors import InputError
-from brachis.search import motion
 from brachis.verify import VerifyOptions
 
 from .conftest import SCARA
@@ -74,10 +73,10 @@ def test_unverified_motion(run, task, write, tmp_path, monkeypatch):
     out = tmp_path / "out"
     task["search"] = {"time_limit": 1.0}  # nothing will ever be verified
     run("bottleneck", write(task), "--out", out)
-    honest = motion.verify_trajectory
+    honest = planner.verify_trajectory
     strict = VerifyOptions(ratio_tolerance=-0.5)
     monkeypatch.setattr(
-        motion, "verify_trajectory", lambda trajectory, _options, **more: honest(trajectory, strict, **more)
+        planner, "verify_trajectory", lambda trajectory, _options, **more: honest(trajectory, strict, **more)
     )
     outcome = run("bottleneck", write(task), "--out", out)
     assert outcome.code == 1

@@ -17,7 +17,6 @@ import pytest
 from brachis import __version__, planner, plots
 from brachis.cli import planning
 from brachis.errors import InputError
-from brachis.search import motion, portfolio
 from brachis.trajectory import Trajectory
 from brachis.verify import VerifyOptions
 
@@ -71,10 +70,10 @@ def test_plan_for_people(run, task, write):
 
 @pytest.fixture
 def too_strict(monkeypatch):
-    honest = motion.verify_trajectory
+    honest = planner.verify_trajectory
     strict = VerifyOptions(ratio_tolerance=-0.5)
     monkeypatch.setattr(
-        motion, "verify_trajectory", lambda trajectory, _options, **more: honest(trajectory, strict, **more)
+        planner, "verify_trajectory", lambda trajectory, _options, **more: honest(trajectory, strict, **more)
     )
 
 
@@ -154,12 +153,12 @@ def test_folder_in_the_place_of_a_result(run, task, write, tmp_path):
 
 
 def test_json_knows_no_nan(run, task, write, tmp_path, monkeypatch):
-    honest = motion.verify_trajectory
+    honest = planner.verify_trajectory
 
     def endless(trajectory, options, **more):
         return replace(honest(trajectory, options, **more), worst_ratio=math.inf, path_error=math.nan)
 
-    monkeypatch.setattr(motion, "verify_trajectory", endless)
+    monkeypatch.setattr(planner, "verify_trajectory", endless)
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
     for text in (outcome.out, (tmp_path / "out/result.json").read_text()):
         data = json.loads(text, parse_constant=pytest.fail)
@@ -172,8 +171,8 @@ def test_lengthened_end_time_is_said(run, task, write, monkeypatch):
 
     def lengthened(*arguments, time_scaled, **options):
         result = honest(*arguments, **options)
-        attempts = tuple(replace(attempt, time_scaled=time_scaled) for attempt in result.attempts)
-        return replace(result, attempts=attempts)
+        refined = replace(result.attempt.refined, time_scaled=time_scaled)
+        return replace(result, attempt=replace(result.attempt, refined=refined))
 
     for time_scaled, expected in ((1.0, False), (1.00004, True)):
         monkeypatch.setattr(planner, "plan", partial(lengthened, time_scaled=time_scaled))
@@ -197,7 +196,7 @@ def test_interrupt(run, task, write, tmp_path, monkeypatch):
     def interrupt(*_arguments, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(portfolio, "plan_coarse", interrupt)
+    monkeypatch.setattr(planner, "solved", interrupt)
     outcome = run("plan", write(task), "--out", tmp_path / "out")
     assert outcome.code == 130
     assert "interrupted" in outcome.err
@@ -205,14 +204,14 @@ def test_interrupt(run, task, write, tmp_path, monkeypatch):
 
 
 def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monkeypatch):
-    honest, now = portfolio.plan_coarse, [0.0]
+    honest, now = planner.solved, [0.0]
 
     def slow(*arguments):
         made = honest(*arguments)
         now[0] += 90.0
         return made
 
-    monkeypatch.setattr(portfolio, "plan_coarse", slow)
+    monkeypatch.setattr(planner, "solved", slow)
     monkeypatch.setattr("brachis.deadline.time.monotonic", lambda: now[0])
     task["spline"] = {"intervals": 10, "points_per_interval": 1}
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")

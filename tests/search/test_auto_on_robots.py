@@ -11,7 +11,7 @@ import pytest
 import brachis
 from brachis.deadline import NEVER
 from brachis.robot.from_task import robot_from_settings
-from brachis.search.ways import waves
+from brachis.search.schedule import batches
 from brachis.setting import Setting, choices
 
 ROOT = Path(__file__).parents[2]
@@ -50,9 +50,9 @@ def test_thorough_looks_at_polynomials_too():
     for effort in ("fast", "thorough"):
         asked = task.model_copy(update={"search": task.search.model_copy(update={"effort": effort})})
         allowed = choices(Setting.of(robot_from_settings(task.robot), asked))
-        planned = waves(allowed, NEVER, lambda _text: None, lambda *_dead_end: None)
-        seeds = [way.seed for wave in planned if not wave.last_resort for way in wave.ways]
-        names[effort] = {seed.choice.name for seed in seeds}
+        planned = batches(allowed, NEVER, lambda _text: None, lambda *_dead_end: None)
+        starts = [start for batch in planned if not batch.last_resort for start in batch.starts]
+        names[effort] = {start.choice.name for start in starts}
     assert names["fast"] == {"rail", "joint_1", "joint_2", "joint_3"}
     assert names["thorough"] == names["fast"] | {"joint_4", "joint_5", "joint_6"}
 

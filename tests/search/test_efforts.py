@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from brachis.search.efforts import EFFORTS
-from brachis.search.ways import looked_at
+from brachis.search.schedule import looked_at
 
 PAGE = Path(__file__).parents[2] / "docs/search.md"
 

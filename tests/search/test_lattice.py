@@ -18,7 +18,7 @@ from brachis.search.course import DeadEnd
 from brachis.search.efforts import EFFORTS
 from brachis.search.explain import no_motion
 from brachis.search.lattice import Lattice
-from brachis.search.seeds import lattice_seeds
+from brachis.search.starts import lattice_starts
 from brachis.setting import Setting, choices
 from support.pose_arms import panda
 
@@ -129,7 +129,7 @@ REASONS = {
 def test_why_there_is_no_course(case):
     options, changes, reason, message = REASONS[case]
     given = setting(scara(**options), **changes)
-    ends = [lattice_seeds(choice, EFFORTS["fast"][0], 0) for choice in choices(given)]
+    ends = [lattice_starts(choice, EFFORTS["fast"][0], 0) for choice in choices(given)]
     assert all(isinstance(end, DeadEnd) for end in ends)
     furthest = max(ends, key=lambda end: end.s)
     assert 0.0 < furthest.s <= 1.0

@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis import planner
 from brachis.errors import PlanningError, TaskError, UnknownNameError
 from brachis.plots import plot_candidates
-from brachis.search import book, portfolio, ways
+from brachis.search import schedule, starts
 from brachis.search.efforts import EFFORTS
 from brachis.search.lattice import Lattice
 from brachis.solvers import apart, uno
@@ -46,10 +47,10 @@ def task(**changes: Any) -> dict[str, Any]:
     } | changes
 
 
-def to_nine_digits(result: brachis.Result) -> list[brachis.Candidate]:
+def to_nine_digits(result: brachis.Result) -> list[dict[str, Any]]:
     """Candidates with their times to nine digits; the last ones differ from process to process."""
-    times = [{name: float(f"{getattr(c, name):.9g}") for name in TIMES} for c in result.candidates]
-    return [dataclasses.replace(c, **rounded) for c, rounded in zip(result.candidates, times, strict=True)]
+    rows = [candidate.to_dict() for candidate in result.candidates]
+    return [row | {name: float(f"{row[name]:.9g}") for name in TIMES} for row in rows]
 
 
 def test_every_candidate_is_listed_the_fastest_first(robot):
@@ -129,7 +130,6 @@ def test_numeric_guesses_stay_an_option(robot):
 
 
 def test_numeric_guesses_step_in_where_the_lattice_has_no_course(robot, monkeypatch):
-    from brachis.search import seeds  # noqa: PLC0415
     from brachis.search.course import DeadEnd  # noqa: PLC0415
 
     class Nothing:
@@ -139,7 +139,7 @@ def test_numeric_guesses_step_in_where_the_lattice_has_no_course(robot, monkeypa
         def courses(self, _most: int) -> DeadEnd:
             return DeadEnd(0.5, {"nothing": 1})
 
-    monkeypatch.setattr(seeds, "Lattice", Nothing)
+    monkeypatch.setattr(starts, "Lattice", Nothing)
     result = brachis.plan(robot, task())
     assert result.verified
     assert result.candidates[0].origin.startswith("numeric")
@@ -147,7 +147,7 @@ def test_numeric_guesses_step_in_where_the_lattice_has_no_course(robot, monkeypa
 
 
 def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
-    honest, calls = portfolio.plan_coarse, []
+    honest, calls = planner.solved, []
 
     def interrupted(*arguments: Any) -> Any:
         calls.append(arguments)
@@ -155,7 +155,7 @@ def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
             raise KeyboardInterrupt
         return honest(*arguments)
 
-    monkeypatch.setattr(portfolio, "plan_coarse", interrupted)
+    monkeypatch.setattr(planner, "solved", interrupted)
     result = brachis.plan(robot, task(search={"effort": "thorough"}))
     assert result.interrupted
     assert result.verified
@@ -182,7 +182,7 @@ def test_a_real_ctrl_c_ends_worker_processes(robot):
 
 
 def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(robot, monkeypatch):
-    honest, calls = portfolio.finish, []
+    honest, calls = planner.finished, []
 
     def interrupted(*arguments: Any) -> Any:
         calls.append(1)
@@ -190,7 +190,7 @@ def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(robot, monk
             raise KeyboardInterrupt
         return honest(*arguments)
 
-    monkeypatch.setattr(portfolio, "finish", interrupted)
+    monkeypatch.setattr(planner, "finished", interrupted)
     with pytest.raises(KeyboardInterrupt, match=r"takes \d\.\d{4} s, and exceeds a limit by \d.* % \(unverified\)"):
         brachis.plan(robot, task(spline=FEW_POINTS))
 
@@ -223,7 +223,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 def test_the_time_limit_gives_the_best_motion_so_far(robot, clock):
-    calls = clock.jump(portfolio, "finish", at=1)
+    calls = clock.jump(planner, "finished", at=1)
     result = brachis.plan(robot, task(search={"effort": "exhaustive"}))
     assert len(calls) == 1
     assert result.verified
@@ -233,7 +233,7 @@ def test_the_time_limit_gives_the_best_motion_so_far(robot, clock):
 
 
 def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(robot, clock):
-    clock.jump(portfolio, "plan_coarse", at=2)
+    clock.jump(planner, "solved", at=2)
     result = brachis.plan(robot, task(spline=FEW_POINTS))
     assert result.interrupted
     assert not result.verified
@@ -241,11 +241,11 @@ def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(r
     planned = [candidate.coarse for candidate in result.candidates if math.isfinite(candidate.coarse)]
     assert len(planned) == 2
     assert result.t_end <= 1.01 * min(planned)
-    assert "of 24 candidates 22 not planned, 1 not refined" in result.undone, "two waves of a dozen each"
+    assert "of 24 candidates 22 not planned, 1 not refined" in result.undone, "two batches of a dozen each"
 
 
 def test_a_time_limit_that_is_too_short_says_what_was_left_undone(robot, clock):
-    clock.jump(ways, "lattice_seeds", at=1)
+    clock.jump(schedule, "lattice_starts", at=1)
     message = (
         r"within the time limit of 60 s: the lattice of j. \| j. was not searched to its end; "
         r"of \d+ candidates \d+ not planned; .*\. Raise search\.time_limit"
@@ -254,8 +254,8 @@ def test_a_time_limit_that_is_too_short_says_what_was_left_undone(robot, clock):
         brachis.plan(robot, task())
 
 
-def test_seeds_that_were_found_in_their_part_of_the_time_are_planned(robot, clock):
-    clock.jump(ways, "lattice_seeds", at=1, by=30.0)
+def test_starts_that_were_found_in_their_part_of_the_time_are_planned(robot, clock):
+    clock.jump(schedule, "lattice_starts", at=1, by=30.0)
     result = brachis.plan(robot, task())
     assert result.verified
     assert len({candidate.redundant_joints for candidate in result.candidates}) == 1
@@ -270,9 +270,11 @@ def test_a_lattice_ends_between_its_layers(robot, clock):
 
 
 def test_only_one_second_of_grace_for_what_fails(robot, monkeypatch, clock):
-    honest = portfolio.finish
-    monkeypatch.setattr(portfolio, "finish", lambda *given: (honest(*given)[0], None))
-    calls = clock.jump(portfolio, "finish", at=1, by=0.6)
+    honest = planner.finished
+    monkeypatch.setattr(
+        planner, "finished", lambda *given: dataclasses.replace(honest(*given), trajectory=None, verification=None)
+    )
+    calls = clock.jump(planner, "finished", at=1, by=0.6)
     with pytest.raises(PlanningError, match="within the time limit"):
         brachis.plan(robot, task(search={"time_limit": 1.5}))
     assert sum(calls) <= math.ceil((1.5 + 1.0) / 0.6) + 3, "three more are only verified at last"
@@ -315,7 +317,7 @@ def test_the_rule_that_leaves_plans_unfinished_loses_nothing(robot, monkeypatch)
     ruled = brachis.plan(robot, task())
     (fast,) = EFFORTS["fast"]
     monkeypatch.setitem(EFFORTS, "fast", (dataclasses.replace(fast, refined=100),))
-    monkeypatch.setattr(book, "_WORTH_IT", -100.0)
+    monkeypatch.setattr(record, "_WORTH_IT", -100.0)
     every = brachis.plan(robot, task())
     finished = [candidate for candidate in every.candidates if math.isfinite(candidate.t_end)]
     assert len(finished) > sum(math.isfinite(candidate.t_end) for candidate in ruled.candidates)

@@ -23,7 +23,7 @@ from brachis.cli.output import (
 )
 from brachis.errors import InputError
 from brachis.result import Result
-from brachis.search.book import SAME_MOTION
+from brachis.search.record import SAME_MOTION
 
 _FILES = {
     True: ("result.npz", "result.json", "overview.png", "candidates.png"),

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from brachis.attempt import Attempt
 from brachis.errors import InputError
 from brachis.plots import style
-from brachis.result import Candidate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,12 +23,12 @@ _MARKS: dict[str, dict[str, Any]] = {
 }
 
 
-def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
+def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
     """Plot the end times of candidates, one row for each choice of redundant joints and branch.
 
     Parameters
     ----------
-    candidates : sequence of Candidate
+    candidates : sequence of Attempt
         The fastest verified one first, as a `Result` has them.
 
     Returns
@@ -63,17 +63,17 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
     return figure
 
 
-def _row(candidate: Candidate) -> str:
+def _row(candidate: Attempt) -> str:
     joints = ", ".join(candidate.redundant_joints) or "no redundant joint"
     return f"{joints}: {candidate.branch}" if candidate.branch else joints
 
 
-def _time(candidate: Candidate, edge: float) -> float:
+def _time(candidate: Attempt, edge: float) -> float:
     """Return the refined end time, else the planned one, else the right edge."""
     return next((time for time in (candidate.t_end, candidate.coarse) if math.isfinite(time)), edge)
 
 
-def _kind(candidate: Candidate, *, first: bool) -> str:
+def _kind(candidate: Attempt, *, first: bool) -> str:
     if candidate.verified:
         return "fastest" if first else "refined"
     return "planned" if math.isfinite(candidate.coarse) and not math.isfinite(candidate.t_end) else "failed"

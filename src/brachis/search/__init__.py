@@ -1,7 +1,8 @@
-"""Search for the fastest motion: lattice seeds, and a portfolio over decompositions, branches and seeds."""
+"""Search for the fastest motion: joint paths from lattices, a portfolio over decompositions, branches and starts."""
 
-from brachis.search.portfolio import Found, find_fastest
-from brachis.search.seeds import first_start
-from brachis.search.solving import Listener
+from brachis.search.portfolio import Stages, find_fastest
+from brachis.search.record import Record
+from brachis.search.solving import MARGINS, Listener, continued, solve_with
+from brachis.search.starts import first_start
 
-__all__ = ["Found", "Listener", "find_fastest", "first_start"]
+__all__ = ["MARGINS", "Listener", "Record", "Stages", "continued", "find_fastest", "first_start", "solve_with"]

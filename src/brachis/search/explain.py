@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from brachis import ik
+from brachis.attempt import Attempt
 from brachis.errors import BrachisError, PathError, PlanningError
-from brachis.result import Candidate
 from brachis.search.course import DeadEnd
 from brachis.search.reach import explain_failure
 from brachis.setting import Choice
@@ -20,7 +20,7 @@ _LOOKED_AT = 2
 _MOST_EFFORT = "exhaustive"
 
 
-def refuse_what_is_out_of_reach(choices: Sequence[Choice], candidates: Sequence[Candidate]) -> None:
+def refuse_what_is_out_of_reach(choices: Sequence[Choice], candidates: Sequence[Attempt]) -> None:
     """Raise the reason where the path is out of reach, so that further attempts would be in vain.
 
     Where no lattice has a course, any part of it counts; where no lattice was looked at, a good part.
@@ -28,7 +28,7 @@ def refuse_what_is_out_of_reach(choices: Sequence[Choice], candidates: Sequence[
     Parameters
     ----------
     choices : sequence of Choice
-    candidates : sequence of Candidate
+    candidates : sequence of Attempt
         So far.
 
     Raises
@@ -50,14 +50,14 @@ def refuse_what_is_out_of_reach(choices: Sequence[Choice], candidates: Sequence[
 
 
 def no_motion(
-    choices: Sequence[Choice], candidates: Sequence[Candidate], dead_ends: Mapping[str, DeadEnd]
+    choices: Sequence[Choice], candidates: Sequence[Attempt], dead_ends: Mapping[str, DeadEnd]
 ) -> BrachisError:
     """Return the error that says why no motion was found.
 
     Parameters
     ----------
     choices : sequence of Choice
-    candidates : sequence of Candidate
+    candidates : sequence of Attempt
     dead_ends : mapping of str to DeadEnd
         Where the lattices end, by the names of the redundant joints.
 
@@ -89,7 +89,7 @@ def no_motion(
     )
 
 
-def _advice(task: Task, candidates: Sequence[Candidate]) -> str:
+def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
     """Say what may help where there are courses, but no motion along them: only what has not been tried."""
     statuses = " ".join(candidate.status for candidate in candidates)
     few = SolverSettings.model_fields
@@ -117,11 +117,11 @@ def _what_is_missing(choice: Choice) -> str:
     return f'. EAIK is not installed (pip install "brachis[eaik]"); it might add the redundant joints {names}'
 
 
-def _lattices(candidates: Sequence[Candidate]) -> list[Candidate]:
+def _lattices(candidates: Sequence[Attempt]) -> list[Attempt]:
     return [candidate for candidate in candidates if candidate.origin.startswith("lattice")]
 
 
-def _some_course(candidates: Sequence[Candidate]) -> bool:
+def _some_course(candidates: Sequence[Attempt]) -> bool:
     """Tell whether a lattice that was looked at has a course."""
     return any(candidate.branch for candidate in _lattices(candidates))
 

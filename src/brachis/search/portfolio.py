@@ -1,8 +1,8 @@
-"""The search: choices of redundant joints x branches x seeds, planned coarsely, ranked, the best finished.
+"""The search: choices of redundant joints x branches x starts, solved coarsely, ranked, the best finished.
 
-1. The lattice of every choice gives seeds; those with the least estimated times are planned at the first collocation
+1. The lattice of every choice gives starts; those with the least estimated times are solved at the first collocation
    points.
-2. Plans that agree are merged. In the order of their end times the others are refined and verified, as long as they
+2. Attempts that agree are merged. In the order of their end times the others are refined and verified, as long as they
    may beat the best verified one: refinement adds rows, so that the coarse end time of an optimum bounds its refined
    one from below.
 3. Only while nothing is verified, other solvers and numeric guesses are tried.
@@ -12,186 +12,178 @@ What comes out does not depend on the number of processes: work that one process
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from brachis import interrupts
+from brachis.attempt import Attempt, Start
 from brachis.deadline import Deadline
 from brachis.errors import PlanningError
-from brachis.result import Attempt, Candidate
-from brachis.search.book import Book, Numbered, rounded
 from brachis.search.explain import no_motion, refuse_what_is_out_of_reach
-from brachis.search.finishing import Motion
+from brachis.search.processes import each, processes
+from brachis.search.record import NOT_TRIED, Numbered, Record, rounded
+from brachis.search.schedule import Batch, batches
 from brachis.search.solving import Listener
-from brachis.search.ways import Wave, waves
-from brachis.search.work import each, finish, plan_coarse, processes
 from brachis.setting import Choice
 
 _COARSE_SHARE = 0.6
-"""Part of the time limit after which no coarse plan is begun while nothing is verified."""
+"""Part of the time limit after which no start is solved while nothing is verified."""
 _LEAST_SHARE, _LARGEST_SHARE = 2.0, 0.15
-"""Seconds that every coarse plan may take, and part of the time limit that none may exceed."""
+"""Seconds that every start may take, and part of the time limit that none may exceed."""
 _GRACE = 1.0
-"""Seconds to finish the best plan where the time is up and nothing is verified."""
+"""Seconds to finish the best attempt where the time is up and nothing is verified."""
 _LAST_CHANCES = 3
-"""Plans of which one becomes the unverified motion where none could be finished."""
+"""Attempts of which one becomes the unverified motion where none could be finished."""
 
 
-@dataclass(frozen=True)
-class Found:
-    """What the search found.
+class Stages(NamedTuple):
+    """What is done with a start; functions of a module, so that they can be sent to other processes.
 
     Attributes
     ----------
-    attempts : tuple of Attempt
-        All that was finished.
-    chosen : int
-        Index of the attempt that gave the motion: the fastest verified one, or the one nearest to the limits.
-    motion : Motion
-    family : str
-        Of its closed form.
-    candidates : tuple of Candidate
-        The fastest verified one first.
-    interrupted : bool
-        Whether Ctrl-C or the time limit ended the search.
-    undone : tuple of str
-        What was left undone, in plain words.
+    solve : callable
+        ``solve(start, deadline, listener)`` returns an `Attempt`, solved at the first collocation points.
+    finish : callable
+        ``finish(attempt, deadline, listener)`` returns it refined and verified; merely verified where the time is up.
     """
 
-    attempts: tuple[Attempt, ...]
-    chosen: int
-    motion: Motion
-    family: str
-    candidates: tuple[Candidate, ...]
-    interrupted: bool
-    undone: tuple[str, ...]
+    solve: Callable[[Start, Deadline, Listener], Attempt]
+    finish: Callable[[Attempt, Deadline, Listener], Attempt]
 
 
-def find_fastest(choices: Sequence[Choice], deadline: Deadline, listener: Listener) -> Found:
+def find_fastest(choices: Sequence[Choice], stages: Stages, deadline: Deadline, listener: Listener) -> Record:
     """Search for the fastest verified motion.
 
     Parameters
     ----------
     choices : sequence of Choice
         At least one, the most promising first.
+    stages : Stages
     deadline : Deadline
         When to return the best motion so far; one that is not verified where none is.
     listener : callable
 
     Returns
     -------
-    Found
+    Record
+        With a best attempt: the fastest verified one, or the one nearest to the limits.
 
     Raises
     ------
     PathError
-        The path is out of reach, or too heavy to hold.
+        The path is out of reach, or no posture along it is allowed at rest.
     PlanningError
         No motion was found.
     KeyboardInterrupt
         Ctrl-C before any motion was verified; its text tells of the best one, if there is one.
     """
-    search = _Search(choices, deadline, listener)
+    search = _Search(choices, stages, deadline, listener)
+    record = search.record
     try:
-        search.run(waves(choices, deadline, listener, search.book.note_choice))
+        search.run(batches(choices, deadline, listener, record.note_choice))
     except KeyboardInterrupt:
         interrupts.forget()
-        search.book.interrupted = True
+        record.interrupted = True
         search.take_what_there_is()
-        if not search.book.content:
-            raise KeyboardInterrupt(str(search.book.best or "")) from None
-    return search.found()
+        if not record.content:
+            raise KeyboardInterrupt(record.best_in_words()) from None
+    if record.best is not None:
+        return record
+    if record.interrupted:
+        limit, left = choices[0].setting.task.search.time_limit, "; ".join(record.undone())
+        problem = f"no motion was found within the time limit of {limit:g} s: {left}"
+        raise PlanningError(problem, hint="Raise search.time_limit")
+    raise no_motion(choices, record.attempts, record.dead_ends)
 
 
 class _Search:
     """A search on its way."""
 
-    def __init__(self, choices: Sequence[Choice], deadline: Deadline, listener: Listener) -> None:
-        self._choices, self._deadline, self._listener = choices, deadline, listener
+    def __init__(self, choices: Sequence[Choice], stages: Stages, deadline: Deadline, listener: Listener) -> None:
+        self._choices, self._stages, self._deadline, self._listener = choices, stages, deadline, listener
         self._task = choices[0].setting.task
         self._jobs = processes(self._task.search.jobs)
-        self.book = Book(refined=self._task.refinement.max_rounds > 0)
+        self.record = Record(refined=self._task.refinement.max_rounds > 0)
 
     @property
     def _latest(self) -> Deadline:
         """When the last work ends: later while nothing is verified."""
-        return self._deadline if self.book.content else self._deadline.extended(_GRACE)
+        return self._deadline if self.record.content else self._deadline.extended(_GRACE)
 
-    def run(self, plan: Iterable[Wave]) -> None:
-        """Try wave after wave."""
+    def run(self, schedule: Iterable[Batch]) -> None:
+        """Try batch after batch."""
         refused = False
-        for wave in plan:
-            if wave.last_resort and self.book.content:
+        for batch in schedule:
+            if batch.last_resort and self.record.content:
                 return
             if self._deadline.passed:
-                self.book.begin(len(wave.ways))
-                self.book.interrupted = True
+                self.record.begin(len(batch.starts))
+                self.record.interrupted = True
                 break
-            if wave.last_resort and not refused:
-                refuse_what_is_out_of_reach(self._choices, self.book.candidates)
+            if batch.last_resort and not refused:
+                refuse_what_is_out_of_reach(self._choices, self.record.attempts)
                 refused = True
-            self._finish(self._plan(wave), wave.refined)
-        if self.book.interrupted:
+            self._finish(self._solve(batch), batch.refined)
+        if self.record.interrupted:
             self.take_what_there_is()
 
-    def _plan(self, wave: Wave) -> list[Numbered]:
-        """Plan the ways of a wave coarsely, and rank those that differ."""
-        book, known = self.book, len(self.book.plans)
-        book.begin(len(wave.ways))
-        limit = self._deadline if book.content else self._deadline.part(_COARSE_SHARE)
-        share = self._task.search.time_limit * min(_LARGEST_SHARE, _COARSE_SHARE / max(1, len(wave.ways)))
-        share = max(_LEAST_SHARE, share)
-        with closing(each(plan_coarse, wave.ways, limit, share, jobs=self._jobs, listener=self._listener)) as outcomes:
-            for plan in outcomes:
-                book.add(plan)
+    def _solve(self, batch: Batch) -> list[Numbered]:
+        """Solve the starts of a batch coarsely, and rank those that differ."""
+        record, known = self.record, len(self.record.solved)
+        record.begin(len(batch.starts))
+        limit = self._deadline if record.content else self._deadline.part(_COARSE_SHARE)
+        share = self._task.search.time_limit * min(_LARGEST_SHARE, _COARSE_SHARE / max(1, len(batch.starts)))
+        work = _solved_in_time, batch.starts, self._stages.solve, limit, max(_LEAST_SHARE, share)
+        with closing(each(*work, jobs=self._jobs, listener=self._listener)) as outcomes:
+            for attempt in outcomes:
+                record.add(attempt)
         # In the last resort a motion that could not be verified gets another chance, with another solver.
-        return book.ranked(book.plans[known:], again=wave.last_resort)
+        return record.ranked(record.solved[known:], again=batch.last_resort)
 
     def _finish(self, ranked: Sequence[Numbered], most: int) -> None:
-        """Refine and verify plans in the order of their end times while they may be the fastest."""
+        """Refine and verify attempts in the order of their end times while they may be the fastest."""
         jobs, left = self._jobs, most
         for first in range(0, len(ranked), jobs):
             batch = ranked[first : first + jobs]
             if not self._goes_on(ranked[first:], left):
                 return
-            with closing(each(finish, batch, self._latest, jobs=jobs, listener=self._listener)) as outcomes:
-                for place, (attempt, motion) in enumerate(outcomes):
+            work = self._stages.finish, [attempt for _, attempt in batch], self._latest
+            with closing(each(*work, jobs=jobs, listener=self._listener)) as outcomes:
+                for place, attempt in enumerate(outcomes):
                     if place and not self._goes_on(ranked[first + place :], left):
                         return
                     left -= 1
-                    self.book.record(*batch[place], attempt, motion)
-                    self._listener(attempt.outcome)
+                    self.record.finish(batch[place][0], attempt)
+                    self._listener(f"{attempt.solver}: t_E = {attempt.t_end:.4f} s, {attempt.status}")
 
     def _goes_on(self, ranked: Sequence[Numbered], left: int) -> bool:
-        """Tell whether the first one of the plans that are left is worth finishing."""
-        if not self.book.may_win(ranked[0][1]) or (self.book.content and left <= 0):
-            self.book.drop(ranked)
+        """Tell whether the first one of the attempts that are left is worth finishing."""
+        if not self.record.may_win(ranked[0][1]) or (self.record.content and left <= 0):
+            self.record.drop(ranked)
             return False
         if self._latest.passed:
-            self.book.interrupted = True
+            self.record.interrupted = True
             return False
         return True
 
     def take_what_there_is(self) -> None:
-        """Verify the best plans as they are until one gives a motion, where none is known."""
+        """Verify the best attempts as they are until one gives a motion, where none is known."""
         over = Deadline(0.0)
-        for number, plan in sorted(self.book.plans, key=lambda item: rounded(item[1].t_end))[:_LAST_CHANCES]:
-            if self.book.best is not None:
+        for number, attempt in sorted(self.record.solved, key=lambda item: rounded(item[1].coarse))[:_LAST_CHANCES]:
+            if self.record.best is not None:
                 return
-            self.book.record(number, plan, *finish((number, plan), over, lambda _text: None))
+            self.record.finish(number, self._stages.finish(attempt, over, lambda _text: None))
 
-    def found(self) -> Found:
-        """Return the best motion, or say why there is none."""
-        book, best = self.book, self.book.best
-        if best is None:
-            if book.interrupted:
-                limit = self._task.search.time_limit
-                left = "; ".join(book.undone())
-                problem = f"no motion was found within the time limit of {limit:g} s: {left}"
-                raise PlanningError(problem, hint="Raise search.time_limit")
-            raise no_motion(self._choices, book.candidates, book.dead_ends)
-        order = sorted(book.candidates, key=lambda c: (not c.verified, *map(rounded, (c.t_end, c.coarse, c.estimate))))
-        return Found(
-            tuple(book.attempts), best.attempt, best.motion, best.family, tuple(order), book.interrupted, book.undone()
-        )
+
+def _solved_in_time(
+    start: Start,
+    solve: Callable[[Start, Deadline, Listener], Attempt],
+    deadline: Deadline,
+    share: float,
+    listener: Listener,
+) -> Attempt:
+    """Solve from a start within its share of the time, s, unless the time is up."""
+    if deadline.passed:
+        return Attempt.of(start, NOT_TRIED)
+    return solve(start, deadline.within(share), listener)

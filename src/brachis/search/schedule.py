@@ -1,4 +1,4 @@
-"""What the search tries, wave after wave: seeds with solvers."""
+"""What the search tries, batch after batch: starts with solvers."""
 
 from __future__ import annotations
 
@@ -7,44 +7,46 @@ import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from brachis.attempt import Start
 from brachis.deadline import Deadline
 from brachis.nlp.numeric_course import STRATEGIES
 from brachis.search.course import DeadEnd
 from brachis.search.efforts import EFFORTS, Effort
-from brachis.search.seeds import Seed, lattice_seeds, numeric_seeds
+from brachis.search.processes import each, processes
 from brachis.search.solving import Listener
-from brachis.search.work import Way, each, processes
+from brachis.search.starts import lattice_starts, numeric_starts
 from brachis.setting import Choice
 from brachis.solvers import solver_named
 
-_WAVE = 12
+_SIZE = 12
 _CRAMPED = 0.1
 _SEED_SHARE = 0.4
-"""Part of the time that is left in which the seeds of a level are looked for; those found by then are planned."""
+"""Part of the time that is left in which the starts of a level are looked for; those found by then are planned."""
 Note = Callable[[Choice, DeadEnd | None], None]
-"""Told why a choice gives no seeds: where its lattice ends, or None where the time was up."""
+"""Told why a choice gives no starts: where its lattice ends, or None where the time was up."""
 
 
 @dataclass(frozen=True)
-class Wave:
-    """Ways that are tried together.
+class Batch:
+    """Starts that are tried together.
 
     Attributes
     ----------
-    ways : tuple of Way
+    starts : tuple of Start
+        With the solvers that plan from them.
     refined : int
         How many of them are refined and verified at most once a motion is verified.
     last_resort : bool
         Whether it is tried only while no motion is verified.
     """
 
-    ways: tuple[Way, ...]
+    starts: tuple[Start, ...]
     refined: int
     last_resort: bool = False
 
 
-def waves(choices: Sequence[Choice], deadline: Deadline, listener: Listener, note: Note) -> Iterator[Wave]:
-    """Yield waves: level by level the most promising seeds with the first solver, then what is tried where all fail.
+def batches(choices: Sequence[Choice], deadline: Deadline, listener: Listener, note: Note) -> Iterator[Batch]:
+    """Yield batches: level by level the most promising starts with the first solver, then what is tried where all fail.
 
     Parameters
     ----------
@@ -57,37 +59,40 @@ def waves(choices: Sequence[Choice], deadline: Deadline, listener: Listener, not
 
     Yields
     ------
-    Wave
+    Batch
     """
     task = choices[0].setting.task
     solvers = [solver.name for solver in solver_named(task.solver.name)]
-    known: list[Seed] = []
+    known: list[Start] = []
     for effort in EFFORTS[task.search.effort]:
         if effort.last_resort:
-            yield Wave((), 0, last_resort=True)  # the search may end here, before lattices are looked at
+            yield Batch((), 0, last_resort=True)  # the search may end here, before lattices are looked at
         allowed = looked_at(choices, effort)
-        seeds: list[Seed] = []
+        starts: list[Start] = []
         rest = allowed or list(choices)
-        while rest and not seeds:  # choices without a course make room for others
+        while rest and not starts:  # choices without a course make room for others
             batch, rest = rest[: effort.choices], rest[effort.choices :]
             if task.search.guesses == "numeric":
-                seeds = [seed for choice in batch for seed in numeric_seeds(choice, effort.seeds, deadline)]
+                starts = [start for choice in batch for start in numeric_starts(choice, effort.seeds, deadline)]
             else:
-                seeds = _from_lattices(batch, effort, deadline, listener, note)
-        known += seeds
-        for first in range(0, len(seeds), _WAVE):
-            yield Wave(
-                tuple(Way(seed, solvers[0]) for seed in seeds[first : first + _WAVE]),
+                starts = _from_lattices(batch, effort, deadline, listener, note)
+        known += starts
+        for first in range(0, len(starts), _SIZE):
+            yield Batch(
+                tuple(start.with_solver(solvers[0]) for start in starts[first : first + _SIZE]),
                 effort.refined,
                 effort.last_resort,
             )
-    many, tried = len(known) + len(STRATEGIES), {(seed.choice.name, seed.origin) for seed in known}
-    yield Wave(tuple(Way(seed, solver) for seed in known[:_WAVE] for solver in solvers[1:2]), many, last_resort=True)
+    many, tried = len(known) + len(STRATEGIES), {(start.choice.name, start.origin) for start in known}
+    again = tuple(start.with_solver(solver) for start in known[:_SIZE] for solver in solvers[1:2])
+    yield Batch(again, many, last_resort=True)
     for choice in (allowed or choices)[: effort.choices]:
-        for seed in numeric_seeds(choice, len(STRATEGIES), deadline):
-            if (choice.name, seed.origin) not in tried:
-                yield Wave(tuple(Way(seed, solver) for solver in solvers[:2]), many, last_resort=True)
-    yield Wave(tuple(Way(seed, solver) for solver in solvers[2:] for seed in known[:2]), many, last_resort=True)
+        for start in numeric_starts(choice, len(STRATEGIES), deadline):
+            if (choice.name, start.origin) not in tried:
+                yield Batch(tuple(start.with_solver(solver) for solver in solvers[:2]), many, last_resort=True)
+    yield Batch(
+        tuple(start.with_solver(solver) for solver in solvers[2:] for start in known[:2]), many, last_resort=True
+    )
 
 
 def looked_at(choices: Sequence[Choice], effort: Effort) -> list[Choice]:
@@ -108,30 +113,30 @@ def _from_lattices(
     deadline: Deadline,
     listener: Listener,
     note: Note,
-) -> list[Seed]:
-    """Take one seed of every choice after the other, of each those with the least estimated times first."""
+) -> list[Start]:
+    """Take one start of every choice after the other, of each those with the least estimated times first."""
     search = choices[0].setting.task.search
     redundancy = max(1, len(choices[0].redundant))
-    ranked: list[tuple[int, float, int, Seed]] = []
+    ranked: list[tuple[int, float, int, Start]] = []
     number = itertools.count()
     jobs, deadline = processes(search.jobs), deadline.part(_SEED_SHARE)
-    outcomes = list(each(_seeds_of, choices, effort, search.seed, deadline, jobs=jobs, listener=listener))
+    outcomes = list(each(_starts_of, choices, effort, search.seed, deadline, jobs=jobs, listener=listener))
     for choice, outcome in zip(choices, outcomes, strict=True):
         if isinstance(outcome, DeadEnd):
             note(choice, outcome)
             continue
         if not outcome:
             note(choice, None)
-        own = [dataclasses.replace(seed, choice=choice) for seed in outcome]  # not another process's copy
-        own = sorted(own, key=lambda seed: seed.estimate) + numeric_seeds(choice, effort.numeric, deadline)
-        ranked += [(place, seed.estimate, next(number), seed) for place, seed in enumerate(own)]
-    return [seed for *_, seed in sorted(ranked, key=lambda item: item[:-1])[: max(1, effort.plans // redundancy)]]
+        own = [dataclasses.replace(start, choice=choice) for start in outcome]  # not another process's copy
+        own = sorted(own, key=lambda start: start.estimate) + numeric_starts(choice, effort.numeric, deadline)
+        ranked += [(place, start.estimate, next(number), start) for place, start in enumerate(own)]
+    return [start for *_, start in sorted(ranked, key=lambda item: item[:-1])[: max(1, effort.plans // redundancy)]]
 
 
-def _seeds_of(
+def _starts_of(
     choice: Choice, effort: Effort, seed: int, deadline: Deadline, listener: Listener
-) -> list[Seed] | DeadEnd:
+) -> list[Start] | DeadEnd:
     if deadline.passed:
         return []
     listener(f"looking for courses on the lattice of {choice.name}")
-    return lattice_seeds(choice, effort, seed, deadline)
+    return lattice_starts(choice, effort, seed, deadline)

@@ -1,12 +1,12 @@
-"""Seeds: courses from which plans are begun, each with an estimate of its least time."""
+"""Starts: joint paths from which plans are begun, each with an estimate of its least time."""
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.attempt import Start
 from brachis.deadline import NEVER, Deadline
 from brachis.errors import PathError
 from brachis.kinematics import Decomposition
@@ -23,39 +23,7 @@ _FINER, _DENSER = 3, 2.0
 _FINEST = 96
 
 
-@dataclass(frozen=True)
-class Seed:
-    """A course from which a plan is begun.
-
-    Attributes
-    ----------
-    choice : Choice
-    branch : int
-        Index into the closed form's branches.
-    start : (n,) ndarray
-        Start posture; a first guess of it where the task leaves it free.
-    course : (S, 1 + r) ndarray
-        Successive values of s and the redundant joints.
-    estimate : float
-        Least time along the course from the phase plane, s; infinite where there is none.
-    origin : str
-        In plain words.
-    """
-
-    choice: Choice
-    branch: int
-    start: np.ndarray
-    course: np.ndarray
-    estimate: float
-    origin: str
-
-    @property
-    def decomposition(self) -> Decomposition:
-        """Robot, path, closed form and branch, put together."""
-        return self.choice.decomposition(self.start, self.branch)
-
-
-def lattice_seeds(choice: Choice, effort: Effort, seed: int, deadline: Deadline = NEVER) -> list[Seed] | DeadEnd:
+def lattice_starts(choice: Choice, effort: Effort, seed: int, deadline: Deadline = NEVER) -> list[Start] | DeadEnd:
     """Take the shortest distinct courses from the lattice of a choice; from a finer one where the first one ends.
 
     Parameters
@@ -68,7 +36,7 @@ def lattice_seeds(choice: Choice, effort: Effort, seed: int, deadline: Deadline 
 
     Returns
     -------
-    list of Seed or DeadEnd
+    list of Start or DeadEnd
         Empty where the time was up.
     """
     cells, nodes, most = (
@@ -89,10 +57,10 @@ def lattice_seeds(choice: Choice, effort: Effort, seed: int, deadline: Deadline 
         found = finer.courses(most)
     if isinstance(found, DeadEnd):
         return found
-    return [_seed(course, f"lattice {number}") for number, course in enumerate(found, 1)]
+    return [_start_along(course, f"lattice {number}") for number, course in enumerate(found, 1)]
 
 
-def _seed(course: Course, origin: str) -> Seed:
+def _start_along(course: Course, origin: str) -> Start:
     """Smooth a course, as far as the closed form can follow, and estimate its time."""
     choice, s = course.choice, course.s
     decomposition = choice.decomposition(course.q[0], course.branch)
@@ -101,11 +69,11 @@ def _seed(course: Course, origin: str) -> Seed:
         stations = np.column_stack([fine, _smoothed(s, course.stations[:, 1:], fine, pieces)])
         q = decomposition.postures(stations)
         if np.isfinite(q).all() and _clear(decomposition, q):
-            return Seed(
+            return Start(
                 choice, course.branch, course.q[0], stations, least_time(choice.setting.limits, fine, q), origin
             )
     estimate = least_time(choice.setting.limits, s, course.q)
-    return Seed(choice, course.branch, course.q[0], course.stations, estimate, origin)
+    return Start(choice, course.branch, course.q[0], course.stations, estimate, origin)
 
 
 def _smoothed(s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int) -> np.ndarray:
@@ -126,7 +94,7 @@ def _clear(decomposition: Decomposition, q: np.ndarray) -> bool:
     return bool(margins.min(initial=np.inf) > 0.5 * min(0.02, float(margins[0].min(initial=np.inf))))
 
 
-def numeric_seeds(choice: Choice, most: int, deadline: Deadline) -> list[Seed]:
+def numeric_starts(choice: Choice, most: int, deadline: Deadline) -> list[Start]:
     """Carry the given start posture along the path by numeric inverse kinematics, in up to `most` ways.
 
     Parameters
@@ -138,7 +106,7 @@ def numeric_seeds(choice: Choice, most: int, deadline: Deadline) -> list[Seed]:
 
     Returns
     -------
-    list of Seed
+    list of Start
     """
     start = choice.setting.start
     if start is None:
@@ -146,7 +114,7 @@ def numeric_seeds(choice: Choice, most: int, deadline: Deadline) -> list[Seed]:
     decomposition = choice.decomposition(start, choice.branches[0])
     courses = itertools.islice(numeric_courses(decomposition, deadline), most)
     return [
-        Seed(choice, choice.branches[0], start, course, np.inf, f"numeric {number}")
+        Start(choice, choice.branches[0], start, course, np.inf, f"numeric {number}")
         for number, course in enumerate(courses, 1)
     ]
 
@@ -161,7 +129,7 @@ def first_start(choice: Choice) -> tuple[np.ndarray, int]:
     """
     if choice.setting.start is not None:
         return choice.setting.start, choice.branches[0]
-    found = lattice_seeds(choice, EFFORTS["fast"][0], choice.setting.task.search.seed)
+    found = lattice_starts(choice, EFFORTS["fast"][0], choice.setting.task.search.seed)
     if isinstance(found, DeadEnd):
         raise PathError(f"no course along the path was found: {found}", s_interval=found.interval)
-    return found[0].start, found[0].branch
+    return found[0].posture, found[0].branch

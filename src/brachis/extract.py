@@ -1,45 +1,37 @@
-"""From an answer of the optimiser to a trajectory and its verification."""
+"""From an answer of the optimiser to a trajectory."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from brachis.kinematics import Decomposition, interpolate
+from brachis.attempt import Attempt, Start
+from brachis.kinematics import interpolate
+from brachis.nlp import Program
 from brachis.refine import Refined
-from brachis.setting import Setting
-from brachis.task import Task
 from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
-from brachis.verify import Verification, VerifyOptions, verify_trajectory
 
 _SAME_TIME = 1e-7
+_BESIDE = 1e-4
 
 
-def judge(decomposition: Decomposition, refined: Refined, setting: Setting) -> tuple[Trajectory, Verification]:
-    """Make the trajectory of an answer, and verify it.
+def extract(start: Start, refined: Refined) -> Trajectory:
+    """Turn the answer of a program into a trajectory that can be evaluated without the closed form.
 
     Parameters
     ----------
-    decomposition : Decomposition
+    start : Start
     refined : Refined
-    setting : Setting
 
     Returns
     -------
     Trajectory
-    Verification
 
     Raises
     ------
     UnreachableError
         The motion leaves the branch between the collocation points.
     """
-    trajectory = _trajectory(decomposition, refined, setting.task)
-    options = VerifyOptions(ratio_tolerance=setting.task.refinement.tolerance)
-    return trajectory, verify_trajectory(trajectory, options, further=setting.further)
-
-
-def _trajectory(decomposition: Decomposition, refined: Refined, task: Task) -> Trajectory:
-    """Turn the answer into a trajectory that can be evaluated without the closed form."""
+    decomposition, task = start.decomposition, start.choice.setting.task
     (motion,) = refined.program.motions(refined.x)
     joins = motion.times_of(decomposition.path.breaks[1:-1])
     gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
@@ -61,3 +53,17 @@ def _trajectory(decomposition: Decomposition, refined: Refined, task: Task) -> T
         degree=motion.degree,
         control_points=motion.control_points,
     )
+
+
+def where_it_failed(attempt: Attempt) -> Program | None:
+    """Add collocation points where the verification found a limit exceeded; None where it found no such place."""
+    trajectory, refined = attempt.trajectory, attempt.refined
+    if trajectory is None or refined is None or attempt.verification is None:
+        return None
+    failed = [check for check in attempt.verification.checks if not check.passed]
+    if not failed or any(not check.name.endswith("ratio") or check.time is None for check in failed):
+        return None
+    t_norm = np.array([check.time for check in failed]) / trajectory.t_end
+    near = t_norm[:, None] + _BESIDE * np.array([-1.0, 0.0, 1.0])
+    (phase,) = refined.program.phases
+    return refined.program.resampled([np.union1d(phase.t_norm, np.clip(near.ravel(), 0.0, 1.0))])

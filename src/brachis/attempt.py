@@ -1,0 +1,219 @@
+"""What the search tries: starts, and the attempts that are made from them."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from brachis.kinematics import Decomposition
+from brachis.nlp import Program
+from brachis.refine import Refined
+from brachis.setting import Choice
+from brachis.solvers import SolverReport
+from brachis.trajectory import Trajectory
+from brachis.verify import Verification
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A joint path from which a plan is begun.
+
+    Attributes
+    ----------
+    choice : Choice
+    branch : int
+        Index into the closed form's branches.
+    posture : (n,) ndarray
+        Start posture; a first guess of it where the task leaves it free.
+    joint_path : (S, 1 + r) ndarray
+        Successive values of s and the redundant joints.
+    estimate : float
+        Least time along the joint path from the phase plane, s; infinite where there is none.
+    origin : str
+        Where it is from, in plain words, for example ``lattice 2``.
+    solver : str
+        The solver that plans from it; empty while none is chosen.
+    """
+
+    choice: Choice
+    branch: int
+    posture: np.ndarray
+    joint_path: np.ndarray
+    estimate: float
+    origin: str
+    solver: str = ""
+
+    @property
+    def decomposition(self) -> Decomposition:
+        """Robot, path, closed form and branch, put together."""
+        return self.choice.decomposition(self.posture, self.branch)
+
+    def with_solver(self, name: str) -> Start:
+        """Return the same start for a solver."""
+        return dataclasses.replace(self, solver=name)
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """What came of a start: first a solved program, then, once it is finished, a verified motion.
+
+    Attributes
+    ----------
+    redundant_joints : tuple of str
+    branch : str
+        Label of the branch; empty where no joint path was found.
+    origin : str
+        See `Start`.
+    solver : str
+        Empty where nothing was solved.
+    estimate : float
+        See `Start`; a rough one.
+    status : str
+        In plain words.
+    start : Start or None
+        None where no joint path was found, and once the search is over.
+    program : Program or None
+        The first one that was solved; None where there was none, and once the search is over.
+    target : Program or None
+        The program over all its knots, where `program` has only some of them.
+    reports : tuple of SolverReport
+        Of all solves: with ever smaller branch margins, on ever finer meshes, then of the refinement rounds.
+    coarse : float
+        End time at the first collocation points, s; infinite where there is none.
+    refined : Refined or None
+        The last program, its answer and its multipliers; None while it is not finished.
+    trajectory : Trajectory or None
+        None while it is not finished, and where none came out.
+    verification : Verification or None
+        Of the trajectory.
+    undone : str
+        What the time, or a solve that failed, left undone, in words; empty where nothing.
+    """
+
+    redundant_joints: tuple[str, ...]
+    branch: str
+    origin: str
+    solver: str
+    estimate: float
+    status: str
+    start: Start | None = None
+    program: Program | None = None
+    target: Program | None = None
+    reports: tuple[SolverReport, ...] = ()
+    coarse: float = np.inf
+    refined: Refined | None = None
+    trajectory: Trajectory | None = None
+    verification: Verification | None = None
+    undone: str = ""
+
+    @classmethod
+    def of(cls, start: Start, status: str, **more: Any) -> Attempt:  # noqa: ANN401  (fields of the class)
+        """Begin an attempt."""
+        choice = start.choice
+        names, branch = choice.match.redundant_joints, choice.match.solver.branches[start.branch]
+        return cls(names, branch, start.origin, start.solver, start.estimate, status, start, **more)
+
+    @property
+    def usable(self) -> bool:
+        """True where there is a first plan that can be finished."""
+        return self.program is not None and bool(self.reports) and self.reports[-1].status.usable
+
+    @property
+    def keeps_knots(self) -> bool:
+        """True where the finished plan has the same knots, so that its end time is no shorter."""
+        if self.start is None or self.program is None or self.target is None:
+            return False
+        spline = self.start.choice.setting.task.spline
+        return spline.knots != "free" and spline.intervals != "auto" and self.program.intervals == self.target.intervals
+
+    @property
+    def t_end(self) -> float:
+        """End time of the trajectory, s; infinite where there is none."""
+        return np.inf if self.trajectory is None else self.trajectory.t_end
+
+    @property
+    def verified(self) -> bool:
+        """Whether there is a trajectory that passed every check."""
+        return self.verification is not None and self.verification.passed
+
+    @property
+    def refinement_rounds(self) -> int:
+        """How many of the solves were refinement rounds."""
+        return 0 if self.refined is None else len(self.refined.reports) - 1
+
+    @property
+    def violation(self) -> float:
+        """Largest violation of a limit on the dense grid, as a fraction; infinite while it is not refined."""
+        return np.inf if self.refined is None else self.refined.violation
+
+    @property
+    def time_scaled(self) -> float:
+        """Factor by which the end time was lengthened at the very end."""
+        return 1.0 if self.refined is None else self.refined.time_scaled
+
+    @property
+    def collocation_points(self) -> int:
+        """Number of collocation points of the last program."""
+        return 0 if self.refined is None else self.refined.program.collocation_points
+
+    def finished(
+        self,
+        *,
+        reports: tuple[SolverReport, ...],
+        refined: Refined,
+        trajectory: Trajectory | None,
+        verification: Verification | None,
+        tolerance: float,
+    ) -> Attempt:
+        """Return the attempt with its motion, and with a status that says what became of it.
+
+        Parameters
+        ----------
+        reports, refined, trajectory, verification
+            See the attributes.
+        tolerance : float
+            Largest violation of a limit that is allowed, as a fraction of it.
+        """
+        last = refined.reports[-1]
+        if verification is not None and verification.passed:
+            status = "verified"
+        elif not refined.converged:
+            status = f"{last.solver}: {last.status.value}"
+        elif not np.isfinite(refined.violation):
+            status = f"{last.solver}: the motion leaves the branch between collocation points"
+        else:
+            if refined.violation > tolerance:
+                found = f"limits exceeded by {100.0 * refined.violation:.2g} %"
+            else:
+                found = "too sharp for a trajectory" if verification is None else "the verification fails"
+            rounds = len(refined.reports) - 1
+            status = f"{last.solver}: t_E = {refined.t_end:.4f} s after {rounds} refinement rounds, {found}"
+        return dataclasses.replace(
+            self,
+            status=status,
+            reports=reports,
+            refined=refined,
+            trajectory=trajectory,
+            verification=verification,
+        )
+
+    def without_programs(self) -> Attempt:
+        """Return the attempt without what only the search needs."""
+        return dataclasses.replace(self, start=None, program=None, target=None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return {
+            "redundant_joints": list(self.redundant_joints),
+            "branch": self.branch,
+            "origin": self.origin,
+            "solver": self.solver,
+            "estimate": self.estimate,
+            "coarse": self.coarse,
+            "t_end": self.t_end,
+            "status": self.status,
+            "verified": self.verified,
+        }

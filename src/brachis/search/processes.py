@@ -1,0 +1,87 @@
+"""Work for several processes."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import warnings
+from collections.abc import Callable, Generator, Sequence
+from typing import Any, TypeVar
+
+from threadpoolctl import ThreadpoolController
+
+from brachis import interrupts
+from brachis.search.solving import Listener
+
+_MAIN = "MainProcess"
+
+_Given = TypeVar("_Given")
+_Made = TypeVar("_Made")
+
+
+def each(
+    function: Callable[..., _Made], given: Sequence[_Given], *others: object, jobs: int, listener: Listener
+) -> Generator[_Made, None, None]:
+    """Do a piece of work for every item, in up to `jobs` processes.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(item, *others, listener)``; a function of a module, so that it can be sent to other processes.
+    given : sequence
+        The items.
+    *others : object
+        The same for all items.
+    jobs : int
+        With 1, and within another program's workers, the work is done here, item by item as it is asked for.
+    listener : callable
+        Only heard of work that is done here.
+
+    Yields
+    ------
+    object
+        What the function returns, in the order of the items.
+    """
+    if jobs == 1 or len(given) <= 1 or _within_a_worker():
+        for item in given:
+            interrupts.check()
+            yield function(item, *others, listener)
+        return
+    interrupts.check()
+    from joblib import Parallel, delayed  # noqa: PLC0415  (a fifth of a second that a single process need not wait)
+
+    made: Any = None
+    try:
+        with interrupts.blocked():  # joblib would lose a press while its processes start, and they would die of it
+            made = Parallel(n_jobs=jobs, backend="loky", return_as="generator")(
+                delayed(_apart)(function, item, *others) for item in given
+            )
+        for one in made:  # noqa: UP028  ("yield from" would close `made` before the lines below)
+            yield one
+    finally:
+        with interrupts.postponed(), warnings.catch_warnings():  # that work is thrown away is meant
+            warnings.simplefilter("ignore")
+            if made is not None:
+                made.close()
+
+
+def processes(jobs: int) -> int:
+    """Return the number of processes that is used where a task asks for `jobs`: no more than there are processors."""
+    return min(jobs, os.cpu_count() or 1)
+
+
+def _within_a_worker() -> bool:
+    """Tell whether this is somebody's worker process: processes of processes would multiply."""
+    from joblib.parallel import get_active_backend  # noqa: PLC0415
+
+    return bool(get_active_backend()[0].nesting_level) or multiprocessing.current_process().name != _MAIN
+
+
+def _apart(function: Callable[..., _Made], *arguments: object) -> _Made:
+    """Run in a process of its own: one thread for linear algebra, nobody listening."""
+    with ThreadpoolController().limit(limits=1, user_api="blas"):
+        return function(*arguments, _deaf)
+
+
+def _deaf(_text: str) -> None:
+    """Listen to nothing."""

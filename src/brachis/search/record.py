@@ -1,0 +1,164 @@
+"""What the search has seen so far: attempts, the best motion, and what is left to do."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from brachis.attempt import Attempt
+from brachis.search.course import DeadEnd
+from brachis.setting import Choice
+
+NOT_TRIED = "not tried: the time was up"
+"""Status of an attempt for which there was no time."""
+SAME_MOTION = "same motion as another"
+"""Status of an attempt that agrees with one that ranks before it."""
+_WORTH_IT = 2e-4
+"""An attempt is finished if it may be faster than the best one by more than this fraction."""
+_SAME_TIME = 1e-4
+_SAME_MOTION = 0.1  # rad or m
+_GAIN_SLACK = 0.005
+"""By which other attempts may gain more from better knots than those finished."""
+
+Numbered = tuple[int, Attempt]
+"""Index among the attempts, and the attempt as it was when it was solved."""
+
+
+class Record:
+    """Record of a search.
+
+    Parameters
+    ----------
+    refined : bool
+        Whether motions are refined; if not, any motion will do.
+    """
+
+    def __init__(self, *, refined: bool) -> None:
+        self._refined = refined
+        self.attempts: list[Attempt] = []
+        self.dead_ends: dict[str, DeadEnd] = {}
+        self.best: Attempt | None = None
+        self.interrupted = False
+        self.solved: list[Numbered] = []
+        self._unsolved = 0
+        self._waiting: list[Numbered] = []
+        self._left_out: dict[str, None] = {}
+        self._known: list[Attempt] = []
+        self._gain = 1.0
+
+    @property
+    def content(self) -> bool:
+        """Whether a verified motion is known; without refinement any motion will do."""
+        return self.best is not None and self._merit(self.best)[0] == -np.inf
+
+    def _merit(self, attempt: Attempt) -> tuple[float, float]:
+        """By what finished attempts are compared: excess over a limit, -inf where it will do, and end time, s."""
+        assert attempt.verification is not None  # noqa: S101  (it is finished)
+        will_do = attempt.verified or not self._refined
+        return (-np.inf if will_do else attempt.verification.worst_ratio - 1.0), attempt.t_end
+
+    def note_choice(self, choice: Choice, dead_end: DeadEnd | None) -> None:
+        """Put down that a choice has no joint path, or that there was no time to look for one."""
+        if dead_end is None:
+            self._left_out[choice.name] = None
+            self.interrupted = True
+            return
+        self.dead_ends[choice.name] = dead_end
+        self.attempts.append(Attempt(choice.match.redundant_joints, "", "lattice", "", np.inf, str(dead_end)))
+
+    def begin(self, starts: int) -> None:
+        """Put down that so many starts are about to be solved."""
+        self._unsolved += starts
+
+    def add(self, attempt: Attempt) -> None:
+        """Put a solved attempt down."""
+        if attempt.status == NOT_TRIED:
+            self.interrupted = True
+        else:
+            self._unsolved -= 1
+        if attempt.usable:
+            self.solved.append((len(self.attempts), attempt))
+        self.attempts.append(attempt)
+
+    def ranked(self, solved: Sequence[Numbered], *, again: bool) -> list[Numbered]:
+        """Order attempts by their end times, without those that are a motion known before; `again` lets these in."""
+        known = [] if again else self._known
+        self._waiting = []
+        for number, attempt in sorted(solved, key=lambda item: (rounded(item[1].coarse), item[0])):
+            if any(_agree(attempt, other) for other in known):
+                self.attempts[number] = dataclasses.replace(attempt, status=SAME_MOTION)
+            else:
+                known.append(attempt)
+                self._waiting.append((number, attempt))
+        return list(self._waiting)
+
+    def may_win(self, attempt: Attempt) -> bool:
+        """Tell whether an attempt may be faster than the best motion."""
+        if self.best is None or not self.content:
+            return True
+        return attempt.coarse * self._gain < (1.0 - _WORTH_IT) * self.best.t_end
+
+    def drop(self, solved: Sequence[Numbered]) -> None:
+        """Put down that attempts need not be finished."""
+        dropped = {number for number, _ in solved}
+        self._waiting = [item for item in self._waiting if item[0] not in dropped]
+
+    def finish(self, number: int, attempt: Attempt) -> None:
+        """Put down what became of an attempt, and keep the best one."""
+        self.drop([(number, attempt)])
+        self.attempts[number] = attempt
+        if attempt.trajectory is None:
+            return
+        if not attempt.keeps_knots:
+            self._gain = min(self._gain, (1.0 - _GAIN_SLACK) * attempt.t_end / attempt.coarse)
+        if self.best is None or self._merit(attempt) < self._merit(self.best):
+            self.best = attempt
+
+    def best_in_words(self) -> str:
+        """Say how far the best motion is from a plan; empty where there is none."""
+        if self.best is None or self.best.verification is None:
+            return ""
+        over = 100.0 * max(self.best.verification.worst_ratio - 1.0, 0.0)
+        return f"the best motion so far takes {self.best.t_end:.4f} s, and exceeds a limit by {over:.2g} % (unverified)"
+
+    def undone(self) -> tuple[str, ...]:
+        """Say in plain words what was left undone."""
+        parts = [self.best.undone] if self.best is not None and self.best.undone else []
+        if not self.interrupted:
+            return tuple(parts)
+        if self._left_out:
+            parts.append(f"the lattice of {' | '.join(self._left_out)} was not searched to its end")
+        total, waiting = len(self.attempts), len(self._waiting)
+        counts = [f"{self._unsolved} not planned"] * bool(self._unsolved) + [f"{waiting} not refined"] * bool(waiting)
+        if counts:
+            unseen = max(0, self._unsolved - sum(attempt.status == NOT_TRIED for attempt in self.attempts))
+            parts.append(f"of {total + unseen} candidates {', '.join(counts)}")
+        return (*parts, "what search.effort asks for was not tried to its end")
+
+    def in_order(self) -> tuple[Attempt, ...]:
+        """All attempts, the fastest verified one first, without their programs."""
+
+        def rank(attempt: Attempt) -> tuple[float, ...]:
+            return (not attempt.verified, *map(rounded, (attempt.t_end, attempt.coarse, attempt.estimate)))
+
+        return tuple(attempt.without_programs() for attempt in sorted(self.attempts, key=rank))
+
+
+def rounded(time: float) -> float:
+    """Leave out the digits in which processes differ, so that these do not choose."""
+    return float(f"{time:.6g}")
+
+
+def _agree(first: Attempt, second: Attempt) -> bool:
+    """Tell whether two attempts of a choice are the same motion."""
+    same = (first.redundant_joints, first.branch) == (second.redundant_joints, second.branch)
+    if not same or abs(first.coarse - second.coarse) > _SAME_TIME * second.coarse:
+        return False
+    postures = []
+    for attempt in (first, second):
+        if attempt.program is not None:
+            (state,) = attempt.program.states(attempt.reports[-1].x)
+            postures.append(state.q)
+    return bool(np.abs(postures[0] - postures[1]).max() < _SAME_MOTION)
