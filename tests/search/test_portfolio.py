@@ -18,7 +18,7 @@ import brachis
 from brachis import planner
 from brachis.errors import PlanningError, TaskError, UnknownNameError
 from brachis.plots import plot_candidates
-from brachis.search import schedule, starts
+from brachis.search import record, schedule, starts
 from brachis.search.efforts import EFFORTS
 from brachis.search.lattice import Lattice
 from brachis.solvers import apart, uno
