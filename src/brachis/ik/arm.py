@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,8 +42,9 @@ class Arm:
     ----------
     screws : tuple of Screw
         Joints a, b, c, which place a point; then those of the wrist that turns about it, u, v, w, where there is one.
+        Around three parallel axes in their order.
     centre : (3, ...) ndarray
-        This point, m: the wrist's centre, or the tool.
+        This point, m: the wrist's centre, or the tool; or one that the joints after parallel axes leave in place.
     meeting : (3, ...) ndarray
         Where the axes of two of a, b, c meet, m; the centre where no use is made of it.
     """
@@ -61,6 +62,11 @@ class Arm:
     def wrist(self) -> tuple[Screw, Screw, Screw]:
         """Joints u, v, w."""
         return self.screws[3], self.screws[4], self.screws[5]
+
+    def with_axis(self, joint: int, axis: np.ndarray) -> Arm:
+        """Turn the axis of one joint."""
+        moved = replace(self.screws[joint], axis=axis)
+        return replace(self, screws=(*self.screws[:joint], moved, *self.screws[joint + 1 :]))
 
 
 def aligned(joints: HeldJoints, i: int, j: int) -> bool:

@@ -80,7 +80,7 @@ class SignSolver(IKSolver):
         fits = places < self.alternatives
         table = np.full((2 * count, self.alternatives, joints.shape[1]), np.nan)
         table[groups[fits], places[fits]] = joints[order[fits]]
-        return table.reshape(count, 2, self.alternatives, -1)
+        return table.reshape(count, 2, *table.shape[1:])
 
 
 def _repeated(marks: np.ndarray, groups: np.ndarray) -> np.ndarray:

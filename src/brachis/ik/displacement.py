@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.ik.geometry import ChainGeometry
+from brachis.ik.screws import Screw
 from brachis.ik.vectors import apply, apply_inverse
 
 
@@ -44,15 +45,22 @@ class Displacement:
 
     @classmethod
     def of(
-        cls, geometry: ChainGeometry, redundant: Sequence[int], targets: np.ndarray, q_r: np.ndarray
+        cls,
+        geometry: ChainGeometry,
+        redundant: Sequence[int],
+        targets: np.ndarray,
+        q_r: np.ndarray,
+        *,
+        mirrored: bool = False,
     ) -> Displacement:
-        """State the equations for pose targets, (K, 12), and redundant joints at q_r, (K, r)."""
+        """State the equations for pose targets, (K, 12), and redundant joints at q_r, (K, r), or the reversed ones."""
         held = geometry.held(redundant, q_r)
         rest = [i for i in range(geometry.n) if i not in redundant]
         wanted = np.moveaxis(targets[:, 3:].reshape(-1, 3, 3), 0, 2)
         rotation = np.stack([apply(wanted, held.tool_rotation[row]) for row in range(3)], axis=1)
         translation = targets[:, :3].T - apply(rotation, held.tool_position)
-        return cls(held.axes[:, rest], held.points[:, rest], geometry.revolute[rest], rotation, translation)
+        equation = cls(held.axes[:, rest], held.points[:, rest], geometry.revolute[rest], rotation, translation)
+        return equation.reversed() if mirrored else equation
 
     def reversed(self) -> Displacement:
         """Return the equations E_6^-1 ... E_1^-1 = D^-1: the same joint positions in the reverse order."""
@@ -73,6 +81,11 @@ class Displacement:
             rotation=np.take(self.rotation, samples, axis=2),
             translation=np.take(self.translation, samples, axis=1),
         )
+
+    def screws(self) -> tuple[Screw, ...]:
+        """Screws of the joints: (3, 1, 1, 1, K), with room for three slots."""
+        axes, points = (array[:, :, None, None, None] for array in (self.axes, self.points))
+        return tuple(Screw(axes[:, i], points[:, i], bool(turns)) for i, turns in enumerate(self.revolute))
 
     def moved(self, position: np.ndarray) -> np.ndarray:
         """Apply D to positions (3, K)."""

@@ -24,7 +24,7 @@ from brachis.ik.by_sign import SignSolver
 from brachis.ik.eaik_answers import EaikChain, installed
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.polish import EXACT, Poses, polished
-from brachis.ik.pose_joints import determinant
+from brachis.ik.pose_joints import determinant, largest_determinant, random_postures
 from brachis.ik.protocol import Kind, NotApplicableError, ik_family
 from brachis.ik.vectors import wrap
 from brachis.robot import TaskSpace
@@ -33,7 +33,6 @@ NOT_INSTALLED = 'EAIK is not installed (pip install "brachis[eaik]")'
 """Why EAIK is not asked, where that is the reason."""
 
 _SAMPLES = 64
-_SINGULAR = 1e-9
 _REACHED = 1e-9
 _PER_SIGN = 8
 """Six revolute joints reach a pose in at most 16 ways."""
@@ -131,15 +130,12 @@ def _part(geometry: ChainGeometry, joints: slice) -> ChainGeometry:
 
 def _check_rank(geometry: ChainGeometry, redundant: tuple[int, ...]) -> None:
     """Refuse a decomposition whose J_nr is singular at all of many random postures."""
-    postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, geometry.n))
-    columns = geometry.posed(postures).jacobian_columns([i for i in range(geometry.n) if i not in redundant])
-    jacobian = np.moveaxis(columns, 2, 0)
-    size = np.abs(jacobian[:, :3]).max()
-    scaled = jacobian / np.array([size, size, size, 1.0, 1.0, 1.0])[:, None]
-    if np.linalg.svd(scaled, compute_uv=False)[:, -1].max() < _SINGULAR:
+    try:
+        largest_determinant(random_postures(geometry), [i for i in range(geometry.n) if i not in redundant])
+    except NotApplicableError as singular:
         names = ", ".join(geometry.joint_names[i] for i in redundant)
         more = f": there is always a motion of the tool that needs {names}" if names else ""
-        raise NotApplicableError(f"J_nr is singular everywhere{more}")
+        raise NotApplicableError(f"{singular}{more}") from None
 
 
 @ik_family(

@@ -1,4 +1,4 @@
-"""What closed forms have in common whose joints a, b, c place a point by one of the recipes of `position_recipes`."""
+"""What closed forms have in common that solve for one joint after the other, so that factors of det J_nr appear."""
 
 from __future__ import annotations
 
@@ -20,24 +20,19 @@ from brachis.ik.protocol import IKSolver, Kind, NotApplicableError
 
 @dataclass(frozen=True)
 class Structure(ABC):
-    """Joints, in one order or the other, and the recipe that fits the first three of them.
+    """Joints, in one order or the other, and what they are to each other.
 
     Attributes
     ----------
     joints : HeldJoints
-    recipe : Recipe
-    meeting : Anchor or None
-        See `Arm`.
     """
 
     joints: HeldJoints
-    recipe: Recipe
-    meeting: Anchor | None
 
     @property
+    @abstractmethod
     def factors(self) -> tuple[Factor, ...]:
         """Factors of det J_nr, of the slots of the steps."""
-        return self.recipe.factors
 
     @abstractmethod
     def posed(self, posed: PosedScrews) -> Arm:
@@ -48,6 +43,29 @@ class Structure(ABC):
         """Names of the joints, by their letters, and of the ``point`` that a, b, c place."""
 
 
+@dataclass(frozen=True)
+class PlacingStructure(Structure):
+    """Joints of which the first three place a point by a recipe.
+
+    Attributes
+    ----------
+    joints
+        See `Structure`.
+    recipe : Recipe
+    meeting : Anchor or None
+        See `Arm`.
+    """
+
+    recipe: Recipe
+    meeting: Anchor | None
+
+    @property
+    def factors(self) -> tuple[Factor, ...]:
+        """See `Structure.factors`."""
+        return self.recipe.factors
+
+
+J = TypeVar("J", bound=HeldJoints)
 S = TypeVar("S", bound=Structure)
 
 
@@ -73,7 +91,10 @@ class FactoredSolver(IKSolver, Generic[S]):
 
     @abstractmethod
     def steps(self, targets: np.ndarray, q_r: np.ndarray) -> tuple[Arm, Sequence[np.ndarray]]:
-        """Return the arm while its joints are at zero, and their positions, with the slots before the samples."""
+        """Return the arm while its joints are at zero, and their positions, with the slots before the samples.
+
+        A slide whose direction, beside a plane, depends on joints that are solved for before it has that direction.
+        """
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """See `IKSolver.solve`."""
@@ -86,7 +107,7 @@ class FactoredSolver(IKSolver, Generic[S]):
         return self._branches.margins(self._structure.posed(self._geometry.posed(q)), branch)
 
 
-def fitted(geometry: ChainGeometry, joints: HeldJoints, fits: Sequence[Callable[[HeldJoints], S]]) -> S:
+def fitted(geometry: ChainGeometry, joints: J, fits: Sequence[Callable[[J], S]]) -> S:
     """Fit a structure to joints.
 
     Parameters

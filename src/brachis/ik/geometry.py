@@ -95,24 +95,6 @@ class ChainGeometry:
         """Number of joints."""
         return len(self.joint_names)
 
-    def forward(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Tool position and world directions of all joint axes.
-
-        Parameters
-        ----------
-        q : (K, n) ndarray
-            Real, or complex for complex-step derivatives.
-
-        Returns
-        -------
-        position : (K, 3) ndarray
-            World frame, m.
-        directions : (K, n, 3) ndarray
-            World direction of every joint's axis.
-        """
-        posed = self.posed(q)
-        return posed.tool_position.T, np.moveaxis(posed.axes, (0, 1, 2), (2, 1, 0))
-
     def posed(self, q: np.ndarray) -> PosedScrews:
         """Screw axes and tool placement at K postures, by the product of exponentials.
 

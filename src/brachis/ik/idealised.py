@@ -20,6 +20,7 @@ import numpy as np
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.polish import goal_of, polished
 from brachis.ik.protocol import IKSolver
+from brachis.ik.vectors import meeting_point
 from brachis.robot import TaskSpace
 
 TOLERANCE = 1e-4
@@ -155,11 +156,9 @@ class _Chain:
         """Points where the last axis and another one are nearest; where they are parallel, beside the last point."""
         if self._axis is None:
             return point, point
-        normal = np.cross(self._axis, axis)
-        size = normal @ normal
         before = self._point
-        if size > _SKEW**2:
-            before = before + self._axis * (np.cross(point - before, axis) @ normal / size)
+        if np.linalg.norm(np.cross(self._axis, axis)) > _SKEW:
+            before = meeting_point(self._axis, before, axis, point)
         return before, point + axis * (axis @ (before - point))
 
 

@@ -16,14 +16,13 @@ Let P be a point that all joints after the parallel ones leave in place, and A o
                                                                 n . E_a^-1 (D P - s p) = n . P       for p
     a p | b c d | w     The same with                           n . (E_a^-1 D P - s p) = n . P       for p
 
-Here p slides along s, and a letter's motion R is a rotation. Then, for all of them and seen along n, where vectors are
-complex numbers and z(.) is a position's, G turns by theta = b + c + d:
+Here p slides along s, and a letter's motion R is a rotation. Then, for all of them, G turns by theta = b + c + d:
 
-    exp(i theta) = z(R_G e) / z(e),      w = z(G D0) - z(B) = z(G P) + exp(i theta) z(D0 - P) - z(B)
-    elbow    |z(C - B) + exp(i c) z(D0 - C)| = |w|   for c (2),    exp(i b) = w / (z(C - B) + exp(i c) z(D0 - C))
+    theta    turns e to R_G e about n,                  G D0 = G P + R_n(theta) (D0 - P)
+    elbow    |E_c D0 - B| = |G D0 - B|   for c (2),     b turns E_c D0 to G D0
 
-with B, C, D0 on the axes b, c, d; d follows from theta. Chains whose last joints do what the first ones do above are
-solved in the reverse order, E_6^-1 ... E_1^-1 = D^-1.
+with B, D0 on the axes b, d, and w in the place of e where there is no e; d follows from theta. Chains whose last joints
+do what the first ones do above are solved in the reverse order, E_6^-1 ... E_1^-1 = D^-1.
 
 Branches are told apart by the signs of these factors, of which det J_nr is the product:
 
@@ -41,79 +40,78 @@ without an order of the solutions; the cases with a rail are ours.
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Sequence
 
 import numpy as np
 
+from brachis.ik.arm import Arm
 from brachis.ik.displacement import Displacement
+from brachis.ik.factored_solver import FactoredSolver, fitted
 from brachis.ik.geometry import ChainGeometry
-from brachis.ik.parallel_chain import ParallelChain
-from brachis.ik.parallel_equations import ParallelEquations
-from brachis.ik.pose_joints import PoseJoints, largest_determinant, random_postures
-from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
-from brachis.ik.vectors import wrap
+from brachis.ik.parallel_structure import ParallelStructure
+from brachis.ik.placing import within_plane
+from brachis.ik.pose_joints import PoseJoints
+from brachis.ik.protocol import ik_family
+from brachis.ik.screws import Circle
+from brachis.ik.vectors import angle_about, apply, apply_inverse, dot, rotate
 from brachis.robot import TaskSpace
 
-_WORDS = {
-    "shoulder": ("front", "back"),
-    "elbow": ("up", "down"),
-    "wrist": ("noflip", "flip"),
-    "rail": ("left", "right"),
-}
-_CONSTANT = 1e-9
+_SHOULDER = 0
 
 
-class ParallelAxesSolver(IKSolver):
+class ParallelAxesSolver(FactoredSolver[ParallelStructure]):
     """Closed form around three parallel axes; see the module's formulas."""
 
-    kind: Kind = "closed_form"
+    def steps(self, targets: np.ndarray, q_r: np.ndarray) -> tuple[Arm, Sequence[np.ndarray]]:
+        """See `FactoredSolver.steps`."""
+        structure = self._structure
+        mirrored = structure.joints.mirrored
+        equation = Displacement.of(self._geometry, self._redundant, targets, q_r, mirrored=mirrored)
+        arm, rotation = structure.arm(equation.screws()), equation.rotation[:, :, None, None, None]
+        place = apply(rotation, arm.centre) + equation.translation[:, None, None, None]
+        values, angle, image = self._outer(arm, rotation, place)
+        a, b, c, d = (arm.screws[i] for i in (structure.turn or 0, *structure.parallel))
+        place, n, slide = a.inverse.orbit(place).at(angle), b.axis, structure.slide
+        theta = angle_about(n, arm.screws[structure.first + 3].axis, rotate(a.axis, -angle, image))
+        if slide is not None:
+            s = arm.screws[slide].axis
+            if slide < (structure.turn or 0):  # a turns its direction as well
+                s = rotate(a.axis, -angle, s)
+                arm = arm.with_axis(slide, s)
+            values[slide] = dot(n, place - arm.centre) / dot(n, s)
+            place = place - s * values[slide]
+        end = place + rotate(n, theta, d.point - arm.centre)
+        around = within_plane(b, c, d.point, end, structure.elbow)
+        outer, elbow = (np.flip(answers, axis=structure.elbow) for answers in around)
+        last = np.sign(dot(n, d.axis)) * (theta - outer - np.sign(dot(n, c.axis)) * elbow)
+        values |= zip(structure.parallel, (outer, elbow, last), strict=True)
+        return arm, [values[i] for i in range(6)]
 
-    def __init__(self, geometry: ChainGeometry, redundant: tuple[int, ...], chain: ParallelChain) -> None:
-        self._geometry = geometry
-        self._redundant = redundant
-        self._chain = chain
-        posed = random_postures(geometry)
-        factors = chain.factors(posed)
-        rail = factors.get("rail", np.ones(1))
-        if np.abs(rail).max() < _CONSTANT:
-            raise NotApplicableError(f"{chain.slide_name} never moves the arm along the parallel axes")
-        largest_determinant(posed, chain.joints)
-        if np.ptp(rail) < _CONSTANT:
-            factors.pop("rail", None)
-        self._words = [name for name in _WORDS if name in factors and np.ptp(np.sign(factors[name])) > 0.0]
-        self._signs = list(itertools.product((1.0, -1.0), repeat=len(self._words)))
-        largest = {name: float(values[np.argmax(np.abs(values))]) for name, values in factors.items()}
-        self._scales = {name: abs(value) if name in self._words else value for name, value in largest.items()}
-        self.branches: tuple[str, ...] = tuple(
-            "_".join(_WORDS[word][sign < 0.0] for word, sign in zip(self._words, signs, strict=True))
-            for signs in self._signs
-        )
-
-    def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
-        """See `IKSolver.branch_margins`: the factors of det J_nr, divided by their largest sizes."""
-        factors = self._chain.factors(self._geometry.posed(q))
-        signs = dict(zip(self._words, self._signs[branch], strict=True))
-        return np.stack([signs.get(name, 1.0) * factors[name] / scale for name, scale in self._scales.items()], axis=1)
-
-    def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """See `IKSolver.solve`."""
-        chain = self._chain
-        equation = Displacement.of(self._geometry, self._redundant, targets, q_r)
-        if chain.mirrored:
-            equation = equation.reversed()
-        with np.errstate(invalid="ignore", divide="ignore"):
-            joints, along = ParallelEquations(chain, equation).solve()
-        if "rail" in self._words:
-            sides = np.stack([along > 0.0, along < 0.0], axis=-2)
-            joints = np.where(sides, joints[..., None, :], np.nan)
-        joints = joints.reshape(6, len(self.branches), -1)
-        joints[equation.revolute] = wrap(joints[equation.revolute])
-        joints[:, np.isnan(joints).any(axis=0)] = np.nan
-        return np.moveaxis(joints[::-1] if chain.mirrored else joints, (0, 1, 2), (2, 1, 0))[:, :, None]
+    def _outer(
+        self, arm: Arm, rotation: np.ndarray, place: np.ndarray
+    ) -> tuple[dict[int, np.ndarray], np.ndarray, np.ndarray]:
+        """Solve for the turning joints beside the parallel ones; return them, the angle of a, and R_D R_post^T e."""
+        structure, angle = self._structure, np.zeros(1)
+        n, turn, wrist = arm.screws[structure.first].axis, structure.turn, structure.elbow + 1
+        a, e, f = arm.screws[turn or 0], arm.screws[4], arm.screws[5]
+        if structure.first == 1:
+            if turn is not None:
+                angle = a.inverse.orbit(place).component(-n, -dot(n, arm.centre), _SHOULDER)
+            y = apply_inverse(rotation, rotate(a.axis, angle, n))
+            last = Circle.of(f.axis, y).component(e.axis, dot(e.axis, n), wrist)
+            values = {4: angle_about(e.axis, rotate(f.axis, last, y), n), 5: last}
+            image = rotate(f.axis, -last, e.axis)
+        else:
+            last = Circle.of(-f.axis, n).component(-apply_inverse(rotation, a.axis), -dot(a.axis, n), wrist)
+            angle = angle_about(a.axis, n, apply(rotation, rotate(f.axis, -last, n)))
+            values, image = {5: last}, f.axis
+        if turn is not None:
+            values[turn] = angle
+        return values, angle, apply(rotation, image)
 
 
 @ik_family("parallel_axes", source="Hawkins 2013 and IK-Geo 2022 for six revolute joints; this module's docstring")
 def parallel_axes(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> ParallelAxesSolver:
     """Fit the family: a pose, six joints left over, and three parallel axes in succession among them."""
     six = PoseJoints.of(geometry, task_space, redundant)
-    return ParallelAxesSolver(geometry, redundant, ParallelChain.of(six))
+    return ParallelAxesSolver(geometry, redundant, fitted(geometry, six, (ParallelStructure.of,)))

@@ -43,7 +43,7 @@ def plane_of_last(arm: Arm, target: np.ndarray) -> Values:
     normal = _normal(b, c)
     orbit = a.inverse.orbit(target)
     first = orbit.component(-normal, -dot(normal, arm.centre), FRONT)
-    return first, *_within_plane(b, c, arm.centre, orbit.at(first), UP)
+    return first, *within_plane(b, c, arm.centre, orbit.at(first), UP)
 
 
 def out_of_last_factor(arm: Arm) -> np.ndarray:
@@ -63,7 +63,7 @@ def plane_of_first(arm: Arm, target: np.ndarray) -> Values:
     normal = _normal(a, b)
     orbit = c.orbit(arm.centre)
     third = orbit.component(normal, dot(normal, target), UP)
-    return *_within_plane(a, b, orbit.at(third), target, FRONT), third
+    return *within_plane(a, b, orbit.at(third), target, FRONT), third
 
 
 def out_of_first_factor(arm: Arm) -> np.ndarray:
@@ -148,7 +148,7 @@ def _normal(first: Screw, second: Screw) -> np.ndarray:
     return second.axis if second.revolute else cross(first.axis, second.axis)
 
 
-def _within_plane(
+def within_plane(
     first: Screw, second: Screw, start: np.ndarray, end: np.ndarray, slot: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Two joints that bring `start` to `end` within the plane in which both move."""

@@ -18,6 +18,7 @@ import numpy as np
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.planar_chain import PlanarChain
 from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
+from brachis.ik.vectors import wrap
 from brachis.robot import TaskSpace
 
 _SAMPLES = 64
@@ -104,7 +105,7 @@ class PlanarSolver(IKSolver):
             lever = np.conj(nu) * alpha * (tool - chain.centre[joint])
             swing = np.arccos(level / np.abs(lever))
             angles = np.stack([swing, -swing], axis=1) - np.angle(lever)[:, None]
-            return (chain.sigma[joint] * _wrap(angles))[:, :, None]
+            return (chain.sigma[joint] * wrap(angles))[:, :, None]
         rate = (np.conj(nu) * alpha * chain.slide[joint]).real
         slide = (value - (np.conj(nu) * (alpha * tool + beta)).real) / rate
         return np.repeat(slide[:, None, None], 2, axis=1)
@@ -137,7 +138,7 @@ class PlanarSolver(IKSolver):
         relative = np.stack([bend, -bend], axis=1)
         inner = relative - np.angle(second / first)[:, None]
         outer = np.angle(w[:, None] / (first[:, None] + np.exp(1j * inner) * second[:, None]))
-        return np.stack([chain.sigma[a] * outer, chain.sigma[b] * _wrap(inner)], axis=2)
+        return np.stack([chain.sigma[a] * outer, chain.sigma[b] * wrap(inner)], axis=2)
 
     def _circle_line(self, w: np.ndarray, between: tuple[np.ndarray, np.ndarray], c: np.ndarray) -> np.ndarray:
         """Solve w = exp(i a) (g + u t), u of unit length."""
@@ -178,7 +179,7 @@ class PlanarSolver(IKSolver):
             angles = angles + chain.sigma[i] * (
                 pair[:, :, self._pair.index(i)] if i in self._pair else known[:, i, None]
             )
-        final = chain.sigma[last] * _wrap(turned[:, None] - angles)
+        final = chain.sigma[last] * wrap(turned[:, None] - angles)
         order = [(*self._pair, last).index(i) for i in self._rest]
         return np.concatenate([pair, final[:, :, None]], axis=2)[:, :, order]
 
@@ -204,11 +205,6 @@ def _lines(h: np.ndarray, first: np.ndarray | complex, second: np.ndarray | comp
     determinant = (np.conj(first) * second).imag
     answers = np.stack([(np.conj(h) * second).imag / determinant, (np.conj(first) * h).imag / determinant], axis=1)
     return np.repeat(answers[:, None], 2, axis=1)
-
-
-def _wrap(angle: np.ndarray) -> np.ndarray:
-    """Return the same angle in (-pi, pi]."""
-    return np.pi - np.mod(np.pi - angle, 2.0 * np.pi)
 
 
 @ik_family("planar", source="two circles, circle and line, two lines: elementary plane geometry")

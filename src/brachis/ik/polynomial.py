@@ -78,9 +78,7 @@ class PolynomialSolver(SignSolver):
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """See `IKSolver.solve`."""
-        equation = Displacement.of(self._chain, self._redundant, targets, q_r)
-        if self._mirrored:
-            equation = equation.reversed()
+        equation = Displacement.of(self._chain, self._redundant, targets, q_r, mirrored=self._mirrored)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             equations = Equations.of(equation, self._turn, 1 - self._turn)
             angles = real_roots(equations.resultant(sample_angles(_DEGREE)), _DEGREE)

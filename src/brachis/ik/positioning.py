@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.ik.arm import Arm
-from brachis.ik.factored_solver import FactoredSolver, Structure, fitted
+from brachis.ik.factored_solver import FactoredSolver, PlacingStructure, fitted
 from brachis.ik.geometry import ChainGeometry, PosedScrews
 from brachis.ik.held_joints import HeldJoints
 from brachis.ik.pose_joints import random_postures
@@ -37,7 +37,7 @@ _VANISHES = 1e-9
 
 
 @dataclass(frozen=True)
-class ToolStructure(Structure):
+class ToolStructure(PlacingStructure):
     """Three joints and the recipe by which they place the tool."""
 
     @classmethod

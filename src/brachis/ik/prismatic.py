@@ -35,8 +35,8 @@ class PrismaticSolver(IKSolver):
 
     def _directions(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Task coordinates (K, m) and the matrix D (K, m, m) of the slides' directions."""
-        position, directions = self._geometry.forward(q)
-        return position[:, self._rows], np.swapaxes(directions[:, self._rest][:, :, self._rows], 1, 2)
+        posed = self._geometry.posed(q)
+        return posed.tool_position[self._rows].T, np.moveaxis(posed.axes[self._rows][:, self._rest], 2, 0)
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """See `IKSolver.solve`."""

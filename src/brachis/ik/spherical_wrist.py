@@ -31,7 +31,7 @@ import numpy as np
 
 from brachis.ik.arm import Anchor, Arm, meeting, miss
 from brachis.ik.displacement import Displacement
-from brachis.ik.factored_solver import FactoredSolver, Structure, fitted
+from brachis.ik.factored_solver import FactoredSolver, PlacingStructure, fitted
 from brachis.ik.factors import Factor
 from brachis.ik.geometry import ChainGeometry, PosedScrews
 from brachis.ik.held_joints import HeldJoints
@@ -56,13 +56,13 @@ WRIST = Factor(wrist_factor, "the axes of {u}, {v}, {w} always are parallel to o
 
 
 @dataclass(frozen=True)
-class WristStructure(Structure):
+class WristStructure(PlacingStructure):
     """Six joints of which the last three have axes that meet.
 
     Attributes
     ----------
     joints, recipe, meeting
-        See `Structure`.
+        See `PlacingStructure`.
     centre : Anchor
         The point where they do.
     """
@@ -97,16 +97,11 @@ class WristStructure(Structure):
         """See `Structure.words`."""
         return {**dict(zip("abcuvw", self.joints.names, strict=True)), "point": _point(self.joints)}
 
-    def held(self, equation: Displacement) -> Arm:
-        """Screws while the six joints are at zero: (3, 1, 1, 1, K), a slot for each step."""
-        axes, points = (array[:, :, None, None, None] for array in (equation.axes, equation.points))
-        return self._arm(tuple(Screw(axes[:, i], points[:, i], bool(equation.revolute[i])) for i in range(6)))
-
     def posed(self, posed: PosedScrews) -> Arm:
         """See `Structure.posed`."""
-        return self._arm(self.joints.screws(posed))
+        return self.arm(self.joints.screws(posed))
 
-    def _arm(self, screws: tuple[Screw, ...]) -> Arm:
+    def arm(self, screws: tuple[Screw, ...]) -> Arm:
         """Put in the points."""
         centre = self.centre.at(screws)
         return Arm(screws, centre, self.meeting.at(screws) if self.meeting else centre)
@@ -131,11 +126,10 @@ class SphericalWristSolver(FactoredSolver[WristStructure]):
 
     def steps(self, targets: np.ndarray, q_r: np.ndarray) -> tuple[Arm, Sequence[np.ndarray]]:
         """See `FactoredSolver.steps`."""
-        equation = Displacement.of(self._geometry, self._redundant, targets, q_r)
-        if self._structure.joints.mirrored:
-            equation = equation.reversed()
+        mirrored = self._structure.joints.mirrored
+        equation = Displacement.of(self._geometry, self._redundant, targets, q_r, mirrored=mirrored)
         rotation, translation = equation.rotation[:, :, None, None, None], equation.translation[:, None, None, None]
-        arm = self._structure.held(equation)
+        arm = self._structure.arm(equation.screws())
         base = self._structure.recipe.solve(arm, apply(rotation, arm.centre) + translation)
         return arm, (*base, *_wrist(arm, base, rotation))
 
