@@ -17,7 +17,7 @@ from threadpoolctl import ThreadpoolController
 
 from brachis import interrupts
 from brachis.deadline import Deadline
-from brachis.mesh import coarsest, settle_knots
+from brachis.mesh import adapt_mesh, coarsest
 from brachis.nlp import Program
 from brachis.nlp.guess import starting_point
 from brachis.refine import RefinementOptions, Solve
@@ -153,7 +153,7 @@ def finish(numbered: tuple[int, Coarse], deadline: Deadline, listener: Listener)
     setting = coarse.way.seed.choice.setting
     task, settings = setting.task, setting.task.refinement
     options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, deadline.part(_KNOT_TIME))
-    program, reports, undone = settle_knots(
+    program, reports, undone = adapt_mesh(
         coarse.program,
         coarse.reports,
         _solve(coarse.way, options.deadline, listener),
