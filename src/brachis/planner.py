@@ -23,7 +23,7 @@ from brachis.custom_limits import LimitModel
 from brachis.deadline import Deadline
 from brachis.errors import UnreachableError
 from brachis.extract import extract, where_it_failed
-from brachis.mesh import coarsest, settle_knots
+from brachis.mesh import adapt_mesh, coarsest
 from brachis.nlp import Program
 from brachis.nlp.guess import starting_point
 from brachis.nlp.layout import SHORTEST_TIME
@@ -190,7 +190,7 @@ def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attemp
     settings, soon = task.refinement, deadline.part(_KNOT_TIME)
     options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, soon)
     solve = _solver(start, soon, listener)
-    adapted = settle_knots(program, attempt.reports, solve, task.spline, options, target=attempt.target)
+    adapted = adapt_mesh(program, attempt.reports, solve, task.spline, options, target=attempt.target)
     attempt = dataclasses.replace(attempt, undone=adapted.undone)
     options, solve = dataclasses.replace(options, deadline=deadline), _solver(start, deadline, listener)
     refined = refine(adapted.program, adapted.reports[-1], solve, options)

@@ -1,4 +1,4 @@
-"""Inserted knots leave the curves as they are; windows as functions of interval lengths; times within intervals."""
+"""Inserted knots leave the curves as they are; basis functions of interval lengths; times within intervals."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
 from brachis.bspline import (
-    basis_windows,
+    basis_derivatives,
+    basis_functions,
     clamped_knots,
     clamped_uniform_knots,
     insert_knots,
+    local_basis,
     spread,
-    window_derivatives,
-    windows_of_lengths,
 )
 
 LENGTHS = np.array([0.3, 0.05, 0.2, 0.01, 0.14, 0.3])
@@ -36,8 +36,8 @@ def test_the_same_curves(degree, old, new, seed):
     points = rng.normal(size=(3, len(knots) - degree - 1))
     inserted = insert_knots(points, knots, fine_knots, degree)
     assert inserted.shape == (3, len(finer) - 1 + degree)
-    tau = np.linspace(0.0, 1.0, 101)
-    before, after = BSpline(knots, points.T, degree)(tau), BSpline(fine_knots, inserted.T, degree)(tau)
+    t_norm = np.linspace(0.0, 1.0, 101)
+    before, after = BSpline(knots, points.T, degree)(t_norm), BSpline(fine_knots, inserted.T, degree)(t_norm)
     np.testing.assert_allclose(after, before, atol=1e-13)
 
 
@@ -49,36 +49,38 @@ def test_one_knot_by_boehm():
 
 
 @pytest.mark.parametrize("degree", range(2, 7))
-def test_windows_of_lengths_are_the_basis(degree):
+def test_basis_functions_of_lengths_are_scipys(degree):
     breaks = np.concatenate([[0.0], np.cumsum(LENGTHS)])
     knots = clamped_knots(degree, breaks / breaks[-1])
     for interval, length in enumerate(LENGTHS):
         for fraction in (0.0, 0.31, 0.999):
             lengths = around(LENGTHS, degree, interval)
-            mine = windows_of_lengths(lengths[None], np.array([fraction]))[:, 0]
-            tau = np.array([breaks[interval] + fraction * length])
+            mine = basis_functions(lengths[None], np.array([fraction]))[:, 0]
+            t_norm = breaks[interval] + fraction * length
+            assert local_basis(knots, degree, np.array([t_norm]))[0][0] == interval
             for order in range(3):
-                first, expected = basis_windows(knots, degree, tau, order)
-                assert first[0] == interval
-                np.testing.assert_allclose(mine[order], expected[0], atol=1e-12 * max(1.0, np.abs(expected).max()))
+                expected = BSpline(knots, np.eye(len(knots) - degree - 1), degree)(t_norm, nu=order)
+                own = expected[interval : interval + degree + 1]
+                np.testing.assert_allclose(mine[order], own, atol=1e-12 * max(1.0, np.abs(own).max()))
+                assert np.count_nonzero(expected) <= degree + 1
 
 
 @pytest.mark.parametrize("degree", range(2, 7))
-def test_window_derivatives_are_differences(degree):
+def test_basis_derivatives_are_differences(degree):
     lengths = np.array([around(LENGTHS, degree, interval) for interval in range(len(LENGTHS))])
     fraction = np.linspace(0.05, 1.0, len(LENGTHS))
-    exact = window_derivatives(lengths, fraction)
+    exact = basis_derivatives(lengths, fraction)
     assert exact.shape == (3, 2 * degree - 1, len(LENGTHS), degree + 1)
     h = 1e-5
     for i, unit in enumerate(np.eye(2 * degree - 1)):
-        ahead, behind = (windows_of_lengths(lengths + step * unit, fraction) for step in (h, -h))
+        ahead, behind = (basis_functions(lengths + step * unit, fraction) for step in (h, -h))
         expected = (ahead - behind) / (2.0 * h)
         for order in range(3):
             scale = np.abs(exact[order]).max()
             assert scale > 0.0
             np.testing.assert_allclose(exact[order, i], expected[order], atol=1e-4 * scale)
     # Twice the lengths: the same values, half the slopes, a quarter of the bends (Euler's theorem).
-    for order, values in enumerate(windows_of_lengths(lengths, fraction)):
+    for order, values in enumerate(basis_functions(lengths, fraction)):
         turned = np.einsum("ikw,ki->kw", exact[order], lengths)
         np.testing.assert_allclose(turned, -order * values, atol=1e-12 * max(1.0, np.abs(values).max()))
 

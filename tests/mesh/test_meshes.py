@@ -10,7 +10,7 @@ import pytest
 
 import brachis
 from brachis.deadline import Deadline
-from brachis.mesh import MeshOptions, coarsest, free_knots, freeing, grow, refine_mesh, settle_knots
+from brachis.mesh import MeshOptions, adapt_mesh, coarsest, knot_optimisation, optimise_knots, refine_mesh, solve_nested
 from brachis.refine import RefinementOptions, refine
 from brachis.solvers import SolverOptions, SolveStatus, solver_named
 from brachis.task import SplineSettings
@@ -112,21 +112,21 @@ def test_what_cannot_be_solved_is_left_as_it_was(solved):
     assert mesh is program
     assert reports[-1] is report
     assert len(reports) == 2
-    same, reports, _ = free_knots(program, report, failing, 0.1, RefinementOptions())
+    same, reports, _ = optimise_knots(program, report, failing, 0.1, RefinementOptions())
     assert same is program
     assert reports[-1] is report
 
 
 def test_no_interval_is_so_short_that_points_fall_together(solved):
     program, report = solved
-    moved, *_ = free_knots(program, report, solve, 1e-9, RefinementOptions())
+    moved, *_ = optimise_knots(program, report, solve, 1e-9, RefinementOptions())
     assert np.diff(moved.phases[0].breaks).min() == pytest.approx(5e-5, rel=1e-3)
 
 
 def test_free_knots_without_a_motion_within_the_limits_are_given_up(solved, monkeypatch):
     program, report = solved
-    monkeypatch.setattr(freeing, "refine", lambda *given: dataclasses.replace(refine(*given), violation=0.5))
-    kept, reports, _ = free_knots(program, report, solve, 0.1, RefinementOptions())
+    monkeypatch.setattr(knot_optimisation, "refine", lambda *given: dataclasses.replace(refine(*given), violation=0.5))
+    kept, reports, _ = optimise_knots(program, report, solve, 0.1, RefinementOptions())
     assert kept is program
     assert reports[-1] is report
     assert len(reports) > 2
@@ -140,7 +140,7 @@ def test_a_free_solve_that_stalls_still_gives_good_knots(solved):
         free = len(tried.phases[0].grid.lower) > 0
         return dataclasses.replace(answer, status=SolveStatus.STALLED) if free else answer
 
-    moved, reports, _ = free_knots(program, report, stalling, 0.1, RefinementOptions())
+    moved, reports, _ = optimise_knots(program, report, stalling, 0.1, RefinementOptions())
     assert reports[-1].status.usable
     assert reports[-1].objective < 0.95 * report.objective
     assert moved.variables == program.variables, "the knots should be fixed again"
@@ -160,21 +160,21 @@ def test_coarsest_problem(intervals):
 
 
 @pytest.mark.parametrize("intervals", [53, 100])
-def test_growing_gives_the_answer_of_a_cold_solve_in_a_few_iterations(intervals):
+def test_nested_iteration_gives_the_answer_of_a_cold_solve_in_a_few_iterations(intervals):
     program, _ = brachis.transcribe(robot(), task(intervals=intervals))
     coarse = coarsest(program).with_margin(0.05)
     report = solve(coarse, next(starting_points(coarse)))
-    grown, reports, undone = grow(program, coarse, report, solve)
+    nested, reports, undone = solve_nested(program, coarse, report, solve)
     assert not undone
-    np.testing.assert_array_equal(grown.phases[0].knots, program.phases[0].knots)
-    np.testing.assert_array_equal(grown.phases[0].t_norm, program.phases[0].t_norm)
-    assert grown.safeguard_bounds == coarse.safeguard_bounds
+    np.testing.assert_array_equal(nested.phases[0].knots, program.phases[0].knots)
+    np.testing.assert_array_equal(nested.phases[0].t_norm, program.phases[0].t_norm)
+    assert nested.safeguard_bounds == coarse.safeguard_bounds
     assert reports[0] is report
     assert max(later.iterations for later in reports[1:]) <= 10
     assert reports[-1].objective == pytest.approx(solve(program, next(starting_points(program))).objective, rel=1e-4)
 
 
-def test_growing_keeps_the_last_level_that_was_solved_and_tells_so():
+def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
     program, _ = brachis.transcribe(robot(), task(intervals=100))
     coarse = coarsest(program)
     report = solve(coarse, next(starting_points(coarse)))
@@ -182,12 +182,12 @@ def test_growing_keeps_the_last_level_that_was_solved_and_tells_so():
     def small_ones_only(tried, x):
         return solve(tried, x) if tried.variables < 150 else failing(tried, x)
 
-    grown, reports, undone = grow(program, coarse, report, small_ones_only)
-    assert grown.intervals == 50
+    nested, reports, undone = solve_nested(program, coarse, report, small_ones_only)
+    assert nested.intervals == 50
     assert [later.status for later in reports][-2:] == [SolveStatus.FAILED, SolveStatus.OPTIMAL]
-    assert reports[-1].x.shape == (grown.variables,)
+    assert reports[-1].x.shape == (nested.variables,)
     assert undone == "the motion has 50 of 100 intervals, of which more were not solved"
-    settled = settle_knots(coarse, (report,), failing, SplineSettings(), RefinementOptions(), target=program)
+    settled = adapt_mesh(coarse, (report,), failing, SplineSettings(), RefinementOptions(), target=program)
     assert settled.reports[-1] is report
     assert settled.undone == "the motion has 13 of 100 intervals, of which more were not solved"
 
@@ -202,9 +202,9 @@ def test_no_level_is_begun_after_the_deadline(solved):
     coarse = coarsest(target)
     first = solve(coarse, next(starting_points(coarse)))
     over = RefinementOptions(deadline=Deadline(0.0))
-    assert grow(target, coarse, first, never, over.deadline).undone
+    assert solve_nested(target, coarse, first, never, over.deadline).undone
     for spline in (SplineSettings(knots="free", intervals=10), SplineSettings(intervals="auto")):
-        kept, reports, undone = settle_knots(program, (report,), never, spline, over)
+        kept, reports, undone = adapt_mesh(program, (report,), never, spline, over)
         assert kept is program
         assert reports == (report,)
         assert undone
@@ -223,17 +223,15 @@ def test_many_intervals_are_planned_from_few():
 def test_settings_choose_what_is_done(solved):
     program, report = solved
     options = RefinementOptions()
-    assert settle_knots(program, (report,), solve, SplineSettings(), options) == (program, (report,), "")
+    assert adapt_mesh(program, (report,), solve, SplineSettings(), options) == (program, (report,), "")
     unusable = (report, failing(program, report.x))
-    assert settle_knots(program, unusable, solve, SplineSettings(knots="free"), options) == (program, unusable, "")
+    assert adapt_mesh(program, unusable, solve, SplineSettings(knots="free"), options) == (program, unusable, "")
     before = dataclasses.replace(report)
-    free, reports, _ = settle_knots(
-        program, (before, report), solve, SplineSettings(knots="free", intervals=10), options
-    )
+    free, reports, _ = adapt_mesh(program, (before, report), solve, SplineSettings(knots="free", intervals=10), options)
     assert reports[0] is before
     assert free.intervals == program.intervals
     auto = SplineSettings(intervals="auto", tolerance=0.1)
-    mesh, *_ = settle_knots(program, (before, report), solve, auto, options)
+    mesh, *_ = adapt_mesh(program, (before, report), solve, auto, options)
     assert mesh.intervals > program.intervals
 
 

@@ -17,7 +17,7 @@ from brachis.kinematics import DirectJointMap
 from brachis.limits import Role
 from brachis.limits.position import PositionLimit
 from brachis.limits.torque import TorqueLimit
-from brachis.mesh import MeshOptions, coarsest, free_knots, grow, refine_mesh
+from brachis.mesh import MeshOptions, coarsest, optimise_knots, refine_mesh, solve_nested
 from brachis.nlp import Boundary, FixedGrid, Link, Phase, Program
 from brachis.nlp.guess import starting_point
 from brachis.refine import RefinementOptions, refine
@@ -108,8 +108,8 @@ def test_refinement_holds_the_limits_in_every_phase():
     assert max(worst(refined.x)) <= 1e-4
     assert refined.violation <= 1e-4
     assert refined.t_end > report.objective
-    grown = [len(new.t_norm) - len(old.t_norm) for new, old in zip(refined.program.phases, program.phases, strict=True)]
-    assert min(grown) > 0
+    pairs = zip(refined.program.phases, program.phases, strict=True)
+    assert min(len(after.t_norm) - len(before.t_norm) for after, before in pairs) > 0
 
 
 def test_meshes_of_every_phase_are_refined():
@@ -125,21 +125,21 @@ def test_meshes_of_every_phase_are_refined():
 def test_knots_of_every_phase_are_freed():
     program = two_moves(degree=3, intervals=3)
     report = solve(program, first_point(program))
-    free, reports, _ = free_knots(program, report, solve, 0.03, RefinementOptions())
+    free, reports, _ = optimise_knots(program, report, solve, 0.03, RefinementOptions())
     assert free.variables == program.variables
     assert reports[-1].objective < 0.99 * report.objective
     assert reports[-1].objective == pytest.approx(bang_bang(0.5, 0.7), rel=1e-3)
 
 
-def test_phases_grow_from_few_intervals():
+def test_phases_are_solved_from_few_intervals():
     phases = [move(0.0, 0.5, degree=3, intervals=60), move(FREE, LENGTH, degree=3, intervals=14)]
     program = Program(phases, [Link(0, 1, ALONE)])
     coarse = coarsest(program)
     assert [phase.intervals for phase in coarse.phases] == [15, 14]
     report = solve(coarse, first_point(coarse))
-    grown, reports, undone = grow(program, coarse, report, solve)
+    nested, reports, undone = solve_nested(program, coarse, report, solve)
     assert not undone
-    assert [phase.intervals for phase in grown.phases] == [60, 14]
+    assert [phase.intervals for phase in nested.phases] == [60, 14]
     assert reports[-1].objective < report.objective
 
 

@@ -1,16 +1,16 @@
 """Knots where they pay: given intervals reached from few, meshes refined, and free knots."""
 
-from brachis.mesh.freeing import free_knots
-from brachis.mesh.growing import coarsest, grow
-from brachis.mesh.halving import COARSE_INTERVALS, MeshOptions, refine_mesh
-from brachis.mesh.settle import settle_knots
+from brachis.mesh.adaptation import adapt_mesh
+from brachis.mesh.h_refinement import COARSE_INTERVALS, MeshOptions, refine_mesh
+from brachis.mesh.knot_optimisation import optimise_knots
+from brachis.mesh.nested_iteration import coarsest, solve_nested
 
 __all__ = [
     "COARSE_INTERVALS",
     "MeshOptions",
+    "adapt_mesh",
     "coarsest",
-    "free_knots",
-    "grow",
+    "optimise_knots",
     "refine_mesh",
-    "settle_knots",
+    "solve_nested",
 ]

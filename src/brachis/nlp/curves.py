@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.bspline import basis_windows
+from brachis.bspline import local_basis
 
 ORDERS = 3
 """Value and two derivatives."""
@@ -127,9 +127,8 @@ class LocalBasis:
     @classmethod
     def of(cls, knots: np.ndarray, degree: int, t_norm: np.ndarray) -> LocalBasis:
         """Sample the basis at normalised times `t_norm`, (K,)."""
-        first, value = basis_windows(knots, degree, t_norm)
-        derivatives = [basis_windows(knots, degree, t_norm, order)[1] for order in range(1, ORDERS)]
-        return cls(first[:, None] + np.arange(degree + 1), np.array([value, *derivatives]))
+        first, values = local_basis(knots, degree, t_norm)
+        return cls(first[:, None] + np.arange(degree + 1), values)
 
     def curves(self, control_points: np.ndarray) -> np.ndarray:
         """Value and two derivatives (3, K, c) of c splines with control points (c, N + d)."""

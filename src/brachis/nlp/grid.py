@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from brachis.bspline import clamped_knots, window_derivatives, windows_of_lengths
+from brachis.bspline import basis_derivatives, basis_functions, clamped_knots
 from brachis.nlp.curves import ORDERS, LocalBasis
 
 
@@ -151,13 +151,13 @@ class FreeGrid:
         """See `Grid`."""
         key = h.tobytes()
         if self._last is None or self._last[0] != key:
-            values = windows_of_lengths(self._lengths_around(h), self._fraction)
+            values = basis_functions(self._lengths_around(h), self._fraction)
             self._last = key, LocalBasis(self._columns, values)
         return self._last[1]
 
     def slopes(self, h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
         """See `Grid`."""
-        derivatives = window_derivatives(self._lengths_around(h), self._fraction)
+        derivatives = basis_derivatives(self._lengths_around(h), self._fraction)
         slopes = np.einsum("oikw,ckw->okic", derivatives, control_points[:, self._columns])
         return np.asarray(slopes[:, self._inside])
 

@@ -78,7 +78,7 @@ def fitted(phase: Phase, duration: float, t_norm: np.ndarray, wanted: np.ndarray
     -------
     (v,) ndarray
     """
-    basis = basis_matrix(phase.knots, phase.degree, t_norm).toarray()
+    basis = basis_matrix(phase.knots, phase.degree, t_norm)
     parts = [np.array([duration])]
     for spline, values in zip(phase.splines, wanted.T, strict=True):
         tied = np.zeros((len(spline.variable), spline.free))

@@ -158,7 +158,7 @@ class RefinementSettings(Model):
         default=1.0e-4,
         ge=1.0e-5,
         le=0.01,
-        description="Largest relative excess over a limit, anywhere; of a position, beyond its range, in rad (m), or "
+        description="Largest relative violation of a limit, anywhere; of a position, beyond its range, in rad (m), or "
         "in half ranges where these are shorter. What is less than 1e-5 the checks do not show.",
     )
     density: Count = Field(

@@ -14,7 +14,7 @@ _WORTH_IT = 2e-4
 """Knots are moved again as long as that shortens the motion by this part of it."""
 
 
-def free_knots(
+def optimise_knots(
     program: Program,
     first: SolverReport,
     solve: Solve,
@@ -43,7 +43,7 @@ def free_knots(
     Returns
     -------
     Answer
-        With knots fixed where they are best; the given program if freeing them led to no motion within the limits.
+        With knots fixed where they are best; the given program if moving them led to no motion within the limits.
     """
     given = program
     reports, best, x = [first], None, first.x

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from brachis.mesh.freeing import free_knots
-from brachis.mesh.growing import grow
-from brachis.mesh.halving import MeshOptions, refine_mesh
+from brachis.mesh.h_refinement import MeshOptions, refine_mesh
 from brachis.mesh.judgement import Answer
+from brachis.mesh.knot_optimisation import optimise_knots
+from brachis.mesh.nested_iteration import solve_nested
 from brachis.nlp import Program
 from brachis.refine import RefinementOptions, Solve
 from brachis.solvers import SolverReport
 from brachis.task import SplineSettings
 
 
-def settle_knots(
+def adapt_mesh(
     program: Program,
     reports: tuple[SolverReport, ...],
     solve: Solve,
@@ -34,7 +34,7 @@ def settle_knots(
     refinement : RefinementOptions
         After its deadline no further round is begun.
     target : Program, optional
-        The program over all its knots, where the solved one is its coarsest (see `grow`).
+        The program over all its knots, where the solved one is its coarsest (see `solve_nested`).
 
     Returns
     -------
@@ -43,16 +43,16 @@ def settle_knots(
     """
     if not reports[-1].status.usable:
         return Answer(program, reports)
-    grown = Answer(program, reports[-1:])
+    nested = Answer(program, reports[-1:])
     if target is not None:
-        grown = grow(target, program, reports[-1], solve, refinement.deadline)
-    last = grown.reports[-1]
+        nested = solve_nested(target, program, reports[-1], solve, refinement.deadline)
+    last = nested.reports[-1]
     if spline.knots == "free":
-        settled = free_knots(grown.program, last, solve, spline.shortest_interval, refinement)
+        adapted = optimise_knots(nested.program, last, solve, spline.shortest_interval, refinement)
     elif spline.intervals == "auto":
         options = MeshOptions(spline.tolerance, spline.points_per_interval)
-        settled = refine_mesh(grown.program, last, solve, options, refinement)
+        adapted = refine_mesh(nested.program, last, solve, options, refinement)
     else:
-        settled = Answer(grown.program, (last,))
-    undone = "; ".join(filter(None, (grown.undone, settled.undone)))
-    return Answer(settled.program, (*reports[:-1], *grown.reports[:-1], *settled.reports), undone)
+        adapted = Answer(nested.program, (last,))
+    undone = "; ".join(filter(None, (nested.undone, adapted.undone)))
+    return Answer(adapted.program, (*reports[:-1], *nested.reports[:-1], *adapted.reports), undone)

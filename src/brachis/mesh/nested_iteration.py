@@ -26,7 +26,9 @@ def coarsest(program: Program) -> Program:
     return next(_levels(program))
 
 
-def grow(target: Program, coarse: Program, report: SolverReport, solve: Solve, deadline: Deadline = NEVER) -> Answer:
+def solve_nested(
+    target: Program, coarse: Program, report: SolverReport, solve: Solve, deadline: Deadline = NEVER
+) -> Answer:
     """Solve a program from the answer of its coarsest one, level by level.
 
     Parameters

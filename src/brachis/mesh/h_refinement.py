@@ -90,11 +90,11 @@ def refine_mesh(
         program, last = finer, report
         if worth_it:
             continue
-        settled = refine(program, last, solve, refinement)
-        doubled = _doubled(settled, solve, options, refinement)
-        reports += [*settled.reports[1:], *doubled.reports]
-        held += [settled, doubled]
-        if not gain(settled, doubled, refinement) >= options.tolerance:
+        refined = refine(program, last, solve, refinement)
+        doubled = _doubled(refined, solve, options, refinement)
+        reports += [*refined.reports[1:], *doubled.reports]
+        held += [refined, doubled]
+        if not gain(refined, doubled, refinement) >= options.tolerance:
             break
     best = min(held, key=lambda refined: end_time(refined, refinement), default=None)
     if refinement.deadline.passed:
@@ -151,7 +151,7 @@ def _with_halves(phase: Phase, intervals: np.ndarray, options: MeshOptions) -> P
     )
 
 
-def _doubled(settled: Refined, solve: Solve, options: MeshOptions, refinement: RefinementOptions) -> Refined:
+def _doubled(refined: Refined, solve: Solve, options: MeshOptions, refinement: RefinementOptions) -> Refined:
     """Halve every interval of a refined program, solve and refine again."""
-    finer, x = _halved(settled.program, settled.x, _every(settled.program), options)
-    return refine(finer, accepted(solve(finer, x), settled.reports[-1]), solve, refinement)
+    finer, x = _halved(refined.program, refined.x, _every(refined.program), options)
+    return refine(finer, accepted(solve(finer, x), refined.reports[-1]), solve, refinement)
