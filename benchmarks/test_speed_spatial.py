@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brachis import Robot, TaskSpace, ik, load_task, plan, transcribe
+from brachis import Robot, ik, load_task, plan, transcribe
 from brachis.ik.eaik import eaik
 from brachis.nlp.guess import guesses
+from brachis.robot import task_map_of
 from brachis.solvers import SolverOptions, solver_named
 
 ROOT = Path(__file__).parents[1]
@@ -64,16 +65,16 @@ def test_evaluation(benchmark, tx90l, task, part):
     benchmark.pedantic(lambda: problem.rows(x) if part == "rows" else problem.jacobian(x), setup=another, rounds=200)
 
 
-def poses(robot, task_space):
+def poses(robot, task_map):
     """Random postures, and the poses that they reach."""
     q = np.random.default_rng(0).uniform(-1.5, 1.5, (POSES, robot.n))
-    return q, task_space.values(*robot.tool_placements(q))
+    return q, task_map.values(q)
 
 
 @pytest.mark.parametrize("joint", ["rail", "joint_1", "joint_2", "joint_3"])
 def test_spherical_wrist(benchmark, tx90l, joint):
     """A batch of 2000 poses, all branches."""
-    space = TaskSpace.of(tx90l, "pose")
+    space = task_map_of(tx90l, "pose")
     match = ik.find(tx90l, space, [joint])
     q, targets = poses(tx90l, space)
     benchmark(match.solver.solve, targets, q[:, [tx90l.joint_names.index(joint)]])
@@ -81,7 +82,7 @@ def test_spherical_wrist(benchmark, tx90l, joint):
 
 def test_eaik(benchmark, tx90l):
     """The same with EAIK, rail redundant: constant geometry."""
-    space = TaskSpace.of(tx90l, "pose")
+    space = task_map_of(tx90l, "pose")
     solver = eaik.build(ik.ChainGeometry.of(tx90l), space, (0,))
     q, targets = poses(tx90l, space)
     benchmark(solver.solve, targets, q[:, [0]])

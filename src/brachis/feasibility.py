@@ -11,7 +11,7 @@ from brachis.ik import Match
 from brachis.limits import Limit, Moments
 from brachis.path import Path, check_on_path
 from brachis.plausibility import position_hint
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, TaskMap
 
 _RANGE_SLACK = 1e-9
 _SAME_POSTURE = 1e-5
@@ -23,7 +23,7 @@ def check_postures(
     start: np.ndarray | None,
     end: np.ndarray | None,
     path: Path,
-    task_space: TaskSpace,
+    task_map: TaskMap,
 ) -> None:
     """Refuse start and end postures out of range, beyond a limit that holds at rest, or off the path.
 
@@ -34,7 +34,7 @@ def check_postures(
     start, end : (n,) ndarray or None
         None where free.
     path : Path
-    task_space : TaskSpace
+    task_map : TaskMap
 
     Raises
     ------
@@ -46,7 +46,7 @@ def check_postures(
     if end is not None:
         _check_range(robot, end, "end")
         _check_at_rest(limits, end, "end")
-        check_on_path(robot, task_space, end, path.sample(np.array([1.0])).target[0], "end")
+        check_on_path(task_map, end, path.sample(np.array([1.0])).target[0], "end")
 
 
 def _check_range(robot: Robot, posture: np.ndarray, name: str) -> None:
@@ -85,7 +85,7 @@ def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str) -> N
 
 
 def branch_of(
-    robot: Robot, task_space: TaskSpace, match: Match, posture: np.ndarray, wanted: str, *, name: str = "start"
+    robot: Robot, task_map: TaskMap, match: Match, posture: np.ndarray, wanted: str, *, name: str = "start"
 ) -> int:
     """Index of the closed form's branch on which the given posture, at the path's start or end, lies.
 
@@ -99,7 +99,7 @@ def branch_of(
     branches = match.solver.branches
     if wanted != "auto" and wanted not in branches:
         raise UnknownNameError("branch", wanted, dict.fromkeys(branches), where="branch")
-    branch = _branch_of(robot, task_space, match, posture, name)
+    branch = _branch_of(robot, task_map, match, posture, name)
     if wanted != "auto" and branches[branch] != wanted:
         raise StartError(
             f"the {name} posture is on another branch",
@@ -111,14 +111,14 @@ def branch_of(
     return branch
 
 
-def check_end_branch(robot: Robot, task_space: TaskSpace, match: Match, end: np.ndarray, branch: int) -> None:
+def check_end_branch(robot: Robot, task_map: TaskMap, match: Match, end: np.ndarray, branch: int) -> None:
     """Refuse an end posture on another branch than the start posture's.
 
     Raises
     ------
     StartError
     """
-    found = _branch_of(robot, task_space, match, end, "end")
+    found = _branch_of(robot, task_map, match, end, "end")
     if match.solver.branches[found] != match.solver.branches[branch]:
         raise StartError(
             "the end posture is on another branch than the start posture",
@@ -129,12 +129,12 @@ def check_end_branch(robot: Robot, task_space: TaskSpace, match: Match, end: np.
         )
 
 
-def _branch_of(robot: Robot, task_space: TaskSpace, match: Match, posture: np.ndarray, name: str) -> int:
+def _branch_of(robot: Robot, task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -> int:
     """Index of the branch in whose inside a posture lies."""
     solver = match.solver
     redundant = [robot.joint_names.index(joint) for joint in match.redundant_joints]
     rest = [i for i in range(robot.n) if i not in redundant]
-    target = task_space.value(robot.tool_placement(posture))
+    target = task_map.value(posture)
     answers = solver.solve(target[None], posture[None, redundant])[0]
     units = np.array(robot.position_units)[rest]
     gap = answers - posture[rest]

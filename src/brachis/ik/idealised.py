@@ -20,7 +20,8 @@ import numpy as np
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.polish import goal_of, polished
 from brachis.ik.protocol import IKSolver, Kind
-from brachis.robot import TaskSpace
+from brachis.robot import TaskMap
+from brachis.robot.task_map import Pose
 
 TOLERANCE = 1e-4
 """Axes this near to parallel or perpendicular (rad), or to meeting (m), are taken to be meant so."""
@@ -54,13 +55,13 @@ class Ideal:
         return " and ".join(f"{size:.1e} {unit}" for size, unit in sizes if size > least)
 
 
-def idealised(geometry: ChainGeometry, task_space: TaskSpace, tolerance: float = TOLERANCE) -> Ideal | None:
+def idealised(geometry: ChainGeometry, task_map: TaskMap, tolerance: float = TOLERANCE) -> Ideal | None:
     """Make axes that are almost parallel, perpendicular or meeting so exactly.
 
     Parameters
     ----------
     geometry : ChainGeometry
-    task_space : TaskSpace
+    task_map : TaskMap
         For positions the world's axes, and a tool on the last axis of rotation, matter as well.
     tolerance : float, optional
         rad for directions, m for points.
@@ -70,13 +71,13 @@ def idealised(geometry: ChainGeometry, task_space: TaskSpace, tolerance: float =
     Ideal or None
         None where the chain is ideal as it is.
     """
-    chain = _Chain([] if task_space.oriented else list(np.eye(3)), tolerance)
+    chain = _Chain([] if isinstance(task_map, Pose) else list(np.eye(3)), tolerance)
     axes, points = np.empty_like(geometry.axes), np.zeros_like(geometry.points)
     for i, revolute in enumerate(geometry.revolute):
         axes[i] = chain.direction(geometry.axes[i], geometry.points[i], revolute=revolute)
         if revolute:
             points[i] = chain.place(axes[i], geometry.points[i])
-    if not task_space.oriented:
+    if not isinstance(task_map, Pose):
         chain.place_tool(geometry.tool_position)
     if max(chain.turned, chain.shifted) < _ROUNDING:
         return None
@@ -200,7 +201,7 @@ class Polished:
         Of the ideal chain.
     geometry : ChainGeometry
         The given chain.
-    task_space : TaskSpace
+    task_map : TaskMap
     redundant : tuple of int
     branches : sequence of int, optional
         Those in which answers are wanted; all unless given.
@@ -210,7 +211,7 @@ class Polished:
         self,
         solver: IKSolver,
         geometry: ChainGeometry,
-        task_space: TaskSpace,
+        task_map: TaskMap,
         redundant: tuple[int, ...],
         branches: Sequence[int] | None = None,
     ) -> None:
@@ -218,7 +219,7 @@ class Polished:
         self.kind: Kind = solver.kind
         self._solver = solver
         self._geometry = geometry
-        self._task_space = task_space
+        self._task_space = task_map
         self._redundant = list(redundant)
         self._rest = [i for i in range(geometry.n) if i not in redundant]
         every = range(len(self.branches))

@@ -52,7 +52,7 @@ from brachis.ik.parallel_equations import ParallelEquations
 from brachis.ik.pose_joints import PoseJoints, largest_determinant, random_postures
 from brachis.ik.protocol import Kind, NotApplicableError, ik_family
 from brachis.ik.vectors import wrap
-from brachis.robot import TaskSpace
+from brachis.robot import TaskMap
 
 _WORDS = {
     "shoulder": ("front", "back"),
@@ -113,7 +113,7 @@ class ParallelAxesSolver:
 
 
 @ik_family("parallel_axes", source="Hawkins 2013 and IK-Geo 2022 for six revolute joints; this module's docstring")
-def parallel_axes(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> ParallelAxesSolver:
+def parallel_axes(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> ParallelAxesSolver:
     """Fit the family: a pose, six joints left over, and three parallel axes in succession among them."""
-    six = PoseJoints.of(geometry, task_space, redundant)
+    six = PoseJoints.of(geometry, task_map, redundant)
     return ParallelAxesSolver(geometry, redundant, ParallelChain.of(six))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.arrays import cross
 from brachis.ik.displacement import Displacement
 from brachis.ik.parallel_chain import ParallelChain
 from brachis.ik.vectors import (
@@ -12,7 +13,6 @@ from brachis.ik.vectors import (
     apply,
     apply_inverse,
     cosine_roots,
-    cross,
     dot,
     meeting_point,
     perpendiculars,

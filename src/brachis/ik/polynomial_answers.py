@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.arrays import cross
 from brachis.ik.displacement import Displacement
-from brachis.ik.vectors import angle_about, apply, apply_inverse, cross, dot, meeting_point, rotate
+from brachis.ik.vectors import angle_about, apply, apply_inverse, dot, meeting_point, rotate
 
 _SAME = 1e-6
 """Roots whose q_a and theta (rad) and p (relative) differ by less are the same."""

@@ -9,7 +9,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from brachis.ik.geometry import ChainGeometry
-from brachis.robot import TaskSpace
+from brachis.robot import TaskMap
 
 Kind = Literal["closed_form", "polynomial"]
 
@@ -36,7 +36,7 @@ class IKSolver(Protocol):
         Parameters
         ----------
         targets : (K, c) ndarray
-            Task coordinates; see `TaskSpace` (for poses c = 12: position, then the rotation matrix row by row).
+            Task coordinates; see `TaskMap` (for poses c = 12: position, then the rotation matrix row by row).
         q_r : (K, r) ndarray
             Redundant joints, chain order.
 
@@ -71,7 +71,7 @@ class NotApplicableError(Exception):
     """A family does not fit a decomposition; the message is the reason, shown to the user."""
 
 
-Build = Callable[[ChainGeometry, TaskSpace, tuple[int, ...]], IKSolver]
+Build = Callable[[ChainGeometry, TaskMap, tuple[int, ...]], IKSolver]
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,11 @@
 
 from brachis.kinematics.decomposition import Decomposition, JointDerivatives, JointState
 from brachis.kinematics.interpolation import Nodes, interpolate
-from brachis.kinematics.task_kinematics import TaskDerivatives, TaskKinematics
 
 __all__ = [
     "Decomposition",
     "JointDerivatives",
     "JointState",
     "Nodes",
-    "TaskDerivatives",
-    "TaskKinematics",
     "interpolate",
 ]

@@ -11,10 +11,10 @@ from brachis.errors import PathError, UnknownNameError
 from brachis.path.pose import POSITIONS, PosePath, rotations
 from brachis.path.pose_segment import pose_curve
 from brachis.path.rotations import matrix, quaternion_of
-from brachis.path.rows import POSE_COORDINATES, ROWS, is_pose
 from brachis.path.sequence import join_curves
 from brachis.path.shapes import curve_of
 from brachis.path.site import Site
+from brachis.robot.task_map.rows import POSE_COORDINATES, POSE_ROWS, ROWS
 from brachis.task import TurnSegment
 
 if TYPE_CHECKING:
@@ -63,11 +63,11 @@ def build_path(segments: Sequence[Segment], start: Sequence[float] | Array, task
         raise PathError(problem, where="path")
     curves: list[Curve] = []
     for i, segment in enumerate(segments):
-        curve = pose_curve(segment, i, point) if is_pose(rows) else _row_curve(segment, i, point, rows)
+        curve = pose_curve(segment, i, point) if rows == POSE_ROWS else _row_curve(segment, i, point, rows)
         curves.append(curve)
         point = curve.derivatives(np.array([curve.length]), 0)[0, 0]
     path = join_curves(curves, [segment.blend for segment in segments], rows)
-    return PosePath(path) if is_pose(rows) else path
+    return PosePath(path) if rows == POSE_ROWS else path
 
 
 def _row_curve(segment: Segment, index: int, start: Array, rows: tuple[str, ...]) -> Curve:
@@ -86,7 +86,7 @@ def _row_curve(segment: Segment, index: int, start: Array, rows: tuple[str, ...]
 
 def _checked_start(start: Sequence[float] | Array, rows: tuple[str, ...]) -> Array:
     point = np.array(start, dtype=float)
-    if is_pose(rows):
+    if rows == POSE_ROWS:
         return _checked_pose(point)
     for row in rows:
         if row not in ROWS:

@@ -9,8 +9,8 @@ import numpy as np
 
 from brachis.errors import PathError
 from brachis.path.pose import POSITIONS, twist
-from brachis.path.rows import is_pose, position_rows
 from brachis.path.site import place, stands_still
+from brachis.robot.task_map.rows import POSE_ROWS, position_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,7 +51,7 @@ class Join:
     @property
     def oriented(self) -> bool:
         """Whether poses are joined."""
-        return is_pose(self.rows)
+        return self.rows == POSE_ROWS
 
     @property
     def where(self) -> str:

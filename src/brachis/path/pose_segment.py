@@ -11,10 +11,10 @@ from brachis.path.line import LineCurve
 from brachis.path.orientation import orientation_along
 from brachis.path.pose import POSITIONS, PoseCurve, rotations
 from brachis.path.pose_spline import pose_spline
-from brachis.path.rows import AXES
 from brachis.path.shapes import curve_of
 from brachis.path.site import ZERO_LENGTH, Site
 from brachis.path.turns import turn_of
+from brachis.robot.task_map.rows import AXES
 from brachis.task import SplineThrough, TurnSegment
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from brachis.path.blend import blend
 from brachis.path.joins import corner_at, find_joins, refuse_corners
 from brachis.path.protocol import PathSample
-from brachis.path.rows import position_rows
+from brachis.robot.task_map.rows import position_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
