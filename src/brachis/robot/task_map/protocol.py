@@ -41,6 +41,8 @@ class TaskMap(ABC):
     robot : Robot
     rows : tuple of str
         Names of the m rows, those of the position (m) first, then the angles (rad).
+    axes : tuple of int
+        World axes (0, 1, 2) of the position rows.
     """
 
     frame: ClassVar[pin.ReferenceFrame]
@@ -48,10 +50,12 @@ class TaskMap(ABC):
 
     robot: Robot
     rows: tuple[str, ...]
+    axes: tuple[int, ...] = field(init=False)
     _data: pin.Data = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Make the workspace."""
+        """Look the axes up, and make a workspace."""
+        object.__setattr__(self, "axes", tuple(AXES.index(row) for row in position_rows(self.rows)))
         object.__setattr__(self, "_data", self.robot.model.createData())
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -62,11 +66,6 @@ class TaskMap(ABC):
     def m(self) -> int:
         """Number of rows."""
         return len(self.rows)
-
-    @property
-    def axes(self) -> tuple[int, ...]:
-        """World axes (0, 1, 2) of the position rows."""
-        return tuple(AXES.index(row) for row in position_rows(self.rows))
 
     @property
     def units(self) -> tuple[str, ...]:
