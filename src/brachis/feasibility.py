@@ -18,33 +18,31 @@ _SAME_POSTURE = 1e-5
 
 
 def check_postures(
-    robot: Robot,
+    task_map: TaskMap,
     limits: Sequence[Limit],
     start: np.ndarray | None,
     end: np.ndarray | None,
     path: Path,
-    task_map: TaskMap,
 ) -> None:
     """Refuse start and end postures out of range, beyond a limit that holds at rest, or off the path.
 
     Parameters
     ----------
-    robot : Robot
+    task_map : TaskMap
     limits : sequence of Limit
     start, end : (n,) ndarray or None
         None where free.
     path : Path
-    task_map : TaskMap
 
     Raises
     ------
     StartError
     """
     if start is not None:
-        _check_range(robot, start, "start")
+        _check_range(task_map.robot, start, "start")
         _check_at_rest(limits, start, "start")
     if end is not None:
-        _check_range(robot, end, "end")
+        _check_range(task_map.robot, end, "end")
         _check_at_rest(limits, end, "end")
         check_on_path(task_map, end, path.sample(np.array([1.0])).target[0], "end")
 
@@ -84,9 +82,7 @@ def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str) -> N
             )
 
 
-def branch_of(
-    robot: Robot, task_map: TaskMap, match: Match, posture: np.ndarray, wanted: str, *, name: str = "start"
-) -> int:
+def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, wanted: str, *, name: str = "start") -> int:
     """Index of the closed form's branch on which the given posture, at the path's start or end, lies.
 
     Raises
@@ -99,7 +95,7 @@ def branch_of(
     branches = match.solver.branches
     if wanted != "auto" and wanted not in branches:
         raise UnknownNameError("branch", wanted, dict.fromkeys(branches), where="branch")
-    branch = _branch_of(robot, task_map, match, posture, name)
+    branch = _branch_of(task_map, match, posture, name)
     if wanted != "auto" and branches[branch] != wanted:
         raise StartError(
             f"the {name} posture is on another branch",
@@ -111,14 +107,14 @@ def branch_of(
     return branch
 
 
-def check_end_branch(robot: Robot, task_map: TaskMap, match: Match, end: np.ndarray, branch: int) -> None:
+def check_end_branch(task_map: TaskMap, match: Match, end: np.ndarray, branch: int) -> None:
     """Refuse an end posture on another branch than the start posture's.
 
     Raises
     ------
     StartError
     """
-    found = _branch_of(robot, task_map, match, end, "end")
+    found = _branch_of(task_map, match, end, "end")
     if match.solver.branches[found] != match.solver.branches[branch]:
         raise StartError(
             "the end posture is on another branch than the start posture",
@@ -129,9 +125,9 @@ def check_end_branch(robot: Robot, task_map: TaskMap, match: Match, end: np.ndar
         )
 
 
-def _branch_of(robot: Robot, task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -> int:
+def _branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -> int:
     """Index of the branch in whose inside a posture lies."""
-    solver = match.solver
+    robot, solver = task_map.robot, match.solver
     redundant = [robot.joint_names.index(joint) for joint in match.redundant_joints]
     rest = [i for i in range(robot.n) if i not in redundant]
     target = task_map.value(posture)

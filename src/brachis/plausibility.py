@@ -94,7 +94,6 @@ def of_robot(robot: Robot) -> tuple[Remark, ...]:
 
 
 def of_places(
-    robot: Robot,
     task_map: TaskMap,
     start: np.ndarray | None,
     end: np.ndarray | None,
@@ -104,14 +103,13 @@ def of_places(
 
     Parameters
     ----------
-    robot : Robot
     task_map : TaskMap
     start, end : (n,) ndarray or None
         Postures, None where free.
     path_start : sequence of float or None
         As in the task.
     """
-    remarks = []
+    remarks, robot = [], task_map.robot
     for key, posture in (("start.joints", start), ("end.joints", end)):
         given = np.zeros(robot.n) if posture is None else posture
         for name, unit, value in zip(robot.joint_names, robot.position_units, given, strict=True):
@@ -142,9 +140,9 @@ def position_hint(value: float, lower: float, upper: float, unit: str) -> str | 
     return None
 
 
-def path_hint(robot: Robot, task_map: TaskMap, targets: np.ndarray) -> str | None:
+def path_hint(task_map: TaskMap, targets: np.ndarray) -> str | None:
     """Say that targets, (K, c), far out of reach look like mm, if they would be about within reach so."""
-    axes = list(task_map.axes)
+    robot, axes = task_map.robot, list(task_map.axes)
     base = np.array(robot.model.jointPlacements[1].translation)[axes]
     away = float(np.linalg.norm(targets[:, : len(axes)] - base, axis=1).max())
     reach = _reach(robot)

@@ -69,7 +69,7 @@ class Setting:
         end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
         path = path_of(task_map, task)
         limits = limits_of(robot, task, further)
-        check_postures(robot, limits, start, end, path, task_map)
+        check_postures(task_map, limits, start, end, path)
         return cls(task, robot, task_map, path, start, end, limits, tuple(further))
 
 
@@ -110,7 +110,7 @@ class Choice:
         """Put robot, path and closed form together for a motion that begins at, or near, `start`, (n,)."""
         given = self.setting
         solver = self.match.solver
-        return Decomposition(given.robot, given.task_map, given.path, solver, self.redundant, branch, start)
+        return Decomposition(given.task_map, given.path, solver, self.redundant, branch, start)
 
 
 def choices(setting: Setting, families: Sequence[ik.Family] = ()) -> list[Choice]:
@@ -139,7 +139,7 @@ def choices(setting: Setting, families: Sequence[ik.Family] = ()) -> list[Choice
     """
     task, robot, task_map = setting.task, setting.robot, setting.task_map
     if task.redundant_joints != "auto":
-        wanted = _with_roll(robot, task_map, task.redundant_joints)
+        wanted = _with_roll(task_map, task.redundant_joints)
         return [_choice(setting, ik.find(robot, task_map, wanted, families=families))]
     found = ik.find_all(robot, task_map, families=families)
     matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
@@ -164,8 +164,9 @@ def choices(setting: Setting, families: Sequence[ik.Family] = ()) -> list[Choice
     return sorted(allowed, key=lambda choice: (choice.match.solver.kind != "closed_form", -choice.room))
 
 
-def _with_roll(robot: Robot, task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
+def _with_roll(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
     """Add the free roll where it is the one redundant joint that is left out."""
+    robot = task_map.robot
     missing = robot.n - task_map.m - len(names)
     return (*names, ROLL_JOINT) if robot.rolls_freely and missing == 1 and ROLL_JOINT not in names else names
 
@@ -176,12 +177,12 @@ def _choice(setting: Setting, match: ik.Match) -> Choice:
     redundant = tuple(robot.joint_names.index(name) for name in match.redundant_joints)
     labels = match.solver.branches
     if setting.start is not None:
-        branch = branch_of(robot, task_map, match, setting.start, wanted)
+        branch = branch_of(task_map, match, setting.start, wanted)
         if setting.end is not None:
-            check_end_branch(robot, task_map, match, setting.end, branch)
+            check_end_branch(task_map, match, setting.end, branch)
         return Choice(setting, match, redundant, (branch,))
     if setting.end is not None:
-        branch = branch_of(robot, task_map, match, setting.end, wanted, name="end")
+        branch = branch_of(task_map, match, setting.end, wanted, name="end")
         return Choice(setting, match, redundant, (branch,))
     if wanted != "auto" and wanted not in labels:
         raise UnknownNameError("branch", wanted, dict.fromkeys(labels), where="branch")

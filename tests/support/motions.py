@@ -25,10 +25,10 @@ def decomposition(
     task = load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": list(rows), "path": list(path)})
     curve = build_path(task.path, space.value(start), space.rows)
     candidate = find(robot, space, redundant)
-    branch = branch_of(robot, space, candidate, start, "auto")
+    branch = branch_of(space, candidate, start, "auto")
     indices = tuple(robot.joint_names.index(name) for name in candidate.redundant_joints)
     assert candidate.solver is not None
-    return Decomposition(robot, space, curve, candidate.solver, indices, branch, start)
+    return Decomposition(space, curve, candidate.solver, indices, branch, start)
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ def check_answers(
     if not len(q):
         raise NotApplicableError("no random posture is inside a branch")
     rest = [i for i in range(robot.n) if i not in redundant]
-    targets = task_map.values(q)
+    targets = task_map.of_placements(*robot.tool_placements(q))
     answers = solver.solve(targets, q[:, list(redundant)])
     expected = (len(q), len(solver.branches), len(rest))
     if answers.shape != expected:
@@ -60,7 +60,7 @@ def check_answers(
     sample, branch = np.nonzero(np.all(np.isfinite(answers), axis=2))
     reached = q[sample]
     reached[:, rest] = answers[sample, branch]
-    miss = np.abs(task_map.difference(task_map.values(reached), targets[sample])).max()
+    miss = np.abs(task_map.difference(task_map.of_placements(*robot.tool_placements(reached)), targets[sample])).max()
     if not miss < _POSE_TOLERANCE:
         raise NotApplicableError(f"its answers miss the target by {miss:.1e}")
 

@@ -26,7 +26,7 @@ import numpy as np
 from brachis.errors import UnreachableError
 from brachis.ik import ChainGeometry, IKSolver, Polished
 from brachis.path import Path, PathSample
-from brachis.robot import Robot, TaskMap
+from brachis.robot import TaskMap
 
 _TURN = 2.0 * np.pi
 _SURE = 0.25
@@ -82,8 +82,8 @@ class Decomposition:
 
     Parameters
     ----------
-    robot : Robot
     task_map : TaskMap
+        Of the robot.
     path : Path
     solver : IKSolver
     redundant : tuple of int
@@ -96,7 +96,6 @@ class Decomposition:
 
     def __init__(
         self,
-        robot: Robot,
         task_map: TaskMap,
         path: Path,
         solver: IKSolver,
@@ -104,7 +103,7 @@ class Decomposition:
         branch: int,
         start: np.ndarray,
     ) -> None:
-        self.robot = robot
+        self.robot = robot = task_map.robot
         self.task_map = task_map
         self.path = path
         self.solver = solver
