@@ -12,7 +12,7 @@ from brachis.path.pose import POSITIONS, PosePath, rotations
 from brachis.path.pose_blend import blend_poses
 from brachis.path.pose_joins import pose_corner
 from brachis.path.pose_segment import pose_curve
-from brachis.path.rotations import rotation_of
+from brachis.path.rotations import matrices, quaternions_of, rotation_of
 from brachis.robot.task_map.rows import AXES, POSE_COORDINATES
 
 if TYPE_CHECKING:
@@ -41,7 +41,8 @@ class PoseCoordinates:
         if stretch > 2.0 * _ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:
             problem = "the start of the path has no rotation matrix"
             raise PathError(problem, found=rotation.tolist(), allowed=allowed, where="start")
-        return np.concatenate([start[:POSITIONS], rotation_of(rotation).as_matrix().ravel()])
+        nearest = matrices(quaternions_of(rotation_of(rotation))[None])[0]
+        return np.concatenate([start[:POSITIONS], nearest.ravel()])
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
         """See `Coordinates.curve`."""
