@@ -31,8 +31,9 @@ import numpy as np
 import pinocchio as pin
 
 import random_poses
-from brachis import PlausibilityWarning, Robot, TaskSpace, ik, plan
+from brachis import PlausibilityWarning, Robot, ik, plan
 from brachis.errors import BrachisError
+from brachis.robot import task_map_of
 
 ROOT = Path(__file__).parents[1]
 ROBOTS = ("scara3", "gantry2", "tx90l_rail", "ur10_rail", "iiwa14", "panda")
@@ -345,7 +346,7 @@ def _random_path(rng: np.random.Generator, robot: Robot, course: np.ndarray, spa
 def _closed_forms(name: str) -> list[ik.Candidate]:
     """Choices of redundant joints of a robot that have a closed form, whatever its limits."""
     robot = Robot.from_urdf(urdf_of(name), tool_frame=TOOLS.get(name))
-    found = ik.find_all(robot, TaskSpace.of(robot, SPACES.get(name, "pose")))
+    found = ik.find_all(robot, task_map_of(robot, SPACES.get(name, "pose")))
     return [c for c in found if c.solver is not None and c.solver.kind == "closed_form"]
 
 

@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from brachis import BrachisError, Robot, TaskSpace, ik, plan
-from brachis.robot import dynamics
+from brachis import BrachisError, Robot, ik, plan
+from brachis.robot import dynamics, task_map_of
 
 ROOT = Path(__file__).parents[1]
 REACH = 0.5  # rad and m
@@ -48,7 +48,7 @@ def robots() -> dict[str, Robot]:
 
 def closed_forms(robot: Robot) -> list[ik.Candidate]:
     """Choices of redundant joints that have a closed form for poses."""
-    found = ik.find_all(robot, TaskSpace.of(robot, "pose"))
+    found = ik.find_all(robot, task_map_of(robot, "pose"))
     return [c for c in found if c.solver is not None and c.solver.kind == "closed_form"]
 
 

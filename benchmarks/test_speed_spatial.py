@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brachis import Robot, TaskSpace, ik, load_task, plan, transcribe
+from brachis import Robot, ik, load_task, plan, transcribe
 from brachis.ik.eaik import eaik
 from brachis.nlp.guess import starting_point
 from brachis.nlp.numeric_course import numeric_courses
+from brachis.robot import task_map_of
 from brachis.solvers import SolverOptions, solver_named
 
 ROOT = Path(__file__).parents[1]
@@ -70,16 +71,16 @@ def test_evaluation(benchmark, tx90l, task, part):
     benchmark.pedantic(lambda: program.rows(x) if part == "rows" else program.jacobian(x), setup=another, rounds=200)
 
 
-def poses(robot, task_space):
+def poses(robot, task_map):
     """Random postures, and the poses that they reach."""
     q = np.random.default_rng(0).uniform(-1.5, 1.5, (POSES, robot.n))
-    return q, task_space.values(*robot.tool_placements(q))
+    return q, task_map.values(q)
 
 
 @pytest.mark.parametrize("joint", ["rail", "joint_1", "joint_2", "joint_3"])
 def test_spherical_wrist(benchmark, tx90l, joint):
     """A batch of 2000 poses, all branches."""
-    space = TaskSpace.of(tx90l, "pose")
+    space = task_map_of(tx90l, "pose")
     match = ik.find(tx90l, space, [joint])
     q, targets = poses(tx90l, space)
     benchmark(match.solver.solve, targets, q[:, [tx90l.joint_names.index(joint)]])
@@ -87,7 +88,7 @@ def test_spherical_wrist(benchmark, tx90l, joint):
 
 def test_eaik(benchmark, tx90l):
     """The same with EAIK, rail redundant: constant geometry."""
-    space = TaskSpace.of(tx90l, "pose")
+    space = task_map_of(tx90l, "pose")
     solver = eaik.build(ik.ChainGeometry.of(tx90l), space, (0,))
     q, targets = poses(tx90l, space)
     benchmark(solver.solve, targets, q[:, [0]])

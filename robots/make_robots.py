@@ -16,7 +16,7 @@ from typing import Any
 import yaml
 from lxml import etree
 
-from brachis.compose import elements, on_rail
+from brachis.compose import Rail, elements, on_rail
 from brachis.compose.elements import Element
 
 ROBOTS = Path(__file__).parent
@@ -65,16 +65,15 @@ def ur10_rail() -> str:
     if folder is None:
         message = "example-robot-data is not installed"
         raise FileNotFoundError(message)
-    rail = figures["rail"]
-    text = on_rail(
-        folder / figures["arm"],
-        axis=rail["axis"],
-        range=rail["range_m"],
-        velocity=rail["max_speed_m_s"],
-        force=rail["max_force_n"],
-        mass=rail["carriage_mass"],
-        meshes=False,
+    given = figures["rail"]
+    rail = Rail(
+        axis=given["axis"],
+        range=given["range_m"],
+        velocity=given["max_speed_m_s"],
+        force=given["max_force_n"],
+        mass=given["carriage_mass"],
     )
+    text = on_rail(folder / figures["arm"], rail, meshes=False)
     element = etree.fromstring(text, etree.XMLParser(remove_blank_text=True, remove_comments=True))
     element.set("name", figures["robot"])
     for tag in ("gazebo", "transmission"):

@@ -1,13 +1,23 @@
-"""The rule that no stage imports one to its right, and that importing brachis stays quick."""
+"""The rules of the structure: what may import what, that importing brachis stays quick, and who names kinds of limits.
+
+Each test collects all that breaks its rule.
+"""
 
 from __future__ import annotations
 
 import ast
 import subprocess
 import sys
+from collections.abc import Iterator, Mapping
+from collections.abc import Set as AbstractSet
+from functools import cache
 from pathlib import Path
 
 import pytest
+
+import brachis
+import brachis.limits
+import brachis.verify.limits
 
 SOURCE = Path(__file__).parents[1] / "src/brachis"
 
@@ -47,53 +57,70 @@ ORDER = (
     "cli",
 )
 VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "limits", "bspline", "nlp", "solvers", "refine", "mesh"}
+MAY_NAME_KINDS = ("limits", "verify/limits", "task", "robot")
 HEAVY = {"matplotlib", "viser", "yourdfpy", "unopy", "ipyopt"}
+MOST_LINES = 400
 
 
-def stage_of(path: Path) -> str:
-    relative = path.relative_to(SOURCE)
-    return relative.parts[0] if len(relative.parts) > 1 else relative.stem
+def module_of(path: Path) -> str:
+    parts = ("brachis", *path.relative_to(SOURCE).with_suffix("").parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def imports_of(path: Path, *, top_level_only: bool = False) -> set[str]:
-    """Dotted names of the modules that a file imports."""
-    tree = ast.parse(path.read_text())
-    typing_only = {
-        id(inner)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
-        for inner in ast.walk(node)
-    }
-    names: set[str] = set()
-    for node in tree.body if top_level_only else ast.walk(tree):
-        if id(node) in typing_only:
+FILES = {module_of(path): path for path in sorted(SOURCE.rglob("*.py"))}
+STAGED = {module: path for module, path in FILES.items() if module not in {"brachis", "brachis.__main__"}}
+
+
+def stage_of(module: str) -> str:
+    return module.split(".")[1]
+
+
+@cache
+def tree_of(module: str) -> ast.Module:
+    return ast.parse(FILES[module].read_text())
+
+
+def only_for_types(tree: ast.Module) -> set[ast.AST]:
+    """Nodes under ``if TYPE_CHECKING``."""
+    tests = [node for node in ast.walk(tree) if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
+    return {inner for node in tests for inner in ast.walk(node)}
+
+
+@cache
+def imports_of(module: str, *, top_level: bool = False, types: bool = False) -> frozenset[str]:
+    """Dotted names of the modules that a module imports; of a package's names the package."""
+    tree, names = tree_of(module), set()
+    skipped = set() if types else only_for_types(tree)
+    for node in tree.body if top_level else ast.walk(tree):
+        if node in skipped:
             continue
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            names |= {f"{node.module}.{alias.name}" for alias in node.names} | {str(node.module)}
-    return names
+            assert node.level == 0
+            assert node.module
+            whole = {f"{node.module}.{alias.name}" for alias in node.names}
+            names |= {name if name in FILES else node.module for name in whole}
+    return frozenset(names)
 
 
-def stages_imported(path: Path) -> set[str]:
-    parts = (name.split(".") for name in imports_of(path))
-    return {part[1] for part in parts if part[0] == "brachis" and len(part) > 1}
-
-
-FILES = sorted(SOURCE.rglob("*.py"))
-STAGED = [path for path in FILES if stage_of(path) not in {"__init__", "__main__"}]
+@cache
+def stages_imported(module: str) -> frozenset[str]:
+    return frozenset(stage_of(name) for name in imports_of(module) if name.startswith("brachis."))
 
 
 def test_every_module_belongs_to_a_stage():
     assert len(STAGED) > 50
-    assert {stage_of(path) for path in STAGED} == set(ORDER)
+    assert {stage_of(module) for module in STAGED} == set(ORDER)
 
 
-@pytest.mark.parametrize("path", STAGED, ids=lambda path: str(path.relative_to(SOURCE)))
-def test_no_stage_imports_one_to_its_right(path):
-    own = stage_of(path)
-    later = set(ORDER[ORDER.index(own) + 1 :])
-    assert not stages_imported(path) & later
+def test_no_stage_imports_one_to_its_right():
+    assert [
+        f"{module} imports {stage}"
+        for module in STAGED
+        for stage in ORDER[ORDER.index(stage_of(module)) + 1 :]
+        if stage in stages_imported(module)
+    ] == []
 
 
 def test_verification_shares_no_code_with_the_optimiser():
@@ -102,15 +129,73 @@ def test_verification_shares_no_code_with_the_optimiser():
     while waiting:
         stage = waiting.pop()
         reached.add(stage)
-        files = [path for path in STAGED if stage_of(path) == stage]
-        waiting |= set().union(*(stages_imported(path) for path in files)) & set(ORDER) - reached
-    assert {"robot", "path", "trajectory"} <= reached
+        waiting |= set().union(*(stages_imported(module) for module in STAGED if stage_of(module) == stage)) - reached
+    assert {"robot", "path", "trajectory", "custom_limits"} <= reached
     assert not reached & VERIFY_MUST_NOT_REACH
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(SOURCE)))
-def test_heavy_libraries_are_imported_where_used(path):
-    assert not {name.split(".")[0] for name in imports_of(path, top_level_only=True)} & HEAVY
+def in_circles(graph: Mapping[str, AbstractSet[str]]) -> list[str]:
+    """Nodes that lie on a circle, or between two."""
+    left = dict(graph)
+    while left:
+        ends = {node for node, others in left.items() if not others & set(left)}
+        starts = set(left) - set().union(*left.values())
+        if not ends | starts:
+            break
+        left = {node: others for node, others in left.items() if node not in ends | starts}
+    return sorted(left)
+
+
+def test_circles_are_found():
+    assert in_circles({"a": {"b"}, "b": {"c"}, "c": set()}) == []
+    assert in_circles({"a": {"b"}, "b": {"c"}, "c": {"b", "d"}, "d": set()}) == ["b", "c"]
+
+
+def test_no_package_has_an_import_circle_between_its_files():
+    """Not for the sake of types either."""
+    found = []
+    for stage in ORDER:
+        own = {module for module in STAGED if stage_of(module) == stage}
+        found += in_circles({module: imports_of(module, types=True) & own - {module} for module in own})
+    assert found == []
+
+
+def test_every_kind_of_limit_is_checked_by_the_verification():
+    checked = {kind.replace(" ", "_") for kind in brachis.verify.limits.TABLE}
+    assert len(brachis.limits.TABLE) >= 5
+    assert set(brachis.limits.TABLE) <= checked
+
+
+def words_compared(tree: ast.Module) -> Iterator[tuple[int, object]]:
+    """Lines and constants that are compared with something, or are among what something is looked for in."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Compare):
+            for side in (node.left, *node.comparators):
+                listed = side.elts if isinstance(side, ast.Tuple | ast.List | ast.Set) else [side]
+                yield from ((node.lineno, each.value) for each in listed if isinstance(each, ast.Constant))
+        elif isinstance(node, ast.MatchValue) and isinstance(node.value, ast.Constant):
+            yield node.value.lineno, node.value.value
+
+
+def test_nobody_asks_for_a_kind_of_limit():
+    kinds = {name for kind in brachis.limits.TABLE for name in (kind, kind.replace("_", " "))}
+    assert (1, "torque") in words_compared(ast.parse("limit.kind in ('jerk', 'torque')"))
+    assert [
+        f"{path.relative_to(SOURCE)}:{line}: {word!r}"
+        for module, path in FILES.items()
+        if not path.relative_to(SOURCE).as_posix().startswith(tuple(f"{folder}/" for folder in MAY_NAME_KINDS))
+        for line, word in words_compared(tree_of(module))
+        if word in kinds
+    ] == []
+
+
+def test_heavy_libraries_are_imported_where_used():
+    assert [
+        f"{module} imports {name}"
+        for module in FILES
+        for name in imports_of(module, top_level=True)
+        if name.split(".")[0] in HEAVY
+    ] == []
 
 
 @pytest.mark.parametrize(
@@ -123,8 +208,6 @@ def test_importing_loads_no_heavy_library(statement):
 
 
 def test_public_names_exist():
-    import brachis  # noqa: PLC0415
-
     for name in brachis.__all__:
         assert getattr(brachis, name) is not None
     assert callable(brachis.plan)
@@ -133,6 +216,6 @@ def test_public_names_exist():
         _ = brachis.nothing
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(SOURCE)))
-def test_modules_stay_small(path):
-    assert len(path.read_text().splitlines()) <= 400
+def test_modules_stay_small():
+    lines = {module: len(path.read_text().splitlines()) for module, path in FILES.items()}
+    assert {module: count for module, count in lines.items() if count > MOST_LINES} == {}

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from brachis.result import Result as Result
     from brachis.robot import LimitSpec as LimitSpec
     from brachis.robot import Robot as Robot
-    from brachis.robot import TaskSpace as TaskSpace
+    from brachis.robot import TaskMap as TaskMap
+    from brachis.robot import task_map_of as task_map_of
     from brachis.task import Task as Task
     from brachis.task import load_task as load_task
     from brachis.trajectory import Trajectory as Trajectory
@@ -43,11 +44,12 @@ _HOME = {
     "Result": "brachis.result",
     "Robot": "brachis.robot",
     "Task": "brachis.task",
-    "TaskSpace": "brachis.robot",
+    "TaskMap": "brachis.robot",
     "Trajectory": "brachis.trajectory",
     "Verification": "brachis.verify",
     "load_task": "brachis.task",
     "plan": "brachis.planner",
+    "task_map_of": "brachis.robot",
     "transcribe": "brachis.planner",
     "verify_trajectory": "brachis.verify",
 }
@@ -63,7 +65,7 @@ __all__ = [
     "Result",
     "Robot",
     "Task",
-    "TaskSpace",
+    "TaskMap",
     "Trajectory",
     "Verification",
     "__version__",
@@ -71,6 +73,7 @@ __all__ = [
     "compose",
     "load_task",
     "plan",
+    "task_map_of",
     "transcribe",
     "verify_trajectory",
 ]

@@ -11,42 +11,40 @@ from brachis.ik import Match
 from brachis.limits import Limit, Moments
 from brachis.path import Path, check_on_path
 from brachis.plausibility import position_hint
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, TaskMap
 
 _RANGE_SLACK = 1e-9
 _SAME_POSTURE = 1e-5
 
 
 def check_postures(
-    robot: Robot,
+    task_map: TaskMap,
     limits: Sequence[Limit],
     start: np.ndarray | None,
     end: np.ndarray | None,
     path: Path,
-    task_space: TaskSpace,
 ) -> None:
     """Refuse start and end postures out of range, beyond a limit that holds at rest, or off the path.
 
     Parameters
     ----------
-    robot : Robot
+    task_map : TaskMap
     limits : sequence of Limit
     start, end : (n,) ndarray or None
         None where free.
     path : Path
-    task_space : TaskSpace
 
     Raises
     ------
     StartError
     """
     if start is not None:
-        _check_range(robot, start, "start")
+        _check_range(task_map.robot, start, "start")
         _check_at_rest(limits, start, "start")
     if end is not None:
-        _check_range(robot, end, "end")
+        _check_range(task_map.robot, end, "end")
         _check_at_rest(limits, end, "end")
-        check_on_path(robot, task_space, end, path.sample(np.array([1.0])).target[0], "end")
+        check_on_path(task_map, end, path.sample(np.array([1.0])).target[0], "end")
 
 
 def _check_range(robot: Robot, posture: np.ndarray, name: str) -> None:
@@ -88,9 +86,7 @@ def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str) -> N
             )
 
 
-def branch_of(
-    robot: Robot, task_space: TaskSpace, match: Match, posture: np.ndarray, wanted: str, *, name: str = "start"
-) -> int:
+def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, wanted: str, *, name: str = "start") -> int:
     """Index of the closed form's branch on which the given posture, at the path's start or end, lies.
 
     Raises
@@ -103,7 +99,7 @@ def branch_of(
     branches = match.solver.branches
     if wanted != "auto" and wanted not in branches:
         raise UnknownNameError("branch", wanted, branches, where="branch")
-    branch = _branch_of(robot, task_space, match, posture, name)
+    branch = _branch_of(task_map, match, posture, name)
     if wanted != "auto" and branches[branch] != wanted:
         raise StartError(
             f"the {name} posture is on another branch",
@@ -115,14 +111,14 @@ def branch_of(
     return branch
 
 
-def check_end_branch(robot: Robot, task_space: TaskSpace, match: Match, end: np.ndarray, branch: int) -> None:
+def check_end_branch(task_map: TaskMap, match: Match, end: np.ndarray, branch: int) -> None:
     """Refuse an end posture on another branch than the start posture's.
 
     Raises
     ------
     StartError
     """
-    found = _branch_of(robot, task_space, match, end, "end")
+    found = _branch_of(task_map, match, end, "end")
     if found != branch:
         raise StartError(
             "the end posture is on another branch than the start posture",
@@ -133,12 +129,12 @@ def check_end_branch(robot: Robot, task_space: TaskSpace, match: Match, end: np.
         )
 
 
-def _branch_of(robot: Robot, task_space: TaskSpace, match: Match, posture: np.ndarray, name: str) -> int:
+def _branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -> int:
     """Index of the branch in whose inside a posture lies."""
-    solver = match.solver
+    robot, solver = task_map.robot, match.solver
     redundant = [robot.joint_names.index(joint) for joint in match.redundant_joints]
     rest = [i for i in range(robot.n) if i not in redundant]
-    target = task_space.value(robot.tool_placement(posture))
+    target = task_map.value(posture)
     answers = solver.solve(target[None], posture[None, redundant])[0]
     units = np.array(robot.position_units)[rest]
     gap = answers - posture[rest]

@@ -120,7 +120,7 @@ def _plan(
     loaded, deadline = time.perf_counter(), Deadline.after(task.search.time_limit)
     remarks = plausibility.tell(plausibility.of_robot(robot), strict=strict, stacklevel=4)
     setting = Setting.of(robot, task, limits)
-    places = plausibility.of_places(setting.robot, setting.task_space, setting.start, setting.end, task.path_start)
+    places = plausibility.of_places(setting.task_map, setting.start, setting.end, task.path_start)
     remarks += plausibility.tell(places, strict=strict, stacklevel=4)
     found = find_fastest(choices(setting, families), Stages(solved, finished), deadline, listener)
     best = found.best

@@ -10,7 +10,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from brachis.errors import PlausibilityError
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, TaskMap
+from brachis.robot.task_map.rows import YAW
 
 _TURN = 2.0 * math.pi
 _FASTEST = {"rad": 60.0, "m": 50.0}
@@ -93,8 +94,7 @@ def of_robot(robot: Robot) -> tuple[Remark, ...]:
 
 
 def of_places(
-    robot: Robot,
-    task_space: TaskSpace,
+    task_map: TaskMap,
     start: np.ndarray | None,
     end: np.ndarray | None,
     path_start: Sequence[float] | None,
@@ -103,21 +103,20 @@ def of_places(
 
     Parameters
     ----------
-    robot : Robot
-    task_space : TaskSpace
+    task_map : TaskMap
     start, end : (n,) ndarray or None
         Postures, None where free.
     path_start : sequence of float or None
         As in the task.
     """
-    remarks = []
+    remarks, robot = [], task_map.robot
     for key, posture in (("start.joints", start), ("end.joints", end)):
         given = np.zeros(robot.n) if posture is None else posture
         for name, unit, value in zip(robot.joint_names, robot.position_units, given, strict=True):
             if unit == "rad" and abs(value) > _FAR_POSTURE:
                 found = f"{value:.6g} rad"
                 remarks.append(Remark(f"{key}.{name}", "the position looks like degrees", found, "within two turns"))
-    if path_start is not None and task_space.yaw_axis is not None and abs(path_start[-1]) > _TURN:
+    if path_start is not None and YAW in task_map.rows and abs(path_start[-1]) > _TURN:
         found = f"{path_start[-1]:.6g} rad"
         remarks.append(Remark("path_start", "yaw looks like degrees", found, "within one turn"))
     return tuple(remarks)
@@ -141,9 +140,9 @@ def position_hint(value: float, lower: float, upper: float, unit: str) -> str | 
     return None
 
 
-def path_hint(robot: Robot, task_space: TaskSpace, targets: np.ndarray) -> str | None:
+def path_hint(task_map: TaskMap, targets: np.ndarray) -> str | None:
     """Say that targets, (K, c), far out of reach look like mm, if they would be about within reach so."""
-    axes = list(task_space.axes)
+    robot, axes = task_map.robot, list(task_map.axes)
     base = np.array(robot.model.jointPlacements[1].translation)[axes]
     away = float(np.linalg.norm(targets[:, : len(axes)] - base, axis=1).max())
     reach = _reach(robot)
@@ -152,9 +151,9 @@ def path_hint(robot: Robot, task_space: TaskSpace, targets: np.ndarray) -> str |
     return f"The path looks like mm: it is {away:.4g} m away from a robot that reaches about {reach:.3g} m"
 
 
-def place_hint(task_space: TaskSpace, place: np.ndarray, target: np.ndarray) -> str | None:
+def place_hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str | None:
     """Say that a target, (c,), looks like mm where the tool's place, (c,), is about there in m."""
-    axes = len(task_space.axes)
+    axes = len(task_map.axes)
     away = np.abs(place[:axes] - target[:axes] / _THOUSAND).max()
     near = away <= _ROUNDED and np.abs(place[:axes] - target[:axes]).max() > _ROUNDED
     return "The path looks like mm: divided by 1000 it is where the tool is" if near else None

@@ -17,7 +17,7 @@ from brachis.limits import Limit, limits_of
 from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Boundary, FixedGrid, Phase, Program
 from brachis.path import Path, path_of
-from brachis.robot import ROLL_JOINT, Robot, TaskSpace, bind
+from brachis.robot import ROLL_JOINT, Robot, TaskMap, bind
 from brachis.task import Task
 
 
@@ -30,7 +30,7 @@ class Setting:
     task : Task
     robot : Robot
         With the virtual roll joint where the tool may roll.
-    task_space : TaskSpace
+    task_map : TaskMap
     path : Path
     start, end : (n,) ndarray or None
         Postures, None where free.
@@ -41,7 +41,7 @@ class Setting:
 
     task: Task
     robot: Robot
-    task_space: TaskSpace
+    task_map: TaskMap
     path: Path
     start: np.ndarray | None
     end: np.ndarray | None
@@ -64,13 +64,13 @@ class Setting:
         InputError
             Task space, postures, path or a limit of the user's do not fit the robot.
         """
-        robot, task_space = bind(robot, task.task_space)
+        robot, task_map = bind(robot, task.task_space)
         start = None if task.start == "free" else robot.posture(task.start.joints, "start.joints")
         end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
-        path = path_of(robot, task_space, task)
+        path = path_of(task_map, task)
         limits = limits_of(robot, task, further)
-        check_postures(robot, limits, start, end, path, task_space)
-        return cls(task, robot, task_space, path, start, end, limits, tuple(further))
+        check_postures(task_map, limits, start, end, path)
+        return cls(task, robot, task_map, path, start, end, limits, tuple(further))
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Choice:
         """Put robot, path and closed form together for a motion that begins at, or near, `start`, (n,)."""
         given = self.setting
         solver = self.match.solver
-        return Decomposition(given.robot, given.task_space, given.path, solver, self.redundant, branch, start)
+        return Decomposition(given.task_map, given.path, solver, self.redundant, branch, start)
 
 
 def choices(setting: Setting, families: Sequence[ik.Family] = ()) -> list[Choice]:
@@ -137,15 +137,15 @@ def choices(setting: Setting, families: Sequence[ik.Family] = ()) -> list[Choice
     UnknownNameError
         There is no such joint or branch.
     """
-    task, robot, task_space = setting.task, setting.robot, setting.task_space
+    task, robot, task_map = setting.task, setting.robot, setting.task_map
     if task.redundant_joints != "auto":
-        wanted = _with_roll(robot, task_space, task.redundant_joints)
-        return [_choice(setting, ik.find(robot, task_space, wanted, families=families))]
-    found = ik.find_all(robot, task_space, families=families)
+        wanted = _with_roll(task_map, task.redundant_joints)
+        return [_choice(setting, ik.find(robot, task_map, wanted, families=families))]
+    found = ik.find_all(robot, task_map, families=families)
     matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
     if not matches:
         if len(found) <= 1:  # nothing to choose: the reasons of the only choice, or the wrong number of joints
-            return [_choice(setting, ik.find(robot, task_space, (), families=families))]
+            return [_choice(setting, ik.find(robot, task_map, (), families=families))]
         raise DecompositionError(
             "no choice of redundant joints has a closed form",
             redundant_joints=(),
@@ -164,24 +164,25 @@ def choices(setting: Setting, families: Sequence[ik.Family] = ()) -> list[Choice
     return sorted(allowed, key=lambda choice: (choice.match.solver.kind != "closed_form", -choice.room))
 
 
-def _with_roll(robot: Robot, task_space: TaskSpace, names: tuple[str, ...]) -> tuple[str, ...]:
+def _with_roll(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
     """Add the free roll where it is the one redundant joint that is left out."""
-    missing = robot.n - task_space.m - len(names)
+    robot = task_map.robot
+    missing = robot.n - task_map.m - len(names)
     return (*names, ROLL_JOINT) if robot.rolls_freely and missing == 1 and ROLL_JOINT not in names else names
 
 
 def _choice(setting: Setting, match: ik.Match) -> Choice:
     """Find the branches on which a motion may begin."""
-    robot, task_space, wanted = setting.robot, setting.task_space, setting.task.branch
+    robot, task_map, wanted = setting.robot, setting.task_map, setting.task.branch
     redundant = tuple(robot.joint_names.index(name) for name in match.redundant_joints)
     labels = match.solver.branches
     if setting.start is not None:
-        branch = branch_of(robot, task_space, match, setting.start, wanted)
+        branch = branch_of(task_map, match, setting.start, wanted)
         if setting.end is not None:
-            check_end_branch(robot, task_space, match, setting.end, branch)
+            check_end_branch(task_map, match, setting.end, branch)
         return Choice(setting, match, redundant, (branch,))
     if setting.end is not None:
-        branch = branch_of(robot, task_space, match, setting.end, wanted, name="end")
+        branch = branch_of(task_map, match, setting.end, wanted, name="end")
         return Choice(setting, match, redundant, (branch,))
     if wanted != "auto" and wanted not in labels:
         raise UnknownNameError("branch", wanted, labels, where="branch")

@@ -12,7 +12,7 @@ import pytest
 
 from brachis import Robot
 from brachis.cli.composition import split_vectors
-from brachis.compose import on_rail
+from brachis.compose import Rail, on_rail
 
 from .conftest import ROOT, SCARA
 
@@ -25,8 +25,7 @@ def test_writes_what_the_library_makes(run, tmp_path):
     options = ("--axis", "0", "0", "1", "--mount-xyz", "0.1", "-0.2", "0.3", "--mount-rpy-deg", "180", "0", "-90")
     outcome = run("compose", SCARA, *FIGURES, *options, "--name", "lift", "--root", "floor", "--out", out)
     assert (outcome.code, outcome.out, outcome.err) == (0, f"wrote {out}\n", "")
-    expected = on_rail(
-        SCARA,
+    rail = Rail(
         axis=(0, 0, 1),
         range=(-2, 2),
         velocity=2,
@@ -37,7 +36,7 @@ def test_writes_what_the_library_makes(run, tmp_path):
         name="lift",
         root="floor",
     )
-    assert out.read_text() == expected
+    assert out.read_text() == on_rail(SCARA, rail)
     robot = Robot.from_urdf(out)
     assert robot.joint_names == ("lift", "j1", "j2", "j3")
     np.testing.assert_array_equal(robot.limits.position_lower[0], -2.0)

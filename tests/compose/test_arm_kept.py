@@ -8,7 +8,7 @@ import pytest
 from lxml import etree
 
 from brachis import InputError, Robot
-from brachis.compose import on_rail
+from brachis.compose import Rail, on_rail
 
 from .conftest import RAIL, arm_text
 
@@ -57,7 +57,7 @@ def test_relative_meshes_are_found_from_the_new_file(meshed, tmp_path, folder):
     (tmp_path / "elsewhere/deep").mkdir(parents=True)
     (tmp_path / "link").symlink_to("elsewhere/deep")
     output = tmp_path / folder / "new.urdf"
-    text = on_rail(meshed, **RAIL, output=output)
+    text = on_rail(meshed, Rail(**RAIL), output=output)
     assert output.read_text() == text
     a, wood, package, absolute, d = files(text)
     assert (package, absolute) == ("package://arm_description/b.dae", "/opt/c.dae")
@@ -68,22 +68,22 @@ def test_relative_meshes_are_found_from_the_new_file(meshed, tmp_path, folder):
 
 def test_relative_meshes_become_absolute_without_a_file(meshed, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    a, wood, *_, d = files(on_rail(meshed.relative_to(tmp_path), **RAIL))
+    a, wood, *_, d = files(on_rail(meshed.relative_to(tmp_path), Rail(**RAIL)))
     assert [a, wood, d] == [str(tmp_path.resolve() / name) for name in ("arm/meshes/a.stl", "wood.png", "arm/d.stl")]
 
 
 def test_meshes_can_be_dropped(meshed):
-    text = on_rail(meshed, **RAIL, meshes=False)
+    text = on_rail(meshed, Rail(**RAIL), meshes=False)
     assert files(text) == []
     cover = parsed(text).find("link[@name='cover']")
     shapes = [each.find("geometry")[0].tag for each in cover]
     assert shapes == ["box", "sphere"]
-    assert files(on_rail(meshed, **RAIL)) != []
+    assert files(on_rail(meshed, Rail(**RAIL))) != []
 
 
 def test_the_rest_of_the_arm_is_kept_as_written(arm):
     arm.write_text(arm_text(more=OTHER))
-    robot = parsed(on_rail(arm, **RAIL))
+    robot = parsed(on_rail(arm, Rail(**RAIL)))
     before = parsed(arm.read_text())
     assert robot.get("name") == "chain_rail"
     for place in ("transmission", "ros2_control", "material", "gazebo[@reference='link1']", "joint[@name='grip']"):
@@ -98,7 +98,7 @@ def test_the_rest_of_the_arm_is_kept_as_written(arm):
 
 def test_root_link_with_a_name_of_its_own_keeps_it(arm):
     arm.write_text(arm_text().replace("'world'", "'stand'"))
-    robot = parsed(on_rail(arm, **RAIL))
+    robot = parsed(on_rail(arm, Rail(**RAIL)))
     links = {each.get("name") for each in robot.findall("link")}
     assert {"world", "rail_carriage", "stand"} <= links
     assert robot.find("joint[@name='rail_mount']/child").get("link") == "stand"
@@ -106,14 +106,14 @@ def test_root_link_with_a_name_of_its_own_keeps_it(arm):
 
 def test_robot_without_a_name_gets_that_of_its_file(arm):
     arm.write_text(arm_text().replace("<robot name='chain'>", "<robot>"))
-    assert parsed(on_rail(arm, **RAIL)).get("name") == "arm_rail"
+    assert parsed(on_rail(arm, Rail(**RAIL))).get("name") == "arm_rail"
 
 
 def test_text_in_other_scripts(arm):
     declared = '<?xml version="1.0" encoding="utf-8"?>\n<!-- Größe, 大きさ -->\n'
     arm.write_text(declared + arm_text(), encoding="utf-8")
     output = arm.with_name("new.urdf")
-    on_rail(arm, **RAIL, output=output)
+    on_rail(arm, Rail(**RAIL), output=output)
     assert "<!-- Größe, 大きさ -->\n<robot" in output.read_text(encoding="utf-8")
     assert Robot.from_urdf(output).n == 4
 
@@ -134,11 +134,11 @@ def test_name_clash_names_its_cure(arm, case):
     old, new, options, parameter, cure = CLASHES[case]
     arm.write_text(arm_text().replace(old, new))
     with pytest.raises(InputError) as caught:
-        on_rail(arm, **RAIL, **options)
+        on_rail(arm, Rail(**RAIL, **options))
     assert caught.value.where == parameter
     assert f"Choose another {parameter}" in str(caught.value)
     if old != new:
         assert new in str(caught.value)
         assert str(arm) in str(caught.value)
-    text = on_rail(arm, **RAIL, **(options | cure))
+    text = on_rail(arm, Rail(**RAIL, **(options | cure)))
     assert Robot.from_urdf("cured", urdf_text=text).n == 4

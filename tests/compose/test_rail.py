@@ -16,7 +16,7 @@ from lxml import etree
 
 import brachis
 from brachis import Robot
-from brachis.compose import on_rail, rail
+from brachis.compose import Rail, on_rail, rail
 from brachis.robot import dynamics
 
 from .conftest import RAIL, ROOT, arm_text
@@ -33,7 +33,7 @@ AXES = {"y": (0, 1, 0), "against x": (-1, 0, 0), "vertical": (0, 0, 2), "tilted"
 
 def robots(path, **options) -> tuple[Robot, Robot]:
     """The arm, and the arm on the rail."""
-    text = on_rail(path, **(RAIL | options))
+    text = on_rail(path, Rail(**(RAIL | options)))
     return Robot.from_urdf(path), Robot.from_urdf("composed", urdf_text=text)
 
 
@@ -109,7 +109,9 @@ def test_gravity_asks_the_same_of_an_upright_arm_and_the_contrary_of_an_inverted
 
 
 def test_carriage_is_a_solid_box_below_the_arm(arm):
-    text = on_rail(arm, **RAIL, mount_xyz=(1.0, 0.0, 0.5), mount_rpy=(pi, 0.0, 0.0), carriage_size=(0.6, 0.2, 0.1))
+    text = on_rail(
+        arm, Rail(**RAIL, mount_xyz=(1.0, 0.0, 0.5), mount_rpy=(pi, 0.0, 0.0), carriage_size=(0.6, 0.2, 0.1))
+    )
     model = pin.buildModelFromXML(text)
     # Pinocchio joins the base to the carriage; taken away, the box is left.
     base = pin.Inertia(7.0, np.array([0.01, 0.02, 0.1]), np.diag([0.1, 0.1, 0.05]))
@@ -123,15 +125,15 @@ def test_carriage_is_a_solid_box_below_the_arm(arm):
 
 @pytest.mark.parametrize("length", [5.0, 5e-200, 5e200])
 def test_axis_may_have_any_length(arm, length):
-    text = on_rail(arm, **RAIL, axis=(0.0, 0.6 * length, -0.8 * length))
+    text = on_rail(arm, Rail(**RAIL, axis=(0.0, 0.6 * length, -0.8 * length)))
     axis = etree.fromstring(text.encode()).find("joint[@name='rail']/axis").get("xyz")
     np.testing.assert_allclose([float(word) for word in axis.split()], [0.0, 0.6, -0.8], rtol=1e-15)
 
 
 def test_rail_on_a_rail(arm, tmp_path):
     first = tmp_path / "one.urdf"
-    on_rail(arm, **RAIL, axis=(1, 0, 0), name="x_axis", output=first)
-    text = on_rail(first, **RAIL, axis=(0, 1, 0), name="y_axis")
+    on_rail(arm, Rail(**RAIL, axis=(1, 0, 0), name="x_axis"), output=first)
+    text = on_rail(first, Rail(**RAIL, axis=(0, 1, 0), name="y_axis"))
     robot, alone = Robot.from_urdf("two", urdf_text=text), Robot.from_urdf(arm)
     assert robot.joint_names == ("y_axis", "x_axis", "j1", "j2", "j3")
     placement = robot.tool_placement(np.array([0.3, 0.7, 0.1, 0.2, 0.3])).translation
@@ -142,7 +144,7 @@ def test_rail_on_a_rail(arm, tmp_path):
 def test_example_of_the_docstring(monkeypatch):
     monkeypatch.chdir(ROOT)
     (example,) = doctest.DocTestFinder(recurse=False).find(rail.on_rail, globs={})
-    assert len(example.examples) == 3
+    assert len(example.examples) == 4
     assert doctest.DocTestRunner().run(example).failed == 0
 
 

@@ -12,7 +12,7 @@ import yourdfpy
 from lxml import etree
 
 from brachis import Robot
-from brachis.compose import on_rail
+from brachis.compose import Rail, on_rail
 from brachis.robot import dynamics
 
 from .conftest import ROOT
@@ -128,7 +128,9 @@ def test_tx90l_rail_moves_the_whole_arm_and_no_other_carriage(tx90l, tmp_path):
     assert 0.8 / 2.0 + 2.0 / (1500.0 / force) == pytest.approx(0.475, abs=1e-3)
     # A carriage of its own is added by composing.
     text = on_rail(
-        ROBOTS / "tx90l_rail/arm.urdf", range=(-2, 2), velocity=2, force=1500, mass=50, output=tmp_path / "new.urdf"
+        ROBOTS / "tx90l_rail/arm.urdf",
+        Rail(range=(-2, 2), velocity=2, force=1500, mass=50),
+        output=tmp_path / "new.urdf",
     )
     heavy = Robot.from_urdf("heavy", urdf_text=text)
     assert dynamics.torque(heavy, q, still, np.eye(7)[:1])[0, 0] == pytest.approx(force + 50.0)
@@ -212,7 +214,8 @@ def test_public_arm_on_a_tilted_rail(maker, name, tmp_path):
         pytest.skip("example-robot-data is not installed")
     path, tool, joints = PUBLIC[name]
     output = tmp_path / "composed.urdf"
-    on_rail(folder / path, axis=(0.6, 0.8, 1.0), range=(0, 3), velocity=1, force=3000, mass=50, output=output)
+    rail = Rail(axis=(0.6, 0.8, 1.0), range=(0, 3), velocity=1, force=3000, mass=50)
+    on_rail(folder / path, rail, output=output)
     arm, robot = (Robot.from_urdf(each, tool_frame=tool) for each in (folder / path, output))
     assert robot.n == 1 + joints
     assert robot.joint_names == ("rail", *arm.joint_names)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from brachis.compose import on_rail
+from brachis.compose import Rail, on_rail
 from brachis.errors import InputError, UrdfError
 
 from .conftest import RAIL, arm_text
@@ -42,15 +42,15 @@ def test_wrong_figure(arm, tmp_path, case):
     options, words = FIGURES[case]
     output = tmp_path / "new.urdf"
     with pytest.raises(InputError) as caught:
-        on_rail(arm, **(RAIL | options), output=output)
+        on_rail(arm, Rail(**(RAIL | options)), output=output)
     assert str(caught.value).startswith(words)
     assert not output.exists()
 
 
 @pytest.mark.parametrize("figure", RAIL)
-def test_no_figure_of_the_rail_is_guessed(arm, figure):
+def test_no_figure_of_the_rail_is_guessed(figure):
     with pytest.raises(TypeError, match=f"missing 1 required keyword-only argument: '{figure}'"):
-        on_rail(arm, **{key: value for key, value in RAIL.items() if key != figure})
+        Rail(**{key: value for key, value in RAIL.items() if key != figure})
 
 
 BASE = "<robot name='x'><link name='base'><inertial><mass value='1'/>{}</inertial></link></robot>"
@@ -112,7 +112,7 @@ def test_wrong_urdf(arm, tmp_path, case):
     text, words = URDFS[case]
     arm.write_text(text)
     with pytest.raises(UrdfError) as caught:
-        on_rail(arm, **RAIL, output=tmp_path / "new.urdf")
+        on_rail(arm, Rail(**RAIL), output=tmp_path / "new.urdf")
     for word in (str(arm), *words):
         assert word in str(caught.value)
     assert not (tmp_path / "new.urdf").exists()
@@ -120,7 +120,7 @@ def test_wrong_urdf(arm, tmp_path, case):
 
 def test_missing_arm(tmp_path):
     with pytest.raises(UrdfError, match=r"nowhere\.urdf: the URDF file does not exist"):
-        on_rail(tmp_path / "nowhere.urdf", **RAIL, output=tmp_path / "new.urdf")
+        on_rail(tmp_path / "nowhere.urdf", Rail(**RAIL), output=tmp_path / "new.urdf")
 
 
 def test_arm_is_never_overwritten(arm, tmp_path, monkeypatch):
@@ -130,7 +130,7 @@ def test_arm_is_never_overwritten(arm, tmp_path, monkeypatch):
     monkeypatch.chdir(arm.parent)
     for output in (arm, alias, Path("arm.urdf"), Path("../arm/arm.urdf")):
         with pytest.raises(InputError, match=r"output .*: is the arm's own file; allowed: another file"):
-            on_rail(arm, **RAIL, output=output)
+            on_rail(arm, Rail(**RAIL), output=output)
     assert arm.read_text() == before
 
 
@@ -138,15 +138,15 @@ def test_output_that_cannot_be_written(arm, tmp_path):
     (tmp_path / "folder.urdf").mkdir()
     for output in (tmp_path / "missing/new.urdf", tmp_path / "folder.urdf"):
         with pytest.raises(InputError) as caught:
-            on_rail(arm, **RAIL, output=output)
+            on_rail(arm, Rail(**RAIL), output=output)
         assert str(caught.value).startswith(f"{output}: cannot be written; found ")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["arm", "folder.urdf"]
 
 
 def test_failure_leaves_the_old_output(arm, tmp_path):
     output = tmp_path / "new.urdf"
-    text = on_rail(arm, **RAIL, output=output)
+    text = on_rail(arm, Rail(**RAIL), output=output)
     arm.write_text("<robot name='x'/>")
     with pytest.raises(UrdfError):
-        on_rail(arm, **RAIL, output=output)
+        on_rail(arm, Rail(**RAIL), output=output)
     assert output.read_text() == text

@@ -15,8 +15,7 @@ from brachis.ik import ChainGeometry, NotApplicableError, check_answers, find, m
 from brachis.ik.eaik import eaik
 from brachis.ik.eaik_answers import exact_axes
 from brachis.ik.idealised import Polished
-from brachis.kinematics import TaskKinematics
-from brachis.robot import TaskSpace
+from brachis.robot import task_map_of
 from support.closed_forms import wrapped
 from support.pose_arms import (
     FAMILIES,
@@ -45,13 +44,13 @@ class Bench:
 
     def __init__(self, robot, redundant, postures=2000, seed=5):
         self.robot, self.redundant = robot, list(redundant)
-        self.space = TaskSpace.of(robot, "pose")
+        self.space = task_map_of(robot, "pose")
         self.rest = [i for i in range(robot.n) if i not in redundant]
         self.q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (postures, robot.n))
         self.solver = eaik.build(ChainGeometry.of(robot), self.space, tuple(redundant))
 
     def poses(self, q):
-        return self.space.values(*self.robot.tool_placements(q))
+        return self.space.values(q)
 
     def solve(self, q):
         """Answers (K, 2, 8, 6) for the poses of postures."""
@@ -109,7 +108,7 @@ def test_all_postures_are_found_and_all_answers_right(robot, redundant):
     margin = bench.margin(postures)
     assert np.array_equal(margin > 0.0, branch == 0), "an answer has the other sign's label"
     assert 0.5 < np.abs(margin).max() < 20.0, "margins are of the order of one"
-    determinant = np.linalg.det(TaskKinematics(bench.robot, bench.space).jacobian(postures)[:, :, rest])
+    determinant = np.linalg.det(bench.space.jacobian(bench.space.twists(postures))[:, :, rest])
     clear = np.abs(margin) > 1e-5
     ratio = margin[clear] / determinant[clear]
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-6)
@@ -276,7 +275,7 @@ def eaik_margin(robot, redundant, q):
 
 
 def rows(robot, *names):
-    return TaskSpace.of(robot, list(names) or "pose")
+    return task_map_of(robot, list(names) or "pose")
 
 
 @pytest.mark.parametrize(

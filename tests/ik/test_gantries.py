@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brachis.ik import find
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, task_map_of
 from support.chains import Joint, chain_urdf, gantry_robot
 from support.closed_forms import Bench
 
@@ -101,7 +101,7 @@ def test_slides_carried_by_turning_joints_have_branches_by_the_sign_of_their_det
         Joint("prismatic", axis=X, xyz=(0.2, 0.0, 0.0), limit=SLIDE),
     ]
     robot = Robot.from_urdf("crane", urdf_text=chain_urdf(joints, tool=(0.3, 0.1, 0.0)))
-    candidate = find(robot, TaskSpace.of(robot, ["x", "y"]), ["j2"])
+    candidate = find(robot, task_map_of(robot, ["x", "y"]), ["j2"])
     assert candidate.solver.branches == ("slides_positive", "slides_negative")
     angles = np.linspace(0.1, 6.2, 50)[:, None]
     answers = candidate.solver.solve(np.full((50, 2), 0.4), angles)

@@ -7,7 +7,8 @@ import pytest
 
 from brachis.errors import DecompositionError, UnknownNameError
 from brachis.ik import IKSolver, NotApplicableError, check_answers, find, find_all, ik_family
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, task_map_of
+from brachis.robot.task_map import RowsAndYaw
 from support.chains import Joint, chain_urdf, planar_robot
 
 
@@ -18,7 +19,7 @@ def arm():
 
 @pytest.fixture(scope="module")
 def plane(arm):
-    return TaskSpace.of(arm, ["x", "y"])
+    return task_map_of(arm, ["x", "y"])
 
 
 def spatial_robot() -> Robot:
@@ -43,8 +44,8 @@ def test_wrong_number_of_redundant_joints(arm, plane, names):
 def test_more_rows_than_joints():
     robot = planar_robot("RR")
     with pytest.raises(DecompositionError, match="fewer joints than the task space has rows"):
-        find(robot, TaskSpace.of(robot, ["x", "y", "yaw"]), [])
-    assert find_all(robot, TaskSpace.of(robot, ["x", "y", "yaw"])) == []
+        find(robot, task_map_of(robot, ["x", "y", "yaw"]), [])
+    assert find_all(robot, task_map_of(robot, ["x", "y", "yaw"])) == []
 
 
 def test_unknown_joint_with_suggestion(arm, plane):
@@ -59,7 +60,7 @@ def test_unknown_joint_with_suggestion(arm, plane):
 def test_no_closed_form_names_every_reason():
     robot = spatial_robot()
     with pytest.raises(DecompositionError) as caught:
-        find(robot, TaskSpace.of(robot, ["x", "y", "z"]), [])
+        find(robot, task_map_of(robot, ["x", "y", "z"]), [])
     reasons = caught.value.reasons
     assert "j1, j2, j3 would be left over and not prismatic" in reasons["prismatic"]
     assert "the axes of j1 and j2 are not parallel" in reasons["planar"]
@@ -72,7 +73,7 @@ def test_no_closed_form_lists_the_choices_that_have_one():
     # Joint 1 slides along the normal: with joint 2 or 3 redundant, x and y hang on one turning joint alone.
     joints = [Joint("prismatic"), Joint("revolute"), Joint("revolute", xyz=(0.4, 0.0, 0.0))]
     robot = Robot.from_urdf("scara", urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0)))
-    space = TaskSpace.of(robot, ["x", "y"])
+    space = task_map_of(robot, ["x", "y"])
     with pytest.raises(DecompositionError) as caught:
         find(robot, space, ["j3"])
     assert caught.value.reasons["planar"] == "J_nr is singular everywhere"
@@ -83,14 +84,14 @@ def test_no_closed_form_lists_the_choices_that_have_one():
 def test_yaw_in_another_plane_than_the_joints_is_refused():
     robot = planar_robot("RRR", "tilted")
     with pytest.raises(DecompositionError, match="yaw turns in another plane than the joints"):
-        find(robot, TaskSpace(("x", "y", "yaw"), yaw_axis=0), [])
+        find(robot, RowsAndYaw(robot, ("x", "y", "yaw"), tool_axis=0), [])
 
 
 def test_rows_that_the_plane_cannot_tell_apart_are_refused():
     # In the xz-plane y stands still: rows x and y are of rank one.
     robot = planar_robot("RR", "xz")
     with pytest.raises(DecompositionError, match="do not fit the plane"):
-        find(robot, TaskSpace.of(robot, ["x", "y"]), [])
+        find(robot, task_map_of(robot, ["x", "y"]), [])
 
 
 def test_find_all_reports_every_choice(arm, plane):
@@ -101,7 +102,7 @@ def test_find_all_reports_every_choice(arm, plane):
 
 def test_order_of_the_redundant_joints_does_not_matter():
     robot = planar_robot("RRRR")
-    candidate = find(robot, TaskSpace.of(robot, ["x", "y"]), ["j3", "j1"])
+    candidate = find(robot, task_map_of(robot, ["x", "y"]), ["j3", "j1"])
     assert candidate.redundant_joints == ("j1", "j3")
 
 

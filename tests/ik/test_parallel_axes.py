@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from brachis.errors import DecompositionError
 from brachis.ik import ChainGeometry, NotApplicableError, find
 from brachis.ik.parallel_axes import parallel_axes
-from brachis.robot import TaskSpace
+from brachis.robot import task_map_of
 from support.arms import (
     MOUNT,
     SKEW,
@@ -202,7 +202,7 @@ def test_arms_as_their_urdf_states_them(name):
     robot = example_robot(name)
     bench = PoseBench(parallel_axes, robot, ())
     bench.check_answers(bench.answers(bench.q))
-    match = find(robot, TaskSpace.of(robot, "pose"), [], families=[parallel_axes])
+    match = find(robot, task_map_of(robot, "pose"), [], families=[parallel_axes])
     assert match.family == "parallel_axes"
 
 
@@ -220,7 +220,7 @@ def test_slide_that_never_helps_is_refused(arm, redundant):
     # Along the pan axis, or radially after it, it moves the arm within the plane of the parallel joints.
     robot = arm.robot(MOUNT)
     with pytest.raises(DecompositionError) as caught:
-        find(robot, TaskSpace.of(robot, "pose"), [redundant], families=[parallel_axes])
+        find(robot, task_map_of(robot, "pose"), [redundant], families=[parallel_axes])
     slide = f"j{arm.letters.index('P') + 1}"
     reason = f"J_nr is singular everywhere: {slide} never moves the arm along the parallel axes"
     assert caught.value.reasons["parallel_axes"] == reason
@@ -229,7 +229,7 @@ def test_slide_that_never_helps_is_refused(arm, redundant):
 
 def refusal(robot, redundant, rows="pose"):
     with pytest.raises(NotApplicableError) as caught:
-        parallel_axes.build(ChainGeometry.of(robot), TaskSpace.of(robot, rows), redundant)
+        parallel_axes.build(ChainGeometry.of(robot), task_map_of(robot, rows), redundant)
     return str(caught.value)
 
 

@@ -110,13 +110,13 @@ def test_a_finite_answer_reaches_any_target_and_none_is_left_out(pattern, far, f
         turning = bench.turning[len(redundant) :]
         grid = np.where(turning, grid, grid * 4.0)
         postures = np.concatenate([np.repeat(q_r, len(grid), axis=0), grid], axis=1)
-        distance = np.linalg.norm(bench.kinematics.position(postures) - np.array(far), axis=1)
+        distance = np.linalg.norm(bench.space.values(postures) - np.array(far), axis=1)
         best = postures[int(np.argmin(distance))]
         for _ in range(60):
-            jacobian = bench.kinematics.jacobian(best[None])[0][:, len(redundant) :]
-            gap = np.array(far) - bench.kinematics.position(best[None])[0]
+            jacobian = bench.space.jacobian(bench.space.twists(best[None]))[0][:, len(redundant) :]
+            gap = np.array(far) - bench.space.values(best[None])[0]
             best[len(redundant) :] += np.linalg.solve(jacobian.T @ jacobian + 1e-6 * np.eye(2), jacobian.T @ gap)
-        assert np.linalg.norm(bench.kinematics.position(best[None])[0] - np.array(far)) > 1e-7
+        assert np.linalg.norm(bench.space.values(best[None])[0] - np.array(far)) > 1e-7
 
 
 @pytest.mark.parametrize("pattern", ["RRR", "RPR", "PRR", "RRP", "RRRR"])
@@ -128,7 +128,7 @@ def test_labels_follow_the_branch_along_smooth_curves(pattern, rows):
     for (redundant, _), _ in itertools.product(bench.decompositions(), range(4)):
         solver, rest = bench.find(redundant).solver, bench.rest(redundant)
         q = rng.uniform(-2.0, 2.0, n) + rng.uniform(0.5, 2.0, n) * np.sin(2.0 * np.pi * t * rng.uniform(0.3, 1.0, n))
-        answers = solver.solve(bench.kinematics.position(q), q[:, list(redundant)])[:, :, 0]
+        answers = solver.solve(bench.space.values(q), q[:, list(redundant)])[:, :, 0]
         for branch in range(2):
             postures = q.copy()
             postures[:, rest] = answers[:, branch]
@@ -141,7 +141,7 @@ def test_labels_follow_the_branch_along_smooth_curves(pattern, rows):
             assert steps[inside].max(initial=0.0) < 0.1, "the branch jumps"
             followed += np.count_nonzero(inside)
         sign = np.sign(solver.branch_margins(q, 0)[:, 0])
-        determinant = np.linalg.det(bench.kinematics.jacobian(q)[:, :, rest])
+        determinant = np.linalg.det(bench.space.jacobian(bench.space.twists(q))[:, :, rest])
         np.testing.assert_array_equal(np.flatnonzero(np.diff(sign)), np.flatnonzero(np.diff(np.sign(determinant))))
         changes += np.count_nonzero(np.diff(sign))
     assert changes >= 2, "no curve crossed a boundary: the test shows nothing"

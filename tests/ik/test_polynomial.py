@@ -11,7 +11,7 @@ from brachis.ik.displacement import Displacement
 from brachis.ik.polynomial import polynomial
 from brachis.ik.polynomial_equations import Equations
 from brachis.ik.trigonometric import real_roots, sample_angles
-from brachis.robot import TaskSpace
+from brachis.robot import task_map_of
 from support.arms import MOUNT, SKEW, TOOL, PoseBench, X, Y, Z, on_random_rail, rolling, tx90l, ur10, zero_crossing
 
 UR, TX = (arm.with_tool(TOOL) for arm in (ur10(), tx90l()))
@@ -172,7 +172,7 @@ def test_out_of_reach_is_nan_without_a_warning():
 
 def test_registry_finds_it_and_says_so():
     robot, _ = CASES["TX90L on a rail, 5"]
-    match = find(robot, TaskSpace.of(robot, "pose"), ["j6"], families=[polynomial])
+    match = find(robot, task_map_of(robot, "pose"), ["j6"], families=[polynomial])
     assert match.family == "polynomial"
 
 
@@ -180,13 +180,13 @@ def test_registry_finds_it_and_says_so():
 def test_rail_that_never_helps_is_refused(j):
     robot = UR.with_slide(0, Z).robot(MOUNT)
     with pytest.raises(DecompositionError) as caught:
-        find(robot, TaskSpace.of(robot, "pose"), [j], families=[polynomial])
+        find(robot, task_map_of(robot, "pose"), [j], families=[polynomial])
     assert caught.value.reasons["polynomial"] == "j1 never moves the arm along the parallel axes"
 
 
 def refusal(robot, redundant, rows="pose"):
     with pytest.raises(NotApplicableError) as caught:
-        polynomial.build(ChainGeometry.of(robot), TaskSpace.of(robot, rows), redundant)
+        polynomial.build(ChainGeometry.of(robot), task_map_of(robot, rows), redundant)
     return str(caught.value)
 
 

@@ -13,8 +13,8 @@ import brachis
 from brachis.ik import ChainGeometry, NotApplicableError, find, find_all
 from brachis.ik.position_recipes import RECIPES
 from brachis.ik.positioning import positioning
-from brachis.kinematics import TaskKinematics
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, task_map_of
+from brachis.robot.task_map import RowsAndYaw
 from support.chains import Joint, chain_urdf
 from support.factored_bench import Bench
 from support.pose_arms import panda as panda_urdf
@@ -94,8 +94,9 @@ ARMS = {
 def test_built_arms_with_all_choices_of_redundant_joints(name):
     make, expected = ARMS[name]
     robot = make()
-    space, served = TaskSpace.of(robot, "position"), 0
-    jacobian = TaskKinematics(robot, space).jacobian(np.random.default_rng(2).uniform(-np.pi, np.pi, (200, robot.n)))
+    space, served = task_map_of(robot, "position"), 0
+    q = np.random.default_rng(2).uniform(-np.pi, np.pi, (200, robot.n))
+    jacobian = space.jacobian(space.twists(q))
     for redundant in itertools.combinations(range(robot.n), robot.n - 3):
         rest = [i for i in range(robot.n) if i not in redundant]
         singular = np.abs(np.linalg.det(jacobian[:, :, rest])).max() < 1e-9
@@ -157,8 +158,8 @@ def test_margins_vanish_where_two_answers_meet(name):
 
 def test_refusals():
     robot = built("tx90l_rail")
-    geometry, position = ChainGeometry.of(robot), TaskSpace.of(robot, "position")
-    for space in (TaskSpace.of(robot, "pose"), TaskSpace.of(robot, ["x", "y"]), TaskSpace(("x", "y", "yaw"), 0)):
+    geometry, position = ChainGeometry.of(robot), task_map_of(robot, "position")
+    for space in (task_map_of(robot, "pose"), task_map_of(robot, ["x", "y"]), RowsAndYaw(robot, ("x", "y", "yaw"), 0)):
         with pytest.raises(NotApplicableError, match="only for the position: x, y and z"):
             positioning.build(geometry, space, (0, 4, 5, 6))
     with pytest.raises(NotApplicableError, match="4 joints would be left over, not three"):
@@ -207,12 +208,12 @@ def test_out_of_reach_is_nan():
 
 def test_it_is_found_by_geometry():
     robot = rail_arm()
-    space = TaskSpace.of(robot, "position")
+    space = task_map_of(robot, "position")
     assert find(robot, space, ["j1", "j5", "j6", "j7"]).family == "positioning"
     families = {candidate.redundant_joints: candidate.family for candidate in find_all(robot, space)}
     assert families["j2", "j5", "j6", "j7"] == "positioning"
     slides = screw_robot(BASES["P|PP"])
-    assert find(slides, TaskSpace.of(slides, "position"), []).family == "prismatic"
+    assert find(slides, task_map_of(slides, "position"), []).family == "prismatic"
 
 
 PLANS = {

@@ -19,7 +19,7 @@ from brachis.errors import DecompositionError
 from brachis.ik import ChainGeometry, Family, check_answers, find, find_all
 from brachis.ik.idealised import Polished, idealised
 from brachis.ik.polish import Poses, polished
-from brachis.robot import Robot, TaskSpace, bind
+from brachis.robot import Robot, bind, task_map_of
 from support.arms import Arm, PoseBench, Y, tx90l
 from support.chains import Joint, chain_urdf
 from support.closed_forms import wrapped
@@ -33,7 +33,7 @@ XARM_START = (-0.2, -0.3, 0.2, 1.4, 0.3, 1.2, 0.1)
 @functools.cache
 def candidates(name, digits, seed=0):
     robot = by_angles(ARMS[name], digits, seed=seed)
-    return robot, find_all(robot, TaskSpace.of(robot, "pose"))
+    return robot, find_all(robot, task_map_of(robot, "pose"))
 
 
 def polished_of(name):
@@ -91,8 +91,8 @@ def test_all_answers_are_right_and_one_is_the_posture(name, joints):
     assert np.isfinite(solved).sum() == 6 * len(sample), "an answer is NaN in part"
     postures = bench.q[sample]
     postures[:, bench.rest] = solved[sample, branch]
-    targets = bench.space.values(*bench.robot.tool_placements(bench.q))
-    reached = bench.space.values(*bench.robot.tool_placements(postures))
+    targets = bench.space.values(bench.q)
+    reached = bench.space.values(postures)
     size = 1.0 + np.abs(np.where(bench.geometry.revolute, 0.0, postures)).max(axis=1)
     assert (np.abs(bench.space.difference(reached, targets[sample])).max(axis=1) / size).max() < 1e-8
 
@@ -171,7 +171,7 @@ def test_what_cannot_be_reached_is_nan():
 @pytest.mark.parametrize("name", ARMS)
 def test_ideal_arm(name):
     robot = by_angles(ARMS[name], ROUNDED)
-    space, geometry = TaskSpace.of(robot, "pose"), ChainGeometry.of(robot)
+    space, geometry = task_map_of(robot, "pose"), ChainGeometry.of(robot)
     ideal = idealised(geometry, space)
     assert 7e-6 < ideal.turned < 8e-6
     assert 1e-8 < ideal.shifted < 1e-5
@@ -190,7 +190,7 @@ def test_small_offsets_of_a_measured_arm_count_as_rounding():
     for step in steps:
         step[:3, 3] += rng.uniform(-2e-5, 2e-5, 3)
     robot = by_angles(type(arm)(arm.letters, arm.axes, tuple(steps)), ROUNDED)
-    match = find(robot, TaskSpace.of(robot, "pose"), ["j3"])
+    match = find(robot, task_map_of(robot, "pose"), ["j3"])
     assert match.family == "spherical_wrist"
     assert isinstance(match.solver, Polished)
 
@@ -201,10 +201,10 @@ def test_small_offsets_of_a_measured_arm_count_as_rounding():
 def test_what_is_farther_off_is_refused_and_the_reason_named(name, joint):
     near, far = (by_angles(ARMS[name], EXACT, bent=bent, bent_joint=joint) for bent in (5e-5, 1e-3))
     redundant = ["j1"] * (near.n - 6)
-    match = find(near, TaskSpace.of(near, "pose"), redundant)
+    match = find(near, task_map_of(near, "pose"), redundant)
     assert re.search(r"axes within [57]\.\de-05 rad", match.remark)
     with pytest.raises(DecompositionError) as caught:
-        find(far, TaskSpace.of(far, "pose"), redundant)
+        find(far, task_map_of(far, "pose"), redundant)
     reasons = [reason for reason in caught.value.reasons.values() if "fits an ideal arm only" in reason]
     assert re.search(r"its axes are up to 1\.\de-03 rad", reasons[0])
     assert "at most 1e-04 is taken for rounding. If the URDF rounds angles" in reasons[0]
@@ -216,7 +216,7 @@ def test_offsets_that_are_meant_are_no_rounding():
     steps[5] = steps[5] + 0.005 * np.outer([0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])
     robot = by_angles(type(arm)(arm.letters, arm.axes, tuple(steps)), ROUNDED)
     with pytest.raises(DecompositionError) as caught:
-        find(robot, TaskSpace.of(robot, "pose"), ["j3"])
+        find(robot, task_map_of(robot, "pose"), ["j3"])
     assert "miss it by 0.005 m" in caught.value.reasons["spherical_wrist"]
     assert "rounds" not in str(caught.value)
 
@@ -232,32 +232,32 @@ def planar(quarter):
 @pytest.mark.parametrize("redundant", range(4))
 def test_rows_and_yaw_of_a_plane_that_is_almost_upright(redundant):
     robot = planar(1.5708)
-    space = TaskSpace.of(robot, ["x", "z", "yaw"])
+    space = task_map_of(robot, ["x", "z", "yaw"])
     match = find(robot, space, [robot.joint_names[redundant]])
     assert match.family == "planar"
     assert match.remark == "axes within 3.7e-06 rad of an ideal arm's: answers are polished"
     q = np.random.default_rng(3).uniform(-1.0, 1.0, (2000, 4))
     rest = [i for i in range(4) if i != redundant]
-    targets = space.values(*robot.tool_placements(q))
+    targets = space.values(q)
     solved = match.solver.solve(targets, q[:, [redundant]])[:, :, 0]
     sample, branch = np.nonzero(np.isfinite(solved).all(axis=2))
     postures = q[sample]
     postures[:, rest] = solved[sample, branch]
-    reached = space.values(*robot.tool_placements(postures))
+    reached = space.values(postures)
     assert np.abs(space.difference(reached, targets[sample])).max() < 1e-8
     turning = np.array([i > 0 for i in rest])
     gap = np.nanmin(np.abs(wrapped(solved - q[:, None, rest], turning)).max(axis=2), axis=1)
     margin = np.abs(match.solver.branch_margins(q, 0)[:, 0])
     assert gap[margin > 5e-3].max() < 1e-8
     exact = planar(np.pi / 2)
-    assert find(exact, TaskSpace.of(exact, space.rows), [exact.joint_names[redundant]]).remark == ""
+    assert find(exact, task_map_of(exact, space.rows), [exact.joint_names[redundant]]).remark == ""
 
 
 def test_positions():
     arm = tx90l()
     arm = Arm("RRR", arm.axes[:3], arm.steps[:4]).with_slide(0, Y)
     exact, rounded = (by_angles(arm, digits) for digits in (EXACT, ROUNDED))
-    space = TaskSpace.of(rounded, ["x", "y", "z"])
+    space = task_map_of(rounded, ["x", "y", "z"])
     ideal = find_all(exact, space)
     for candidate, expected in zip(find_all(rounded, space), ideal, strict=True):
         assert candidate.family == expected.family
@@ -295,7 +295,7 @@ def xarm():
 
 def test_xarm7_of_example_robot_data_has_decompositions():
     robot = Robot.from_urdf(xarm(), tool_frame="link_eef")
-    families = {c.redundant_joints[0]: c.family for c in find_all(robot, TaskSpace.of(robot, "pose"))}
+    families = {c.redundant_joints[0]: c.family for c in find_all(robot, task_map_of(robot, "pose"))}
     assert families == {
         **dict.fromkeys(("joint1", "joint2", "joint3"), None),
         **dict.fromkeys(("joint4", "joint7"), "spherical_wrist"),

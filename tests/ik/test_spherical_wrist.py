@@ -11,7 +11,8 @@ import pytest
 from brachis.errors import DecompositionError
 from brachis.ik import ChainGeometry, NotApplicableError, find
 from brachis.ik.spherical_wrist import spherical_wrist
-from brachis.robot import Robot, TaskSpace, bind
+from brachis.robot import Robot, bind, task_map_of
+from brachis.robot.task_map import Pose
 from support.chains import Joint, chain_urdf
 from support.factored_bench import Bench
 from support.screw_arms import BASES, Axis, extra, panda, screw_robot, seven_joints, unit, wrist
@@ -159,7 +160,7 @@ def test_free_roll_takes_the_place_of_a_wrist_joint():
         urdf_text=chain_urdf([*joints, Joint("fixed", xyz=(0.0, 0.0, -0.1), rpy=(0.5, 0.0, 0.0), limit=None)]),
     )
     robot, space = bind(arm, "pose_free_roll")
-    assert space.oriented
+    assert isinstance(space, Pose)
     for name in ("j4", "j5", "j6", "tool_roll"):
         Bench(robot, (robot.joint_names.index(name),)).check()
 
@@ -177,7 +178,7 @@ def test_a_slide_that_moves_the_centre_along_one_axis_of_the_wrist():
 
 def test_refusals():
     with pytest.raises(NotApplicableError, match="only for poses"):
-        spherical_wrist.build(ChainGeometry.of(rail_arm()), TaskSpace.of(rail_arm(), ["x", "y", "z"]), (0, 1, 2, 3))
+        spherical_wrist.build(ChainGeometry.of(rail_arm()), task_map_of(rail_arm(), ["x", "y", "z"]), (0, 1, 2, 3))
     rng = np.random.default_rng(8)
     general = [extra(rng, "R") for _ in range(3)]
     with pytest.raises(NotApplicableError) as caught:
@@ -210,9 +211,9 @@ def test_no_targets_have_no_answers():
 
 def test_it_is_found_by_geometry():
     robot = rail_arm()
-    match = find(robot, TaskSpace.of(robot, "pose"), ["j1"], families=[spherical_wrist])
+    match = find(robot, task_map_of(robot, "pose"), ["j1"], families=[spherical_wrist])
     assert match.family == "spherical_wrist"
     assert "placing" in spherical_wrist.source
     with pytest.raises(DecompositionError, match="j1 slides at an angle to the axis of j2") as caught:
-        find(rail_arm(RAILS["at an angle to"]), TaskSpace.of(robot, "pose"), ["j3"], families=[spherical_wrist])
+        find(rail_arm(RAILS["at an angle to"]), task_map_of(robot, "pose"), ["j3"], families=[spherical_wrist])
     assert ("j1",) in caught.value.available

@@ -11,12 +11,10 @@ from brachis.path.rotations import (
     angular_velocity,
     hat,
     matrices,
-    matrix,
-    quaternion_about,
     quaternion_derivatives,
-    quaternion_from,
-    quaternion_of,
-    rotation_vector,
+    quaternions_of,
+    rotation_from,
+    rotation_of,
     with_like_signs,
 )
 from brachis.path.sampling import smallest
@@ -81,31 +79,25 @@ def test_a_product_has_the_derivatives_that_both_factors_have():
     assert len(product(np.ones((4, 2)), np.ones((3, 2)), "...,...->...")) == 3
 
 
-def test_rotations_agree_with_scipy():
-    for one in Rotation.random(50, rng=6):
-        quaternion = np.roll(one.as_quat(), 1)
-        np.testing.assert_allclose(matrix(quaternion), one.as_matrix(), atol=1e-14)
-        np.testing.assert_allclose(rotation_vector(quaternion), one.as_rotvec(), atol=1e-14)
-        np.testing.assert_allclose(rotation_vector(-quaternion), one.as_rotvec(), atol=1e-14)
-        for same in (quaternion_of(one.as_matrix()), quaternion_about(one.as_rotvec())):
-            assert abs(same @ quaternion) == pytest.approx(1.0, abs=1e-14)
-
-
-@pytest.mark.parametrize("vector", [[0, 0, 0], [1e-12, 0, 0], [np.pi, 0, 0], [0, np.pi, 0], [0, 0, np.pi]])
-def test_rotations_at_both_ends(vector):
-    quaternion = quaternion_of(Rotation.from_rotvec(vector).as_matrix())
-    np.testing.assert_allclose(rotation_vector(quaternion), vector, atol=1e-15)
-    np.testing.assert_allclose(quaternion_about(np.array(vector)), quaternion, atol=1e-15)
+def test_quaternions_have_the_scalar_first():
+    rotations = Rotation.random(50, rng=6)
+    quaternions = quaternions_of(rotation_of(rotations.as_matrix()))
+    np.testing.assert_allclose(matrices(quaternions[None])[0], rotations.as_matrix(), atol=1e-14)
+    np.testing.assert_array_equal(quaternions_of(Rotation.identity()), [1, 0, 0, 0])
 
 
 def test_orientations_of_a_task():
-    expected = np.roll(Rotation.from_euler("xyz", [10, 20, 30], degrees=True).as_quat(), 1)
-    np.testing.assert_allclose(quaternion_from(RollPitchYaw(rpy_deg=(10, 20, 30))), expected)
-    vector = Rotation.from_euler("xyz", [10, 20, 30], degrees=True).as_rotvec()
-    np.testing.assert_allclose(quaternion_from(RotationVector(rotation_vector=tuple(vector))), expected)
-    rounded = tuple(np.round(expected, 3))
-    np.testing.assert_allclose(quaternion_from(Quaternion(quaternion=rounded)), expected, atol=1e-3)
-    assert np.linalg.norm(quaternion_from(Quaternion(quaternion=rounded))) == pytest.approx(1.0, abs=1e-15)
+    expected = Rotation.from_rotvec([0, 0, np.deg2rad(30)]) * Rotation.from_rotvec([0, np.deg2rad(20), 0])
+    expected = expected * Rotation.from_rotvec([np.deg2rad(10), 0, 0])
+    quaternion = quaternions_of(expected)
+    for attitude, tolerance in (
+        (RollPitchYaw(rpy_deg=(10, 20, 30)), 1e-15),
+        (RotationVector(rotation_vector=tuple(expected.as_rotvec())), 1e-15),
+        (Quaternion(quaternion=tuple(quaternion)), 1e-15),
+        (Quaternion(quaternion=tuple(np.round(quaternion, 3))), 2e-3),
+    ):
+        assert (rotation_from(attitude).inv() * expected).magnitude() < tolerance
+        assert np.linalg.norm(quaternions_of(rotation_from(attitude))) == pytest.approx(1.0, abs=1e-15)
 
 
 def test_quaternion_derivatives_give_the_matrix_back():
@@ -124,7 +116,8 @@ def test_angular_velocity_about_an_axis():
 
 
 def test_signs_of_neighbours():
-    quaternions = np.stack([quaternion_about(np.array([0, 0, angle])) for angle in np.linspace(0, 12, 13)])
+    half = np.linspace(0, 12, 13) / 2
+    quaternions = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
     flipped = quaternions * RANDOM.choice([-1.0, 1.0], 13)[:, None]
     np.testing.assert_allclose(with_like_signs(flipped), quaternions * np.sign(flipped[0] @ quaternions[0]))
 

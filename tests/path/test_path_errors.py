@@ -9,8 +9,8 @@ import pytest
 
 from brachis.errors import PathError, UnknownNameError
 from brachis.path import build_path
-from brachis.path.blend import septic
-from brachis.path.joins import Join, corner_at
+from brachis.path.joins import Join, row_corner
+from brachis.path.septic import septic
 from brachis.task import LineBy, LineSegment, load_task
 
 X, XY, XYZ, XYW = ["x"], ["x", "y"], ["x", "y", "z"], ["x", "y", "yaw"]
@@ -146,7 +146,7 @@ def test_every_derivative_is_compared(order: int, jump: list[float], expected: s
     far[0] = [2.0, 1.0]
     after[order] += jump
     join = Join(0, 0.5, np.zeros(2), ("x", "y"))
-    corner = corner_at(join, septic(-far, before, 2.0), septic(after, far, 2.0))
+    corner = row_corner(join, septic(-far, before, 2.0), septic(after, far, 2.0))
     assert (corner and corner.found) == expected
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from brachis.errors import PathError
 from brachis.path import build_path
-from brachis.path.rows import POSE_ROWS
+from brachis.robot.task_map.rows import POSE_ROWS
 from brachis.task import CsvFile, CsvSegment, LineBy, LineSegment
 from support.poses import pose, pose_path
 

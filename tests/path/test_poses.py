@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from brachis.path import PathSample, PosePath, build_path
-from brachis.path.rows import POSE_ROWS
-from brachis.robot import task_space
+from brachis.robot.task_map.rows import POSE_ROWS
 from brachis.task import LineBy, LineSegment
 from support.poses import (
     START,
@@ -69,10 +68,6 @@ def path(request: pytest.FixtureRequest) -> PosePath:
 
 def size(values: np.ndarray) -> float:
     return max(float(np.abs(values).max()), 1.0)
-
-
-def test_the_rows_are_those_of_the_robot() -> None:
-    assert POSE_ROWS == task_space.POSE_ROWS
 
 
 def test_the_twist_is_that_of_the_poses(path: PosePath) -> None:

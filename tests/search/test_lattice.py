@@ -68,7 +68,7 @@ def test_courses_are_motions_of_the_robot(case):
         found += len(courses)
         for course in courses:
             targets = given.path.sample(course.s).target
-            miss = given.task_space.difference(given.task_space.values(*robot.tool_placements(course.q)), targets)
+            miss = given.task_map.difference(given.task_map.values(course.q), targets)
             assert np.abs(miss).max() < 1e-6
             assert np.abs(np.diff(course.q, axis=0)).max() < 0.9
             assert np.all(course.q >= limits.position_lower - 1e-9)
@@ -170,5 +170,5 @@ def test_eaik_is_not_promised_where_no_closed_form_can_be(monkeypatch):
     """Joint 4 of this arm fixes the distance of shoulder and wrist."""
     monkeypatch.setattr("brachis.ik.eaik.installed", lambda: False)
     robot = brachis.Robot.from_urdf(ROOT / "robots/iiwa14/robot.urdf", tool_frame="tool")
-    space = brachis.TaskSpace.of(robot, "pose")
+    space = brachis.task_map_of(robot, "pose")
     assert ik.without_eaik(ik.find_all(robot, space)) == ()

@@ -114,7 +114,7 @@ def test_small_circles_have_stations_enough(turns):
     given = setting(
         scara(), start={"joints": [0.5, -2.0, 1.7]}, path=[{"circle": {"center": [0.0, 0.0], "turns": turns}}]
     )
-    assert len(stations(given.path, given.task_space)) > 24 * turns / 2
+    assert len(stations(given.path, given.task_map)) > 24 * turns / 2
     for choice in choices(given):
         assert not isinstance(Lattice(choice).courses(1), DeadEnd)
 

@@ -14,8 +14,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from brachis.ik import ChainGeometry, Family, IKSolver, margin_gradient
-from brachis.kinematics import TaskKinematics
-from brachis.robot import Robot, TaskSpace, bind
+from brachis.robot import Robot, bind, task_map_of
 from support.chains import Joint, chain_urdf
 from support.closed_forms import wrapped
 
@@ -162,7 +161,7 @@ class PoseBench:
 
     def __init__(self, family: Family, robot: Robot, redundant: Sequence[int], postures: int = 2000, seed: int = 5):
         self.robot, self.redundant = robot, list(redundant)
-        self.space = TaskSpace.of(robot, "pose")
+        self.space = task_map_of(robot, "pose")
         self.geometry = ChainGeometry.of(robot)
         self.rest = [i for i in range(robot.n) if i not in redundant]
         self.turning = self.geometry.revolute[self.rest]
@@ -197,7 +196,7 @@ class PoseBench:
 
     def determinant(self, q: np.ndarray) -> np.ndarray:
         """Det J_nr by Pinocchio."""
-        return np.linalg.det(TaskKinematics(self.robot, self.space).jacobian(q)[:, :, self.rest])
+        return np.linalg.det(self.space.jacobian(self.space.twists(q))[:, :, self.rest])
 
     def check_answers(self, solved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Put the answers for the random postures to the test; return their samples, branches and postures."""
@@ -213,7 +212,7 @@ class PoseBench:
         miss = np.abs(self.space.difference(self.poses(postures), targets[sample])).max(axis=1)
         assert (miss / size).max() < 1e-8
         some = slice(0, 400)
-        pinocchio = self.space.values(*self.robot.tool_placements(postures[some]))
+        pinocchio = self.space.values(postures[some])
         miss = np.abs(self.space.difference(pinocchio, targets[sample[some]])).max(axis=1)
         assert (miss / size[some]).max() < 1e-8
         return sample, branch, postures

@@ -8,8 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from brachis.ik import Candidate, Family, find, margin_gradient
-from brachis.kinematics import TaskKinematics
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, task_map_of
 
 
 def wrapped(delta: np.ndarray, angles: np.ndarray) -> np.ndarray:
@@ -22,11 +21,10 @@ class Bench:
 
     def __init__(self, robot: Robot, rows: Sequence[str], postures: int, seed: int = 5) -> None:
         self.robot = robot
-        self.space = TaskSpace.of(robot, rows)
-        self.kinematics = TaskKinematics(robot, self.space)
+        self.space = task_map_of(robot, rows)
         self.q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (postures, robot.n))
-        self.targets = self.kinematics.position(self.q)
-        self.jacobian = self.kinematics.jacobian(self.q)
+        self.targets = self.space.values(self.q)
+        self.jacobian = self.space.jacobian(self.space.twists(self.q))
         self.turning = np.array([unit == "rad" for unit in robot.position_units])
         self.angles = np.array([unit == "rad" for unit in self.space.units])
 
@@ -47,7 +45,7 @@ class Bench:
 
     def miss(self, postures: np.ndarray, targets: np.ndarray) -> np.ndarray:
         """Largest distance from the target of every posture, by Pinocchio's forward kinematics."""
-        return np.abs(wrapped(self.kinematics.position(postures) - targets, self.angles)).max(axis=1)
+        return np.abs(wrapped(self.space.values(postures) - targets, self.angles)).max(axis=1)
 
     def check(self, redundant: Sequence[int], families: Sequence[Family] = (), *, distinct_roots: int) -> Candidate:
         """Hold a closed form to its promises; `distinct_roots` is how many answers geometry allows."""

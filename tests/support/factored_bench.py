@@ -9,8 +9,7 @@ from scipy.optimize import brentq
 
 from brachis.ik import ChainGeometry, margin_gradient
 from brachis.ik.spherical_wrist import spherical_wrist
-from brachis.kinematics import TaskKinematics
-from brachis.robot import TaskSpace
+from brachis.robot import task_map_of
 
 
 def wrapped(delta, turning):
@@ -22,14 +21,14 @@ class Bench:
 
     def __init__(self, robot, redundant, postures=2000, seed=5, family=spherical_wrist, rows="pose"):
         self.robot, self.redundant = robot, list(redundant)
-        self.space = TaskSpace.of(robot, rows)
+        self.space = task_map_of(robot, rows)
         self.rest = [i for i in range(robot.n) if i not in redundant]
         self.turning = np.array([unit == "rad" for unit in robot.position_units])[self.rest]
         self.q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (postures, robot.n))
         self.solver = family.build(ChainGeometry.of(robot), self.space, tuple(redundant))
 
     def targets(self, q):
-        return self.space.values(*self.robot.tool_placements(q))
+        return self.space.values(q)
 
     def answers(self, q):
         """Postures (K, B, n) that reach the targets of the given ones."""
@@ -44,7 +43,7 @@ class Bench:
         return np.stack([self.solver.branch_margins(q, b) for b in range(len(self.solver.branches))], axis=1)
 
     def determinant(self, q):
-        return np.linalg.det(TaskKinematics(self.robot, self.space).jacobian(q)[:, :, self.rest])
+        return np.linalg.det(self.space.jacobian(self.space.twists(q))[:, :, self.rest])
 
     def check(self):
         """Hold the closed form to its promises."""

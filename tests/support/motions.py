@@ -12,7 +12,7 @@ from brachis.feasibility import branch_of
 from brachis.ik import find
 from brachis.kinematics import Decomposition
 from brachis.path import build_path
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, task_map_of
 from brachis.task import load_task
 
 
@@ -21,14 +21,14 @@ def decomposition(
 ) -> Decomposition:
     """Decomposition on the branch of the start posture; the path's segments as a task file writes them."""
     start = np.array(start, dtype=float)
-    space = TaskSpace.of(robot, rows)
+    space = task_map_of(robot, rows)
     task = load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": list(rows), "path": list(path)})
-    curve = build_path(task.path, space.value(robot.tool_placement(start)), space.rows)
+    curve = build_path(task.path, space.value(start), space.rows)
     candidate = find(robot, space, redundant)
-    branch = branch_of(robot, space, candidate, start, "auto")
+    branch = branch_of(space, candidate, start, "auto")
     indices = tuple(robot.joint_names.index(name) for name in candidate.redundant_joints)
     assert candidate.solver is not None
-    return Decomposition(robot, space, curve, candidate.solver, indices, branch, start)
+    return Decomposition(space, curve, candidate.solver, indices, branch, start)
 
 
 @dataclass(frozen=True)

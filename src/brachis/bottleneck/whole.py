@@ -46,7 +46,7 @@ class BottleneckReport:
 
     def __str__(self) -> str:
         """Say all in plain words."""
-        return "\n".join(in_words(self))
+        return "\n".join(in_words(**vars(self)))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""

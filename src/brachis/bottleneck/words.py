@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from brachis.bottleneck.check import CheckedSensitivity, SensitivityCheck
 from brachis.bottleneck.reference import MEANING, Reference
 from brachis.bottleneck.saturation import THRESHOLD, Saturation
 from brachis.bottleneck.sensitivities import BranchBoundary, Sensitivities, Sensitivity
-
-if TYPE_CHECKING:
-    from brachis.bottleneck.whole import BottleneckReport
 
 _FRACTION = 0.1
 _NOTHING = 1e-5
@@ -21,16 +17,24 @@ _MOMENT = 5e-4
 """Smallest share of the time that is worth a line."""
 
 
-def in_words(report: BottleneckReport) -> list[str]:
-    """Say what a report found, a line each."""
+def in_words(
+    *,
+    t_end: float,
+    sensitivities: Sensitivities,
+    saturations: tuple[Saturation, ...],
+    check: SensitivityCheck | None,
+    reference: Reference | None,
+    reference_sought: bool,
+) -> list[str]:
+    """Say what a report found, a line each; see `BottleneckReport` for its parts."""
     lines = [
-        *_costs(report.sensitivities, report.t_end),
-        *([] if report.check is None else _checked(report.check)),
-        *_active(report.saturations),
+        *_costs(sensitivities, t_end),
+        *([] if check is None else _checked(check)),
+        *_active(saturations),
     ]
-    if report.reference is not None:
-        lines.append(_reference(report.reference, report.t_end))
-    elif report.reference_sought:
+    if reference is not None:
+        lines.append(_reference(reference, t_end))
+    elif reference_sought:
         lines.append("reference: no faster motion was found")
     return lines
 

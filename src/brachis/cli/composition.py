@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
+from typing import Annotated
 
 import typer
 from typer.core import TyperCommand
 
 from brachis.cli.folder import write_one
-from brachis.cli.output import print_json, result_console
+from brachis.cli.output import Json, print_json, result_console
 
 Triple = tuple[float, float, float]
 
@@ -44,28 +44,36 @@ def _split(word: str) -> list[str]:
     return [part for part in re.split(r"[,\s]+", word) if part] or [word]
 
 
-def compose_command(
-    arm: Path,
-    *,
-    axis: Triple,
-    travel: tuple[float, float],
-    velocity: float,
-    force: float,
-    mass: float,
-    mount_xyz: Triple,
-    mount_rpy_deg: Triple,
-    name: str,
-    root: str,
-    meshes: bool,
-    out: Path,
-    as_json: bool,
+def compose(
+    arm: Annotated[Path, typer.Argument(help="URDF file of the arm.", metavar="ARM")],
+    travel: Annotated[tuple[float, float], typer.Option("--range", help="Lowest and highest position on the rail, m.")],
+    velocity: Annotated[float, typer.Option(help="Limit of the rail's speed, m/s.")],
+    force: Annotated[float, typer.Option(help="Limit of the rail's drive force, N.")],
+    mass: Annotated[float, typer.Option(help="Mass of the carriage, kg.")],
+    out: Annotated[Path, typer.Option(help="URDF file to write.")],
+    axis: Annotated[Triple, typer.Option(help="Direction of the rail in the world frame: 0 1 0 or 0,1,0.")] = (
+        0.0,
+        1.0,
+        0.0,
+    ),
+    mount_xyz: Annotated[Triple, typer.Option(help="Where the arm's root link lies on the carriage, m.")] = (
+        0.0,
+        0.0,
+        0.0,
+    ),
+    mount_rpy_deg: Annotated[
+        Triple,
+        typer.Option(help="Its roll, pitch and yaw, degrees; 180 0 0 hangs the arm upside down."),
+    ] = (0.0, 0.0, 0.0),
+    name: Annotated[str, typer.Option(help="Name of the rail's joint.")] = "rail",
+    root: Annotated[str, typer.Option(help="Name of the root link, the world frame.")] = "world",
+    meshes: Annotated[bool, typer.Option(help="Keep the arm's meshes, or drop them.")] = True,
+    json: Json = False,
 ) -> None:
-    """Write the URDF of an arm on a rail."""
-    from brachis.compose import on_rail  # noqa: PLC0415  (loads Pinocchio, which no help needs)
+    """Mount an arm on a linear axis and write the URDF of both. No figure of the axis is guessed."""
+    from brachis.compose import Rail, on_rail  # noqa: PLC0415  (loads Pinocchio, which no help needs)
 
-    compose = partial(
-        on_rail,
-        arm,
+    rail = Rail(
         axis=axis,
         range=travel,
         velocity=velocity,
@@ -75,10 +83,9 @@ def compose_command(
         mount_rpy=[math.radians(angle) for angle in mount_rpy_deg],
         name=name,
         root=root,
-        meshes=meshes,
     )
-    write_one(out, lambda path: compose(output=path), (".urdf",), (arm,))
-    if as_json:
+    write_one(out, lambda path: on_rail(arm, rail, meshes=meshes, output=path), (".urdf",), (arm,))
+    if json:
         print_json({"urdf": str(out), "arm": str(arm), "joint": name, "root": root})
     else:
         result_console().print(f"wrote {out}")

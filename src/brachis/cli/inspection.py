@@ -15,9 +15,9 @@ from brachis import ik
 from brachis.cli.output import print_json, result_console
 from brachis.errors import InputError
 from brachis.plausibility import of_robot
-from brachis.robot import LimitSpec, Robot, TaskSpace, bind
+from brachis.robot import LimitSpec, Robot, TaskMap, bind
 from brachis.robot.limits import UrdfLimit
-from brachis.robot.task_space import AXES, POSE_ROWS, YAW
+from brachis.robot.task_map.rows import AXES, POSE_ROWS, YAW
 from brachis.robot.urdf import last_common_link, read_file
 
 _PARALLEL = 1e-9
@@ -156,10 +156,10 @@ def _figure(value: float | None, unit: str) -> str:
     return "not stated" if value is None else f"{value:.4g} {unit}"
 
 
-def _decompositions(robot: Robot, task_space: TaskSpace) -> list[dict[str, Any]]:
+def _decompositions(robot: Robot, task_map: TaskMap) -> list[dict[str, Any]]:
     """Every choice of redundant joints, its solver or the reasons why there is none."""
     rows = []
-    for candidate in ik.find_all(robot, task_space):
+    for candidate in ik.find_all(robot, task_map):
         solver = candidate.solver
         told = {family: reason for family, reason in candidate.reasons.items() if reason not in _OTHER_TASKS}
         why = "; ".join(f"{family}: {reason}" for family, reason in (told or candidate.reasons).items())

@@ -17,8 +17,8 @@ import typer
 from typer.core import TyperGroup
 
 from brachis import interrupts
-from brachis.cli.composition import VectorCommand, compose_command
-from brachis.cli.output import StandardOutput, open_streams, print_failure
+from brachis.cli.composition import VectorCommand, compose
+from brachis.cli.output import Json, StandardOutput, open_streams, print_failure
 from brachis.errors import BrachisError
 from brachis.interrupts import INTERRUPTED
 
@@ -60,7 +60,6 @@ Strict = Annotated[
     bool,
     typer.Option("--strict", help="Refuse figures that are hardly meant, such as degrees for rad, instead of warning."),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 
 
 def _print_version(asked: bool) -> None:  # noqa: FBT001  (Typer calls it so)
@@ -225,45 +224,7 @@ def inspect(
     )
 
 
-@app.command(cls=VectorCommand)
-def compose(
-    arm: Annotated[Path, typer.Argument(help="URDF file of the arm.", metavar="ARM")],
-    travel: Annotated[tuple[float, float], typer.Option("--range", help="Lowest and highest position on the rail, m.")],
-    velocity: Annotated[float, typer.Option(help="Limit of the rail's speed, m/s.")],
-    force: Annotated[float, typer.Option(help="Limit of the rail's drive force, N.")],
-    mass: Annotated[float, typer.Option(help="Mass of the carriage, kg.")],
-    out: Annotated[Path, typer.Option(help="URDF file to write.")],
-    axis: Annotated[
-        tuple[float, float, float], typer.Option(help="Direction of the rail in the world frame: 0 1 0 or 0,1,0.")
-    ] = (0.0, 1.0, 0.0),
-    mount_xyz: Annotated[
-        tuple[float, float, float], typer.Option(help="Where the arm's root link lies on the carriage, m.")
-    ] = (0.0, 0.0, 0.0),
-    mount_rpy_deg: Annotated[
-        tuple[float, float, float],
-        typer.Option(help="Its roll, pitch and yaw, degrees; 180 0 0 hangs the arm upside down."),
-    ] = (0.0, 0.0, 0.0),
-    name: Annotated[str, typer.Option(help="Name of the rail's joint.")] = "rail",
-    root: Annotated[str, typer.Option(help="Name of the root link, the world frame.")] = "world",
-    meshes: Annotated[bool, typer.Option(help="Keep the arm's meshes, or drop them.")] = True,
-    json: Json = False,
-) -> None:
-    """Mount an arm on a linear axis and write the URDF of both. No figure of the axis is guessed."""
-    compose_command(
-        arm,
-        axis=axis,
-        travel=travel,
-        velocity=velocity,
-        force=force,
-        mass=mass,
-        mount_xyz=mount_xyz,
-        mount_rpy_deg=mount_rpy_deg,
-        name=name,
-        root=root,
-        meshes=meshes,
-        out=out,
-        as_json=json,
-    )
+app.command(cls=VectorCommand)(compose)
 
 
 @app.command()

@@ -10,8 +10,9 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
+import typer
 from rich.console import Console
 from rich.table import Table
 
@@ -21,6 +22,7 @@ from brachis.errors import InputError
 if TYPE_CHECKING:  # loads Pinocchio, which no error message and no help needs
     from brachis.verify import Verification
 
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 _NO_FIGURE = 3
 """Exit code of a verified motion whose figures could not all be written."""
 

@@ -1,5 +1,5 @@
 """Composing robots: an arm on a linear axis, as a plain URDF."""
 
-from brachis.compose.rail import on_rail
+from brachis.compose.rail import Rail, on_rail
 
-__all__ = ["on_rail"]
+__all__ = ["Rail", "on_rail"]

@@ -17,41 +17,13 @@ from brachis.compose.elements import Element
 from brachis.errors import InputError
 from brachis.files import atomic_write
 
-CARRIAGE_SIZE = (0.4, 0.4, 0.1)
-"""Sides of the carriage, m. It only shifts, so its mass matters to the motion and its inertia does not."""
 
+@dataclass(frozen=True, kw_only=True)
+class Rail:
+    """A linear axis with its carriage. Its figures are never guessed.
 
-def on_rail(
-    arm_urdf: str | os.PathLike[str],
-    *,
-    axis: Sequence[float] = (0.0, 1.0, 0.0),
-    range: Sequence[float],  # noqa: A002 (the word of every data sheet)
-    velocity: float,
-    force: float,
-    mass: float,
-    mount_xyz: Sequence[float] = elements.ZERO,
-    mount_rpy: Sequence[float] = elements.ZERO,
-    carriage_size: Sequence[float] = CARRIAGE_SIZE,
-    name: str = "rail",
-    root: str = "world",
-    meshes: bool = True,
-    output: str | os.PathLike[str] | None = None,
-) -> str:
-    """Mount an arm on a linear axis and return the URDF of both.
-
-    The chain is: link `root` (the world frame), prismatic joint `name`, link ``<name>_carriage``, fixed joint
-    ``<name>_mount``, and the arm's own root link, below which nothing of the arm changes. An arm's root link that is
-    itself called `root` becomes ``<name>_base``. At rail position p, m, the arm's root link lies at
-    ``p * axis + mount_xyz``, turned by `mount_rpy`.
-
-    Figures of the axis are never guessed: `range`, `velocity`, `force` and `mass` have to be given.
-
-    Parameters
+    Attributes
     ----------
-    arm_urdf : path
-        URDF of the arm, without xacro macros.
-    axis : (3,) sequence of float, optional
-        Direction of the rail in the world frame, any length but zero; horizontal, vertical or tilted.
     range : (2,) sequence of float
         Lowest and highest position on the rail, m.
     velocity : float
@@ -61,84 +33,52 @@ def on_rail(
         horizontal.
     mass : float
         Mass of the carriage, kg: a solid box.
-    mount_xyz, mount_rpy : (3,) sequence of float, optional
+    axis : (3,) sequence of float
+        Direction of the rail in the world frame, any length but zero; horizontal, vertical or tilted.
+    mount_xyz, mount_rpy : (3,) sequence of float
         Placement of the arm's root link on the carriage, m and rad (roll, pitch and yaw about the fixed axes x, y, z
         of the world frame). ``(pi, 0, 0)`` hangs the arm upside down, ``(0, pi / 2, 0)`` mounts it on a wall.
-    carriage_size : (3,) sequence of float, optional
+    carriage_size : (3,) sequence of float
         Sides of the carriage, m, along the axes of the mounted arm's root link, whose origin is the middle of the
         box's top. For the drawing; the carriage only shifts, so that its inertia never enters the motion.
-    name : str, optional
+    name : str
         Name of the joint, and the beginning of the other new names.
-    root : str, optional
+    root : str
         Name of the root link.
-    meshes : bool, optional
-        False drops all visuals and collisions of the arm that are meshes.
-    output : path, optional
-        File to write. Relative mesh files are then kept valid relative to its folder; without `output` they become
-        absolute. ``package://`` and other schemes stay as they are.
-
-    Returns
-    -------
-    str
-        The URDF.
 
     Raises
     ------
     InputError
-        A figure cannot be, a name is taken, or `output` cannot be written or is the arm's own file.
-    UrdfError
-        The arm's URDF is missing, broken, not one tree, or has bodies that cannot be.
-
-    Examples
-    --------
-    >>> import brachis
-    >>> text = brachis.compose.on_rail(
-    ...     "robots/iiwa14/robot.urdf", axis=(0, 1, 0), range=(-2, 2), velocity=2, force=1500, mass=80
-    ... )
-    >>> brachis.Robot.from_urdf("iiwa14 on a rail", urdf_text=text).joint_names[:2]
-    ('rail', 'joint_1')
+        A figure cannot be.
     """
-    low, high = checks.interval(range, "range", "m")
-    rail = Rail(
-        name=checks.identifier(name, "name"),
-        root=checks.identifier(root, "root"),
-        axis=checks.direction(axis, "axis"),
-        low=low,
-        high=high,
-        velocity=checks.positive(velocity, "velocity", "m/s"),
-        force=checks.positive(force, "force", "N"),
-        mass=checks.positive(mass, "mass", "kg"),
-        mount_xyz=checks.vector(mount_xyz, "mount_xyz", "[x, y, z] in m"),
-        mount_rpy=checks.vector(mount_rpy, "mount_rpy", "[roll, pitch, yaw] in rad"),
-        carriage_size=checks.vector(carriage_size, "carriage_size", "three lengths > 0 m", above=0.0),
-    )
-    source, target = Path(arm_urdf), None if output is None else Path(output)
-    arm = read_arm(source)
-    if target is not None and target.exists() and target.samefile(source):
-        raise InputError("is the arm's own file", where=f"output {target}", allowed="another file")
-    text = rail.mount(arm, target, meshes=meshes)
-    check_composed(text, rail.name, str(source))
-    if target is not None:
-        with atomic_write(target) as stream:
-            stream.write(text.encode())
-    return text
 
-
-@dataclass(frozen=True)
-class Rail:
-    """A linear axis with its carriage; see `on_rail` for the figures."""
-
-    name: str
-    root: str
-    axis: tuple[float, ...]
-    low: float
-    high: float
+    range: Sequence[float]
     velocity: float
     force: float
     mass: float
-    mount_xyz: tuple[float, ...]
-    mount_rpy: tuple[float, ...]
-    carriage_size: tuple[float, ...]
+    axis: Sequence[float] = (0.0, 1.0, 0.0)
+    mount_xyz: Sequence[float] = elements.ZERO
+    mount_rpy: Sequence[float] = elements.ZERO
+    carriage_size: Sequence[float] = (0.4, 0.4, 0.1)
+    name: str = "rail"
+    root: str = "world"
+
+    def __post_init__(self) -> None:
+        """Check the figures."""
+        checked = {
+            "range": checks.interval(self.range, "range", "m"),
+            "name": checks.identifier(self.name, "name"),
+            "root": checks.identifier(self.root, "root"),
+            "axis": checks.direction(self.axis, "axis"),
+            "velocity": checks.positive(self.velocity, "velocity", "m/s"),
+            "force": checks.positive(self.force, "force", "N"),
+            "mass": checks.positive(self.mass, "mass", "kg"),
+            "mount_xyz": checks.vector(self.mount_xyz, "mount_xyz", "[x, y, z] in m"),
+            "mount_rpy": checks.vector(self.mount_rpy, "mount_rpy", "[roll, pitch, yaw] in rad"),
+            "carriage_size": checks.vector(self.carriage_size, "carriage_size", "three lengths > 0 m", above=0.0),
+        }
+        for figure, value in checked.items():
+            object.__setattr__(self, figure, value)
 
     def mount(self, arm: Arm, target: Path | None, *, meshes: bool) -> str:
         """Put the arm, whose XML is changed, on the carriage, and return the URDF's text."""
@@ -178,13 +118,14 @@ class Rail:
     def _elements(self, arm_root: str) -> list[Element]:
         """World, rail, carriage and mount."""
         carriage = f"{self.name}_carriage"
+        low, high = self.range
         height = self.carriage_size[2]
         down = (pin.rpy.rpyToMatrix(*self.mount_rpy) @ np.array([0.0, 0.0, -1.0])).round(15)  # cos(pi / 2) is not 0
         centre = np.array(self.mount_xyz) + 0.5 * height * down
-        beam = (centre + height * down + 0.5 * (self.low + self.high) * np.array(self.axis)).round(12)
-        length = self.high - self.low + max(self.carriage_size[:2])
+        beam = (centre + height * down + 0.5 * (low + high) * np.array(self.axis)).round(12)
+        length = high - low + max(self.carriage_size[:2])
         heading = (0.0, -math.asin(self.axis[2]), math.atan2(self.axis[1], self.axis[0]))
-        limit = {"lower": self.low, "upper": self.high, "velocity": self.velocity, "effort": self.force}
+        limit = {"lower": low, "upper": high, "velocity": self.velocity, "effort": self.force}
         colour = (f"{self.name}_grey", elements.GREY)  # a name of its own: the arm may have another grey
         inertia = elements.box_inertia(self.mass, self.carriage_size)
         return [
@@ -199,3 +140,60 @@ class Rail:
             ),
             elements.joint(f"{self.name}_mount", "fixed", carriage, arm_root, xyz=self.mount_xyz, rpy=self.mount_rpy),
         ]
+
+
+def on_rail(
+    arm_urdf: str | os.PathLike[str],
+    rail: Rail,
+    *,
+    meshes: bool = True,
+    output: str | os.PathLike[str] | None = None,
+) -> str:
+    """Mount an arm on a linear axis and return the URDF of both.
+
+    The chain is: link `rail.root` (the world frame), prismatic joint `rail.name`, link ``<name>_carriage``, fixed joint
+    ``<name>_mount``, and the arm's own root link, below which nothing of the arm changes. An arm's root link that is
+    itself called `rail.root` becomes ``<name>_base``. At rail position p, m, the arm's root link lies at
+    ``p * axis + mount_xyz``, turned by `rail.mount_rpy`.
+
+    Parameters
+    ----------
+    arm_urdf : path
+        URDF of the arm, without xacro macros.
+    rail : Rail
+    meshes : bool, optional
+        False drops all visuals and collisions of the arm that are meshes.
+    output : path, optional
+        File to write. Relative mesh files are then kept valid relative to its folder; without `output` they become
+        absolute. ``package://`` and other schemes stay as they are.
+
+    Returns
+    -------
+    str
+        The URDF.
+
+    Raises
+    ------
+    InputError
+        A name is taken, or `output` cannot be written or is the arm's own file.
+    UrdfError
+        The arm's URDF is missing, broken, not one tree, or has bodies that cannot be.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> rail = brachis.compose.Rail(axis=(0, 1, 0), range=(-2, 2), velocity=2, force=1500, mass=80)
+    >>> text = brachis.compose.on_rail("robots/iiwa14/robot.urdf", rail)
+    >>> brachis.Robot.from_urdf("iiwa14 on a rail", urdf_text=text).joint_names[:2]
+    ('rail', 'joint_1')
+    """
+    source, target = Path(arm_urdf), None if output is None else Path(output)
+    arm = read_arm(source)
+    if target is not None and target.exists() and target.samefile(source):
+        raise InputError("is the arm's own file", where=f"output {target}", allowed="another file")
+    text = rail.mount(arm, target, meshes=meshes)
+    check_composed(text, rail.name, str(source))
+    if target is not None:
+        with atomic_write(target) as stream:
+            stream.write(text.encode())
+    return text

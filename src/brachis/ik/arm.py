@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from brachis.arrays import cross
 from brachis.ik.held_joints import HeldJoints
 from brachis.ik.screws import Screw
-from brachis.ik.vectors import across, cross, dot
+from brachis.ik.vectors import across, dot
 
 _TOLERANCE = 1e-9
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.protocol import IKSolver, NotApplicableError
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, TaskMap
 
 _CHECKED_POSTURES = 100
 _INSIDE = 1e-2
@@ -17,7 +17,7 @@ _FAR = 20.0
 
 def check_answers(
     robot: Robot,
-    task_space: TaskSpace,
+    task_map: TaskMap,
     redundant: tuple[int, ...],
     solver: IKSolver,
     *,
@@ -29,7 +29,7 @@ def check_answers(
 
     Parameters
     ----------
-    robot, task_space : Robot, TaskSpace
+    robot, task_map : Robot, TaskMap
     redundant : tuple of int
         Indices of the redundant joints.
     solver : IKSolver
@@ -51,7 +51,7 @@ def check_answers(
     if not len(q):
         raise NotApplicableError("no random posture is inside a branch")
     rest = [i for i in range(robot.n) if i not in redundant]
-    targets = task_space.values(*robot.tool_placements(q))
+    targets = task_map.of_placements(*robot.tool_placements(q))
     answers = solver.solve(targets, q[:, list(redundant)])
     expected = (len(q), len(solver.branches), solver.alternatives, len(rest))
     if answers.shape != expected:
@@ -64,7 +64,7 @@ def check_answers(
     sample = np.nonzero(exists)[0]
     reached = q[sample]
     reached[:, rest] = answers[exists]
-    miss = np.abs(task_space.difference(task_space.values(*robot.tool_placements(reached)), targets[sample])).max()
+    miss = np.abs(task_map.difference(task_map.of_placements(*robot.tool_placements(reached)), targets[sample])).max()
     if not miss < _POSE_TOLERANCE:
         raise NotApplicableError(f"its answers miss the target by {miss:.1e}")
 

@@ -27,7 +27,8 @@ from brachis.ik.polish import EXACT, Poses, polished
 from brachis.ik.pose_joints import determinant, largest_determinant, random_postures
 from brachis.ik.protocol import Kind, NotApplicableError, ik_family
 from brachis.ik.vectors import wrap
-from brachis.robot import TaskSpace
+from brachis.robot import TaskMap
+from brachis.robot.task_map import Pose
 
 NOT_INSTALLED = 'EAIK is not installed (pip install "brachis[eaik]")'
 """Why EAIK is not asked, where that is the reason."""
@@ -141,9 +142,9 @@ def _check_rank(geometry: ChainGeometry, redundant: tuple[int, ...]) -> None:
 @ik_family(
     "eaik", source="D. Ostermeier, J. Külz, M. Althoff, Automatic geometric decomposition for analytical IK, 2025"
 )
-def eaik(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> EaikSolver:
+def eaik(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> EaikSolver:
     """Fit the family: a pose is prescribed, and six joints are left over, all revolute, which EAIK can solve."""
-    if not task_space.oriented:
+    if not isinstance(task_map, Pose):
         raise NotApplicableError("no whole pose is prescribed")
     sliding = [geometry.joint_names[i] for i in range(geometry.n) if i not in redundant and not geometry.revolute[i]]
     if sliding:

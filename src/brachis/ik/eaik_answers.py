@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from brachis.arrays import cross
 from brachis.ik.geometry import ChainGeometry
-from brachis.ik.vectors import across, cross, dot
+from brachis.ik.vectors import across, dot
 
 EXACT = 1e-8
 """Axes this near to parallel, or to meeting, are taken to do so, rad or m."""

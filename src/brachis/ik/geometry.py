@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from brachis.ik.vectors import cross
+from brachis.arrays import cross
 from brachis.robot import Robot
 
 

@@ -21,7 +21,8 @@ from brachis.ik.geometry import ChainGeometry
 from brachis.ik.polish import goal_of, polished
 from brachis.ik.protocol import IKSolver
 from brachis.ik.vectors import meeting_point
-from brachis.robot import TaskSpace
+from brachis.robot import TaskMap
+from brachis.robot.task_map import Pose
 
 TOLERANCE = 1e-4
 """Axes this near to parallel or perpendicular (rad), or to meeting (m), are taken to be meant so."""
@@ -55,13 +56,13 @@ class Ideal:
         return " and ".join(f"{size:.1e} {unit}" for size, unit in sizes if size > least)
 
 
-def idealised(geometry: ChainGeometry, task_space: TaskSpace, tolerance: float = TOLERANCE) -> Ideal | None:
+def idealised(geometry: ChainGeometry, task_map: TaskMap, tolerance: float = TOLERANCE) -> Ideal | None:
     """Make axes that are almost parallel, perpendicular or meeting so exactly.
 
     Parameters
     ----------
     geometry : ChainGeometry
-    task_space : TaskSpace
+    task_map : TaskMap
         For positions the world's axes, and a tool on the last axis of rotation, matter as well.
     tolerance : float, optional
         rad for directions, m for points.
@@ -71,13 +72,13 @@ def idealised(geometry: ChainGeometry, task_space: TaskSpace, tolerance: float =
     Ideal or None
         None where the chain is ideal as it is.
     """
-    chain = _Chain([] if task_space.oriented else list(np.eye(3)), tolerance)
+    chain = _Chain([] if isinstance(task_map, Pose) else list(np.eye(3)), tolerance)
     axes, points = np.empty_like(geometry.axes), np.zeros_like(geometry.points)
     for i, revolute in enumerate(geometry.revolute):
         axes[i] = chain.direction(geometry.axes[i], geometry.points[i], revolute=revolute)
         if revolute:
             points[i] = chain.place(axes[i], geometry.points[i])
-    if not task_space.oriented:
+    if not isinstance(task_map, Pose):
         chain.place_tool(geometry.tool_position)
     if max(chain.turned, chain.shifted) < _ROUNDING:
         return None
@@ -199,7 +200,7 @@ class Polished(IKSolver):
         Of the ideal chain.
     geometry : ChainGeometry
         The given chain.
-    task_space : TaskSpace
+    task_map : TaskMap
     redundant : tuple of int
     """
 
@@ -207,13 +208,13 @@ class Polished(IKSolver):
         self,
         solver: IKSolver,
         geometry: ChainGeometry,
-        task_space: TaskSpace,
+        task_map: TaskMap,
         redundant: tuple[int, ...],
     ) -> None:
         self.branches, self.alternatives, self.kind = solver.branches, solver.alternatives, solver.kind
         self._solver = solver
         self._geometry = geometry
-        self._task_space = task_space
+        self._task_map = task_map
         self._redundant = list(redundant)
         self._rest = [i for i in range(geometry.n) if i not in redundant]
 
@@ -233,7 +234,7 @@ class Polished(IKSolver):
         q[:, self._redundant] = q_r[sample]
         q[:, self._rest] = answers[exists]
         exact = np.full_like(answers, np.nan)
-        exact[exists] = polished(self._geometry, self._rest, q, goal_of(self._task_space, targets[sample]))
+        exact[exists] = polished(self._geometry, self._rest, q, goal_of(self._task_map, targets[sample]))
         return exact
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:

@@ -54,7 +54,7 @@ from brachis.ik.pose_joints import PoseJoints
 from brachis.ik.protocol import ik_family
 from brachis.ik.screws import Circle
 from brachis.ik.vectors import angle_about, apply, apply_inverse, dot, rotate
-from brachis.robot import TaskSpace
+from brachis.robot import TaskMap
 
 _SHOULDER = 0
 
@@ -111,7 +111,7 @@ class ParallelAxesSolver(FactoredSolver[ParallelStructure]):
 
 
 @ik_family("parallel_axes", source="Hawkins 2013 and IK-Geo 2022 for six revolute joints; this module's docstring")
-def parallel_axes(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> ParallelAxesSolver:
+def parallel_axes(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> ParallelAxesSolver:
     """Fit the family: a pose, six joints left over, and three parallel axes in succession among them."""
-    six = PoseJoints.of(geometry, task_space, redundant)
+    six = PoseJoints.of(geometry, task_map, redundant)
     return ParallelAxesSolver(geometry, redundant, fitted(geometry, six, (ParallelStructure.of,)))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.arrays import cross
 from brachis.ik.arm import Arm
 from brachis.ik.factored_solver import Structure
 from brachis.ik.factors import Factor
@@ -13,7 +14,7 @@ from brachis.ik.geometry import PosedScrews
 from brachis.ik.pose_joints import PoseJoints
 from brachis.ik.protocol import NotApplicableError
 from brachis.ik.screws import Screw
-from brachis.ik.vectors import cross, dot, meeting_point
+from brachis.ik.vectors import dot, meeting_point
 
 _LAST_FIRST = {1: 4, 2: 5}
 """Joints before the parallel ones, and the place of the first joint after them."""

@@ -27,9 +27,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.arrays import cross
 from brachis.ik.arm import Arm
 from brachis.ik.screws import Screw
-from brachis.ik.vectors import across, angle_about, cross, dot
+from brachis.ik.vectors import across, angle_about, dot
 
 FRONT, UP, FLIP = 0, 1, 2
 """Slots of the two steps of a recipe, and of the wrist's."""

@@ -19,7 +19,8 @@ from brachis.ik.geometry import ChainGeometry
 from brachis.ik.planar_chain import PlanarChain
 from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
 from brachis.ik.vectors import wrap
-from brachis.robot import TaskSpace
+from brachis.robot import TaskMap
+from brachis.robot.task_map import Pose, RowsAndYaw
 
 _SAMPLES = 64
 _LABELS = {"RR": "elbow", "RP": "reach", "PR": "reach", "PP": "slides", "R": "swing", "P": "slide"}
@@ -208,12 +209,12 @@ def _lines(h: np.ndarray, first: np.ndarray | complex, second: np.ndarray | comp
 
 
 @ik_family("planar", source="two circles, circle and line, two lines: elementary plane geometry")
-def planar(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> PlanarSolver:
+def planar(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> PlanarSolver:
     """Fit the family: all joints move in one plane that the prescribed rows can see."""
-    if task_space.oriented:
+    if isinstance(task_map, Pose):
         raise NotApplicableError("a whole pose is prescribed")
-    chain = PlanarChain.of(geometry, task_space)
-    yaw = task_space.yaw_axis is not None
+    chain = PlanarChain.of(geometry, task_map)
+    yaw = isinstance(task_map, RowsAndYaw)
     rest = [i for i in range(geometry.n) if i not in redundant]
     if yaw and not any(geometry.revolute[i] for i in rest):
         raise NotApplicableError("no revolute joint is left to set yaw")

@@ -14,7 +14,8 @@ import numpy as np
 
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.protocol import NotApplicableError
-from brachis.robot import TaskSpace
+from brachis.robot import TaskMap
+from brachis.robot.task_map import RowsAndYaw
 
 _PARALLEL = 1e-9
 
@@ -50,7 +51,7 @@ class PlanarChain:
     offset: np.ndarray
 
     @classmethod
-    def of(cls, geometry: ChainGeometry, task_space: TaskSpace) -> PlanarChain:
+    def of(cls, geometry: ChainGeometry, task_map: TaskMap) -> PlanarChain:
         """Find the plane from the screw axes.
 
         Raises
@@ -59,12 +60,12 @@ class PlanarChain:
             The joints do not move in one plane, or the rows cannot tell positions in it apart.
         """
         normal = _normal(geometry)
-        first, second = _basis(normal, task_space)
+        first, second = _basis(normal, task_map)
         normal = np.cross(first, second)
         basis = first + 1j * second
         along = geometry.axes @ normal
         inert = ~geometry.revolute & (np.abs(along) > 1.0 - _PARALLEL)
-        selection = np.eye(3)[list(task_space.axes)]
+        selection = np.eye(3)[list(task_map.axes)]
         if np.any(inert) and np.any(np.abs(selection @ normal) > _PARALLEL):
             raise NotApplicableError("a slide along the plane's normal changes the prescribed rows")
         to_plane = selection @ np.column_stack([first, second])
@@ -72,10 +73,10 @@ class PlanarChain:
         if np.linalg.matrix_rank(to_plane, tol=_PARALLEL) < min(2, len(to_plane)) or len(to_plane) > 2:  # noqa: PLR2004
             raise NotApplicableError("the prescribed rows do not fit the plane in which the joints move")
         yaw = 0.0
-        if task_space.yaw_axis is not None:
-            if abs(normal[task_space.yaw_world_axis]) < 1.0 - _PARALLEL:
+        if isinstance(task_map, RowsAndYaw):
+            if abs(normal[task_map.world_axis]) < 1.0 - _PARALLEL:
                 raise NotApplicableError("yaw turns in another plane than the joints")
-            yaw = float(np.angle(basis @ geometry.tool_rotation[:, task_space.yaw_axis]))
+            yaw = float(np.angle(basis @ geometry.tool_rotation[:, task_map.tool_axis]))
         return cls(
             revolute=geometry.revolute,
             sigma=np.where(geometry.revolute, np.sign(along), 0.0),
@@ -175,9 +176,9 @@ def _normal(geometry: ChainGeometry) -> np.ndarray:
     return normal
 
 
-def _basis(normal: np.ndarray, task_space: TaskSpace) -> tuple[np.ndarray, np.ndarray]:
+def _basis(normal: np.ndarray, task_map: TaskMap) -> tuple[np.ndarray, np.ndarray]:
     """Two orthonormal vectors of the plane; the rows' own axes where the rows span it."""
-    wanted = np.eye(3)[list(task_space.axes[:2])]
+    wanted = np.eye(3)[list(task_map.axes[:2])]
     if len(wanted) == 2 and np.all(np.abs(wanted @ normal) < _PARALLEL):  # noqa: PLR2004
         return wanted[0], wanted[1]
     first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])

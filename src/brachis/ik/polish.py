@@ -19,9 +19,11 @@ from typing import Protocol
 
 import numpy as np
 
+from brachis.arrays import cross
 from brachis.ik.geometry import ChainGeometry, PosedScrews
-from brachis.ik.vectors import apply, apply_inverse, cross
-from brachis.robot import TaskSpace
+from brachis.ik.vectors import apply, apply_inverse
+from brachis.robot import TaskMap
+from brachis.robot.task_map import Pose
 
 EXACT = 1e-13
 """A gap that needs no polishing, m or rad, for joints near zero."""
@@ -108,34 +110,30 @@ class Rows:
 
     Attributes
     ----------
-    task_space : TaskSpace
+    task_map : TaskMap
     targets : (N, m) ndarray
     """
 
-    task_space: TaskSpace
+    task_map: TaskMap
     targets: np.ndarray
 
     def __getitem__(self, samples: np.ndarray) -> Rows:
         """See `Goal`."""
-        return Rows(self.task_space, self.targets[samples])
+        return Rows(self.task_map, self.targets[samples])
 
     def gap(self, posed: PosedScrews) -> np.ndarray:
         """See `Goal`."""
-        reached = self.task_space.values(posed.tool_position.T, np.moveaxis(posed.tool_rotation, 2, 0))
-        return self.task_space.difference(self.targets, reached)
+        reached = self.task_map.of_placements(posed.tool_position.T, np.moveaxis(posed.tool_rotation, 2, 0))
+        return self.task_map.difference(self.targets, reached)
 
     def rows(self, columns: np.ndarray) -> np.ndarray:
         """See `Goal`."""
-        space = self.task_space
-        rows = columns[list(space.axes)]
-        if space.yaw_axis is None:
-            return rows
-        return np.concatenate([rows, space.yaw_sign * columns[3 + space.yaw_world_axis, None]])
+        return self.task_map.rates(columns)
 
 
-def goal_of(task_space: TaskSpace, targets: np.ndarray) -> Goal:
+def goal_of(task_map: TaskMap, targets: np.ndarray) -> Goal:
     """Return what task coordinates, (N, c), ask for."""
-    return Poses.of_targets(targets) if task_space.oriented else Rows(task_space, targets)
+    return Poses.of_targets(targets) if isinstance(task_map, Pose) else Rows(task_map, targets)
 
 
 def polished(chain: ChainGeometry, joints: Sequence[int], q: np.ndarray, goal: Goal) -> np.ndarray:

@@ -52,7 +52,7 @@ from brachis.ik.pose_joints import PoseJoints, determinant, largest_determinant,
 from brachis.ik.protocol import Kind, NotApplicableError, ik_family
 from brachis.ik.trigonometric import real_roots, sample_angles
 from brachis.ik.vectors import dot, wrap
-from brachis.robot import TaskSpace
+from brachis.robot import TaskMap
 
 _DEGREE = 6
 _EACH = 6
@@ -121,6 +121,6 @@ def _structure(six: PoseJoints) -> PoseJoints:
 
 
 @ik_family("polynomial", source="resultant of two equations linear in a cosine and a sine; this module's docstring")
-def polynomial(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> PolynomialSolver:
+def polynomial(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> PolynomialSolver:
     """Fit the family: a pose, and six joints left over that have the module's structure."""
-    return PolynomialSolver(geometry, redundant, _structure(PoseJoints.of(geometry, task_space, redundant)))
+    return PolynomialSolver(geometry, redundant, _structure(PoseJoints.of(geometry, task_map, redundant)))

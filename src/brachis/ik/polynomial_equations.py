@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.arrays import cross
 from brachis.ik.displacement import Displacement
-from brachis.ik.vectors import apply, cross, dot, meeting_point, perpendiculars
+from brachis.ik.vectors import apply, dot, meeting_point, perpendiculars
 
 _ROUNDS = 6
 _STEPS = 2

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.arrays import cross
 from brachis.ik.arm import aligned, meeting
 from brachis.ik.geometry import ChainGeometry, PosedScrews
 from brachis.ik.held_joints import HeldJoints
 from brachis.ik.protocol import NotApplicableError
-from brachis.ik.vectors import cross
-from brachis.robot import TaskSpace
+from brachis.robot import TaskMap
+from brachis.robot.task_map import Pose
 
 _JOINTS = 6
 _POSTURES = 256
@@ -25,7 +26,7 @@ class PoseJoints(HeldJoints):
     """The six non-redundant joints of a pose; see `HeldJoints`."""
 
     @classmethod
-    def of(cls, geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> PoseJoints:
+    def of(cls, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> PoseJoints:
         """Hold the redundant joints at random positions.
 
         Raises
@@ -33,7 +34,7 @@ class PoseJoints(HeldJoints):
         NotApplicableError
             No pose is prescribed, or other than six joints are left over.
         """
-        if not task_space.oriented:
+        if not isinstance(task_map, Pose):
             raise NotApplicableError("only for poses")
         if geometry.n - len(redundant) != _JOINTS:
             raise NotApplicableError(f"{geometry.n - len(redundant)} joints would be left over, not six")

@@ -29,7 +29,8 @@ from brachis.ik.pose_joints import random_postures
 from brachis.ik.position_recipes import recipe_for
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import Screw
-from brachis.robot import TaskSpace
+from brachis.robot import TaskMap
+from brachis.robot.task_map import Pose
 
 _POINT = "the tool"
 _JOINTS = 3
@@ -99,16 +100,16 @@ class PositioningSolver(FactoredSolver[ToolStructure]):
 
 
 @ik_family("positioning", source="Pieper 1968; Paden 1985; IK-Geo 2022; `placing`")
-def positioning(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> PositioningSolver:
+def positioning(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> PositioningSolver:
     """Fit the family: the tool's position alone is prescribed, and three joints are left over for it."""
-    if task_space.oriented or len(task_space.axes) != _JOINTS:
+    if isinstance(task_map, Pose) or len(task_map.axes) != _JOINTS:
         raise NotApplicableError("only for the position: x, y and z")
     if geometry.n - len(redundant) != _JOINTS:
         raise NotApplicableError(f"{geometry.n - len(redundant)} joints would be left over, not three")
     three = HeldJoints.beside(geometry, redundant)
     _refuse_idle(geometry, three)
     structure = fitted(geometry, three, (ToolStructure.of,))
-    return PositioningSolver(geometry, redundant, structure, task_space.axes)
+    return PositioningSolver(geometry, redundant, structure, task_map.axes)
 
 
 def _refuse_idle(geometry: ChainGeometry, three: HeldJoints) -> None:

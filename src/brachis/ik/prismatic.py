@@ -10,7 +10,8 @@ import numpy as np
 
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
-from brachis.robot import TaskSpace
+from brachis.robot import TaskMap
+from brachis.robot.task_map import Pose, RowsAndYaw
 
 _SAMPLES = 64
 
@@ -20,11 +21,11 @@ class PrismaticSolver(IKSolver):
 
     kind: Kind = "closed_form"
 
-    def __init__(self, geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> None:
+    def __init__(self, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> None:
         self._geometry = geometry
         self._redundant = list(redundant)
         self._rest = [i for i in range(geometry.n) if i not in redundant]
-        self._rows = list(task_space.axes)
+        self._rows = list(task_map.axes)
         postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, geometry.n))
         determinants = np.linalg.det(self._directions(postures)[1])
         self._scale = float(np.abs(determinants).max())
@@ -62,13 +63,13 @@ class PrismaticSolver(IKSolver):
 
 
 @ik_family("prismatic", source="linear in the slides; this module's docstring")
-def prismatic(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> PrismaticSolver:
+def prismatic(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> PrismaticSolver:
     """Fit the family: every non-redundant joint is prismatic and no angle is prescribed."""
-    if task_space.oriented:
+    if isinstance(task_map, Pose):
         raise NotApplicableError("a whole pose is prescribed")
     turning = [geometry.joint_names[i] for i in range(geometry.n) if i not in redundant and geometry.revolute[i]]
     if turning:
         raise NotApplicableError(f"{', '.join(turning)} would be left over and not prismatic")
-    if task_space.yaw_axis is not None:
+    if isinstance(task_map, RowsAndYaw):
         raise NotApplicableError("prismatic joints do not change yaw")
-    return PrismaticSolver(geometry, task_space, redundant)
+    return PrismaticSolver(geometry, task_map, redundant)

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from brachis.ik.geometry import ChainGeometry
-from brachis.robot import TaskSpace
+from brachis.robot import TaskMap
 
 Kind = Literal["closed_form", "polynomial"]
 
@@ -41,7 +41,7 @@ class IKSolver(ABC):
         Parameters
         ----------
         targets : (K, c) ndarray
-            Task coordinates; see `TaskSpace` (for poses c = 12: position, then the rotation matrix row by row).
+            Task coordinates; see `TaskMap` (for poses c = 12: position, then the rotation matrix row by row).
         q_r : (K, r) ndarray
             Redundant joints, chain order.
 
@@ -79,7 +79,7 @@ class NotApplicableError(Exception):
     """A family does not fit a decomposition; the message is the reason, shown to the user."""
 
 
-Build = Callable[[ChainGeometry, TaskSpace, tuple[int, ...]], IKSolver]
+Build = Callable[[ChainGeometry, TaskMap, tuple[int, ...]], IKSolver]
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Family:
     ----------
     name : str
     build : callable
-        ``build(geometry, task_space, redundant)`` returns a solver for the redundant joints with these indices, or
+        ``build(geometry, task_map, redundant)`` returns a solver for the redundant joints with these indices, or
         raises `NotApplicableError` with the reason.
     source : str
         Where the formulas come from.

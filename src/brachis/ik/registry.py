@@ -28,7 +28,7 @@ from brachis.ik.positioning import positioning
 from brachis.ik.prismatic import prismatic
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError
 from brachis.ik.spherical_wrist import spherical_wrist
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, TaskMap
 
 BUILTIN: tuple[Family, ...] = (prismatic, planar, positioning, spherical_wrist, parallel_axes, eaik, polynomial)
 
@@ -89,15 +89,13 @@ def _loaded(entry: importlib.metadata.EntryPoint) -> Family:
     return Family(entry.name, refuse, entry.value)
 
 
-def find(
-    robot: Robot, task_space: TaskSpace, redundant_joints: Sequence[str], *, families: Sequence[Family] = ()
-) -> Match:
+def find(robot: Robot, task_map: TaskMap, redundant_joints: Sequence[str], *, families: Sequence[Family] = ()) -> Match:
     """Find the closed form for a choice of redundant joints.
 
     Parameters
     ----------
     robot : Robot
-    task_space : TaskSpace
+    task_map : TaskMap
     redundant_joints : sequence of str
         As many as the robot has joints more than the task space has rows.
     families : sequence of Family, optional
@@ -118,19 +116,17 @@ def find(
     for name in names:
         if name not in robot.joint_names:
             raise UnknownNameError("joint", name, robot.joint_names, where="redundant_joints")
-    r = robot.n - task_space.m
+    r = robot.n - task_map.m
     if len(set(names)) != len(names) or len(names) != r:
         raise DecompositionError(
             "wrong number of redundant joints" if r >= 0 else "the robot has fewer joints than the task space has rows",
             redundant_joints=names,
             found=f"{len(names)} ({', '.join(names) or 'none'})",
-            allowed=f"{r}: {robot.n} joints less {task_space.m} rows ({', '.join(task_space.rows)})"
-            if r >= 0
-            else None,
+            allowed=f"{r}: {robot.n} joints less {task_map.m} rows ({', '.join(task_map.rows)})" if r >= 0 else None,
         )
-    candidate = _try(robot, task_space, names, families, _ideals(robot, task_space))
+    candidate = _try(robot, task_map, names, families, _ideals(robot, task_map))
     if not isinstance(candidate, Match):
-        available = [c.redundant_joints for c in find_all(robot, task_space, families=families) if c.solver is not None]
+        available = [c.redundant_joints for c in find_all(robot, task_map, families=families) if c.solver is not None]
         raise DecompositionError(
             f"no closed form for redundant joints [{', '.join(names)}]",
             redundant_joints=names,
@@ -140,13 +136,13 @@ def find(
     return candidate
 
 
-def find_all(robot: Robot, task_space: TaskSpace, *, families: Sequence[Family] = ()) -> list[Candidate]:
+def find_all(robot: Robot, task_map: TaskMap, *, families: Sequence[Family] = ()) -> list[Candidate]:
     """Try every choice of redundant joints; see `find`."""
-    r = robot.n - task_space.m
+    r = robot.n - task_map.m
     if r < 0:
         return []
-    ideals = _ideals(robot, task_space)
-    return [_try(robot, task_space, names, families, ideals) for names in itertools.combinations(robot.joint_names, r)]
+    ideals = _ideals(robot, task_map)
+    return [_try(robot, task_map, names, families, ideals) for names in itertools.combinations(robot.joint_names, r)]
 
 
 def without_eaik(candidates: Sequence[Candidate]) -> tuple[tuple[str, ...], ...]:
@@ -158,15 +154,15 @@ def without_eaik(candidates: Sequence[Candidate]) -> tuple[tuple[str, ...], ...]
     )
 
 
-def _ideals(robot: Robot, task_space: TaskSpace) -> Callable[[float], Ideal | None]:
+def _ideals(robot: Robot, task_map: TaskMap) -> Callable[[float], Ideal | None]:
     """Return the ideal arm within a tolerance as a function of it; the redundant joints have no part in it."""
     geometry = ChainGeometry.of(robot)
-    return cache(lambda tolerance: idealised(geometry, task_space, tolerance))
+    return cache(lambda tolerance: idealised(geometry, task_map, tolerance))
 
 
 def _try(
     robot: Robot,
-    task_space: TaskSpace,
+    task_map: TaskMap,
     names: tuple[str, ...],
     families: Sequence[Family],
     ideals: Callable[[float], Ideal | None],
@@ -175,17 +171,17 @@ def _try(
     redundant = tuple(sorted(robot.joint_names.index(name) for name in names))
     reasons: dict[str, str] = {}
     tried = (*families, *BUILTIN, *plugin_families())
-    match = _fitting(robot, task_space, redundant, tried, reasons, None)
+    match = _fitting(robot, task_map, redundant, tried, reasons, None)
     if match is None and (ideal := ideals(TOLERANCE)):
-        match = _fitting(robot, task_space, redundant, tried, reasons, ideal)
+        match = _fitting(robot, task_map, redundant, tried, reasons, ideal)
     if match is None and (rough := ideals(_NEAR)):
-        _name_rounding(task_space, redundant, tried, reasons, rough)
+        _name_rounding(task_map, redundant, tried, reasons, rough)
     return match or Candidate(tuple(robot.joint_names[i] for i in redundant), None, None, reasons)
 
 
 def _fitting(
     robot: Robot,
-    task_space: TaskSpace,
+    task_map: TaskMap,
     redundant: tuple[int, ...],
     families: Sequence[Family],
     reasons: dict[str, str],
@@ -195,10 +191,10 @@ def _fitting(
     geometry = ChainGeometry.of(robot)
     for family in families:
         try:
-            solver = family.build(ideal.geometry if ideal else geometry, task_space, redundant)
+            solver = family.build(ideal.geometry if ideal else geometry, task_map, redundant)
             if ideal:
-                solver = Polished(solver, geometry, task_space, redundant)
-            check_answers(robot, task_space, redundant, solver)
+                solver = Polished(solver, geometry, task_map, redundant)
+            check_answers(robot, task_map, redundant, solver)
         except NotApplicableError as reason:
             reasons[family.name] = str(reason)
         except Exception as error:
@@ -213,14 +209,14 @@ def _fitting(
 
 
 def _name_rounding(
-    task_space: TaskSpace, redundant: tuple[int, ...], families: Sequence[Family], reasons: dict[str, str], ideal: Ideal
+    task_map: TaskMap, redundant: tuple[int, ...], families: Sequence[Family], reasons: dict[str, str], ideal: Ideal
 ) -> None:
     """Put down which families would fit if the axes were nearer to the ideal arm's."""
     if max(ideal.turned, ideal.shifted) < TOLERANCE:
         return
     for family in (family for family in families if family in BUILTIN):
         with contextlib.suppress(NotApplicableError):
-            family.build(ideal.geometry, task_space, redundant)
+            family.build(ideal.geometry, task_map, redundant)
             reasons[family.name] = (
                 f"fits an ideal arm only, and its axes are up to {ideal.miss} from there; at most {TOLERANCE:.0e} is "
                 "taken for rounding. If the URDF rounds angles, as in 1.57, write them with more digits"

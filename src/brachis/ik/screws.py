@@ -16,7 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.ik.vectors import cosine_roots, cross, dot
+from brachis.arrays import cross
+from brachis.ik.vectors import cosine_roots, dot
 
 
 @dataclass(frozen=True)

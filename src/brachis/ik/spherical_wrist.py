@@ -29,6 +29,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.arrays import cross
 from brachis.ik.arm import Anchor, Arm, meeting, miss
 from brachis.ik.displacement import Displacement
 from brachis.ik.factored_solver import FactoredSolver, PlacingStructure, fitted
@@ -40,8 +41,8 @@ from brachis.ik.pose_joints import PoseJoints
 from brachis.ik.position_recipes import recipe_for
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import Circle, Screw
-from brachis.ik.vectors import angle_about, apply, apply_inverse, cross, dot
-from brachis.robot import TaskSpace
+from brachis.ik.vectors import angle_about, apply, apply_inverse, dot
+from brachis.robot import TaskMap
 
 _WRIST = (3, 4, 5)
 
@@ -154,9 +155,9 @@ def _wrist(arm: Arm, base: tuple[np.ndarray, ...], rotation: np.ndarray) -> tupl
 
 
 @ik_family("spherical_wrist", source="Pieper 1968; Paden 1985; Brandstoetter et al. 2014; IK-Geo 2022; `placing`")
-def spherical_wrist(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> SphericalWristSolver:
+def spherical_wrist(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> SphericalWristSolver:
     """Fit the family: a pose, and six joints left over of which the last or the first three axes meet in a point."""
-    six = PoseJoints.of(geometry, task_space, redundant)
+    six = PoseJoints.of(geometry, task_map, redundant)
     return SphericalWristSolver(
         geometry, redundant, fitted(geometry, six, (WristStructure.of, WristStructure.backwards))
     )

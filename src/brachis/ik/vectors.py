@@ -11,20 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.arrays import cross
+
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Scalar product, shape (...)."""
     return np.einsum("i...,i...->...", a, b)
-
-
-def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Vector product, shape (3, ...)."""
-    first = a[1] * b[2]
-    product = np.empty((3, *first.shape), dtype=first.dtype)
-    np.subtract(first, a[2] * b[1], out=product[0, ...])
-    np.subtract(a[2] * b[0], a[0] * b[2], out=product[1, ...])
-    np.subtract(a[0] * b[1], a[1] * b[0], out=product[2, ...])
-    return product
 
 
 def across(axis: np.ndarray, vector: np.ndarray) -> np.ndarray:

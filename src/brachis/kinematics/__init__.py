@@ -4,7 +4,6 @@ from brachis.kinematics.decomposition import Decomposition
 from brachis.kinematics.direct import DirectJointMap
 from brachis.kinematics.interpolation import Nodes, interpolate
 from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
-from brachis.kinematics.task_kinematics import TaskDerivatives, TaskKinematics
 
 __all__ = [
     "Decomposition",
@@ -13,7 +12,5 @@ __all__ = [
     "JointMap",
     "JointState",
     "Nodes",
-    "TaskDerivatives",
-    "TaskKinematics",
     "interpolate",
 ]

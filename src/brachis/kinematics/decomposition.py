@@ -13,7 +13,7 @@ J qddot + Jdot qdot = xi_ds sdot^2 + xi sddot:
     dqddot_nr/dydot = J_nr^-1 ([2 xi_ds sdot, 0] - A_v G)
     dqddot_nr/dy    = J_nr^-1 ([xi_dds sdot^2 + xi_ds sddot, 0] - A_q G - A_v dqdot/dy)
 
-with V_q, A_q, A_v the derivatives of task velocity and acceleration (`task_kinematics`). Rows of redundant joints are
+with V_q, A_q, A_v the derivatives of task velocity and acceleration (`TaskMap`). Rows of redundant joints are
 constant: their derivatives vanish.
 """
 
@@ -26,9 +26,8 @@ import numpy as np
 from brachis.errors import UnreachableError
 from brachis.ik import ChainGeometry, IKSolver, margin_gradient
 from brachis.kinematics.joint_map import JointDerivatives, JointState
-from brachis.kinematics.task_kinematics import TaskKinematics
 from brachis.path import Path, PathSample
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import TaskMap
 
 _TURN = 2.0 * np.pi
 _SURE = 0.25
@@ -43,7 +42,7 @@ class PathState(JointState):
     ----------
     path : PathSample
     twists : (6, K, n) ndarray
-        Columns of the tool frame's Jacobian; see `TaskKinematics.twists`.
+        Columns of the tool frame's Jacobian; see `TaskMap.twists`.
     inverse : (K, m, m) ndarray
         J_nr^-1.
     """
@@ -58,8 +57,8 @@ class Decomposition:
 
     Parameters
     ----------
-    robot : Robot
-    task_space : TaskSpace
+    task_map : TaskMap
+        Of the robot.
     path : Path
     solver : IKSolver
     redundant : tuple of int
@@ -72,23 +71,21 @@ class Decomposition:
 
     def __init__(
         self,
-        robot: Robot,
-        task_space: TaskSpace,
+        task_map: TaskMap,
         path: Path,
         solver: IKSolver,
         redundant: tuple[int, ...],
         branch: int,
         start: np.ndarray,
     ) -> None:
-        self.robot = robot
-        self.task_space = task_space
+        self.robot = robot = task_map.robot
+        self.task_map = task_map
         self.path = path
         self.solver = solver
         self.redundant = list(redundant)
         self.nonredundant = [i for i in range(robot.n) if i not in redundant]
         self.branch = branch
         self.start = start
-        self.kinematics = TaskKinematics(robot, task_space)
         self._turning = ChainGeometry.of(robot).revolute[self.nonredundant]
         self._turns = [joint for joint, turning in zip(self.nonredundant, self._turning, strict=True) if turning]
         limits = robot.limits
@@ -203,8 +200,8 @@ class Decomposition:
         q = self.postures(y, sample, near=near)
         if not np.all(np.isfinite(q)):
             raise UnreachableError("the target is out of the branch's reach")
-        twists = self.kinematics.twists(q)
-        jacobian = self.kinematics.rows(twists)
+        twists = self.task_map.twists(q)
+        jacobian = self.task_map.jacobian(twists)
         try:
             inverse = np.linalg.inv(jacobian[:, :, self.nonredundant])
         except np.linalg.LinAlgError as error:
@@ -212,7 +209,7 @@ class Decomposition:
         gradient = self._gradient(sample, jacobian, inverse)
         qdot = np.einsum("kij,kj->ki", gradient, ydot)
         # What the redundant joints and the path leave to the non-redundant ones.
-        wanted = sample.xi_ds * ydot[:, :1] ** 2 - self.kinematics.bias(twists, qdot)
+        wanted = sample.xi_ds * ydot[:, :1] ** 2 - self.task_map.bias(twists, qdot)
         qddot = np.einsum("kij,kj->ki", gradient, yddot)
         qddot[:, self.nonredundant] += np.einsum("kij,kj->ki", inverse, wanted)
         if near is not None:
@@ -244,7 +241,7 @@ class Decomposition:
 
     def derivatives(self, state: PathState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""
-        task = self.kinematics.derivatives(state.twists, state.qdot, state.qddot)
+        task = self.task_map.derivatives(state.twists, state.qdot, state.qddot)
         sdot, sddot = state.ydot[:, :1], state.yddot[:, :1]
         sample, zeros = state.path, np.zeros_like(state.gradient)
         qdot_y, qddot_y, qddot_ydot = zeros, zeros.copy(), zeros.copy()

@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kinematics import TaskKinematics
 from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials, PhaseLines, Role
-from brachis.robot import Robot, TaskSpace
+from brachis.robot import Robot, task_map_of
 from brachis.task import Task
 
 
@@ -32,7 +31,7 @@ class ToolSpeedLimit(Limit):
     time_scaling = True
 
     def __init__(self, robot: Robot, figure: float) -> None:
-        self._kinematics = TaskKinematics(robot, TaskSpace.of(robot, "position"))
+        self._tool = task_map_of(robot, "position")
         self._figure = figure
         self.labels = (Label("tool", "speed", "m/s", "tool_limits.speed"),)
         self.lower, self.upper = np.full(1, -np.inf), np.ones(1)
@@ -44,24 +43,24 @@ class ToolSpeedLimit(Limit):
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        velocity = np.einsum("kij,kj->ki", self._kinematics.jacobian(motion.q), motion.qdot)
+        velocity = np.einsum("kij,kj->ki", self._tool.jacobian(self._tool.twists(motion.q)), motion.qdot)
         return np.linalg.norm(velocity, axis=1)[:, None] / self._figure
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
-        twists = self._kinematics.twists(motion.q)
-        jacobian = self._kinematics.rows(twists)
+        twists = self._tool.twists(motion.q)
+        jacobian = self._tool.jacobian(twists)
         velocity = np.einsum("kij,kj->ki", jacobian, motion.qdot)
         speed = np.linalg.norm(velocity, axis=1)[:, None]
         direction = np.divide(velocity, speed, out=np.zeros_like(velocity), where=speed > 0.0)
-        by_q = self._kinematics.derivatives(twists, motion.qdot, motion.qddot).velocity_q
+        by_q = self._tool.derivatives(twists, motion.qdot, motion.qddot).velocity_q
         parts = (np.einsum("ki,kij->kj", direction, part)[:, None] / self._figure for part in (by_q, jacobian))
         by_position, by_velocity = parts
         return Partials(q=by_position, qdot=by_velocity)
 
     def lines(self, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
         """See `Limit.lines`: the square of the ratio."""
-        tangent = np.einsum("kij,kj->ki", self._kinematics.jacobian(q), q_ds)
+        tangent = np.einsum("kij,kj->ki", self._tool.jacobian(self._tool.twists(q)), q_ds)
         return PhaseLines(None, np.sum(tangent**2, axis=1)[:, None] / self._figure**2, np.zeros((len(q), 1)))
 
 

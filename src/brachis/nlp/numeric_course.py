@@ -148,12 +148,12 @@ def _follow(
 
     `step_s` is the step in s, None for unfolding on the spot.
     """
-    kinematics = decomposition.kinematics
+    task_map = decomposition.task_map
     for correction in range(_CORRECTIONS):
-        miss = decomposition.task_space.difference(target, kinematics.position(q[None])[0])
+        miss = task_map.difference(target, task_map.value(q))
         if correction and np.abs(miss).max() < 1e-3:  # noqa: PLR2004  (the closed form takes it from here)
             return q, previous
-        jacobian = kinematics.jacobian(q[None])[0]
+        jacobian = task_map.jacobian(task_map.twists(q[None]))[0]
         square = jacobian @ jacobian.T + _DAMPING * np.eye(len(miss))
         step = jacobian.T @ np.linalg.solve(square, miss)
         if correction == 0:

@@ -4,7 +4,7 @@ from brachis.path.build import build_path
 from brachis.path.origin import check_on_path, path_of
 from brachis.path.pose import PosePath
 from brachis.path.protocol import Array, Curve, Path, PathSample
-from brachis.path.sequence import SequencePath, join_curves
+from brachis.path.sequence import SequencePath
 
 __all__ = [
     "Array",
@@ -15,6 +15,5 @@ __all__ = [
     "SequencePath",
     "build_path",
     "check_on_path",
-    "join_curves",
     "path_of",
 ]

@@ -188,6 +188,5 @@ def _with_yaw(arc: ArcCurve, turning: str, site: Site) -> ArcCurve:
         return replace(arc, yaw=(float(site.start[-1]), sense / arc.radius if turning == "tangent" else 0.0))
     if turning == "tangent":
         problem = "yaw is not a row of the task space"
-        hint = "Set orientation: tangent beside it" if site.oriented else "Add yaw to task_space"
-        raise PathError(problem, found="tangent", allowed="fixed", where=f"{site.key}.yaw", hint=hint)
+        raise PathError(problem, found="tangent", allowed="fixed", where=f"{site.key}.yaw", hint=site.along_tangent)
     return arc

@@ -7,21 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.errors import PathError, UnknownNameError
-from brachis.path.pose import POSITIONS, PosePath, rotations
-from brachis.path.pose_segment import pose_curve
-from brachis.path.rotations import matrix, quaternion_of
-from brachis.path.rows import POSE_COORDINATES, ROWS, is_pose
-from brachis.path.sequence import join_curves
-from brachis.path.shapes import curve_of
-from brachis.path.site import Site
-from brachis.task import TurnSegment
+from brachis.errors import PathError
+from brachis.path.assembly import join_curves
+from brachis.path.pose_coordinates import PoseCoordinates
+from brachis.path.row_coordinates import RowCoordinates
+from brachis.robot.task_map.rows import POSE_ROWS
 
 if TYPE_CHECKING:
+    from brachis.path.coordinates import Coordinates
     from brachis.path.protocol import Array, Curve, Path
     from brachis.task import Segment
-
-_ROTATION_TOLERANCE = 1e-6
 
 
 def build_path(segments: Sequence[Segment], start: Sequence[float] | Array, task_space_rows: Sequence[str]) -> Path:
@@ -57,55 +52,13 @@ def build_path(segments: Sequence[Segment], start: Sequence[float] | Array, task
     [[1.0, 1.0]]
     """
     rows = tuple(task_space_rows)
-    point = _checked_start(start, rows)
+    coordinates: Coordinates = PoseCoordinates() if rows == POSE_ROWS else RowCoordinates(rows)
+    point = coordinates.checked(np.array(start, dtype=float))
     if not segments:
         problem = "a path needs at least one segment"
         raise PathError(problem, where="path")
     curves: list[Curve] = []
     for i, segment in enumerate(segments):
-        curve = pose_curve(segment, i, point) if is_pose(rows) else _row_curve(segment, i, point, rows)
-        curves.append(curve)
-        point = curve.derivatives(np.array([curve.length]), 0)[0, 0]
-    path = join_curves(curves, [segment.blend for segment in segments], rows)
-    return PosePath(path) if is_pose(rows) else path
-
-
-def _row_curve(segment: Segment, index: int, start: Array, rows: tuple[str, ...]) -> Curve:
-    """Return the curve of a segment in a task space of rows, where the tool's orientation is not prescribed."""
-    found, hint = f"task_space [{', '.join(rows)}]", "Set task_space: pose"
-    if isinstance(segment, TurnSegment):
-        problem = "a turn is for task spaces of poses"
-        if "yaw" in rows:
-            hint = "Use line: {by: [0, 0, ...]} to turn yaw"
-        raise PathError(problem, found=found, where=f"path[{index}].turn", hint=hint)
-    if segment.orientation is not None:
-        problem = "an orientation along a segment is for task spaces of poses"
-        raise PathError(problem, found=found, where=f"path[{index}].orientation", hint=hint)
-    return curve_of(segment.shape, Site(f"path[{index}].{segment.kind}", start, rows))
-
-
-def _checked_start(start: Sequence[float] | Array, rows: tuple[str, ...]) -> Array:
-    point = np.array(start, dtype=float)
-    if is_pose(rows):
-        return _checked_pose(point)
-    for row in rows:
-        if row not in ROWS:
-            raise UnknownNameError(kind="row of the task space", name=row, valid=ROWS, where="task_space")
-    if point.shape != (len(rows),) or not np.all(np.isfinite(point)):
-        problem = "the start of the path needs one finite coordinate for each row of the task space"
-        raise PathError(problem, found=point.tolist(), allowed=f"[{', '.join(rows)}]", where="start")
-    return point
-
-
-def _checked_pose(point: Array) -> Array:
-    """Return the coordinates of a pose with the rotation matrix freed of rounding."""
-    allowed = "the position (3), then a rotation matrix row by row (9)"
-    if point.shape != (POSE_COORDINATES,) or not np.all(np.isfinite(point)):
-        problem = "the start of a path of poses needs 12 finite coordinates"
-        raise PathError(problem, found=point.tolist(), allowed=allowed, where="start")
-    rotation = rotations(point)
-    nearest = matrix(quaternion_of(rotation))
-    if np.abs(rotation - nearest).max() > _ROTATION_TOLERANCE:
-        problem = "the start of the path has no rotation matrix"
-        raise PathError(problem, found=rotation.tolist(), allowed=allowed, where="start")
-    return np.concatenate([point[:POSITIONS], nearest.ravel()])
+        curves.append(coordinates.curve(segment, i, point))
+        point = curves[-1].derivatives(np.array([curves[-1].length]), 0)[0, 0]
+    return coordinates.path(join_curves(curves, [segment.blend for segment in segments], coordinates))

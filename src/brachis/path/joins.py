@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import PathError
-from brachis.path.pose import POSITIONS, twist
-from brachis.path.rows import is_pose, position_rows
-from brachis.path.site import place, stands_still
+from brachis.path.site import place
+from brachis.robot.task_map.rows import position_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,7 +34,7 @@ class Join:
     point : ndarray, shape (m,)
         Task coordinates; of a pose twelve.
     rows : tuple of str
-        Rows of the task space.
+        Rows of the task space; of a pose its position rows.
     """
 
     index: int
@@ -49,20 +48,19 @@ class Join:
         return len(position_rows(self.rows))
 
     @property
-    def oriented(self) -> bool:
-        """Whether poses are joined."""
-        return is_pose(self.rows)
-
-    @property
     def where(self) -> str:
         """Keys and place, for messages."""
-        rows = position_rows(self.rows) if self.oriented else self.rows
-        return f"path[{self.index}] to path[{self.index + 1}], at s = {self.s:.4g}, {place(rows, self.point)}"
+        return f"path[{self.index}] to path[{self.index + 1}], at s = {self.s:.4g}, {place(self.rows, self.point)}"
 
     @property
     def blend_key(self) -> str:
         """The key that rounds the corner."""
         return f"path[{self.index}].blend"
+
+    @property
+    def rounding(self) -> str:
+        """What to set to round the corner."""
+        return f"{self.blend_key} (m) to round it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,25 +89,17 @@ def find_joins(curves: Sequence[Curve], rows: tuple[str, ...]) -> list[Join]:
     return [Join(i, float(ends[i] / ends[-1]), point, rows) for i, point in enumerate(points)]
 
 
-def corner_at(join: Join, first: Curve, second: Curve) -> Corner | None:
-    """Return what jumps from one curve to the next, or None where three derivatives continue."""
-    rounding = f"{join.blend_key} (m) to round it"
+def at_join(first: Curve, second: Curve) -> tuple[Array, Array, float]:
+    """Return the derivatives, (4, m), of both curves where they meet, and the length of the shorter one."""
     before = first.derivatives(np.array([first.length]))[:, 0]
     after = second.derivatives(np.zeros(1))[:, 0]
-    length = min(first.length, second.length)
-    if not join.oriented:
-        found = mismatch(before, after, length, join.positions)
-        return Corner(join, found, f"Set {rounding}") if found else None
-    on_the_spot = [stands_still(curve, POSITIONS) for curve in (first, second)]
-    if on_the_spot[0] != on_the_spot[1]:
-        found = "a stop: the position moves on one side, and the tool turns on the spot on the other"
-        return Corner(join, found, "Turn the tool along a segment, by its orientation, or in a task of its own")
-    found = mismatch(before[:, :POSITIONS], after[:, :POSITIONS], length, POSITIONS)
-    if found:
-        return Corner(join, found, f"Set {rounding}")
-    found = turning_mismatch(before, after, length, "rad" if on_the_spot[0] else "m")
-    smooth = "Set profile: smooth where the tool turns"
-    return Corner(join, found, smooth if on_the_spot[0] else f"{smooth}, or {rounding}") if found else None
+    return before, after, min(first.length, second.length)
+
+
+def row_corner(join: Join, first: Curve, second: Curve) -> Corner | None:
+    """Return what jumps from one curve of rows to the next, or None where three derivatives continue."""
+    found = mismatch(*at_join(first, second), join.positions)
+    return Corner(join, found, f"Set {join.rounding}") if found else None
 
 
 def mismatch(before: Array, after: Array, length: float, positions: int) -> str | None:
@@ -130,7 +120,7 @@ def mismatch(before: Array, after: Array, length: float, positions: int) -> str 
     if np.all(jumps <= TOLERANCE):
         return None
     if jumps[1] > TOLERANCE:
-        corner = _angle(before[1], after[1])
+        corner = angle_between(before[1], after[1])
         speed, new_speed = (float(np.linalg.norm(one[1])) for one in (before, after))
         # Splines change their speed at joins; what rounding turns the tangent by is then not worth a word.
         if corner > _WORTH_MENTIONING * abs(new_speed - speed):
@@ -139,33 +129,6 @@ def mismatch(before: Array, after: Array, length: float, positions: int) -> str 
     if jumps[2] > TOLERANCE:
         return f"a curvature jump of {np.linalg.norm(after[2] - before[2]):.4g} 1/m"
     return f"a jump of {np.linalg.norm(after[3] - before[3]):.4g} 1/m^2 in the third derivative"
-
-
-def turning_mismatch(before: Array, after: Array, length: float, unit: str = "m") -> str | None:
-    """Return in words what jumps in the turning of the tool, or None where three derivatives continue.
-
-    Parameters
-    ----------
-    before, after : ndarray, shape (4, 12)
-        Derivatives of the coordinates of the pose by sigma at the join.
-    length : float
-        Length of the shorter curve, sigma.
-    unit : str, optional
-        Unit of sigma.
-    """
-    old, new = (twist(one[:, None])[:, 0, POSITIONS:] for one in (before, after))
-    rate, new_rate = (float(np.linalg.norm(one[0])) for one in (old, new))
-    jumps = np.linalg.norm(new - old, axis=1)
-    large = jumps * length ** np.arange(3.0) > TOLERANCE * max(rate, 1.0)
-    if not np.any(large):
-        return None
-    if not large[0]:
-        order, k = ("slope", 1) if large[1] else ("second derivative", 2)
-        return f"the {order} of the tool's turning rate jumps by {jumps[k]:.4g} rad/{unit}^{k + 1}"
-    if abs(new_rate - rate) > TOLERANCE * max(rate, 1.0):
-        return f"the tool's turning rate jumps: {rate:.4g} rad/{unit} before and {new_rate:.4g} after"
-    angle = np.rad2deg(_angle(old[0], new[0]))
-    return f"the axis about which the tool turns jumps by {angle:.4g} degrees"
 
 
 def refuse_corners(corners: Sequence[Corner]) -> None:
@@ -185,7 +148,7 @@ def refuse_corners(corners: Sequence[Corner]) -> None:
     )
 
 
-def _angle(one: Array, other: Array) -> float:
+def angle_between(one: Array, other: Array) -> float:
     """Return the angle between two vectors, accurate for small ones as well."""
     a, b = one * np.linalg.norm(other), other * np.linalg.norm(one)
     return float(2 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b)))

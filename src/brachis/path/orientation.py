@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,18 +16,10 @@ from brachis.path.turns import turn_of
 from brachis.task import AlongTangent, Rotate, TurnTo
 
 if TYPE_CHECKING:
-    from brachis.path.protocol import Array, Curve
+    from brachis.path.protocol import Array, Curve, Orientation
 
 _PARALLEL = np.sin(np.deg2rad(1.0))
 _STOPS = 1e-3
-
-
-class Orientation(Protocol):
-    """Orientation of the tool along a segment."""
-
-    def matrices(self, sigma: Array, order: int = 3) -> Array:
-        """Return the rotation matrix and its derivatives by sigma, shape (order + 1, K, 3, 3)."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,7 @@ from brachis.path.rotations import angular_velocity, matrices
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from brachis.path.orientation import Orientation
-    from brachis.path.protocol import Array, Curve
+    from brachis.path.protocol import Array, Curve, Orientation
     from brachis.path.sequence import SequencePath
 
 POSITIONS = 3

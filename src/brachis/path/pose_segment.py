@@ -11,15 +11,18 @@ from brachis.path.line import LineCurve
 from brachis.path.orientation import orientation_along
 from brachis.path.pose import POSITIONS, PoseCurve, rotations
 from brachis.path.pose_spline import pose_spline
-from brachis.path.rows import AXES
 from brachis.path.shapes import curve_of
 from brachis.path.site import ZERO_LENGTH, Site
 from brachis.path.turns import turn_of
+from brachis.robot.task_map.rows import AXES
 from brachis.task import SplineThrough, TurnSegment
 
 if TYPE_CHECKING:
     from brachis.path.protocol import Array, Curve
     from brachis.task import Segment
+
+_TO_TURN = "A segment turn: {...} turns the tool on the spot"
+_ALONG_TANGENT = "Set orientation: tangent beside it"
 
 
 def pose_curve(segment: Segment, index: int, start: Array) -> Curve:
@@ -40,7 +43,7 @@ def pose_curve(segment: Segment, index: int, start: Array) -> Curve:
         The segment has zero length, or position or orientation is not defined.
     """
     position, rotation = start[:POSITIONS], rotations(start)
-    site = Site(f"path[{index}].{segment.kind}", position, AXES, oriented=True)
+    site = Site(f"path[{index}].{segment.kind}", position, AXES, _TO_TURN, _ALONG_TANGENT)
     if isinstance(segment, TurnSegment):
         turn = turn_of(segment.turn, rotation, site.key)
         if abs(turn.angle) < ZERO_LENGTH:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,20 +9,15 @@ import numpy as np
 from brachis.errors import PathError
 from brachis.path.line import LineCurve
 from brachis.path.pose import LEAST_QUALITY, PoseCurve, QuaternionPoseCurve
-from brachis.path.rotations import (
-    conjugate,
-    multiply,
-    quaternion_from,
-    quaternion_of,
-    rotation_vector,
-    with_like_signs,
-)
+from brachis.path.rotations import quaternions_of, rotation_from, rotation_of, with_like_signs
 from brachis.path.sampling import smallest
 from brachis.path.spline import START_TOLERANCE, chord_knots, interpolate, starts_elsewhere, waypoints_of
 from brachis.path.turns import AMBIGUOUS, half_turn, turn_between
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from scipy.spatial.transform import Rotation
 
     from brachis.path.protocol import Array
     from brachis.path.site import Site
@@ -56,34 +50,31 @@ def pose_spline(
         half a turn apart or turn back and forth too much.
     """
     points = waypoints_of(shape, site)
-    quaternions = _quaternions(shape, attitudes, site, rotation)
-    angles = np.array([_angle(one, other) for one, other in pairwise(quaternions)])
+    turned = _rotations(shape, attitudes, site, rotation)
+    angles = np.asarray((turned[:-1].inv() * turned[1:]).magnitude())
     for i in np.flatnonzero(angles > np.pi - AMBIGUOUS):
         raise half_turn(f"{site.key}.orientations[{i}]")
     knots = chord_knots(np.linalg.norm(np.diff(points, axis=0), axis=1), angles, shape, site)
     if len(points) == 2:  # noqa: PLR2004 - the start and one waypoint
-        turn = turn_between(rotation, quaternions[1], f"{site.key}.orientations[0]")
+        turn = turn_between(rotation, turned[1], f"{site.key}.orientations[0]")
         position = LineCurve(points[0], (points[1] - points[0]) / knots[1], float(knots[1]))
         return PoseCurve(position, turn.over(position.length))
+    quaternions = with_like_signs(quaternions_of(turned))
     curve = QuaternionPoseCurve(interpolate(knots, np.concatenate([points, quaternions], axis=1)))
     _check_quaternions(curve, site)
     return curve
 
 
-def _quaternions(shape: SplineThrough, attitudes: Sequence[Attitude], site: Site, rotation: Array) -> Array:
-    """Return unit quaternions of neighbouring signs at the start and the waypoints, shape (n, 4)."""
-    start = quaternion_of(rotation)
-    expected = None if shape.starts_oriented is None else quaternion_from(shape.starts_oriented)
-    change = np.array([1.0, 0.0, 0.0, 0.0])
+def _rotations(shape: SplineThrough, attitudes: Sequence[Attitude], site: Site, matrix: Array) -> Rotation:
+    """Return the n rotations at the start and the waypoints."""
+    start, given = rotation_of(matrix), [rotation_from(attitude) for attitude in attitudes]
+    expected = None if shape.starts_oriented is None else rotation_from(shape.starts_oriented)
     if shape.relative:
-        change = start if expected is None else multiply(start, conjugate(expected))
-    elif expected is not None and (angle := _angle(start, expected)) > START_TOLERANCE:
+        change = start if expected is None else start * expected.inv()
+        given = [change * one for one in given]
+    elif expected is not None and (angle := (start.inv() * expected).magnitude()) > START_TOLERANCE:
         raise starts_elsewhere(f"{site.key}.starts_oriented", f"an orientation that is {angle:.4g} rad off")
-    return with_like_signs(np.stack([start, *(multiply(change, quaternion_from(attitude)) for attitude in attitudes)]))
-
-
-def _angle(one: Array, other: Array) -> float:
-    return float(np.linalg.norm(rotation_vector(multiply(conjugate(one), other))))
+    return start.concatenate([start, *given])
 
 
 def _check_quaternions(curve: QuaternionPoseCurve, site: Site) -> None:

@@ -84,3 +84,11 @@ class Curve(Protocol):
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
         """Return the curve and its derivatives by sigma up to `order`, shape (order + 1, K, m or 12)."""
         ...
+
+
+class Orientation(Protocol):
+    """Orientation of the tool along a segment."""
+
+    def matrices(self, sigma: Array, order: int = 3) -> Array:
+        """Return the rotation matrix and its derivatives by sigma, shape (order + 1, K, 3, 3)."""
+        ...

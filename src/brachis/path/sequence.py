@@ -1,4 +1,4 @@
-"""A path made of curves: joining them, with blends, and sampling the result."""
+"""A path made of curves."""
 
 from __future__ import annotations
 
@@ -7,19 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.path.blend import blend
-from brachis.path.joins import corner_at, find_joins, refuse_corners
 from brachis.path.protocol import PathSample
-from brachis.path.rows import position_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from brachis.path.joins import Corner
     from brachis.path.protocol import Array, Curve
 
 _QUADRATURE_POINTS = 16
-_NOTHING = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +30,17 @@ class Piece:
         """Range of sigma."""
         return self.last - self.first
 
+    def arc_length(self, positions: int) -> float:
+        """Return the arc length of the position rows by Gauss quadrature between the curve's knots."""
+        knots = self.curve.knots
+        inner = knots[(knots > self.first) & (knots < self.last)]
+        bounds = np.concatenate([[self.first], inner, [self.last]])
+        nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE_POINTS)
+        half = np.diff(bounds)[:, None] / 2
+        sigma = bounds[:-1, None] + half * (nodes + 1)
+        slope = self.curve.derivatives(sigma.ravel(), 1)[1, :, :positions]
+        return float(np.linalg.norm(slope, axis=1) @ (half * weights).ravel())
+
 
 @dataclass(frozen=True, eq=False)
 class SequencePath:
@@ -44,8 +50,6 @@ class SequencePath:
     ----------
     pieces : tuple of Piece
         Parts of the segments' curves, and blends.
-    positions : int
-        Number of position rows; they come first.
     breaks : ndarray
         Values of s where pieces join, from 0 to 1.
     length : float
@@ -53,9 +57,14 @@ class SequencePath:
     """
 
     pieces: tuple[Piece, ...]
-    positions: int
     breaks: Array
     length: float
+
+    @classmethod
+    def of(cls, pieces: tuple[Piece, ...], positions: int) -> SequencePath:
+        """Put pieces together whose first `positions` rows are those of the position."""
+        ends = np.cumsum([0.0, *(piece.length for piece in pieces)])
+        return cls(pieces, ends / ends[-1], sum(piece.arc_length(positions) for piece in pieces))
 
     @property
     def total(self) -> float:
@@ -86,53 +95,3 @@ class SequencePath:
                 result[:, here] = piece.curve.derivatives(sigma)
         result *= total ** np.arange(4)[:, None, None]
         return result
-
-
-def join_curves(curves: Sequence[Curve], blends: Sequence[float | None], rows: tuple[str, ...]) -> SequencePath:
-    """Return the path along curves, with their corners rounded.
-
-    Parameters
-    ----------
-    curves : sequence of Curve
-        Each starts where its predecessor ends.
-    blends : sequence of float or None
-        For every curve, what its blend with the next one takes from either, m.
-    rows : tuple of str
-        Rows of the task space; yaw, if it is one, comes last. Curves of poses have the twelve coordinates of a pose.
-
-    Raises
-    ------
-    PathError
-        Curves do not continue each other to the third derivative and are not blended; or a blend does not fit.
-    """
-    positions = len(position_rows(rows))
-    corners: list[Corner | None] = []
-    pieces: list[Piece] = []
-    taken = 0.0
-    for join, curve, following, size in zip(find_joins(curves, rows), curves, curves[1:], blends, strict=False):
-        if size is None:
-            corners.append(corner_at(join, curve, following))
-            pieces.append(Piece(curve, taken, curve.length))
-            taken = 0.0
-        else:
-            rounded = blend(curve, following, size, join)
-            pieces += [Piece(curve, taken, curve.length - size), Piece(rounded, 0.0, rounded.length)]
-            taken = size
-    pieces.append(Piece(curves[-1], taken, curves[-1].length))
-    refuse_corners([corner for corner in corners if corner is not None])
-    # Two blends that meet in the middle of a segment leave nothing of it, but rounding.
-    kept = tuple(piece for piece in pieces if piece.length > _NOTHING * piece.curve.length)
-    ends = np.cumsum([0.0, *(piece.length for piece in kept)])
-    return SequencePath(kept, positions, ends / ends[-1], sum(_arc_length(piece, positions) for piece in kept))
-
-
-def _arc_length(piece: Piece, positions: int) -> float:
-    """Return the arc length of the position rows by Gauss quadrature between the curve's knots."""
-    knots = piece.curve.knots
-    inner = knots[(knots > piece.first) & (knots < piece.last)]
-    bounds = np.concatenate([[piece.first], inner, [piece.last]])
-    nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE_POINTS)
-    half = np.diff(bounds)[:, None] / 2
-    sigma = bounds[:-1, None] + half * (nodes + 1)
-    slope = piece.curve.derivatives(sigma.ravel(), 1)[1, :, :positions]
-    return float(np.linalg.norm(slope, axis=1) @ (half * weights).ravel())

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import PathError
-from brachis.path.rows import position_rows
+from brachis.robot.task_map.rows import position_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,14 +31,17 @@ class Site:
         Task coordinates at which the segment starts.
     rows : tuple of str
         Rows of the task space; of a pose its position rows.
-    oriented : bool
-        Whether the task space is that of poses.
+    to_turn : str or None
+        Hint for those who want to turn the tool on the spot.
+    along_tangent : str
+        Hint for those who want the tool to turn with the tangent.
     """
 
     key: str
     start: Array
     rows: tuple[str, ...]
-    oriented: bool = False
+    to_turn: str | None = None
+    along_tangent: str = "Add yaw to task_space"
 
     @property
     def positions(self) -> tuple[str, ...]:
@@ -102,7 +105,7 @@ class Site:
             found=found,
             allowed="a motion away from the segment's start",
             where=f"{self.key}{key}",
-            hint="A segment turn: {...} turns the tool on the spot" if self.oriented else None,
+            hint=self.to_turn,
         )
 
 

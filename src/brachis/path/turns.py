@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import PathError
-from brachis.path.blend import septic
 from brachis.path.leibniz import sine_cosine
 from brachis.path.line import LineCurve
-from brachis.path.rotations import conjugate, hat, multiply, quaternion_from, quaternion_of, rotation_vector
+from brachis.path.rotations import hat, rotation_from, rotation_of
+from brachis.path.septic import septic
 from brachis.path.site import ZERO_LENGTH
 from brachis.task import Rotate, TurnTo
 
 if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
     from brachis.path.protocol import Array, Curve
 
 AMBIGUOUS = 1e-4
@@ -106,18 +108,18 @@ def turn_of(turning: Rotate | TurnTo, start: Array, key: str) -> Turn:
         if rotate.frame == "world":
             axis = start.T @ axis
         return Turn(start, axis, float(np.deg2rad(rotate.angle_deg)), rotate.profile == "smooth")
-    return turn_between(start, quaternion_from(turning.to), f"{key}.to", smooth=turning.to.profile == "smooth")
+    return turn_between(start, rotation_from(turning.to), f"{key}.to", smooth=turning.to.profile == "smooth")
 
 
-def turn_between(start: Array, target: Array, key: str, *, smooth: bool = False) -> Turn:
-    """Return the shortest turn from a rotation matrix to a unit quaternion.
+def turn_between(start: Array, target: Rotation, key: str, *, smooth: bool = False) -> Turn:
+    """Return the shortest turn from a rotation matrix to another rotation.
 
     Raises
     ------
     PathError
         The target is half a turn away, so that there are two shortest ways.
     """
-    vector = rotation_vector(multiply(conjugate(quaternion_of(start)), target))
+    vector = (rotation_of(start).inv() * target).as_rotvec()
     angle = float(np.linalg.norm(vector))
     if angle > np.pi - AMBIGUOUS:
         raise half_turn(key)

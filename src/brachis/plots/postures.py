@@ -9,7 +9,7 @@ import numpy as np
 from brachis.plots import style
 from brachis.plots.curves import dense_samples
 from brachis.plots.skeleton import drawing_plane, skeleton
-from brachis.robot import TaskSpace
+from brachis.robot import task_map_of
 from brachis.trajectory import Samples, Trajectory
 
 if TYPE_CHECKING:
@@ -95,8 +95,8 @@ def legend_postures(ax: Axes, trajectory: Trajectory, width: float) -> None:
 
 
 def _plane(trajectory: Trajectory) -> tuple[int, int] | None:
-    task_space = TaskSpace.of(trajectory.robot, trajectory.task.task_space)
-    return drawing_plane(trajectory.robot, trajectory.q[0], task_space.axes)
+    task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
+    return drawing_plane(trajectory.robot, trajectory.q[0], task_map.axes)
 
 
 def _shades() -> np.ndarray:

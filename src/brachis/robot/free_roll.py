@@ -17,13 +17,13 @@ from brachis.errors import InputError
 from brachis.robot.friction import Friction
 from brachis.robot.limits import Limits, UrdfLimit
 from brachis.robot.robot import ROLL_JOINT, Robot
-from brachis.robot.task_space import FREE_ROLL, TaskSpace
+from brachis.robot.task_map import FREE_ROLL, TaskMap, task_map_of
 
 _NO_SPEED_SCALE = 1.0
 
 
-def bind(robot: Robot, space: str | Sequence[str]) -> tuple[Robot, TaskSpace]:
-    """Return the robot as a task space needs it, and the task space bound to it.
+def bind(robot: Robot, space: str | Sequence[str]) -> tuple[Robot, TaskMap]:
+    """Return the robot as a task space needs it, and the task map bound to it.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def bind(robot: Robot, space: str | Sequence[str]) -> tuple[Robot, TaskSpace]:
     Raises
     ------
     InputError
-        See `TaskSpace.of`; or the robot has a joint of the virtual joint's name.
+        See `TaskMap.of`; or the robot has a joint of the virtual joint's name.
     """
     if robot.rolls_freely and space != FREE_ROLL:
         raise InputError(
@@ -47,7 +47,7 @@ def bind(robot: Robot, space: str | Sequence[str]) -> tuple[Robot, TaskSpace]:
         )
     if space == FREE_ROLL and not robot.rolls_freely:
         robot = with_free_roll(robot)
-    return robot, TaskSpace.of(robot, space)
+    return robot, task_map_of(robot, space)
 
 
 def with_free_roll(robot: Robot) -> Robot:

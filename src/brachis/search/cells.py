@@ -109,6 +109,6 @@ def _nearby(given: Setting, joint: int) -> float:
     q = np.zeros(given.robot.n)
     there = np.array(given.robot.tool_placement(q).translation)
     q[joint] = 1.0
-    axis = (np.array(given.robot.tool_placement(q).translation) - there)[list(given.task_space.axes)]
-    wanted = given.path.sample(np.zeros(1)).target[0, : len(given.task_space.axes)]
-    return float(axis @ (wanted - there[list(given.task_space.axes)]) / max(axis @ axis, 1e-12))
+    axis = (np.array(given.robot.tool_placement(q).translation) - there)[list(given.task_map.axes)]
+    wanted = given.path.sample(np.zeros(1)).target[0, : len(given.task_map.axes)]
+    return float(axis @ (wanted - there[list(given.task_map.axes)]) / max(axis @ axis, 1e-12))

@@ -110,7 +110,7 @@ def _what_is_missing(choice: Choice) -> str:
     setting = choice.setting
     if setting.task.redundant_joints != "auto":
         return ""
-    further = ik.without_eaik(ik.find_all(setting.robot, setting.task_space))
+    further = ik.without_eaik(ik.find_all(setting.robot, setting.task_map))
     if not further:
         return ""
     names = ", ".join("[" + ", ".join(joints) + "]" for joints in further)

@@ -78,7 +78,7 @@ class Lattice:
     ) -> None:
         given = choice.setting
         self.choice = choice
-        self.s = stations(given.path, given.task_space, density)
+        self.s = stations(given.path, given.task_map, density)
         self._robot, self._solver = given.robot, choice.match.solver
         self._redundant = list(choice.redundant)
         self._rest = np.array([i for i in range(given.robot.n) if i not in choice.redundant], dtype=int)

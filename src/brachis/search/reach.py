@@ -52,7 +52,7 @@ def explain_failure(
         (
             found.exists.any(axis=(1, 2, 3)) | anywhere.exists.any(axis=(1, 2, 3)),
             "the path is out of reach from s = {first:.3g} on (no posture was found)",
-            path_hint(decomposition.robot, decomposition.task_space, decomposition.path.sample(s).target)
+            path_hint(decomposition.task_map, decomposition.path.sample(s).target)
             or "Shorten or move the path, or choose another start posture",
         ),
         (

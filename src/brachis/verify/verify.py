@@ -14,7 +14,7 @@ import numpy as np
 from brachis.custom_limits import LimitModel
 from brachis.errors import InputError
 from brachis.path import Path, path_of
-from brachis.robot import Robot, TaskSpace, bind
+from brachis.robot import Robot, TaskMap, bind
 from brachis.trajectory import Trajectory
 from brachis.verify.checks import continuity_checks, end_checks, progress_checks, spline_checks
 from brachis.verify.limits import Given, limit_checks
@@ -55,7 +55,7 @@ def verify_trajectory(
         (`InputError`, `StartError`), task space (`InputError`) or path (`PathError`).
     """
     options = options or VerifyOptions()
-    robot, task_space = bind(trajectory.robot if robot is None else robot, trajectory.task.task_space)
+    robot, task_map = bind(trajectory.robot if robot is None else robot, trajectory.task.task_space)
     if robot.joint_names != trajectory.joint_names:
         raise InputError(
             "the robot has other joints than the trajectory",
@@ -63,7 +63,7 @@ def verify_trajectory(
             found=", ".join(robot.joint_names),
             allowed=", ".join(trajectory.joint_names),
         )
-    pieces, path = Pieces.of(trajectory), path_of(robot, task_space, trajectory.task)
+    pieces, path = Pieces.of(trajectory), path_of(task_map, trajectory.task)
     parts = (
         spread_out(trajectory, pieces, options),
         within_path_pieces(trajectory, pieces, path.breaks, options),
@@ -72,7 +72,7 @@ def verify_trajectory(
     )
     places = (np.concatenate(part) for part in zip(*parts, strict=True))
     states = States.at(pieces, robot, *places)
-    path_check = _path_error(trajectory, robot, path, task_space, states, options)
+    path_check = _path_error(trajectory, path, task_map, states, options)
     limits = limit_checks(Given(robot, trajectory.task, pieces, states), further, options)
     checks = [
         path_check,
@@ -88,9 +88,8 @@ def verify_trajectory(
 
 def _path_error(
     trajectory: Trajectory,
-    robot: Robot,
     path: Path,
-    task_space: TaskSpace,
+    task_map: TaskMap,
     states: States,
     options: VerifyOptions,
 ) -> Check:
@@ -98,9 +97,7 @@ def _path_error(
     once = np.append(np.diff(states.t) > 0.0, True)  # not both sides of a node
     t, q = states.t[once], states.q[once]
     targets = path.sample(np.clip(trajectory.path_spline(t), 0.0, 1.0)).target
-    miss = task_space.difference(task_space.values(*robot.tool_placements(q)), targets)
-    positions = len(task_space.axes)
-    errors = np.maximum(np.linalg.norm(miss[:, :positions], axis=1), np.linalg.norm(miss[:, positions:], axis=1))
+    errors = np.maximum(*task_map.norms(task_map.difference(task_map.values(q), targets)))
     worst = int(np.argmax(errors))
     tolerance = options.path_tolerance
     return Check(

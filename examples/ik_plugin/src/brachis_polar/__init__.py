@@ -13,9 +13,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.arrays import cross
 from brachis.ik import ChainGeometry, IKSolver, NotApplicableError, PosedScrews, ik_family
-from brachis.ik.vectors import across, angle_about, cross, dot, meeting_point
-from brachis.robot import TaskSpace
+from brachis.ik.vectors import across, angle_about, dot, meeting_point
+from brachis.robot import TaskMap
 
 ROUNDING = 1e-9
 METRE = 1.0
@@ -80,9 +81,9 @@ def length(screws: PosedScrews) -> np.ndarray:
 
 
 @ik_family("polar", source="this module's docstring")
-def polar(geometry: ChainGeometry, task_space: TaskSpace, redundant: tuple[int, ...]) -> PolarSolver:
+def polar(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> PolarSolver:
     """Fit the family, or say why it does not."""
-    if task_space.rows != ("x", "y", "z"):
+    if task_map.rows != ("x", "y", "z"):
         raise NotApplicableError("it serves the three rows of the position")
     if redundant != tuple(range(geometry.n - 3)):
         raise NotApplicableError("the redundant joints have to come before the arm's three")

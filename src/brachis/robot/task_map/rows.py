@@ -1,11 +1,13 @@
-"""Rows of a task space, and what a path needs to know of them."""
+"""Names of the rows of task spaces."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 AXES: Final = ("x", "y", "z")
-ROWS: Final = (*AXES, "yaw")
+YAW: Final = "yaw"
+ROWS: Final = (*AXES, YAW)
 """What a task space of rows may consist of."""
 POSE_ROWS: Final = (*AXES, "rx", "ry", "rz")
 """Rows of a pose: displacement and rotation along and about the tool frame's axes."""
@@ -13,11 +15,6 @@ POSE_COORDINATES: Final = 12
 """Coordinates of a pose: the position, then the rotation matrix row by row."""
 
 
-def is_pose(rows: tuple[str, ...]) -> bool:
-    """Return whether the rows are those of a pose."""
-    return rows == POSE_ROWS
-
-
-def position_rows(rows: tuple[str, ...]) -> tuple[str, ...]:
+def position_rows(rows: Sequence[str]) -> tuple[str, ...]:
     """Return the position rows; they come first."""
     return tuple(row for row in rows if row in AXES)

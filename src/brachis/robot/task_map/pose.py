@@ -1,0 +1,76 @@
+"""The tool's pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pinocchio as pin
+
+from brachis.errors import InputError
+from brachis.robot.task_map.protocol import TaskDerivatives, TaskMap
+from brachis.robot.task_map.rows import AXES, POSE_ROWS
+from brachis.robot.task_map.twists import tool_bias, tool_motion
+
+_POSITIONS = 3
+_UNIT = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class Pose(TaskMap):
+    """The tool frame's pose.
+
+    It has 12 coordinates for its 6 rows: the position (3), then the rotation matrix row by row (9), both in the world
+    frame. Its rows are those of the body twist: displacement (m) and rotation (rad) along and about the tool frame's
+    own axes, as the formulas of `twists` give them.
+    """
+
+    frame: ClassVar[pin.ReferenceFrame] = pin.ReferenceFrame.LOCAL
+
+    rows: tuple[str, ...] = POSE_ROWS
+
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """See `TaskMap.stated`: the position and a quaternion."""
+        return (*AXES, "qw", "qx", "qy", "qz")
+
+    def read(self, stated: Sequence[float], where: str) -> np.ndarray:
+        """See `TaskMap.read`."""
+        values = super().read(stated, where)
+        size = float(np.linalg.norm(values[_POSITIONS:]))
+        if abs(size - 1.0) > _UNIT:
+            raise InputError("has no unit quaternion", where=where, found=f"a norm of {size:.6g}", allowed="1")
+        w, x, y, z = values[_POSITIONS:] / size
+        return np.concatenate([values[:_POSITIONS], pin.Quaternion(w, x, y, z).matrix().ravel()])
+
+    def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """See `TaskMap.of_placements`."""
+        return np.concatenate([positions, rotations.reshape(-1, 9)], axis=1)
+
+    def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """See `TaskMap.difference`: the translation and the rotation vector, in the frame of `second`."""
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415  (a fifth of a second that others need not wait)
+
+        first, second = np.broadcast_arrays(np.asarray(first, dtype=float), np.asarray(second, dtype=float))
+        shape = first.shape[:-1]
+        to = first[..., _POSITIONS:].reshape(*shape, 3, 3)
+        back = np.swapaxes(second[..., _POSITIONS:].reshape(*shape, 3, 3), -1, -2)
+        shift = np.einsum("...ij,...j->...i", back, first[..., :_POSITIONS] - second[..., :_POSITIONS])
+        turn = Rotation.from_matrix((back @ to).reshape(-1, 3, 3)).as_rotvec()
+        return np.concatenate([shift, turn.reshape(*shape, 3)], axis=-1)
+
+    def rates(self, twists: np.ndarray) -> np.ndarray:
+        """See `TaskMap.rates`."""
+        return twists
+
+    def bias(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
+        """See `TaskMap.bias`."""
+        return tool_bias(twists, qdot)[1].T
+
+    def derivatives(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:
+        """See `TaskMap.derivatives`."""
+        tool = tool_motion(twists, qdot, qddot)
+        parts = (tool.velocity_q, tool.acceleration_q, tool.acceleration_qdot)
+        return TaskDerivatives(*(self.jacobian(part) for part in parts))

@@ -1,0 +1,140 @@
+"""What a task map is: from joint positions to task coordinates, with its derivatives."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar
+
+import numpy as np
+import pinocchio as pin
+
+from brachis.errors import InputError
+from brachis.robot.robot import Robot
+from brachis.robot.task_map.rows import AXES, position_rows
+
+
+@dataclass(frozen=True)
+class TaskDerivatives:
+    """Derivatives of task velocity and acceleration for K states, each (K, m, n).
+
+    Attributes
+    ----------
+    velocity_q : (K, m, n) ndarray
+        V_q = d(J qdot)/dq.
+    acceleration_q, acceleration_qdot : (K, m, n) ndarray
+        A_q and A_v, of J qddot + Jdot qdot.
+    """
+
+    velocity_q: np.ndarray
+    acceleration_q: np.ndarray
+    acceleration_qdot: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class TaskMap(ABC):
+    """Map from the joint positions of a robot to the c task coordinates of its tool, whose velocity has m rows.
+
+    Attributes
+    ----------
+    robot : Robot
+    rows : tuple of str
+        Names of the m rows, those of the position (m) first, then the angles (rad).
+    axes : tuple of int
+        World axes (0, 1, 2) of the position rows.
+    """
+
+    frame: ClassVar[pin.ReferenceFrame]
+    """The axes in which twists are."""
+
+    robot: Robot
+    rows: tuple[str, ...]
+    axes: tuple[int, ...] = field(init=False)
+    _data: pin.Data = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Look the axes up, and make a workspace."""
+        object.__setattr__(self, "axes", tuple(AXES.index(row) for row in position_rows(self.rows)))
+        object.__setattr__(self, "_data", self.robot.model.createData())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Leave Pinocchio's workspace behind."""
+        return type(self), tuple(getattr(self, entry.name) for entry in fields(self) if entry.init)
+
+    @property
+    def m(self) -> int:
+        """Number of rows."""
+        return len(self.rows)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of every row."""
+        return tuple("m" if row in AXES else "rad" for row in self.rows)
+
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """Names of the coordinates as a task states them."""
+        return self.rows
+
+    def read(self, stated: Sequence[float], where: str) -> np.ndarray:
+        """Task coordinates, (c,), from what a task states.
+
+        Raises
+        ------
+        InputError
+            They are not as many as `stated`, or do not make a pose.
+        """
+        if len(stated) != len(self.stated):
+            raise InputError(
+                "has the wrong number of coordinates",
+                where=where,
+                found=len(stated),
+                allowed=f"{len(self.stated)}: {', '.join(self.stated)}",
+            )
+        return np.array(stated, dtype=float)
+
+    def value(self, q: np.ndarray) -> np.ndarray:
+        """Task coordinates, (c,), of one posture, (n,)."""
+        return self.values(q[None])[0]
+
+    def values(self, q: np.ndarray) -> np.ndarray:
+        """Task coordinates, (K, c), of postures (K, n)."""
+        return self.of_placements(*self.robot.tool_placements(q))
+
+    @abstractmethod
+    def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """Task coordinates, (K, c), of tool positions (K, 3) and rotations (K, 3, 3) in the world frame."""
+
+    @abstractmethod
+    def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Displacement (..., m) that leads from the `second` task coordinates (..., c) to the `first`."""
+
+    def norms(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Sizes (...) of displacements (..., m): of their position part, m, and of their angle part, rad."""
+        position, angle = np.split(displacement, [len(self.axes)], axis=-1)
+        return np.linalg.norm(position, axis=-1), np.linalg.norm(angle, axis=-1)
+
+    def twists(self, q: np.ndarray) -> np.ndarray:
+        """Columns (6, K, n) of the tool frame's Jacobian at K postures (K, n): linear, then angular velocity."""
+        model, data, frame = self.robot.model, self._data, self.robot.frame_id
+        columns = np.empty((len(q), 6, self.robot.n))
+        for k in range(len(q)):
+            columns[k].flat = pin.computeFrameJacobian(model, data, q[k], frame, self.frame)  # (6,) for one joint
+        return np.moveaxis(columns, 1, 0)
+
+    @abstractmethod
+    def rates(self, twists: np.ndarray) -> np.ndarray:
+        """Rows (m, ...) of the task velocity that twists (6, ...) make."""
+
+    def jacobian(self, twists: np.ndarray) -> np.ndarray:
+        """Task Jacobian J (K, m, n) from the `twists` at K postures."""
+        return np.moveaxis(self.rates(twists), 0, 1)
+
+    @abstractmethod
+    def bias(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
+        """Velocity-dependent task acceleration Jdot qdot, (K, m), from the `twists` at K postures."""
+
+    @abstractmethod
+    def derivatives(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:
+        """V_q, A_q and A_v of K states from the `twists` at their postures; see `twists`."""
