@@ -9,8 +9,8 @@ import math
 from pathlib import Path
 
 from brachis import LimitSpec, Robot, load_task, transcribe
+from brachis.nlp.differential_ik import differential_ik_paths
 from brachis.nlp.guess import starting_point
-from brachis.nlp.numeric_course import numeric_courses
 from brachis.solvers import SolverOptions, solver_named
 
 ROOT = Path(__file__).parents[1]
@@ -19,7 +19,7 @@ INTERVALS = (10, 20, 50, 100, 200)
 
 def first_point(program):
     """Start from the first course of numeric inverse kinematics."""
-    return starting_point(program, [next(numeric_courses(program.phases[0].joint_map))])
+    return starting_point(program, [next(differential_ik_paths(program.phases[0].joint_map))])
 
 
 def main() -> None:

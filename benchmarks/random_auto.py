@@ -19,10 +19,10 @@ import random_lines
 import random_poses
 from brachis import LimitSpec, Robot, load_task
 from brachis.errors import BrachisError
-from brachis.search.course import DeadEnd
-from brachis.search.efforts import EFFORTS
+from brachis.problem import Problem, decompositions_of
+from brachis.search.joint_path import DeadEnd
+from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.starts import lattice_starts
-from brachis.setting import Setting, choices
 
 
 def planar_arm() -> Robot:
@@ -43,10 +43,12 @@ def tasks(name: str, robot: Robot, seed: int, count: int) -> Iterator[dict[str, 
 def has_course(robot: Robot, task: dict[str, object]) -> bool:
     """Tell whether the lattice of any choice of redundant joints has a course."""
     try:
-        found = choices(Setting.of(robot, load_task(task)))
+        found = decompositions_of(Problem.of(robot, load_task(task)))
     except BrachisError:
         return False
-    return any(not isinstance(lattice_starts(choice, EFFORTS["fast"][0], 0), DeadEnd) for choice in found)
+    return any(
+        not isinstance(lattice_starts(decomposition, SEARCH_LEVELS["fast"][0], 0), DeadEnd) for decomposition in found
+    )
 
 
 def main() -> None:
@@ -56,18 +58,18 @@ def main() -> None:
     for name, robot in {"scara3": planar_arm(), **random_poses.robots()}.items():
         if chosen not in ("all", name):
             continue
-        courses, planned, times = 0, 0, []
+        joint_paths, planned, times = 0, 0, []
         for number, task in enumerate(tasks(name, robot, seed, count)):
             exists = has_course(robot, task)
             began = time.perf_counter()
             reason = random_poses.tried(robot, task)
             times.append(time.perf_counter() - began)
-            courses += exists
+            joint_paths += exists
             planned += exists and not reason
             if reason:
                 print(f"{name} {number}, {'a' if exists else 'no'} lattice course: {reason}", flush=True)
         print(
-            f"{name}: {courses} of {count} have a lattice course, {planned} of these are planned and verified; "
+            f"{name}: {joint_paths} of {count} have a lattice course, {planned} of these are planned and verified; "
             f"median {np.median(times):.2f} s, longest {max(times):.1f} s",
             flush=True,
         )

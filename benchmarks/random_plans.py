@@ -232,11 +232,13 @@ def random_task(name: str, seed: int, number: int, folder: Path, time_limit: flo
     gravity = _tilted(rng, np.zeros(3) if name in ("scara3", "gantry2") else np.array([0.0, 0.0, -9.81]))
     robot = Robot.from_urdf(urdf_of(name), tool_frame=tool, gravity=gravity)
     while True:
-        course = _joint_motion(rng, robot)
-        tau = np.abs([pin.rnea(robot.model, robot.model.createData(), q, 0.0 * q, 0.0 * q) for q in course]).max(axis=0)
+        joint_path = _joint_motion(rng, robot)
+        tau = np.abs([pin.rnea(robot.model, robot.model.createData(), q, 0.0 * q, 0.0 * q) for q in joint_path]).max(
+            axis=0
+        )
         if np.all(tau < 0.6 * robot.limits.torque) or name == "scara3":
             break
-    limits, friction = _random_limits(rng, robot, course, tau)
+    limits, friction = _random_limits(rng, robot, joint_path, tau)
     free_knots = rng.random() < 0.1
     degree = int(rng.integers(2, 6))
     task: dict[str, object] = {
@@ -248,9 +250,9 @@ def random_task(name: str, seed: int, number: int, folder: Path, time_limit: flo
             "friction": friction,
             **({"tool_frame": tool} if tool else {}),
         },
-        "start": {"joints": course[0].tolist()},
+        "start": {"joints": joint_path[0].tolist()},
         "task_space": space,
-        "path": _random_path(rng, robot, course, space, folder / f"{name}_{number}.csv"),
+        "path": _random_path(rng, robot, joint_path, space, folder / f"{name}_{number}.csv"),
         "search": {"effort": "single", "time_limit": time_limit},
         "solver": {"time_limit": 0.2 * time_limit},
         "spline": {
@@ -260,9 +262,9 @@ def random_task(name: str, seed: int, number: int, folder: Path, time_limit: flo
             "rest": "velocity" if degree == 2 or rng.random() < 0.3 else "full",
         },
     }
-    task["redundant_joints"] = _redundant(rng, name, course, space)
+    task["redundant_joints"] = _redundant(rng, name, joint_path, space)
     if rng.random() < 0.15:
-        task |= {"start": "free", "path_start": _coordinates(robot, course[0], space)}
+        task |= {"start": "free", "path_start": _coordinates(robot, joint_path[0], space)}
     return task
 
 
@@ -283,7 +285,7 @@ def _joint_motion(rng: np.random.Generator, robot: Robot) -> np.ndarray:
 
 
 def _random_limits(
-    rng: np.random.Generator, robot: Robot, course: np.ndarray, held: np.ndarray
+    rng: np.random.Generator, robot: Robot, joint_path: np.ndarray, held: np.ndarray
 ) -> tuple[dict[str, object], dict[str, object]]:
     """Limits and friction that leave the motion possible."""
     names, n = robot.joint_names, robot.n
@@ -296,7 +298,7 @@ def _random_limits(
         "coulomb_velocity": dict(zip(names, (10.0 ** rng.uniform(-5.0, -1.0, n)).tolist(), strict=True)),
     }
     ranges: dict[str, list[float | None]] = {}
-    for name, low, high in zip(names, course.min(axis=0), course.max(axis=0), strict=True):
+    for name, low, high in zip(names, joint_path.min(axis=0), joint_path.max(axis=0), strict=True):
         room = rng.uniform(0.05, 0.5, 2)
         ends = [float(low - room[0]), float(high + room[1])]
         kind = rng.integers(0, 8)
@@ -311,9 +313,9 @@ def _random_limits(
     return limits, friction
 
 
-def _random_path(rng: np.random.Generator, robot: Robot, course: np.ndarray, space: object, csv: Path) -> object:
+def _random_path(rng: np.random.Generator, robot: Robot, joint_path: np.ndarray, space: object, csv: Path) -> object:
     """Segments near the tool's path along the motion."""
-    placements = [robot.tool_placement(q) for q in course]
+    placements = [robot.tool_placement(q) for q in joint_path]
     rows = 3 if space == "pose" else 2
     points = np.array([placement.translation[:rows] for placement in placements])
     quaternions = np.array([pin.Quaternion(placement.rotation).coeffs() for placement in placements])[:, [3, 0, 1, 2]]
@@ -350,11 +352,11 @@ def _closed_forms(name: str) -> list[ik.Candidate]:
     return [c for c in found if c.solver is not None and c.solver.kind == "closed_form"]
 
 
-def _redundant(rng: np.random.Generator, name: str, course: np.ndarray, space: object) -> list[str]:
+def _redundant(rng: np.random.Generator, name: str, joint_path: np.ndarray, space: object) -> list[str]:
     """Redundant joints: of those with a closed form one of the two with the most room along the motion."""
     forms = _closed_forms(name)
     if space == "pose":
-        forms = sorted(forms, key=lambda c: -random_poses.room(course, c))
+        forms = sorted(forms, key=lambda c: -random_poses.room(joint_path, c))
     return list(forms[int(rng.integers(0, min(2, len(forms))))].redundant_joints)
 
 

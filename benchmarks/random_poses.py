@@ -52,10 +52,10 @@ def closed_forms(robot: Robot) -> list[ik.Candidate]:
     return [c for c in found if c.solver is not None and c.solver.kind == "closed_form"]
 
 
-def room(course: np.ndarray, candidate: ik.Candidate) -> float:
+def room(joint_path: np.ndarray, candidate: ik.Candidate) -> float:
     """Least branch margin along a course of postures (K, n), on the branch where it is largest."""
     solver = candidate.solver
-    return max(float(solver.branch_margins(course, b).min()) for b in range(len(solver.branches)))
+    return max(float(solver.branch_margins(joint_path, b).min()) for b in range(len(solver.branches)))
 
 
 def random_tasks(
@@ -70,13 +70,13 @@ def random_tasks(
         while True:
             start = rng.uniform(lower + clear, upper - clear)
             end = np.clip(start + rng.uniform(-REACH, REACH, robot.n), lower + clear, upper - clear)
-            course = followed(robot, start, robot.tool_placement(start), robot.tool_placement(end))
-            if course is not None:
+            joint_path = followed(robot, start, robot.tool_placement(start), robot.tool_placement(end))
+            if joint_path is not None:
                 break
         goal = robot.tool_placement(end)
         turn = pin.log3(goal.rotation @ robot.tool_placement(start).rotation.T)
         angle = float(np.linalg.norm(turn))
-        choice = choices[number % len(choices)] if in_turn else max(choices, key=lambda c: room(course, c))
+        choice = choices[number % len(choices)] if in_turn else max(choices, key=lambda c: room(joint_path, c))
         yield {
             "brachis": 1,
             "start": {"joints": start},
@@ -98,7 +98,7 @@ def followed(robot: Robot, start: np.ndarray, first: pin.SE3, last: pin.SE3) -> 
     turn = pin.log3(first.rotation.T @ last.rotation)
     middle = 0.5 * (limits.position_lower + limits.position_upper)
     middle = np.where(np.isfinite(middle), middle, start)
-    course = []
+    joint_path = []
     for s in np.linspace(0.0, 1.0, STEPS + 1):
         target = pin.SE3(first.rotation @ pin.exp3(s * turn), (1.0 - s) * first.translation + s * last.translation)
         for _ in range(3):
@@ -111,8 +111,8 @@ def followed(robot: Robot, start: np.ndarray, first: pin.SE3, last: pin.SE3) -> 
         held = np.all(np.abs(dynamics.torque(robot, q[None], zero, zero)[0]) <= limits.torque)
         if not (inside and held and np.abs(miss).max() < 1e-3):
             return None
-        course.append(q)
-    return np.array(course)
+        joint_path.append(q)
+    return np.array(joint_path)
 
 
 def tried(robot: Robot, task: dict[str, object]) -> str:

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from brachis import plan, transcribe
+from brachis.nlp.differential_ik import differential_ik_paths
 from brachis.nlp.guess import starting_point
-from brachis.nlp.numeric_course import numeric_courses
 from brachis.solvers import SolverOptions, solver_named
 
 
 def first_point(program):
     """Start from the first course of numeric inverse kinematics."""
-    return starting_point(program, [next(numeric_courses(program.phases[0].joint_map))])
+    return starting_point(program, [next(differential_ik_paths(program.phases[0].joint_map))])
 
 
 @pytest.mark.parametrize("joint", ["j1", "j2", "j3"])

@@ -13,8 +13,8 @@ import pytest
 
 from brachis import Robot, ik, load_task, plan, transcribe
 from brachis.ik.eaik import eaik
+from brachis.nlp.differential_ik import differential_ik_paths
 from brachis.nlp.guess import starting_point
-from brachis.nlp.numeric_course import numeric_courses
 from brachis.robot import task_map_of
 from brachis.solvers import SolverOptions, solver_named
 
@@ -24,7 +24,7 @@ POSES = 2000
 
 def first_point(program):
     """Start from the first course of numeric inverse kinematics."""
-    return starting_point(program, [next(numeric_courses(program.phases[0].joint_map))])
+    return starting_point(program, [next(differential_ik_paths(program.phases[0].joint_map))])
 
 
 @pytest.fixture(scope="module")

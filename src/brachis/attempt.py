@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from brachis.kinematics import Decomposition
+from brachis.kinematics import ClosedFormMap
 from brachis.nlp import Program
+from brachis.problem import Decomposition
 from brachis.refine import Refined
-from brachis.setting import Choice
 from brachis.solvers import SolverReport
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
@@ -23,7 +23,7 @@ class Start:
 
     Attributes
     ----------
-    choice : Choice
+    decomposition : Decomposition
     branch : int
         Index into the closed form's branches.
     posture : (n,) ndarray
@@ -38,7 +38,7 @@ class Start:
         The solver that plans from it; empty while none is chosen.
     """
 
-    choice: Choice
+    decomposition: Decomposition
     branch: int
     posture: np.ndarray
     joint_path: np.ndarray
@@ -47,9 +47,9 @@ class Start:
     solver: str = ""
 
     @property
-    def decomposition(self) -> Decomposition:
+    def joint_map(self) -> ClosedFormMap:
         """Robot, path, closed form and branch, put together."""
-        return self.choice.decomposition(self.posture, self.branch)
+        return self.decomposition.joint_map(self.posture, self.branch)
 
     def with_solver(self, name: str) -> Start:
         """Return the same start for a solver."""
@@ -112,8 +112,8 @@ class Attempt:
     @classmethod
     def of(cls, start: Start, status: str, **more: Any) -> Attempt:  # noqa: ANN401  (fields of the class)
         """Begin an attempt."""
-        choice = start.choice
-        names, branch = choice.match.redundant_joints, choice.match.solver.branches[start.branch]
+        decomposition = start.decomposition
+        names, branch = decomposition.match.redundant_joints, decomposition.match.solver.branches[start.branch]
         return cls(names, branch, start.origin, start.solver, start.estimate, status, start, **more)
 
     @property
@@ -126,7 +126,7 @@ class Attempt:
         """True where the finished plan has the same knots, so that its end time is no shorter."""
         if self.start is None or self.program is None or self.target is None:
             return False
-        spline = self.start.choice.setting.task.spline
+        spline = self.start.decomposition.problem.task.spline
         return spline.knots != "free" and spline.intervals != "auto" and self.program.intervals == self.target.intervals
 
     @property

@@ -31,19 +31,19 @@ def extract(start: Start, refined: Refined) -> Trajectory:
     UnreachableError
         The motion leaves the branch between the collocation points.
     """
-    decomposition, task = start.decomposition, start.choice.setting.task
+    joint_map, task = start.joint_map, start.decomposition.problem.task
     (motion,) = refined.program.motions(refined.x)
-    joins = motion.times_of(decomposition.path.breaks[1:-1])
+    joins = motion.times_of(joint_map.path.breaks[1:-1])
     gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
     breaks = np.union1d(motion.breaks, joins[gaps > _SAME_TIME * motion.t_end])
-    nodes = interpolate(decomposition, motion.at, breaks, jumps=motion.degree < CONTINUOUS_TORQUE)
-    robot = decomposition.robot
+    nodes = interpolate(joint_map, motion.at, breaks, jumps=motion.degree < CONTINUOUS_TORQUE)
+    robot = joint_map.robot
     return Trajectory(
         task=task,
         urdf=robot.urdf,
         robot=robot,
-        redundant_joints=tuple(robot.joint_names[i] for i in decomposition.redundant),
-        branch=decomposition.branch_label,
+        redundant_joints=tuple(robot.joint_names[i] for i in joint_map.redundant),
+        branch=joint_map.branch_label,
         times=nodes.times,
         q=nodes.q,
         qdot=nodes.qdot,

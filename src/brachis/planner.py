@@ -27,12 +27,12 @@ from brachis.mesh import adapt_mesh, coarsest
 from brachis.nlp import Program
 from brachis.nlp.guess import starting_point
 from brachis.nlp.layout import SHORTEST_TIME
+from brachis.problem import Problem, breaks_of, decompositions_of, program_of
 from brachis.refine import Refined, RefinementOptions, Solve, refine
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.combine import robot_for
 from brachis.search import MARGINS, Listener, Stages, continued, find_fastest, first_start, solve_with
-from brachis.setting import Setting, breaks_of, choices, program_of
 from brachis.solvers import SolverReport, SolveStatus, solver_named
 from brachis.task import Task, load_task
 from brachis.verify import VerifyOptions, verify_trajectory
@@ -119,10 +119,10 @@ def _plan(
     task = task.model_copy(update={"robot": robot.settings})
     loaded, deadline = time.perf_counter(), Deadline.after(task.search.time_limit)
     remarks = plausibility.tell(plausibility.of_robot(robot), strict=strict, stacklevel=4)
-    setting = Setting.of(robot, task, limits)
-    places = plausibility.of_places(setting.task_map, setting.start, setting.end, task.path_start)
+    problem = Problem.of(robot, task, limits)
+    places = plausibility.of_places(problem.task_map, problem.start, problem.end, task.path_start)
     remarks += plausibility.tell(places, strict=strict, stacklevel=4)
-    found = find_fastest(choices(setting, families), Stages(solved, finished), deadline, listener)
+    found = find_fastest(decompositions_of(problem, families), Stages(solved, finished), deadline, listener)
     best = found.best
     assert best is not None and best.start is not None  # noqa: PT018, S101  (else nothing would have come back)
     assert best.trajectory is not None and best.verification is not None  # noqa: PT018, S101
@@ -132,7 +132,7 @@ def _plan(
         task=task,
         trajectory=best.trajectory,
         verification=best.verification,
-        family=best.start.choice.match.family,
+        family=best.start.decomposition.match.family,
         attempt=best.without_programs(),
         timing={"load": loaded - began, "total": time.perf_counter() - began},
         candidates=found.in_order(),
@@ -155,8 +155,8 @@ def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
     -------
     Attempt
     """
-    task = start.choice.setting.task
-    target = program_of(start.choice.setting, start.decomposition, breaks_of(task))
+    task = start.decomposition.problem.task
+    target = program_of(start.decomposition.problem, start.joint_map, breaks_of(task))
     program = coarsest(target) if target.variables > _MANY_VARIABLES else target
     x = starting_point(program, [start.joint_path])
     if x is None:
@@ -186,7 +186,7 @@ def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attemp
     """
     start, program = attempt.start, attempt.program
     assert start is not None and program is not None  # noqa: PT018, S101  (it is usable)
-    task = start.choice.setting.task
+    task = start.decomposition.problem.task
     settings, soon = task.refinement, deadline.part(_KNOT_TIME)
     options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, soon)
     solve = _solver(start, soon, listener)
@@ -211,18 +211,18 @@ def _verified(attempt: Attempt, before: tuple[SolverReport, ...], refined: Refin
     """Make the trajectory of a refined program and verify it; `before` are the reports of earlier solves."""
     start = attempt.start
     assert start is not None  # noqa: S101
-    setting, trajectory, verification = start.choice.setting, None, None
+    problem, trajectory, verification = start.decomposition.problem, None, None
     if refined.converged and np.isfinite(refined.violation):
         with contextlib.suppress(UnreachableError):
             trajectory = extract(start, refined)
-            options = VerifyOptions(ratio_tolerance=setting.task.refinement.tolerance)
-            verification = verify_trajectory(trajectory, options, further=setting.further)
+            options = VerifyOptions(ratio_tolerance=problem.task.refinement.tolerance)
+            verification = verify_trajectory(trajectory, options, further=problem.further)
     return attempt.finished(
         reports=(*before, *refined.reports),
         refined=refined,
         trajectory=trajectory,
         verification=verification,
-        tolerance=setting.task.refinement.tolerance,
+        tolerance=problem.task.refinement.tolerance,
     )
 
 
@@ -236,7 +236,9 @@ def _in_words(status: SolveStatus) -> str:
 def _solver(start: Start, deadline: Deadline, listener: Listener) -> Solve:
     """Make a function that solves with the start's solver."""
     (solver,) = solver_named(start.solver)
-    return solve_with(solver, start.choice.setting.task.solver, len(start.choice.redundant), deadline, listener)
+    return solve_with(
+        solver, start.decomposition.problem.task.solver, len(start.decomposition.redundant), deadline, listener
+    )
 
 
 def transcribe(
@@ -265,8 +267,8 @@ def transcribe(
     InputError
         See `plan`.
     """
-    setting = Setting.of(robot_for(robot, task.robot), task, limits)
-    choice = choices(setting, families)[0]
-    decomposition = choice.decomposition(*first_start(choice))
-    program = program_of(setting, decomposition, breaks_of(task))
-    return program, choice.match.family
+    problem = Problem.of(robot_for(robot, task.robot), task, limits)
+    decomposition = decompositions_of(problem, families)[0]
+    joint_map = decomposition.joint_map(*first_start(decomposition))
+    program = program_of(problem, joint_map, breaks_of(task))
+    return program, decomposition.match.family

@@ -28,11 +28,11 @@ def test_planar_line(scara):
     assert 2.32 < reference.t_end < 2.34
     assert reference.intervals == 100
     (motion,) = reference.refined.program.motions(reference.refined.x)
-    decomposition = scara("j3").attempt.refined.program.phases[0].joint_map
+    joint_map = scara("j3").attempt.refined.program.phases[0].joint_map
     t = np.sort(np.random.default_rng(3).uniform(0.0, motion.t_end, 4000))
-    state = decomposition.state(*motion.at(t), t=t)
-    torque = dynamics.torque(decomposition.robot, state.q, state.qdot, state.qddot)
-    assert np.abs(torque / decomposition.robot.limits.torque).max() <= 1.0 + 1e-4
+    state = joint_map.state(*motion.at(t), t=t)
+    torque = dynamics.torque(joint_map.robot, state.q, state.qdot, state.qddot)
+    assert np.abs(torque / joint_map.robot.limits.torque).max() <= 1.0 + 1e-4
     y, ydot, _ = motion.at(np.array([0.0, motion.t_end]))
     np.testing.assert_allclose(y[:, 0], [0.0, 1.0], atol=1e-12)
     np.testing.assert_allclose(ydot, 0.0, atol=1e-9)

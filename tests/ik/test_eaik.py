@@ -187,11 +187,11 @@ def test_continuity_follows_a_posture_among_answers_of_its_label(robot, redundan
         if np.abs(margin).min() < 0.03:
             continue
         answers = bench.solve(q)[:, int(margin[0] < 0.0)]
-        course = [q[0, bench.rest]]
+        joint_path = [q[0, bench.rest]]
         for choice in answers:
-            gap = wrapped(choice - course[-1], np.ones(6, dtype=bool))
-            course.append(course[-1] + gap[np.nanargmin(np.abs(gap).max(axis=1))])
-        np.testing.assert_allclose(course[1:], q[:, bench.rest], atol=1e-8)
+            gap = wrapped(choice - joint_path[-1], np.ones(6, dtype=bool))
+            joint_path.append(joint_path[-1] + gap[np.nanargmin(np.abs(gap).max(axis=1))])
+        np.testing.assert_allclose(joint_path[1:], q[:, bench.rest], atol=1e-8)
         followed += 1
     assert followed >= 5
 

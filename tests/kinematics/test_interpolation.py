@@ -10,7 +10,7 @@ from brachis.errors import UnreachableError
 from brachis.kinematics import interpolate
 from brachis.robot import Robot
 from support.chains import planar_robot
-from support.motions import Sway, decomposition
+from support.motions import Sway, joint_map
 
 
 def pieces(nodes) -> BPoly:
@@ -23,7 +23,7 @@ def pieces(nodes) -> BPoly:
     [("RRR", [0.4, 1.0, 0.5], ["j2"]), ("RPR", [0.4, 0.2, 0.9], ["j1"]), ("RRRR", [0.4, 0.8, 0.7, 0.5], ["j1", "j4"])],
 )
 def test_pieces_agree_with_the_closed_form_at_random_times(pattern, start, redundant):
-    chain = decomposition(planar_robot(pattern), ["x", "y"], [{"line": {"by": [-0.15, 0.1]}}], start, redundant)
+    chain = joint_map(planar_robot(pattern), ["x", "y"], [{"line": {"by": [-0.15, 0.1]}}], start, redundant)
     motion = Sway(chain)
     nodes = interpolate(chain, motion, np.linspace(0.0, 1.0, 6), jumps=False)
     assert nodes.position_error <= 1e-11
@@ -39,7 +39,7 @@ def test_nodes_contain_the_breaks_and_are_denser_where_the_motion_bends(scara_ur
     # A line that passes the base closely: joint 1 turns quickly in the middle of it.
     start = [np.deg2rad(-40.0), np.deg2rad(100.0), np.deg2rad(65.0)]
     tool = robot.tool_placement(np.array(start)).translation[:2]
-    chain = decomposition(robot, ["x", "y"], [{"line": {"to": [-tool[0], tool[1]]}}], start, ["j2"])
+    chain = joint_map(robot, ["x", "y"], [{"line": {"to": [-tool[0], tool[1]]}}], start, ["j2"])
     motion = Sway(chain, amplitude=0.0)
     breaks = np.linspace(0.0, 1.0, 5)
     nodes = interpolate(chain, motion, breaks, jumps=False)
@@ -52,7 +52,7 @@ def test_nodes_contain_the_breaks_and_are_denser_where_the_motion_bends(scara_ur
 
 def test_motion_that_leaves_the_branch_between_the_breaks(scara_urdf):
     robot = Robot.from_urdf(scara_urdf)
-    chain = decomposition(robot, ["x", "y"], [{"line": {"by": [0.0, 0.1]}}], [0.2, 1.0, 0.6], ["j3"])
+    chain = joint_map(robot, ["x", "y"], [{"line": {"by": [0.0, 0.1]}}], [0.2, 1.0, 0.6], ["j3"])
 
     def excursion(t):
         s = np.sin(4.0 * np.pi * t) ** 2 * 60.0  # far off at all times but the quarters

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from brachis.nlp import Program
+from brachis.nlp.differential_ik import STRATEGIES, differential_ik_path
 from brachis.nlp.guess import shortest_time, worst_time_scaling_ratio
-from brachis.nlp.numeric_course import STRATEGIES, numeric_course
 from support.chains import planar_robot, program_of
 from support.phases import CASES, phase_of
 from support.starts import starting_points
@@ -39,15 +39,15 @@ def test_guesses_differ():
 @pytest.mark.parametrize("case", CASES)
 def test_numeric_course_is_one_that_the_closed_form_can_follow(case):
     chain = phase_of(case).joint_map
-    course = numeric_course(chain, STRATEGIES[0])
-    assert course.shape[1] == 1 + chain.r
+    joint_path = differential_ik_path(chain, STRATEGIES[0])
+    assert joint_path.shape[1] == 1 + chain.r
     if chain.r == 0:
-        np.testing.assert_array_equal(course, [[0.0], [1.0]])
+        np.testing.assert_array_equal(joint_path, [[0.0], [1.0]])
         return
-    np.testing.assert_array_equal(course[0], [0.0, *chain.start[chain.redundant]])
-    assert course[-1, 0] == 1.0
-    assert np.all(np.diff(course[:, 0]) >= 0.0)
-    postures = chain.postures(course)
+    np.testing.assert_array_equal(joint_path[0], [0.0, *chain.start[chain.redundant]])
+    assert joint_path[-1, 0] == 1.0
+    assert np.all(np.diff(joint_path[:, 0]) >= 0.0)
+    postures = chain.postures(joint_path)
     assert np.isfinite(postures).all()
     assert np.abs(np.diff(postures, axis=0)).max() < 0.5
 

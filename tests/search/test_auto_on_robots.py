@@ -10,9 +10,9 @@ import pytest
 
 import brachis
 from brachis.deadline import NEVER
+from brachis.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.schedule import batches
-from brachis.setting import Setting, choices
 
 ROOT = Path(__file__).parents[2]
 RAIL_LINE = ROOT / "examples/03_tx90l_rail_line.yaml"
@@ -47,12 +47,12 @@ def test_auto_is_never_slower_than_the_rail_alone(intervals):
 def test_thorough_looks_at_polynomials_too():
     task = brachis.load_task({**brachis.load_task(RAIL_LINE).to_dict(), "redundant_joints": "auto"})
     names: dict[str, set[str]] = {}
-    for effort in ("fast", "thorough"):
-        asked = task.model_copy(update={"search": task.search.model_copy(update={"effort": effort})})
-        allowed = choices(Setting.of(robot_from_settings(task.robot), asked))
+    for level in ("fast", "thorough"):
+        asked = task.model_copy(update={"search": task.search.model_copy(update={"effort": level})})
+        allowed = decompositions_of(Problem.of(robot_from_settings(task.robot), asked))
         planned = batches(allowed, NEVER, lambda _text: None, lambda *_dead_end: None)
         starts = [start for batch in planned if not batch.last_resort for start in batch.starts]
-        names[effort] = {start.choice.name for start in starts}
+        names[level] = {start.decomposition.name for start in starts}
     assert names["fast"] == {"rail", "joint_1", "joint_2", "joint_3"}
     assert names["thorough"] == names["fast"] | {"joint_4", "joint_5", "joint_6"}
 

@@ -10,8 +10,8 @@ import pytest
 
 import brachis
 from brachis.nlp.guess import starting_point
+from brachis.problem import Problem, decompositions_of, program_of
 from brachis.search.solving import MARGINS, continued
-from brachis.setting import Setting, choices, program_of
 from brachis.solvers import SolverOptions, solver_named
 
 ROOT = Path(__file__).parents[2]
@@ -21,7 +21,7 @@ table = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(table)
 
 
-def random_course(rng: np.random.Generator, start: float) -> np.ndarray:
+def random_joint_path(rng: np.random.Generator, start: float) -> np.ndarray:
     """A smooth course of the redundant joint that may go anywhere, (S, 2)."""
     s = np.linspace(0.0, 1.0, 41)
     sizes = rng.normal(size=4) * [1.5, 0.8, 0.5, 0.3]
@@ -29,23 +29,23 @@ def random_course(rng: np.random.Generator, start: float) -> np.ndarray:
     return np.column_stack([s, start + sizes[0] * s + waves])
 
 
-def restarts(setting: Setting) -> dict[str, np.ndarray]:
+def restarts(problem: Problem) -> dict[str, np.ndarray]:
     """End times, s, of plans from random courses, for every choice of the redundant joint."""
     rng = np.random.default_rng(0)
     times = {}
-    for choice in choices(setting):
-        decomposition = choice.decomposition(setting.start, choice.branches[0])
-        program = program_of(setting, decomposition, np.linspace(0.0, 1.0, 21))
+    for decomposition in decompositions_of(problem):
+        joint_map = decomposition.joint_map(problem.start, decomposition.branches[0])
+        program = program_of(problem, joint_map, np.linspace(0.0, 1.0, 21))
         found = []
         for _ in range(4000):
-            x = starting_point(program, [random_course(rng, setting.start[choice.redundant[0]])])
+            x = starting_point(program, [random_joint_path(rng, problem.start[decomposition.redundant[0]])])
             if x is None:
                 continue
             _, reports = continued(program, x, solve, MARGINS)
             found.append(reports[-1].objective if reports[-1].status.usable else np.inf)
             if len(found) == RESTARTS:
                 break
-        times[choice.name] = np.array(found)
+        times[decomposition.name] = np.array(found)
     return times
 
 
@@ -58,7 +58,7 @@ def test_auto_is_at_the_best_optimum_of_random_restarts(angle):
     robot, task = table.robot_and_task(angle, "auto")
     result = brachis.plan(robot, task)
     assert result.verified
-    times = restarts(Setting.of(robot, brachis.load_task(task)))
+    times = restarts(Problem.of(robot, brachis.load_task(task)))
     assert set(times) == {"j1", "j2", "j3"}
     assert all(len(found) == RESTARTS for found in times.values())
     best = min(found.min() for found in times.values())

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from brachis.search.efforts import EFFORTS
+from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.schedule import looked_at
 
 PAGE = Path(__file__).parents[2] / "docs/search.md"
@@ -17,10 +17,10 @@ def test_the_documented_efforts_are_the_real_ones():
     rows = [line.split("|")[1:-1] for line in PAGE.read_text().splitlines() if line.startswith("| `")]
     named = {cells[0].split("`")[1]: [cell.strip() for cell in cells[1:]] for cells in rows if len(cells) == 5}
     table = {name: cells for name, cells in named.items() if name != "search.effort"}
-    assert set(table) == set(EFFORTS)
-    for name, (choices, seeds, plans, refined) in table.items():
-        level = [level for level in EFFORTS[name] if not level.last_resort][-1]
-        assert choices == {1: "the first one", 6: "6", 20: "20"}.get(level.choices, "all")
+    assert set(table) == set(SEARCH_LEVELS)
+    for name, (decompositions, seeds, plans, refined) in table.items():
+        level = [level for level in SEARCH_LEVELS[name] if not level.last_resort][-1]
+        assert decompositions == {1: "the first one", 6: "6", 20: "20"}.get(level.decompositions, "all")
         assert seeds.split(",")[0] == str(level.seeds)
         assert ("and 8" in seeds) is (level.numeric == 8)
         assert plans == (str(level.plans) if level.plans < 10_000 else "all")
@@ -40,11 +40,14 @@ def test_the_documented_efforts_are_the_real_ones():
 def test_polynomials_are_looked_at_where_every_closed_form_is_cramped(rooms, start, expected, given):
     start, end = (start, None) if given == "start" else (None, start)
 
-    def choice(kind, room):
+    def decomposition(kind, clearance):
         solver = SimpleNamespace(kind=kind)
-        setting = SimpleNamespace(start=start, end=end)
-        return SimpleNamespace(match=SimpleNamespace(solver=solver), room=room, setting=setting)
+        problem = SimpleNamespace(start=start, end=end)
+        return SimpleNamespace(match=SimpleNamespace(solver=solver), clearance=clearance, problem=problem)
 
-    choices = [*(choice("closed_form", room) for room in rooms), choice("polynomial", 0.6)]
-    (fast,) = EFFORTS["fast"]
-    assert [found.match.solver.kind for found in looked_at(choices, fast)] == expected
+    decompositions = [
+        *(decomposition("closed_form", clearance) for clearance in rooms),
+        decomposition("polynomial", 0.6),
+    ]
+    (fast,) = SEARCH_LEVELS["fast"]
+    assert [found.match.solver.kind for found in looked_at(decompositions, fast)] == expected

@@ -12,14 +12,14 @@ import pytest
 import brachis
 from brachis import ik
 from brachis.errors import PathError, PlanningError
+from brachis.problem import Problem, decompositions_of
 from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
-from brachis.search.course import DeadEnd
-from brachis.search.efforts import EFFORTS
 from brachis.search.explain import no_motion
+from brachis.search.joint_path import DeadEnd
 from brachis.search.lattice import Lattice
+from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.starts import lattice_starts
-from brachis.setting import Setting, choices
 from support.pose_arms import panda
 
 ROOT = Path(__file__).parents[2]
@@ -31,28 +31,28 @@ def scara(limits: dict[str, Any] | None = None, **options: Any) -> brachis.Robot
     return brachis.Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", limits=spec, **({"gravity": [0, 0, 0]} | options))
 
 
-def setting(robot: brachis.Robot, **changes: Any) -> Setting:
+def problem(robot: brachis.Robot, **changes: Any) -> Problem:
     task = {
         "brachis": 1,
         "start": {"joints": START},
         "task_space": ["x", "y"],
         "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
     }
-    return Setting.of(robot, brachis.load_task(task | changes))
+    return Problem.of(robot, brachis.load_task(task | changes))
 
 
-def example(name: str, **changes: Any) -> Setting:
+def example(name: str, **changes: Any) -> Problem:
     task = brachis.load_task(brachis.load_task(ROOT / "examples" / name).to_dict() | changes)
-    return Setting.of(robot_from_settings(task.robot), task)
+    return Problem.of(robot_from_settings(task.robot), task)
 
 
 CASES = {
-    "planar": lambda: setting(scara()),
-    "ranges": lambda: setting(scara({"position": {"j1": [-0.5, 1.5], "j2": [-3.0, 0.0], "j3": [0.0, 3.5]}})),
-    "free start": lambda: setting(scara(), start="free", path_start=[math.sqrt(3.0), 0.0]),
+    "planar": lambda: problem(scara()),
+    "ranges": lambda: problem(scara({"position": {"j1": [-0.5, 1.5], "j2": [-3.0, 0.0], "j3": [0.0, 3.5]}})),
+    "free start": lambda: problem(scara(), start="free", path_start=[math.sqrt(3.0), 0.0]),
     "rail": lambda: example("03_tx90l_rail_line.yaml", redundant_joints="auto"),
     "two redundant": lambda: example("06_free_roll.yaml"),
-    "none redundant": lambda: setting(scara(locked_joints={"j3": 0.4}), start={"joints": START[:2]}),
+    "none redundant": lambda: problem(scara(locked_joints={"j3": 0.4}), start={"joints": START[:2]}),
 }
 
 
@@ -61,51 +61,51 @@ def test_courses_are_motions_of_the_robot(case):
     given = CASES[case]()
     robot, limits = given.robot, given.robot.limits
     found = 0
-    for choice in choices(given):
-        courses = Lattice(choice).courses(4)
-        if isinstance(courses, DeadEnd):
+    for decomposition in decompositions_of(given):
+        joint_paths = Lattice(decomposition).joint_paths(4)
+        if isinstance(joint_paths, DeadEnd):
             continue
-        found += len(courses)
-        for course in courses:
-            targets = given.path.sample(course.s).target
-            miss = given.task_map.difference(given.task_map.values(course.q), targets)
+        found += len(joint_paths)
+        for joint_path in joint_paths:
+            targets = given.path.sample(joint_path.s).target
+            miss = given.task_map.difference(given.task_map.values(joint_path.q), targets)
             assert np.abs(miss).max() < 1e-6
-            assert np.abs(np.diff(course.q, axis=0)).max() < 0.9
-            assert np.all(course.q >= limits.position_lower - 1e-9)
-            assert np.all(course.q <= limits.position_upper + 1e-9)
-            still = np.zeros_like(course.q)
-            assert np.all(np.abs(dynamics.torque(robot, course.q, still, still)) <= limits.torque)
-            margins = choice.match.solver.branch_margins(course.q, course.branch)
+            assert np.abs(np.diff(joint_path.q, axis=0)).max() < 0.9
+            assert np.all(joint_path.q >= limits.position_lower - 1e-9)
+            assert np.all(joint_path.q <= limits.position_upper + 1e-9)
+            still = np.zeros_like(joint_path.q)
+            assert np.all(np.abs(dynamics.torque(robot, joint_path.q, still, still)) <= limits.torque)
+            margins = decomposition.match.solver.branch_margins(joint_path.q, joint_path.branch)
             assert margins.min(initial=1.0) > 0.0
             if given.start is not None:
-                np.testing.assert_allclose(course.q[0], given.start, atol=1e-12)
-        stations = [course.q for course in courses]
+                np.testing.assert_allclose(joint_path.q[0], given.start, atol=1e-12)
+        stations = [joint_path.q for joint_path in joint_paths]
         assert all(np.abs(a - b).max() > 0.05 for i, a in enumerate(stations) for b in stations[:i])
     assert found >= 3 or case == "none redundant"
     assert found
 
 
 def test_the_shortest_course_comes_first_and_is_shorter_than_any_detour():
-    (choice, *_) = choices(setting(scara(), redundant_joints=["j1"]))
-    first, *others = Lattice(choice).courses(6)
+    (decomposition, *_) = decompositions_of(problem(scara(), redundant_joints=["j1"]))
+    first, *others = Lattice(decomposition).joint_paths(6)
     assert others
     assert all(other.length >= first.length for other in others)
 
 
 def test_an_end_posture_is_reached():
-    free = Lattice(choices(setting(scara(), redundant_joints=["j1"]))[0]).courses(3)
+    free = Lattice(decompositions_of(problem(scara(), redundant_joints=["j1"]))[0]).joint_paths(3)
     end = free[-1].q[-1]
-    given = setting(scara(), redundant_joints=["j1"], end={"joints": end})
-    courses = Lattice(choices(given)[0]).courses(3)
-    assert all(np.abs(course.q[-1] - end).max() < 0.2 for course in courses)
+    given = problem(scara(), redundant_joints=["j1"], end={"joints": end})
+    joint_paths = Lattice(decompositions_of(given)[0]).joint_paths(3)
+    assert all(np.abs(joint_path.q[-1] - end).max() < 0.2 for joint_path in joint_paths)
 
 
 def test_lifts_follow_the_course():
     """Three turns about the base: the joint leaves (-pi, pi]."""
     arm = scara(locked_joints={"j3": 0.4})
-    given = setting(arm, start={"joints": [0.3, 0.9]}, path=[{"circle": {"center": [0.0, 0.0], "turns": 3}}])
-    (course,) = Lattice(choices(given)[0]).courses(1)
-    assert course.q[-1, 0] - course.q[0, 0] == pytest.approx(6 * math.pi, abs=1e-6)
+    given = problem(arm, start={"joints": [0.3, 0.9]}, path=[{"circle": {"center": [0.0, 0.0], "turns": 3}}])
+    (joint_path,) = Lattice(decompositions_of(given)[0]).joint_paths(1)
+    assert joint_path.q[-1, 0] - joint_path.q[0, 0] == pytest.approx(6 * math.pi, abs=1e-6)
 
 
 REASONS = {
@@ -128,8 +128,8 @@ REASONS = {
 @pytest.mark.parametrize("case", REASONS)
 def test_why_there_is_no_course(case):
     options, changes, reason, message = REASONS[case]
-    given = setting(scara(**options), **changes)
-    ends = [lattice_starts(choice, EFFORTS["fast"][0], 0) for choice in choices(given)]
+    given = problem(scara(**options), **changes)
+    ends = [lattice_starts(decomposition, SEARCH_LEVELS["fast"][0], 0) for decomposition in decompositions_of(given)]
     assert all(isinstance(end, DeadEnd) for end in ends)
     furthest = max(ends, key=lambda end: end.s)
     assert 0.0 < furthest.s <= 1.0
@@ -149,7 +149,7 @@ def test_a_narrow_range_of_the_redundant_joint_is_not_called_out_of_reach():
 
 
 def test_advice_names_what_was_kept_low():
-    given = setting(scara(), solver={"max_iterations": 1, "name": "uno"}, redundant_joints=["j1"])
+    given = problem(scara(), solver={"max_iterations": 1, "name": "uno"}, redundant_joints=["j1"])
     with pytest.raises(PlanningError, match=r"raise solver.max_iterations, which is 1$") as caught:
         brachis.plan(given.robot, given.task)
     assert "effort" not in str(caught.value)
@@ -159,8 +159,8 @@ def test_what_eaik_might_add_is_said_where_it_is_missing(monkeypatch):
     """With another redundant joint the motion might go on."""
     monkeypatch.setattr("brachis.ik.eaik.installed", lambda: False)
     task = {"start": {"joints": [0.3, -0.5, 0.2, -2.2, 0.3, 1.9, 0.8]}, "task_space": "pose"}
-    given = setting(panda(), path=[{"line": {"by": [0.0, 0.05, 0.0]}}], **task)
-    reason = no_motion(choices(given), [], {"panda_joint4": DeadEnd(0.4, {"the branch ends": 1})})
+    given = problem(panda(), path=[{"line": {"by": [0.0, 0.05, 0.0]}}], **task)
+    reason = no_motion(decompositions_of(given), [], {"panda_joint4": DeadEnd(0.4, {"the branch ends": 1})})
     assert isinstance(reason, PathError)
     assert "EAIK is not installed" in str(reason)
     assert "[panda_joint5], [panda_joint6]" in str(reason)

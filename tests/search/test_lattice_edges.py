@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_from_settings
-from brachis.search.course import DeadEnd
+from brachis.search.joint_path import DeadEnd
 from brachis.search.lattice import Lattice
 from brachis.search.stations import stations
-from brachis.setting import Setting, choices
 
 ROOT = Path(__file__).parents[2]
 SCARA = ROOT / "robots/scara3/robot.urdf"
@@ -24,8 +24,8 @@ def scara(locked: dict[str, float] | None = None, **limits: object) -> brachis.R
     return brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=spec, locked_joints=locked)
 
 
-def setting(robot: brachis.Robot, **task: object) -> Setting:
-    return Setting.of(robot, brachis.load_task({"brachis": 1, "task_space": ["x", "y"]} | task))
+def problem(robot: brachis.Robot, **task: object) -> Problem:
+    return Problem.of(robot, brachis.load_task({"brachis": 1, "task_space": ["x", "y"]} | task))
 
 
 def rail_task(**changes: object) -> dict[str, object]:
@@ -39,19 +39,19 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way):
     start = np.array([way * (-2 * math.pi + 0.2), 0.9])
     here = robot.tool_placement(start).translation[:2]
     turns = [{"circle": {"center": [0.0, 0.0], "turns": 1.5 * way}}]
-    (choice,) = choices(setting(robot, start="free", path_start=list(here), path=turns))
-    courses = Lattice(choice).courses(4)
-    assert not isinstance(courses, DeadEnd)
-    assert all(-2 * math.pi <= q <= 2 * math.pi for course in courses for q in course.q[:, 0])
-    assert min(abs(course.q[0, 0] - start[0]) for course in courses) < 1e-6
+    (decomposition,) = decompositions_of(problem(robot, start="free", path_start=list(here), path=turns))
+    joint_paths = Lattice(decomposition).joint_paths(4)
+    assert not isinstance(joint_paths, DeadEnd)
+    assert all(-2 * math.pi <= q <= 2 * math.pi for joint_path in joint_paths for q in joint_path.q[:, 0])
+    assert min(abs(joint_path.q[0, 0] - start[0]) for joint_path in joint_paths) < 1e-6
 
 
 def test_a_circle_too_many_for_the_range_is_a_dead_end_at_its_joint():
     robot = scara({"j3": 0.4}, position={"j1": [-2 * math.pi, 2 * math.pi]})
     here = robot.tool_placement(np.array([0.2, 0.9])).translation[:2]
     turns = [{"circle": {"center": [0.0, 0.0], "turns": 2.1}}]
-    (choice,) = choices(setting(robot, start="free", path_start=list(here), path=turns))
-    end = Lattice(choice).courses(4)
+    (decomposition,) = decompositions_of(problem(robot, start="free", path_start=list(here), path=turns))
+    end = Lattice(decomposition).joint_paths(4)
     assert isinstance(end, DeadEnd)
     assert 1.8 / 2.1 < end.s < 1.0
     assert "the range of joint 'j1' ends" in end.causes
@@ -67,10 +67,10 @@ def test_a_free_start_on_a_long_rail(reach):
     task["path_start"] = [x, y + 20.0, z, *_quaternion(placement.rotation)]
     task["path"] = [{"line": {"by": [0.0, 0.8, 0.0]}}]
     task["robot"]["limits"]["position"] = {"rail": reach}
-    given = Setting.of(robot_from_settings(brachis.load_task(task).robot), brachis.load_task(task))
-    courses = Lattice(choices(given)[0]).courses(2)
-    assert not isinstance(courses, DeadEnd)
-    assert all(abs(course.q[0, 0] - 20.0) < 3.0 for course in courses)
+    given = Problem.of(robot_from_settings(brachis.load_task(task).robot), brachis.load_task(task))
+    joint_paths = Lattice(decompositions_of(given)[0]).joint_paths(2)
+    assert not isinstance(joint_paths, DeadEnd)
+    assert all(abs(joint_path.q[0, 0] - 20.0) < 3.0 for joint_path in joint_paths)
 
 
 def _quaternion(rotation: np.ndarray) -> list[float]:
@@ -82,17 +82,17 @@ def _quaternion(rotation: np.ndarray) -> list[float]:
 
 def test_both_branches_of_a_free_start():
     line = [{"line": {"length": 0.6, "angle_deg": 90}}]
-    given = setting(scara(), start="free", path_start=[math.sqrt(3.0), 0.0], path=line, redundant_joints=["j1"])
-    courses = Lattice(choices(given)[0]).courses(4)
-    assert {course.branch for course in courses} == {0, 1}
+    given = problem(scara(), start="free", path_start=[math.sqrt(3.0), 0.0], path=line, redundant_joints=["j1"])
+    joint_paths = Lattice(decompositions_of(given)[0]).joint_paths(4)
+    assert {joint_path.branch for joint_path in joint_paths} == {0, 1}
 
 
 def test_a_free_start_that_no_torque_holds_says_so():
     limits = brachis.LimitSpec(torque=1.0, velocity=None)
     robot = brachis.Robot.from_urdf(SCARA, gravity=[0, -9.81, 0], limits=limits)
     line = [{"line": {"length": 0.6, "angle_deg": 90}}]
-    given = setting(robot, start="free", path_start=[math.sqrt(3.0), 0.0], path=line, redundant_joints=["j1"])
-    end = Lattice(choices(given)[0]).courses(1)
+    given = problem(robot, start="free", path_start=[math.sqrt(3.0), 0.0], path=line, redundant_joints=["j1"])
+    end = Lattice(decompositions_of(given)[0]).joint_paths(1)
     assert isinstance(end, DeadEnd)
     assert end.s == 0.0
     assert "the torque limit cannot hold the arm against gravity" in end.causes
@@ -101,31 +101,31 @@ def test_a_free_start_that_no_torque_holds_says_so():
 def test_acceleration_limits_alone_have_shortest_courses():
     robot = scara(torque=None, acceleration=3.0)
     line = [{"line": {"length": 1.0, "angle_deg": 90}}]
-    given = setting(robot, start={"joints": [0.5, -2.0, 2.0]}, path=line, redundant_joints=["j1"])
-    courses = Lattice(choices(given)[0]).courses(3)
-    assert len(courses) == 3
-    assert courses[0].length > 0.0
-    steps = np.abs(np.diff(courses[0].q[:, 0], n=2))
+    given = problem(robot, start={"joints": [0.5, -2.0, 2.0]}, path=line, redundant_joints=["j1"])
+    joint_paths = Lattice(decompositions_of(given)[0]).joint_paths(3)
+    assert len(joint_paths) == 3
+    assert joint_paths[0].length > 0.0
+    steps = np.abs(np.diff(joint_paths[0].q[:, 0], n=2))
     assert steps.max() < 0.2, "the shortest course does not zigzag"
 
 
 @pytest.mark.parametrize("turns", [4, 30])
 def test_small_circles_have_stations_enough(turns):
-    given = setting(
+    given = problem(
         scara(), start={"joints": [0.5, -2.0, 1.7]}, path=[{"circle": {"center": [0.0, 0.0], "turns": turns}}]
     )
     assert len(stations(given.path, given.task_map)) > 24 * turns / 2
-    for choice in choices(given):
-        assert not isinstance(Lattice(choice).courses(1), DeadEnd)
+    for decomposition in decompositions_of(given):
+        assert not isinstance(Lattice(decomposition).joint_paths(1), DeadEnd)
 
 
 def test_an_end_posture_without_redundancy_may_be_rounded():
     robot = scara({"j3": 0.4})
     line = [{"line": {"by": [-0.3, 0.2]}}]
-    free = brachis.plan(robot, setting(robot, start={"joints": [0.3, 0.9]}, path=line).task)
+    free = brachis.plan(robot, problem(robot, start={"joints": [0.3, 0.9]}, path=line).task)
     end = [round(float(value), 7) for value in free.trajectory.position(free.t_end)]
-    given = setting(robot, start={"joints": [0.3, 0.9]}, path=line, end={"joints": end})
-    assert not isinstance(Lattice(choices(given)[0]).courses(1), DeadEnd)
+    given = problem(robot, start={"joints": [0.3, 0.9]}, path=line, end={"joints": end})
+    assert not isinstance(Lattice(decompositions_of(given)[0]).joint_paths(1), DeadEnd)
 
 
 def back_from(end: np.ndarray, robot: brachis.Robot, by: list[float]) -> dict[str, object]:
@@ -161,11 +161,11 @@ def test_a_free_start_is_in_the_turn_from_which_the_given_end_is_reached(turned)
         end[robot.joint_names.index(joint)] += 2.0 * math.pi * turns
     task |= back_from(end, robot, [0.0, 0.4, 0.0])
     found = 0
-    for choice in choices(Setting.of(robot, brachis.load_task(task))):
-        if choice.match.solver.kind == "closed_form":
-            courses = Lattice(choice).courses(2)
-            assert not isinstance(courses, DeadEnd)
-            assert all(np.abs(course.q[-1] - end).max() < 1e-9 for course in courses)
+    for decomposition in decompositions_of(Problem.of(robot, brachis.load_task(task))):
+        if decomposition.match.solver.kind == "closed_form":
+            joint_paths = Lattice(decomposition).joint_paths(2)
+            assert not isinstance(joint_paths, DeadEnd)
+            assert all(np.abs(joint_path.q[-1] - end).max() < 1e-9 for joint_path in joint_paths)
             found += 1
     assert found == 4
 
@@ -188,8 +188,8 @@ def test_a_dead_end_back_from_the_end_says_so():
     end = np.array([0.5, -2.0, 2.0])
     x, y, _ = robot.tool_placement(end).translation
     path = [{"line": {"by": [-4.0, 0.0]}}]
-    given = setting(robot, start="free", path_start=[x + 4.0, y], end={"joints": end.tolist()}, path=path)
-    dead = Lattice(choices(given)[0]).courses(1)
+    given = problem(robot, start="free", path_start=[x + 4.0, y], end={"joints": end.tolist()}, path=path)
+    dead = Lattice(decompositions_of(given)[0]).joint_paths(1)
     assert isinstance(dead, DeadEnd)
     assert dead.interval[0] == 0.0
     assert 0.0 < dead.interval[1] < 1.0

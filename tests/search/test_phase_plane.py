@@ -28,23 +28,23 @@ def least_time(robot: brachis.Robot, s: np.ndarray, q: np.ndarray) -> float:
     return phase_plane.least_time([limit for limit in built if limit is not None], s, q)
 
 
-def course(distance: float) -> np.ndarray:
+def joint_path(distance: float) -> np.ndarray:
     return np.column_stack([distance * S, np.zeros_like(S)])
 
 
 def test_bang_bang_with_a_torque_limit():
     robot = gantry(torque=20.0)
     mass = dynamics.mass_matrices(robot, np.zeros((1, 2)))[0, 0, 0]
-    assert least_time(robot, S, course(0.4)) == pytest.approx(2.0 * np.sqrt(0.4 * mass / 20.0), rel=5e-3)
+    assert least_time(robot, S, joint_path(0.4)) == pytest.approx(2.0 * np.sqrt(0.4 * mass / 20.0), rel=5e-3)
 
 
 def test_bang_bang_with_an_acceleration_limit():
-    assert least_time(gantry(acceleration=3.0), S, course(0.4)) == pytest.approx(2.0 * np.sqrt(0.4 / 3.0), rel=5e-3)
+    assert least_time(gantry(acceleration=3.0), S, joint_path(0.4)) == pytest.approx(2.0 * np.sqrt(0.4 / 3.0), rel=5e-3)
 
 
 def test_trapezoid_with_a_velocity_limit():
     robot = gantry(acceleration=3.0, velocity=0.5)
-    assert least_time(robot, S, course(0.4)) == pytest.approx(0.4 / 0.5 + 0.5 / 3.0, rel=5e-3)
+    assert least_time(robot, S, joint_path(0.4)) == pytest.approx(0.4 / 0.5 + 0.5 / 3.0, rel=5e-3)
 
 
 def test_gravity_that_no_torque_holds():
@@ -52,7 +52,7 @@ def test_gravity_that_no_torque_holds():
     robot = brachis.Robot.from_urdf(GANTRY, gravity=[-9.81, 0, 0], limits=limits)
     weight = np.abs(dynamics.torque(robot, np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, 2)))).max()
     assert weight > 1.0, "the case asks nothing"
-    assert least_time(robot, S, course(0.4)) == np.inf
+    assert least_time(robot, S, joint_path(0.4)) == np.inf
 
 
 def test_mass_matrices_are_what_the_torque_multiplies():

@@ -19,8 +19,8 @@ from brachis import planner
 from brachis.errors import PlanningError, TaskError, UnknownNameError
 from brachis.plots import plot_candidates
 from brachis.search import record, schedule, starts
-from brachis.search.efforts import EFFORTS
 from brachis.search.lattice import Lattice
+from brachis.search.levels import SEARCH_LEVELS
 from brachis.solvers import apart, uno
 
 ROOT = Path(__file__).parents[2]
@@ -130,13 +130,13 @@ def test_numeric_guesses_stay_an_option(robot):
 
 
 def test_numeric_guesses_step_in_where_the_lattice_has_no_course(robot, monkeypatch):
-    from brachis.search.course import DeadEnd  # noqa: PLC0415
+    from brachis.search.joint_path import DeadEnd  # noqa: PLC0415
 
     class Nothing:
         def __init__(self, *_arguments: object, **_options: object) -> None:
             pass
 
-        def courses(self, _most: int) -> DeadEnd:
+        def joint_paths(self, _most: int) -> DeadEnd:
             return DeadEnd(0.5, {"nothing": 1})
 
     monkeypatch.setattr(starts, "Lattice", Nothing)
@@ -315,8 +315,8 @@ def test_more_processes_than_processors_are_not_made(robot, monkeypatch):
 
 def test_the_rule_that_leaves_plans_unfinished_loses_nothing(robot, monkeypatch):
     ruled = brachis.plan(robot, task())
-    (fast,) = EFFORTS["fast"]
-    monkeypatch.setitem(EFFORTS, "fast", (dataclasses.replace(fast, refined=100),))
+    (fast,) = SEARCH_LEVELS["fast"]
+    monkeypatch.setitem(SEARCH_LEVELS, "fast", (dataclasses.replace(fast, refined=100),))
     monkeypatch.setattr(record, "_WORTH_IT", -100.0)
     every = brachis.plan(robot, task())
     finished = [candidate for candidate in every.candidates if math.isfinite(candidate.t_end)]

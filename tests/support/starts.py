@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from brachis.nlp import Program
+from brachis.nlp.differential_ik import differential_ik_paths
 from brachis.nlp.guess import starting_point
-from brachis.nlp.numeric_course import numeric_courses
 
 
 def starting_points(program: Program) -> Iterator[np.ndarray]:
     """Points x of a program of one phase along a path, the most natural first."""
     (phase,) = program.phases
-    found = (starting_point(program, [course]) for course in numeric_courses(phase.joint_map))
+    found = (starting_point(program, [joint_path]) for joint_path in differential_ik_paths(phase.joint_map))
     return (x for x in found if x is not None)

@@ -15,10 +15,10 @@ from threadpoolctl import ThreadpoolController
 from brachis.deadline import Deadline
 from brachis.errors import PlanningError, UnreachableError
 from brachis.nlp import Motion, Program
+from brachis.problem import Problem, decompositions_of, program_of
 from brachis.refine import Refined, RefinementOptions, refine
 from brachis.robot import ROLL_JOINT
 from brachis.search.solving import MARGINS, solve_with
-from brachis.setting import Setting, choices, program_of
 from brachis.solvers import solver_named
 from brachis.trajectory import Trajectory
 
@@ -67,9 +67,9 @@ def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
     """Lay the problem down over the saved knots; the motion is its point x."""
     names = tuple(name for name in trajectory.redundant_joints if name != ROLL_JOINT)
     task = trajectory.task.model_copy(update={"redundant_joints": names, "branch": trajectory.branch})
-    (choice,) = choices(Setting.of(trajectory.robot, task))
-    decomposition = choice.decomposition(trajectory.q[0], choice.branches[0])
-    program = program_of(choice.setting, decomposition, np.unique(trajectory.knots))
+    (decomposition,) = decompositions_of(Problem.of(trajectory.robot, task))
+    joint_map = decomposition.joint_map(trajectory.q[0], decomposition.branches[0])
+    program = program_of(decomposition.problem, joint_map, np.unique(trajectory.knots))
     motion = Motion(trajectory.t_end, trajectory.knots, trajectory.degree, trajectory.control_points)
     x = program.variables_from([motion])
     for margin in MARGINS:

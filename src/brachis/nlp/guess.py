@@ -22,7 +22,7 @@ _SHORTEST_TIME, _LONGEST_TIME = 0.01, 200.0
 _FIT_DENSITY = 4
 
 
-def starting_point(program: Program, courses: Sequence[np.ndarray]) -> np.ndarray | None:
+def starting_point(program: Program, joint_paths: Sequence[np.ndarray]) -> np.ndarray | None:
     """Fit splines to a course of every phase, and scale the time until the limits hold.
 
     Control points taken from the course itself smooth it; where that leaves the branch, least squares follow it closer.
@@ -38,27 +38,27 @@ def starting_point(program: Program, courses: Sequence[np.ndarray]) -> np.ndarra
     (v,) ndarray or None
         None where the fit is out of reach at a collocation point.
     """
-    pairs = list(zip(program.phases, courses, strict=True))
+    pairs = list(zip(program.phases, joint_paths, strict=True))
     for fit in (_smoothed, _followed):
         with contextlib.suppress(UnreachableError):
-            return shortest_time(program, np.concatenate([fit(phase, course) for phase, course in pairs]))
+            return shortest_time(program, np.concatenate([fit(phase, joint_path) for phase, joint_path in pairs]))
     return None
 
 
-def _smoothed(phase: Phase, course: np.ndarray) -> np.ndarray:
-    return phase.variables_from(Motion(1.0, phase.knots, phase.degree, _timed(course, phase.splines[0].greville).T))
+def _smoothed(phase: Phase, joint_path: np.ndarray) -> np.ndarray:
+    return phase.variables_from(Motion(1.0, phase.knots, phase.degree, _timed(joint_path, phase.splines[0].greville).T))
 
 
-def _followed(phase: Phase, course: np.ndarray) -> np.ndarray:
+def _followed(phase: Phase, joint_path: np.ndarray) -> np.ndarray:
     t_norm = np.linspace(0.0, 1.0, _FIT_DENSITY * len(phase.knots))
-    return fitted(phase, 1.0, t_norm, _timed(course, t_norm))
+    return fitted(phase, 1.0, t_norm, _timed(joint_path, t_norm))
 
 
-def _timed(course: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
+def _timed(joint_path: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
     """Follow a course, (S, c), with a smooth motion from rest to rest: the places at `t_norm`, (K, c)."""
     u = t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
-    grid = np.linspace(0.0, 1.0, len(course))
-    return np.column_stack([np.interp(u, grid, column) for column in course.T])
+    grid = np.linspace(0.0, 1.0, len(joint_path))
+    return np.column_stack([np.interp(u, grid, column) for column in joint_path.T])
 
 
 def fitted(phase: Phase, duration: float, t_norm: np.ndarray, wanted: np.ndarray) -> np.ndarray:

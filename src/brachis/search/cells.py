@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.setting import Choice, Setting
+from brachis.problem import Decomposition, Problem
 
 _TURN = 2.0 * np.pi
 _CELLS_PER_METRE = 1.0 / 3.0  # of those of a turn
@@ -41,13 +41,13 @@ class Cells:
     window: int
 
     @classmethod
-    def of(cls, choice: Choice, cells_per_turn: int, posture: np.ndarray | None) -> Cells:
+    def of(cls, decomposition: Decomposition, cells_per_turn: int, posture: np.ndarray | None) -> Cells:
         """Lay out the cells of a choice of redundant joints.
 
         The posture, (n,), from which courses begin is the middle of a cell. Where none is given, the cells cover closed
         ranges, a turn of an open revolute joint, and what of an open prismatic joint is near the path's beginning.
         """
-        given, joints = choice.setting, list(choice.redundant)
+        given, joints = decomposition.problem, list(decomposition.redundant)
         turning = np.array([given.robot.position_units[joint] == "rad" for joint in joints], dtype=bool)
         low, high = given.robot.limits.position_lower[joints], given.robot.limits.position_upper[joints]
         size = np.where(turning, _TURN, 1.0 / _CELLS_PER_METRE) / cells_per_turn
@@ -104,7 +104,7 @@ def unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return cells[first], where.ravel()
 
 
-def _nearby(given: Setting, joint: int) -> float:
+def _nearby(given: Problem, joint: int) -> float:
     """Where a prismatic joint takes the tool, with the other joints at zero, nearest to the path's beginning, m."""
     q = np.zeros(given.robot.n)
     there = np.array(given.robot.tool_placement(q).translation)

@@ -10,9 +10,9 @@ import numpy as np
 from brachis import ik
 from brachis.attempt import Attempt
 from brachis.errors import BrachisError, PathError, PlanningError
-from brachis.search.course import DeadEnd
+from brachis.problem import Decomposition
+from brachis.search.joint_path import DeadEnd
 from brachis.search.reach import explain_failure
-from brachis.setting import Choice
 from brachis.task import SolverSettings, Task
 
 _GOOD_PART = 0.1
@@ -20,14 +20,14 @@ _LOOKED_AT = 2
 _MOST_EFFORT = "exhaustive"
 
 
-def refuse_what_is_out_of_reach(choices: Sequence[Choice], candidates: Sequence[Attempt]) -> None:
+def refuse_what_is_out_of_reach(decompositions: Sequence[Decomposition], candidates: Sequence[Attempt]) -> None:
     """Raise the reason where the path is out of reach, so that further attempts would be in vain.
 
     Where no lattice has a course, any part of it counts; where no lattice was looked at, a good part.
 
     Parameters
     ----------
-    choices : sequence of Choice
+    decompositions : sequence of Decomposition
     candidates : sequence of Attempt
         So far.
 
@@ -37,7 +37,7 @@ def refuse_what_is_out_of_reach(choices: Sequence[Choice], candidates: Sequence[
     """
     if _some_course(candidates):
         return
-    reasons = [_reason(choice) for choice in choices[:_LOOKED_AT]]
+    reasons = [_reason(decomposition) for decomposition in decompositions[:_LOOKED_AT]]
     clear = [
         (reason.s_interval, reason)
         for reason in reasons
@@ -50,13 +50,13 @@ def refuse_what_is_out_of_reach(choices: Sequence[Choice], candidates: Sequence[
 
 
 def no_motion(
-    choices: Sequence[Choice], candidates: Sequence[Attempt], dead_ends: Mapping[str, DeadEnd]
+    decompositions: Sequence[Decomposition], candidates: Sequence[Attempt], dead_ends: Mapping[str, DeadEnd]
 ) -> BrachisError:
     """Return the error that says why no motion was found.
 
     Parameters
     ----------
-    choices : sequence of Choice
+    decompositions : sequence of Decomposition
     candidates : sequence of Attempt
     dead_ends : mapping of str to DeadEnd
         Where the lattices end, by the names of the redundant joints.
@@ -65,27 +65,27 @@ def no_motion(
     -------
     PathError or PlanningError
     """
-    course = _some_course(candidates)
-    reason = _advice(choices[0].setting.task, candidates) if course else _reason(choices[0])
+    joint_path = _some_course(candidates)
+    reason = _advice(decompositions[0].problem.task, candidates) if joint_path else _reason(decompositions[0])
     if isinstance(reason, BrachisError):
         return reason
-    if dead_ends and not course:
+    if dead_ends and not joint_path:
         name, furthest = min(dead_ends.items(), key=lambda item: np.diff(item[1].interval)[0])
         others = (
             f" (redundant joints {name}; {len(dead_ends) - 1} other choices end sooner)" if len(dead_ends) > 1 else ""
         )
-        start = "" if choices[0].setting.start is None else "start in another posture, "
+        start = "" if decompositions[0].problem.start is None else "start in another posture, "
         return PathError(
             f"no course along the path was found: {furthest}{others}",
             s_interval=furthest.interval,
             hint=f"{start}shorten or move the path, or widen the joint ranges".capitalize()
-            + _what_is_missing(choices[0]),
+            + _what_is_missing(decompositions[0]),
         )
     counts = Counter(candidate.status for candidate in candidates)
     outcomes = "; ".join(status if n == 1 else f"{status} ({n} times)" for status, n in counts.items())
     return PlanningError(
         f"no motion within the limits was found: {outcomes or 'no initial guess'}",
-        hint=reason + _what_is_missing(choices[0]),
+        hint=reason + _what_is_missing(decompositions[0]),
     )
 
 
@@ -105,12 +105,12 @@ def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
     return f"There is a course along the path within reach, but no motion along it was found; {', or '.join(tried)}"
 
 
-def _what_is_missing(choice: Choice) -> str:
+def _what_is_missing(decomposition: Decomposition) -> str:
     """Say which further choices of redundant joints EAIK might add where it is not installed."""
-    setting = choice.setting
-    if setting.task.redundant_joints != "auto":
+    problem = decomposition.problem
+    if problem.task.redundant_joints != "auto":
         return ""
-    further = ik.without_eaik(ik.find_all(setting.robot, setting.task_map))
+    further = ik.without_eaik(ik.find_all(problem.robot, problem.task_map))
     if not further:
         return ""
     names = ", ".join("[" + ", ".join(joints) + "]" for joints in further)
@@ -126,13 +126,13 @@ def _some_course(candidates: Sequence[Attempt]) -> bool:
     return any(candidate.branch for candidate in _lattices(candidates))
 
 
-def _reason(choice: Choice) -> BrachisError | str:
-    setting = choice.setting
-    given = setting.end if setting.start is None else setting.start
-    posture = np.zeros(setting.robot.n) if given is None else given
+def _reason(decomposition: Decomposition) -> BrachisError | str:
+    problem = decomposition.problem
+    given = problem.end if problem.start is None else problem.start
+    posture = np.zeros(problem.robot.n) if given is None else given
     return explain_failure(
-        choice.decomposition(posture, choice.branches[0]),
-        setting.limits,
+        decomposition.joint_map(posture, decomposition.branches[0]),
+        problem.limits,
         any_branch=given is None,
-        given="end" if setting.start is None else "start",
+        given="end" if problem.start is None else "start",
     )

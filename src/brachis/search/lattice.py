@@ -24,20 +24,20 @@ import numpy as np
 
 from brachis.deadline import NEVER, Deadline
 from brachis.limits import Moments
+from brachis.problem import Decomposition
 from brachis.search.cells import Cells, unique
-from brachis.search.course import (
+from brachis.search.joint_path import (
     JUMPS,
     NO_ANSWER,
     OTHER_BRANCH,
-    Course,
     DeadEnd,
+    JointPath,
     beyond_ranges,
     causes_of,
     distinct,
 )
 from brachis.search.layer import Layer
 from brachis.search.stations import stations
-from brachis.setting import Choice
 
 _TURN = 2.0 * np.pi
 _LARGEST_STEP = 0.8  # rad or m between stations
@@ -53,7 +53,7 @@ class Lattice:
 
     Parameters
     ----------
-    choice : Choice
+    decomposition : Decomposition
     cells_per_turn : int, optional
         Cells of a turn of a revolute joint; a metre of a prismatic joint has a third as many.
     density : float, optional
@@ -68,7 +68,7 @@ class Lattice:
 
     def __init__(
         self,
-        choice: Choice,
+        decomposition: Decomposition,
         *,
         cells_per_turn: int = 72,
         density: float = 1.0,
@@ -76,18 +76,18 @@ class Lattice:
         seed: int = 0,
         deadline: Deadline = NEVER,
     ) -> None:
-        given = choice.setting
-        self.choice = choice
+        given = decomposition.problem
+        self.decomposition = decomposition
         self.s = stations(given.path, given.task_map, density)
-        self._robot, self._solver = given.robot, choice.match.solver
-        self._redundant = list(choice.redundant)
-        self._rest = np.array([i for i in range(given.robot.n) if i not in choice.redundant], dtype=int)
+        self._robot, self._solver = given.robot, decomposition.match.solver
+        self._redundant = list(decomposition.redundant)
+        self._rest = np.array([i for i in range(given.robot.n) if i not in decomposition.redundant], dtype=int)
         self._turning = np.array([unit == "rad" for unit in given.robot.position_units])
         self._nodes, self._seed, self._deadline = nodes, seed, deadline
         self._turns = self._rest[self._turning[self._rest]]
         self._backwards = given.start is None and given.end is not None
         self._origin = given.end if self._backwards else given.start
-        self._cells = Cells.of(choice, cells_per_turn, self._origin)
+        self._cells = Cells.of(decomposition, cells_per_turn, self._origin)
         self._targets = given.path.sample(self.s).target
         self._limits = given.limits
         # In which turn the angles of a free origin are is open until the course is known.
@@ -102,10 +102,10 @@ class Lattice:
         self._telling = (ranged & ~self._loose)[self._turns]
         self._clear = _CLEAR
         if self._origin is not None:
-            at_origin = self._solver.branch_margins(self._origin[None], choice.branches[0])[0]
+            at_origin = self._solver.branch_margins(self._origin[None], decomposition.branches[0])[0]
             self._clear = float(np.minimum(_CLEAR, 0.5 * at_origin.min(initial=np.inf)))
 
-    def courses(self, most: int) -> list[Course] | DeadEnd:
+    def joint_paths(self, most: int) -> list[JointPath] | DeadEnd:
         """Find courses along the path.
 
         Parameters
@@ -134,15 +134,15 @@ class Lattice:
         q, branches = self._traced(layers, ends)
         lengths = layers[-1].length[ends]
         found = [
-            Course(self.choice, int(branch), self.s, course, float(length))
-            for branch, course, length in zip(branches, q, lengths, strict=True)
+            JointPath(self.decomposition, int(branch), self.s, joint_path, float(length))
+            for branch, joint_path, length in zip(branches, q, lengths, strict=True)
         ]
         return distinct(found, most)
 
     def _ends(self, last: Layer) -> np.ndarray:
         """Nodes at which courses may end, (E,), the nearest first."""
         order = np.argsort(last.length, kind="stable")
-        given = self.choice.setting
+        given = self.decomposition.problem
         if given.end is not None and not self._backwards:
             allowed = np.full(self._robot.n, _LARGEST_STEP)
             allowed[self._redundant] = self._cells.size
@@ -155,8 +155,8 @@ class Lattice:
         for layer in reversed(layers):
             q.append(layer.q[nodes])
             nodes = layer.parent[nodes]
-        courses = np.array(q if self._backwards else q[::-1]).swapaxes(0, 1)
-        return courses + _TURN * self._turn_of(layers[-1][ends])[:, None], layers[-1].branch[ends]
+        joint_paths = np.array(q if self._backwards else q[::-1]).swapaxes(0, 1)
+        return joint_paths + _TURN * self._turn_of(layers[-1][ends])[:, None], layers[-1].branch[ends]
 
     def _turn_of(self, nodes: Layer) -> np.ndarray:
         """Multiples of 2 pi, (E, n), that bring the courses to nodes into the ranges, in the middle if closed."""
@@ -186,9 +186,9 @@ class Lattice:
         r = self._cells.r
         if self._origin is not None:
             none, q = np.zeros(1, dtype=int), self._origin[None].astype(float)
-            return Layer(np.zeros((1, r), dtype=int), none + self.choice.branches[0], q, q, q, np.zeros(1), none)
+            return Layer(np.zeros((1, r), dtype=int), none + self.decomposition.branches[0], q, q, q, np.zeros(1), none)
         cells = self._cells.everywhere(_STARTS * self._nodes, rng)
-        answers = self._answers(cells, 0)[:, self.choice.branches]
+        answers = self._answers(cells, 0)[:, self.decomposition.branches]
         which, branch, alternative = np.nonzero(np.isfinite(answers).all(axis=3))
         if not len(which):
             return {NO_ANSWER: len(cells)}
@@ -199,7 +199,7 @@ class Lattice:
         inside = within.all(axis=1)
         if not inside.any():
             return beyond_ranges(self._robot, within)
-        cell, branch, q = cells[which[inside]], np.array(self.choice.branches)[branch[inside]], q[inside]
+        cell, branch, q = cells[which[inside]], np.array(self.decomposition.branches)[branch[inside]], q[inside]
         nothing = np.zeros(len(q))
         return self._kept(Layer(cell, branch, q, q, q, nothing, nothing.astype(int)))
 
@@ -213,7 +213,7 @@ class Lattice:
         offsets = self._cells.neighbours(rng)
         parent = np.repeat(np.arange(len(before.branch)), len(offsets))
         edges = before.cell[parent] + np.tile(offsets, (len(before.branch), 1))
-        end = self.choice.setting.end
+        end = self.decomposition.problem.end
         if end is not None and not self._backwards and station == len(self.s) - 1:
             aim = np.tile(self._cells.near(end[self._redundant]), (len(before.branch), 1))
             parent = np.append(parent, np.arange(len(before.branch)))

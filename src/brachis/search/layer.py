@@ -9,7 +9,7 @@ import numpy as np
 
 from brachis.limits import Limit
 from brachis.robot import Robot
-from brachis.search.course import weights_near
+from brachis.search.joint_path import weights_near
 
 
 @dataclass(frozen=True)

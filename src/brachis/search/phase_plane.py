@@ -84,12 +84,12 @@ def _controllable(
         up = np.append(slope[0][i], -0.5 / step), np.append(offset[0][i], 0.5 * high[i + 1] / step)
         down = np.append(slope[1][i], -0.5 / step), np.append(offset[1][i], 0.5 * low[i + 1] / step)
         tilt = (up[0][:, None] - down[0][None]).ravel()
-        room = (up[1][:, None] - down[1][None]).ravel()
-        if np.any((room < 0.0) & (np.abs(tilt) < _SLOWEST)):
+        clearance = (up[1][:, None] - down[1][None]).ravel()
+        if np.any((clearance < 0.0) & (np.abs(tilt) < _SLOWEST)):
             return None
         falling, rising = tilt < -_SLOWEST, tilt > _SLOWEST
-        high[i] = min(ceiling[i], np.min(room[falling] / -tilt[falling], initial=np.inf))
-        low[i] = max(0.0, np.max(-room[rising] / tilt[rising], initial=0.0))
+        high[i] = min(ceiling[i], np.min(clearance[falling] / -tilt[falling], initial=np.inf))
+        low[i] = max(0.0, np.max(-clearance[rising] / tilt[rising], initial=0.0))
         if low[i] > high[i]:
             return None
     return low, high

@@ -20,12 +20,12 @@ from brachis import interrupts
 from brachis.attempt import Attempt, Start
 from brachis.deadline import Deadline
 from brachis.errors import PlanningError
+from brachis.problem import Decomposition
 from brachis.search.explain import no_motion, refuse_what_is_out_of_reach
 from brachis.search.processes import each, processes
 from brachis.search.record import NOT_TRIED, Numbered, Record, rounded
 from brachis.search.schedule import Batch, batches
 from brachis.search.solving import Listener
-from brachis.setting import Choice
 
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no start is solved while nothing is verified."""
@@ -52,12 +52,14 @@ class Stages(NamedTuple):
     finish: Callable[[Attempt, Deadline, Listener], Attempt]
 
 
-def find_fastest(choices: Sequence[Choice], stages: Stages, deadline: Deadline, listener: Listener) -> Record:
+def find_fastest(
+    decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline, listener: Listener
+) -> Record:
     """Search for the fastest verified motion.
 
     Parameters
     ----------
-    choices : sequence of Choice
+    decompositions : sequence of Decomposition
         At least one, the most promising first.
     stages : Stages
     deadline : Deadline
@@ -78,10 +80,10 @@ def find_fastest(choices: Sequence[Choice], stages: Stages, deadline: Deadline, 
     KeyboardInterrupt
         Ctrl-C before any motion was verified; its text tells of the best one, if there is one.
     """
-    search = _Search(choices, stages, deadline, listener)
+    search = _Search(decompositions, stages, deadline, listener)
     record = search.record
     try:
-        search.run(batches(choices, deadline, listener, record.note_choice))
+        search.run(batches(decompositions, deadline, listener, record.note_decomposition))
     except KeyboardInterrupt:
         interrupts.forget()
         record.interrupted = True
@@ -91,18 +93,20 @@ def find_fastest(choices: Sequence[Choice], stages: Stages, deadline: Deadline, 
     if record.best is not None:
         return record
     if record.interrupted:
-        limit, left = choices[0].setting.task.search.time_limit, "; ".join(record.undone())
+        limit, left = decompositions[0].problem.task.search.time_limit, "; ".join(record.undone())
         problem = f"no motion was found within the time limit of {limit:g} s: {left}"
         raise PlanningError(problem, hint="Raise search.time_limit")
-    raise no_motion(choices, record.attempts, record.dead_ends)
+    raise no_motion(decompositions, record.attempts, record.dead_ends)
 
 
 class _Search:
     """A search on its way."""
 
-    def __init__(self, choices: Sequence[Choice], stages: Stages, deadline: Deadline, listener: Listener) -> None:
-        self._choices, self._stages, self._deadline, self._listener = choices, stages, deadline, listener
-        self._task = choices[0].setting.task
+    def __init__(
+        self, decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline, listener: Listener
+    ) -> None:
+        self._decompositions, self._stages, self._deadline, self._listener = decompositions, stages, deadline, listener
+        self._task = decompositions[0].problem.task
         self._jobs = processes(self._task.search.jobs)
         self.record = Record(refined=self._task.refinement.max_rounds > 0)
 
@@ -122,7 +126,7 @@ class _Search:
                 self.record.interrupted = True
                 break
             if batch.last_resort and not refused:
-                refuse_what_is_out_of_reach(self._choices, self.record.attempts)
+                refuse_what_is_out_of_reach(self._decompositions, self.record.attempts)
                 refused = True
             self._finish(self._solve(batch), batch.refined)
         if self.record.interrupted:

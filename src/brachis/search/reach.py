@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.errors import BrachisError, PathError
-from brachis.kinematics import Decomposition
+from brachis.kinematics import ClosedFormMap
 from brachis.limits import Limit, Moments
 from brachis.plausibility import path_hint
 
@@ -20,7 +20,7 @@ _FAR = 10.0  # m
 
 
 def explain_failure(
-    decomposition: Decomposition, limits: Sequence[Limit], *, any_branch: bool = False, given: str = "start"
+    joint_map: ClosedFormMap, limits: Sequence[Limit], *, any_branch: bool = False, given: str = "start"
 ) -> BrachisError | str:
     """Why no motion was found: an error where the path is out of reach or too heavy to hold, else advice.
 
@@ -29,7 +29,7 @@ def explain_failure(
 
     Parameters
     ----------
-    decomposition : Decomposition
+    joint_map : ClosedFormMap
     limits : sequence of Limit
     any_branch : bool, optional
         Whether a motion may be on any branch, not the decomposition's alone.
@@ -41,24 +41,24 @@ def explain_failure(
     BrachisError or str
     """
     s = np.linspace(0.0, 1.0, _STATIONS)
-    found = _answers_along(decomposition, s, opened=False)
-    branches = slice(None) if any_branch else slice(decomposition.branch, decomposition.branch + 1)
+    found = _answers_along(joint_map, s, opened=False)
+    branches = slice(None) if any_branch else slice(joint_map.branch, joint_map.branch + 1)
     own = _Answers(*(part[:, :, branches] for part in (found.q, found.exists, found.inside)))
     # Where the redundant joints' ranges leave no answer, wider ones tell whether the ranges or the arm are to blame.
-    anywhere = found if found.exists.any(axis=(1, 2, 3)).all() else _answers_along(decomposition, s, opened=True)
+    anywhere = found if found.exists.any(axis=(1, 2, 3)).all() else _answers_along(joint_map, s, opened=True)
     within = np.asarray(found.within.any(axis=(1, 2, 3)))
-    label = decomposition.branch_label
+    label = joint_map.branch_label
     reasons = (
         (
             found.exists.any(axis=(1, 2, 3)) | anywhere.exists.any(axis=(1, 2, 3)),
             "the path is out of reach from s = {first:.3g} on (no posture was found)",
-            path_hint(decomposition.task_map, decomposition.path.sample(s).target)
+            path_hint(joint_map.task_map, joint_map.path.sample(s).target)
             or "Shorten or move the path, or choose another start posture",
         ),
         (
             within,
             "no posture within the joint ranges was found from s = {first:.3g} on"
-            + _beyond(decomposition, within, found, anywhere),
+            + _beyond(joint_map, within, found, anywhere),
             "Shorten or move the path, or widen the joint ranges",
         ),
         (
@@ -80,7 +80,7 @@ def explain_failure(
         if not possible.all():
             first, last = float(s[int(np.argmin(possible))]), float(s[np.flatnonzero(~possible)[-1]])
             return PathError(problem.format(first=first), s_interval=(first, last), hint=hint)
-    others = f"try {'other redundant joints, ' if decomposition.r else ''}another {given} posture"
+    others = f"try {'other redundant joints, ' if joint_map.r else ''}another {given} posture"
     return f"Every point of the path is within reach of this branch, but no course along it was found; {others}"
 
 
@@ -106,16 +106,16 @@ class _Answers:
         return np.asarray(self.exists & self.inside.all(axis=4))
 
 
-def _answers_along(decomposition: Decomposition, s: np.ndarray, *, opened: bool) -> _Answers:
+def _answers_along(joint_map: ClosedFormMap, s: np.ndarray, *, opened: bool) -> _Answers:
     """Postures that reach stations s, (S,), with random redundant joints, angles turned into their ranges.
 
     `opened` takes the ranges of the redundant joints for open ones; otherwise the start posture's are tried as well.
     """
-    robot, redundant, rest = decomposition.robot, decomposition.redundant, decomposition.nonredundant
+    robot, redundant, rest = joint_map.robot, joint_map.redundant, joint_map.nonredundant
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
     turning = np.array([unit == "rad" for unit in robot.position_units])
     wide = np.isin(np.arange(robot.n), redundant) & opened
-    near = np.clip(decomposition.start, lower, upper)
+    near = np.clip(joint_map.start, lower, upper)
     low = np.where(turning, -np.pi, near - _FAR)
     high = np.where(turning, np.pi, near + _FAR)
     low = np.where(np.isfinite(lower) & ~wide, np.where(turning, lower, np.maximum(lower, low)), low)
@@ -123,9 +123,9 @@ def _answers_along(decomposition: Decomposition, s: np.ndarray, *, opened: bool)
     tries = _SEARCHED * len(redundant) ** 2 if redundant else 1
     q_r = np.random.default_rng(0).uniform(low[redundant], high[redundant], (tries, len(redundant)))
     if not opened:
-        q_r[0] = np.clip(decomposition.start, low, high)[redundant]
-    targets = decomposition.path.sample(s).target
-    answers = decomposition.solver.solve(np.repeat(targets, tries, axis=0), np.tile(q_r, (len(s), 1)))
+        q_r[0] = np.clip(joint_map.start, low, high)[redundant]
+    targets = joint_map.path.sample(s).target
+    answers = joint_map.solver.solve(np.repeat(targets, tries, axis=0), np.tile(q_r, (len(s), 1)))
     answers = answers.reshape(len(s), tries, *answers.shape[1:])
     postures = np.empty((*answers.shape[:-1], robot.n))
     postures[..., redundant] = q_r[:, None, None]
@@ -136,12 +136,12 @@ def _answers_along(decomposition: Decomposition, s: np.ndarray, *, opened: bool)
     return _Answers(lifted, np.asarray(np.isfinite(lifted).all(axis=4)), inside)
 
 
-def _beyond(decomposition: Decomposition, within: np.ndarray, *found: _Answers) -> str:
+def _beyond(joint_map: ClosedFormMap, within: np.ndarray, *found: _Answers) -> str:
     """Say in words which joint the posture that is nearest to the ranges has beyond its own, and by how much.
 
     At the first station without a posture within them, `within` is (S,) bool.
     """
-    robot = decomposition.robot
+    robot = joint_map.robot
     if within.all():
         return ""
     station = int(np.argmin(within))
@@ -165,7 +165,7 @@ def _beyond(decomposition: Decomposition, within: np.ndarray, *found: _Answers) 
 def _allowed(limit: Limit, found: _Answers) -> np.ndarray:
     """At which stations a limit allows some posture at rest, (S,) bool."""
     allowed = np.zeros(len(found.q), dtype=bool)
-    for station, (choices, exist) in enumerate(zip(found.q, found.within, strict=True)):
-        still = Moments.at_rest(choices[exist][:_HELD_CHECKS])
+    for station, (postures, exist) in enumerate(zip(found.q, found.within, strict=True)):
+        still = Moments.at_rest(postures[exist][:_HELD_CHECKS])
         allowed[station] = bool(np.any(np.all(limit.violation(limit.values(still)) <= 0.0, axis=1)))
     return allowed

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.attempt import Attempt
-from brachis.search.course import DeadEnd
-from brachis.setting import Choice
+from brachis.problem import Decomposition
+from brachis.search.joint_path import DeadEnd
 
 NOT_TRIED = "not tried: the time was up"
 """Status of an attempt for which there was no time."""
@@ -59,14 +59,14 @@ class Record:
         will_do = attempt.verified or not self._refined
         return (-np.inf if will_do else attempt.verification.worst_ratio - 1.0), attempt.t_end
 
-    def note_choice(self, choice: Choice, dead_end: DeadEnd | None) -> None:
+    def note_decomposition(self, decomposition: Decomposition, dead_end: DeadEnd | None) -> None:
         """Put down that a choice has no joint path, or that there was no time to look for one."""
         if dead_end is None:
-            self._left_out[choice.name] = None
+            self._left_out[decomposition.name] = None
             self.interrupted = True
             return
-        self.dead_ends[choice.name] = dead_end
-        self.attempts.append(Attempt(choice.match.redundant_joints, "", "lattice", "", np.inf, str(dead_end)))
+        self.dead_ends[decomposition.name] = dead_end
+        self.attempts.append(Attempt(decomposition.match.redundant_joints, "", "lattice", "", np.inf, str(dead_end)))
 
     def begin(self, starts: int) -> None:
         """Put down that so many starts are about to be solved."""

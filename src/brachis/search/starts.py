@@ -9,13 +9,13 @@ import numpy as np
 from brachis.attempt import Start
 from brachis.deadline import NEVER, Deadline
 from brachis.errors import PathError
-from brachis.kinematics import Decomposition
-from brachis.nlp.numeric_course import numeric_courses
-from brachis.search.course import Course, DeadEnd
-from brachis.search.efforts import EFFORTS, Effort
+from brachis.kinematics import ClosedFormMap
+from brachis.nlp.differential_ik import differential_ik_paths
+from brachis.problem import Decomposition
+from brachis.search.joint_path import DeadEnd, JointPath
 from brachis.search.lattice import Lattice
+from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.phase_plane import least_time
-from brachis.setting import Choice
 
 _PIECES = (3, 8)
 _START_WEIGHT = 1e3
@@ -23,12 +23,14 @@ _FINER, _DENSER = 3, 2.0
 _FINEST = 96
 
 
-def lattice_starts(choice: Choice, effort: Effort, seed: int, deadline: Deadline = NEVER) -> list[Start] | DeadEnd:
+def lattice_starts(
+    decomposition: Decomposition, level: SearchLevel, seed: int, deadline: Deadline = NEVER
+) -> list[Start] | DeadEnd:
     """Take the shortest distinct courses from the lattice of a choice; from a finer one where the first one ends.
 
     Parameters
     ----------
-    choice : Choice
+    decomposition : Decomposition
     effort : Effort
     seed : int
         Of what is drawn at random with several redundant joints.
@@ -40,40 +42,45 @@ def lattice_starts(choice: Choice, effort: Effort, seed: int, deadline: Deadline
         Empty where the time was up.
     """
     cells, nodes, most = (
-        effort.cells_per_turn,
-        effort.nodes,
-        max(1, effort.seeds // max(1, len(choice.redundant))) * len(choice.branches),
+        level.cells_per_turn,
+        level.nodes,
+        max(1, level.seeds // max(1, len(decomposition.redundant))) * len(decomposition.branches),
     )
-    found = Lattice(choice, cells_per_turn=cells, nodes=nodes, seed=seed, deadline=deadline).courses(most)
+    found = Lattice(decomposition, cells_per_turn=cells, nodes=nodes, seed=seed, deadline=deadline).joint_paths(most)
     if isinstance(found, DeadEnd):
         finer = Lattice(
-            choice,
+            decomposition,
             cells_per_turn=_FINER * cells,
             density=_DENSER,
             nodes=_FINER * nodes,
             seed=seed,
             deadline=deadline,
         )
-        found = finer.courses(most)
+        found = finer.joint_paths(most)
     if isinstance(found, DeadEnd):
         return found
-    return [_start_along(course, f"lattice {number}") for number, course in enumerate(found, 1)]
+    return [_start_along(joint_path, f"lattice {number}") for number, joint_path in enumerate(found, 1)]
 
 
-def _start_along(course: Course, origin: str) -> Start:
+def _start_along(joint_path: JointPath, origin: str) -> Start:
     """Smooth a course, as far as the closed form can follow, and estimate its time."""
-    choice, s = course.choice, course.s
-    decomposition = choice.decomposition(course.q[0], course.branch)
+    decomposition, s = joint_path.decomposition, joint_path.s
+    joint_map = decomposition.joint_map(joint_path.q[0], joint_path.branch)
     fine = np.linspace(0.0, 1.0, max(2 * len(s) - 1, _FINEST + 1))
     for pieces in _PIECES:
-        stations = np.column_stack([fine, _smoothed(s, course.stations[:, 1:], fine, pieces)])
-        q = decomposition.postures(stations)
-        if np.isfinite(q).all() and _clear(decomposition, q):
+        stations = np.column_stack([fine, _smoothed(s, joint_path.stations[:, 1:], fine, pieces)])
+        q = joint_map.postures(stations)
+        if np.isfinite(q).all() and _clear(joint_map, q):
             return Start(
-                choice, course.branch, course.q[0], stations, least_time(choice.setting.limits, fine, q), origin
+                decomposition,
+                joint_path.branch,
+                joint_path.q[0],
+                stations,
+                least_time(decomposition.problem.limits, fine, q),
+                origin,
             )
-    estimate = least_time(choice.setting.limits, s, course.q)
-    return Start(choice, course.branch, course.q[0], course.stations, estimate, origin)
+    estimate = least_time(decomposition.problem.limits, s, joint_path.q)
+    return Start(decomposition, joint_path.branch, joint_path.q[0], joint_path.stations, estimate, origin)
 
 
 def _smoothed(s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int) -> np.ndarray:
@@ -88,18 +95,18 @@ def _smoothed(s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int) 
     return np.asarray(make_lsq_spline(s, values, knots, k=3, w=weights)(fine))
 
 
-def _clear(decomposition: Decomposition, q: np.ndarray) -> bool:
+def _clear(joint_map: ClosedFormMap, q: np.ndarray) -> bool:
     """Tell whether a course keeps clear of the branch boundary, (K, n)."""
-    margins = decomposition.branch_margins(q)
+    margins = joint_map.branch_margins(q)
     return bool(margins.min(initial=np.inf) > 0.5 * min(0.02, float(margins[0].min(initial=np.inf))))
 
 
-def numeric_starts(choice: Choice, most: int, deadline: Deadline) -> list[Start]:
+def numeric_starts(decomposition: Decomposition, most: int, deadline: Deadline) -> list[Start]:
     """Carry the given start posture along the path by numeric inverse kinematics, in up to `most` ways.
 
     Parameters
     ----------
-    choice : Choice
+    decomposition : Decomposition
         With a given start posture.
     most : int
     deadline : Deadline
@@ -108,18 +115,18 @@ def numeric_starts(choice: Choice, most: int, deadline: Deadline) -> list[Start]
     -------
     list of Start
     """
-    start = choice.setting.start
+    start = decomposition.problem.start
     if start is None:
         return []
-    decomposition = choice.decomposition(start, choice.branches[0])
-    courses = itertools.islice(numeric_courses(decomposition, deadline), most)
+    joint_map = decomposition.joint_map(start, decomposition.branches[0])
+    joint_paths = itertools.islice(differential_ik_paths(joint_map, deadline), most)
     return [
-        Start(choice, choice.branches[0], start, course, np.inf, f"numeric {number}")
-        for number, course in enumerate(courses, 1)
+        Start(decomposition, decomposition.branches[0], start, joint_path, np.inf, f"numeric {number}")
+        for number, joint_path in enumerate(joint_paths, 1)
     ]
 
 
-def first_start(choice: Choice) -> tuple[np.ndarray, int]:
+def first_start(decomposition: Decomposition) -> tuple[np.ndarray, int]:
     """Return the given start posture, (n,), or that of the lattice's shortest course where it is free, and its branch.
 
     Raises
@@ -127,9 +134,9 @@ def first_start(choice: Choice) -> tuple[np.ndarray, int]:
     PathError
         The start posture is free, and the lattice has no course.
     """
-    if choice.setting.start is not None:
-        return choice.setting.start, choice.branches[0]
-    found = lattice_starts(choice, EFFORTS["fast"][0], choice.setting.task.search.seed)
+    if decomposition.problem.start is not None:
+        return decomposition.problem.start, decomposition.branches[0]
+    found = lattice_starts(decomposition, SEARCH_LEVELS["fast"][0], decomposition.problem.task.search.seed)
     if isinstance(found, DeadEnd):
         raise PathError(f"no course along the path was found: {found}", s_interval=found.interval)
     return found[0].posture, found[0].branch

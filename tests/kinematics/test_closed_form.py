@@ -8,7 +8,7 @@ import pytest
 from brachis.errors import UnreachableError
 from brachis.robot import Robot
 from support.chains import planar_robot
-from support.motions import Sway, decomposition
+from support.motions import Sway, joint_map
 
 CASES = {
     "r = 0, 2R": ("RR", "xz", ["x", "z"], [0.4, 1.2], []),
@@ -32,7 +32,7 @@ def curved(robot, rows, start):
 def motion(request):
     pattern, plane, rows, start, redundant = CASES[request.param]
     robot = planar_robot(pattern, plane)
-    return Sway(decomposition(robot, rows, curved(robot, rows, start), start, redundant), amplitude=0.1)
+    return Sway(joint_map(robot, rows, curved(robot, rows, start), start, redundant), amplitude=0.1)
 
 
 T = np.linspace(0.02, 0.98, 25)
@@ -40,13 +40,13 @@ T = np.linspace(0.02, 0.98, 25)
 
 def test_path_is_met_exactly(motion):
     y, _, _ = motion(T)
-    chain = motion.decomposition
+    chain = motion.joint_map
     targets = chain.path.sample(y[:, 0]).target
     np.testing.assert_allclose(chain.task_map.values(chain.postures(y)), targets, atol=1e-12)
 
 
 def test_motion_is_the_time_derivative_of_the_postures(motion):
-    chain, h = motion.decomposition, 1e-4
+    chain, h = motion.joint_map, 1e-4
     state = chain.state(*motion(T))
     before, here, after = (chain.postures(motion(T + step)[0]) for step in (-h, 0.0, h))
     np.testing.assert_allclose(state.q, here, atol=1e-14)
@@ -58,7 +58,7 @@ def test_motion_is_the_time_derivative_of_the_postures(motion):
 
 
 def test_derivatives(motion):
-    chain, h = motion.decomposition, 1e-5
+    chain, h = motion.joint_map, 1e-5
     parts = motion(T)
     state = chain.state(*parts)
     exact = chain.derivatives(state)
@@ -92,7 +92,7 @@ def test_derivatives(motion):
 
 
 def test_rows_of_redundant_joints_are_constant(motion):
-    chain = motion.decomposition
+    chain = motion.joint_map
     state = chain.state(*motion(T))
     exact = chain.derivatives(state)
     np.testing.assert_array_equal(state.q[:, chain.redundant], motion(T)[0][:, 1:])
@@ -106,7 +106,7 @@ def test_angles_are_lifted_from_the_start_posture_on_and_stay_continuous_over_ma
     robot = Robot.from_urdf(scara_urdf)
     start = np.array([0.2 + 2.0 * np.pi * turns, 1.0, 0.6])
     circle = [{"circle": {"center": [0.0, 0.0], "turns": 3}}]
-    chain = decomposition(robot, ["x", "y"], circle, start, ["j3"])
+    chain = joint_map(robot, ["x", "y"], circle, start, ["j3"])
     s = np.linspace(0.0, 1.0, 400)
     q = chain.postures(np.stack([s, np.full(400, 0.6)], axis=1))
     np.testing.assert_allclose(q[0], start, atol=1e-12)
@@ -117,7 +117,7 @@ def test_angles_are_lifted_from_the_start_posture_on_and_stay_continuous_over_ma
 def test_slides_are_never_wrapped():
     robot = planar_robot("PPR")
     start = [20.0, -30.0, 0.4]
-    chain = decomposition(robot, ["x", "y"], [{"line": {"by": [40.0, 0.0]}}], start, ["j3"])
+    chain = joint_map(robot, ["x", "y"], [{"line": {"by": [40.0, 0.0]}}], start, ["j3"])
     s = np.linspace(0.0, 1.0, 4)  # steps far beyond 2 pi
     q = chain.postures(np.stack([s, np.full(4, 0.4)], axis=1))
     np.testing.assert_allclose(q[0], start, atol=1e-9)
@@ -126,7 +126,7 @@ def test_slides_are_never_wrapped():
 
 def test_target_out_of_reach(scara_urdf):
     robot = Robot.from_urdf(scara_urdf)
-    chain = decomposition(robot, ["x", "y"], [{"line": {"by": [3.0, 0.0]}}], [0.2, 1.0, 0.6], ["j3"])
+    chain = joint_map(robot, ["x", "y"], [{"line": {"by": [3.0, 0.0]}}], [0.2, 1.0, 0.6], ["j3"])
     y = np.array([[0.0, 0.6], [1.0, 0.6]])
     postures = chain.postures(y)
     assert np.isfinite(postures[0]).all()

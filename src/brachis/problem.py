@@ -12,7 +12,7 @@ from brachis.bspline import clamped_knots, spread
 from brachis.custom_limits import LimitModel
 from brachis.errors import DecompositionError, StartError, UnknownNameError
 from brachis.feasibility import branch_of, check_end_branch, check_postures
-from brachis.kinematics import Decomposition
+from brachis.kinematics import ClosedFormMap
 from brachis.limits import Limit, limits_of
 from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Boundary, FixedGrid, Phase, Program
@@ -22,7 +22,7 @@ from brachis.task import Task
 
 
 @dataclass(frozen=True)
-class Setting:
+class Problem:
     """A task on a robot.
 
     Attributes
@@ -49,7 +49,7 @@ class Setting:
     further: tuple[LimitModel, ...] = ()
 
     @classmethod
-    def of(cls, robot: Robot, task: Task, further: Sequence[LimitModel] = ()) -> Setting:
+    def of(cls, robot: Robot, task: Task, further: Sequence[LimitModel] = ()) -> Problem:
         """Bind robot and task, and check the postures that the task gives.
 
         Parameters
@@ -74,12 +74,12 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Choice:
+class Decomposition:
     """Redundant joints with their closed form, and the branches on which a motion may begin.
 
     Attributes
     ----------
-    setting : Setting
+    problem : Problem
     match : Match
     redundant : tuple of int
         Indices of the redundant joints, ascending.
@@ -87,7 +87,7 @@ class Choice:
         Indices into ``match.solver.branches``; one where start or end posture is given.
     """
 
-    setting: Setting
+    problem: Problem
     match: ik.Match
     redundant: tuple[int, ...]
     branches: tuple[int, ...]
@@ -98,33 +98,33 @@ class Choice:
         return ", ".join(self.match.redundant_joints) or "none"
 
     @property
-    def room(self) -> float:
+    def clearance(self) -> float:
         """Least branch margin of the start posture, of the end posture where the start is free; zero without both."""
-        given = self.setting.end if self.setting.start is None else self.setting.start
+        given = self.problem.end if self.problem.start is None else self.problem.start
         if given is None:
             return 0.0
         margins = self.match.solver.branch_margins(given[None], self.branches[0])
         return float(margins.min(initial=np.inf))
 
-    def decomposition(self, start: np.ndarray, branch: int) -> Decomposition:
+    def joint_map(self, start: np.ndarray, branch: int) -> ClosedFormMap:
         """Put robot, path and closed form together for a motion that begins at, or near, `start`, (n,)."""
-        given = self.setting
+        given = self.problem
         solver = self.match.solver
-        return Decomposition(given.task_map, given.path, solver, self.redundant, branch, start)
+        return ClosedFormMap(given.task_map, given.path, solver, self.redundant, branch, start)
 
 
-def choices(setting: Setting, families: Sequence[ik.Family] = ()) -> list[Choice]:
+def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> list[Decomposition]:
     """List the choices that the task allows.
 
     Parameters
     ----------
-    setting : Setting
+    problem : Problem
     families : sequence of Family, optional
         Closed forms to try before the built-in ones.
 
     Returns
     -------
-    list of Choice
+    list of Decomposition
         At least one; with ``redundant_joints: auto`` the one with the largest branch margin at the start posture
         first, and closed forms before polynomials.
 
@@ -133,35 +133,37 @@ def choices(setting: Setting, families: Sequence[ik.Family] = ()) -> list[Choice
     DecompositionError
         No closed form fits.
     StartError
-        The start posture is singular for every choice, or on another branch than the task's, or than the end posture.
+        The start posture is singular for every decomposition, or on another branch than the task's, or than the end posture.
     UnknownNameError
         There is no such joint or branch.
     """
-    task, robot, task_map = setting.task, setting.robot, setting.task_map
+    task, robot, task_map = problem.task, problem.robot, problem.task_map
     if task.redundant_joints != "auto":
         wanted = _with_roll(task_map, task.redundant_joints)
-        return [_choice(setting, ik.find(robot, task_map, wanted, families=families))]
+        return [_decomposition(problem, ik.find(robot, task_map, wanted, families=families))]
     found = ik.find_all(robot, task_map, families=families)
     matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
     if not matches:
         if len(found) <= 1:  # nothing to choose: the reasons of the only choice, or the wrong number of joints
-            return [_choice(setting, ik.find(robot, task_map, (), families=families))]
+            return [_decomposition(problem, ik.find(robot, task_map, (), families=families))]
         raise DecompositionError(
             "no choice of redundant joints has a closed form",
             redundant_joints=(),
             reasons={", ".join(c.redundant_joints): "; ".join(c.reasons.values()) for c in found},
             available=[],
         )
-    allowed: list[Choice] = []
+    allowed: list[Decomposition] = []
     refusals: list[StartError | UnknownNameError] = []
     for match in matches:
         try:
-            allowed.append(_choice(setting, match))
+            allowed.append(_decomposition(problem, match))
         except (StartError, UnknownNameError) as error:
             refusals.append(error)
     if not allowed:
         raise refusals[0]
-    return sorted(allowed, key=lambda choice: (choice.match.solver.kind != "closed_form", -choice.room))
+    return sorted(
+        allowed, key=lambda decomposition: (decomposition.match.solver.kind != "closed_form", -decomposition.clearance)
+    )
 
 
 def _with_roll(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -171,32 +173,32 @@ def _with_roll(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
     return (*names, ROLL_JOINT) if robot.rolls_freely and missing == 1 and ROLL_JOINT not in names else names
 
 
-def _choice(setting: Setting, match: ik.Match) -> Choice:
+def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
     """Find the branches on which a motion may begin."""
-    robot, task_map, wanted = setting.robot, setting.task_map, setting.task.branch
+    robot, task_map, wanted = problem.robot, problem.task_map, problem.task.branch
     redundant = tuple(robot.joint_names.index(name) for name in match.redundant_joints)
     labels = match.solver.branches
-    if setting.start is not None:
-        branch = branch_of(task_map, match, setting.start, wanted)
-        if setting.end is not None:
-            check_end_branch(task_map, match, setting.end, branch)
-        return Choice(setting, match, redundant, (branch,))
-    if setting.end is not None:
-        branch = branch_of(task_map, match, setting.end, wanted, name="end")
-        return Choice(setting, match, redundant, (branch,))
+    if problem.start is not None:
+        branch = branch_of(task_map, match, problem.start, wanted)
+        if problem.end is not None:
+            check_end_branch(task_map, match, problem.end, branch)
+        return Decomposition(problem, match, redundant, (branch,))
+    if problem.end is not None:
+        branch = branch_of(task_map, match, problem.end, wanted, name="end")
+        return Decomposition(problem, match, redundant, (branch,))
     if wanted != "auto" and wanted not in labels:
         raise UnknownNameError("branch", wanted, labels, where="branch")
     allowed = tuple(branch for branch, label in enumerate(labels) if wanted in ("auto", label))
-    return Choice(setting, match, redundant, allowed)
+    return Decomposition(problem, match, redundant, allowed)
 
 
-def program_of(setting: Setting, decomposition: Decomposition, breaks: np.ndarray) -> Program:
+def program_of(problem: Problem, joint_map: ClosedFormMap, breaks: np.ndarray) -> Program:
     """Write the NLP of a decomposition down: one phase, along the path.
 
     Parameters
     ----------
-    setting : Setting
-    decomposition : Decomposition
+    problem : Problem
+    joint_map : ClosedFormMap
         Beginning at the task's start posture, or at a first guess of it where that is free.
     breaks : (N + 1,) ndarray
         Ends of the knot intervals in normalised time.
@@ -205,13 +207,13 @@ def program_of(setting: Setting, decomposition: Decomposition, breaks: np.ndarra
     -------
     Program
     """
-    spline, free = setting.task.spline, np.full(setting.robot.n, np.nan)
-    start, end = (free if posture is None else posture for posture in (setting.start, setting.end))
+    spline, free = problem.task.spline, np.full(problem.robot.n, np.nan)
+    start, end = (free if posture is None else posture for posture in (problem.start, problem.end))
     boundary = Boundary(
-        decomposition.coordinates(0.0, start), decomposition.coordinates(1.0, end), 2 if spline.rest == "full" else 1
+        joint_map.coordinates(0.0, start), joint_map.coordinates(1.0, end), 2 if spline.rest == "full" else 1
     )
     grid = FixedGrid(clamped_knots(spline.degree, breaks), spline.degree, spread(breaks, spline.points_per_interval))
-    return Program([Phase(decomposition, setting.limits, grid, boundary)])
+    return Program([Phase(joint_map, problem.limits, grid, boundary)])
 
 
 def breaks_of(task: Task) -> np.ndarray:

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Effort:
+class SearchLevel:
     """One level of the search.
 
     Attributes
     ----------
-    choices : int
+    decompositions : int
         Choices of redundant joints that are looked at; those with the most room at the start come first.
     polynomial : bool
-        Whether choices whose inverse kinematics is a polynomial's roots are looked at beside closed forms.
+        Whether decompositions whose inverse kinematics is a polynomial's roots are looked at beside closed forms.
     seeds : int
-        Courses taken from the lattice of a choice, for each branch on which the motion may begin.
+        Courses taken from the lattice of a decomposition, for each branch on which the motion may begin.
     numeric : int
         Courses by numeric inverse kinematics beside them, where the start posture is given.
     plans : int
@@ -30,7 +30,7 @@ class Effort:
         Whether it is gone through only while no motion is verified.
     """
 
-    choices: int
+    decompositions: int
     polynomial: bool
     seeds: int
     numeric: int
@@ -42,15 +42,17 @@ class Effort:
 
 
 _LEVELS = {
-    "single": Effort(1, polynomial=False, seeds=1, numeric=0, plans=1, refined=1, cells_per_turn=72, nodes=120),
-    "fast": Effort(6, polynomial=False, seeds=4, numeric=0, plans=24, refined=4, cells_per_turn=72, nodes=120),
-    "thorough": Effort(20, polynomial=True, seeds=8, numeric=8, plans=100, refined=12, cells_per_turn=96, nodes=300),
-    "exhaustive": Effort(
+    "single": SearchLevel(1, polynomial=False, seeds=1, numeric=0, plans=1, refined=1, cells_per_turn=72, nodes=120),
+    "fast": SearchLevel(6, polynomial=False, seeds=4, numeric=0, plans=24, refined=4, cells_per_turn=72, nodes=120),
+    "thorough": SearchLevel(
+        20, polynomial=True, seeds=8, numeric=8, plans=100, refined=12, cells_per_turn=96, nodes=300
+    ),
+    "exhaustive": SearchLevel(
         10_000, polynomial=True, seeds=30, numeric=8, plans=10_000, refined=40, cells_per_turn=144, nodes=600
     ),
 }
 
-EFFORTS = {
+SEARCH_LEVELS = {
     "single": (_LEVELS["single"], dataclasses.replace(_LEVELS["fast"], last_resort=True)),
     "fast": (_LEVELS["fast"],),
     "thorough": (_LEVELS["fast"], _LEVELS["thorough"]),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.deadline import NEVER, Deadline
-from brachis.kinematics import Decomposition
+from brachis.kinematics import ClosedFormMap
 
 _FEWEST_STEPS, _MOST_STEPS, _STEP_LENGTH = 24, 1000, 0.05  # metres a step
 _DAMPING = 1e-6
@@ -58,12 +58,12 @@ STRATEGIES = (
 )
 
 
-def numeric_courses(decomposition: Decomposition, deadline: Deadline = NEVER) -> Iterator[np.ndarray]:
+def differential_ik_paths(joint_map: ClosedFormMap, deadline: Deadline = NEVER) -> Iterator[np.ndarray]:
     """Yield courses one after the other; where the first one comes near a branch boundary, the roomiest ones first.
 
     Parameters
     ----------
-    decomposition : Decomposition
+    joint_map : ClosedFormMap
     deadline : Deadline, optional
         Courses that are not complete by then are left out.
 
@@ -72,28 +72,30 @@ def numeric_courses(decomposition: Decomposition, deadline: Deadline = NEVER) ->
     (steps, 1 + r) ndarray
         See `numeric_course`.
     """
-    strategies = STRATEGIES if decomposition.r else STRATEGIES[:1]
-    courses = (numeric_course(decomposition, strategy, deadline) for strategy in strategies if not deadline.passed)
-    found = (course for course in courses if course is not None)
+    strategies = STRATEGIES if joint_map.r else STRATEGIES[:1]
+    joint_paths = (
+        differential_ik_path(joint_map, strategy, deadline) for strategy in strategies if not deadline.passed
+    )
+    found = (joint_path for joint_path in joint_paths if joint_path is not None)
     first = next(found, None)
     if first is None:
         return
-    if _room(decomposition, first) > _ROOMY:
+    if _room(joint_map, first) > _ROOMY:
         yield first
         yield from found
     else:
-        yield from sorted((first, *found), key=lambda course: -_room(decomposition, course))
+        yield from sorted((first, *found), key=lambda joint_path: -_room(joint_map, joint_path))
 
 
-def _room(decomposition: Decomposition, course: np.ndarray) -> float:
+def _room(joint_map: ClosedFormMap, joint_path: np.ndarray) -> float:
     """Return the least branch margin along a course; -inf where the branch cannot follow it."""
-    q = decomposition.postures(course)
+    q = joint_map.postures(joint_path)
     if not np.isfinite(q).all():
         return -np.inf
-    return float(decomposition.branch_margins(q).min(initial=np.inf))
+    return float(joint_map.branch_margins(q).min(initial=np.inf))
 
 
-def numeric_course(decomposition: Decomposition, strategy: Strategy, deadline: Deadline = NEVER) -> np.ndarray | None:
+def differential_ik_path(joint_map: ClosedFormMap, strategy: Strategy, deadline: Deadline = NEVER) -> np.ndarray | None:
     """Redundant joints along the path by numeric inverse kinematics from the start posture.
 
     Near a branch boundary the posture is unfolded first, while the tool stays where it is: there any motion of the tool
@@ -101,7 +103,7 @@ def numeric_course(decomposition: Decomposition, strategy: Strategy, deadline: D
 
     Parameters
     ----------
-    decomposition : Decomposition
+    joint_map : ClosedFormMap
     strategy : Strategy
     deadline : Deadline, optional
 
@@ -110,33 +112,33 @@ def numeric_course(decomposition: Decomposition, strategy: Strategy, deadline: D
     (steps, 1 + r) ndarray or None
         Successive values of s and the redundant joints; None where the target cannot be followed, or not in time.
     """
-    if decomposition.r == 0:
+    if joint_map.r == 0:
         return np.array([[0.0], [1.0]])
-    steps = int(np.clip(np.ceil(decomposition.path.length / _STEP_LENGTH), _FEWEST_STEPS, _MOST_STEPS))
+    steps = int(np.clip(np.ceil(joint_map.path.length / _STEP_LENGTH), _FEWEST_STEPS, _MOST_STEPS))
     s = np.linspace(0.0, 1.0, steps + 1)
-    targets = decomposition.path.sample(s).target
-    q = decomposition.start.astype(float)
+    targets = joint_map.path.sample(s).target
+    q = joint_map.start.astype(float)
     previous = np.zeros_like(q)
-    course = [np.append(0.0, q[decomposition.redundant])]
+    joint_path = [np.append(0.0, q[joint_map.redundant])]
     for _ in range(_UNFOLDING_STEPS):
-        if decomposition.branch_margins(q[None]).min(initial=1.0) > 0.5 * strategy.threshold:
+        if joint_map.branch_margins(q[None]).min(initial=1.0) > 0.5 * strategy.threshold:
             break
-        moved = _follow(decomposition, strategy, q, previous, targets[0], step_s=None)
+        moved = _follow(joint_map, strategy, q, previous, targets[0], step_s=None)
         if moved is None or deadline.passed:
             break
         q, previous = moved
-        course.append(np.append(0.0, q[decomposition.redundant]))
+        joint_path.append(np.append(0.0, q[joint_map.redundant]))
     for station, target in zip(s[1:], targets[1:], strict=True):
-        moved = _follow(decomposition, strategy, q, previous, target, step_s=1.0 / steps)
+        moved = _follow(joint_map, strategy, q, previous, target, step_s=1.0 / steps)
         if moved is None or deadline.passed:
             return None
         q, previous = moved
-        course.append(np.append(station, q[decomposition.redundant]))
-    return np.array(course)
+        joint_path.append(np.append(station, q[joint_map.redundant]))
+    return np.array(joint_path)
 
 
 def _follow(
-    decomposition: Decomposition,
+    joint_map: ClosedFormMap,
     strategy: Strategy,
     q: np.ndarray,
     previous: np.ndarray,
@@ -148,7 +150,7 @@ def _follow(
 
     `step_s` is the step in s, None for unfolding on the spot.
     """
-    task_map = decomposition.task_map
+    task_map = joint_map.task_map
     for correction in range(_CORRECTIONS):
         miss = task_map.difference(target, task_map.value(q))
         if correction and np.abs(miss).max() < 1e-3:  # noqa: PLR2004  (the closed form takes it from here)
@@ -157,7 +159,7 @@ def _follow(
         square = jacobian @ jacobian.T + _DAMPING * np.eye(len(miss))
         step = jacobian.T @ np.linalg.solve(square, miss)
         if correction == 0:
-            wish = _wish(decomposition, strategy, q, previous)
+            wish = _wish(joint_map, strategy, q, previous)
             free = wish - jacobian.T @ np.linalg.solve(square, jacobian @ wish)
             size = float(np.abs(free).max())
             largest = _UNFOLDING_STEP if step_s is None else _LARGEST_STEP
@@ -168,13 +170,13 @@ def _follow(
     return None
 
 
-def _wish(decomposition: Decomposition, strategy: Strategy, q: np.ndarray, previous: np.ndarray) -> np.ndarray:
+def _wish(joint_map: ClosedFormMap, strategy: Strategy, q: np.ndarray, previous: np.ndarray) -> np.ndarray:
     """Joint motion per unit s that the null space may realise, (n,)."""
-    limits = decomposition.robot.limits
+    limits = joint_map.robot.limits
     wish = np.zeros_like(q)
-    margins = decomposition.branch_margins(q[None])[0]
+    margins = joint_map.branch_margins(q[None])[0]
     if np.any(margins < strategy.threshold):
-        gradients = decomposition.branch_margin_gradient(q[None])[0]
+        gradients = joint_map.branch_margin_gradient(q[None])[0]
         shortfall = np.clip(strategy.threshold - margins, 0.0, 2.0 * strategy.threshold)
         wish += strategy.push * shortfall @ gradients
     # A tenth of the range, or of a radian or metre where it is open, is kept clear at each end.
@@ -187,6 +189,6 @@ def _wish(decomposition: Decomposition, strategy: Strategy, q: np.ndarray, previ
         middle = limits.position_lower[ranged] + 0.5 * stroke[ranged]
         wish[ranged] += strategy.centre * (middle - q[ranged])
     if strategy.drift:
-        direction = previous if previous.any() else np.eye(len(q))[decomposition.redundant[0]]
+        direction = previous if previous.any() else np.eye(len(q))[joint_map.redundant[0]]
         wish += strategy.drift * direction / np.linalg.norm(direction)
     return wish

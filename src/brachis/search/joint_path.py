@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.limits import Limit
+from brachis.problem import Decomposition
 from brachis.robot import Robot
-from brachis.setting import Choice
 
 _APART = 0.02
 _TINY = 1e-9
@@ -20,12 +20,12 @@ JUMPS = "no posture is near enough to continue"
 
 
 @dataclass(frozen=True)
-class Course:
+class JointPath:
     """Redundant joints along the path.
 
     Attributes
     ----------
-    choice : Choice
+    decomposition : Decomposition
     branch : int
         Index into the closed form's branches.
     s : (S + 1,) ndarray
@@ -35,7 +35,7 @@ class Course:
         In the measure of the lattice, s^2.
     """
 
-    choice: Choice
+    decomposition: Decomposition
     branch: int
     s: np.ndarray
     q: np.ndarray
@@ -44,7 +44,7 @@ class Course:
     @property
     def stations(self) -> np.ndarray:
         """Path coordinate and redundant joints, (S + 1, 1 + r)."""
-        return np.column_stack([self.s, self.q[:, list(self.choice.redundant)]])
+        return np.column_stack([self.s, self.q[:, list(self.decomposition.redundant)]])
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class DeadEnd:
         return f"{place} {next(iter(self.causes))}"
 
 
-def distinct(courses: Sequence[Course], most: int) -> list[Course]:
+def distinct(joint_paths: Sequence[JointPath], most: int) -> list[JointPath]:
     """Choose up to `most` courses: the shortest one, and others far from those chosen.
 
     The next one is the one with the largest ratio of its distance from those chosen to its length; on another branch
@@ -92,21 +92,24 @@ def distinct(courses: Sequence[Course], most: int) -> list[Course]:
     -------
     list of Course
     """
-    branches, q = np.array([course.branch for course in courses]), np.array([course.q for course in courses])
-    length = np.array([course.length for course in courses])
-    setting = courses[0].choice.setting
-    weights = weights_near(setting.robot, setting.limits, q[0, q.shape[1] // 2])
-    distance = np.full(len(courses), np.inf)
+    branches, q = (
+        np.array([joint_path.branch for joint_path in joint_paths]),
+        np.array([joint_path.q for joint_path in joint_paths]),
+    )
+    length = np.array([joint_path.length for joint_path in joint_paths])
+    problem = joint_paths[0].decomposition.problem
+    weights = weights_near(problem.robot, problem.limits, q[0, q.shape[1] // 2])
+    distance = np.full(len(joint_paths), np.inf)
     chosen: list[int] = []
     best = 0
-    while len(chosen) < min(most, len(courses)):
+    while len(chosen) < min(most, len(joint_paths)):
         chosen.append(best)
         apart = (np.abs(q - q[best]) * weights).max(axis=(1, 2))
         distance = np.minimum(distance, np.where(branches == branches[best], apart, np.inf))
         best = int(np.argmax(distance / (length + _TINY)))
         if distance[best] <= _APART * distance[np.isfinite(distance)].max(initial=0.0):
             break
-    return [courses[one] for one in chosen]
+    return [joint_paths[one] for one in chosen]
 
 
 def weights_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> np.ndarray:

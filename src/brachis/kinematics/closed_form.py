@@ -52,7 +52,7 @@ class PathState(JointState):
     inverse: np.ndarray
 
 
-class Decomposition:
+class ClosedFormMap:
     """Robot, path, closed form and branch, put together: the `JointMap` with y = (s, q_r).
 
     Parameters
@@ -160,13 +160,13 @@ class Decomposition:
 
     def _tracked(self, answers: np.ndarray) -> np.ndarray:
         """Choose from answers (K, A, m) at successive times a course, each nearest to its predecessor."""
-        course = np.empty((len(answers), len(self.nonredundant)))
+        joint_path = np.empty((len(answers), len(self.nonredundant)))
         previous = self.start[self.nonredundant]
         for k in range(len(answers)):
-            course[k] = self._nearest(answers[k : k + 1], previous[None])[0]
-            if np.isfinite(course[k]).all():
-                previous = course[k]
-        return course
+            joint_path[k] = self._nearest(answers[k : k + 1], previous[None])[0]
+            if np.isfinite(joint_path[k]).all():
+                previous = joint_path[k]
+        return joint_path
 
     def state(
         self,
