@@ -16,10 +16,7 @@ from brachis.path.rotations import matrices, quaternions_of, rotation_of
 from brachis.robot.task_map.rows import AXES, POSE_COORDINATES
 
 if TYPE_CHECKING:
-    from brachis.path.joins import Corner, Join
-    from brachis.path.protocol import Array, Curve
-    from brachis.path.sequence import SequencePath
-    from brachis.task import Segment
+    from brachis.path.protocol import Array
 
 _ROTATION_TOLERANCE = 1e-6
 
@@ -29,6 +26,10 @@ class PoseCoordinates:
     """The twelve coordinates of poses; see `Coordinates`."""
 
     rows: tuple[str, ...] = AXES
+    curve = staticmethod(pose_curve)
+    corner = staticmethod(pose_corner)
+    blend = staticmethod(blend_poses)
+    path = staticmethod(PosePath)
 
     def checked(self, start: Array) -> Array:
         """See `Coordinates.checked`."""
@@ -43,19 +44,3 @@ class PoseCoordinates:
             raise PathError(problem, found=rotation.tolist(), allowed=allowed, where="start")
         nearest = matrices(quaternions_of(rotation_of(rotation))[None])[0]
         return np.concatenate([start[:POSITIONS], nearest.ravel()])
-
-    def curve(self, segment: Segment, index: int, start: Array) -> Curve:
-        """See `Coordinates.curve`."""
-        return pose_curve(segment, index, start)
-
-    def corner(self, join: Join, first: Curve, second: Curve) -> Corner | None:
-        """See `Coordinates.corner`."""
-        return pose_corner(join, first, second)
-
-    def blend(self, first: Curve, second: Curve, size: float, join: Join) -> Curve:
-        """See `Coordinates.blend`."""
-        return blend_poses(first, second, size, join)
-
-    def path(self, sequence: SequencePath) -> PosePath:
-        """See `Coordinates.path`: the task velocity is the body twist."""
-        return PosePath(sequence)

@@ -16,7 +16,6 @@ from brachis.robot.task_map.rows import ROWS, YAW
 from brachis.task import TurnSegment
 
 if TYPE_CHECKING:
-    from brachis.path.joins import Corner, Join
     from brachis.path.protocol import Array, Curve
     from brachis.path.sequence import SequencePath
     from brachis.task import Segment
@@ -27,6 +26,8 @@ class RowCoordinates:
     """Rows of a task space; see `Coordinates`."""
 
     rows: tuple[str, ...]
+    corner = staticmethod(row_corner)
+    blend = staticmethod(blend_rows)
 
     def checked(self, start: Array) -> Array:
         """See `Coordinates.checked`."""
@@ -50,14 +51,6 @@ class RowCoordinates:
             problem = "an orientation along a segment is for task spaces of poses"
             raise PathError(problem, found=found, where=f"path[{index}].orientation", hint=hint)
         return curve_of(segment.shape, Site(f"path[{index}].{segment.kind}", start, self.rows))
-
-    def corner(self, join: Join, first: Curve, second: Curve) -> Corner | None:
-        """See `Coordinates.corner`."""
-        return row_corner(join, first, second)
-
-    def blend(self, first: Curve, second: Curve, size: float, join: Join) -> Curve:
-        """See `Coordinates.blend`."""
-        return blend_rows(first, second, size, join)
 
     def path(self, sequence: SequencePath) -> SequencePath:
         """See `Coordinates.path`: the task velocity is the coordinates' own derivative."""
