@@ -75,11 +75,15 @@ def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str) -> N
         worst = int(np.argmax(ratios))
         if ratios[worst] > 1.0 + _RANGE_SLACK:
             label = limit.labels[worst]
+            figures = [bound.figure for bound in limit.bounds if bound.column == worst and bound.end is None]
+            found, allowed = f"{ratios[worst]:.4g} times the limit", "no more than the limit"
+            if figures:
+                found, allowed = (f"{size * figures[0]:.4g} {label.unit}" for size in (ratios[worst], 1.0))
             raise StartError(
-                f"{label.subject!r} {limit.refusal}",
+                f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
                 where=f"{name}.joints",
-                found=f"{ratios[worst]:.4g} times the {label.kind} limit at rest",
-                allowed="no more than the limit",
+                found=f"{found} needed at rest",
+                allowed=allowed,
                 hint=f"Choose another posture{f', or raise {label.key}' if label.key else ''}",
             )
 

@@ -52,10 +52,10 @@ def test_json(run, task, write):
     assert data["verified"] is True
     assert found["t_end_s"] == data["t_end"]
     first = found["sensitivities"]["limits"][0]
-    assert (first["joint"], first["kind"], first["unit"]) == ("j1", "torque", "Nm")
+    assert (first["subject"], first["kind"], first["unit"]) == ("j1", "torque", "Nm")
     assert first["change_for_1_percent_s"] == pytest.approx(0.01 * first["derivative_s_per_unit"] * first["limit"])
     assert found["sensitivities"]["multipliers"] == "solver"
-    assert {entry["joint"] for entry in found["saturations"]} == {"j1", "j2", "j3"}
+    assert {entry["subject"] for entry in found["saturations"]} == {"j1", "j2", "j3"}
     assert found["check"] is None
     assert found["reference"] is None
 
@@ -76,7 +76,9 @@ def test_unverified_motion(run, task, write, tmp_path, monkeypatch):
     run("bottleneck", write(task), "--out", out)
     honest = motion.verify_trajectory
     strict = VerifyOptions(ratio_tolerance=-0.5)
-    monkeypatch.setattr(motion, "verify_trajectory", lambda trajectory, _options: honest(trajectory, strict))
+    monkeypatch.setattr(
+        motion, "verify_trajectory", lambda trajectory, _options, **more: honest(trajectory, strict, **more)
+    )
     outcome = run("bottleneck", write(task), "--out", out)
     assert outcome.code == 1
     assert "did not pass the verification" in outcome.err
@@ -115,7 +117,7 @@ def test_a_saved_motion(run, task, write, tmp_path):
     assert saved["t_end"] == fresh["t_end"]
     assert saved["bottleneck"]["saturations"] == fresh["bottleneck"]["saturations"]
     for one, other in zip(*(d["bottleneck"]["sensitivities"]["limits"] for d in (saved, fresh)), strict=True):
-        assert one["joint"] == other["joint"]
+        assert one["subject"] == other["subject"]
         assert one["change_for_10_percent_s"] == pytest.approx(other["change_for_10_percent_s"], rel=1e-3, abs=1e-6)
     assert {path.name for path in out.iterdir()} >= {"result.npz", "bottleneck.json", "timeline.png"}
     assert run("bottleneck", out / "result.npz").out.startswith("end time t_E: 2.47")

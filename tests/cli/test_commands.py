@@ -73,7 +73,9 @@ def test_plan_for_people(run, task, write):
 def too_strict(monkeypatch):
     honest = motion.verify_trajectory
     strict = VerifyOptions(ratio_tolerance=-0.5)
-    monkeypatch.setattr(motion, "verify_trajectory", lambda trajectory, _options: honest(trajectory, strict))
+    monkeypatch.setattr(
+        motion, "verify_trajectory", lambda trajectory, _options, **more: honest(trajectory, strict, **more)
+    )
 
 
 def test_unverified_plan_says_so(run, task, write, tmp_path, too_strict):  # noqa: ARG001
@@ -154,8 +156,8 @@ def test_folder_in_the_place_of_a_result(run, task, write, tmp_path):
 def test_json_knows_no_nan(run, task, write, tmp_path, monkeypatch):
     honest = motion.verify_trajectory
 
-    def endless(trajectory, options):
-        return replace(honest(trajectory, options), worst_ratio=math.inf, path_error=math.nan)
+    def endless(trajectory, options, **more):
+        return replace(honest(trajectory, options, **more), worst_ratio=math.inf, path_error=math.nan)
 
     monkeypatch.setattr(motion, "verify_trajectory", endless)
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
@@ -275,7 +277,7 @@ def test_export(run, planned, tmp_path):
     np.testing.assert_allclose(np.diff(times)[:-1], 0.01)
 
 
-@pytest.mark.parametrize("kind", ["torques", "postures", "motion", "overview", "timeline"])
+@pytest.mark.parametrize("kind", ["torques", "postures", "motion", "overview", "timeline", "limits"])
 def test_plot(kind, run, planned, tmp_path):
     _, out = planned
     figure = tmp_path / f"{kind}.svg"

@@ -62,7 +62,12 @@ def test_torque_cannot_hold_the_arm(run, task, write):
     task["start"] = {"joints": [0.0, 0.3, 0.3]}
     outcome = run("plan", write(task))
     assert outcome.code == 2
-    for part in ("'j1' cannot hold the arm against gravity", "Nm needed at rest", "10 Nm", "robot.limits.torque.j1"):
+    for part in (
+        "the torque limit of 'j1' cannot hold the arm against gravity",
+        "Nm needed at rest",
+        "10 Nm",
+        "robot.limits.torque.j1",
+    ):
         assert part in outcome.err
 
 

@@ -120,5 +120,5 @@ def test_wrong_parameters_are_said(parameters, said):
 
 def test_a_start_posture_beyond_it_is_refused(plugin):
     model = plugin.CoupledRange(("j2", "j3"), 0.5, 0.7)
-    with pytest.raises(brachis.errors.StartError, match=re.escape("'j2 + j3' is beyond its limit")):
+    with pytest.raises(brachis.errors.StartError, match=re.escape("the range limit of 'j2 + j3' is exceeded")):
         brachis.plan(None, ROOT / "examples/01_scara_line.yaml", limits=[model])

@@ -119,8 +119,8 @@ REASONS = {
     "gravity": (
         {"gravity": [0, -9.81, 0], "limits": {"torque": [280.0, 200.0, 100.0]}},
         {"path": [{"line": {"to": [2.8, 0.0]}}]},
-        "the torque limits cannot hold",
-        "the torque limits cannot hold",
+        "the torque limit cannot hold",
+        "the torque limit cannot hold",
     ),
 }
 

@@ -182,7 +182,7 @@ def plot(
     result: ResultFile,
     out: Annotated[Path, typer.Option(help="Figure to write: png, pdf or svg.")],
     kind: Annotated[
-        str, typer.Option(help="Which figure: torques, postures, motion, overview or timeline.")
+        str, typer.Option(help="Which figure: torques, postures, motion, overview, timeline or limits.")
     ] = "overview",
 ) -> None:
     """Draw a saved motion."""

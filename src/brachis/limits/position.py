@@ -27,7 +27,6 @@ class PositionLimit(Limit):
     kind = "position"
     static = True
     whole_turns = True
-    refusal = "is out of its range"
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
         low, high = robot.limits.position_lower[joints], robot.limits.position_upper[joints]

@@ -161,7 +161,7 @@ class Limit(ABC):
     bounds : tuple of Bound
         The figures that the user could change.
     refusal : str
-        What is said of a posture that it does not allow, after the subject.
+        What is said where an arm at rest is beyond it, after "the ... limit".
     """
 
     kind: str
@@ -172,7 +172,7 @@ class Limit(ABC):
     time_scaling: bool = False
     static: bool = False
     whole_turns: bool = False
-    refusal: str = "is beyond its limit"
+    refusal: str = "is exceeded at rest"
 
     @abstractmethod
     def values(self, motion: JointMotion) -> np.ndarray:
@@ -181,6 +181,11 @@ class Limit(ABC):
     @abstractmethod
     def partials(self, motion: JointMotion) -> Partials:
         """Differentiate `values` with respect to q, qdot, qddot, each taken as independent."""
+
+    @property
+    def name(self) -> str:
+        """The kind in words."""
+        return self.kind.replace("_", " ")
 
     @property
     def violation_scale(self) -> np.ndarray:

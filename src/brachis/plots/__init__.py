@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from brachis.plots.candidates import plot_candidates
 from brachis.plots.comparison import plot_comparison
+from brachis.plots.limits import plot_limits
 from brachis.plots.motion import plot_motion
 from brachis.plots.overview import plot_overview
 from brachis.plots.postures import plot_postures
@@ -28,6 +29,7 @@ PLOTS: dict[str, Callable[[Trajectory], Figure]] = {
     "motion": plot_motion,
     "overview": plot_overview,
     "timeline": plot_timeline,
+    "limits": plot_limits,
 }
 """Plots of one trajectory by name; `plot_comparison` compares many, `plot_candidates` draws a search."""
 
@@ -37,6 +39,7 @@ __all__ = [
     "check_suffix",
     "plot_candidates",
     "plot_comparison",
+    "plot_limits",
     "plot_motion",
     "plot_overview",
     "plot_postures",

@@ -278,7 +278,7 @@ class Lattice:
         refused: dict[str, int] = {}
         for limit in self._static:
             allowed = np.all(limit.violation(limit.values(still)) <= _SLACK, axis=1)
-            refused[f"the {limit.kind} limit {limit.refusal}"] = int((clear & ~allowed).sum())
+            refused[f"the {limit.name} limit {limit.refusal}"] = int((clear & ~allowed).sum())
             held &= allowed
         if not (clear & held).any():
             refused[OTHER_BRANCH] = int((~clear).sum())

@@ -69,8 +69,8 @@ def explain_failure(
         *(
             (
                 _allowed(limit, own),
-                f"the {limit.kind} limit {limit.refusal} from s = {{first:.3g}} on",
-                f"Raise the {limit.kind} limit, or lead the path elsewhere",
+                f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on",
+                f"Raise the {limit.name} limit, or lead the path elsewhere",
             )
             for limit in limits
             if limit.static and not limit.whole_turns

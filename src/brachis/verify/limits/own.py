@@ -27,4 +27,4 @@ def check_own(model: LimitModel, given: Given) -> tuple[str, Worst]:
         return np.abs(independent(given.robot, states.q, states.qdot, states.qddot, states.tau))
 
     worst = worst_between(given, ratios, [label.subject for label in limit.labels])
-    return limit.kind.replace("_", " "), worst if independent else worst._replace(remark=_OWN_FORMULA)
+    return limit.name, worst if independent else worst._replace(remark=_OWN_FORMULA)

@@ -1,0 +1,44 @@
+"""Ratios to all limits, a panel for each kind."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from brachis.bottleneck import limit_ratios
+from brachis.plots import plot_limits
+from brachis.task import ToolLimits
+
+
+def lines(ax):
+    """Curves by their labels."""
+    return {line.get_label(): line for line in ax.get_lines() if not line.get_label().startswith("_")}
+
+
+def test_a_panel_for_every_kind_and_a_line_for_every_value(line_trajectory):
+    capped = line_trajectory.task.model_copy(update={"tool_limits": ToolLimits(speed=2.0)})
+    trajectory = dataclasses.replace(line_trajectory, task=capped)
+    ratios = limit_ratios(trajectory)
+    panels = plot_limits(trajectory).axes
+    drawn = {(line, ax.get_ylabel().split(" / ")[0]): lines(ax)[line] for ax in panels for line in lines(ax)}
+    assert set(drawn) == {(label.subject, label.kind) for label in ratios.labels}
+    assert ("tool", "speed") in drawn
+    for label, column in zip(ratios.labels, ratios.values.T, strict=True):
+        np.testing.assert_array_equal(drawn[label.subject, label.kind].get_ydata(), column)
+
+
+def test_a_joint_has_one_colour_in_all_panels(line_trajectory):
+    for name in line_trajectory.joint_names:
+        found = {lines(ax)[name].get_color() for ax in plot_limits(line_trajectory).axes if name in lines(ax)}
+        assert len(found) == 1
+
+
+@pytest.mark.parametrize("name", ["line_trajectory", "spatial_trajectory"])
+def test_nothing_is_cut_off(name, request):
+    figure = plot_limits(request.getfixturevalue(name))
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        low, high = ax.get_ylim()
+        assert all(low <= value <= high for line in lines(ax).values() for value in line.get_ydata())
