@@ -142,7 +142,7 @@ def test_interrupt_during_an_evaluation(name, evaluation):
     assert len(problem.evaluations) == evaluation, "the backend went on after the interrupt"
 
 
-# The objective is not the first variable here, as it is in a transcription.
+# The objective is not the first variable here, as it is in a program of one phase.
 def test_progress_tells_iteration_and_objective(name):
     problem, calls = bounded(), []
     report = solve(name, problem, [1.0, 3.0], progress=lambda *call: calls.append(call))

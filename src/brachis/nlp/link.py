@@ -15,8 +15,9 @@ from brachis.nlp.phase import Phase
 class Link:
     """Joints whose positions at the end of one phase are those at the start of another.
 
-    A row for each of them is the difference of the two, rad or m, which is 0. Where a phase fixes a position at its
-    boundary, only the other phase's variables matter; a joint that both phases fix needs no link.
+    A row for each of them is the difference of the two, rad or m, turns included, which is 0. Where a phase fixes a
+    position at its boundary, only the other phase's variables matter; a joint that both phases fix needs no link. Along
+    paths on both sides the redundant joints are enough: the closed form gives the others.
 
     Attributes
     ----------

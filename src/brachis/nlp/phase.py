@@ -83,17 +83,11 @@ class Phase:
         return other
 
     def resampled(self, t_norm: np.ndarray) -> Phase:
-        """Return the same phase over its present knots, fixed, with other collocation points; x keeps its meaning.
-
-        Parameters
-        ----------
-        t_norm : (K,) ndarray
-            In normalised time, ascending, from 0 to 1.
-        """
+        """Return the same phase over its present knots, with collocation points `t_norm`; x keeps its meaning."""
         return self.with_knots(self.knots, t_norm)
 
     def with_knots(self, knots: np.ndarray, t_norm: np.ndarray) -> Phase:
-        """Return the same phase over other fixed knots, with collocation points `t_norm`.
+        """Return the same phase over other fixed knots, with collocation points `t_norm`, ascending from 0 to 1.
 
         Where `knots` contain the present ones, ``variables_from(before.motion(x).over(knots))`` is the same motion.
         """

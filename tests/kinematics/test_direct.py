@@ -1,0 +1,31 @@
+"""The joint map without a path: the identity."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.kinematics import DirectJointMap
+from brachis.limits import branch_margin
+from support.chains import planar_robot
+
+
+def test_every_joint_is_a_curve():
+    start = np.array([0.4, -0.2, 0.1])
+    free = DirectJointMap(planar_robot("RRP"), start)
+    y, ydot, yddot = np.random.default_rng(0).normal(size=(3, 5, 3))
+    state = free.state(y, ydot, yddot, t=np.linspace(0.0, 1.0, 5), near=y + 7.0)
+    for mine, given in ((state.q, y), (state.qdot, ydot), (state.qddot, yddot), (free.postures(y), y)):
+        np.testing.assert_array_equal(mine, given)
+    np.testing.assert_array_equal(state.gradient, [np.eye(3)] * 5)
+    exact = free.derivatives(state)
+    for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot):
+        np.testing.assert_array_equal(part, np.zeros((5, 3, 3)))
+    assert free.path is None
+    assert free.r == 3
+    np.testing.assert_array_equal(free.coordinates(0.0, start), start)
+
+
+def test_nothing_guards_it():
+    free = DirectJointMap(planar_robot("RRP"), np.zeros(3))
+    assert branch_margin.build(free) == ()
+    assert free.branch_margin_gradient(np.zeros((4, 3))).shape == (4, 0, 3)
