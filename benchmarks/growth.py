@@ -18,7 +18,7 @@ INTERVALS = (10, 20, 50, 100, 200)
 
 
 def first_point(program):
-    """Start from the first course of numeric inverse kinematics."""
+    """Start from the first joint path of numeric inverse kinematics."""
     return starting_point(program, [next(differential_ik_paths(program.phases[0].joint_map))])
 
 

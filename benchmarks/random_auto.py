@@ -1,9 +1,9 @@
-"""Random postures and lines with everything left open: of those with a course on a lattice, how many are planned.
+"""Random postures and lines with everything left open: of those with a joint path on a lattice, how many are planned.
 
 Usage: python benchmarks/random_auto.py [ROBOT|all] [SEED] [COUNT]
 
 The tasks are those of random_lines.py (the planar arm) and random_poses.py (the spatial ones) with
-``redundant_joints: auto`` at effort fast. A lattice course exists if the lattice of any closed form has one; it is
+``redundant_joints: auto`` at effort fast. A lattice joint path exists if the lattice of any closed form has one; it is
 looked for apart from the plan.
 """
 
@@ -41,7 +41,7 @@ def tasks(name: str, robot: Robot, seed: int, count: int) -> Iterator[dict[str, 
 
 
 def has_course(robot: Robot, task: dict[str, object]) -> bool:
-    """Tell whether the lattice of any choice of redundant joints has a course."""
+    """Tell whether the lattice of any choice of redundant joints has a joint path."""
     try:
         found = decompositions_of(Problem.of(robot, load_task(task)))
     except BrachisError:
@@ -67,9 +67,9 @@ def main() -> None:
             joint_paths += exists
             planned += exists and not reason
             if reason:
-                print(f"{name} {number}, {'a' if exists else 'no'} lattice course: {reason}", flush=True)
+                print(f"{name} {number}, {'a' if exists else 'no'} lattice joint path: {reason}", flush=True)
         print(
-            f"{name}: {joint_paths} of {count} have a lattice course, {planned} of these are planned and verified; "
+            f"{name}: {joint_paths} of {count} have a lattice joint path, {planned} of these are planned and verified; "
             f"median {np.median(times):.2f} s, longest {max(times):.1f} s",
             flush=True,
         )

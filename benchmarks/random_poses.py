@@ -5,9 +5,9 @@ Usage: python benchmarks/random_poses.py [ROBOT|all] [SEED] [COUNT] [roomiest|in
 A task starts in a random posture (a tenth of every range is kept clear at both ends), and its path leads straight, the
 orientation turning at a constant rate, to the pose of another posture whose joints are up to 0.5 rad or 0.5 m away. It
 counts as reachable if a damped least-squares inverse kinematics, which knows nothing of the planner, follows the path
-within the joint ranges and with torques that hold the arm at rest. The redundant joint is the one whose closed form has
-the most room along this course (the largest least branch margin), or goes round all closed forms in turn, which counts
-those as well whose branch ends along the path.
+within the joint ranges and with torques that hold the arm at rest. The redundant joint is the one whose closed form keeps
+farthest from singularity along this joint path (the largest least branch margin), or goes round all closed forms in
+turn, which counts those as well whose branch ends along the path.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def closed_forms(robot: Robot) -> list[ik.Candidate]:
 
 
 def room(joint_path: np.ndarray, candidate: ik.Candidate) -> float:
-    """Least branch margin along a course of postures (K, n), on the branch where it is largest."""
+    """Least branch margin along a joint path of postures (K, n), on the branch where it is largest."""
     solver = candidate.solver
     return max(float(solver.branch_margins(joint_path, b).min()) for b in range(len(solver.branches)))
 

@@ -16,7 +16,7 @@ from brachis.solvers import SolverOptions, solver_named
 
 
 def first_point(program):
-    """Start from the first course of numeric inverse kinematics."""
+    """Start from the first joint path of numeric inverse kinematics."""
     return starting_point(program, [next(differential_ik_paths(program.phases[0].joint_map))])
 
 

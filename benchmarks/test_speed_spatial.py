@@ -23,7 +23,7 @@ POSES = 2000
 
 
 def first_point(program):
-    """Start from the first course of numeric inverse kinematics."""
+    """Start from the first joint path of numeric inverse kinematics."""
     return starting_point(program, [next(differential_ik_paths(program.phases[0].joint_map))])
 
 

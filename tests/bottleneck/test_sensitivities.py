@@ -9,7 +9,7 @@ import pytest
 
 import brachis
 from brachis.bottleneck import sensitivities
-from brachis.bottleneck.multipliers import Multipliers, Pushes, multipliers_of
+from brachis.bottleneck.multipliers import ActiveSet, Multipliers, multipliers_of
 from brachis.bottleneck.sensitivities import sensitivities_at
 from brachis.solvers import SolverOptions, solver_named
 
@@ -119,10 +119,10 @@ def test_rows_that_nothing_can_change_do_not_press(slide, end):
     limits = {"torque": {"j1": 30.0}, "position": {"j1": [lower, upper]}}
     refined = slide((X, X), ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits}).attempt.refined
     program, x = refined.program, refined.reports[-1].x
-    pushes = Pushes.at(program, x, 1e-5)
-    assert np.abs(pushes.slopes).max(axis=1).min() > 0.0
+    active_set = ActiveSet.at(program, x, 1e-5)
+    assert np.abs(active_set.slopes).max(axis=1).min() > 0.0
     at_start = np.flatnonzero(np.minimum(program.rows(x) - program.lower, program.upper - program.rows(x)) == 0.0)
-    assert set(at_start) - set(pushes.rows), "some row should hold without pressing"
+    assert set(at_start) - set(active_set.rows), "some row should hold without pressing"
 
 
 @pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
@@ -164,11 +164,11 @@ def test_multipliers_of_wrong_sign_are_not_believed(scara):
 
 
 def test_two_rows_that_hold_alike_give_way_together_only():
-    # min t over t >= b1, t >= b2 with b1 = b2: relief of one alone saves nothing.
-    pushes = Pushes(np.array([[1.0], [1.0]]), np.array([0, 1]), np.array([1.0, 1.0]))
-    assert pushes.dependent
+    # min t over t >= b1, t >= b2 with b1 = b2: relaxation of one alone saves nothing.
+    active_set = ActiveSet(np.array([[1.0], [1.0]]), np.array([0, 1]), np.array([1.0, 1.0]))
+    assert active_set.dependent
     for weights in ([1.0, 0.0], [0.3, 0.7]):
-        both = Multipliers(pushes, np.array(weights), "solver", 0.0, unique=False)
+        both = Multipliers(active_set, np.array(weights), "solver", 0.0, unique=False)
         assert both.change(np.array([1.0, 0.0])) == pytest.approx(0.0)
         assert both.change(np.array([0.0, 1.0])) == pytest.approx(0.0)
         assert both.change(np.array([1.0, 2.0])) == pytest.approx(-1.0)

@@ -81,7 +81,7 @@ def test_answers_of_a_sign_are_distinct_and_in_ascending_order(name):
     steps = np.diff(angle, axis=1)
     assert not np.any(steps < -0.01)
     finite = np.isfinite(angle)
-    assert np.all(np.diff(finite.astype(int), axis=1) <= 0), "the first slots are filled"
+    assert np.all(np.diff(finite.astype(int), axis=1) <= 0), "the first alternatives are filled"
     assert np.nanmin(np.abs(np.diff(solved, axis=1)).max(axis=2)) > 1e-6
 
 

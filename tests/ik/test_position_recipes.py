@@ -10,7 +10,7 @@ from support.factored_bench import Bench
 from support.screw_arms import BASES, extra, screw_robot, wrist
 
 
-def slots(name):
+def alternatives(name):
     """How many answers the three joints have: one where a step has nothing that turns."""
     if "|" not in name:
         return 4
@@ -28,7 +28,7 @@ def test_every_recipe(name, arrangement):
     elif arrangement == "carried":  # redundant joints before, within and behind the six
         axes, redundant = [extra(rng, "R"), *axes[:3], extra(rng, "P"), *axes[3:], extra(rng, "R")], (0, 4, 8)
     bench = Bench(screw_robot(axes), redundant).check()
-    assert len(bench.solver.branches) == 2 * slots(name)
+    assert len(bench.solver.branches) == 2 * alternatives(name)
     assert len(set(bench.solver.branches)) == len(bench.solver.branches)
 
 

@@ -22,7 +22,7 @@ spec.loader.exec_module(table)
 
 
 def random_joint_path(rng: np.random.Generator, start: float) -> np.ndarray:
-    """A smooth course of the redundant joint that may go anywhere, (S, 2)."""
+    """A smooth joint path of the redundant joint that may go anywhere, (S, 2)."""
     s = np.linspace(0.0, 1.0, 41)
     sizes = rng.normal(size=4) * [1.5, 0.8, 0.5, 0.3]
     waves = sum(size * np.sin(k * np.pi * s) for k, size in enumerate(sizes[1:], 1))
@@ -30,7 +30,7 @@ def random_joint_path(rng: np.random.Generator, start: float) -> np.ndarray:
 
 
 def restarts(problem: Problem) -> dict[str, np.ndarray]:
-    """End times, s, of plans from random courses, for every choice of the redundant joint."""
+    """End times, s, of plans from random joint paths, for every choice of the redundant joint."""
     rng = np.random.default_rng(0)
     times = {}
     for decomposition in decompositions_of(problem):

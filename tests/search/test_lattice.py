@@ -1,4 +1,4 @@
-"""Courses on the lattice: on the path, continuous, within limits, different; and the reasons where there is none."""
+"""Joint paths on the lattice: on the path, continuous, within limits, different; reasons where there is none."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ def test_acceleration_limits_alone_have_shortest_courses():
     assert len(joint_paths) == 3
     assert joint_paths[0].length > 0.0
     steps = np.abs(np.diff(joint_paths[0].q[:, 0], n=2))
-    assert steps.max() < 0.2, "the shortest course does not zigzag"
+    assert steps.max() < 0.2, "the shortest joint path does not zigzag"
 
 
 @pytest.mark.parametrize("turns", [4, 30])

@@ -1,4 +1,4 @@
-"""Least times along fixed courses, against formulas."""
+"""Least times along fixed joint paths, against formulas."""
 
 from __future__ import annotations
 

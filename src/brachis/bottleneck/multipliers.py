@@ -8,8 +8,8 @@ with p_i the gradient of a row or variable at its lower bound, or minus that at 
 left over, relative to the gradient's, tells how far an answer is from being stationary.
 
 If the bounds of the active rows give way at rates d_i >= 0, then dt_E = -sum_i w_i d_i. Where the slopes are linearly
-dependent, many sets of multipliers balance the gradient, and the one that holds for a relief is the one that promises
-the least (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977): a linear program.
+dependent, many sets of multipliers balance the gradient, and the one that holds for a relaxation is the one that
+promises the least (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977): a linear program.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ from brachis.refine import Refined
 
 ACTIVE = (1e-8, 1e-7, 1e-6, 1e-5)
 """Distances from a bound within which rows and variables press on it; dimensionless. The least that gives a balance
-counts: solvers differ in how near they come, and what does not press would seem to take back what a relief promises."""
+counts: solvers differ in how near they come, and a row that is near its bound without being active would count as one
+that takes over within any step."""
 _GOOD = 1e-5
 """The solver's multipliers with a smaller residual are taken as they are."""
 _DEPENDENT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Pushes:
+class ActiveSet:
     """What presses on a point x.
 
     Attributes
@@ -49,7 +50,7 @@ class Pushes:
     signs: np.ndarray
 
     @classmethod
-    def at(cls, program: Program, x: np.ndarray, near: float) -> Pushes:
+    def at(cls, program: Program, x: np.ndarray, near: float) -> ActiveSet:
         """Collect what presses on x, (v,): what is nearer to its bound than `near`, dimensionless.
 
         Raises
@@ -72,7 +73,7 @@ class Pushes:
         """True where several sets of multipliers may balance a gradient."""
         return bool(np.linalg.matrix_rank(self.slopes, tol=_DEPENDENT) < len(self.slopes))
 
-    def leftover(self, gradient: np.ndarray, weights: np.ndarray) -> float:
+    def stationarity_residual(self, gradient: np.ndarray, weights: np.ndarray) -> float:
         """Norm of the part of a gradient, (v,), that weights, (p,), do not balance; relative to the gradient's."""
         return float(np.linalg.norm(gradient - weights @ self.slopes) / np.linalg.norm(gradient))
 
@@ -95,29 +96,29 @@ class Multipliers:
 
     Attributes
     ----------
-    pushes : Pushes
+    active_set : ActiveSet
     weights : (p,) ndarray
-        Multipliers of the pushes, >= 0; s for a row, whose values are dimensionless.
+        Multipliers of the active_set, >= 0; s for a row, whose values are dimensionless.
     source : str
         ``"solver"`` or ``"least squares"``.
     residual : float
-        See `Pushes.leftover`; 1 where nothing balances.
+        See `ActiveSet.stationarity_residual`; 1 where nothing balances.
     unique : bool
         False where other multipliers balance the gradient as well.
     """
 
-    pushes: Pushes
+    active_set: ActiveSet
     weights: np.ndarray
     source: str
     residual: float
     unique: bool
 
-    def change(self, relief: np.ndarray, side: float | None = None) -> float:
+    def change(self, relaxation: np.ndarray, side: float | None = None) -> float:
         """Directional derivative of t_E as bounds give way.
 
         Parameters
         ----------
-        relief : (c,) ndarray
+        relaxation : (c,) ndarray
             Rates >= 0 at which the bounds of every row move outwards, dimensionless.
         side : {1, -1}, optional
             Only lower, or only upper bounds move.
@@ -127,9 +128,9 @@ class Multipliers:
         float
             <= 0, s.
         """
-        rates = relief[self.pushes.rows]
+        rates = relaxation[self.active_set.rows]
         if side is not None:
-            rates = np.where(self.pushes.signs == side, rates, 0.0)
+            rates = np.where(self.active_set.signs == side, rates, 0.0)
         active = self.weights[: len(rates)]
         if self.unique or not (rates @ active):
             return -float(rates @ active)
@@ -139,7 +140,7 @@ class Multipliers:
         """Least of ``rates @ w`` over all weights that balance as much as `weights` do."""
         from scipy.optimize import linprog  # noqa: PLC0415
 
-        slopes = self.pushes.slopes
+        slopes = self.active_set.slopes
         found = linprog(rates, A_eq=slopes.T, b_eq=self.weights @ slopes, bounds=(0.0, None), method="highs")
         best = self.weights if found.x is None else found.x
         return float(rates @ best)
@@ -166,20 +167,20 @@ def multipliers_of(program: Program, x: np.ndarray, given: np.ndarray | None = N
     """
     tried: list[Multipliers] = []
     for near in ACTIVE:
-        tried.append(_balancing(Pushes.at(program, x, near), program.gradient(), given))
+        tried.append(_balancing(ActiveSet.at(program, x, near), program.gradient(), given))
         if tried[-1].residual <= _GOOD:
             break
     return min(tried, key=lambda multipliers: multipliers.residual)
 
 
-def _balancing(pushes: Pushes, gradient: np.ndarray, given: np.ndarray | None) -> Multipliers:
-    """Choose the weights of pushes that balance a gradient, (v,), best."""
-    candidates = [] if given is None else [("solver", pushes.weights_of(gradient, given))]
-    if not candidates or pushes.leftover(gradient, candidates[0][1]) > _GOOD:
-        candidates.append(("least squares", pushes.fitted_weights(gradient)))
-    source, weights = min(candidates, key=lambda candidate: pushes.leftover(gradient, candidate[1]))
-    residual = pushes.leftover(gradient, weights)
-    return Multipliers(pushes, weights, source, residual, unique=not pushes.dependent)
+def _balancing(active_set: ActiveSet, gradient: np.ndarray, given: np.ndarray | None) -> Multipliers:
+    """Choose the weights of active_set that balance a gradient, (v,), best."""
+    candidates = [] if given is None else [("solver", active_set.weights_of(gradient, given))]
+    if not candidates or active_set.stationarity_residual(gradient, candidates[0][1]) > _GOOD:
+        candidates.append(("least squares", active_set.fitted_weights(gradient)))
+    source, weights = min(candidates, key=lambda candidate: active_set.stationarity_residual(gradient, candidate[1]))
+    residual = active_set.stationarity_residual(gradient, weights)
+    return Multipliers(active_set, weights, source, residual, unique=not active_set.dependent)
 
 
 def multipliers_of_answer(refined: Refined) -> Multipliers:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from brachis.arrays import cross
-from brachis.ik.held_joints import HeldJoints
+from brachis.ik.remaining_joints import RemainingJoints
 from brachis.ik.screws import Screw
 from brachis.ik.vectors import across, dot
 
@@ -70,23 +70,23 @@ class Arm:
         return replace(self, screws=(*self.screws[:joint], moved, *self.screws[joint + 1 :]))
 
 
-def aligned(joints: HeldJoints, i: int, j: int) -> bool:
+def aligned(joints: RemainingJoints, i: int, j: int) -> bool:
     """Whether the directions of two joints, of whatever kind, are always parallel."""
     return bool(np.abs(cross(joints.axes[:, i], joints.axes[:, j])).max() < _TOLERANCE)
 
 
-def perpendicular(joints: HeldJoints, i: int, j: int) -> bool:
+def perpendicular(joints: RemainingJoints, i: int, j: int) -> bool:
     """Whether the directions of two joints, of whatever kind, are always at a right angle."""
     return bool(np.abs(dot(joints.axes[:, i], joints.axes[:, j])).max() < _TOLERANCE)
 
 
-def miss(joints: HeldJoints, *places: int) -> float:
+def miss(joints: RemainingJoints, *places: int) -> float:
     """Largest distance of the axes of revolute joints from the point where the first two come nearest, m."""
     gaps = across(joints.axes[:, places], _nearest(joints, *places[:2])[:, None] - joints.points[:, places])
     return float(np.sqrt(dot(gaps, gaps).max()))
 
 
-def meeting(joints: HeldJoints, *places: int) -> Anchor | None:
+def meeting(joints: RemainingJoints, *places: int) -> Anchor | None:
     """Point in which the axes of joints always meet; None if there is none, or if it moves along all of them.
 
     Of two axes that coincide it is any point.
@@ -101,7 +101,7 @@ def meeting(joints: HeldJoints, *places: int) -> Anchor | None:
     return None
 
 
-def _nearest(joints: HeldJoints, i: int, j: int) -> np.ndarray:
+def _nearest(joints: RemainingJoints, i: int, j: int) -> np.ndarray:
     """Point (3, S) on the axis of i that is nearest to that of j; any one where they are parallel."""
     first, second = joints.axes[:, i], joints.axes[:, j]
     normal = cross(first, second)

@@ -83,7 +83,7 @@ class Displacement:
         )
 
     def screws(self) -> tuple[Screw, ...]:
-        """Screws of the joints: (3, 1, 1, 1, K), with room for three slots."""
+        """Screws of the joints: (3, 1, 1, 1, K), with room for three alternatives."""
         axes, points = (array[:, :, None, None, None] for array in (self.axes, self.points))
         return tuple(Screw(axes[:, i], points[:, i], bool(turns)) for i, turns in enumerate(self.revolute))
 

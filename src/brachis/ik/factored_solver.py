@@ -12,10 +12,10 @@ import numpy as np
 from brachis.ik.arm import Anchor, Arm
 from brachis.ik.factors import Factor, FactoredBranches, vanishing
 from brachis.ik.geometry import ChainGeometry, PosedScrews
-from brachis.ik.held_joints import HeldJoints
 from brachis.ik.pose_joints import largest_determinant, random_postures
 from brachis.ik.position_recipes import Recipe
 from brachis.ik.protocol import IKSolver, Kind, NotApplicableError
+from brachis.ik.remaining_joints import RemainingJoints
 
 
 @dataclass(frozen=True)
@@ -24,15 +24,15 @@ class Structure(ABC):
 
     Attributes
     ----------
-    joints : HeldJoints
+    joints : RemainingJoints
     """
 
-    joints: HeldJoints
+    joints: RemainingJoints
 
     @property
     @abstractmethod
     def factors(self) -> tuple[Factor, ...]:
-        """Factors of det J_nr, of the slots of the steps."""
+        """Factors of det J_nr, of the alternatives of the steps."""
 
     @abstractmethod
     def posed(self, posed: PosedScrews) -> Arm:
@@ -65,7 +65,7 @@ class PlacingStructure(Structure):
         return self.recipe.factors
 
 
-J = TypeVar("J", bound=HeldJoints)
+J = TypeVar("J", bound=RemainingJoints)
 S = TypeVar("S", bound=Structure)
 
 
@@ -91,7 +91,7 @@ class FactoredSolver(IKSolver, Generic[S]):
 
     @abstractmethod
     def steps(self, targets: np.ndarray, q_r: np.ndarray) -> tuple[Arm, Sequence[np.ndarray]]:
-        """Return the arm while its joints are at zero, and their positions, with the slots before the samples.
+        """Return the arm while its joints are at zero, and their positions, with the alternatives before the samples.
 
         A slide whose direction, beside a plane, depends on joints that are solved for before it has that direction.
         """
@@ -113,7 +113,7 @@ def fitted(geometry: ChainGeometry, joints: J, fits: Sequence[Callable[[J], S]])
     Parameters
     ----------
     geometry : ChainGeometry
-    joints : HeldJoints
+    joints : RemainingJoints
         From the base to the tool.
     fits : sequence of callable
         Each returns a structure of the joints, or raises `NotApplicableError`; the first that does is taken.

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.ik.arm import Arm
-from brachis.ik.held_joints import HeldJoints
+from brachis.ik.remaining_joints import RemainingJoints
 from brachis.ik.vectors import wrap
 
 _VANISHES = 1e-9
@@ -47,7 +47,7 @@ class Factor:
     words: tuple[str, str]
     slides: tuple[int, ...] = ()
 
-    def linear(self, joints: HeldJoints) -> bool:
+    def linear(self, joints: RemainingJoints) -> bool:
         """Whether the step has one answer."""
         return bool(self.slides) and not joints.revolute[list(self.slides)].any()
 
@@ -63,7 +63,7 @@ class FactoredBranches:
     Parameters
     ----------
     factors : sequence of Factor
-    joints : HeldJoints
+    joints : RemainingJoints
     postures : Arm
         Random ones, by which the factors' sizes and signs are told.
 
@@ -73,7 +73,7 @@ class FactoredBranches:
         A word for each factor that has both signs.
     """
 
-    def __init__(self, factors: Sequence[Factor], joints: HeldJoints, postures: Arm) -> None:
+    def __init__(self, factors: Sequence[Factor], joints: RemainingJoints, postures: Arm) -> None:
         self._factors = factors
         self._joints = joints
         values = [factor.value(postures) for factor in factors]
@@ -96,7 +96,7 @@ class FactoredBranches:
         Parameters
         ----------
         values : sequence of (..., K) ndarray
-            Positions of the joints, in the order of `HeldJoints`, with the slots as axes before the samples.
+            Positions of the joints, in the order of `RemainingJoints`; the alternatives are axes before the samples.
         held : Arm
             While the joints are at zero.
 
@@ -112,9 +112,9 @@ class FactoredBranches:
         turning = slice(None) if revolute.all() else revolute
         joints[turning] = wrap(joints[turning])
         joints += 0.0 * joints.sum(axis=0)
-        slots = range(len(self._factors) + 1)
+        alternatives = range(len(self._factors) + 1)
         for slot in self._sided:
-            side = np.expand_dims(self._signs[slot], [axis for axis in slots if axis != slot])
+            side = np.expand_dims(self._signs[slot], [axis for axis in alternatives if axis != slot])
             joints = np.where(side * self._factors[slot].value(held) > 0.0, joints, np.nan)
         ordered = joints[::-1] if self._joints.mirrored else joints
         return ordered.reshape(len(values), len(self.labels), -1).T

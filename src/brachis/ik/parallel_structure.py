@@ -61,7 +61,7 @@ class ParallelStructure(Structure):
 
     @property
     def factors(self) -> tuple[Factor, ...]:
-        """See `Structure.factors`; of the slots shoulder, elbow, wrist, or of elbow, wrist, rail."""
+        """See `Structure.factors`; of the alternatives shoulder, elbow, wrist, or of elbow, wrist, rail."""
         elbow = Factor(self._elbow, "the axes of two of {b}, {c}, {d} coincide", ("up", "down"))
         wrist = Factor(self._wrist, "the axes of {x}, {f}, {b} always are parallel to one plane", ("noflip", "flip"))
         if self.slide is None:

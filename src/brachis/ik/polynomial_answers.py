@@ -9,7 +9,7 @@ from brachis.ik.vectors import angle_about, apply, apply_inverse, dot, meeting_p
 
 
 def joints_of_roots(equation: Displacement, turn: int, roots: np.ndarray) -> np.ndarray:
-    """All six joints (6, K) in their order, angles of any lift, from q_a, p and theta, (3, K).
+    """All six joints (6, K) in their order, angles of any turn, from q_a, p and theta, (3, K).
 
     `turn` is the place of a, 0 or 1; the parallel axes are at 2 and 3, the meeting ones at 4 and 5.
     """

@@ -10,8 +10,8 @@ import numpy as np
 from brachis.arrays import cross
 from brachis.ik.arm import aligned, meeting
 from brachis.ik.geometry import ChainGeometry, PosedScrews
-from brachis.ik.held_joints import HeldJoints
 from brachis.ik.protocol import NotApplicableError
+from brachis.ik.remaining_joints import RemainingJoints
 from brachis.robot import TaskMap
 from brachis.robot.task_map import Pose
 
@@ -22,8 +22,8 @@ _SINGULAR = 1e-9
 
 
 @dataclass(frozen=True)
-class PoseJoints(HeldJoints):
-    """The six non-redundant joints of a pose; see `HeldJoints`."""
+class PoseJoints(RemainingJoints):
+    """The six non-redundant joints of a pose; see `RemainingJoints`."""
 
     @classmethod
     def of(cls, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> PoseJoints:

@@ -16,8 +16,8 @@ import numpy as np
 from brachis.ik import placing
 from brachis.ik.arm import Anchor, Arm, aligned, meeting, perpendicular
 from brachis.ik.factors import Factor
-from brachis.ik.held_joints import HeldJoints
 from brachis.ik.protocol import NotApplicableError
+from brachis.ik.remaining_joints import RemainingJoints
 
 
 @dataclass(frozen=True)
@@ -31,19 +31,19 @@ class Recipe:
     meets : tuple of int or None
         Two joints whose axes meet in `Arm.meeting`.
     solve : callable
-        Positions of a, b, c, with one or two answers along the slots `FRONT` and `UP`, from the screws while the joints
+        Positions of a, b, c, with one or two answers along the alternatives `FRONT` and `UP`, from the screws while the joints
         are at zero and the target of their centre; NaN where there is none.
     factors : tuple of Factor
-        Of these two slots.
+        Of these two alternatives.
     """
 
-    fits: Callable[[HeldJoints], bool]
+    fits: Callable[[RemainingJoints], bool]
     meets: tuple[int, int] | None
     solve: Callable[[Arm, np.ndarray], placing.Values]
     factors: tuple[Factor, Factor]
 
 
-def coplanar(joints: HeldJoints, i: int, j: int) -> bool:
+def coplanar(joints: RemainingJoints, i: int, j: int) -> bool:
     """Whether two joints move positions in planes of one and the same direction."""
     if joints.revolute[i] and joints.revolute[j]:
         return aligned(joints, i, j)
@@ -52,12 +52,12 @@ def coplanar(joints: HeldJoints, i: int, j: int) -> bool:
     return not aligned(joints, i, j)
 
 
-def meet(joints: HeldJoints, i: int, j: int) -> bool:
+def meet(joints: RemainingJoints, i: int, j: int) -> bool:
     """Whether the axes of two joints meet in a fixed point of one of them."""
     return meeting(joints, i, j) is not None
 
 
-def on_cylinder(joints: HeldJoints) -> bool:
+def on_cylinder(joints: RemainingJoints) -> bool:
     """Whether the first joint slides along the second's axis, and the third's is perpendicular to it."""
     return joints.revolute[:3].tolist() == [False, True, True] and aligned(joints, 0, 1) and perpendicular(joints, 1, 2)
 
@@ -115,7 +115,7 @@ RECIPES = (
 )
 
 
-def recipe_for(joints: HeldJoints, point: str) -> tuple[Recipe, Anchor | None]:
+def recipe_for(joints: RemainingJoints, point: str) -> tuple[Recipe, Anchor | None]:
     """Find the recipe by which the first three joints place a point, and where two of their axes meet if it matters.
 
     Raises
@@ -130,7 +130,7 @@ def recipe_for(joints: HeldJoints, point: str) -> tuple[Recipe, Anchor | None]:
     raise NotApplicableError(f"no closed form moves {point} by {', '.join(joints.names[:3])}: {relations}")
 
 
-def _relation(joints: HeldJoints, i: int, j: int) -> str:
+def _relation(joints: RemainingJoints, i: int, j: int) -> str:
     """How two neighbours lie to each other."""
     first, second = joints.names[i], joints.names[j]
     if joints.revolute[i] and joints.revolute[j]:

@@ -24,10 +24,10 @@ import numpy as np
 from brachis.ik.arm import Arm
 from brachis.ik.factored_solver import FactoredSolver, PlacingStructure, fitted
 from brachis.ik.geometry import ChainGeometry, PosedScrews
-from brachis.ik.held_joints import HeldJoints
 from brachis.ik.pose_joints import random_postures
 from brachis.ik.position_recipes import recipe_for
 from brachis.ik.protocol import NotApplicableError, ik_family
+from brachis.ik.remaining_joints import RemainingJoints
 from brachis.ik.screws import Screw
 from brachis.robot import TaskMap
 from brachis.robot.task_map import Pose
@@ -42,7 +42,7 @@ class ToolStructure(PlacingStructure):
     """Three joints and the recipe by which they place the tool."""
 
     @classmethod
-    def of(cls, three: HeldJoints) -> ToolStructure:
+    def of(cls, three: RemainingJoints) -> ToolStructure:
         """Find the recipe, from the base to the tool or the other way round.
 
         Raises
@@ -95,7 +95,7 @@ class PositioningSolver(FactoredSolver[ToolStructure]):
         posed = self._geometry.held(self._redundant, q_r)
         tool, target = posed.tool_position[:, None, None], targets.T[self._order, None, None]
         start, end = (target, tool) if structure.joints.mirrored else (tool, target)
-        arm = structure.arm(structure.joints.screws(posed, slots=2), start)
+        arm = structure.arm(structure.joints.screws(posed, alternatives=2), start)
         return arm, structure.recipe.solve(arm, end)
 
 
@@ -106,13 +106,13 @@ def positioning(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int
         raise NotApplicableError("only for the position: x, y and z")
     if geometry.n - len(redundant) != _JOINTS:
         raise NotApplicableError(f"{geometry.n - len(redundant)} joints would be left over, not three")
-    three = HeldJoints.beside(geometry, redundant)
+    three = RemainingJoints.beside(geometry, redundant)
     _refuse_idle(geometry, three)
     structure = fitted(geometry, three, (ToolStructure.of,))
     return PositioningSolver(geometry, redundant, structure, task_map.axes)
 
 
-def _refuse_idle(geometry: ChainGeometry, three: HeldJoints) -> None:
+def _refuse_idle(geometry: ChainGeometry, three: RemainingJoints) -> None:
     """Refuse a joint that never moves the tool: the last one, often, if the tool is on its axis."""
     speeds = np.abs(random_postures(geometry).jacobian_columns(three.joints)[:_JOINTS]).max(axis=(0, 2))
     for name, speed in zip(three.names, speeds, strict=True):

@@ -48,7 +48,7 @@ class IKSolver(ABC):
         Returns
         -------
         (K, B, A, m) ndarray
-            Chain order; angles in (-pi, pi] or any other lift; NaN where there is no answer, or no further one.
+            Chain order; angles in (-pi, pi] or any other turn; NaN where there is no answer, or no further one.
         """
 
     def solve_branch(self, targets: np.ndarray, q_r: np.ndarray, branch: int) -> np.ndarray:

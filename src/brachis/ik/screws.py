@@ -6,8 +6,8 @@ quadratic. Roots are told apart by the sign of the condition's derivative, so th
 continuous curve until the two meet: see Subproblems 1 to 4 of A. J. Elias, J. T. Wen, "IK-Geo: unified robot inverse
 kinematics using subproblem decomposition", 2022, whose solutions are in no such order.
 
-Vectors have their components along the first axis, then come the slots (alternatives, one axis for each step with two
-of them) and the samples; joint positions have slots and samples alone.
+Vectors have their components along the first axis, then come the alternatives (one axis for each step with
+two of them) and the samples; joint positions have alternatives and samples alone.
 """
 
 from __future__ import annotations

@@ -35,11 +35,11 @@ from brachis.ik.displacement import Displacement
 from brachis.ik.factored_solver import FactoredSolver, PlacingStructure, fitted
 from brachis.ik.factors import Factor
 from brachis.ik.geometry import ChainGeometry, PosedScrews
-from brachis.ik.held_joints import HeldJoints
 from brachis.ik.placing import FLIP
 from brachis.ik.pose_joints import PoseJoints
 from brachis.ik.position_recipes import recipe_for
 from brachis.ik.protocol import NotApplicableError, ik_family
+from brachis.ik.remaining_joints import RemainingJoints
 from brachis.ik.screws import Circle, Screw
 from brachis.ik.vectors import angle_about, apply, apply_inverse, dot
 from brachis.robot import TaskMap
@@ -71,7 +71,7 @@ class WristStructure(PlacingStructure):
     centre: Anchor
 
     @classmethod
-    def of(cls, six: HeldJoints) -> WristStructure:
+    def of(cls, six: RemainingJoints) -> WristStructure:
         """Find the centre and the recipe.
 
         Raises
@@ -85,13 +85,13 @@ class WristStructure(PlacingStructure):
         return cls(six, *recipe_for(six, _point(six)), centre)
 
     @classmethod
-    def backwards(cls, six: HeldJoints) -> WristStructure:
+    def backwards(cls, six: RemainingJoints) -> WristStructure:
         """See the joints from the tool: the axes of the first three have to meet."""
         return cls.of(six.reversed())
 
     @property
     def factors(self) -> tuple[Factor, ...]:
-        """See `Structure.factors`; of the slots `FRONT`, `UP`, `FLIP`."""
+        """See `Structure.factors`; of the alternatives `FRONT`, `UP`, `FLIP`."""
         return *self.recipe.factors, WRIST
 
     def words(self) -> dict[str, str]:
@@ -108,12 +108,12 @@ class WristStructure(PlacingStructure):
         return Arm(screws, centre, self.meeting.at(screws) if self.meeting else centre)
 
 
-def _point(six: HeldJoints) -> str:
+def _point(six: RemainingJoints) -> str:
     """Put the centre into words."""
     return f"the point where the axes of {', '.join(six.names[3:])} meet"
 
 
-def _reason_against_centre(six: HeldJoints) -> str:
+def _reason_against_centre(six: RemainingJoints) -> str:
     """Say why the last three joints have no centre."""
     names = ", ".join(six.names[3:])
     sliding = [six.names[i] for i in _WRIST if not six.revolute[i]]

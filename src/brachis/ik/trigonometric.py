@@ -47,7 +47,7 @@ def real_roots(samples: np.ndarray, degree: int) -> np.ndarray:
     Returns
     -------
     (2 d, K) ndarray
-        Angles, of any lift; NaN for roots with an imaginary part above 0.01, and where samples are not finite or all
+        Angles, of any turn; NaN for roots with an imaginary part above 0.01, and where samples are not finite or all
         zero.
     """
     count = len(samples)

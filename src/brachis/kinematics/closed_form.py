@@ -66,7 +66,7 @@ class ClosedFormMap:
     branch : int
         Index into ``solver.branches``.
     start : (n,) ndarray
-        Start posture; angles are lifted (by multiples of 2 pi) to begin nearest to it.
+        Start posture; turns of its angles by 2 pi are chosen to begin nearest to it.
     """
 
     def __init__(
@@ -159,7 +159,7 @@ class ClosedFormMap:
         return answers[np.arange(len(answers)), choice]
 
     def _tracked(self, answers: np.ndarray) -> np.ndarray:
-        """Choose from answers (K, A, m) at successive times a course, each nearest to its predecessor."""
+        """Choose from answers (K, A, m) at successive times a joint path, each nearest to its predecessor."""
         joint_path = np.empty((len(answers), len(self.nonredundant)))
         previous = self.start[self.nonredundant]
         for k in range(len(answers)):
@@ -184,11 +184,11 @@ class ClosedFormMap:
         y, ydot, yddot : (K, 1 + r) ndarray
             Path coordinate and redundant joints, and their time derivatives.
         t : (K,) ndarray, optional
-            The times, ascending from the start on, s. Angles are then lifted by 2 pi so that they follow their own
+            The times, ascending from the start on, s. Turns by 2 pi are then chosen so that angles follow their own
             velocities from the start posture on. Without `t` and `near`, successive times must be so close that no
             joint turns by pi in between.
         near : (K, n) ndarray, optional
-            Postures known to be near; angles are lifted to these, and the times may be any.
+            Postures known to be near; turns of angles follow these, and the times may be any.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Courses of the redundant joints by numeric inverse kinematics along the path.
+"""Joint paths by differential inverse kinematics along the path.
 
 As in the paper, it carries the start posture along the path. Its null-space motion climbs the branch margin and stays
 within the joint ranges, so that the closed form can follow.
@@ -59,13 +59,13 @@ STRATEGIES = (
 
 
 def differential_ik_paths(joint_map: ClosedFormMap, deadline: Deadline = NEVER) -> Iterator[np.ndarray]:
-    """Yield courses one after the other; where the first one comes near a branch boundary, the roomiest ones first.
+    """Yield joint paths one after the other; where the first one comes near a branch boundary, the roomiest ones first.
 
     Parameters
     ----------
     joint_map : ClosedFormMap
     deadline : Deadline, optional
-        Courses that are not complete by then are left out.
+        Joint paths that are not complete by then are left out.
 
     Yields
     ------
@@ -88,7 +88,7 @@ def differential_ik_paths(joint_map: ClosedFormMap, deadline: Deadline = NEVER) 
 
 
 def _room(joint_map: ClosedFormMap, joint_path: np.ndarray) -> float:
-    """Return the least branch margin along a course; -inf where the branch cannot follow it."""
+    """Return the least branch margin along a joint path; -inf where the branch cannot follow it."""
     q = joint_map.postures(joint_path)
     if not np.isfinite(q).all():
         return -np.inf

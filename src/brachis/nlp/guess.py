@@ -23,14 +23,15 @@ _FIT_DENSITY = 4
 
 
 def starting_point(program: Program, joint_paths: Sequence[np.ndarray]) -> np.ndarray | None:
-    """Fit splines to a course of every phase, and scale the time until the limits hold.
+    """Fit splines to a joint path of every phase, and scale the time until the limits hold.
 
-    Control points taken from the course itself smooth it; where that leaves the branch, least squares follow it closer.
+    Control points taken from the joint path itself smooth it; where that leaves the branch, least squares follow it
+    closer.
 
     Parameters
     ----------
     program : Program
-    courses : sequence of (S, c) ndarray
+    joint_paths : sequence of (S, c) ndarray
         For each phase, successive values of its curves: along a path of s and the redundant joints.
 
     Returns
@@ -55,7 +56,7 @@ def _followed(phase: Phase, joint_path: np.ndarray) -> np.ndarray:
 
 
 def _timed(joint_path: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
-    """Follow a course, (S, c), with a smooth motion from rest to rest: the places at `t_norm`, (K, c)."""
+    """Follow a joint path, (S, c), with a smooth motion from rest to rest: the places at `t_norm`, (K, c)."""
     u = t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
     grid = np.linspace(0.0, 1.0, len(joint_path))
     return np.column_stack([np.interp(u, grid, column) for column in joint_path.T])

@@ -44,8 +44,8 @@ class Cells:
     def of(cls, decomposition: Decomposition, cells_per_turn: int, posture: np.ndarray | None) -> Cells:
         """Lay out the cells of a choice of redundant joints.
 
-        The posture, (n,), from which courses begin is the middle of a cell. Where none is given, the cells cover closed
-        ranges, a turn of an open revolute joint, and what of an open prismatic joint is near the path's beginning.
+        The posture, (n,), from which joint paths begin is the middle of a cell. Where none is given, the cells cover
+        closed ranges, a turn of an open revolute joint, and what of an open prismatic joint is near the path's beginning.
         """
         given, joints = decomposition.problem, list(decomposition.redundant)
         turning = np.array([given.robot.position_units[joint] == "rad" for joint in joints], dtype=bool)

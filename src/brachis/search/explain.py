@@ -23,7 +23,7 @@ _MOST_EFFORT = "exhaustive"
 def refuse_what_is_out_of_reach(decompositions: Sequence[Decomposition], candidates: Sequence[Attempt]) -> None:
     """Raise the reason where the path is out of reach, so that further attempts would be in vain.
 
-    Where no lattice has a course, any part of it counts; where no lattice was looked at, a good part.
+    Where no lattice has a joint path, any part of it counts; where no lattice was looked at, a good part.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def no_motion(
         )
         start = "" if decompositions[0].problem.start is None else "start in another posture, "
         return PathError(
-            f"no course along the path was found: {furthest}{others}",
+            f"no joint path was found: {furthest}{others}",
             s_interval=furthest.interval,
             hint=f"{start}shorten or move the path, or widen the joint ranges".capitalize()
             + _what_is_missing(decompositions[0]),
@@ -90,7 +90,7 @@ def no_motion(
 
 
 def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
-    """Say what may help where there are courses, but no motion along them: only what has not been tried."""
+    """Say what may help where there are joint paths, but no motion along them: only what has not been tried."""
     statuses = " ".join(candidate.status for candidate in candidates)
     few = SolverSettings.model_fields
     tried = []
@@ -102,7 +102,7 @@ def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
         tried.append(f"raise search.effort, which is {task.search.effort}")
     if not tried:
         tried.append("raise the limits, or try another start posture")
-    return f"There is a course along the path within reach, but no motion along it was found; {', or '.join(tried)}"
+    return f"There is a joint path within reach, but no motion along it was found; {', or '.join(tried)}"
 
 
 def _what_is_missing(decomposition: Decomposition) -> str:
@@ -122,7 +122,7 @@ def _lattices(candidates: Sequence[Attempt]) -> list[Attempt]:
 
 
 def _some_course(candidates: Sequence[Attempt]) -> bool:
-    """Tell whether a lattice that was looked at has a course."""
+    """Tell whether a lattice that was looked at has a joint path."""
     return any(candidate.branch for candidate in _lattices(candidates))
 
 

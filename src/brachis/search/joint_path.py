@@ -1,4 +1,4 @@
-"""Courses of the redundant joints, which of them differ, and where there is none."""
+"""Joint paths of the redundant joints, which of them differ, and where there is none."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class JointPath:
         Index into the closed form's branches.
     s : (S + 1,) ndarray
     q : (S + 1, n) ndarray
-        Postures, rad or m, angles lifted so that they are continuous.
+        Postures, rad or m, angles in such turns that they are continuous.
     length : float
         In the measure of the lattice, s^2.
     """
@@ -77,20 +77,20 @@ class DeadEnd:
 
 
 def distinct(joint_paths: Sequence[JointPath], most: int) -> list[JointPath]:
-    """Choose up to `most` courses: the shortest one, and others far from those chosen.
+    """Choose up to `most` joint paths: the shortest one, and others far from those chosen.
 
     The next one is the one with the largest ratio of its distance from those chosen to its length; on another branch
     the distance is infinite.
 
     Parameters
     ----------
-    courses : sequence of Course
+    joint_paths : sequence of JointPath
         The shortest one first, at least one.
     most : int
 
     Returns
     -------
-    list of Course
+    list of JointPath
     """
     branches, q = (
         np.array([joint_path.branch for joint_path in joint_paths]),

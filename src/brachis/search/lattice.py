@@ -1,4 +1,4 @@
-"""Courses of the redundant joints along the path, from a lattice of closed-form postures.
+"""Joint paths along the path, from a lattice of closed-form postures.
 
 The path is cut into stations, the redundant joints into cells. Layer by layer from the given start, every node (a cell,
 a branch and the posture that the closed form gives there) is joined to the cells around it at the next station, where
@@ -6,14 +6,14 @@ the posture exists, is within the joint ranges, clear of the branch boundary and
 the arm against gravity), and no joint jumps. Of all edges into a node the one with the least total length stays
 (dynamic programming). Where the end posture is given and the start is not, the layers run backwards from the end.
 
-Turns of angles by 2 pi follow the course. From a given posture, nodes of one cell in different turns are different
-nodes. Where neither end is given, all turns of a course exist at once: a node keeps how far its joints have gone, and
-is within the ranges as long as some multiple of 2 pi brings the whole course there. The length of an edge,
+Turns of angles by 2 pi follow the joint path. From a given posture, nodes of one cell in different turns are different
+nodes. Where neither end is given, all turns of a joint path exist at once: a node keeps how far its joints have gone,
+and is within the ranges as long as some multiple of 2 pi brings the whole joint path there. The length of an edge,
 
     max |A(q) dq|  +  T max |B(q) dq|
 
-with the rows A (M / tau_max, 1 / a_max) and B (1 / v_max) of `Limit.step_rows`, does not depend on how fast the course
-is followed: with the first term alone the time of a straight course is 2 sqrt(length). One redundant joint is searched
+with the rows A (M / tau_max, 1 / a_max) and B (1 / v_max) of `Limit.step_rows`, does not depend on how fast the joint
+path is followed: with the first term alone the time of a straight one is 2 sqrt(length). One redundant joint is searched
 completely at the lattice's spacing. Of several, all neighbours along one joint at a time and random ones, and a layer
 keeps a bounded number of nodes, half of them the nearest and half far from each other.
 """
@@ -90,7 +90,7 @@ class Lattice:
         self._cells = Cells.of(decomposition, cells_per_turn, self._origin)
         self._targets = given.path.sample(self.s).target
         self._limits = given.limits
-        # In which turn the angles of a free origin are is open until the course is known.
+        # In which turn the angles of a free origin are is open until the joint path is known.
         self._static = [limit for limit in given.limits if limit.static and not limit.whole_turns]
         limits = given.robot.limits
         self._lower, self._upper = limits.position_lower - _SLACK, limits.position_upper + _SLACK
@@ -106,7 +106,7 @@ class Lattice:
             self._clear = float(np.minimum(_CLEAR, 0.5 * at_origin.min(initial=np.inf)))
 
     def joint_paths(self, most: int) -> list[JointPath] | DeadEnd:
-        """Find courses along the path.
+        """Find joint paths along the path.
 
         Parameters
         ----------
@@ -115,7 +115,7 @@ class Lattice:
 
         Returns
         -------
-        list of Course or DeadEnd
+        list of JointPath or DeadEnd
             Distinct ones, the shortest first; none where the time was up; where the lattice ends, if there is none.
         """
         rng = np.random.default_rng(self._seed)
@@ -140,7 +140,7 @@ class Lattice:
         return distinct(found, most)
 
     def _ends(self, last: Layer) -> np.ndarray:
-        """Nodes at which courses may end, (E,), the nearest first."""
+        """Nodes at which joint paths may end, (E,), the nearest first."""
         order = np.argsort(last.length, kind="stable")
         given = self.decomposition.problem
         if given.end is not None and not self._backwards:
@@ -150,7 +150,7 @@ class Lattice:
         return order[last.length[order] <= _LONGEST * last.length[order[:1]] + _SLACK]
 
     def _traced(self, layers: list[Layer], ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Trace courses back from their ends, (E,): postures (E, S + 1, n), in their turns, and branches (E,)."""
+        """Trace joint paths back from their ends, (E,): postures (E, S + 1, n), in their turns, and branches (E,)."""
         nodes, q = ends, []
         for layer in reversed(layers):
             q.append(layer.q[nodes])
@@ -159,7 +159,7 @@ class Lattice:
         return joint_paths + _TURN * self._turn_of(layers[-1][ends])[:, None], layers[-1].branch[ends]
 
     def _turn_of(self, nodes: Layer) -> np.ndarray:
-        """Multiples of 2 pi, (E, n), that bring the courses to nodes into the ranges, in the middle if closed."""
+        """Multiples of 2 pi, (E, n), that bring the joint paths to nodes into the ranges, in the middle if closed."""
         first, last = self._turns_within(nodes.low, nodes.high)
         with np.errstate(invalid="ignore"):  # inf - inf
             middle = 0.5 * (self._lower + self._upper - nodes.low - nodes.high) / _TURN
@@ -167,7 +167,7 @@ class Lattice:
         return np.clip(wanted, first, last)
 
     def _turns_within(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Least and largest multiples of 2 pi, (E, n), that bring courses within low and high into the ranges.
+        """Least and largest multiples of 2 pi, (E, n), that bring joint paths within low and high into the ranges.
 
         Joints that are in a turn already have the multiple 0 or, where it is not within the range, none at all: the
         least is then above the largest.
@@ -177,7 +177,7 @@ class Lattice:
         return first, last
 
     def _inside(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Which joints of courses, (E, n), can be brought into their ranges; see `_turns_within`."""
+        """Which joints of joint paths, (E, n), can be brought into their ranges; see `_turns_within`."""
         first, last = self._turns_within(low, high)
         return np.asarray(first <= last)
 

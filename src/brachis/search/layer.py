@@ -22,11 +22,11 @@ class Layer:
     branch : (K,) int ndarray
         Index into the closed form's branches.
     q : (K, n) ndarray
-        Postures, rad or m, continuous along the courses there.
+        Postures, rad or m, continuous along the joint paths there.
     low, high : (K, n) ndarray
-        Least and largest positions along the course to the node.
+        Least and largest positions along the joint path to the node.
     length : (K,) ndarray
-        Of the shortest course to the node.
+        Of the shortest joint path to the node.
     parent : (K,) int ndarray
         Its last node in the layer before.
     """

@@ -13,13 +13,13 @@ class SearchLevel:
     Attributes
     ----------
     decompositions : int
-        Choices of redundant joints that are looked at; those with the most room at the start come first.
+        Decompositions that are looked at; those farthest from singularity at the start come first.
     polynomial : bool
         Whether decompositions whose inverse kinematics is a polynomial's roots are looked at beside closed forms.
     seeds : int
-        Courses taken from the lattice of a decomposition, for each branch on which the motion may begin.
+        Joint paths taken from the lattice of a decomposition, for each branch on which the motion may begin.
     numeric : int
-        Courses by numeric inverse kinematics beside them, where the start posture is given.
+        Joint paths by numeric inverse kinematics beside them, where the start posture is given.
     plans : int
         Coarse plans; those with the least estimated time come first.
     refined : int

@@ -1,14 +1,14 @@
-"""Least time along a fixed course: the phase plane of s and ds/dt.
+"""Least time along a fixed joint path: the phase plane of s and ds/dt.
 
-With u = d2s/dt2 and x = (ds/dt)^2, limits along a course q(s) are lines in (u, x) (`Limit.lines`):
+With u = d2s/dt2 and x = (ds/dt)^2, limits along a joint path q(s) are lines in (u, x) (`Limit.lines`):
 
     a(s) u + b(s) x + c(s)   in [-1, 1],
 
 for torques a = M q_ds / tau_max, b = (M q_dds + C(q, q_ds) q_ds) / tau_max and c the torque at rest; those that do not
-ask for u are ceilings for x. Backwards along the course,
+ask for u are ceilings for x. Backwards along the joint path,
 the largest x from which the next station's interval can be reached is kept; forwards, the largest u that stays within
 is taken (Pham, Pham, IEEE Trans. Robotics 34(3), 2018). Torque may jump here, and viscous and Coulomb friction are left
-out, so the time is an estimate by which courses are ranked, no bound.
+out, so the time is an estimate by which joint paths are ranked, no bound.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _STANDING = 1e-3
 
 
 def least_time(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> float:
-    """Estimate the least time along a course from rest to rest.
+    """Estimate the least time along a joint path from rest to rest.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def least_time(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> float:
     Returns
     -------
     float
-        s; infinite where the course cannot be followed at any speed.
+        s; infinite where the joint path cannot be followed at any speed.
     """
     step = s[1] - s[0]
     slope, offset, ceiling = _lines(limits, q, np.gradient(q, step, axis=0, edge_order=2), step)

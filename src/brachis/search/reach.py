@@ -81,7 +81,7 @@ def explain_failure(
             first, last = float(s[int(np.argmin(possible))]), float(s[np.flatnonzero(~possible)[-1]])
             return PathError(problem.format(first=first), s_interval=(first, last), hint=hint)
     others = f"try {'other redundant joints, ' if joint_map.r else ''}another {given} posture"
-    return f"Every point of the path is within reach of this branch, but no course along it was found; {others}"
+    return f"Every point of the path is within reach of this branch, but no joint path through them was found; {others}"
 
 
 @dataclass(frozen=True)
@@ -131,9 +131,9 @@ def _answers_along(joint_map: ClosedFormMap, s: np.ndarray, *, opened: bool) -> 
     postures[..., redundant] = q_r[:, None, None]
     postures[..., rest] = answers
     middle = 0.5 * (low + high)
-    lifted = np.where(turning, postures - 2.0 * np.pi * np.round((postures - middle) / (2.0 * np.pi)), postures)
-    inside = (lifted >= lower - _RANGE_SLACK) & (lifted <= upper + _RANGE_SLACK)
-    return _Answers(lifted, np.asarray(np.isfinite(lifted).all(axis=4)), inside)
+    turned = np.where(turning, postures - 2.0 * np.pi * np.round((postures - middle) / (2.0 * np.pi)), postures)
+    inside = (turned >= lower - _RANGE_SLACK) & (turned <= upper + _RANGE_SLACK)
+    return _Answers(turned, np.asarray(np.isfinite(turned).all(axis=4)), inside)
 
 
 def _beyond(joint_map: ClosedFormMap, within: np.ndarray, *found: _Answers) -> str:

@@ -54,7 +54,7 @@ class Record:
         return self.best is not None and self._merit(self.best)[0] == -np.inf
 
     def _merit(self, attempt: Attempt) -> tuple[float, float]:
-        """By what finished attempts are compared: excess over a limit, -inf where it will do, and end time, s."""
+        """By what finished attempts are compared: violation of a limit, -inf where it will do, and end time, s."""
         assert attempt.verification is not None  # noqa: S101  (it is finished)
         will_do = attempt.verified or not self._refined
         return (-np.inf if will_do else attempt.verification.worst_ratio - 1.0), attempt.t_end

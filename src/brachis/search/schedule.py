@@ -54,10 +54,10 @@ def batches(
     ----------
     decompositions : sequence of Decomposition
     deadline : Deadline
-        Courses that are not found by then are left out.
+        Joint paths that are not found by then are left out.
     listener : callable
     note : callable
-        Told of choices whose lattice has no course, and of those for which there was no time.
+        Told of decompositions whose lattice has no joint path, and of those for which there was no time.
 
     Yields
     ------
@@ -72,7 +72,7 @@ def batches(
         allowed = looked_at(decompositions, level)
         starts: list[Start] = []
         rest = allowed or list(decompositions)
-        while rest and not starts:  # choices without a course make room for others
+        while rest and not starts:  # decompositions without a joint path make room for others
             batch, rest = rest[: level.decompositions], rest[level.decompositions :]
             if task.search.guesses == "numeric":
                 starts = [
@@ -100,7 +100,7 @@ def batches(
 
 
 def looked_at(decompositions: Sequence[Decomposition], level: SearchLevel) -> list[Decomposition]:
-    """Return the choices that a level looks at: closed forms, and polynomials where asked for, or where all is cramped.
+    """Return the decompositions of a level: closed forms; polynomials where asked for, or where all are near-singular.
 
     That is where the given start, or else end, posture is near the branch boundary of every closed form.
     """
@@ -144,5 +144,5 @@ def _starts_of(
 ) -> list[Start] | DeadEnd:
     if deadline.passed:
         return []
-    listener(f"looking for courses on the lattice of {decomposition.name}")
+    listener(f"looking for joint paths on the lattice of {decomposition.name}")
     return lattice_starts(decomposition, level, seed, deadline)

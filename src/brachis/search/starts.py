@@ -26,7 +26,7 @@ _FINEST = 96
 def lattice_starts(
     decomposition: Decomposition, level: SearchLevel, seed: int, deadline: Deadline = NEVER
 ) -> list[Start] | DeadEnd:
-    """Take the shortest distinct courses from the lattice of a choice; from a finer one where the first one ends.
+    """Take the shortest distinct joint paths from a decomposition's lattice; from a finer one where the first one ends.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def lattice_starts(
 
 
 def _start_along(joint_path: JointPath, origin: str) -> Start:
-    """Smooth a course, as far as the closed form can follow, and estimate its time."""
+    """Smooth a joint path, as far as the closed form can follow, and estimate its time."""
     decomposition, s = joint_path.decomposition, joint_path.s
     joint_map = decomposition.joint_map(joint_path.q[0], joint_path.branch)
     fine = np.linspace(0.0, 1.0, max(2 * len(s) - 1, _FINEST + 1))
@@ -96,7 +96,7 @@ def _smoothed(s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int) 
 
 
 def _clear(joint_map: ClosedFormMap, q: np.ndarray) -> bool:
-    """Tell whether a course keeps clear of the branch boundary, (K, n)."""
+    """Tell whether a joint path keeps clear of the branch boundary, (K, n)."""
     margins = joint_map.branch_margins(q)
     return bool(margins.min(initial=np.inf) > 0.5 * min(0.02, float(margins[0].min(initial=np.inf))))
 
@@ -127,16 +127,16 @@ def numeric_starts(decomposition: Decomposition, most: int, deadline: Deadline) 
 
 
 def first_start(decomposition: Decomposition) -> tuple[np.ndarray, int]:
-    """Return the given start posture, (n,), or that of the lattice's shortest course where it is free, and its branch.
+    """Return the given start posture, (n,), or that of the shortest joint path where it is free, and its branch.
 
     Raises
     ------
     PathError
-        The start posture is free, and the lattice has no course.
+        The start posture is free, and the lattice has no joint path.
     """
     if decomposition.problem.start is not None:
         return decomposition.problem.start, decomposition.branches[0]
     found = lattice_starts(decomposition, SEARCH_LEVELS["fast"][0], decomposition.problem.task.search.seed)
     if isinstance(found, DeadEnd):
-        raise PathError(f"no course along the path was found: {found}", s_interval=found.interval)
+        raise PathError(f"no joint path was found: {found}", s_interval=found.interval)
     return found[0].posture, found[0].branch

@@ -18,7 +18,7 @@ class SolveStatus(enum.Enum):
 
     OPTIMAL = "optimal: first-order conditions hold"
     ACCEPTABLE = "acceptable: feasible, but the solver could not confirm optimality; another start may be better"
-    SETTLED = "settled: feasible, and the last iterations made it no faster; other motions take as long"
+    STAGNATED = "stagnated: feasible, and the last iterations made it no faster; other motions take as long"
     ITERATION_LIMIT = "iteration limit reached; raise solver.max_iterations"
     STALLED = "the solver crept on without progress; another start or solver may do better"
     TIME_LIMIT = "time limit reached"
@@ -29,7 +29,7 @@ class SolveStatus(enum.Enum):
     @property
     def usable(self) -> bool:
         """True where the answer satisfies the rows."""
-        return self in (SolveStatus.OPTIMAL, SolveStatus.SETTLED, SolveStatus.ACCEPTABLE)
+        return self in (SolveStatus.OPTIMAL, SolveStatus.STAGNATED, SolveStatus.ACCEPTABLE)
 
 
 class Problem(Protocol):

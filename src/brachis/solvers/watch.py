@@ -16,8 +16,8 @@ from brachis.solvers.protocol import Problem, Progress, Solve, SolverOptions, So
 
 _EVALUATIONS = 10
 """Evaluations for each iteration allowed, on average: a solver that needs more cannot leave a point out of reach."""
-_SETTLED_ITERATIONS = 15
-_SETTLED_PROGRESS = 1e-6
+_STAGNATED_ITERATIONS = 15
+_STAGNATED_PROGRESS = 1e-6
 _LARGEST = 1e30
 """Backends multiply what they get: the square of a larger number may overflow, and end the interpreter."""
 _FEASIBLE = 10.0
@@ -46,7 +46,7 @@ class Watch:
         self.timed_out = False
         self.exhausted = False
         self._evaluations = 0
-        self.settled = False
+        self.stagnated = False
         self._feasible: list[float] = []
         self._progress = progress
         self._handler: Any = None
@@ -89,16 +89,16 @@ class Watch:
         return self.must_stop()
 
     def has_settled(self, objective: float, infeasibility: float) -> bool:
-        """Tell whether feasible iterates have the same objective for long; kept in `settled`.
+        """Tell whether feasible iterates have the same objective for long; kept in `stagnated`.
 
         A redundant joint that no limit touches, the roll of a tool for example, leaves a set of equally fast motions,
         within which a solver wanders without ever seeing its conditions of optimality hold.
         """
         self._feasible = [*self._feasible, objective] if infeasibility <= self.options.tolerance else []
-        recent = self._feasible[-_SETTLED_ITERATIONS:]
+        recent = self._feasible[-_STAGNATED_ITERATIONS:]
         spread = max(recent, default=0.0) - min(recent, default=0.0)
-        self.settled = len(recent) == _SETTLED_ITERATIONS and spread <= _SETTLED_PROGRESS * abs(objective)
-        return self.settled
+        self.stagnated = len(recent) == _STAGNATED_ITERATIONS and spread <= _STAGNATED_PROGRESS * abs(objective)
+        return self.stagnated
 
     def must_stop(self) -> bool:
         """Tell whether the user has interrupted or the time is over."""
@@ -145,8 +145,8 @@ class Watch:
         if self.interrupt is not None:
             raise self.interrupt
         violation = residual(self.problem, x)
-        if self.settled and not status.usable:
-            status = SolveStatus.SETTLED
+        if self.stagnated and not status.usable:
+            status = SolveStatus.STAGNATED
         feasible = violation <= _FEASIBLE * self.options.tolerance
         if status.usable and not feasible:
             status = SolveStatus.INFEASIBLE

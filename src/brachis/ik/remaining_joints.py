@@ -19,7 +19,7 @@ _SAMPLES = 8
 
 
 @dataclass(frozen=True)
-class HeldJoints:
+class RemainingJoints:
     """The J non-redundant joints, with their axes at S random positions of the redundant ones.
 
     Attributes
@@ -65,13 +65,13 @@ class HeldJoints:
             mirrored=not self.mirrored,
         )
 
-    def screws(self, posed: PosedScrews, slots: int = 0) -> tuple[Screw, ...]:
+    def screws(self, posed: PosedScrews, alternatives: int = 0) -> tuple[Screw, ...]:
         """Pick these joints, in their order and sense, out of a chain's K postures.
 
-        Vectors are (3, ..., K), with so many axes of length one before the samples as there are `slots`.
+        Vectors are (3, ..., K), with so many axes of length one before the samples as there are `alternatives`.
         """
         axes = -posed.axes if self.mirrored else posed.axes
-        spread = (slice(None), *[None] * slots)
+        spread = (slice(None), *[None] * alternatives)
         return tuple(
             Screw(axes[:, i][spread], posed.points[:, i][spread], bool(posed.revolute[i])) for i in self.joints
         )
