@@ -32,7 +32,7 @@ INSTALL = {
 }
 COMMANDS = {
     "demo": [["brachis", "plan", "examples/01_scara_line.yaml", "--out", "out"]],
-    "test": [["python", "-m", "pytest", "-n", "2", "--dist", "loadgroup"]],
+    "test": [["python", "-m", "pytest", "-n", "2", "--dist", "worksteal"]],
     "lint": [["ruff", "check", "."], ["ruff", "format", "--check", "."]],
     "types": [["mypy"]],
     "bench": [["python", "-m", "pytest", "benchmarks", "-p", "no:xdist"], ["python", "benchmarks/growth.py"]],

@@ -73,7 +73,7 @@ def run(case: fuzz_cases.Case, folder: Path) -> str:
                 brachis.plan(None, folder / "task.yaml")
             else:
                 inspect_command(
-                    folder / "robot.urdf", task_map="x,y", tool_frame=None, base_frame=None, lock=[], as_json=True
+                    folder / "robot.urdf", task_space="x,y", tool_frame=None, base_frame=None, lock=[], as_json=True
                 )
         except brachis.BrachisError as error:
             outcome = type(error).__name__

@@ -5,9 +5,9 @@ Usage: python benchmarks/random_poses.py [ROBOT|all] [SEED] [COUNT] [roomiest|in
 A task starts in a random posture (a tenth of every range is kept clear at both ends), and its path leads straight, the
 orientation turning at a constant rate, to the pose of another posture whose joints are up to 0.5 rad or 0.5 m away. It
 counts as reachable if a damped least-squares inverse kinematics, which knows nothing of the planner, follows the path
-within the joint ranges and with torques that hold the arm at rest. The redundant joint is the one whose closed form keeps
-farthest from singularity along this joint path (the largest least branch margin), or goes round all closed forms in
-turn, which counts those as well whose branch ends along the path.
+within the joint ranges and with torques that hold the arm at rest. The redundant joint is the one whose closed form
+keeps farthest from singularity along this joint path (the largest least branch margin), or goes round all closed forms
+in turn, which counts those as well whose branch ends along the path.
 """
 
 from __future__ import annotations

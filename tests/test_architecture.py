@@ -45,7 +45,7 @@ ORDER = (
     "feasibility",
     "trajectory",
     "verify",
-    "setting",
+    "problem",
     "attempt",
     "extract",
     "search",

@@ -90,27 +90,17 @@ def test_example_01_python(capsys):
     assert "end time 2.47" in capsys.readouterr().out
 
 
-@pytest.fixture(scope="session")
-def table():
+def test_example_02():
     module = load(ROOT / "examples/02_scara_table.py")
-    return module, module.plan_all()
-
-
-@pytest.mark.xdist_group("example 02")
-def test_example_02_every_plan_is_verified(table):
-    _, results = table
+    results = module.plan_all()
     assert len(results) == 24
     assert all(result.verified for result in results.values())
     assert max(result.verification.worst_ratio for result in results.values()) <= 1 + 1e-4
     assert max(result.verification.path_error for result in results.values()) <= 1e-9
-
-
-@pytest.mark.xdist_group("example 02")
-def test_example_02_reaches_the_reference_figures(table):
-    _, results = table
     assert results[90, "j1"].t_end <= 2.260
     assert results[90, "j2"].t_end <= 2.267
     assert results[90, "j3"].t_end <= 2.478
+    check_table("examples/02_scara_table.py", module.markdown_table(results))
 
 
 def check_table(name: str, made: str) -> None:
@@ -122,31 +112,14 @@ def check_table(name: str, made: str) -> None:
     assert ours == pytest.approx(theirs, abs=0.003)
 
 
-@pytest.mark.xdist_group("example 02")
-def test_table_of_the_readme_is_what_example_02_prints(table):
-    module, results = table
-    check_table("examples/02_scara_table.py", module.markdown_table(results))
-
-
-@pytest.fixture(scope="session")
-def rail_table():
+def test_example_03():
     module = load(ROOT / "examples/03_tx90l_rail_line.py")
-    return module, module.plan_all()
-
-
-@pytest.mark.xdist_group("example 03")
-def test_example_03_every_plan_is_verified_and_as_fast_as_it_should_be(rail_table):
-    _, results = rail_table
+    results = module.plan_all()
     assert len(results) == 12
     assert all(result.verified for result in results.values())
     assert results["rail", 10].t_end <= 0.4275
     assert results["rail", 20].t_end <= 0.4027
     assert results["rail", 40].t_end <= 0.3913
-
-
-@pytest.mark.xdist_group("example 03")
-def test_table_of_the_readme_is_what_example_03_prints(rail_table):
-    module, results = rail_table
     check_table("examples/03_tx90l_rail_line.py", module.markdown_table(results))
 
 
@@ -176,35 +149,19 @@ def test_example_06():
     assert results["free roll"].trajectory.joint_names[-1] == "tool_roll"
 
 
-@pytest.fixture(scope="session")
-def fastest_table():
+def test_example_07():
     module = load(ROOT / "examples/07_find_the_fastest.py")
-    return module, module.plan_all()
-
-
-@pytest.mark.xdist_group("example 07")
-def test_example_07_auto_is_never_slower_than_one_guess(fastest_table):
-    module, results = fastest_table
+    results = module.plan_all()
     assert all(result.verified for result in results.values())
     for angle in module.ANGLES_DEG:
         one_guess = min(results[angle, joint].t_end for joint in module.JOINTS)
         assert results[angle, "auto"].t_end <= one_guess * (1.0 + 1e-3)
         assert results[angle, "free start"].t_end <= results[angle, "auto"].t_end * (1.0 + 1e-3)
     assert results[180, "auto"].t_end <= 2.10
-
-
-@pytest.mark.xdist_group("example 07")
-def test_a_free_start_makes_mirror_images_equally_fast(fastest_table):
-    """The path begins on the x axis: a line and its mirror image only differ by the start posture."""
-    _, results = fastest_table
+    # The path begins on the x axis: a line and its mirror image only differ by the start posture.
     for angle in (45, 90, 135):
         mirrored = results[360 - angle, "free start"].t_end
         assert results[angle, "free start"].t_end == pytest.approx(mirrored, rel=2e-3)
-
-
-@pytest.mark.xdist_group("example 07")
-def test_table_of_the_readme_is_what_example_07_prints(fastest_table):
-    module, results = fastest_table
     check_table("examples/07_find_the_fastest.py", module.markdown_table(results))
 
 

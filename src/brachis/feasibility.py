@@ -12,6 +12,7 @@ from brachis.limits import Limit, Moments
 from brachis.path import Path, check_on_path
 from brachis.plausibility import position_hint
 from brachis.robot import Robot, TaskMap
+from brachis.robot.joint_space import complement, difference
 
 _RANGE_SLACK = 1e-9
 _SAME_POSTURE = 1e-5
@@ -133,12 +134,10 @@ def _branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) 
     """Index of the branch in whose inside a posture lies."""
     robot, solver = task_map.robot, match.solver
     redundant = [robot.joint_names.index(joint) for joint in match.redundant_joints]
-    rest = [i for i in range(robot.n) if i not in redundant]
+    rest = complement(robot.n, redundant)
     target = task_map.value(posture)
     answers = solver.solve(target[None], posture[None, redundant])[0]
-    units = np.array(robot.position_units)[rest]
-    gap = answers - posture[rest]
-    gap = np.where(units == "rad", np.remainder(gap + np.pi, 2.0 * np.pi) - np.pi, gap)
+    gap = difference(answers, posture[rest], robot.revolute[rest])
     gaps = np.where(np.isfinite(gap).all(axis=2), np.abs(gap).max(axis=2), np.inf).min(axis=1)
     branch = int(np.argmin(gaps))
     margins = solver.branch_margins(posture[None], branch)[0]

@@ -133,7 +133,7 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
     DecompositionError
         No closed form fits.
     StartError
-        The start posture is singular for every decomposition, or on another branch than the task's or the end posture's.
+        The start posture is singular everywhere, or on another branch than the task's or the end posture's.
     UnknownNameError
         There is no such joint or branch.
     """

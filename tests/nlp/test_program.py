@@ -96,7 +96,7 @@ def test_a_stop_that_only_the_ranges_of_the_phases_bound():
 
 
 def test_refinement_holds_the_limits_in_every_phase():
-    program = two_moves(degree=5, intervals=5, points=1)
+    program = two_moves(degree=5, intervals=5, points=2)
     report = solve(program, first_point(program))
 
     def worst(x):

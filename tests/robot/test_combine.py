@@ -196,4 +196,4 @@ def test_a_robot_whose_tool_rolls_freely_is_made_anew_without_the_virtual_joint(
 def test_transcribe_combines_as_well():
     task = brachis.load_task(line(gravity=[0, 0, 0], limits={"torque": 3, "velocity": None}))
     problem, _ = brachis.transcribe(Robot.from_urdf(SCARA), task)
-    np.testing.assert_array_equal(problem.decomposition.robot.limits.torque, 3.0)
+    np.testing.assert_array_equal(problem.phases[0].joint_map.robot.limits.torque, 3.0)

@@ -14,8 +14,8 @@ import numpy as np
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.pose_joints import determinant
 from brachis.ik.protocol import IKSolver
+from brachis.robot.joint_space import TURN
 
-_TURN = 2.0 * np.pi
 _SAME = 1e-5
 """Answers whose angles (rad) and slides (m, in proportion to their size) differ by less are the same."""
 _CELLS = 1024
@@ -68,7 +68,7 @@ class SignSolver(IKSolver):
             NaN where there is no further answer.
         """
         revolute = self._chain.revolute[list(self._joints)]
-        marks = 0.5 + np.where(revolute, joints / _TURN, 0.5 * joints / (1.0 + np.abs(joints)))
+        marks = 0.5 + np.where(revolute, joints / TURN, 0.5 * joints / (1.0 + np.abs(joints)))
         keys = np.zeros(len(joints), dtype=np.int64)
         for cell in np.floor(_CELLS * marks[:, revolute]).astype(np.int64).T:
             keys = keys * (_CELLS + 1) + cell
@@ -91,5 +91,5 @@ def _repeated(marks: np.ndarray, groups: np.ndarray) -> np.ndarray:
         if len(together) == 0:
             break
         gap = np.abs(marks[together + behind] - marks[together])
-        repeated[together + behind] |= np.minimum(gap, 1.0 - gap).max(axis=1) < _SAME / _TURN
+        repeated[together + behind] |= np.minimum(gap, 1.0 - gap).max(axis=1) < _SAME / TURN
     return repeated

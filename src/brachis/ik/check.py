@@ -7,6 +7,7 @@ import numpy as np
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.protocol import IKSolver, NotApplicableError
 from brachis.robot import Robot, TaskMap
+from brachis.robot.joint_space import complement, difference
 
 _CHECKED_POSTURES = 100
 _INSIDE = 1e-2
@@ -50,14 +51,14 @@ def check_answers(
     q = q[np.max(margins, axis=0) > _INSIDE]
     if not len(q):
         raise NotApplicableError("no random posture is inside a branch")
-    rest = [i for i in range(robot.n) if i not in redundant]
+    rest = complement(robot.n, redundant)
     targets = task_map.of_placements(*robot.tool_placements(q))
     answers = solver.solve(targets, q[:, list(redundant)])
     expected = (len(q), len(solver.branches), solver.alternatives, len(rest))
     if answers.shape != expected:
         raise NotApplicableError(f"its answers have the shape {answers.shape}, not {expected}")
     turning = ChainGeometry.of(robot).revolute[rest]
-    own = np.abs(_difference(answers, q[:, None, None, rest], turning)).max(axis=3)
+    own = np.abs(difference(answers, q[:, None, None, rest], turning)).max(axis=3)
     if not np.all(np.nanmin(np.where(np.isnan(own), np.inf, own), axis=(1, 2)) < _POSE_TOLERANCE * 100):
         raise NotApplicableError("its answers leave out postures that reach the target")
     exists = np.isfinite(answers).all(axis=3)
@@ -79,9 +80,3 @@ def _checked_ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     near = np.clip(0.0, lower, upper)
     lower, upper = np.maximum(lower, near - _FAR), np.minimum(upper, near + _FAR)
     return np.where(ranged, lower, -np.pi), np.where(ranged, upper, np.pi)
-
-
-def _difference(first: np.ndarray, second: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Difference of coordinates, modulo 2 pi where they are angles."""
-    delta = first - second
-    return np.where(angles, np.mod(delta + np.pi, 2.0 * np.pi) - np.pi, delta)

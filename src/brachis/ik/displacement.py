@@ -18,6 +18,7 @@ import numpy as np
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.screws import Screw
 from brachis.ik.vectors import apply, apply_inverse
+from brachis.robot.joint_space import complement
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class Displacement:
     ) -> Displacement:
         """State the equations for pose targets, (K, 12), and redundant joints at q_r, (K, r), or the reversed ones."""
         held = geometry.held(redundant, q_r)
-        rest = [i for i in range(geometry.n) if i not in redundant]
+        rest = complement(geometry.n, redundant)
         wanted = np.moveaxis(targets[:, 3:].reshape(-1, 3, 3), 0, 2)
         rotation = np.stack([apply(wanted, held.tool_rotation[row]) for row in range(3)], axis=1)
         translation = targets[:, :3].T - apply(rotation, held.tool_position)

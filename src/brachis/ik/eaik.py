@@ -28,6 +28,7 @@ from brachis.ik.pose_joints import determinant, largest_determinant, random_post
 from brachis.ik.protocol import Kind, NotApplicableError, ik_family
 from brachis.ik.vectors import wrap
 from brachis.robot import TaskMap
+from brachis.robot.joint_space import complement
 from brachis.robot.task_map import Pose
 
 NOT_INSTALLED = 'EAIK is not installed (pip install "brachis[eaik]")'
@@ -48,7 +49,7 @@ class EaikSolver(SignSolver):
     kind: Kind = "closed_form"
 
     def __init__(self, geometry: ChainGeometry, redundant: tuple[int, ...]) -> None:
-        rest = [i for i in range(geometry.n) if i not in redundant]
+        rest = complement(geometry.n, redundant)
         first, last = rest[0], rest[-1]
         self._geometry = geometry
         self._before = [i for i in redundant if i < first]
@@ -132,7 +133,7 @@ def _part(geometry: ChainGeometry, joints: slice) -> ChainGeometry:
 def _check_rank(geometry: ChainGeometry, redundant: tuple[int, ...]) -> None:
     """Refuse a decomposition whose J_nr is singular at all of many random postures."""
     try:
-        largest_determinant(random_postures(geometry), [i for i in range(geometry.n) if i not in redundant])
+        largest_determinant(random_postures(geometry), complement(geometry.n, redundant))
     except NotApplicableError as singular:
         names = ", ".join(geometry.joint_names[i] for i in redundant)
         more = f": there is always a motion of the tool that needs {names}" if names else ""
@@ -146,7 +147,7 @@ def eaik(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...])
     """Fit the family: a pose is prescribed, and six joints are left over, all revolute, which EAIK can solve."""
     if not isinstance(task_map, Pose):
         raise NotApplicableError("no whole pose is prescribed")
-    sliding = [geometry.joint_names[i] for i in range(geometry.n) if i not in redundant and not geometry.revolute[i]]
+    sliding = [geometry.joint_names[i] for i in complement(geometry.n, redundant) if not geometry.revolute[i]]
     if sliding:
         raise NotApplicableError(f"{', '.join(sliding)} would be left over and not revolute")
     _check_rank(geometry, redundant)

@@ -22,6 +22,7 @@ from brachis.ik.polish import goal_of, polished
 from brachis.ik.protocol import IKSolver
 from brachis.ik.vectors import meeting_point
 from brachis.robot import TaskMap
+from brachis.robot.joint_space import complement
 from brachis.robot.task_map import Pose
 
 TOLERANCE = 1e-4
@@ -216,7 +217,7 @@ class Polished(IKSolver):
         self._geometry = geometry
         self._task_map = task_map
         self._redundant = list(redundant)
-        self._rest = [i for i in range(geometry.n) if i not in redundant]
+        self._rest = complement(geometry.n, redundant)
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """See `IKSolver.solve`."""

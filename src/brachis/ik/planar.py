@@ -20,6 +20,7 @@ from brachis.ik.planar_chain import PlanarChain
 from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
 from brachis.ik.vectors import wrap
 from brachis.robot import TaskMap
+from brachis.robot.joint_space import complement
 from brachis.robot.task_map import Pose, RowsAndYaw
 
 _SAMPLES = 64
@@ -35,7 +36,7 @@ class PlanarSolver(IKSolver):
         self._chain = chain
         self._n = len(chain.revolute)
         self._redundant = list(redundant)
-        self._rest = [i for i in range(self._n) if i not in redundant]
+        self._rest = complement(self._n, redundant)
         self._yaw = yaw
         turning = [i for i in self._rest if chain.revolute[i]]
         self._last = turning[-1] if yaw else self._n
@@ -215,7 +216,7 @@ def planar(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...
         raise NotApplicableError("a whole pose is prescribed")
     chain = PlanarChain.of(geometry, task_map)
     yaw = isinstance(task_map, RowsAndYaw)
-    rest = [i for i in range(geometry.n) if i not in redundant]
+    rest = complement(geometry.n, redundant)
     if yaw and not any(geometry.revolute[i] for i in rest):
         raise NotApplicableError("no revolute joint is left to set yaw")
     return PlanarSolver(chain, redundant, yaw=yaw)

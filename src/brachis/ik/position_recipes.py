@@ -31,8 +31,8 @@ class Recipe:
     meets : tuple of int or None
         Two joints whose axes meet in `Arm.meeting`.
     solve : callable
-        Positions of a, b, c, with one or two answers along the alternatives `FRONT` and `UP`, from the screws while the joints
-        are at zero and the target of their centre; NaN where there is none.
+        Positions of a, b, c, with one or two answers along the alternatives `FRONT` and `UP`, from the screws while the
+        joints are at zero and the target of their centre; NaN where there is none.
     factors : tuple of Factor
         Of these two alternatives.
     """

@@ -11,6 +11,7 @@ import numpy as np
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
 from brachis.robot import TaskMap
+from brachis.robot.joint_space import complement
 from brachis.robot.task_map import Pose, RowsAndYaw
 
 _SAMPLES = 64
@@ -24,7 +25,7 @@ class PrismaticSolver(IKSolver):
     def __init__(self, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> None:
         self._geometry = geometry
         self._redundant = list(redundant)
-        self._rest = [i for i in range(geometry.n) if i not in redundant]
+        self._rest = complement(geometry.n, redundant)
         self._rows = list(task_map.axes)
         postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, geometry.n))
         determinants = np.linalg.det(self._directions(postures)[1])
@@ -67,7 +68,7 @@ def prismatic(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, 
     """Fit the family: every non-redundant joint is prismatic and no angle is prescribed."""
     if isinstance(task_map, Pose):
         raise NotApplicableError("a whole pose is prescribed")
-    turning = [geometry.joint_names[i] for i in range(geometry.n) if i not in redundant and geometry.revolute[i]]
+    turning = [geometry.joint_names[i] for i in complement(geometry.n, redundant) if geometry.revolute[i]]
     if turning:
         raise NotApplicableError(f"{', '.join(turning)} would be left over and not prismatic")
     if isinstance(task_map, RowsAndYaw):

@@ -14,6 +14,7 @@ import numpy as np
 
 from brachis.ik.geometry import ChainGeometry, PosedScrews
 from brachis.ik.screws import Screw
+from brachis.robot.joint_space import complement
 
 _SAMPLES = 8
 
@@ -44,7 +45,7 @@ class RemainingJoints:
     @classmethod
     def beside(cls, geometry: ChainGeometry, redundant: tuple[int, ...]) -> Self:
         """Hold the redundant joints at random positions."""
-        rest = tuple(i for i in range(geometry.n) if i not in redundant)
+        rest = tuple(complement(geometry.n, redundant))
         q_r = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, len(redundant)))
         held, kept = geometry.held(redundant, q_r), list(rest)
         names = tuple(geometry.joint_names[i] for i in rest)

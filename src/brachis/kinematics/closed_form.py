@@ -24,12 +24,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.ik import ChainGeometry, IKSolver, margin_gradient
+from brachis.ik import IKSolver, margin_gradient
 from brachis.kinematics.joint_map import JointDerivatives, JointState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
+from brachis.robot.joint_space import TURN, complement, difference
 
-_TURN = 2.0 * np.pi
 _SURE = 0.25
 """A step that differs from its prediction by more than this part of a turn is not counted."""
 
@@ -83,10 +83,10 @@ class ClosedFormMap:
         self.path = path
         self.solver = solver
         self.redundant = list(redundant)
-        self.nonredundant = [i for i in range(robot.n) if i not in redundant]
+        self.nonredundant = complement(robot.n, redundant)
         self.branch = branch
         self.start = start
-        self._turning = ChainGeometry.of(robot).revolute[self.nonredundant]
+        self._turning = robot.revolute[self.nonredundant]
         self._turns = [joint for joint, turning in zip(self.nonredundant, self._turning, strict=True) if turning]
         limits = robot.limits
         ranged = np.isfinite(limits.position_lower) | np.isfinite(limits.position_upper)
@@ -152,8 +152,7 @@ class ClosedFormMap:
 
     def _nearest(self, answers: np.ndarray, near: np.ndarray) -> np.ndarray:
         """Choose from answers (K, A, m) those nearest to postures (K, m), modulo 2 pi."""
-        gap = answers - near[:, None]
-        gap = np.where(self._turning, np.remainder(gap + np.pi, _TURN) - np.pi, gap)
+        gap = difference(answers, near[:, None], self._turning)
         distance = np.linalg.norm(gap, axis=2)
         choice = np.argmin(np.where(np.isfinite(distance), distance, np.inf), axis=1)
         return answers[np.arange(len(answers)), choice]
@@ -213,7 +212,7 @@ class ClosedFormMap:
         qddot = np.einsum("kij,kj->ki", gradient, yddot)
         qddot[:, self.nonredundant] += np.einsum("kij,kj->ki", inverse, wanted)
         if near is not None:
-            q[:, self._turns] += _TURN * np.round((near - q)[:, self._turns] / _TURN)
+            q[:, self._turns] += TURN * np.round((near - q)[:, self._turns] / TURN)
         elif t is not None and self._ranged.any():  # otherwise no limit asks which turn an angle is in
             self._follow(q, qdot, qddot, t)
         return PathState(y, ydot, yddot, q, qdot, qddot, gradient, sample, twists, inverse)
@@ -223,13 +222,13 @@ class ClosedFormMap:
         turns, h = self._turns, np.diff(t)[:, None]
         v, a = qdot[:, turns], qddot[:, turns]
         predicted = 0.5 * h * (v[1:] + v[:-1]) - h**2 / 12.0 * np.diff(a, axis=0)
-        gap = (predicted - np.diff(q[:, turns], axis=0)) / _TURN
+        gap = (predicted - np.diff(q[:, turns], axis=0)) / TURN
         counted = np.round(gap)
         unsure = np.abs(gap - counted) > _SURE
         if np.any(unsure & self._ranged):
             raise UnreachableError("a joint turns too far between collocation points to count its turns")
-        first = np.round((self.start[turns] - q[0, turns]) / _TURN)
-        q[:, turns] += _TURN * (first + np.vstack([np.zeros(len(turns)), np.cumsum(counted, axis=0)]))
+        first = np.round((self.start[turns] - q[0, turns]) / TURN)
+        q[:, turns] += TURN * (first + np.vstack([np.zeros(len(turns)), np.cumsum(counted, axis=0)]))
 
     def _gradient(self, sample: PathSample, jacobian: np.ndarray, inverse: np.ndarray) -> np.ndarray:
         """G = dq/dy, (K, n, 1 + r)."""

@@ -60,7 +60,7 @@ def drawing_plane(robot: Robot, q: np.ndarray, axes: Sequence[int]) -> tuple[int
     """
     data = robot.model.createData()
     columns = np.asarray(pin.computeJointJacobians(robot.model, data, q)).reshape(6, robot.n)  # (6,) for one joint
-    revolute = np.array([unit == "rad" for unit in robot.position_units])
+    revolute = robot.revolute
     turning, sliding = columns[3:, revolute], columns[:3, ~revolute]
     for normal in (2, 1, 0):
         in_plane = [axis for axis in range(3) if axis != normal]

@@ -160,6 +160,11 @@ class Robot:
         """Unit of every joint's position, ``rad`` or ``m``."""
         return tuple("m" if "P" in joint.shortname() else "rad" for joint in list(self.model.joints)[1:])
 
+    @property
+    def revolute(self) -> np.ndarray:
+        """Which joints turn, (n,) bool; the others slide."""
+        return np.array([unit == "rad" for unit in self.position_units])
+
     def posture(self, joints: object, where: str) -> np.ndarray:
         """Check a list or mapping of joint positions and return it as (n,) in chain order, rad or m.
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.problem import Decomposition, Problem
+from brachis.robot.joint_space import TURN
 
-_TURN = 2.0 * np.pi
 _CELLS_PER_METRE = 1.0 / 3.0  # of those of a turn
 _REACH = 2.0  # m
 _FAR = 20.0  # rad or m: nobody goes further, and every cell takes memory
@@ -45,19 +45,20 @@ class Cells:
         """Lay out the cells of a choice of redundant joints.
 
         The posture, (n,), from which joint paths begin is the middle of a cell. Where none is given, the cells cover
-        closed ranges, a turn of an open revolute joint, and what of an open prismatic joint is near the path's beginning.
+        closed ranges, a turn of an open revolute joint, and what of an open prismatic joint is near where the path
+        begins.
         """
         given, joints = decomposition.problem, list(decomposition.redundant)
-        turning = np.array([given.robot.position_units[joint] == "rad" for joint in joints], dtype=bool)
+        turning = given.robot.revolute[joints]
         low, high = given.robot.limits.position_lower[joints], given.robot.limits.position_upper[joints]
-        size = np.where(turning, _TURN, 1.0 / _CELLS_PER_METRE) / cells_per_turn
+        size = np.where(turning, TURN, 1.0 / _CELLS_PER_METRE) / cells_per_turn
         if posture is not None:
             origin = posture[joints]
         else:
             places = [0.0 if turns else _nearby(given, joint) for joint, turns in zip(joints, turning, strict=True)]
             origin = np.clip(places, low, high)
         closed = np.isfinite(low) & np.isfinite(high)
-        reach = np.where(turning, 0.5 * _TURN, _REACH + given.path.length)
+        reach = np.where(turning, 0.5 * TURN, _REACH + given.path.length)
         reach = np.where(closed, np.maximum(reach, _FAR), reach)
         lowest, highest = np.maximum(low, origin - reach), np.minimum(high, origin + reach)
         first, last = np.ceil((lowest - origin) / size), np.floor((highest - origin) / size)

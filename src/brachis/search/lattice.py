@@ -13,9 +13,9 @@ and is within the ranges as long as some multiple of 2 pi brings the whole joint
     max |A(q) dq|  +  T max |B(q) dq|
 
 with the rows A (M / tau_max, 1 / a_max) and B (1 / v_max) of `Limit.step_rows`, does not depend on how fast the joint
-path is followed: with the first term alone the time of a straight one is 2 sqrt(length). One redundant joint is searched
-completely at the lattice's spacing. Of several, all neighbours along one joint at a time and random ones, and a layer
-keeps a bounded number of nodes, half of them the nearest and half far from each other.
+path is followed: with the first term alone the time of a straight one is 2 sqrt(length). One redundant joint is
+searched completely at the lattice's spacing. Of several, all neighbours along one joint at a time and random ones, and
+a layer keeps a bounded number of nodes, half of them the nearest and half far from each other.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ import numpy as np
 from brachis.deadline import NEVER, Deadline
 from brachis.limits import Moments
 from brachis.problem import Decomposition
+from brachis.robot.joint_space import TURN, complement
 from brachis.search.cells import Cells, unique
 from brachis.search.joint_path import (
     JUMPS,
@@ -39,7 +40,6 @@ from brachis.search.joint_path import (
 from brachis.search.layer import Layer
 from brachis.search.stations import stations
 
-_TURN = 2.0 * np.pi
 _LARGEST_STEP = 0.8  # rad or m between stations
 _TYPICAL_TIME = 0.5  # s
 _CLEAR = 0.02
@@ -81,8 +81,8 @@ class Lattice:
         self.s = stations(given.path, given.task_map, density)
         self._robot, self._solver = given.robot, decomposition.match.solver
         self._redundant = list(decomposition.redundant)
-        self._rest = np.array([i for i in range(given.robot.n) if i not in decomposition.redundant], dtype=int)
-        self._turning = np.array([unit == "rad" for unit in given.robot.position_units])
+        self._rest = np.array(complement(given.robot.n, decomposition.redundant), dtype=int)
+        self._turning = given.robot.revolute
         self._nodes, self._seed, self._deadline = nodes, seed, deadline
         self._turns = self._rest[self._turning[self._rest]]
         self._backwards = given.start is None and given.end is not None
@@ -156,13 +156,13 @@ class Lattice:
             q.append(layer.q[nodes])
             nodes = layer.parent[nodes]
         joint_paths = np.array(q if self._backwards else q[::-1]).swapaxes(0, 1)
-        return joint_paths + _TURN * self._turn_of(layers[-1][ends])[:, None], layers[-1].branch[ends]
+        return joint_paths + TURN * self._turn_of(layers[-1][ends])[:, None], layers[-1].branch[ends]
 
     def _turn_of(self, nodes: Layer) -> np.ndarray:
         """Multiples of 2 pi, (E, n), that bring the joint paths to nodes into the ranges, in the middle if closed."""
         first, last = self._turns_within(nodes.low, nodes.high)
         with np.errstate(invalid="ignore"):  # inf - inf
-            middle = 0.5 * (self._lower + self._upper - nodes.low - nodes.high) / _TURN
+            middle = 0.5 * (self._lower + self._upper - nodes.low - nodes.high) / TURN
         wanted = np.where(self._loose & np.isfinite(middle), np.round(middle), 0.0)
         return np.clip(wanted, first, last)
 
@@ -172,8 +172,8 @@ class Lattice:
         Joints that are in a turn already have the multiple 0 or, where it is not within the range, none at all: the
         least is then above the largest.
         """
-        first = np.where(self._loose, np.ceil((self._lower - low) / _TURN), low < self._lower)
-        last = np.where(self._loose, np.floor((self._upper - high) / _TURN), -1.0 * (high > self._upper))
+        first = np.where(self._loose, np.ceil((self._lower - low) / TURN), low < self._lower)
+        last = np.where(self._loose, np.floor((self._upper - high) / TURN), -1.0 * (high > self._upper))
         return first, last
 
     def _inside(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -233,8 +233,8 @@ class Lattice:
         q[:, self._redundant] = self._cells.positions(cells)[where]
         q[:, self._rest] = answers[where, branch, alternative]
         step = q - before.q[parent]
-        turn = -np.round(step[:, self._turns] / _TURN)
-        step[:, self._turns] += _TURN * turn
+        turn = -np.round(step[:, self._turns] / TURN)
+        step[:, self._turns] += TURN * turn
         q = before.q[parent] + step
         low, high = np.minimum(before.low[parent], q), np.maximum(before.high[parent], q)
         found = exists[where, branch, alternative]

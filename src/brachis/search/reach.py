@@ -11,6 +11,7 @@ from brachis.errors import BrachisError, PathError
 from brachis.kinematics import ClosedFormMap
 from brachis.limits import Limit, Moments
 from brachis.plausibility import path_hint
+from brachis.robot.joint_space import in_turn_of
 
 _RANGE_SLACK = 1e-9
 _SEARCHED = 400
@@ -113,7 +114,7 @@ def _answers_along(joint_map: ClosedFormMap, s: np.ndarray, *, opened: bool) -> 
     """
     robot, redundant, rest = joint_map.robot, joint_map.redundant, joint_map.nonredundant
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
-    turning = np.array([unit == "rad" for unit in robot.position_units])
+    turning = robot.revolute
     wide = np.isin(np.arange(robot.n), redundant) & opened
     near = np.clip(joint_map.start, lower, upper)
     low = np.where(turning, -np.pi, near - _FAR)
@@ -131,7 +132,7 @@ def _answers_along(joint_map: ClosedFormMap, s: np.ndarray, *, opened: bool) -> 
     postures[..., redundant] = q_r[:, None, None]
     postures[..., rest] = answers
     middle = 0.5 * (low + high)
-    turned = np.where(turning, postures - 2.0 * np.pi * np.round((postures - middle) / (2.0 * np.pi)), postures)
+    turned = in_turn_of(postures, middle, turning)
     inside = (turned >= lower - _RANGE_SLACK) & (turned <= upper + _RANGE_SLACK)
     return _Answers(turned, np.asarray(np.isfinite(turned).all(axis=4)), inside)
 

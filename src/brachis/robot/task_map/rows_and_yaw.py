@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.robot.joint_space import principal
 from brachis.robot.task_map.world_rows import WorldRows
 
 
@@ -44,7 +45,7 @@ class RowsAndYaw(WorldRows):
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """See `TaskMap.difference`; yaw is in [-pi, pi)."""
         delta = super().difference(first, second).copy()
-        delta[..., -1] = np.remainder(delta[..., -1] + np.pi, 2.0 * np.pi) - np.pi
+        delta[..., -1] = principal(delta[..., -1])
         return delta
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
