@@ -6,7 +6,7 @@ Newton's method and one more with the same J,
     d1 = J(q)^-1 g(q),    d2 = J(q)^-1 g(q + d1),
 
 which leaves a gap of about 2 |g(q + d1)|^2 / |g(q)|. Steps have to shrink, |d2| < |d1| / 2: then the method converges,
-and to the answer beside which it began; a posture whose steps do not has nowhere to go.
+and to the answer beside which it began. A posture from which the steps do not converge gives no answer.
 
 P. Deuflhard, Newton methods for nonlinear problems, Springer 2004 (natural monotonicity test).
 """

@@ -1,4 +1,4 @@
-"""How far the search goes, by the word for it in the task."""
+"""Search levels: how much is tried for each value of the task's `search.effort`."""
 
 from __future__ import annotations
 
