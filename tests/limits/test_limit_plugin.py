@@ -5,7 +5,9 @@ from __future__ import annotations
 import importlib.metadata
 import importlib.util
 import json
+import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -14,6 +16,7 @@ import pytest
 
 import brachis
 from brachis.errors import InputError, UnknownNameError
+from brachis.limits import Label, Limit, Partials
 from brachis.verify import verify_trajectory
 
 ROOT = Path(__file__).parents[2]
@@ -122,3 +125,83 @@ def test_a_start_posture_beyond_it_is_refused(plugin):
     model = plugin.CoupledRange(("j2", "j3"), 0.5, 0.7)
     with pytest.raises(brachis.errors.StartError, match=re.escape("the range limit of 'j2 + j3' is exceeded")):
         brachis.plan(None, ROOT / "examples/01_scara_line.yaml", limits=[model])
+
+
+class Rate(Limit):
+    """Rate of the last joint, rad/s; its parts are spoiled one by one below."""
+
+    kind = "last_rate"
+    time_scaling = True
+
+    def __init__(self, robot):
+        self.labels = (Label("j3", "rate", "rad/s"),)
+        self.lower, self.upper = -np.ones(1), np.ones(1)
+        self._row = np.eye(robot.n)[[-1]]
+
+    def values(self, motion):
+        return motion.qdot @ self._row.T
+
+    def partials(self, motion):
+        return Partials(qdot=np.broadcast_to(self._row, (len(motion.q), *self._row.shape)))
+
+
+class Given:
+    """Bind the limit with some of its parts replaced."""
+
+    def __init__(self, **parts):
+        self.parts = parts
+
+    def bind(self, robot):
+        limit = Rate(robot)
+        for name, part in self.parts.items():
+            setattr(limit, name, part)
+        return limit
+
+
+LINE = ROOT / "examples/01_scara_line.yaml"
+
+
+@pytest.mark.parametrize(
+    ("parts", "where", "said"),
+    [
+        ({"labels": ()}, "limits[0].lower", "found (1,); allowed: (0,)"),
+        ({"lower": np.ones(2)}, "limits[0].lower", "(2,)"),
+        ({"lower": np.ones(1)}, "limits[0]", "lower is not below upper"),
+        ({"values": lambda motion: motion.qdot[:, 2]}, "limits[0].values", "found (2,) for 2 moments"),
+        ({"values": lambda motion: np.full((len(motion.q), 1), np.nan)}, "limits[0].values", "not finite"),
+        ({"partials": lambda motion: Partials(qdot=motion.q)}, "limits[0].partials.qdot", "(2, 1, 3)"),
+        ({"partials": lambda _motion: Partials()}, "limits[0].partials", "all None"),
+        ({"partials": lambda _motion: None}, "limits[0].partials", "is no brachis.limits.Partials"),
+        ({"kind": "torque"}, "limits[0].kind", "taken"),
+    ],
+)
+def test_a_limit_whose_parts_do_not_fit_is_refused(parts, where, said):
+    with pytest.raises(InputError) as caught:
+        brachis.plan(None, LINE, limits=[Given(**parts)])
+    assert str(caught.value).startswith(f"{where}: ")
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("wrong", [Rate, 3.0, "torque"], ids=str)
+def test_what_is_no_limit_is_refused(wrong):
+    with pytest.raises(InputError, match=r"limits\[0\]: is no limit that can be bound"):
+        brachis.plan(None, LINE, limits=[wrong])
+
+
+def test_limits_are_a_list():
+    with pytest.raises(InputError, match="limits: is no list"):
+        brachis.plan(None, LINE, limits=Given())
+
+
+def test_two_processes_take_it_as_well():
+    code = (
+        "import brachis, sys; from brachis_coupled import CoupledRange;"
+        "task = brachis.load_task(sys.argv[1]).to_dict() | {'search': {'jobs': 2}, 'redundant_joints': 'auto'};"
+        "result = brachis.plan(None, task, limits=[CoupledRange(('j2', 'j3'), -0.5, 0.7)]);"
+        "print(result.verified, 'coupled range ratio' in [check.name for check in result.verification.checks])"
+    )
+    search = os.pathsep.join([str(PLUGIN / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = {**os.environ, "PYTHONPATH": search}
+    command = [sys.executable, "-c", code, LINE]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True", "True"]

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 
 from brachis.custom_limits import LimitModel, custom_limits
 from brachis.limits import branch_margin, joint_rate, position, tool_speed, torque
+from brachis.limits.checks import bound_limits
 from brachis.limits.protocol import (
     Bound,
     JointMotion,
@@ -53,11 +54,11 @@ def limits_of(robot: Robot, task: Task, further: Sequence[LimitModel] = ()) -> t
     Raises
     ------
     InputError
-        A limit of the user's own does not fit the robot.
+        A limit of the user's own does not fit the robot, or is none (see `bound_limits`).
     """
-    built = (build(robot, task) for build in TABLE.values())
-    own = [model.bind(robot) for model in (*custom_limits(task), *further)]
-    return (*(limit for limit in built if limit is not None), *own)
+    built = tuple(limit for build in TABLE.values() if (limit := build(robot, task)) is not None)
+    own = bound_limits(custom_limits(task), robot, tuple(TABLE))
+    return (*built, *own, *bound_limits(further, robot, (*TABLE, *(limit.kind for limit in own))))
 
 
 __all__ = [
