@@ -1,4 +1,4 @@
-"""When to end."""
+"""A moment by which work has to end, handed on from stage to stage."""
 
 from __future__ import annotations
 

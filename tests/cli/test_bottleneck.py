@@ -10,7 +10,6 @@ import pytest
 
 from brachis import planner, plots
 from brachis.errors import InputError
-from brachis.verify import VerifyOptions
 
 from .conftest import SCARA
 
@@ -69,15 +68,10 @@ def test_files(run, task, write, tmp_path):
     assert (out / "timeline.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_unverified_motion(run, task, write, tmp_path, monkeypatch):
+def test_unverified_motion(run, task, write, tmp_path, request):
     out = tmp_path / "out"
-    task["search"] = {"time_limit": 1.0}  # nothing will ever be verified
     run("bottleneck", write(task), "--out", out)
-    honest = planner.verify_trajectory
-    strict = VerifyOptions(ratio_tolerance=-0.5)
-    monkeypatch.setattr(
-        planner, "verify_trajectory", lambda trajectory, _options, **more: honest(trajectory, strict, **more)
-    )
+    request.getfixturevalue("too_strict")
     outcome = run("bottleneck", write(task), "--out", out)
     assert outcome.code == 1
     assert "did not pass the verification" in outcome.err

@@ -18,7 +18,6 @@ from brachis import __version__, planner, plots
 from brachis.cli import planning
 from brachis.errors import InputError
 from brachis.trajectory import Trajectory
-from brachis.verify import VerifyOptions
 
 from .conftest import SCARA
 
@@ -68,17 +67,8 @@ def test_plan_for_people(run, task, write):
     assert outcome.err == ""  # no progress display in a pipe
 
 
-@pytest.fixture
-def too_strict(monkeypatch):
-    honest = planner.verify_trajectory
-    strict = VerifyOptions(ratio_tolerance=-0.5)
-    monkeypatch.setattr(
-        planner, "verify_trajectory", lambda trajectory, _options, **more: honest(trajectory, strict, **more)
-    )
-
-
-def test_unverified_plan_says_so(run, task, write, tmp_path, too_strict):  # noqa: ARG001
-    task["search"] = {"time_limit": 1.0}  # nothing will ever be verified
+@pytest.mark.usefixtures("too_strict")
+def test_unverified_plan_says_so(run, task, write, tmp_path):
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
     assert outcome.code == 1
     assert json.loads(outcome.out)["verified"] is False
@@ -91,7 +81,6 @@ def test_two_motions_do_not_mix_in_one_folder(run, task, write, planned, request
     _, out = planned
     (out / "notes.txt").write_text("mine")
     request.getfixturevalue("too_strict")
-    task["search"] = {"time_limit": 1.0}
     assert run("plan", write(task), "--out", out).code == 1
     names = {path.name for path in out.iterdir()}
     assert names == {"unverified.npz", "unverified.json", "unverified.png", "unverified_candidates.png", "notes.txt"}

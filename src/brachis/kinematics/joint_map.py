@@ -1,6 +1,6 @@
 """What a joint map is: curves y(t) in, joint motion and its exact derivatives out.
 
-Along a path y = (s, q_r), and the closed form gives the other joints (`decomposition`). Without a path y = q
+Along a path y = (s, q_r), and the closed form gives the other joints (`closed_form`). Without a path y = q
 (`direct`). Everything that lays down, solves and refines a program takes any of them.
 """
 

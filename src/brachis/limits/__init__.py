@@ -1,7 +1,8 @@
 """Limits on the motion: one kind per file, listed in `TABLE`.
 
-A new kind is its model in `task`, its file here with a line in `TABLE`, and a file in `verify.limits` with a line in
-the table there. Everything else takes the objects as they are and names no kind.
+A limit is a function of q, qdot and qddot. A new kind is its model in `task` (of joints, its field in `robot.limits`
+as well), its file here with a line in `TABLE`, and a file in `verify.limits` with a line in the table there. Nothing
+else asks which kind a limit is. Joint ranges are known elsewhere too: postures and turns are chosen within them.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A limit has c values at every moment of the motion, held between `lower` and `upper`. Most are ratios to a figure, so
 that their bounds are -1 and 1. How far a value v is beyond its bounds is its *violation*, and how near it is its
-*ratio*, 1 at the upper bound, -1 at the lower one, with the limit's own scale k:
+*ratio*, 1 at the upper bound, -1 at the lower one, with the limit's own `violation_scale` k:
 
     violation = k max(v - upper, lower - v)
     ratio     = max(1 + k (v - upper), 0) - max(1 + k (lower - v), 0)
@@ -55,8 +55,11 @@ class Role(Enum):
     """Whose limit it is."""
 
     ROBOT = "robot"
+    """Of its drives and joints."""
     PROCESS = "process"
+    """Of what the tool does."""
     SCENE = "scene"
+    """Of what stands around."""
     SAFEGUARD = "safeguard"
     """Guards the computation alone: falling short of it harms nobody, and the verification does not know it."""
 
@@ -157,7 +160,7 @@ class Limit(ABC):
     whole_turns : bool
         Whether it asks in which turn (multiple of 2 pi) an angle is.
     violation_scale : (c,) ndarray
-        See the module.
+        Violation of a value that is beyond its bound by 1; 1 unless values are measured otherwise (see the module).
     bounds : tuple of Bound
         The figures that the user could change.
     refusal : str
@@ -211,10 +214,10 @@ class Limit(ABC):
         return None
 
     def step_rows(self, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:  # noqa: ARG002
-        """Rows A, (K, c, n), by which |A qddot| and |A qdot| from postures (K, n) count as parts of the limit.
+        """How much of the limit a step of the joints takes: rows A and B, (K, c, n), in postures (K, n).
 
-        The first for accelerations, the second for velocities; None where the limit does not mind. Paths through joint
-        space are compared by them.
+        A qddot is the part of the limit that joint accelerations qddot take, B qdot that of joint velocities; None
+        where the limit does not ask for them. The lattice measures steps between postures by them.
         """
         return None, None
 

@@ -1,4 +1,4 @@
-"""What the rounds of both methods are judged by."""
+"""What the rounds of mesh refinement and of knot optimisation are judged by."""
 
 from __future__ import annotations
 

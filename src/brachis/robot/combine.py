@@ -13,7 +13,7 @@ from brachis.errors import InputError, TaskError
 from brachis.robot.free_roll import with_free_roll
 from brachis.robot.friction import Friction
 from brachis.robot.from_task import limit_spec, robot_from_settings
-from brachis.robot.limits import Limits, per_joint_values, resolve_limits
+from brachis.robot.limits import MAGNITUDES, Limits, per_joint_values, resolve_limits
 from brachis.robot.robot import ROLL_JOINT, Robot
 from brachis.robot.urdf import read_chain
 from brachis.task import FrictionSettings, LimitSettings, RobotSettings
@@ -22,7 +22,7 @@ from brachis.task.fields import Model
 _FRAMES = ("tool_frame", "base_frame", "locked_joints")
 """Settings that decide which joints the chain has."""
 _PER_JOINT = (
-    *(f"robot.limits.{kind}" for kind in ("torque", "velocity", "acceleration", "position")),
+    *(f"robot.limits.{kind}" for kind in (*MAGNITUDES, "position")),
     *(f"robot.friction.{kind}" for kind in FrictionSettings.model_fields),
 )
 """Settings with a value for each joint, which may be written as one value, a list or a mapping."""
@@ -99,12 +99,8 @@ def _limits(limits: Limits, names: Sequence[str]) -> LimitSettings:
         return [float(value) if np.isfinite(value) else None for value in values[: len(names)]]
 
     ranges = zip(finite(limits.position_lower), finite(limits.position_upper), strict=True)
-    return LimitSettings(
-        torque=dict(zip(names, finite(limits.torque), strict=True)),
-        velocity=dict(zip(names, finite(limits.velocity), strict=True)),
-        acceleration=dict(zip(names, finite(limits.acceleration), strict=True)),
-        position=dict(zip(names, ranges, strict=True)),
-    )
+    magnitudes = {kind: dict(zip(names, finite(getattr(limits, kind)), strict=True)) for kind in MAGNITUDES}
+    return LimitSettings.model_validate({"position": dict(zip(names, ranges, strict=True)), **magnitudes})
 
 
 def _friction(friction: Friction, names: Sequence[str]) -> FrictionSettings:

@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from brachis.errors import InputError
 from brachis.robot.friction import Friction
-from brachis.robot.limits import Limits, UrdfLimit
+from brachis.robot.limits import UrdfLimit
 from brachis.robot.robot import ROLL_JOINT, Robot
 from brachis.robot.task_map import FREE_ROLL, TaskMap, task_map_of
 
@@ -72,13 +72,7 @@ def with_free_roll(robot: Robot) -> Robot:
         model=model,
         joint_names=(*robot.joint_names, ROLL_JOINT),
         tool_frame=frame,
-        limits=Limits(
-            position_lower=np.append(old.position_lower, -np.inf),
-            position_upper=np.append(old.position_upper, np.inf),
-            velocity=np.append(old.velocity, np.inf),
-            acceleration=np.append(old.acceleration, np.inf),
-            torque=np.append(old.torque, np.inf),
-        ),
+        limits=old.with_free_joint(),
         stated_limits=(*robot.stated_limits, UrdfLimit(None, None, None, None)),
         friction=Friction(
             armature=np.append(friction.armature, 0.0),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import fields
 
 from brachis.errors import TaskError
 from brachis.robot.limits import LimitSpec
@@ -48,10 +49,5 @@ def robot_from_settings(
 
 def limit_spec(limits: LimitSettings) -> LimitSpec:
     """Return the limits of a task as `Robot.from_urdf` takes them."""
-    return LimitSpec(
-        torque=limits.torque,
-        velocity=limits.velocity,
-        acceleration=limits.acceleration,
-        position=limits.position,
-        scale=limits.scale.model_dump(),
-    )
+    given = {field.name: getattr(limits, field.name) for field in fields(LimitSpec)}
+    return LimitSpec(**given | {"scale": limits.scale.model_dump()})

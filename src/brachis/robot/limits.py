@@ -10,7 +10,6 @@ import numpy as np
 from brachis.arrays import freeze
 from brachis.errors import InputError, LimitError, UnknownNameError
 
-_SCALABLE = ("torque", "velocity", "acceleration")
 FROM_URDF = "urdf"
 """Marks a limit that is taken from the URDF (the default of every `LimitSpec` entry)."""
 LEAST, LARGEST = 1e-6, 1e12
@@ -68,6 +67,18 @@ class Limits:
         """Take copies that nobody can write to."""
         freeze(self, *(each.name for each in fields(self)))
 
+    def with_free_joint(self) -> Limits:
+        """Return the limits with those of a further joint, which has none."""
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        return Limits(**{name: np.append(old, -np.inf if name == _LOWEST else np.inf) for name, old in values.items()})
+
+
+_LOWEST = "position_lower"
+MAGNITUDES = tuple(each.name for each in fields(Limits) if not each.name.startswith("position_"))
+"""Kinds of limits that are one number > 0 for each joint."""
+STATED = {"torque": "effort", "velocity": "velocity"}
+"""Those of them that a URDF states, and its words for them."""
+
 
 @dataclass(frozen=True)
 class UrdfLimit:
@@ -107,10 +118,11 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
     """
     names = list(joint_names)
     _check_scale(spec.scale)
-    torque = _per_joint("torque", spec.torque, names, [u.effort for u in urdf])
-    velocity = _per_joint("velocity", spec.velocity, names, [u.velocity for u in urdf])
-    acceleration = _per_joint("acceleration", spec.acceleration, names, [None] * len(names))
-    for name, tau, acc in zip(names, torque, acceleration, strict=True):
+    found = {
+        kind: _per_joint(kind, getattr(spec, kind), names, [getattr(u, STATED.get(kind, ""), None) for u in urdf])
+        for kind in MAGNITUDES
+    }
+    for name, tau, acc in zip(names, found["torque"], found["acceleration"], strict=True):
         if np.isinf(tau) and np.isinf(acc):
             raise LimitError(
                 "has neither a torque nor an acceleration limit, so its time would go to zero",
@@ -118,19 +130,14 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
                 key=f"robot.limits.torque.{name} or robot.limits.acceleration.{name}",
             )
     lower, upper = _ranges(spec.position, names, urdf)
-    return Limits(
-        position_lower=lower,
-        position_upper=upper,
-        velocity=_scaled("velocity", velocity, spec.scale, names),
-        acceleration=_scaled("acceleration", acceleration, spec.scale, names),
-        torque=_scaled("torque", torque, spec.scale, names),
-    )
+    scaled = {kind: _scaled(kind, limits, spec.scale, names) for kind, limits in found.items()}
+    return Limits(position_lower=lower, position_upper=upper, **scaled)
 
 
 def _check_scale(scale: Mapping[str, float]) -> None:
     for kind, factor in scale.items():
-        if kind not in _SCALABLE:
-            raise UnknownNameError("limit to scale", kind, _SCALABLE, where="robot.limits.scale")
+        if kind not in MAGNITUDES:
+            raise UnknownNameError("limit to scale", kind, MAGNITUDES, where="robot.limits.scale")
         if not (np.isfinite(factor) and factor > 0.0):
             raise InputError(
                 "is not a factor", where=f"robot.limits.scale.{kind}", found=factor, allowed="a finite number > 0"

@@ -16,6 +16,8 @@ from brachis.robot.limits import (
     FARTHEST,
     FROM_URDF,
     LARGEST,
+    MAGNITUDES,
+    STATED,
     Limits,
     LimitSpec,
     UrdfLimit,
@@ -244,9 +246,10 @@ def _settings(
             "gravity": gravity,
             "locked_joints": dict(locked_joints or {}),
             "limits": {
-                "torque": _by_name(limits.torque, names, FROM_URDF),
-                "velocity": _by_name(limits.velocity, names, FROM_URDF),
-                "acceleration": _by_name(limits.acceleration, names, None),
+                **{
+                    kind: _by_name(getattr(limits, kind), names, FROM_URDF if kind in STATED else None)
+                    for kind in MAGNITUDES
+                },
                 "position": _by_name(limits.position, names, FROM_URDF),
                 "scale": dict(limits.scale),
             },

@@ -35,7 +35,7 @@ def refuse_what_is_out_of_reach(decompositions: Sequence[Decomposition], candida
     ------
     PathError
     """
-    if _some_course(candidates):
+    if _some_joint_path(candidates):
         return
     reasons = [_reason(decomposition) for decomposition in decompositions[:_LOOKED_AT]]
     clear = [
@@ -65,7 +65,7 @@ def no_motion(
     -------
     PathError or PlanningError
     """
-    joint_path = _some_course(candidates)
+    joint_path = _some_joint_path(candidates)
     reason = _advice(decompositions[0].problem.task, candidates) if joint_path else _reason(decompositions[0])
     if isinstance(reason, BrachisError):
         return reason
@@ -87,6 +87,12 @@ def no_motion(
         f"no motion within the limits was found: {outcomes or 'no initial guess'}",
         hint=reason + _what_is_missing(decompositions[0]),
     )
+
+
+def out_of_time(task: Task, undone: Sequence[str]) -> PlanningError:
+    """Return the error that says that the time was up, and what was left undone."""
+    problem = f"no motion was found within the time limit of {task.search.time_limit:g} s: {'; '.join(undone)}"
+    return PlanningError(problem, hint="Raise search.time_limit")
 
 
 def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
@@ -121,7 +127,7 @@ def _lattices(candidates: Sequence[Attempt]) -> list[Attempt]:
     return [candidate for candidate in candidates if candidate.origin.startswith("lattice")]
 
 
-def _some_course(candidates: Sequence[Attempt]) -> bool:
+def _some_joint_path(candidates: Sequence[Attempt]) -> bool:
     """Tell whether a lattice that was looked at has a joint path."""
     return any(candidate.branch for candidate in _lattices(candidates))
 

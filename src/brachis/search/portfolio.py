@@ -19,9 +19,8 @@ from typing import NamedTuple
 from brachis import interrupts
 from brachis.attempt import Attempt, Start
 from brachis.deadline import Deadline
-from brachis.errors import PlanningError
 from brachis.problem import Decomposition
-from brachis.search.explain import no_motion, refuse_what_is_out_of_reach
+from brachis.search.explain import no_motion, out_of_time, refuse_what_is_out_of_reach
 from brachis.search.processes import each, processes
 from brachis.search.record import NOT_TRIED, Numbered, Record, rounded
 from brachis.search.schedule import Batch, batches
@@ -29,8 +28,10 @@ from brachis.search.solving import Listener
 
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no start is solved while nothing is verified."""
-_LEAST_SHARE, _LARGEST_SHARE = 2.0, 0.15
-"""Seconds that every start may take, and part of the time limit that none may exceed."""
+_LEAST_SHARE = 2.0
+"""Seconds that the solve from any start may take, however many starts there are."""
+_LARGEST_SHARE = 0.15
+"""Part of the time limit that the solve from one start may take at most."""
 _GRACE = 1.0
 """Seconds to finish the best attempt where the time is up and nothing is verified."""
 _LAST_CHANCES = 3
@@ -93,9 +94,7 @@ def find_fastest(
     if record.best is not None:
         return record
     if record.interrupted:
-        limit, left = decompositions[0].problem.task.search.time_limit, "; ".join(record.undone())
-        problem = f"no motion was found within the time limit of {limit:g} s: {left}"
-        raise PlanningError(problem, hint="Raise search.time_limit")
+        raise out_of_time(decompositions[0].problem.task, record.undone())
     raise no_motion(decompositions, record.attempts, record.dead_ends)
 
 

@@ -20,7 +20,7 @@ _WORTH_IT = 2e-4
 _SAME_TIME = 1e-4
 _SAME_MOTION = 0.1  # rad or m
 _GAIN_SLACK = 0.005
-"""By which other attempts may gain more from better knots than those finished."""
+"""Better knots shorten a motion when it is finished; an attempt may gain this part more by them than any one so far."""
 
 Numbered = tuple[int, Attempt]
 """Index among the attempts, and the attempt as it was when it was solved."""

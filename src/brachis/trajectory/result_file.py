@@ -176,6 +176,8 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
         raise InputError(
             f"not the knots of a spline of degree {degree}", where="knots", found=_extent(knots), allowed=allowed
         )
+    if not (np.diff(knots[degree : len(knots) - degree]) > 0.0).all():
+        raise InputError("internal knots are repeated", where="knots", allowed="every internal knot once")
     shapes = dict.fromkeys(("q", "qdot", "qddot", "qddot_before"), (len(times), n))
     shapes["control_points"] = (1 + r, len(knots) - outer)
     for name, shape in shapes.items():

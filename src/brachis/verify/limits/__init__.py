@@ -16,13 +16,13 @@ TABLE: dict[str, LimitCheck] = {
     "velocity": joint_rate.worst_velocity,
     "acceleration": joint_rate.worst_acceleration,
     "position": position.worst,
-    "tool speed": tool_speed.worst,
+    "tool_speed": tool_speed.worst,
 }
 
 
 def limit_checks(given: Given, further: Sequence[LimitModel], options: VerifyOptions) -> list[Check]:
     """Check every kind of limit that there is, then those of the task's ``custom_limits`` and the `further` ones."""
-    found = [(name, worst) for name, find in TABLE.items() if (worst := find(given)) is not None]
+    found = [(kind.replace("_", " "), worst) for kind, find in TABLE.items() if (worst := find(given)) is not None]
     found += [check_own(model, given) for model in (*custom_limits(given.task), *further)]
     allowed = 1.0 + options.ratio_tolerance
     return [
