@@ -61,7 +61,7 @@ def where_it_failed(attempt: Attempt) -> Program | None:
     if trajectory is None or refined is None or attempt.verification is None:
         return None
     failed = [check for check in attempt.verification.checks if not check.passed]
-    if not failed or any(not check.name.endswith("ratio") or check.time is None for check in failed):
+    if not failed or any(not check.of_limit or check.time is None for check in failed):
         return None
     t_norm = np.array([check.time for check in failed]) / trajectory.t_end
     near = t_norm[:, None] + _BESIDE * np.array([-1.0, 0.0, 1.0])

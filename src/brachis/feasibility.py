@@ -70,21 +70,29 @@ def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str) -> N
     for limit in limits:
         if not limit.static:
             continue
-        ratios = np.abs(limit.ratio(limit.values(still))[0])
-        worst = int(np.argmax(ratios))
-        if ratios[worst] > 1.0 + _RANGE_SLACK:
+        values = limit.values(still)
+        beyond = limit.violation(values)[0] - _RANGE_SLACK * np.maximum(limit.violation_scale, 1.0)
+        worst = int(np.argmax(beyond))
+        if beyond[worst] > 0.0:
             label = limit.labels[worst]
-            figures = [bound.figure for bound in limit.bounds if bound.column == worst and bound.end is None]
-            found, allowed = f"{ratios[worst]:.4g} times the limit", "no more than the limit"
-            if figures:
-                found, allowed = (f"{size * figures[0]:.4g} {label.unit}" for size in (ratios[worst], 1.0))
+            found, allowed = _in_figures(limit, worst, float(values[0, worst]))
             raise StartError(
                 f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
                 where=f"{name}.joints",
-                found=f"{found} needed at rest",
-                allowed=allowed,
+                found=f"{found} {label.unit} needed at rest",
+                allowed=f"{allowed} {label.unit}",
                 hint=f"Choose another posture{f', or raise {label.key}' if label.key else ''}",
             )
+
+
+def _in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
+    """Write a value and its bounds in the unit of the value's label."""
+    bounds = [bound for bound in limit.bounds if bound.column == column]
+    if bounds[0].end is None:  # the value is a ratio to one figure
+        return f"{abs(value) * bounds[0].figure:.4g}", f"{bounds[0].figure:.4g}"
+    ends = {bound.end: f"{bound.figure:.4g}" for bound in bounds}
+    allowed = " to ".join(ends.get(end, "any") for end in ("lower", "upper"))
+    return f"{value / bounds[0].per_unit:.4g}", allowed
 
 
 def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, wanted: str, *, name: str = "start") -> int:

@@ -76,7 +76,7 @@ def test_an_object_limits_the_motion(plugin):
     (checked,) = [each for each in report.check.entries if each.sensitivity == entry]
     assert checked.deviation < 0.05
     # A motion that was planned without it does not pass with it.
-    assert not verify_trajectory(free.trajectory, further=[model]).passed
+    assert not verify_trajectory(free.trajectory, limits=[model]).passed
 
 
 @pytest.mark.usefixtures("installed")
@@ -172,7 +172,9 @@ LINE = ROOT / "examples/01_scara_line.yaml"
         ({"partials": lambda motion: Partials(qdot=motion.q)}, "limits[0].partials.qdot", "(2, 1, 3)"),
         ({"partials": lambda _motion: Partials()}, "limits[0].partials", "all None"),
         ({"partials": lambda _motion: None}, "limits[0].partials", "is no brachis.limits.Partials"),
-        ({"kind": "torque"}, "limits[0].kind", "taken"),
+        ({"labels": (Label("j1", "torque", "Nm"),)}, "limits[0].labels", "taken"),
+        ({"labels": ("j3",)}, "limits[0].labels", "Label"),
+        ({"labels": (), "lower": np.empty(0), "upper": np.empty(0)}, "limits[0].labels", "no values"),
     ],
 )
 def test_a_limit_whose_parts_do_not_fit_is_refused(parts, where, said):

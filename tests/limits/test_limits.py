@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from brachis.limits import TABLE, Moments, limits_of
+from brachis.limits import TABLE, Label, Limit, Moments, Partials, limits_of
 from support.chains import planar_robot
 from support.phases import FRICTION
 
@@ -97,3 +97,29 @@ def test_limits_come_in_the_order_of_the_table_and_only_where_there_is_one():
     assert kinds == ["torque", "velocity", "position", "tool_speed"]
     open_task = SimpleNamespace(tool_limits=SimpleNamespace(speed=None), custom_limits={})
     assert "tool_speed" not in [limit.kind for limit in limits_of(ROBOT, open_task)]
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(0.0, 0.3), (-0.1, -0.05), (-np.inf, 0.2), (0.5, np.inf), (-3.0, 4.0)])
+def test_a_ratio_is_above_one_exactly_where_a_bound_is_violated(lower, upper):
+    """However narrow the bounds are, or far from zero."""
+
+    class Sum(Limit):
+        kind = "sum"
+        labels = (Label("j1", "sum", "rad"),)
+
+        def values(self, motion):
+            return motion.q[:, :1]
+
+        def partials(self, motion):
+            return Partials(q=np.ones((len(motion.q), 1, 3)))
+
+    limit = Sum()
+    limit.lower, limit.upper = np.array([lower]), np.array([upper])
+    values = np.linspace(-4.0, 5.0, 901)[:, None] + 1e-6
+    ratio, violation = limit.ratio(values), limit.violation(values)
+    assert np.array_equal(np.abs(ratio) > 1.0, violation > 0.0)
+    beyond = violation > 0.0
+    np.testing.assert_allclose(np.abs(ratio)[beyond], 1.0 + violation[beyond])
+    for bound, sign in ((lower, -1.0), (upper, 1.0)):
+        if np.isfinite(bound):
+            assert limit.ratio(np.array([[bound]]))[0, 0] == sign

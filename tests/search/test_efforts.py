@@ -21,7 +21,7 @@ def test_the_documented_efforts_are_the_real_ones():
     for name, (decompositions, seeds, plans, refined) in table.items():
         level = [level for level in SEARCH_LEVELS[name] if not level.last_resort][-1]
         assert decompositions == {1: "the first one", 6: "6", 20: "20"}.get(level.decompositions, "all")
-        assert seeds.split(",")[0] == str(level.seeds)
+        assert seeds.split(",")[0] == str(level.joint_paths)
         assert ("and 8" in seeds) is (level.numeric == 8)
         assert plans == (str(level.plans) if level.plans < 10_000 else "all")
         assert refined == str(level.refined)

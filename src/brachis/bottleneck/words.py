@@ -55,7 +55,7 @@ def _costs(found: Sensitivities, t_end: float) -> list[str]:
     costly = [entry for entry in found.limits if -entry.change(_FRACTION) > _NOTHING * t_end]
     lines += [_saving(entry, t_end) for entry in costly]
     if len(costly) < len(found.limits):
-        lines.append("no other limit costs time" if costly else "no limit of a joint costs time")
+        lines.append("no other limit costs time" if costly else "no limit costs time")
     lines.append(f"(to first order, from multipliers by the {found.source}, residual {found.residual:.0e})")
     return lines + [_boundary(e) for e in found.boundaries if e.derivative * e.margin > _NOTHING * t_end]
 

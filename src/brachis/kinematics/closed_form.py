@@ -28,7 +28,7 @@ from brachis.ik import IKSolver, margin_gradient
 from brachis.kinematics.joint_map import JointDerivatives, JointState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
-from brachis.robot.joint_space import TURN, complement, difference
+from brachis.robot.joint_space import TURN, complement, difference, in_turn_of
 
 _SURE = 0.25
 """A step that differs from its prediction by more than this part of a turn is not counted."""
@@ -212,13 +212,13 @@ class ClosedFormMap:
         qddot = np.einsum("kij,kj->ki", gradient, yddot)
         qddot[:, self.nonredundant] += np.einsum("kij,kj->ki", inverse, wanted)
         if near is not None:
-            q[:, self._turns] += TURN * np.round((near - q)[:, self._turns] / TURN)
+            q = in_turn_of(q, near, np.isin(np.arange(self.robot.n), self._turns))
         elif t is not None and self._ranged.any():  # otherwise no limit asks which turn an angle is in
             self._follow(q, qdot, qddot, t)
         return PathState(y, ydot, yddot, q, qdot, qddot, gradient, sample, twists, inverse)
 
     def _follow(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, t: np.ndarray) -> None:
-        """Lift angles in place so that they follow their velocities; the quintic's rule predicts each step."""
+        """Choose turns of angles, in place, that follow their velocities; the quintic's rule predicts each step."""
         turns, h = self._turns, np.diff(t)[:, None]
         v, a = qdot[:, turns], qddot[:, turns]
         predicted = 0.5 * h * (v[1:] + v[:-1]) - h**2 / 12.0 * np.diff(a, axis=0)

@@ -58,8 +58,8 @@ def limits_of(robot: Robot, task: Task, further: Sequence[LimitModel] = ()) -> t
         A limit of the user's own does not fit the robot, or is none (see `bound_limits`).
     """
     built = tuple(limit for build in TABLE.values() if (limit := build(robot, task)) is not None)
-    own = bound_limits(custom_limits(task), robot, tuple(TABLE))
-    return (*built, *own, *bound_limits(further, robot, (*TABLE, *(limit.kind for limit in own))))
+    named = bound_limits(custom_limits(task), robot, built, "custom_limits")
+    return (*built, *named, *bound_limits(further, robot, (*built, *named), "limits"))
 
 
 __all__ = [

@@ -8,47 +8,57 @@ import numpy as np
 
 from brachis.custom_limits import LimitModel
 from brachis.errors import InputError
-from brachis.limits.protocol import Limit, Moments, Partials
+from brachis.limits.protocol import Label, Limit, Moments, Partials
 from brachis.robot import Robot
 
 _MOMENTS = 2
 """Moments at which a limit is tried; two tell (K, c) from (c,)."""
 
 
-def bound_limits(models: Sequence[LimitModel], robot: Robot, taken: Sequence[str]) -> list[Limit]:
+def bound_limits(models: Sequence[LimitModel], robot: Robot, others: Sequence[Limit], where: str) -> list[Limit]:
     """Bind a user's limits to a robot, and check them.
 
     Parameters
     ----------
     models : sequence of LimitModel
     robot : Robot
-    taken : sequence of str
-        Kinds that there are already.
+    others : sequence of Limit
+        Those that there are already: labels are unique.
+    where : str
+        What the models are called in messages.
 
     Raises
     ------
     InputError
-        A model cannot be bound, or its limit is none; its kind is taken; its parts do not fit together; its values or
+        A model cannot be bound, or its limit is none; its parts do not fit together; a label is taken; its values or
         partials have the wrong shape or are not finite.
     """
     if not isinstance(models, Sequence):
-        raise InputError("is no list", where="limits", found=models, allowed="a list of limits: limits=[...]")
+        raise InputError("is no list", where=where, found=models, allowed="a list of limits: limits=[...]")
     found: list[Limit] = []
     for number, model in enumerate(models):
-        where = f"limits[{number}]"
+        here = f"{where}[{number}]"
         if isinstance(model, type) or not callable(getattr(model, "bind", None)):
             raise InputError(
                 "is no limit that can be bound to a robot",
-                where=where,
+                where=here,
                 found=model,
                 allowed="an object whose bind(robot) returns a brachis.limits.Limit (docs/own_limit.md)",
             )
-        limit = model.bind(robot)
+        try:
+            limit = model.bind(robot)
+        except (TypeError, ValueError) as error:
+            raise InputError(
+                f"cannot be bound to the robot: {error}", where=here, found=type(model).__name__
+            ) from error
         if not isinstance(limit, Limit):
-            raise InputError("bind returned no brachis.limits.Limit", where=where, found=limit)
-        if limit.kind in (*taken, *(other.kind for other in found)):
-            raise InputError("its kind is taken", where=f"{where}.kind", found=limit.kind, allowed="a name of its own")
-        _check(limit, robot.n, where)
+            raise InputError("bind returned no brachis.limits.Limit", where=here, found=type(limit).__name__)
+        _check(limit, robot.n, here)
+        taken = {str(label) for other in (*others, *found) for label in other.labels}
+        for label in limit.labels:
+            if str(label) in taken:
+                problem = "the label is taken; subject and kind together name a value"
+                raise InputError(problem, where=f"{here}.labels", found=str(label))
         found.append(limit)
     return found
 
@@ -59,6 +69,10 @@ def _check(limit: Limit, n: int, where: str) -> None:
     if missing:
         raise InputError("lacks what every limit has", where=where, found=f"no {', '.join(missing)}")
     count = len(limit.labels)
+    if not all(isinstance(label, Label) for label in limit.labels):
+        raise InputError("are not all brachis.limits.Label", where=f"{where}.labels", found=limit.labels)
+    if not count and not len(limit.lower):
+        raise InputError("the limit has no values", where=f"{where}.labels", allowed="at least one label")
     for name in ("lower", "upper"):
         _check_shape(f"{where}.{name}", np.asarray(getattr(limit, name)), (count,), finite=False)
     if not np.all(np.asarray(limit.lower) < limit.upper):
@@ -84,4 +98,6 @@ def _check_shape(where: str, array: object, shape: tuple[int, ...], *, finite: b
         moments = f" for {_MOMENTS} moments" if finite else ""
         raise InputError("has the wrong shape", where=where, found=f"{found}{moments}", allowed=f"{shape}")
     if finite and not np.all(np.isfinite(np.asarray(array, dtype=float))):
-        raise InputError("is not finite", where=where, found=array, allowed="finite numbers")
+        raise InputError(
+            "is not finite", where=where, found=np.asarray(array).ravel().tolist(), allowed="finite numbers"
+        )

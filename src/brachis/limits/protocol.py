@@ -4,8 +4,9 @@ A limit has c values at every moment of the motion, held between `lower` and `up
 that their bounds are -1 and 1. How far a value v is beyond its bounds is its *violation*, and how near it is its
 *ratio*, 1 at the upper bound, -1 at the lower one, with the limit's own `violation_scale` k:
 
-    violation = k max(v - upper, lower - v)
-    ratio     = max(1 + k (v - upper), 0) - max(1 + k (lower - v), 0)
+    violation = max(k (v - upper), k (lower - v))
+    ratio     = max(1 + k (v - upper), 0)     where the upper bound is the nearer one
+              = -max(1 + k (lower - v), 0)    where it is the lower one
 """
 
 from __future__ import annotations
@@ -238,6 +239,5 @@ class Limit(ABC):
 
     def ratio(self, values: np.ndarray) -> np.ndarray:
         """How near values, (K, c), are to their bounds; see the module."""
-        scale = self.violation_scale
-        above = np.maximum(1.0 + (values - self.upper) * scale, 0.0)
-        return np.asarray(above - np.maximum(1.0 + (self.lower - values) * scale, 0.0))
+        above, below = (values - self.upper) * self.violation_scale, (self.lower - values) * self.violation_scale
+        return np.where(above >= below, np.maximum(1.0 + above, 0.0), -np.maximum(1.0 + below, 0.0))

@@ -190,9 +190,13 @@ class Phase:
         totals = np.full(len(self.grid.total), x[self._lengths].sum())
         return np.concatenate([*values, np.diff(x[self._s]), totals])
 
+    def has(self, limit: Limit) -> bool:
+        """Tell whether a limit is one of the phase's, the very object."""
+        return any(each is limit for each in self.limits)
+
     def rows_of(self, limit: Limit) -> np.ndarray:
         """Numbers of the rows of one of the limits, (K, c)."""
-        before = self.limits[: self.limits.index(limit)]
+        before = self.limits[: [each is limit for each in self.limits].index(True)]
         count, size = len(self.t_norm), len(limit.lower)
         return count * sum(len(each.lower) for each in before) + np.arange(count * size).reshape(count, size)
 

@@ -127,12 +127,12 @@ class Program:
     @property
     def limits(self) -> tuple[Limit, ...]:
         """The limits of all phases, safeguards included, each once."""
-        return tuple(dict.fromkeys(limit for phase in self.phases for limit in phase.limits))
+        return tuple({id(limit): limit for phase in self.phases for limit in phase.limits}.values())
 
     def rows_of(self, limit: Limit) -> np.ndarray:
         """Numbers of the rows of a limit, (K, c), at the collocation points of all phases that have it."""
         pairs = zip(self.phases, self._first_rows, strict=False)  # the links' rows come behind
-        return np.concatenate([first + phase.rows_of(limit) for phase, first in pairs if limit in phase.limits])
+        return np.concatenate([first + phase.rows_of(limit) for phase, first in pairs if phase.has(limit)])
 
     def motions(self, x: np.ndarray) -> list[Motion]:
         """Curves of every phase that belong to x."""

@@ -35,7 +35,7 @@ def bind(robot: Robot, space: str | Sequence[str]) -> tuple[Robot, TaskMap]:
     Raises
     ------
     InputError
-        See `TaskMap.of`; or the robot has a joint of the virtual joint's name.
+        See `task_map_of`; or the robot has a joint of the virtual joint's name.
     """
     if robot.rolls_freely and space != FREE_ROLL:
         raise InputError(

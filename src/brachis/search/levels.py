@@ -16,7 +16,7 @@ class SearchLevel:
         Decompositions that are looked at; those farthest from singularity at the start come first.
     polynomial : bool
         Whether decompositions whose inverse kinematics is a polynomial's roots are looked at beside closed forms.
-    seeds : int
+    joint_paths : int
         Joint paths taken from the lattice of a decomposition, for each branch on which the motion may begin.
     numeric : int
         Joint paths by numeric inverse kinematics beside them, where the start posture is given.
@@ -32,7 +32,7 @@ class SearchLevel:
 
     decompositions: int
     polynomial: bool
-    seeds: int
+    joint_paths: int
     numeric: int
     plans: int
     refined: int
@@ -42,13 +42,17 @@ class SearchLevel:
 
 
 _LEVELS = {
-    "single": SearchLevel(1, polynomial=False, seeds=1, numeric=0, plans=1, refined=1, cells_per_turn=72, nodes=120),
-    "fast": SearchLevel(6, polynomial=False, seeds=4, numeric=0, plans=24, refined=4, cells_per_turn=72, nodes=120),
+    "single": SearchLevel(
+        1, polynomial=False, joint_paths=1, numeric=0, plans=1, refined=1, cells_per_turn=72, nodes=120
+    ),
+    "fast": SearchLevel(
+        6, polynomial=False, joint_paths=4, numeric=0, plans=24, refined=4, cells_per_turn=72, nodes=120
+    ),
     "thorough": SearchLevel(
-        20, polynomial=True, seeds=8, numeric=8, plans=100, refined=12, cells_per_turn=96, nodes=300
+        20, polynomial=True, joint_paths=8, numeric=8, plans=100, refined=12, cells_per_turn=96, nodes=300
     ),
     "exhaustive": SearchLevel(
-        10_000, polynomial=True, seeds=30, numeric=8, plans=10_000, refined=40, cells_per_turn=144, nodes=600
+        10_000, polynomial=True, joint_paths=30, numeric=8, plans=10_000, refined=40, cells_per_turn=144, nodes=600
     ),
 }
 

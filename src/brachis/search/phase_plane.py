@@ -5,10 +5,10 @@ With u = d2s/dt2 and x = (ds/dt)^2, limits along a joint path q(s) are lines in 
     a(s) u + b(s) x + c(s)   in [-1, 1],
 
 for torques a = M q_ds / tau_max, b = (M q_dds + C(q, q_ds) q_ds) / tau_max and c the torque at rest; those that do not
-ask for u are ceilings for x. Backwards along the joint path,
-the largest x from which the next station's interval can be reached is kept; forwards, the largest u that stays within
-is taken (Pham, Pham, IEEE Trans. Robotics 34(3), 2018). Torque may jump here, and viscous and Coulomb friction are left
-out, so the time is an estimate by which joint paths are ranked, no bound.
+ask for u are ceilings for x. Backwards along the joint path, the largest x from which the next station's interval can
+be reached is kept; forwards, the largest u that stays within is taken (Pham, Pham, IEEE Trans. Robotics 34(3), 2018).
+Torque may jump here, and viscous and Coulomb friction are left out, so the time is an estimate by which joint paths are
+ranked, no bound.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from brachis.solvers import solver_named
 
 _SIZE = 12
 _NEAR_SINGULAR = 0.1
-_SEED_SHARE = 0.4
+_LATTICE_SHARE = 0.4
 """Part of the time that is left in which the starts of a level are looked for; those found by then are planned."""
 Note = Callable[[Decomposition, DeadEnd | None], None]
 """Told why a choice gives no starts: where its lattice ends, or None where the time was up."""
@@ -76,7 +76,9 @@ def batches(
             batch, rest = rest[: level.decompositions], rest[level.decompositions :]
             if task.search.guesses == "numeric":
                 starts = [
-                    start for decomposition in batch for start in numeric_starts(decomposition, level.seeds, deadline)
+                    start
+                    for decomposition in batch
+                    for start in numeric_starts(decomposition, level.joint_paths, deadline)
                 ]
             else:
                 starts = _from_lattices(batch, level, deadline, listener, note)
@@ -123,7 +125,7 @@ def _from_lattices(
     redundancy = max(1, len(decompositions[0].redundant))
     ranked: list[tuple[int, float, int, Start]] = []
     number = itertools.count()
-    jobs, deadline = processes(search.jobs), deadline.part(_SEED_SHARE)
+    jobs, deadline = processes(search.jobs), deadline.part(_LATTICE_SHARE)
     outcomes = list(each(_starts_of, decompositions, level, search.seed, deadline, jobs=jobs, listener=listener))
     for decomposition, outcome in zip(decompositions, outcomes, strict=True):
         if isinstance(outcome, DeadEnd):

@@ -31,7 +31,7 @@ def lattice_starts(
     Parameters
     ----------
     decomposition : Decomposition
-    effort : Effort
+    level : SearchLevel
     seed : int
         Of what is drawn at random with several redundant joints.
     deadline : Deadline, optional
@@ -44,7 +44,7 @@ def lattice_starts(
     cells, nodes, most = (
         level.cells_per_turn,
         level.nodes,
-        max(1, level.seeds // max(1, len(decomposition.redundant))) * len(decomposition.branches),
+        max(1, level.joint_paths // max(1, len(decomposition.redundant))) * len(decomposition.branches),
     )
     found = Lattice(decomposition, cells_per_turn=cells, nodes=nodes, seed=seed, deadline=deadline).joint_paths(most)
     if isinstance(found, DeadEnd):

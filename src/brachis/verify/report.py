@@ -27,6 +27,8 @@ class Check:
         When, s.
     remark : str
         What there is to know of the check itself; empty where there is nothing.
+    of_limit : bool
+        Whether it compares the motion with a limit, so that `value` is a ratio.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Check:
     subject: str | None = None
     time: float | None = None
     remark: str = ""
+    of_limit: bool = False
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ def verify_trajectory(
     options: VerifyOptions | None = None,
     *,
     robot: Robot | None = None,
-    further: Sequence[LimitModel] = (),
+    limits: Sequence[LimitModel] = (),
 ) -> Verification:
     """Check path, limits, progress, start and end, splines, and continuity of a trajectory.
 
@@ -40,7 +40,7 @@ def verify_trajectory(
     robot : Robot, optional
         Check against this robot and not the saved one, for example a newer URDF; its joints must have the same names
         in the same order.
-    further : sequence of LimitModel, optional
+    limits : sequence of LimitModel, optional
         Limits of the user's own with which the trajectory was planned, beside those that its task names.
 
     Returns
@@ -73,16 +73,16 @@ def verify_trajectory(
     places = (np.concatenate(part) for part in zip(*parts, strict=True))
     states = States.at(pieces, robot, *places)
     path_check = _path_error(trajectory, path, task_map, states, options)
-    limits = limit_checks(Given(robot, trajectory.task, pieces, states), further, options)
+    ratios = limit_checks(Given(robot, trajectory.task, pieces, states), limits, options)
     checks = [
         path_check,
-        *limits,
+        *ratios,
         *progress_checks(trajectory, states.t, options),
         *end_checks(trajectory, robot, options),
         *spline_checks(trajectory, robot, states, options),
         *continuity_checks(trajectory, pieces, robot, options),
     ]
-    worst = max((check.value for check in limits), default=0.0)
+    worst = max((check.value for check in ratios), default=0.0)
     return Verification(tuple(checks), len(states.t), worst, path_check.value)
 
 

@@ -17,6 +17,8 @@ class CoupledRange:
     """Range of the sum of two joints' positions, rad; what a task gives as ``custom_limits: {coupled_range: ...}``."""
 
     def __init__(self, joints: tuple[str, str], lower: float, upper: float) -> None:
+        if len(joints) != 2 or joints[0] == joints[1]:  # noqa: PLR2004
+            raise ValueError(f"two different joints are coupled, found {list(joints)}")
         if not lower < upper:
             raise ValueError(f"lower must be below upper, found [{lower}, {upper}]")
         self.joints, self.lower, self.upper = tuple(joints), lower, upper

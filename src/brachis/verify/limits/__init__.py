@@ -1,4 +1,7 @@
-"""Ratios to limits by formulas of the verification's own, which share nothing with `brachis.limits`: a kind a file."""
+"""Ratios to limits by formulas of the verification's own, which share nothing with `brachis.limits`: a kind a file.
+
+Only limits of a user's own that bring no check along are looked at by their own values (`own`), and marked so.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +29,8 @@ def limit_checks(given: Given, further: Sequence[LimitModel], options: VerifyOpt
     found += [check_own(model, given) for model in (*custom_limits(given.task), *further)]
     allowed = 1.0 + options.ratio_tolerance
     return [
-        Check(
-            f"{name} ratio", worst.ratio, allowed, "-", worst.ratio <= allowed, worst.subject, worst.time, worst.remark
-        )
-        for name, worst in found
+        Check(f"{name} ratio", ratio, allowed, "-", ratio <= allowed, subject, time, remark, of_limit=True)
+        for name, (ratio, subject, time, remark) in found
     ]
 
 

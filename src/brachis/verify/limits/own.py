@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.custom_limits import LimitModel
+from brachis.errors import InputError
 from brachis.verify.limits.peaks import worst_between
 from brachis.verify.limits.protocol import Given, Worst
 from brachis.verify.motion import States
@@ -23,8 +24,14 @@ def check_own(model: LimitModel, given: Given) -> tuple[str, Worst]:
 
     def ratios(states: States) -> np.ndarray:
         if independent is None:
-            return np.abs(limit.ratio(limit.values(states)))
-        return np.abs(independent(given.robot, states.q, states.qdot, states.qddot, states.tau))
+            values = limit.values(states)
+            return 1.0 + np.maximum(values - limit.upper, limit.lower - values) * limit.violation_scale
+        found = np.abs(independent(given.robot, states.q, states.qdot, states.qddot, states.tau))
+        if found.shape != (len(states.t), len(limit.labels)):
+            allowed = f"{(len(states.t), len(limit.labels))}, a ratio for every moment and label"
+            where = f"{type(model).__name__}.check"
+            raise InputError("has the wrong shape", where=where, found=found.shape, allowed=allowed)
+        return found
 
     worst = worst_between(given, ratios, [label.subject for label in limit.labels])
     return limit.name, worst if independent else worst._replace(remark=_OWN_FORMULA)
