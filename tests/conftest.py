@@ -9,12 +9,19 @@ from pathlib import Path
 import pytest
 
 _TESTS = Path(__file__).resolve().parent
+_LONG = ("test_readme.py", "test_random_poses.py", "test_random_lines.py", "test_fuzz.py", "test_auto_on_robots.py")
+"""Tests of these files take up to a minute each: they come first, so that no worker is left alone with one at last."""
 if str(_TESTS) not in sys.path:
     sys.path.append(str(_TESTS))
 
 # A shell that starts the tests in the background has Ctrl-C ignored; tests that press it want Python's usual handler.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let long tests come first."""
+    items.sort(key=lambda item: item.path.name not in _LONG)
 
 
 @pytest.fixture(scope="session")
