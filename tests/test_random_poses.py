@@ -13,10 +13,8 @@ import pytest
 import brachis
 
 ROOT = Path(__file__).parents[1]
-COUNT, SEED = (
-    5,
-    1,
-)  # of seed 0 the second line of the TX90L takes its whole time limit: nothing here waits for the clock
+COUNT, SEED = 5, 1
+"""With seed 0 the second line of the TX90L takes its whole time limit; no test waits for that."""
 
 
 @pytest.fixture(scope="module")
