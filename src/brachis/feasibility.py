@@ -88,11 +88,15 @@ def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str) -> N
 def _in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
     """Write a value and its bounds in the unit of the value's label."""
     bounds = [bound for bound in limit.bounds if bound.column == column]
-    if bounds[0].end is None:  # the value is a ratio to one figure
-        return f"{abs(value) * bounds[0].figure:.4g}", f"{bounds[0].figure:.4g}"
+    if not bounds:
+        return f"{value:.4g}", f"{limit.lower[column]:.4g} to {limit.upper[column]:.4g}"
+    first = bounds[0]
+    if first.end is None:  # the value is a ratio to one figure
+        return f"{abs(value) * first.figure:.4g}", f"{first.figure:.4g}"
+    level = limit.lower[column] if first.end == "lower" else limit.upper[column]
     ends = {bound.end: f"{bound.figure:.4g}" for bound in bounds}
     allowed = " to ".join(ends.get(end, "any") for end in ("lower", "upper"))
-    return f"{value / bounds[0].per_unit:.4g}", allowed
+    return f"{first.figure + (value - level) / first.per_unit:.4g}", allowed
 
 
 def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, wanted: str, *, name: str = "start") -> int:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials, PhaseLines
+from brachis.limits.per_joint import JointRatioLimit
+from brachis.limits.protocol import JointMotion, Partials, PhaseLines
 from brachis.robot import Robot
 from brachis.task import Task
 
 
-class _JointRateLimit(Limit):
+class _JointRateLimit(JointRatioLimit):
     """Joint velocities or accelerations over their limits.
 
     Parameters
@@ -21,23 +22,11 @@ class _JointRateLimit(Limit):
         Their limits.
     """
 
-    time_scaling = True
     _per_time: str
 
     def __init__(self, robot: Robot, joints: np.ndarray, figures: np.ndarray) -> None:
-        self._joints, self._scale = joints, 1.0 / figures
+        super().__init__(robot, joints, figures, [unit + self._per_time for unit in robot.position_units])
         self._selection = np.eye(robot.n)[joints] * self._scale[:, None]
-        self.labels = tuple(
-            Label(name, self.kind, robot.position_units[i] + self._per_time, f"robot.limits.{self.kind}.{name}")
-            for i, name in ((i, robot.joint_names[i]) for i in joints)
-        )
-        self.lower, self.upper = -np.ones(len(joints)), np.ones(len(joints))
-        self._bounds = tuple(Bound(c, limit, limit, 1.0 / limit) for c, limit in enumerate(figures.tolist()))
-
-    @property
-    def bounds(self) -> tuple[Bound, ...]:
-        """See `Limit`."""
-        return self._bounds
 
     def _rows(self, count: int) -> np.ndarray:
         """Constant partials at `count` moments, (K, c, n)."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials, PhaseLines
+from brachis.limits.per_joint import JointRatioLimit
+from brachis.limits.protocol import JointMotion, Partials, PhaseLines
 from brachis.robot import Robot, dynamics
 from brachis.task import Task
 
 
-class TorqueLimit(Limit):
+class TorqueLimit(JointRatioLimit):
     """Joint torques over their limits.
 
     Parameters
@@ -20,26 +21,13 @@ class TorqueLimit(Limit):
     """
 
     kind = "torque"
-    time_scaling = True
     static = True
     refusal = "cannot hold the arm against gravity"
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
-        self._robot, self._joints = robot, joints
-        figures = robot.limits.torque[joints]
-        self._scale = 1.0 / figures
-        units = {"rad": "Nm", "m": "N"}
-        self.labels = tuple(
-            Label(name, "torque", units[robot.position_units[i]], f"robot.limits.torque.{name}")
-            for i, name in ((i, robot.joint_names[i]) for i in joints)
-        )
-        self.lower, self.upper = -np.ones(len(joints)), np.ones(len(joints))
-        self._bounds = tuple(Bound(c, limit, limit, 1.0 / limit) for c, limit in enumerate(figures.tolist()))
-
-    @property
-    def bounds(self) -> tuple[Bound, ...]:
-        """See `Limit`."""
-        return self._bounds
+        units = [{"rad": "Nm", "m": "N"}[unit] for unit in robot.position_units]
+        super().__init__(robot, joints, robot.limits.torque[joints], units)
+        self._robot = robot
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
