@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from brachis.kinematics import ClosedFormMap
+from brachis.kinematics import ChartMap, ClosedFormMap
 from brachis.nlp import Program
-from brachis.problem import Decomposition
+from brachis.problem import Problem
 from brachis.refine import Refined
 from brachis.solvers import SolverReport
 from brachis.trajectory import Trajectory
@@ -23,33 +23,28 @@ class Start:
 
     Attributes
     ----------
-    decomposition : Decomposition
-    branch : int
-        Index into the closed form's branches.
-    posture : (n,) ndarray
-        Start posture; a first guess of it where the task leaves it free.
+    problem : Problem
+    joint_map : ClosedFormMap or ChartMap
+        Robot, path and coordinates put together, for a motion that begins at, or near, its start posture.
     joint_path : (S, 1 + r) ndarray
-        Successive values of s and the redundant joints.
+        Successive values of the map's curves: s and the redundant joints, or s and the chart's sigma.
     estimate : float
         Least time along the joint path from the phase plane, s; infinite where there is none.
     origin : str
         Where it is from, in plain words, for example ``lattice 2``.
+    family : str
+        Family of the closed form; ``chart`` where there is none.
     solver : str
         The solver that plans from it; empty while none is chosen.
     """
 
-    decomposition: Decomposition
-    branch: int
-    posture: np.ndarray
+    problem: Problem
+    joint_map: ClosedFormMap | ChartMap
     joint_path: np.ndarray
     estimate: float
     origin: str
+    family: str
     solver: str = ""
-
-    @property
-    def joint_map(self) -> ClosedFormMap:
-        """Robot, path, closed form and branch, put together."""
-        return self.decomposition.joint_map(self.posture, self.branch)
 
     def with_solver(self, name: str) -> Start:
         """Return the same start for a solver."""
@@ -63,8 +58,9 @@ class Attempt:
     Attributes
     ----------
     redundant_joints : tuple of str
+        None where the coordinates are a chart's.
     branch : str
-        Label of the branch; empty where no joint path was found.
+        Label of the branch, or ``chart``; empty where no joint path was found.
     origin : str
         See `Start`.
     solver : str
@@ -112,8 +108,8 @@ class Attempt:
     @classmethod
     def of(cls, start: Start, status: str, **more: Any) -> Attempt:  # noqa: ANN401  (fields of the class)
         """Begin an attempt."""
-        decomposition = start.decomposition
-        names, branch = decomposition.match.redundant_joints, decomposition.match.solver.branches[start.branch]
+        joint_map = start.joint_map
+        names, branch = joint_map.redundant_joints, joint_map.branch_label
         return cls(names, branch, start.origin, start.solver, start.estimate, status, start, **more)
 
     @property
@@ -126,7 +122,7 @@ class Attempt:
         """True where the finished plan has the same knots, so that its end time is no shorter."""
         if self.start is None or self.program is None or self.target is None:
             return False
-        spline = self.start.decomposition.problem.task.spline
+        spline = self.start.problem.task.spline
         return spline.knots != "free" and spline.intervals != "auto" and self.program.intervals == self.target.intervals
 
     @property

@@ -31,8 +31,8 @@ def extract(start: Start, refined: Refined) -> Trajectory:
     UnreachableError
         The motion leaves the branch between the collocation points.
     """
-    joint_map, task = start.joint_map, start.decomposition.problem.task
-    (motion,) = refined.program.motions(refined.x)
+    (phase,), (motion,) = refined.program.phases, refined.program.motions(refined.x)
+    joint_map, task = phase.joint_map, start.problem.task
     joins = motion.times_of(joint_map.path.breaks[1:-1])
     gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
     breaks = np.union1d(motion.breaks, joins[gaps > _SAME_TIME * motion.t_end])
@@ -42,7 +42,7 @@ def extract(start: Start, refined: Refined) -> Trajectory:
         task=task,
         urdf=robot.urdf,
         robot=robot,
-        redundant_joints=tuple(robot.joint_names[i] for i in joint_map.redundant),
+        redundant_joints=joint_map.redundant_joints,
         branch=joint_map.branch_label,
         times=nodes.times,
         q=nodes.q,

@@ -27,12 +27,23 @@ from brachis.mesh import adapt_mesh, coarsest
 from brachis.nlp import Program
 from brachis.nlp.guess import starting_point
 from brachis.nlp.layout import SHORTEST_TIME
-from brachis.problem import Problem, breaks_of, decompositions_of, program_of
+from brachis.problem import Problem, breaks_of, decompositions_of, phase_in, program_of
 from brachis.refine import Refined, RefinementOptions, Solve, refine
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.combine import robot_for
-from brachis.search import MARGINS, Listener, Stages, continued, find_fastest, first_start, solve_with
+from brachis.kinematics import ChartMap
+from brachis.search import (
+    MARGINS,
+    Listener,
+    Stages,
+    best_of_joints,
+    continued,
+    find_fastest,
+    first_map,
+    solve_with,
+    solved_in_chart,
+)
 from brachis.solvers import SolverReport, SolveStatus, solver_named
 from brachis.task import Task, load_task
 from brachis.verify import VerifyOptions, verify_trajectory
@@ -122,7 +133,7 @@ def _plan(
     problem = Problem.of(robot, task, limits)
     places = plausibility.of_places(problem.task_map, problem.start, problem.end, task.path_start)
     remarks += plausibility.tell(places, strict=strict, stacklevel=4)
-    found = find_fastest(decompositions_of(problem, families), Stages(solved, finished), deadline, listener)
+    found = find_fastest(problem, decompositions_of(problem, families), Stages(solved, finished), deadline, listener)
     best = found.best
     assert best is not None and best.start is not None  # noqa: PT018, S101  (else nothing would have come back)
     assert best.trajectory is not None and best.verification is not None  # noqa: PT018, S101
@@ -132,7 +143,7 @@ def _plan(
         task=task,
         trajectory=best.trajectory,
         verification=best.verification,
-        family=best.start.decomposition.match.family,
+        family=best.start.family,
         attempt=best.without_programs(),
         timing={"load": loaded - began, "total": time.perf_counter() - began},
         candidates=found.in_order(),
@@ -155,14 +166,20 @@ def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
     -------
     Attempt
     """
-    task = start.decomposition.problem.task
-    target = program_of(start.decomposition.problem, start.joint_map, breaks_of(task))
+    problem = start.problem
+    target = program_of(problem, start.joint_map, breaks_of(problem.task))
     program = coarsest(target) if target.variables > _MANY_VARIABLES else target
     x = starting_point(program, [start.joint_path])
     if x is None:
         return Attempt.of(start, "the splines through the joint path leave the branch")
+    solve = _solver(start, deadline, listener)
     try:
-        program, reports = continued(program, x, _solver(start, deadline, listener), MARGINS)
+        if isinstance(start.joint_map, ChartMap):
+            program, reports = solved_in_chart(problem, program, x, solve)
+            joint_map = program.phases[0].joint_map
+            target = target.with_phases(phase_in(problem, joint_map, phase.grid) for phase in target.phases)
+        else:
+            program, reports = continued(program, x, solve, MARGINS)
     except ImportError as error:
         return Attempt.of(start, f"{start.solver}: not installed ({error})")
     last = reports[-1]
@@ -186,11 +203,15 @@ def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attemp
     """
     start, program = attempt.start, attempt.program
     assert start is not None and program is not None  # noqa: PT018, S101  (it is usable)
-    task = start.decomposition.problem.task
+    task = start.problem.task
     settings, soon = task.refinement, deadline.part(_KNOT_TIME)
     options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, soon)
     solve = _solver(start, soon, listener)
-    adapted = adapt_mesh(program, attempt.reports, solve, task.spline, options, target=attempt.target)
+    reports, target = attempt.reports, attempt.target
+    if attempt.keeps_knots and isinstance(start.joint_map, ChartMap) and not deadline.passed:
+        program, further = best_of_joints(start.problem, program, reports[-1], solve)
+        reports, target = (*reports[:-1], *further), program
+    adapted = adapt_mesh(program, reports, solve, task.spline, options, target=target)
     attempt = dataclasses.replace(attempt, undone=adapted.undone)
     options, solve = dataclasses.replace(options, deadline=deadline), _solver(start, deadline, listener)
     refined = refine(adapted.program, adapted.reports[-1], solve, options)
@@ -211,7 +232,7 @@ def _verified(attempt: Attempt, before: tuple[SolverReport, ...], refined: Refin
     """Make the trajectory of a refined program and verify it; `before` are the reports of earlier solves."""
     start = attempt.start
     assert start is not None  # noqa: S101
-    problem, trajectory, verification = start.decomposition.problem, None, None
+    problem, trajectory, verification = start.problem, None, None
     if refined.converged and np.isfinite(refined.violation):
         with contextlib.suppress(UnreachableError):
             trajectory = extract(start, refined)
@@ -236,9 +257,7 @@ def _in_words(status: SolveStatus) -> str:
 def _solver(start: Start, deadline: Deadline, listener: Listener) -> Solve:
     """Make a function that solves with the start's solver."""
     (solver,) = solver_named(start.solver)
-    return solve_with(
-        solver, start.decomposition.problem.task.solver, len(start.decomposition.redundant), deadline, listener
-    )
+    return solve_with(solver, start.problem.task.solver, start.joint_map.r, deadline, listener)
 
 
 def transcribe(
@@ -268,7 +287,5 @@ def transcribe(
         See `plan`.
     """
     problem = Problem.of(robot_for(robot, task.robot), task, limits)
-    decomposition = decompositions_of(problem, families)[0]
-    joint_map = decomposition.joint_map(*first_start(decomposition))
-    program = program_of(problem, joint_map, breaks_of(task))
-    return program, decomposition.match.family
+    joint_map, family = first_map(problem, decompositions_of(problem, families))
+    return program_of(problem, joint_map, breaks_of(task)), family

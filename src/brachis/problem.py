@@ -12,10 +12,10 @@ from brachis.bspline import clamped_knots, spread
 from brachis.custom_limits import LimitModel
 from brachis.errors import DecompositionError, StartError, UnknownNameError
 from brachis.feasibility import branch_of, check_end_branch, check_postures
-from brachis.kinematics import ClosedFormMap
+from brachis.kinematics import ClosedFormMap, JointMap
 from brachis.limits import Limit, limits_of
 from brachis.mesh import COARSE_INTERVALS
-from brachis.nlp import Boundary, FixedGrid, Phase, Program
+from brachis.nlp import Boundary, FixedGrid, Grid, Phase, Program
 from brachis.path import Path, path_of
 from brachis.robot import ROLL_JOINT, Robot, TaskMap, bind
 from brachis.task import Task
@@ -125,8 +125,8 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
     Returns
     -------
     list of Decomposition
-        At least one; with ``redundant_joints: auto`` the one with the largest branch margin at the start posture
-        first, and closed forms before polynomials.
+        With ``redundant_joints: auto`` the one with the largest branch margin at the start posture first, and closed
+        forms before polynomials; none where the robot has no closed form. At least one if the task names the joints.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
         return [_decomposition(problem, ik.find(robot, task_map, wanted, families=families))]
     found = ik.find_all(robot, task_map, families=families)
     matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
-    if not matches:
+    if not matches and (task.branch != "auto" or robot.n < task_map.m):
         if len(found) <= 1:  # nothing to choose: the reasons of the only choice, or the wrong number of joints
             return [_decomposition(problem, ik.find(robot, task_map, (), families=families))]
         raise DecompositionError(
@@ -159,7 +159,7 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
             allowed.append(_decomposition(problem, match))
         except (StartError, UnknownNameError) as error:
             refusals.append(error)
-    if not allowed:
+    if refusals and not allowed and (task.branch != "auto" or robot.n == task_map.m):
         raise refusals[0]
     return sorted(
         allowed, key=lambda decomposition: (decomposition.match.solver.kind != "closed_form", -decomposition.clearance)
@@ -192,13 +192,13 @@ def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
     return Decomposition(problem, match, redundant, allowed)
 
 
-def program_of(problem: Problem, joint_map: ClosedFormMap, breaks: np.ndarray) -> Program:
+def program_of(problem: Problem, joint_map: JointMap, breaks: np.ndarray) -> Program:
     """Write the NLP of a decomposition down: one phase, along the path.
 
     Parameters
     ----------
     problem : Problem
-    joint_map : ClosedFormMap
+    joint_map : JointMap
         Beginning at the task's start posture, or at a first guess of it where that is free.
     breaks : (N + 1,) ndarray
         Ends of the knot intervals in normalised time.
@@ -207,13 +207,18 @@ def program_of(problem: Problem, joint_map: ClosedFormMap, breaks: np.ndarray) -
     -------
     Program
     """
-    spline, free = problem.task.spline, np.full(problem.robot.n, np.nan)
-    start, end = (free if posture is None else posture for posture in (problem.start, problem.end))
-    boundary = Boundary(
-        joint_map.coordinates(0.0, start), joint_map.coordinates(1.0, end), 2 if spline.rest == "full" else 1
-    )
+    spline = problem.task.spline
     grid = FixedGrid(clamped_knots(spline.degree, breaks), spline.degree, spread(breaks, spline.points_per_interval))
-    return Program([Phase(joint_map, problem.limits, grid, boundary)])
+    return Program([phase_in(problem, joint_map, grid)])
+
+
+def phase_in(problem: Problem, joint_map: JointMap, grid: Grid) -> Phase:
+    """Write the motion along the path down as a phase, in the coordinates of a joint map, over a grid."""
+    free = np.full(problem.robot.n, np.nan)
+    start, end = (free if posture is None else posture for posture in (problem.start, problem.end))
+    rest = 2 if problem.task.spline.rest == "full" else 1
+    boundary = Boundary(joint_map.coordinates(0.0, start), joint_map.coordinates(1.0, end), rest)
+    return Phase(joint_map, problem.limits, grid, boundary)
 
 
 def breaks_of(task: Task) -> np.ndarray:

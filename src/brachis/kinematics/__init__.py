@@ -1,16 +1,26 @@
 """Joint maps: joint motion and its derivatives from curves y, such as (s, q_r)."""
 
+from brachis.kinematics.chart import ChartMap
+from brachis.kinematics.chart_rows import ChartRows
+from brachis.kinematics.charting import chart_around, null_spaces, transversality
 from brachis.kinematics.closed_form import ClosedFormMap
 from brachis.kinematics.direct import DirectJointMap
 from brachis.kinematics.interpolation import Nodes, interpolate
 from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
+from brachis.kinematics.newton import Newton
 
 __all__ = [
+    "ChartMap",
+    "ChartRows",
     "ClosedFormMap",
     "DirectJointMap",
     "JointDerivatives",
     "JointMap",
     "JointState",
+    "Newton",
     "Nodes",
+    "chart_around",
     "interpolate",
+    "null_spaces",
+    "transversality",
 ]

@@ -98,6 +98,11 @@ class ClosedFormMap:
         return len(self.redundant)
 
     @property
+    def redundant_joints(self) -> tuple[str, ...]:
+        """Names of the redundant joints."""
+        return tuple(self.robot.joint_names[joint] for joint in self.redundant)
+
+    @property
     def branch_label(self) -> str:
         """Label of the branch."""
         return self.solver.branches[self.branch]
@@ -109,6 +114,18 @@ class ClosedFormMap:
     def branch_margin_gradient(self, q: np.ndarray) -> np.ndarray:
         """Differentiate `branch_margins` with respect to q, (K, b, n)."""
         return margin_gradient(self.solver, q, self.branch)
+
+    def start_margins(self) -> np.ndarray:
+        """See `JointMap`."""
+        return np.asarray(self.branch_margins(self.start[None])[0])
+
+    def margins(self, state: JointState) -> np.ndarray:
+        """See `JointMap`."""
+        return self.branch_margins(state.q)
+
+    def margin_gradient(self, state: JointState) -> tuple[np.ndarray, None]:
+        """See `JointMap`."""
+        return self.branch_margin_gradient(state.q), None
 
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Value of y = (s, q_r), (1 + r,), in a posture, (n,)."""

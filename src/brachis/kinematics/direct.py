@@ -30,6 +30,11 @@ class DirectJointMap:
         """See `JointMap`."""
         return self.robot.n
 
+    @property
+    def redundant_joints(self) -> tuple[str, ...]:
+        """See `JointMap`."""
+        return self.robot.joint_names
+
     def coordinates(self, _s: float, q: np.ndarray) -> np.ndarray:
         """See `JointMap`."""
         return q
@@ -56,10 +61,14 @@ class DirectJointMap:
         zeros = np.zeros_like(state.gradient)
         return JointDerivatives(zeros, zeros, zeros)
 
-    def branch_margins(self, q: np.ndarray) -> np.ndarray:
+    def start_margins(self) -> np.ndarray:
         """See `JointMap`."""
-        return np.empty((len(q), 0))
+        return np.empty(0)
 
-    def branch_margin_gradient(self, q: np.ndarray) -> np.ndarray:
+    def margins(self, state: JointState) -> np.ndarray:
         """See `JointMap`."""
-        return np.empty((len(q), 0, self.r))
+        return np.empty((len(state.q), 0))
+
+    def margin_gradient(self, state: JointState) -> tuple[np.ndarray, None]:
+        """See `JointMap`."""
+        return np.empty((len(state.q), 0, self.r)), None

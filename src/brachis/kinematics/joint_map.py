@@ -63,8 +63,10 @@ class JointMap(Protocol):
         The path along which y[0] is the path coordinate s; None where there is none, and no s.
     r : int
         Number of joints that are chosen freely.
+    redundant_joints : tuple of str
+        Names of the joints that are curves themselves.
     branch_label : str
-        What the branch is called whose margins `branch_margins` gives; empty where there is none.
+        What the branch is called whose margins `margins` gives; empty where there is none.
     """
 
     robot: Robot
@@ -74,6 +76,8 @@ class JointMap(Protocol):
     def path(self) -> Path | None: ...  # noqa: D102
     @property
     def r(self) -> int: ...  # noqa: D102
+    @property
+    def redundant_joints(self) -> tuple[str, ...]: ...  # noqa: D102
     @property
     def branch_label(self) -> str: ...  # noqa: D102
 
@@ -115,10 +119,14 @@ class JointMap(Protocol):
         """Exact derivatives of a state that this map gave."""
         ...
 
-    def branch_margins(self, q: np.ndarray) -> np.ndarray:
-        """Margins, (K, b), of postures (K, n) to where the map ends to be computable; b = 0 where it never does."""
+    def start_margins(self) -> np.ndarray:
+        """Margins, (b,), of the start to where the map ends to be computable; b = 0 where it never does."""
         ...
 
-    def branch_margin_gradient(self, q: np.ndarray) -> np.ndarray:
-        """Differentiate `branch_margins` with respect to q, (K, b, n)."""
+    def margins(self, state: Any) -> np.ndarray:  # noqa: ANN401
+        """Margins, (K, b), of a state that this map gave; see `start_margins`."""
+        ...
+
+    def margin_gradient(self, state: Any) -> tuple[np.ndarray, np.ndarray | None]:  # noqa: ANN401
+        """Differentiate `margins` with respect to q, (K, b, n), and to s, (K, b); None where it vanishes."""
         ...

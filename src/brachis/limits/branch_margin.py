@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kinematics import JointMap
-from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials, Role
+from brachis.kinematics import JointMap, JointState
+from brachis.limits.protocol import Bound, Label, Limit, Partials, Role
 
 MARGIN = 5e-3
 """Least branch margin, dimensionless. Nearer to the boundary the non-redundant joints outrun any collocation grid.
@@ -40,16 +40,17 @@ class BranchMargin(Limit):
         """See `Limit`."""
         return tuple(Bound(c, least, least, 1.0, "lower") for c, least in enumerate(self.lower.tolist()))
 
-    def values(self, motion: JointMotion) -> np.ndarray:
+    def values(self, motion: JointState) -> np.ndarray:  # type: ignore[override]  (safeguards are of the optimiser)
         """See `Limit.values`."""
-        return self._joint_map.branch_margins(motion.q)
+        return self._joint_map.margins(motion)
 
-    def partials(self, motion: JointMotion) -> Partials:
+    def partials(self, motion: JointState) -> Partials:  # type: ignore[override]
         """See `Limit.partials`."""
-        return Partials(q=self._joint_map.branch_margin_gradient(motion.q))
+        by_q, by_s = self._joint_map.margin_gradient(motion)
+        return Partials(q=by_q, s=by_s)
 
 
 def build(joint_map: JointMap, margin: float = MARGIN) -> tuple[BranchMargin, ...]:
     """Build the limit, where the joint map has margins: what keeps the motion where it can be computed."""
-    at_start = joint_map.branch_margins(joint_map.start[None])[0]
+    at_start = joint_map.start_margins()
     return (BranchMargin(joint_map, at_start, margin),) if len(at_start) else ()

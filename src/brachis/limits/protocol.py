@@ -118,11 +118,15 @@ class Bound:
 
 @dataclass(frozen=True)
 class Partials:
-    """Partial derivatives of a limit's c values at K moments, each (K, c, n), or None where they vanish."""
+    """Partial derivatives of a limit's c values at K moments, each (K, c, n), or None where they vanish.
+
+    `s`, (K, c), is that by the path coordinate, where a value depends on it besides.
+    """
 
     q: np.ndarray | None = None
     qdot: np.ndarray | None = None
     qddot: np.ndarray | None = None
+    s: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,9 @@ def chain(partials: Partials, state: JointState, exact: JointDerivatives) -> tup
     by_y, by_ydot, by_yddot = zeros, zeros, zeros
     if partials.q is not None:
         by_y = by_y + partials.q @ state.gradient
+    if partials.s is not None:
+        by_y = by_y.copy()
+        by_y[:, :, 0] += partials.s
     if partials.qdot is not None:
         by_y = by_y + partials.qdot @ exact.qdot_y
         by_ydot = by_ydot + partials.qdot @ state.gradient

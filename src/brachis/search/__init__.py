@@ -2,7 +2,19 @@
 
 from brachis.search.portfolio import Stages, find_fastest
 from brachis.search.record import Record
+from brachis.search.chart_starts import first_map
+from brachis.search.recentring import best_of_joints, solved_in_chart
 from brachis.search.solving import MARGINS, Listener, continued, solve_with
-from brachis.search.starts import first_start
 
-__all__ = ["MARGINS", "Listener", "Record", "Stages", "continued", "find_fastest", "first_start", "solve_with"]
+__all__ = [
+    "MARGINS",
+    "Listener",
+    "Record",
+    "Stages",
+    "best_of_joints",
+    "continued",
+    "find_fastest",
+    "first_map",
+    "solve_with",
+    "solved_in_chart",
+]

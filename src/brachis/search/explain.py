@@ -10,7 +10,7 @@ import numpy as np
 from brachis import ik
 from brachis.attempt import Attempt
 from brachis.errors import BrachisError, PathError, PlanningError
-from brachis.problem import Decomposition
+from brachis.problem import Decomposition, Problem
 from brachis.search.joint_path import DeadEnd
 from brachis.search.reach import explain_failure
 from brachis.task import SolverSettings, Task
@@ -35,7 +35,7 @@ def refuse_what_is_out_of_reach(decompositions: Sequence[Decomposition], candida
     ------
     PathError
     """
-    if _some_joint_path(candidates):
+    if not decompositions or _some_joint_path(candidates):
         return
     reasons = [_reason(decomposition) for decomposition in decompositions[:_LOOKED_AT]]
     clear = [
@@ -50,12 +50,16 @@ def refuse_what_is_out_of_reach(decompositions: Sequence[Decomposition], candida
 
 
 def no_motion(
-    decompositions: Sequence[Decomposition], candidates: Sequence[Attempt], dead_ends: Mapping[str, DeadEnd]
+    problem: Problem,
+    decompositions: Sequence[Decomposition],
+    candidates: Sequence[Attempt],
+    dead_ends: Mapping[str, DeadEnd],
 ) -> BrachisError:
     """Return the error that says why no motion was found.
 
     Parameters
     ----------
+    problem : Problem
     decompositions : sequence of Decomposition
     candidates : sequence of Attempt
     dead_ends : mapping of str to DeadEnd
@@ -66,7 +70,9 @@ def no_motion(
     PathError or PlanningError
     """
     joint_path = _some_joint_path(candidates)
-    reason = _advice(decompositions[0].problem.task, candidates) if joint_path else _reason(decompositions[0])
+    reason = _advice(problem.task, candidates)
+    if decompositions and not joint_path:
+        reason = _reason(decompositions[0])
     if isinstance(reason, BrachisError):
         return reason
     if dead_ends and not joint_path:
@@ -74,18 +80,18 @@ def no_motion(
         others = (
             f" (redundant joints {name}; {len(dead_ends) - 1} other choices end sooner)" if len(dead_ends) > 1 else ""
         )
-        start = "" if decompositions[0].problem.start is None else "start in another posture, "
+        start = "" if problem.start is None else "start in another posture, "
         return PathError(
             f"no joint path was found: {furthest}{others}",
             s_interval=furthest.interval,
             hint=f"{start}shorten or move the path, or widen the joint ranges".capitalize()
-            + _what_is_missing(decompositions[0]),
+            + _what_is_missing(problem),
         )
     counts = Counter(candidate.status for candidate in candidates)
     outcomes = "; ".join(status if n == 1 else f"{status} ({n} times)" for status, n in counts.items())
     return PlanningError(
         f"no motion within the limits was found: {outcomes or 'no initial guess'}",
-        hint=reason + _what_is_missing(decompositions[0]),
+        hint=reason + _what_is_missing(problem),
     )
 
 
@@ -111,9 +117,8 @@ def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
     return f"There is a joint path within reach, but no motion along it was found; {', or '.join(tried)}"
 
 
-def _what_is_missing(decomposition: Decomposition) -> str:
+def _what_is_missing(problem: Problem) -> str:
     """Say which further choices of redundant joints EAIK might add where it is not installed."""
-    problem = decomposition.problem
     if problem.task.redundant_joints != "auto":
         return ""
     further = ik.without_eaik(ik.find_all(problem.robot, problem.task_map))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.limits import Limit
-from brachis.problem import Decomposition
+from brachis.problem import Problem
 from brachis.robot import Robot
 
 _APART = 0.02
@@ -21,30 +21,25 @@ JUMPS = "no posture is near enough to continue"
 
 @dataclass(frozen=True)
 class JointPath:
-    """Redundant joints along the path.
+    """Postures along the path.
 
     Attributes
     ----------
-    decomposition : Decomposition
-    branch : int
-        Index into the closed form's branches.
+    problem : Problem
     s : (S + 1,) ndarray
     q : (S + 1, n) ndarray
         Postures, rad or m, angles in such turns that they are continuous.
     length : float
         In the measure of the lattice, s^2.
+    branch : int
+        Index into the closed form's branches; 0 where the joint path keeps to none.
     """
 
-    decomposition: Decomposition
-    branch: int
+    problem: Problem
     s: np.ndarray
     q: np.ndarray
     length: float
-
-    @property
-    def stations(self) -> np.ndarray:
-        """Path coordinate and redundant joints, (S + 1, 1 + r)."""
-        return np.column_stack([self.s, self.q[:, list(self.decomposition.redundant)]])
+    branch: int = 0
 
 
 @dataclass(frozen=True)
@@ -97,7 +92,7 @@ def distinct(joint_paths: Sequence[JointPath], most: int) -> list[JointPath]:
         np.array([joint_path.q for joint_path in joint_paths]),
     )
     length = np.array([joint_path.length for joint_path in joint_paths])
-    problem = joint_paths[0].decomposition.problem
+    problem = joint_paths[0].problem
     weights = weights_near(problem.robot, problem.limits, q[0, q.shape[1] // 2])
     distance = np.full(len(joint_paths), np.inf)
     chosen: list[int] = []

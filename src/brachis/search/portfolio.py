@@ -19,7 +19,7 @@ from typing import NamedTuple
 from brachis import interrupts
 from brachis.attempt import Attempt, Start
 from brachis.deadline import Deadline
-from brachis.problem import Decomposition
+from brachis.problem import Decomposition, Problem
 from brachis.search.explain import no_motion, out_of_time, refuse_what_is_out_of_reach
 from brachis.search.processes import each, processes
 from brachis.search.record import NOT_TRIED, Numbered, Record, rounded
@@ -54,14 +54,19 @@ class Stages(NamedTuple):
 
 
 def find_fastest(
-    decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline, listener: Listener
+    problem: Problem,
+    decompositions: Sequence[Decomposition],
+    stages: Stages,
+    deadline: Deadline,
+    listener: Listener,
 ) -> Record:
     """Search for the fastest verified motion.
 
     Parameters
     ----------
+    problem : Problem
     decompositions : sequence of Decomposition
-        At least one, the most promising first.
+        The most promising first.
     stages : Stages
     deadline : Deadline
         When to return the best motion so far; one that is not verified where none is.
@@ -81,10 +86,10 @@ def find_fastest(
     KeyboardInterrupt
         Ctrl-C before any motion was verified; its text tells of the best one, if there is one.
     """
-    search = _Search(decompositions, stages, deadline, listener)
+    search = _Search(problem, decompositions, stages, deadline, listener)
     record = search.record
     try:
-        search.run(batches(decompositions, deadline, listener, record.note_decomposition))
+        search.run(batches(problem, decompositions, deadline, listener, record.note_lattice))
     except KeyboardInterrupt:
         interrupts.forget()
         record.interrupted = True
@@ -94,18 +99,23 @@ def find_fastest(
     if record.best is not None:
         return record
     if record.interrupted:
-        raise out_of_time(decompositions[0].problem.task, record.undone())
-    raise no_motion(decompositions, record.attempts, record.dead_ends)
+        raise out_of_time(problem.task, record.undone())
+    raise no_motion(problem, decompositions, record.attempts, record.dead_ends)
 
 
 class _Search:
     """A search on its way."""
 
     def __init__(
-        self, decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline, listener: Listener
+        self,
+        problem: Problem,
+        decompositions: Sequence[Decomposition],
+        stages: Stages,
+        deadline: Deadline,
+        listener: Listener,
     ) -> None:
         self._decompositions, self._stages, self._deadline, self._listener = decompositions, stages, deadline, listener
-        self._task = decompositions[0].problem.task
+        self._task = problem.task
         self._jobs = processes(self._task.search.jobs)
         self.record = Record(refined=self._task.refinement.max_rounds > 0)
 

@@ -13,6 +13,8 @@ from brachis.search.joint_path import DeadEnd
 
 NOT_TRIED = "not tried: the time was up"
 """Status of an attempt for which there was no time."""
+ALL_POSTURES = "all postures"
+"""What the lattice is called that keeps to no choice of redundant joints."""
 SAME_MOTION = "same motion as another"
 """Status of an attempt that agrees with one that ranks before it."""
 _WORTH_IT = 2e-4
@@ -59,14 +61,16 @@ class Record:
         will_do = attempt.verified or not self._refined
         return (-np.inf if will_do else attempt.verification.worst_ratio - 1.0), attempt.t_end
 
-    def note_decomposition(self, decomposition: Decomposition, dead_end: DeadEnd | None) -> None:
-        """Put down that a choice has no joint path, or that there was no time to look for one."""
+    def note_lattice(self, decomposition: Decomposition | None, dead_end: DeadEnd | None) -> None:
+        """Put down that a lattice has no joint path, or that there was no time for it; None: that of all postures."""
+        name = ALL_POSTURES if decomposition is None else decomposition.name
         if dead_end is None:
-            self._left_out[decomposition.name] = None
+            self._left_out[name] = None
             self.interrupted = True
             return
-        self.dead_ends[decomposition.name] = dead_end
-        self.attempts.append(Attempt(decomposition.match.redundant_joints, "", "lattice", "", np.inf, str(dead_end)))
+        self.dead_ends[name] = dead_end
+        names = () if decomposition is None else decomposition.match.redundant_joints
+        self.attempts.append(Attempt(names, "", "lattice", "", np.inf, str(dead_end)))
 
     def begin(self, starts: int) -> None:
         """Put down that so many starts are about to be solved."""

@@ -1,4 +1,9 @@
-"""What the search tries, batch after batch: starts with solvers."""
+"""What the search tries, batch after batch: starts with solvers.
+
+Where the task leaves the choice of redundant joints open, starts come from the lattice of all postures, and plans are
+made in charts; the closed forms of single choices are tried only while nothing is verified. A task that names its
+redundant joints or its branch gets these alone.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +15,8 @@ from dataclasses import dataclass
 from brachis.attempt import Start
 from brachis.deadline import Deadline
 from brachis.nlp.differential_ik import STRATEGIES
-from brachis.problem import Decomposition
+from brachis.problem import Decomposition, Problem
+from brachis.search.chart_starts import chart_starts
 from brachis.search.joint_path import DeadEnd
 from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.processes import each, processes
@@ -22,7 +28,7 @@ _SIZE = 12
 _NEAR_SINGULAR = 0.1
 _LATTICE_SHARE = 0.4
 """Part of the time that is left in which the starts of a level are looked for; those found by then are planned."""
-Note = Callable[[Decomposition, DeadEnd | None], None]
+Note = Callable[[Decomposition | None, DeadEnd | None], None]
 """Told why a choice gives no starts: where its lattice ends, or None where the time was up."""
 
 
@@ -46,12 +52,13 @@ class Batch:
 
 
 def batches(
-    decompositions: Sequence[Decomposition], deadline: Deadline, listener: Listener, note: Note
+    problem: Problem, decompositions: Sequence[Decomposition], deadline: Deadline, listener: Listener, note: Note
 ) -> Iterator[Batch]:
     """Yield batches: level by level the most promising starts with the first solver, then what is tried where all fail.
 
     Parameters
     ----------
+    problem : Problem
     decompositions : sequence of Decomposition
     deadline : Deadline
         Joint paths that are not found by then are left out.
@@ -63,10 +70,17 @@ def batches(
     ------
     Batch
     """
-    task = decompositions[0].problem.task
+    task = problem.task
     solvers = [solver.name for solver in solver_named(task.solver.name)]
+    charts = charts_allowed(problem, decompositions)
+    if charts:
+        yield from _in_charts(problem, decompositions, solvers, deadline, listener, note)
+    if not decompositions:
+        return
     known: list[Start] = []
     for level in SEARCH_LEVELS[task.search.effort]:
+        if charts:
+            level = dataclasses.replace(level, last_resort=True)  # noqa: PLW2901
         if level.last_resort:
             yield Batch((), 0, last_resort=True)  # the search may end here, before lattices are looked at
         allowed = looked_at(decompositions, level)
@@ -89,16 +103,49 @@ def batches(
                 level.refined,
                 level.last_resort,
             )
-    many, tried = len(known) + len(STRATEGIES), {(start.decomposition.name, start.origin) for start in known}
+    many, tried = len(known) + len(STRATEGIES), {(start.joint_map.redundant_joints, start.origin) for start in known}
     again = tuple(start.with_solver(solver) for start in known[:_SIZE] for solver in solvers[1:2])
     yield Batch(again, many, last_resort=True)
     for decomposition in (allowed or decompositions)[: level.decompositions]:
         for start in numeric_starts(decomposition, len(STRATEGIES), deadline):
-            if (decomposition.name, start.origin) not in tried:
+            if (start.joint_map.redundant_joints, start.origin) not in tried:
                 yield Batch(tuple(start.with_solver(solver) for solver in solvers[:2]), many, last_resort=True)
     yield Batch(
         tuple(start.with_solver(solver) for solver in solvers[2:] for start in known[:2]), many, last_resort=True
     )
+
+
+def charts_allowed(problem: Problem, decompositions: Sequence[Decomposition]) -> bool:
+    """Tell whether motions may be planned in charts: nobody asks for a choice of joints, and there is redundancy."""
+    task = problem.task
+    asked = task.redundant_joints != "auto" or task.branch != "auto" or task.search.guesses != "lattice"
+    return not asked and (problem.robot.n > problem.task_map.m or not decompositions)
+
+
+def _in_charts(
+    problem: Problem,
+    decompositions: Sequence[Decomposition],
+    solvers: Sequence[str],
+    deadline: Deadline,
+    listener: Listener,
+    note: Note,
+) -> Iterator[Batch]:
+    """Yield batches of starts in charts: level by level with the first solver, then with the others."""
+    known: list[Start] = []
+    for level in SEARCH_LEVELS[problem.task.search.effort]:
+        if level.last_resort:
+            yield Batch((), 0, last_resort=True)
+        listener("looking for joint paths on the lattice of all postures")
+        starts = chart_starts(problem, decompositions, level, deadline.part(_LATTICE_SHARE))
+        if isinstance(starts, DeadEnd):
+            note(None, starts)
+            continue
+        if not starts:
+            note(None, None)
+        known += starts
+        yield Batch(tuple(start.with_solver(solvers[0]) for start in starts), level.refined, level.last_resort)
+    for solver in solvers[1:]:
+        yield Batch(tuple(start.with_solver(solver) for start in known[:_SIZE]), len(known), last_resort=True)
 
 
 def looked_at(decompositions: Sequence[Decomposition], level: SearchLevel) -> list[Decomposition]:
@@ -133,9 +180,7 @@ def _from_lattices(
             continue
         if not outcome:
             note(decomposition, None)
-        own = [
-            dataclasses.replace(start, decomposition=decomposition) for start in outcome
-        ]  # not another process's copy
+        own = [dataclasses.replace(start, problem=decomposition.problem) for start in outcome]
         own = sorted(own, key=lambda start: start.estimate) + numeric_starts(decomposition, level.numeric, deadline)
         ranked += [(place, start.estimate, next(number), start) for place, start in enumerate(own)]
     return [start for *_, start in sorted(ranked, key=lambda item: item[:-1])[: max(1, level.plans // redundancy)]]

@@ -18,7 +18,7 @@ Listener = Callable[[str], None]
 
 MARGINS = (0.1, 0.02, MARGIN)
 """Branch margins that are tried in turn; see `continued`."""
-_HELD_BACK = 1e-4
+HELD_BACK = 1e-4
 """A margin that is nearer to its bound than this holds the motion back."""
 _ON_ITS_WAY = 1e-3
 _PATIENCE = 100
@@ -69,7 +69,7 @@ def continued(
                 break
             solved.append(outcome)
             x = outcome[1].x
-            if tried.safeguard_slack(x) > _HELD_BACK:
+            if tried.safeguard_slack(x) > HELD_BACK:
                 break
         else:
             failed.append(outcome)

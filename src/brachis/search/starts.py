@@ -8,16 +8,16 @@ import numpy as np
 
 from brachis.attempt import Start
 from brachis.deadline import NEVER, Deadline
-from brachis.errors import PathError
 from brachis.kinematics import ClosedFormMap
 from brachis.nlp.differential_ik import differential_ik_paths
 from brachis.problem import Decomposition
 from brachis.search.joint_path import DeadEnd, JointPath
-from brachis.search.lattice import Lattice
-from brachis.search.levels import SEARCH_LEVELS, SearchLevel
+from brachis.search.closed_form_lattice import ClosedFormLattice
+from brachis.search.levels import SearchLevel
 from brachis.search.phase_plane import least_time
 
-_PIECES = (3, 8)
+PIECES = (3, 8)
+"""Pieces of the splines that smooth a joint path; more where it cannot be followed so."""
 _START_WEIGHT = 1e3
 _FINER, _DENSER = 3, 2.0
 _FINEST = 96
@@ -46,9 +46,10 @@ def lattice_starts(
         level.nodes,
         max(1, level.joint_paths // max(1, len(decomposition.redundant))) * len(decomposition.branches),
     )
-    found = Lattice(decomposition, cells_per_turn=cells, nodes=nodes, seed=seed, deadline=deadline).joint_paths(most)
+    lattice = ClosedFormLattice(decomposition, cells_per_turn=cells, nodes=nodes, seed=seed, deadline=deadline)
+    found = lattice.joint_paths(most)
     if isinstance(found, DeadEnd):
-        finer = Lattice(
+        finer = ClosedFormLattice(
             decomposition,
             cells_per_turn=_FINER * cells,
             density=_DENSER,
@@ -59,31 +60,31 @@ def lattice_starts(
         found = finer.joint_paths(most)
     if isinstance(found, DeadEnd):
         return found
-    return [_start_along(joint_path, f"lattice {number}") for number, joint_path in enumerate(found, 1)]
+    return [_start_along(decomposition, joint_path, f"lattice {number}") for number, joint_path in enumerate(found, 1)]
 
 
-def _start_along(joint_path: JointPath, origin: str) -> Start:
+def _start_along(decomposition: Decomposition, joint_path: JointPath, origin: str) -> Start:
     """Smooth a joint path, as far as the closed form can follow, and estimate its time."""
-    decomposition, s = joint_path.decomposition, joint_path.s
+    s, redundant = joint_path.s, joint_path.q[:, list(decomposition.redundant)]
     joint_map = decomposition.joint_map(joint_path.q[0], joint_path.branch)
-    fine = np.linspace(0.0, 1.0, max(2 * len(s) - 1, _FINEST + 1))
-    for pieces in _PIECES:
-        stations = np.column_stack([fine, _smoothed(s, joint_path.stations[:, 1:], fine, pieces)])
+    places = fine_places(s)
+    for pieces in PIECES:
+        stations = np.column_stack([places, smoothed(s, redundant, places, pieces)])
         q = joint_map.postures(stations)
         if np.isfinite(q).all() and _clear(joint_map, q):
-            return Start(
-                decomposition,
-                joint_path.branch,
-                joint_path.q[0],
-                stations,
-                least_time(decomposition.problem.limits, fine, q),
-                origin,
-            )
-    estimate = least_time(decomposition.problem.limits, s, joint_path.q)
-    return Start(decomposition, joint_path.branch, joint_path.q[0], joint_path.stations, estimate, origin)
+            break
+    else:
+        places, stations, q = s, np.column_stack([s, redundant]), joint_path.q
+    estimate = least_time(decomposition.problem.limits, places, q)
+    return Start(decomposition.problem, joint_map, stations, estimate, origin, decomposition.match.family)
 
 
-def _smoothed(s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int) -> np.ndarray:
+def fine_places(s: np.ndarray) -> np.ndarray:
+    """Path coordinates at which a joint path is looked at more finely than at its stations, (S,)."""
+    return np.linspace(0.0, 1.0, max(2 * len(s) - 1, _FINEST + 1))
+
+
+def smoothed(s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int) -> np.ndarray:
     """Least-squares cubic splines through values (S, r), nearly exact at both ends, at the places `fine`."""
     from scipy.interpolate import make_lsq_spline  # noqa: PLC0415  (imports in 0.3 s)
 
@@ -121,22 +122,6 @@ def numeric_starts(decomposition: Decomposition, most: int, deadline: Deadline) 
     joint_map = decomposition.joint_map(start, decomposition.branches[0])
     joint_paths = itertools.islice(differential_ik_paths(joint_map, deadline), most)
     return [
-        Start(decomposition, decomposition.branches[0], start, joint_path, np.inf, f"numeric {number}")
+        Start(decomposition.problem, joint_map, joint_path, np.inf, f"numeric {number}", decomposition.match.family)
         for number, joint_path in enumerate(joint_paths, 1)
     ]
-
-
-def first_start(decomposition: Decomposition) -> tuple[np.ndarray, int]:
-    """Return the given start posture, (n,), or that of the shortest joint path where it is free, and its branch.
-
-    Raises
-    ------
-    PathError
-        The start posture is free, and the lattice has no joint path.
-    """
-    if decomposition.problem.start is not None:
-        return decomposition.problem.start, decomposition.branches[0]
-    found = lattice_starts(decomposition, SEARCH_LEVELS["fast"][0], decomposition.problem.task.search.seed)
-    if isinstance(found, DeadEnd):
-        raise PathError(f"no joint path was found: {found}", s_interval=found.interval)
-    return found[0].posture, found[0].branch

@@ -1,0 +1,249 @@
+"""Joint motion along a path as a function of y = (s, sigma), in a chart around a known joint path.
+
+The self-motion of the arm is measured by r linear functions of the joints,
+
+    sigma = C(s) q - p(s),
+
+whose rows C (r, n) are transversal to the self-motion along the reference q_ref(s): J_aug = [J; C] is regular there, and
+as far around it as its least singular value stays away from zero. Where one C does for the whole path, it is constant
+and p = 0. The decomposition of the paper is the case of rows of C that each select a joint, with the closed form in
+place of Newton's method (`closed_form`). With xi = dz/ds, e = C' q - p' and e' = C'' q - p'' (derivatives by s alone):
+
+    G = dq/dy       = J_aug^-1 [xi, 0; -e, I]
+    qdot            = G ydot
+    qddot           = G yddot + J_aug^-1 (xi_ds sdot^2 - Jdot qdot;  -2 C' qdot sdot - e' sdot^2)
+
+and, by differentiating J_aug qdot and J_aug qddot,
+
+    dqdot/dy        = J_aug^-1 (-V_q G + [xi_ds sdot, 0];  -C' G sdot - [C' qdot + e' sdot, 0])
+    dqddot/dydot    = J_aug^-1 (-A_v G + [2 xi_ds sdot, 0];  -2 C' G sdot - [2 C' qdot + 2 e' sdot, 0])
+    dqddot/dy       = J_aug^-1 (-A_q G - A_v dqdot/dy + [xi_dds sdot^2 + xi_ds sddot, 0];
+                                -2 C' sdot dqdot/dy - (C'' sdot^2 + C' sddot) G
+                                - [C' qddot + 2 C'' qdot sdot + e'' sdot^2 + e' sddot, 0])
+
+with V_q, A_q, A_v the derivatives of task velocity and acceleration (`TaskMap`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.errors import UnreachableError
+from brachis.kinematics.chart_rows import ChartRows
+from brachis.kinematics.joint_map import JointDerivatives, JointState
+from brachis.kinematics.newton import Newton
+from brachis.path import Path, PathSample
+from brachis.robot import TaskMap
+
+_NEAR = 0.2
+"""rad or m; the last state tells about postures no farther from it."""
+_SUBSTEPS = 6
+"""Steps in which sigma is led away from the reference where one does not find a posture."""
+
+
+@dataclass(frozen=True)
+class ChartState(JointState):
+    """Motion of all joints along a path at K times.
+
+    Attributes
+    ----------
+    path : PathSample
+    twists : (6, K, n) ndarray
+        Columns of the tool frame's Jacobian; see `TaskMap.twists`.
+    inverse : (K, n, n) ndarray
+        J_aug^-1.
+    rows : (4, K, r, n) ndarray
+        C and its derivatives by s.
+    drift : (3, K, r) ndarray
+        e, e' and e''.
+    """
+
+    path: PathSample
+    twists: np.ndarray
+    inverse: np.ndarray
+    rows: np.ndarray
+    drift: np.ndarray
+
+
+class ChartMap:
+    """Robot, path and chart put together: the `JointMap` with y = (s, sigma).
+
+    Parameters
+    ----------
+    task_map : TaskMap
+        Of the robot.
+    path : Path
+    rows : ChartRows
+        C and p.
+    s : (S,) ndarray
+        Path coordinates of the reference, from 0 to 1.
+    reference : (S, n) ndarray
+        Postures q_ref there, so near each other that straight lines join them.
+    """
+
+    def __init__(self, task_map: TaskMap, path: Path, rows: ChartRows, s: np.ndarray, reference: np.ndarray) -> None:
+        self.robot = task_map.robot
+        self.task_map, self.path, self.rows = task_map, path, rows
+        self.s, self.reference = s, reference
+        self._newton = Newton(task_map)
+        self._last: JointState | None = None
+
+    @property
+    def start(self) -> np.ndarray:
+        """Posture at, or near, the beginning, (n,)."""
+        return np.asarray(self.reference[0])
+
+    @property
+    def r(self) -> int:
+        """Degree of redundancy."""
+        return self.rows.r
+
+    @property
+    def redundant_joints(self) -> tuple[str, ...]:
+        """Names of the joints that sigma selects; none where it is another measure of self-motion."""
+        return tuple(self.robot.joint_names[joint] for joint in self.rows.selected)
+
+    @property
+    def branch_label(self) -> str:
+        """What the margin is called."""
+        return "chart"
+
+    def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
+        """Value of y = (s, sigma), (1 + r,), in a posture, (n,); NaN in a posture that is not known."""
+        return self.curves(np.array([s]), q[None])[0]
+
+    def curves(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Values of y, (K, 1 + r), in postures (K, n) at path coordinates (K,)."""
+        return np.column_stack([s, self.rows.values(s, q)])
+
+    def postures(
+        self, y: np.ndarray, sample: PathSample | None = None, *, near: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Joint positions, (K, n), where the curves are y, (K, 1 + r), at any times.
+
+        Parameters
+        ----------
+        y : (K, 1 + r) ndarray
+        sample : PathSample, optional
+            The path at ``y[:, 0]`` if already known.
+        near : (K, n) ndarray, optional
+            Postures known to be near; without them the search begins at the reference.
+
+        Returns
+        -------
+        (K, n) ndarray
+            NaN where there is no answer near the reference.
+        """
+        s = y[:, 0]
+        targets = (sample or self.path.sample(s)).target
+        rows, offset = self.rows.at(s)
+        wanted = y[:, 1:] + offset
+        if near is not None:
+            return self._newton.solve(targets, near, rows, wanted)
+        reference = np.column_stack([np.interp(s, self.s, joint) for joint in self.reference.T])
+        q = self._newton.solve(targets, self._predicted(y, reference), rows, wanted)
+        lost = np.flatnonzero(np.isnan(q).any(axis=1))
+        if len(lost):
+            begun, own = np.einsum("kij,kj->ki", rows[lost], reference[lost]), reference[lost]
+            for part in np.linspace(0.0, 1.0, _SUBSTEPS + 1):
+                own = self._newton.solve(targets[lost], own, rows[lost], begun + part * (wanted[lost] - begun))
+            q[lost] = own
+        return q
+
+    def _predicted(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
+        """Postures, (K, n), to begin with: those of the last state moved on where they are near, else the reference."""
+        last = self._last
+        if last is None or last.y.shape != y.shape:
+            return reference
+        step = np.einsum("kij,kj->ki", last.gradient, y - last.y)
+        near = np.abs(step).max(axis=1, initial=0.0) < _NEAR
+        return np.where(near[:, None], last.q + step, reference)
+
+    def state(
+        self,
+        y: np.ndarray,
+        ydot: np.ndarray,
+        yddot: np.ndarray,
+        *,
+        t: np.ndarray | None = None,  # noqa: ARG002  (the reference tells the turns)
+        near: np.ndarray | None = None,
+    ) -> ChartState:
+        """See `JointMap`."""
+        sample = self.path.sample(y[:, 0])
+        q = self.postures(y, sample, near=near)
+        if not np.isfinite(q).all():
+            raise UnreachableError("the chart has no posture there")
+        twists = self.task_map.twists(q)
+        rows, drift = self.rows.orders(y[:, 0], q)
+        try:
+            inverse = np.linalg.inv(np.concatenate([self.task_map.jacobian(twists), rows[0]], axis=1))
+        except np.linalg.LinAlgError as error:
+            raise UnreachableError("the chart is singular") from error
+        m, sdot = self.task_map.m, ydot[:, :1]
+        right = np.zeros((len(q), self.robot.n, 1 + self.r))
+        right[:, :m, 0], right[:, m:, 0] = sample.xi, -drift[0]
+        right[:, m:, 1:] = np.eye(self.r)
+        gradient = inverse @ right
+        qdot = np.einsum("kij,kj->ki", gradient, ydot)
+        bent = -2.0 * sdot * np.einsum("kij,kj->ki", rows[1], qdot) - drift[1] * sdot**2
+        given = np.concatenate([sample.xi_ds * sdot**2 - self.task_map.bias(twists, qdot), bent], axis=1)
+        qddot = np.einsum("kij,kj->ki", gradient, yddot) + np.einsum("kij,kj->ki", inverse, given)
+        state = ChartState(y, ydot, yddot, q, qdot, qddot, gradient, sample, twists, inverse, rows, drift)
+        self._last = state
+        return state
+
+    def derivatives(self, state: ChartState) -> JointDerivatives:
+        """Exact derivatives of a state; see the module's formulas."""
+        task = self.task_map.derivatives(state.twists, state.qdot, state.qddot)
+        sdot, sddot, gradient, sample = state.ydot[:, :1], state.yddot[:, :1], state.gradient, state.path
+        _, first, second, _ = state.rows
+        _, e_ds, e_dds = state.drift
+        along = sdot[:, :, None]
+
+        by_s = np.einsum("kij,kj->ki", first, state.qdot)
+        rows = -first @ gradient * along
+        rows[:, :, 0] -= by_s + e_ds * sdot
+        qdot_y = self._solved(state, -task.velocity_q @ gradient, rows, sample.xi_ds * sdot)
+
+        rows = -2.0 * first @ gradient * along
+        rows[:, :, 0] -= 2.0 * (by_s + e_ds * sdot)
+        qddot_ydot = self._solved(state, -task.acceleration_qdot @ gradient, rows, 2.0 * sample.xi_ds * sdot)
+
+        rows = -2.0 * first @ qdot_y * along - (second * along**2 + first * sddot[:, :, None]) @ gradient
+        rows[:, :, 0] -= np.einsum("kij,kj->ki", first, state.qddot) + e_dds * sdot**2 + e_ds * sddot
+        rows[:, :, 0] -= 2.0 * sdot * np.einsum("kij,kj->ki", second, state.qdot)
+        right = -task.acceleration_q @ gradient - task.acceleration_qdot @ qdot_y
+        qddot_y = self._solved(state, right, rows, sample.xi_dds * sdot**2 + sample.xi_ds * sddot)
+        return JointDerivatives(qdot_y, qddot_y, qddot_ydot)
+
+    def _solved(self, state: ChartState, task: np.ndarray, rows: np.ndarray, by_s: np.ndarray) -> np.ndarray:
+        """J_aug^-1 (task + [by_s, 0]; rows), with parts (K, m, c), (K, r, c) and (K, m)."""
+        task[:, :, 0] += by_s
+        return state.inverse @ np.concatenate([task, rows], axis=1)
+
+    def start_margins(self) -> np.ndarray:
+        """See `JointMap`."""
+        jacobian = self.task_map.jacobian(self.task_map.twists(self.reference[:1]))
+        augmented = np.concatenate([jacobian, self.rows.at(self.s[:1])[0]], axis=1)
+        return np.asarray(np.linalg.svd(augmented, compute_uv=False)[0, -1:])
+
+    def margins(self, state: ChartState) -> np.ndarray:
+        """See `JointMap`: the least singular value of J_aug, (K, 1)."""
+        return _least_singular(state.inverse)[0][:, None]
+
+    def margin_gradient(self, state: ChartState) -> tuple[np.ndarray, np.ndarray]:
+        """See `JointMap`: for singular vectors u and v of the least singular value it changes by u^T dJ_aug v."""
+        least, v = _least_singular(state.inverse)
+        u = least[:, None] * np.einsum("kji,kj->ki", state.inverse, v)
+        m = self.task_map.m
+        moved = self.task_map.derivatives(state.twists, v, np.zeros_like(v)).velocity_q
+        by_s = np.einsum("ki,kij,kj->k", u[:, m:], state.rows[1], v)
+        return np.einsum("ki,kij->kj", u[:, :m], moved)[:, None], by_s[:, None]
+
+
+def _least_singular(inverse: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least singular values (K,) of matrices, and their right singular vectors (K, n), from the inverses (K, n, n)."""
+    values, vectors = np.linalg.eigh(inverse @ np.swapaxes(inverse, 1, 2))
+    return 1.0 / np.sqrt(values[:, -1]), vectors[:, :, -1]

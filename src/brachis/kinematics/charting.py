@@ -1,0 +1,88 @@
+"""Which chart to lay around a joint path: rows transversal to the self-motion along it, constant where one set will do.
+
+The self-motion at a posture is the null space of the task Jacobian, with an orthonormal basis N (n, r). Rows C are
+transversal where C N is regular; with orthonormal rows the least singular value of C N is 1 where they span the null
+space itself and 0 where they miss a part of it. The best constant rows are the leading eigenvectors of the mean of
+N N^T. Where these are not transversal enough, rows follow the null space, continued from place to place by the rotation
+that brings its basis nearest to the one before (orthogonal Procrustes problem; P. H. Schoenemann, Psychometrika 31,
+1966).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.errors import UnreachableError
+from brachis.kinematics.chart import ChartMap
+from brachis.kinematics.chart_rows import ChartRows
+from brachis.kinematics.newton import Newton
+from brachis.path import Path
+from brachis.robot import TaskMap
+
+_ENOUGH = 0.35
+"""Least transversality of constant rows along the reference."""
+_PLACES = (9, 17, 33, 65, 129)
+"""Numbers of places through which rows that follow the null space are led, as few as are enough."""
+
+
+def chart_around(
+    task_map: TaskMap, path: Path, s: np.ndarray, reference: np.ndarray, rows: np.ndarray | None = None
+) -> ChartMap:
+    """Lay a chart around a joint path.
+
+    Parameters
+    ----------
+    task_map : TaskMap
+    path : Path
+    s : (S,) ndarray
+        Path coordinates, ascending from 0 to 1.
+    reference : (S, n) ndarray
+        Postures there.
+    rows : (r, n) ndarray, optional
+        Constant rows of the chart's; chosen here if not given.
+
+    Returns
+    -------
+    ChartMap
+
+    Raises
+    ------
+    UnreachableError
+        The Jacobian loses rank along the joint path, so that no chart follows it.
+    """
+    if rows is not None:
+        return ChartMap(task_map, path, ChartRows.constant(rows), s, reference)
+    null = null_spaces(Newton(task_map).placed(reference)[1])
+    r = null.shape[2]
+    constant = np.linalg.eigh(np.einsum("kir,kjr->ij", null, null))[1][:, ::-1][:, :r].T
+    if transversality(constant[None], null).min(initial=np.inf) >= _ENOUGH:
+        return ChartMap(task_map, path, ChartRows.constant(constant), s, reference)
+    following = np.swapaxes(_continued(null), 1, 2)
+    for count in _PLACES:
+        places = np.unique(np.linspace(0, len(s) - 1, min(count, len(s))).round().astype(int))
+        chosen = ChartRows.along(s[places], following[places], reference[places])
+        if transversality(chosen.at(s)[0], null).min() >= _ENOUGH:
+            return ChartMap(task_map, path, chosen, s, reference)
+    raise UnreachableError("the arm comes too near a singularity of its own for a chart")
+
+
+def null_spaces(jacobian: np.ndarray) -> np.ndarray:
+    """Orthonormal bases (K, n, r) of the null spaces of Jacobians (K, m, n)."""
+    m = jacobian.shape[1]
+    return np.asarray(np.swapaxes(np.linalg.svd(jacobian)[2][:, m:], 1, 2))
+
+
+def transversality(rows: np.ndarray, null: np.ndarray) -> np.ndarray:
+    """Least singular value of C N, (K,), of rows (K, r, n) and bases (K, n, r); infinite without redundancy."""
+    if not null.shape[2]:
+        return np.full(len(null), np.inf)
+    return np.asarray(np.linalg.svd(rows @ null, compute_uv=False)[:, -1])
+
+
+def _continued(null: np.ndarray) -> np.ndarray:
+    """Turn each basis, (S, n, r), within its null space to be nearest to the one before."""
+    turned = null.copy()
+    for k in range(1, len(null)):
+        left, _, right = np.linalg.svd(null[k].T @ turned[k - 1])
+        turned[k] = null[k] @ left @ right
+    return turned

@@ -1,0 +1,123 @@
+"""Starts in charts: joint paths from the lattice of all postures, each with a chart around it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from brachis.attempt import Start
+from brachis.deadline import NEVER, Deadline
+from brachis.errors import PathError, UnreachableError
+from brachis.kinematics import ChartMap, ClosedFormMap, Newton, chart_around, null_spaces
+from brachis.problem import Decomposition, Problem
+from brachis.search.joint_path import DeadEnd, JointPath
+from brachis.search.lattice import LARGEST_STEP
+from brachis.search.levels import SEARCH_LEVELS, SearchLevel
+from brachis.search.phase_plane import least_time
+from brachis.search.posture_lattice import PostureLattice
+from brachis.search.starts import PIECES, fine_places, lattice_starts, smoothed
+
+CHART = "chart"
+_FINER, _DENSER = 2, 2.0
+
+
+def chart_starts(
+    problem: Problem,
+    decompositions: Sequence[Decomposition],
+    level: SearchLevel,
+    deadline: Deadline = NEVER,
+) -> list[Start] | DeadEnd:
+    """Take the shortest distinct joint paths from the lattice of all postures; from a finer one where it ends.
+
+    Parameters
+    ----------
+    problem : Problem
+    decompositions : sequence of Decomposition
+        Whose closed forms give postures to begin with where neither end is given.
+    level : SearchLevel
+    deadline : Deadline, optional
+
+    Returns
+    -------
+    list of Start or DeadEnd
+        Those with the least estimated times first; empty where the time was up.
+    """
+    seed, most = problem.task.search.seed, level.joint_paths
+    cells, nodes = level.cells_per_turn, level.nodes
+    found = PostureLattice(
+        problem, decompositions, cells_per_turn=cells, nodes=nodes, seed=seed, deadline=deadline
+    ).joint_paths(most)
+    if isinstance(found, DeadEnd):
+        found = PostureLattice(
+            problem,
+            decompositions,
+            cells_per_turn=_FINER * cells,
+            density=_DENSER,
+            nodes=_FINER * nodes,
+            seed=seed,
+            deadline=deadline,
+        ).joint_paths(most)
+    if isinstance(found, DeadEnd):
+        return found
+    newton = Newton(problem.task_map)
+    starts = (_start_along(newton, joint_path, f"lattice {number}") for number, joint_path in enumerate(found, 1))
+    return sorted((start for start in starts if start is not None), key=lambda start: start.estimate)
+
+
+def _start_along(newton: Newton, joint_path: JointPath, origin: str) -> Start | None:
+    """Smooth a joint path, lay a chart around it, and estimate its time; None where no chart can follow it."""
+    problem = joint_path.problem
+    places = fine_places(joint_path.s)
+    for pieces in (*PIECES, None):
+        q = _followed(newton, joint_path, places, pieces)
+        if q is None:
+            continue
+        try:
+            chart = chart_around(problem.task_map, problem.path, places, q)
+        except UnreachableError:
+            continue
+        estimate = least_time(problem.limits, places, q)
+        return Start(problem, chart, chart.curves(places, q), estimate, origin, CHART)
+    return None
+
+
+def _followed(newton: Newton, joint_path: JointPath, places: np.ndarray, pieces: int | None) -> np.ndarray | None:
+    """Postures (S, n) on the path nearest to a smoothed joint path; `pieces` None: to the joint path as it is."""
+    if pieces is None:
+        q = np.column_stack([np.interp(places, joint_path.s, joint) for joint in joint_path.q.T])
+    else:
+        q = smoothed(joint_path.s, joint_path.q, places, pieces)
+    rows = np.swapaxes(null_spaces(newton.placed(q)[1]), 1, 2)
+    targets = joint_path.problem.path.sample(places).target
+    q = newton.solve(targets, q, rows, np.einsum("kij,kj->ki", rows, q))
+    given = joint_path.problem.start, joint_path.problem.end
+    for place, posture in zip((0, -1), given, strict=True):
+        if posture is not None:
+            q[place] = posture
+    follows = np.isfinite(q).all() and np.abs(np.diff(q, axis=0)).max(initial=0.0) <= LARGEST_STEP
+    return q if follows else None
+
+
+def first_map(problem: Problem, decompositions: Sequence[Decomposition]) -> tuple[ClosedFormMap | ChartMap, str]:
+    """Return a joint map of the problem, of a closed form where there is one, and its family.
+
+    It begins at the given start posture, or where that is free at that of the first joint path.
+
+    Raises
+    ------
+    PathError
+        The lattice has no joint path.
+    """
+    level = SEARCH_LEVELS["fast"][0]
+    if decompositions and problem.start is not None:
+        first = decompositions[0]
+        return first.joint_map(problem.start, first.branches[0]), first.match.family
+    found = (
+        lattice_starts(decompositions[0], level, problem.task.search.seed)
+        if decompositions
+        else chart_starts(problem, decompositions, level)
+    )
+    if isinstance(found, DeadEnd):
+        raise PathError(f"no joint path was found: {found}", s_interval=found.interval)
+    return found[0].joint_map, found[0].family

@@ -1,0 +1,219 @@
+"""The lattice of all postures of the arm, whatever branch or choice of redundant joints they belong to.
+
+At every node the r joints that move most in the arm's self-motion there are cut into cells; the postures at the cells
+around, at the next station, follow by Newton's method. So every posture that a continuous motion reaches from the
+nodes before is found, at the spacing of the cells, and no closed form ends it. Where neither end is given, the first
+layer comes from all closed forms there are, which see the whole self-motion manifold, or, for arms without one, from
+random postures. Two postures are joined if no joint moves far and the step is along the self-motion: what the next
+target asks of the joints apart, most of it lies in the null space of the Jacobian. Of several redundant joints, cells
+are sampled, and a layer keeps a bounded number of nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from brachis.deadline import NEVER, Deadline
+from brachis.kinematics import Newton, null_spaces
+from brachis.problem import Decomposition, Problem
+from brachis.robot.joint_space import TURN, difference
+from brachis.search.cells import Cells
+from brachis.search.joint_path import NO_ANSWER, beyond_ranges, causes_of
+from brachis.search.lattice import LARGEST_STEP, Lattice, shortest
+from brachis.search.layer import Layer
+
+_CELLS_PER_METRE = 1.0 / 3.0  # of those of a turn
+_NEIGHBOURS = (-2, -1, 0, 1, 2)
+_STEPS, _RANDOM, _SPREAD = (1, 3), 6, 3.0
+_COARSE, _SAME = 0.5, 1e-3  # rad or m
+_ALONG = 0.7
+"""Least part of a step that is self-motion; postures across a fold of the manifold differ in other directions."""
+_STARTS = 4  # times the nodes of a layer
+_DRAWN = 10.0
+"""Reach of what is drawn for joints without ranges, rad or m."""
+
+
+class PostureLattice(Lattice):
+    """Lattice of all postures.
+
+    Parameters
+    ----------
+    problem : Problem
+    decompositions : sequence of Decomposition
+        Whose closed forms give the first layer where neither end is given.
+    cells_per_turn : int, optional
+        Cells of a turn of a revolute joint; a metre of a prismatic joint has a third as many.
+    density, nodes, seed, deadline
+        See `Lattice`.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        decompositions: Sequence[Decomposition],
+        *,
+        cells_per_turn: int = 72,
+        density: float = 1.0,
+        nodes: int = 120,
+        seed: int = 0,
+        deadline: Deadline = NEVER,
+    ) -> None:
+        super().__init__(problem, problem.robot.revolute, density=density, nodes=nodes, seed=seed, deadline=deadline)
+        self._decompositions, self._cells_per_turn = decompositions, cells_per_turn
+        revolute = problem.robot.revolute
+        self._r = problem.robot.n - problem.task_map.m
+        self._size = np.where(revolute, TURN, 1.0 / _CELLS_PER_METRE) / cells_per_turn
+        self._newton = Newton(problem.task_map)
+        self._modulo = revolute & ~self._telling
+
+    def _at_end(self, last: Layer) -> np.ndarray:
+        """See `Lattice`."""
+        assert self.problem.end is not None  # noqa: S101
+        return np.asarray(np.abs(last.q - self.problem.end).max(axis=1) < _SAME)
+
+    def _first_layer(self, rng: np.random.Generator) -> Layer | dict[str, int]:
+        """See `Lattice`."""
+        if self._origin is not None:
+            return _layer(self._origin[None].astype(float))
+        q = self._seeds(rng)
+        if not len(q):
+            return {NO_ANSWER: 1}
+        _, kept = np.unique(self._key(q, self._size), axis=0, return_index=True)
+        q = q[kept]
+        within = self._inside(q, q)
+        if not within.all(axis=1).any():
+            return beyond_ranges(self._robot, within)
+        return self._kept(_layer(q[within.all(axis=1)]))
+
+    def _seeds(self, rng: np.random.Generator) -> np.ndarray:
+        """Postures, (K, n), at the beginning of the path, all over the self-motion manifold."""
+        target, found = self._targets[0], []
+        for decomposition in self._decompositions:
+            cells = Cells.of(decomposition, self._cells_per_turn, None)
+            some = cells.everywhere(_STARTS * self._nodes, rng)
+            q_r = cells.positions(some)
+            answers = decomposition.match.solver.solve(np.repeat(target[None], len(some), axis=0), q_r)
+            q = np.empty((*answers.shape[:3], self._robot.n))
+            redundant = list(decomposition.redundant)
+            q[..., redundant] = q_r[:, None, None]
+            q[..., np.setdiff1d(np.arange(self._robot.n), redundant)] = answers
+            found.append(q[np.isfinite(q).all(axis=3)])
+        if found:
+            return np.concatenate(found)
+        lower, upper = self._lower, self._upper
+        reach = np.where(self._robot.revolute, np.pi, _DRAWN)
+        low, high = np.maximum(lower, -reach), np.minimum(upper, reach)
+        drawn = rng.uniform(low, high, (_STARTS * self._nodes, self._robot.n))
+        rows = np.swapaxes(null_spaces(self._newton.placed(drawn)[1]), 1, 2)
+        q = self._newton.solve(np.repeat(target[None], len(drawn), axis=0), drawn, rows, _product(rows, drawn))
+        return q[np.isfinite(q).all(axis=1)]
+
+    def _key(self, q: np.ndarray, size: np.ndarray | float) -> np.ndarray:
+        """Whole numbers, (K, n), by which postures are told apart at a spacing; turns that nobody asks for left out."""
+        return np.rint(np.where(self._modulo, np.remainder(q, TURN), q) / size).astype(int)
+
+    def _offsets(self, rng: np.random.Generator) -> np.ndarray:
+        """Offsets, (O, r), to the cells at which postures of the next station are looked for."""
+        if self._r <= 1:
+            return np.array(_NEIGHBOURS)[:, None] if self._r else np.zeros((1, 0), dtype=int)
+        single = [sign * step * row for row in np.eye(self._r, dtype=int) for step in _STEPS for sign in (-1, 1)]
+        random = np.rint(rng.normal(0.0, _SPREAD, (_RANDOM, self._r))).astype(int)
+        return np.unique(np.vstack([np.zeros((1, self._r), dtype=int), single, random]), axis=0)
+
+    def _next(self, before: Layer, station: int, rng: np.random.Generator) -> Layer | dict[str, int]:
+        """See `Lattice`."""
+        values, jacobian = self._newton.placed(before.q)
+        null = null_spaces(jacobian)
+        wanted = self.problem.task_map.difference(self._targets[station][None], values)
+        found = self._postures(before.q, jacobian, null, wanted, station, rng)
+        if self._to_end and station == len(self.s) - 1:
+            found = np.vstack([found, self.problem.end])
+        if not len(found):
+            return {NO_ANSWER: len(before.q)}
+        needed = np.einsum("kij,kj->ki", np.linalg.pinv(jacobian), wanted)
+        step = np.where(self._modulo, difference(found[None], before.q[:, None], self._modulo), found - before.q[:, None])
+        near = np.all(np.abs(step) <= LARGEST_STEP, axis=2)
+        parent, child = np.nonzero(near)
+        step = step[parent, child]
+        own = step - needed[parent]
+        along = np.linalg.norm(np.einsum("eir,ei->er", null[parent], own), axis=1)
+        small = np.all(np.abs(own) <= self._size, axis=1)
+        kept = small | (along >= _ALONG * np.linalg.norm(own, axis=1))
+        parent, child, step = parent[kept], child[kept], step[kept]
+        q = before.q[parent] + step
+        low, high = np.minimum(before.low[parent], q), np.maximum(before.high[parent], q)
+        inside = self._inside(low, high)
+        good = inside.all(axis=1)
+        if not good.any():
+            every = np.ones(max(len(parent), 1), dtype=bool)
+            inside = inside if len(parent) else np.ones((1, self._robot.n), dtype=bool)
+            return causes_of(self._robot, every, every, inside, every & bool(len(parent)))
+        parent, child, step = parent[good], child[good], step[good]
+        length = before.length[parent] + self._lengths(before.q, step, parent)
+        nothing = np.zeros(len(parent), dtype=int)
+        layer = Layer(nothing[:, None], nothing, q[good], low[good], high[good], length, parent)
+        return self._kept(layer[shortest(length, child[:, None])])
+
+    def _postures(
+        self,
+        q: np.ndarray,
+        jacobian: np.ndarray,
+        null: np.ndarray,
+        wanted: np.ndarray,
+        station: int,
+        rng: np.random.Generator,
+    ) -> np.ndarray:
+        """Postures (C, n) at the cells around nodes with postures (K, n), on the way to the next station's target."""
+        joints = _moving_most(null / self._size[:, None])
+        rows = np.eye(self._robot.n)[joints]
+        offsets = self._offsets(rng)
+        size = self._size[joints]
+        cells = np.rint(np.take_along_axis(q, joints, axis=1) / size).astype(int)[:, None] + offsets
+        levels = cells * size[:, None]
+        moved = levels - np.take_along_axis(q, joints, axis=1)[:, None]
+        right = np.concatenate([np.broadcast_to(wanted[:, None], (*moved.shape[:2], wanted.shape[1])), moved], axis=2)
+        begun = q[:, None] + np.linalg.solve(
+            np.concatenate([jacobian, rows], axis=1)[:, None], right[..., None]
+        )[..., 0]
+        which = np.repeat(np.arange(len(q)), len(offsets))
+        begun, cells, levels = (part.reshape(len(which), -1) for part in (begun, cells, levels))
+        keys = np.concatenate([joints[which], cells, self._key(begun, _COARSE)], axis=1)
+        far = np.tile(np.abs(offsets).sum(axis=1), len(q))
+        chosen = shortest(far.astype(float), keys)
+        targets = np.repeat(self._targets[station][None], len(chosen), axis=0)
+        found = self._newton.solve(targets, begun[chosen], rows[which[chosen]], levels[chosen])
+        chosen, found = chosen[np.isfinite(found).all(axis=1)], found[np.isfinite(found).all(axis=1)]
+        keys = np.concatenate([keys[chosen, : 2 * self._r], self._key(found, _SAME)], axis=1)
+        return np.asarray(found[np.unique(keys, axis=0, return_index=True)[1]])
+
+    def _kept(self, layer: Layer) -> Layer | dict[str, int]:
+        """Keep nodes that can be held against gravity, not too many of them."""
+        held, refused = self._held(layer.q)
+        if not held.any():
+            return refused
+        kept = layer[held]
+        return kept if self._r <= 1 else kept.bounded(self._nodes, self._robot, self.problem.limits)
+
+
+def _layer(q: np.ndarray) -> Layer:
+    """Nodes, (K, n), with which joint paths begin."""
+    nothing = np.zeros(len(q), dtype=int)
+    return Layer(nothing[:, None], nothing, q, q, q, np.zeros(len(q)), nothing)
+
+
+def _product(rows: np.ndarray, q: np.ndarray) -> np.ndarray:
+    return np.asarray(np.einsum("kij,kj->ki", rows, q))
+
+
+def _moving_most(null: np.ndarray) -> np.ndarray:
+    """For null spaces, (K, n, r), the r joints, (K, r), ascending, whose rows span most, by pivoting."""
+    left, chosen = null.copy(), []
+    for _ in range(null.shape[2]):
+        joint = np.argmax(np.linalg.norm(left, axis=2), axis=1)
+        chosen.append(joint)
+        row = left[np.arange(len(left)), joint]
+        unit = row / np.maximum(np.linalg.norm(row, axis=1, keepdims=True), 1e-300)
+        left = left - np.einsum("knr,kr->kn", left, unit)[:, :, None] * unit[:, None]
+    return np.sort(np.array(chosen, dtype=int).reshape(null.shape[2], len(null)).T, axis=1)
