@@ -14,8 +14,8 @@ import pinocchio as pin
 from brachis.ik import ChainGeometry
 from brachis.robot import TaskMap
 
-_MET = 1e-11
-"""Miss, in m or rad, after which one more step meets the target to rounding."""
+_MET = 1e-7
+"""Miss, in m or rad, after which one more step meets the target to rounding: Newton's method squares it."""
 _LARGEST_STEP = 0.5
 """rad or m; longer steps are shortened, since the linear model says little about postures so far away."""
 _STEPS = 15
