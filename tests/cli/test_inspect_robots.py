@@ -79,11 +79,21 @@ def test_published_robots(run, name):
 
 
 def test_kinds_of_published_robots(run):
-    pytest.importorskip("eaik.pybindings.EAIK")
+    pytest.importorskip("eaik.pybindings.EAIK")  # which comes along where it has wheels
     panda = decompositions(run, published("Panda"))
     closed = [joint for joint, kind in panda.items() if kind == "closed_form"]
     assert closed == [f"panda_joint{i}" for i in (4, 5, 6, 7)]
     assert decompositions(run, published("UR5")) == {"none": "closed_form"}
+
+
+def test_without_eaik_it_is_said_what_is_missing(run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "eaik.pybindings.EAIK", None)
+    panda = decompositions(run, published("Panda"))
+    assert [joint for joint, kind in panda.items() if kind == "closed_form"] == ["panda_joint4", "panda_joint7"]
+    outcome = run("inspect", published("Panda"))
+    assert outcome.out.count("pip install EAIK") == 1
+    remarks = json.loads(run("inspect", published("Panda"), "--json").out)["remarks"]
+    assert remarks[-1].startswith("EAIK is not installed; it might add the redundant joints [panda_joint1], ")
 
 
 def test_the_chosen_tool_frame_is_named(run):

@@ -116,11 +116,8 @@ def _what_is_missing(decomposition: Decomposition) -> str:
     problem = decomposition.problem
     if problem.task.redundant_joints != "auto":
         return ""
-    further = ik.without_eaik(ik.find_all(problem.robot, problem.task_map))
-    if not further:
-        return ""
-    names = ", ".join("[" + ", ".join(joints) + "]" for joints in further)
-    return f'. EAIK is not installed (pip install "brachis[eaik]"); it might add the redundant joints {names}'
+    missing = ik.missing_eaik(ik.find_all(problem.robot, problem.task_map))
+    return f". {missing}" if missing else ""
 
 
 def _lattices(candidates: Sequence[Attempt]) -> list[Attempt]:
