@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from brachis import ik
+
 ROOT = Path(__file__).parents[2]
+WITHOUT_CLOSED_FORM = {"gen3": 7, "arm8": 28, "gen3_rails": 84}
 OWN = sorted((ROOT / "robots").glob("*/*.urdf"))
 PUBLISHED = {
     "UR5": "ur_description/urdf/ur5_robot.urdf",
@@ -43,7 +46,23 @@ def decompositions(run, urdf: Path, *options: str) -> dict[str, str]:
 
 @pytest.mark.parametrize("urdf", OWN, ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_every_robot_of_the_repository(run, urdf):
-    assert "closed_form" in decompositions(run, urdf).values()
+    none = urdf.parent.name in WITHOUT_CLOSED_FORM
+    assert ("closed_form" not in decompositions(run, urdf).values()) == none
+    assert (ik.NO_CLOSED_FORM in run("inspect", urdf).out) == none
+
+
+@pytest.mark.parametrize(("name", "choices"), WITHOUT_CLOSED_FORM.items())
+def test_robots_without_any_closed_form(run, name, choices):
+    urdf = ROOT / f"robots/{name}/robot.urdf"
+    kinds = decompositions(run, urdf)
+    assert (len(kinds), set(kinds.values())) == (choices, {"-"})
+    assert ik.NO_CLOSED_FORM in json.loads(run("inspect", urdf, "--json").out)["remarks"]
+
+
+def test_no_closed_form_is_missed_where_there_is_nothing_to_choose(run):
+    outcome = run("inspect", ROOT / "robots/scara3/robot.urdf", "--task-space", "pose")
+    assert "fewer joints than the task space has rows" in outcome.out
+    assert ik.NO_CLOSED_FORM not in outcome.out
 
 
 def test_tx90l_on_its_rail(run):
