@@ -11,10 +11,8 @@ NO_CLOSED_FORM = (
     "no choice of redundant joints has a closed form: motions are planned from differential inverse kinematics"
 )
 """Of a robot and a task space without any."""
-HOW_TO_INSTALL = (
-    "pip install EAIK, which takes a C++ compiler except on macOS and on Linux for x86_64 with Python 3.13 or older"
-)
-"""How to come by EAIK; where it has wheels it comes with brachis."""
+_INSTALLING = "installing it takes a C++ compiler except on macOS and on Linux for x86_64 with Python 3.13 or older"
+"""What installing EAIK may ask for; where it has wheels it comes with brachis."""
 
 
 def missing_eaik(candidates: Sequence[Candidate]) -> str:
@@ -38,4 +36,4 @@ def missing_eaik(candidates: Sequence[Candidate]) -> str:
     if not further:
         return ""
     names = ", ".join("[" + ", ".join(joints) + "]" for joints in further)
-    return f"{NOT_INSTALLED}; it might add the redundant joints {names} ({HOW_TO_INSTALL})"
+    return f"{NOT_INSTALLED}; it might add the redundant joints {names}; {_INSTALLING}"
