@@ -1,6 +1,6 @@
 """A seven-joint arm, straight from the package example-robot-data: the Panda draws a circle without turning its hand.
 
-Needs the URDFs and, for joints 5 and 6, EAIK: pip install "brachis[robots,eaik]".
+Needs the URDFs: pip install "brachis[robots]".
 """
 
 from __future__ import annotations

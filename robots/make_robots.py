@@ -1,4 +1,4 @@
-"""Write the URDFs of tx90l_rail, ur10_rail and iiwa14 from their figures with ``python robots/make_robots.py``.
+"""Write the URDFs of the robots that have a ``figures.yaml`` with ``python robots/make_robots.py``.
 
 ur10_rail needs the arm of example-robot-data (``pip install ".[robots]"``) and is left as it is without.
 """
@@ -10,6 +10,7 @@ import math
 import sys
 import sysconfig
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -53,10 +54,17 @@ def tx90l() -> str:
     return robot(figures, "tx90l", figures["joints"])
 
 
-def iiwa14() -> str:
-    """KUKA LBR iiwa 14 R820."""
-    figures = read_figures("iiwa14")
+def alone(name: str) -> str:
+    """Build a robot of which everything stands in its own figures."""
+    figures = read_figures(name)
     return robot(figures, figures["robot"], figures["joints"])
+
+
+def gen3_rails() -> str:
+    """Kinova Gen3 hanging from two rails."""
+    rails, arm = read_figures("gen3_rails"), read_figures("gen3")
+    both = {part: {**rails[part], **arm[part]} for part in ("links", "visuals")}
+    return robot(both, rails["robot"], [*rails["joints"], *arm["joints"]])
 
 
 def ur10_rail() -> str:
@@ -91,7 +99,8 @@ def ur10_rail() -> str:
 MAKERS: dict[str, Callable[[], str]] = {
     "tx90l_rail/robot.urdf": tx90l_rail,
     "tx90l_rail/arm.urdf": tx90l,
-    "iiwa14/robot.urdf": iiwa14,
+    **{f"{name}/robot.urdf": partial(alone, name) for name in ("iiwa14", "gen3", "arm8")},
+    "gen3_rails/robot.urdf": gen3_rails,
     "ur10_rail/robot.urdf": ur10_rail,
 }
 
@@ -131,10 +140,11 @@ def joint_of(figures: Mapping[str, Any]) -> Element:
     """Joint from its figures; degrees become radians in full precision."""
     kind = figures["type"]
     limit = None
-    if kind == "revolute":
-        low, high = (math.radians(angle) for angle in figures["range_deg"])
-        speed = math.radians(figures["max_speed_deg_s"])
-        limit = {"lower": low, "upper": high, "velocity": speed, "effort": figures["torque_nm"]}
+    if kind in ("revolute", "continuous"):
+        limit = {"velocity": math.radians(figures["max_speed_deg_s"]), "effort": figures["torque_nm"]}
+        if kind == "revolute":
+            low, high = (math.radians(angle) for angle in figures["range_deg"])
+            limit = {"lower": low, "upper": high, **limit}
     elif kind == "prismatic":
         low, high = figures["range_m"]
         limit = {"lower": low, "upper": high, "velocity": figures["max_speed_m_s"], "effort": figures["max_force_n"]}

@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from brachis import ik
+
 ROOT = Path(__file__).parents[2]
+WITHOUT_CLOSED_FORM = {"gen3": 7, "arm8": 28, "gen3_rails": 84}
 OWN = sorted((ROOT / "robots").glob("*/*.urdf"))
 PUBLISHED = {
     "UR5": "ur_description/urdf/ur5_robot.urdf",
@@ -43,7 +46,23 @@ def decompositions(run, urdf: Path, *options: str) -> dict[str, str]:
 
 @pytest.mark.parametrize("urdf", OWN, ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_every_robot_of_the_repository(run, urdf):
-    assert "closed_form" in decompositions(run, urdf).values()
+    none = urdf.parent.name in WITHOUT_CLOSED_FORM
+    assert ("closed_form" not in decompositions(run, urdf).values()) == none
+    assert (ik.NO_CLOSED_FORM in run("inspect", urdf).out) == none
+
+
+@pytest.mark.parametrize(("name", "choices"), WITHOUT_CLOSED_FORM.items())
+def test_robots_without_any_closed_form(run, name, choices):
+    urdf = ROOT / f"robots/{name}/robot.urdf"
+    kinds = decompositions(run, urdf)
+    assert (len(kinds), set(kinds.values())) == (choices, {"-"})
+    assert ik.NO_CLOSED_FORM in json.loads(run("inspect", urdf, "--json").out)["remarks"]
+
+
+def test_no_closed_form_is_missed_where_there_is_nothing_to_choose(run):
+    outcome = run("inspect", ROOT / "robots/scara3/robot.urdf", "--task-space", "pose")
+    assert "fewer joints than the task space has rows" in outcome.out
+    assert ik.NO_CLOSED_FORM not in outcome.out
 
 
 def test_tx90l_on_its_rail(run):
@@ -79,11 +98,21 @@ def test_published_robots(run, name):
 
 
 def test_kinds_of_published_robots(run):
-    pytest.importorskip("eaik.pybindings.EAIK")
+    pytest.importorskip("eaik.pybindings.EAIK")  # which comes along where it has wheels
     panda = decompositions(run, published("Panda"))
     closed = [joint for joint, kind in panda.items() if kind == "closed_form"]
     assert closed == [f"panda_joint{i}" for i in (4, 5, 6, 7)]
     assert decompositions(run, published("UR5")) == {"none": "closed_form"}
+
+
+def test_without_eaik_it_is_said_what_is_missing(run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "eaik.pybindings.EAIK", None)
+    panda = decompositions(run, published("Panda"))
+    assert [joint for joint, kind in panda.items() if kind == "closed_form"] == ["panda_joint4", "panda_joint7"]
+    remarks = json.loads(run("inspect", published("Panda"), "--json").out)["remarks"]
+    assert remarks[-1].startswith("EAIK is not installed (pip install EAIK); it might add the redundant joints [")
+    assert "[panda_joint5], [panda_joint6]; installing it takes a C++ compiler except on" in remarks[-1]
+    assert remarks[-1] in run("inspect", published("Panda")).out.replace("\n", " ")
 
 
 def test_the_chosen_tool_frame_is_named(run):

@@ -19,7 +19,12 @@ from .conftest import ROOT
 
 ROBOTS = ROOT / "robots"
 URDFS = sorted(ROBOTS.glob("*/*.urdf"))
-MADE = ("tx90l_rail/robot.urdf", "tx90l_rail/arm.urdf", "iiwa14/robot.urdf", "ur10_rail/robot.urdf")
+MADE = (
+    "tx90l_rail/robot.urdf",
+    "tx90l_rail/arm.urdf",
+    *(f"{name}/robot.urdf" for name in ("iiwa14", "gen3", "gen3_rails", "arm8")),
+    "ur10_rail/robot.urdf",
+)
 TX90L_START = (0.0, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1)
 
 
@@ -42,7 +47,7 @@ def shift(x: float, y: float, z: float) -> pin.SE3:
 
 
 def test_there_are_robots():
-    assert {path.parent.name for path in URDFS} >= {"scara3", "gantry2", "tx90l_rail", "ur10_rail", "iiwa14"}
+    assert {path.parent.name for path in URDFS} >= {"scara3", "gantry2", *(Path(path).parent.name for path in MADE)}
 
 
 @pytest.mark.parametrize("path", URDFS, ids=lambda path: "/".join(path.parts[-2:]))
@@ -67,13 +72,13 @@ def test_robot_is_what_the_script_makes_of_its_figures(maker, name):
 def test_script_makes_every_composed_robot(maker, monkeypatch, tmp_path, capsys):
     assert set(maker.MAKERS) == set(MADE)
     monkeypatch.setattr(maker, "example_robot_data", lambda: None)
-    for name in ("tx90l_rail", "iiwa14", "ur10_rail"):
+    for name in {Path(path).parent.name for path in MADE}:
         (tmp_path / name).mkdir()
         (tmp_path / name / "figures.yaml").write_text((ROBOTS / name / "figures.yaml").read_text())
     monkeypatch.setattr(maker, "ROBOTS", tmp_path)
     maker.main()
     assert "ur10_rail/robot.urdf: left as it is, example-robot-data is not installed" in capsys.readouterr().out
-    assert {str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*.urdf")} == set(MADE[:3])
+    assert {str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*.urdf")} == set(MADE[:-1])
 
 
 @pytest.fixture(scope="module")

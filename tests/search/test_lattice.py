@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis import ik
 from brachis.errors import PathError, PlanningError
 from brachis.problem import Problem, decompositions_of
 from brachis.robot import dynamics
@@ -164,11 +163,3 @@ def test_what_eaik_might_add_is_said_where_it_is_missing(monkeypatch):
     assert isinstance(reason, PathError)
     assert "EAIK is not installed" in str(reason)
     assert "[panda_joint5], [panda_joint6]" in str(reason)
-
-
-def test_eaik_is_not_promised_where_no_closed_form_can_be(monkeypatch):
-    """Joint 4 of this arm fixes the distance of shoulder and wrist."""
-    monkeypatch.setattr("brachis.ik.eaik.installed", lambda: False)
-    robot = brachis.Robot.from_urdf(ROOT / "robots/iiwa14/robot.urdf", tool_frame="tool")
-    space = brachis.task_map_of(robot, "pose")
-    assert ik.without_eaik(ik.find_all(robot, space)) == ()

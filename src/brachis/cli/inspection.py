@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from brachis import ik
 from brachis.cli.output import print_json, result_console
 from brachis.errors import InputError
 from brachis.plausibility import of_robot
-from brachis.robot import LimitSpec, Robot, TaskMap, bind
+from brachis.robot import LimitSpec, Robot, bind
 from brachis.robot.limits import UrdfLimit
 from brachis.robot.task_map.rows import AXES, POSE_ROWS, YAW
 from brachis.robot.urdf import last_common_link, read_file
@@ -50,7 +51,9 @@ def inspect_command(
     robot, rows = bind(robot, _space(task_space) if task_space else _natural_space(robot, remarks))
     remarks += [f"warning: {remark}" for remark in of_robot(_with_stated_speeds(robot))]
     joints = _joints(robot)
-    decompositions = _decompositions(robot, rows)
+    candidates = ik.find_all(robot, rows)
+    remarks += _remarks_on_closed_forms(candidates)
+    decompositions = _decompositions(candidates)
     if posture is not None:
         remarks.append(_tool_pose(robot, posture))
     if as_json:
@@ -156,10 +159,17 @@ def _figure(value: float | None, unit: str) -> str:
     return "not stated" if value is None else f"{value:.4g} {unit}"
 
 
-def _decompositions(robot: Robot, task_map: TaskMap) -> list[dict[str, Any]]:
+def _remarks_on_closed_forms(candidates: Sequence[ik.Candidate]) -> list[str]:
+    """Say where there is none at all, and what EAIK might add."""
+    none = bool(candidates) and not any(candidate.solver for candidate in candidates)
+    missing = ik.missing_eaik(candidates)
+    return [*([ik.NO_CLOSED_FORM] if none else []), *([missing] if missing else [])]
+
+
+def _decompositions(candidates: Sequence[ik.Candidate]) -> list[dict[str, Any]]:
     """Every choice of redundant joints, its solver or the reasons why there is none."""
     rows = []
-    for candidate in ik.find_all(robot, task_map):
+    for candidate in candidates:
         solver = candidate.solver
         told = {family: reason for family, reason in candidate.reasons.items() if reason not in _OTHER_TASKS}
         why = "; ".join(f"{family}: {reason}" for family, reason in (told or candidate.reasons).items())

@@ -1,12 +1,14 @@
 """Closed-form inverse kinematics: protocol, families, and the registry that finds them by geometry."""
 
+from brachis.ik.advice import NO_CLOSED_FORM, missing_eaik
 from brachis.ik.check import check_answers
 from brachis.ik.geometry import ChainGeometry, PosedScrews
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError, ik_family, margin_gradient
-from brachis.ik.registry import BUILTIN, Candidate, Match, find, find_all, without_eaik
+from brachis.ik.registry import BUILTIN, Candidate, Match, find, find_all
 
 __all__ = [
     "BUILTIN",
+    "NO_CLOSED_FORM",
     "Candidate",
     "ChainGeometry",
     "Family",
@@ -19,5 +21,5 @@ __all__ = [
     "find_all",
     "ik_family",
     "margin_gradient",
-    "without_eaik",
+    "missing_eaik",
 ]

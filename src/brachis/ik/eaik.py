@@ -31,7 +31,7 @@ from brachis.robot import TaskMap
 from brachis.robot.joint_space import complement
 from brachis.robot.task_map import Pose
 
-NOT_INSTALLED = 'EAIK is not installed (pip install "brachis[eaik]")'
+NOT_INSTALLED = "EAIK is not installed (pip install EAIK)"
 """Why EAIK is not asked, where that is the reason."""
 
 _SAMPLES = 64

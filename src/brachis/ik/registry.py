@@ -18,7 +18,7 @@ from functools import cache
 
 from brachis.errors import DecompositionError, UnknownNameError
 from brachis.ik.check import check_answers
-from brachis.ik.eaik import NOT_INSTALLED, eaik
+from brachis.ik.eaik import eaik
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.idealised import TOLERANCE, Ideal, Polished, idealised
 from brachis.ik.parallel_axes import parallel_axes
@@ -143,15 +143,6 @@ def find_all(robot: Robot, task_map: TaskMap, *, families: Sequence[Family] = ()
         return []
     ideals = _ideals(robot, task_map)
     return [_try(robot, task_map, names, families, ideals) for names in itertools.combinations(robot.joint_names, r)]
-
-
-def without_eaik(candidates: Sequence[Candidate]) -> tuple[tuple[str, ...], ...]:
-    """Choices of redundant joints without a closed form for which EAIK, were it installed, might have one."""
-    return tuple(
-        candidate.redundant_joints
-        for candidate in candidates
-        if candidate.solver is None and candidate.reasons.get(eaik.name) == NOT_INSTALLED
-    )
 
 
 def _ideals(robot: Robot, task_map: TaskMap) -> Callable[[float], Ideal | None]:

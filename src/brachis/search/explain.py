@@ -121,11 +121,8 @@ def _what_is_missing(problem: Problem) -> str:
     """Say which further choices of redundant joints EAIK might add where it is not installed."""
     if problem.task.redundant_joints != "auto":
         return ""
-    further = ik.without_eaik(ik.find_all(problem.robot, problem.task_map))
-    if not further:
-        return ""
-    names = ", ".join("[" + ", ".join(joints) + "]" for joints in further)
-    return f'. EAIK is not installed (pip install "brachis[eaik]"); it might add the redundant joints {names}'
+    missing = ik.missing_eaik(ik.find_all(problem.robot, problem.task_map))
+    return f". {missing}" if missing else ""
 
 
 def _lattices(candidates: Sequence[Attempt]) -> list[Attempt]:
