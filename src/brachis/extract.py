@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.attempt import Attempt, Start
-from brachis.kinematics import interpolate
+from brachis.kinematics import ChartMap, interpolate
 from brachis.nlp import Program
 from brachis.refine import Refined
 from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
@@ -33,11 +33,13 @@ def extract(start: Start, refined: Refined) -> Trajectory:
     """
     (phase,), (motion,) = refined.program.phases, refined.program.motions(refined.x)
     joint_map, task = phase.joint_map, start.problem.task
+    assert joint_map.path is not None  # noqa: S101  (a task has a path)
     joins = motion.times_of(joint_map.path.breaks[1:-1])
     gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
     breaks = np.union1d(motion.breaks, joins[gaps > _SAME_TIME * motion.t_end])
     nodes = interpolate(joint_map, motion.at, breaks, jumps=motion.degree < CONTINUOUS_TORQUE)
     robot = joint_map.robot
+    rows, knots = joint_map.rows.arrays() if isinstance(joint_map, ChartMap) else (np.empty((0, 0, 0)), np.empty(0))
     return Trajectory(
         task=task,
         urdf=robot.urdf,
@@ -52,6 +54,8 @@ def extract(start: Start, refined: Refined) -> Trajectory:
         knots=motion.knots,
         degree=motion.degree,
         control_points=motion.control_points,
+        chart_rows=rows,
+        chart_knots=knots,
     )
 
 

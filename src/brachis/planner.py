@@ -23,6 +23,7 @@ from brachis.custom_limits import LimitModel
 from brachis.deadline import Deadline
 from brachis.errors import UnreachableError
 from brachis.extract import extract, where_it_failed
+from brachis.kinematics import ChartMap
 from brachis.mesh import adapt_mesh, coarsest
 from brachis.nlp import Program
 from brachis.nlp.guess import starting_point
@@ -32,7 +33,6 @@ from brachis.refine import Refined, RefinementOptions, Solve, refine
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.combine import robot_for
-from brachis.kinematics import ChartMap
 from brachis.search import (
     MARGINS,
     Listener,

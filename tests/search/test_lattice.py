@@ -16,7 +16,7 @@ from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.explain import no_motion
 from brachis.search.joint_path import DeadEnd
-from brachis.search.lattice import Lattice
+from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.starts import lattice_starts
 from support.pose_arms import panda
@@ -61,7 +61,7 @@ def test_courses_are_motions_of_the_robot(case):
     robot, limits = given.robot, given.robot.limits
     found = 0
     for decomposition in decompositions_of(given):
-        joint_paths = Lattice(decomposition).joint_paths(4)
+        joint_paths = ClosedFormLattice(decomposition).joint_paths(4)
         if isinstance(joint_paths, DeadEnd):
             continue
         found += len(joint_paths)
@@ -86,16 +86,16 @@ def test_courses_are_motions_of_the_robot(case):
 
 def test_the_shortest_course_comes_first_and_is_shorter_than_any_detour():
     (decomposition, *_) = decompositions_of(problem(scara(), redundant_joints=["j1"]))
-    first, *others = Lattice(decomposition).joint_paths(6)
+    first, *others = ClosedFormLattice(decomposition).joint_paths(6)
     assert others
     assert all(other.length >= first.length for other in others)
 
 
 def test_an_end_posture_is_reached():
-    free = Lattice(decompositions_of(problem(scara(), redundant_joints=["j1"]))[0]).joint_paths(3)
+    free = ClosedFormLattice(decompositions_of(problem(scara(), redundant_joints=["j1"]))[0]).joint_paths(3)
     end = free[-1].q[-1]
     given = problem(scara(), redundant_joints=["j1"], end={"joints": end})
-    joint_paths = Lattice(decompositions_of(given)[0]).joint_paths(3)
+    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(3)
     assert all(np.abs(joint_path.q[-1] - end).max() < 0.2 for joint_path in joint_paths)
 
 
@@ -103,7 +103,7 @@ def test_lifts_follow_the_course():
     """Three turns about the base: the joint leaves (-pi, pi]."""
     arm = scara(locked_joints={"j3": 0.4})
     given = problem(arm, start={"joints": [0.3, 0.9]}, path=[{"circle": {"center": [0.0, 0.0], "turns": 3}}])
-    (joint_path,) = Lattice(decompositions_of(given)[0]).joint_paths(1)
+    (joint_path,) = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
     assert joint_path.q[-1, 0] - joint_path.q[0, 0] == pytest.approx(6 * math.pi, abs=1e-6)
 
 

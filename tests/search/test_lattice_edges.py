@@ -12,7 +12,7 @@ import brachis
 from brachis.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.joint_path import DeadEnd
-from brachis.search.lattice import Lattice
+from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.stations import stations
 
 ROOT = Path(__file__).parents[2]
@@ -40,7 +40,7 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way):
     here = robot.tool_placement(start).translation[:2]
     turns = [{"circle": {"center": [0.0, 0.0], "turns": 1.5 * way}}]
     (decomposition,) = decompositions_of(problem(robot, start="free", path_start=list(here), path=turns))
-    joint_paths = Lattice(decomposition).joint_paths(4)
+    joint_paths = ClosedFormLattice(decomposition).joint_paths(4)
     assert not isinstance(joint_paths, DeadEnd)
     assert all(-2 * math.pi <= q <= 2 * math.pi for joint_path in joint_paths for q in joint_path.q[:, 0])
     assert min(abs(joint_path.q[0, 0] - start[0]) for joint_path in joint_paths) < 1e-6
@@ -51,7 +51,7 @@ def test_a_circle_too_many_for_the_range_is_a_dead_end_at_its_joint():
     here = robot.tool_placement(np.array([0.2, 0.9])).translation[:2]
     turns = [{"circle": {"center": [0.0, 0.0], "turns": 2.1}}]
     (decomposition,) = decompositions_of(problem(robot, start="free", path_start=list(here), path=turns))
-    end = Lattice(decomposition).joint_paths(4)
+    end = ClosedFormLattice(decomposition).joint_paths(4)
     assert isinstance(end, DeadEnd)
     assert 1.8 / 2.1 < end.s < 1.0
     assert "the range of joint 'j1' ends" in end.causes
@@ -68,7 +68,7 @@ def test_a_free_start_on_a_long_rail(reach):
     task["path"] = [{"line": {"by": [0.0, 0.8, 0.0]}}]
     task["robot"]["limits"]["position"] = {"rail": reach}
     given = Problem.of(robot_from_settings(brachis.load_task(task).robot), brachis.load_task(task))
-    joint_paths = Lattice(decompositions_of(given)[0]).joint_paths(2)
+    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(2)
     assert not isinstance(joint_paths, DeadEnd)
     assert all(abs(joint_path.q[0, 0] - 20.0) < 3.0 for joint_path in joint_paths)
 
@@ -83,7 +83,7 @@ def _quaternion(rotation: np.ndarray) -> list[float]:
 def test_both_branches_of_a_free_start():
     line = [{"line": {"length": 0.6, "angle_deg": 90}}]
     given = problem(scara(), start="free", path_start=[math.sqrt(3.0), 0.0], path=line, redundant_joints=["j1"])
-    joint_paths = Lattice(decompositions_of(given)[0]).joint_paths(4)
+    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(4)
     assert {joint_path.branch for joint_path in joint_paths} == {0, 1}
 
 
@@ -92,7 +92,7 @@ def test_a_free_start_that_no_torque_holds_says_so():
     robot = brachis.Robot.from_urdf(SCARA, gravity=[0, -9.81, 0], limits=limits)
     line = [{"line": {"length": 0.6, "angle_deg": 90}}]
     given = problem(robot, start="free", path_start=[math.sqrt(3.0), 0.0], path=line, redundant_joints=["j1"])
-    end = Lattice(decompositions_of(given)[0]).joint_paths(1)
+    end = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
     assert isinstance(end, DeadEnd)
     assert end.s == 0.0
     assert "the torque limit cannot hold the arm against gravity" in end.causes
@@ -102,7 +102,7 @@ def test_acceleration_limits_alone_have_shortest_courses():
     robot = scara(torque=None, acceleration=3.0)
     line = [{"line": {"length": 1.0, "angle_deg": 90}}]
     given = problem(robot, start={"joints": [0.5, -2.0, 2.0]}, path=line, redundant_joints=["j1"])
-    joint_paths = Lattice(decompositions_of(given)[0]).joint_paths(3)
+    joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(3)
     assert len(joint_paths) == 3
     assert joint_paths[0].length > 0.0
     steps = np.abs(np.diff(joint_paths[0].q[:, 0], n=2))
@@ -116,7 +116,7 @@ def test_small_circles_have_stations_enough(turns):
     )
     assert len(stations(given.path, given.task_map)) > 24 * turns / 2
     for decomposition in decompositions_of(given):
-        assert not isinstance(Lattice(decomposition).joint_paths(1), DeadEnd)
+        assert not isinstance(ClosedFormLattice(decomposition).joint_paths(1), DeadEnd)
 
 
 def test_an_end_posture_without_redundancy_may_be_rounded():
@@ -125,7 +125,7 @@ def test_an_end_posture_without_redundancy_may_be_rounded():
     free = brachis.plan(robot, problem(robot, start={"joints": [0.3, 0.9]}, path=line).task)
     end = [round(float(value), 7) for value in free.trajectory.position(free.t_end)]
     given = problem(robot, start={"joints": [0.3, 0.9]}, path=line, end={"joints": end})
-    assert not isinstance(Lattice(decompositions_of(given)[0]).joint_paths(1), DeadEnd)
+    assert not isinstance(ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1), DeadEnd)
 
 
 def back_from(end: np.ndarray, robot: brachis.Robot, by: list[float]) -> dict[str, object]:
@@ -163,7 +163,7 @@ def test_a_free_start_is_in_the_turn_from_which_the_given_end_is_reached(turned)
     found = 0
     for decomposition in decompositions_of(Problem.of(robot, brachis.load_task(task))):
         if decomposition.match.solver.kind == "closed_form":
-            joint_paths = Lattice(decomposition).joint_paths(2)
+            joint_paths = ClosedFormLattice(decomposition).joint_paths(2)
             assert not isinstance(joint_paths, DeadEnd)
             assert all(np.abs(joint_path.q[-1] - end).max() < 1e-9 for joint_path in joint_paths)
             found += 1
@@ -189,7 +189,7 @@ def test_a_dead_end_back_from_the_end_says_so():
     x, y, _ = robot.tool_placement(end).translation
     path = [{"line": {"by": [-4.0, 0.0]}}]
     given = problem(robot, start="free", path_start=[x + 4.0, y], end={"joints": end.tolist()}, path=path)
-    dead = Lattice(decompositions_of(given)[0]).joint_paths(1)
+    dead = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
     assert isinstance(dead, DeadEnd)
     assert dead.interval[0] == 0.0
     assert 0.0 < dead.interval[1] < 1.0

@@ -1,8 +1,8 @@
 """The solved problem that belongs to a saved motion, which has neither collocation points nor multipliers.
 
-Task, URDF, redundant joints, branch, knots and control points are saved. The problem is laid down over these knots,
-with the branch margin that the motion keeps, solved from the saved control points and refined as in a plan. That takes
-a few iterations, since the start is an optimum already, and ends at the same one.
+Task, URDF, redundant joints and branch, or the chart, knots and control points are saved. The problem is laid down over
+these knots, with the branch margin that the motion keeps, solved from the saved control points and refined as in a
+plan. That takes a few iterations, since the start is an optimum already, and ends at the same one.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from threadpoolctl import ThreadpoolController
 
 from brachis.deadline import Deadline
 from brachis.errors import PlanningError, UnreachableError
+from brachis.kinematics import ChartMap, ChartRows, JointMap, chart_around
 from brachis.nlp import Motion, Program
 from brachis.problem import Problem, decompositions_of, program_of
 from brachis.refine import Refined, RefinementOptions, refine
@@ -65,11 +66,16 @@ def solved_again(trajectory: Trajectory) -> Refined:
 
 def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
     """Lay the problem down over the saved knots; the motion is its point x."""
-    names = tuple(name for name in trajectory.redundant_joints if name != ROLL_JOINT)
-    task = trajectory.task.model_copy(update={"redundant_joints": names, "branch": trajectory.branch})
-    (decomposition,) = decompositions_of(Problem.of(trajectory.robot, task))
-    joint_map = decomposition.joint_map(trajectory.q[0], decomposition.branches[0])
-    program = program_of(decomposition.problem, joint_map, np.unique(trajectory.knots))
+    if len(trajectory.chart_rows):
+        problem = Problem.of(trajectory.robot, trajectory.task)
+        joint_map: JointMap = _chart(problem, trajectory)
+    else:
+        names = tuple(name for name in trajectory.redundant_joints if name != ROLL_JOINT)
+        task = trajectory.task.model_copy(update={"redundant_joints": names, "branch": trajectory.branch})
+        (decomposition,) = decompositions_of(Problem.of(trajectory.robot, task))
+        problem = decomposition.problem
+        joint_map = decomposition.joint_map(trajectory.q[0], decomposition.branches[0])
+    program = program_of(problem, joint_map, np.unique(trajectory.knots))
     motion = Motion(trajectory.t_end, trajectory.knots, trajectory.degree, trajectory.control_points)
     x = program.variables_from([motion])
     for margin in MARGINS:
@@ -77,6 +83,13 @@ def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
         if program.safeguard_slack(x) >= -_KEPT:
             break
     return program, x
+
+
+def _chart(problem: Problem, trajectory: Trajectory) -> ChartMap:
+    """Lay the saved chart around the saved motion."""
+    rows = ChartRows.of_arrays(trajectory.chart_rows, trajectory.chart_knots)
+    s = trajectory.path_coordinate(trajectory.times)
+    return chart_around(problem.task_map, problem.path, s, trajectory.q, rows)
 
 
 def _answers(program: Program, x: np.ndarray, trajectory: Trajectory) -> Iterator[Refined]:

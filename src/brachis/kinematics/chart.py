@@ -4,9 +4,9 @@ The self-motion of the arm is measured by r linear functions of the joints,
 
     sigma = C(s) q - p(s),
 
-whose rows C (r, n) are transversal to the self-motion along the reference q_ref(s): J_aug = [J; C] is regular there, and
-as far around it as its least singular value stays away from zero. Where one C does for the whole path, it is constant
-and p = 0. The decomposition of the paper is the case of rows of C that each select a joint, with the closed form in
+whose rows C (r, n) are transversal to the self-motion along the reference q_ref(s): J_aug = [J; C] is regular there,
+and as far around it as its least singular value stays away from zero. Where one C does for the whole path, it is
+constant and p = 0. The decomposition of the paper is the case of rows of C that each select a joint, with the closed form in
 place of Newton's method (`closed_form`). With xi = dz/ds, e = C' q - p' and e' = C'' q - p'' (derivatives by s alone):
 
     G = dq/dy       = J_aug^-1 [xi, 0; -e, I]
@@ -87,13 +87,9 @@ class ChartMap:
         self.robot = task_map.robot
         self.task_map, self.path, self.rows = task_map, path, rows
         self.s, self.reference = s, reference
+        self.start = np.asarray(reference[0])
         self._newton = Newton(task_map)
         self._last: JointState | None = None
-
-    @property
-    def start(self) -> np.ndarray:
-        """Posture at, or near, the beginning, (n,)."""
-        return np.asarray(self.reference[0])
 
     @property
     def r(self) -> int:

@@ -40,10 +40,19 @@ class ChartRows:
         spline = make_interp_spline(s, np.concatenate([rows, offset[:, :, None]], axis=2), k=_DEGREE)
         return cls(np.asarray(spline.c), np.asarray(spline.t))
 
+    @classmethod
+    def of_arrays(cls, coefficients: np.ndarray, knots: np.ndarray) -> ChartRows:
+        """Read what `arrays` gave."""
+        return cls(coefficients, knots if len(knots) else None)
+
     @property
     def r(self) -> int:
         """Number of rows."""
         return int(self.coefficients.shape[1])
+
+    def arrays(self) -> tuple[np.ndarray, np.ndarray]:
+        """Coefficients and knots as they are saved: no knots where the rows are constant."""
+        return self.coefficients, np.empty(0) if self.knots is None else self.knots
 
     @property
     def selected(self) -> tuple[int, ...]:

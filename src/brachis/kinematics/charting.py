@@ -21,12 +21,14 @@ from brachis.robot import TaskMap
 
 _ENOUGH = 0.35
 """Least transversality of constant rows along the reference."""
+_APART = 1e-7
+"""Path coordinates of a reference differ by more."""
 _PLACES = (9, 17, 33, 65, 129)
 """Numbers of places through which rows that follow the null space are led, as few as are enough."""
 
 
 def chart_around(
-    task_map: TaskMap, path: Path, s: np.ndarray, reference: np.ndarray, rows: np.ndarray | None = None
+    task_map: TaskMap, path: Path, s: np.ndarray, reference: np.ndarray, rows: ChartRows | None = None
 ) -> ChartMap:
     """Lay a chart around a joint path.
 
@@ -35,11 +37,11 @@ def chart_around(
     task_map : TaskMap
     path : Path
     s : (S,) ndarray
-        Path coordinates, ascending from 0 to 1.
+        Path coordinates from 0 to 1; where they do not grow, the first one counts, and at 1 the last one.
     reference : (S, n) ndarray
         Postures there.
-    rows : (r, n) ndarray, optional
-        Constant rows of the chart's; chosen here if not given.
+    rows : ChartRows, optional
+        Chosen here if not given.
 
     Returns
     -------
@@ -50,8 +52,10 @@ def chart_around(
     UnreachableError
         The Jacobian loses rank along the joint path, so that no chart follows it.
     """
+    kept = _growing(s)
+    s, reference = s[kept], reference[kept]
     if rows is not None:
-        return ChartMap(task_map, path, ChartRows.constant(rows), s, reference)
+        return ChartMap(task_map, path, rows, s, reference)
     null = null_spaces(Newton(task_map).placed(reference)[1])
     r = null.shape[2]
     constant = np.linalg.eigh(np.einsum("kir,kjr->ij", null, null))[1][:, ::-1][:, :r].T
@@ -64,6 +68,14 @@ def chart_around(
         if transversality(chosen.at(s)[0], null).min() >= _ENOUGH:
             return ChartMap(task_map, path, chosen, s, reference)
     raise UnreachableError("the arm comes too near a singularity of its own for a chart")
+
+
+def _growing(s: np.ndarray) -> np.ndarray:
+    """Return where path coordinates (S,) have grown since the one before, and the first and the last place."""
+    furthest = np.maximum.accumulate(s)
+    grown = np.append(True, np.diff(furthest) > _APART) & (s < s[-1] - _APART)
+    grown[0] = grown[-1] = True
+    return np.flatnonzero(grown)
 
 
 def null_spaces(jacobian: np.ndarray) -> np.ndarray:

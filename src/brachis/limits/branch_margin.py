@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.kinematics import JointMap, JointState
-from brachis.limits.protocol import Bound, Label, Limit, Partials, Role
+from brachis.kinematics import JointMap
+from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials, Role
 
 MARGIN = 5e-3
 """Least branch margin, dimensionless. Nearer to the boundary the non-redundant joints outrun any collocation grid.
@@ -40,11 +40,11 @@ class BranchMargin(Limit):
         """See `Limit`."""
         return tuple(Bound(c, least, least, 1.0, "lower") for c, least in enumerate(self.lower.tolist()))
 
-    def values(self, motion: JointState) -> np.ndarray:  # type: ignore[override]  (safeguards are of the optimiser)
-        """See `Limit.values`."""
+    def values(self, motion: JointMotion) -> np.ndarray:
+        """See `Limit.values`; the motion is a state of the joint map."""
         return self._joint_map.margins(motion)
 
-    def partials(self, motion: JointState) -> Partials:  # type: ignore[override]
+    def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
         by_q, by_s = self._joint_map.margin_gradient(motion)
         return Partials(q=by_q, s=by_s)

@@ -1,9 +1,9 @@
 """Search for the fastest motion: joint paths from lattices, a portfolio over decompositions, branches and starts."""
 
-from brachis.search.portfolio import Stages, find_fastest
-from brachis.search.record import Record
 from brachis.search.chart_starts import first_map
+from brachis.search.portfolio import Stages, find_fastest
 from brachis.search.recentring import best_of_joints, solved_in_chart
+from brachis.search.record import Record
 from brachis.search.solving import MARGINS, Listener, continued, solve_with
 
 __all__ = [

@@ -70,9 +70,8 @@ def no_motion(
     PathError or PlanningError
     """
     joint_path = _some_joint_path(candidates)
-    reason = _advice(problem.task, candidates)
-    if decompositions and not joint_path:
-        reason = _reason(decompositions[0])
+    search = bool(decompositions) and not joint_path
+    reason = _reason(decompositions[0]) if search else _advice(problem.task, candidates)
     if isinstance(reason, BrachisError):
         return reason
     if dead_ends and not joint_path:
@@ -84,8 +83,7 @@ def no_motion(
         return PathError(
             f"no joint path was found: {furthest}{others}",
             s_interval=furthest.interval,
-            hint=f"{start}shorten or move the path, or widen the joint ranges".capitalize()
-            + _what_is_missing(problem),
+            hint=f"{start}shorten or move the path, or widen the joint ranges".capitalize() + _what_is_missing(problem),
         )
     counts = Counter(candidate.status for candidate in candidates)
     outcomes = "; ".join(status if n == 1 else f"{status} ({n} times)" for status, n in counts.items())

@@ -18,7 +18,7 @@ import numpy as np
 from brachis.deadline import NEVER, Deadline
 from brachis.kinematics import Newton, null_spaces
 from brachis.problem import Decomposition, Problem
-from brachis.robot.joint_space import TURN, difference
+from brachis.robot.joint_space import TURN
 from brachis.search.cells import Cells
 from brachis.search.joint_path import NO_ANSWER, beyond_ranges, causes_of
 from brachis.search.lattice import LARGEST_STEP, Lattice, shortest
@@ -26,7 +26,7 @@ from brachis.search.layer import Layer
 
 _CELLS_PER_METRE = 1.0 / 3.0  # of those of a turn
 _NEIGHBOURS = (-2, -1, 0, 1, 2)
-_STEPS, _RANDOM, _SPREAD = (1, 3), 6, 3.0
+_STEPS, _RANDOM, _SPREAD = (1.0, 4.0), 6, 2.5  # cells
 _COARSE, _SAME = 0.5, 1e-3  # rad or m
 _ALONG = 0.7
 """Least part of a step that is self-motion; postures across a fold of the manifold differ in other directions."""
@@ -114,79 +114,86 @@ class PostureLattice(Lattice):
         """Whole numbers, (K, n), by which postures are told apart at a spacing; turns that nobody asks for left out."""
         return np.rint(np.where(self._modulo, np.remainder(q, TURN), q) / size).astype(int)
 
-    def _offsets(self, rng: np.random.Generator) -> np.ndarray:
-        """Offsets, (O, r), to the cells at which postures of the next station are looked for."""
-        if self._r <= 1:
-            return np.array(_NEIGHBOURS)[:, None] if self._r else np.zeros((1, 0), dtype=int)
-        single = [sign * step * row for row in np.eye(self._r, dtype=int) for step in _STEPS for sign in (-1, 1)]
-        random = np.rint(rng.normal(0.0, _SPREAD, (_RANDOM, self._r))).astype(int)
-        return np.unique(np.vstack([np.zeros((1, self._r), dtype=int), single, random]), axis=0)
-
     def _next(self, before: Layer, station: int, rng: np.random.Generator) -> Layer | dict[str, int]:
         """See `Lattice`."""
         values, jacobian = self._newton.placed(before.q)
         null = null_spaces(jacobian)
         wanted = self.problem.task_map.difference(self._targets[station][None], values)
-        found = self._postures(before.q, jacobian, null, wanted, station, rng)
-        if self._to_end and station == len(self.s) - 1:
-            found = np.vstack([found, self.problem.end])
-        if not len(found):
-            return {NO_ANSWER: len(before.q)}
         needed = np.einsum("kij,kj->ki", np.linalg.pinv(jacobian), wanted)
-        step = np.where(self._modulo, difference(found[None], before.q[:, None], self._modulo), found - before.q[:, None])
-        near = np.all(np.abs(step) <= LARGEST_STEP, axis=2)
-        parent, child = np.nonzero(near)
-        step = step[parent, child]
+        if self._r <= 1:
+            parent, q = _pairs(len(before.q), self._at_cells(before.q, jacobian, null, wanted, station))
+        else:
+            parent, q = self._sampled(before.q, null, needed, station, rng)
+        if self._to_end and station == len(self.s) - 1:
+            own, end = _pairs(len(before.q), np.array([self.problem.end]))
+            parent, q = np.append(parent, own), np.vstack([q, end])
+        if not len(q):
+            return {NO_ANSWER: len(before.q)}
+        step = self._step(before.q[parent], q)
+        near = np.all(np.abs(step) <= LARGEST_STEP, axis=1)
         own = step - needed[parent]
-        along = np.linalg.norm(np.einsum("eir,ei->er", null[parent], own), axis=1)
-        small = np.all(np.abs(own) <= self._size, axis=1)
-        kept = small | (along >= _ALONG * np.linalg.norm(own, axis=1))
-        parent, child, step = parent[kept], child[kept], step[kept]
-        q = before.q[parent] + step
-        low, high = np.minimum(before.low[parent], q), np.maximum(before.high[parent], q)
+        near &= np.all(np.abs(own) <= self._size, axis=1) | (
+            np.linalg.norm(np.einsum("eir,ei->er", null[parent], own), axis=1) >= _ALONG * np.linalg.norm(own, axis=1)
+        )
+        low, high = (
+            bound(part[parent], before.q[parent] + step)
+            for bound, part in ((np.minimum, before.low), (np.maximum, before.high))
+        )
         inside = self._inside(low, high)
-        good = inside.all(axis=1)
+        good = near & inside.all(axis=1)
         if not good.any():
-            every = np.ones(max(len(parent), 1), dtype=bool)
-            inside = inside if len(parent) else np.ones((1, self._robot.n), dtype=bool)
-            return causes_of(self._robot, every, every, inside, every & bool(len(parent)))
-        parent, child, step = parent[good], child[good], step[good]
+            every = np.ones(len(q), dtype=bool)
+            return causes_of(self._robot, every, every, inside, near)
+        parent, step, q = parent[good], step[good], q[good]
         length = before.length[parent] + self._lengths(before.q, step, parent)
         nothing = np.zeros(len(parent), dtype=int)
-        layer = Layer(nothing[:, None], nothing, q[good], low[good], high[good], length, parent)
-        return self._kept(layer[shortest(length, child[:, None])])
+        layer = Layer(nothing[:, None], nothing, before.q[parent] + step, low[good], high[good], length, parent)
+        return self._kept(layer[shortest(length, self._key(q, _SAME))])
 
-    def _postures(
-        self,
-        q: np.ndarray,
-        jacobian: np.ndarray,
-        null: np.ndarray,
-        wanted: np.ndarray,
-        station: int,
-        rng: np.random.Generator,
+    def _step(self, before: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Return the steps, (E, n), from postures to others; modulo 2 pi where nobody asks for turns."""
+        step = q - before
+        return np.where(self._modulo, step - TURN * np.round(step / TURN), step)
+
+    def _at_cells(
+        self, q: np.ndarray, jacobian: np.ndarray, null: np.ndarray, wanted: np.ndarray, station: int
     ) -> np.ndarray:
         """Postures (C, n) at the cells around nodes with postures (K, n), on the way to the next station's target."""
         joints = _moving_most(null / self._size[:, None])
-        rows = np.eye(self._robot.n)[joints]
-        offsets = self._offsets(rng)
-        size = self._size[joints]
-        cells = np.rint(np.take_along_axis(q, joints, axis=1) / size).astype(int)[:, None] + offsets
+        rows, size = np.eye(self._robot.n)[joints], self._size[joints]
+        at = np.take_along_axis(q, joints, axis=1)
+        offsets = np.array(_NEIGHBOURS)[:, None] if self._r else np.zeros((1, 0), dtype=int)
+        cells = np.rint(at / size).astype(int)[:, None] + offsets
         levels = cells * size[:, None]
-        moved = levels - np.take_along_axis(q, joints, axis=1)[:, None]
+        moved = levels - at[:, None]
         right = np.concatenate([np.broadcast_to(wanted[:, None], (*moved.shape[:2], wanted.shape[1])), moved], axis=2)
-        begun = q[:, None] + np.linalg.solve(
-            np.concatenate([jacobian, rows], axis=1)[:, None], right[..., None]
-        )[..., 0]
+        augmented = np.concatenate([jacobian, rows], axis=1)
+        begun = q[:, None] + np.linalg.solve(augmented[:, None], right[..., None])[..., 0]
         which = np.repeat(np.arange(len(q)), len(offsets))
         begun, cells, levels = (part.reshape(len(which), -1) for part in (begun, cells, levels))
         keys = np.concatenate([joints[which], cells, self._key(begun, _COARSE)], axis=1)
-        far = np.tile(np.abs(offsets).sum(axis=1), len(q))
-        chosen = shortest(far.astype(float), keys)
-        targets = np.repeat(self._targets[station][None], len(chosen), axis=0)
-        found = self._newton.solve(targets, begun[chosen], rows[which[chosen]], levels[chosen])
-        chosen, found = chosen[np.isfinite(found).all(axis=1)], found[np.isfinite(found).all(axis=1)]
-        keys = np.concatenate([keys[chosen, : 2 * self._r], self._key(found, _SAME)], axis=1)
-        return np.asarray(found[np.unique(keys, axis=0, return_index=True)[1]])
+        chosen = shortest(np.tile(np.abs(offsets).sum(axis=1), len(q)).astype(float), keys)
+        found = self._met(begun[chosen], rows[which[chosen]], levels[chosen], station)
+        found = found[np.isfinite(found).all(axis=1)]
+        return np.asarray(found[np.unique(self._key(found, _SAME), axis=0, return_index=True)[1]])
+
+    def _sampled(
+        self, q: np.ndarray, null: np.ndarray, needed: np.ndarray, station: int, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes, (E,), and postures (E, n) around them: along each direction of self-motion, and at random."""
+        single = [sign * step * row for row in np.eye(self._r) for step in _STEPS for sign in (-1.0, 1.0)]
+        offsets = np.vstack([np.zeros((1, self._r)), single, rng.normal(0.0, _SPREAD, (_RANDOM, self._r))])
+        aside = np.einsum("kij,oj->koi", null, offsets) * self._size
+        parent = np.repeat(np.arange(len(q)), len(offsets))
+        begun = ((q + needed)[:, None] + aside).reshape(len(parent), -1)
+        rows = np.swapaxes(null, 1, 2)[parent]
+        found = self._met(begun, rows, _product(rows, begun), station)
+        exists = np.isfinite(found).all(axis=1)
+        return parent[exists], found[exists]
+
+    def _met(self, q: np.ndarray, rows: np.ndarray, levels: np.ndarray, station: int) -> np.ndarray:
+        """Postures (C, n) near given ones that meet a station's target; see `Newton.solve`."""
+        return self._newton.solve(np.repeat(self._targets[station][None], len(q), axis=0), q, rows, levels)
 
     def _kept(self, layer: Layer) -> Layer | dict[str, int]:
         """Keep nodes that can be held against gravity, not too many of them."""
@@ -201,6 +208,11 @@ def _layer(q: np.ndarray) -> Layer:
     """Nodes, (K, n), with which joint paths begin."""
     nothing = np.zeros(len(q), dtype=int)
     return Layer(nothing[:, None], nothing, q, q, q, np.zeros(len(q)), nothing)
+
+
+def _pairs(nodes: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Every node with every posture, (C, n): indices of nodes and postures, (E,) and (E, n)."""
+    return np.repeat(np.arange(nodes), len(q)), np.tile(q, (nodes, 1))
 
 
 def _product(rows: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ import itertools
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.kinematics import ChartMap, JointState, Newton, chart_around, null_spaces, transversality
+from brachis.kinematics import ChartMap, ChartRows, Newton, chart_around, null_spaces, transversality
 from brachis.nlp import Program
 from brachis.nlp.guess import fitted, shortest_time
 from brachis.problem import Problem, phase_in
@@ -30,8 +30,6 @@ _SELECTABLE = 0.05
 _SELECTED = 3
 """Choices of joints that are tried at most."""
 _DENSE = 4
-_APART = 1e-7
-"""Path coordinates of a reference differ by more."""
 
 Solved = tuple[Program, tuple[SolverReport, ...]]
 
@@ -92,7 +90,8 @@ def best_of_joints(problem: Problem, program: Program, report: SolverReport, sol
     reports : tuple of SolverReport
         Of the further solves, then `report` if it belongs to `program`, else the one that does.
     """
-    best, last, others = program, report, []
+    best, last = program, report
+    others: list[SolverReport] = []
     for rows in _selections(program, report.x):
         moved = moved_to(problem, program, report.x, rows)
         if moved is None:
@@ -105,7 +104,7 @@ def best_of_joints(problem: Problem, program: Program, report: SolverReport, sol
 
 
 def moved_to(
-    problem: Problem, program: Program, x: np.ndarray, rows: np.ndarray | None = None
+    problem: Problem, program: Program, x: np.ndarray, rows: ChartRows | None = None
 ) -> tuple[Program, np.ndarray] | None:
     """Write a motion in a chart around itself; None where there is none.
 
@@ -115,8 +114,8 @@ def moved_to(
     program : Program
         Of one phase.
     x : (v,) ndarray
-    rows : (r, n) ndarray, optional
-        Constant rows of the chart; see `chart_around`.
+    rows : ChartRows, optional
+        Of the chart; see `chart_around`.
 
     Returns
     -------
@@ -128,32 +127,22 @@ def moved_to(
     t_norm = np.linspace(0.0, 1.0, _DENSE * len(phase.t_norm) + 1)
     try:
         state = phase.joint_map.state(*motion.at(t_norm * motion.t_end), t=t_norm * motion.t_end)
-        chart = chart_of(problem, state, rows)
+        s = state.y[:, 0]
+        chart = chart_around(problem.task_map, problem.path, s, state.q, rows)
         other = Program([phase_in(problem, chart, phase.grid)])
-        fit = fitted(other.phases[0], motion.t_end, t_norm, chart.curves(state.y[:, 0], state.q))
+        fit = fitted(other.phases[0], motion.t_end, t_norm, chart.curves(s, state.q))
         return other, shortest_time(other, fit)
     except UnreachableError:
         return None
 
 
-def chart_of(problem: Problem, state: JointState, rows: np.ndarray | None = None) -> ChartMap:
-    """Lay a chart around the postures of a motion along the path; raises UnreachableError as `chart_around` does."""
-    s, q = np.clip(state.y[:, 0], 0.0, 1.0), state.q
-    ahead = np.append(True, np.diff(np.maximum.accumulate(s)) > _APART)
-    ahead[-1] = True
-    behind = np.flatnonzero(ahead[:-1])
-    ahead[behind[s[behind] > s[-1] - _APART]] = False  # the last posture is the one at the very end
-    ahead[0] = True
-    return chart_around(problem.task_map, problem.path, s[ahead], q[ahead], rows)
-
-
-def _transversal(program: Program, x: np.ndarray, rows: np.ndarray | None = None) -> float:
-    """Least transversality of rows, (r, n), or of the chart's own, along a motion."""
+def _transversal(program: Program, x: np.ndarray, rows: ChartRows | None = None) -> float:
+    """Least transversality of rows, or of the chart's own, along a motion."""
     (state,), (phase,) = program.states(x), program.phases
     chart = phase.joint_map
     assert isinstance(chart, ChartMap)  # noqa: S101
     null = null_spaces(Newton(chart.task_map).placed(state.q)[1])
-    return float(transversality(chart.rows.at(state.y[:, 0])[0] if rows is None else rows[None], null).min())
+    return float(transversality((rows or chart.rows).at(state.y[:, 0])[0], null).min())
 
 
 def _follows(program: Program, x: np.ndarray) -> bool:
@@ -161,10 +150,10 @@ def _follows(program: Program, x: np.ndarray) -> bool:
     return program.safeguard_slack(x) > HELD_BACK and _transversal(program, x) >= _TRANSVERSAL
 
 
-def _selections(program: Program, x: np.ndarray) -> list[np.ndarray]:
+def _selections(program: Program, x: np.ndarray) -> list[ChartRows]:
     """Rows that select joints and are transversal along the motion, the most transversal ones first."""
     (phase,) = program.phases
     n, r = phase.joint_map.robot.n, phase.joint_map.r
-    choices = [np.eye(n)[list(joints)] for joints in itertools.combinations(range(n), r)]
+    choices = [ChartRows.constant(np.eye(n)[list(joints)]) for joints in itertools.combinations(range(n), r)]
     ranked = sorted(((_transversal(program, x, rows), number) for number, rows in enumerate(choices)), reverse=True)
     return [choices[number] for least, number in ranked[:_SELECTED] if least >= _SELECTABLE]

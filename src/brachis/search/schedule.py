@@ -70,17 +70,27 @@ def batches(
     ------
     Batch
     """
-    task = problem.task
-    solvers = [solver.name for solver in solver_named(task.solver.name)]
-    charts = charts_allowed(problem, decompositions)
-    if charts:
+    solvers = [solver.name for solver in solver_named(problem.task.solver.name)]
+    levels = SEARCH_LEVELS[problem.task.search.effort]
+    if charts_allowed(problem, decompositions):
         yield from _in_charts(problem, decompositions, solvers, deadline, listener, note)
-    if not decompositions:
-        return
+        levels = tuple(dataclasses.replace(level, last_resort=True) for level in levels)
+    if decompositions:
+        yield from _in_closed_forms(decompositions, levels, solvers, deadline, listener, note)
+
+
+def _in_closed_forms(
+    decompositions: Sequence[Decomposition],
+    levels: Sequence[SearchLevel],
+    solvers: Sequence[str],
+    deadline: Deadline,
+    listener: Listener,
+    note: Note,
+) -> Iterator[Batch]:
+    """Yield batches of starts on the branches of closed forms."""
+    task = decompositions[0].problem.task
     known: list[Start] = []
-    for level in SEARCH_LEVELS[task.search.effort]:
-        if charts:
-            level = dataclasses.replace(level, last_resort=True)  # noqa: PLW2901
+    for level in levels:
         if level.last_resort:
             yield Batch((), 0, last_resort=True)  # the search may end here, before lattices are looked at
         allowed = looked_at(decompositions, level)

@@ -11,8 +11,8 @@ from brachis.deadline import NEVER, Deadline
 from brachis.kinematics import ClosedFormMap
 from brachis.nlp.differential_ik import differential_ik_paths
 from brachis.problem import Decomposition
-from brachis.search.joint_path import DeadEnd, JointPath
 from brachis.search.closed_form_lattice import ClosedFormLattice
+from brachis.search.joint_path import DeadEnd, JointPath
 from brachis.search.levels import SearchLevel
 from brachis.search.phase_plane import least_time
 

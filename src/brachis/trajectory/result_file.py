@@ -19,9 +19,11 @@ from brachis.robot import Robot, bind
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import Task, load_task
 
-SCHEMA = 1
-ARRAYS = ("times", "q", "qdot", "qddot", "qddot_before", "knots", "control_points")
+SCHEMA = 2
+ARRAYS = ("times", "q", "qdot", "qddot", "qddot_before", "knots", "control_points", "chart_rows", "chart_knots")
 """Names of the arrays in the file; as in `Trajectory`."""
+CHART_DEGREE = 5
+"""Of the splines of a chart's rows."""
 LARGEST = 64_000_000
 """Of a result file and of what it holds unpacked, bytes."""
 
@@ -151,8 +153,23 @@ def _content(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Content:
     if meta["redundant_joints"] != redundant:
         allowed = f"some of {', '.join(robot.joint_names)}, in this order"
         raise InputError("unknown joints", where="redundant_joints", found=meta["redundant_joints"], allowed=allowed)
-    _check_arrays(arrays, robot.n, len(redundant), meta["degree"])
+    r = _redundancy(arrays, robot.n, len(redundant))
+    _check_arrays(arrays, robot.n, r, meta["degree"])
     return Content(task, meta["urdf"], robot, tuple(redundant), meta["branch"], meta["degree"], arrays)
+
+
+def _redundancy(arrays: dict[str, np.ndarray], n: int, named: int) -> int:
+    """Degree of redundancy, after a check of the chart that says it where joints do not."""
+    rows, knots = arrays["chart_rows"], arrays["chart_knots"]
+    if not rows.size and not len(rows):
+        return named
+    count = 0 if len(rows) == 1 else len(rows) + CHART_DEGREE + 1
+    if rows.ndim != 3 or rows.shape[2] != n + 1 or knots.shape != (count,) or (np.diff(knots) < 0.0).any():  # noqa: PLR2004
+        allowed = f"rows (B, r, {n + 1}), and B + {CHART_DEGREE + 1} ascending knots where B is not 1"
+        raise InputError("no chart", where="chart_rows", found=f"{rows.shape}, knots {knots.shape}", allowed=allowed)
+    if named not in (0, rows.shape[1]):
+        raise InputError("other joints than the chart's", where="redundant_joints", found=named, allowed=rows.shape[1])
+    return int(rows.shape[1])
 
 
 def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) -> None:

@@ -33,7 +33,7 @@ class Trajectory:
 
     Joint positions are quintic polynomials between nodes, which meet the closed form to 1e-11 rad or m and join with
     continuous position, velocity and (from degree 3 on) acceleration. The path coordinate and the redundant joints are
-    also kept as the B-splines that the optimiser found.
+    also kept as the B-splines that the optimiser found; in a chart, its measure sigma of self-motion in their place.
 
     Attributes
     ----------
@@ -55,7 +55,12 @@ class Trajectory:
     degree : int
         B-spline degree d.
     control_points : (1 + r, N + d) ndarray
-        Of s (dimensionless), then of each redundant joint (rad or m) in chain order.
+        Of s (dimensionless), then of each redundant joint (rad or m) in chain order, or of the chart's sigma.
+    chart_rows : (B, r, n + 1) ndarray
+        Coefficients of the chart in which the motion was planned, see `brachis.kinematics.ChartRows`; B = 0 where a
+        closed form took its place.
+    chart_knots : ndarray
+        Knots of its splines; none where the rows are constant (B = 1).
     """
 
     task: Task
@@ -71,6 +76,8 @@ class Trajectory:
     knots: np.ndarray
     degree: int
     control_points: np.ndarray
+    chart_rows: np.ndarray
+    chart_knots: np.ndarray
 
     def __post_init__(self) -> None:
         """Take copies of the arrays that nobody can write to."""
@@ -105,7 +112,7 @@ class Trajectory:
 
     @cached_property
     def redundant_spline(self) -> BSpline:
-        """Positions of the r redundant joints as SciPy's B-spline over time in seconds, rad or m."""
+        """Positions of the r redundant joints, or sigma of the chart, as SciPy's B-spline over time in seconds."""
         from scipy.interpolate import BSpline  # noqa: PLC0415
 
         return BSpline(self.knots * self.t_end, self.control_points[1:].T, self.degree)
