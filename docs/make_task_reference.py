@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from pydantic import BaseModel
+from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from brachis.task import (
     FrictionSettings,
     LimitScale,
-    LimitSettings,
+    LimitSpec,
     RefinementSettings,
     RobotSettings,
     SearchSettings,
@@ -36,9 +37,9 @@ from brachis.task.segments import (
 
 PAGE = Path(__file__).parent / "task_files.md"
 
-PARTS: dict[str, type[BaseModel]] = {
+PARTS: dict[str, type] = {
     "robot": RobotSettings,
-    "robot.limits": LimitSettings,
+    "robot.limits": dataclass(LimitSpec),
     "robot.limits.scale": LimitScale,
     "robot.friction": FrictionSettings,
     "tool_limits": ToolLimits,
@@ -166,10 +167,10 @@ The file is read with the task, and becomes a `spline` with `through`, `orientat
 """
 
 
-def rows(model: type[BaseModel]) -> Iterator[str]:
+def rows(model: type) -> Iterator[str]:
     """Yield one line a key: name, default, description."""
     yield from TABLE_HEAD
-    for name, field in model.model_fields.items():
+    for name, field in model.__pydantic_fields__.items():
         yield _row(name, field)
 
 
@@ -181,7 +182,7 @@ def _default(field: FieldInfo) -> str:
     if field.is_required():
         return "required"
     value = field.get_default(call_default_factory=True)
-    if value is PydanticUndefined or isinstance(value, BaseModel):
+    if value is PydanticUndefined or isinstance(value, BaseModel | LimitSpec):
         return "see below"
     return "`null`" if value is None else f"`{list(value) if isinstance(value, tuple) else value}`"
 

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis import LimitSpec
 from brachis.errors import BrachisError, PathError, PlausibilityError, StartError, UrdfError
 from brachis.plausibility import of_end_time, of_robot
-from brachis.robot import LimitSpec, Robot
+from brachis.robot import Robot
 from brachis.robot.urdf import last_common_link, read_file
 from support.chains import Joint, chain_urdf
 

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from brachis.planner import transcribe as transcribe
     from brachis.plausibility import PlausibilityWarning as PlausibilityWarning
     from brachis.result import Result as Result
-    from brachis.robot import LimitSpec as LimitSpec
     from brachis.robot import Robot as Robot
     from brachis.robot import TaskMap as TaskMap
     from brachis.robot import task_map_of as task_map_of
+    from brachis.task import LimitSpec as LimitSpec
     from brachis.task import Task as Task
     from brachis.task import load_task as load_task
     from brachis.trajectory import Trajectory as Trajectory
@@ -38,7 +38,7 @@ _HOME = {
     "BrachisError": "brachis.errors",
     "Attempt": "brachis.attempt",
     "InputError": "brachis.errors",
-    "LimitSpec": "brachis.robot",
+    "LimitSpec": "brachis.task",
     "PlanningError": "brachis.errors",
     "PlausibilityWarning": "brachis.plausibility",
     "Result": "brachis.result",

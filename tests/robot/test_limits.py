@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.errors import InputError, LimitError, UnknownNameError
-from brachis.robot import FROM_URDF, LimitSpec, Robot
+from brachis import LimitSpec
+from brachis.errors import InputError, LimitError, TaskError, UnknownNameError
+from brachis.robot import Robot
+from brachis.robot.from_task import robot_from_settings
+from brachis.task import FROM_URDF
 from support.chains import Joint, chain_urdf, planar_robot
 
 INF = np.inf
@@ -31,6 +34,9 @@ def with_limit(**changes) -> Robot:
         (12.5, [12.5, 12.5, 12.5]),
         ([1.0, 2.0, 3.0], [1.0, 2.0, 3.0]),
         ((1.0, None, FROM_URDF), [1.0, INF, 60.0]),
+        (np.array([1.0, 2.0, 3.0]), [1.0, 2.0, 3.0]),
+        (np.float32(12.5), [12.5, 12.5, 12.5]),
+        ({"j2": np.int64(5)}, [80.0, 5.0, 60.0]),
         ({"j2": 5.0}, [80.0, 5.0, 60.0]),
         ({"j3": None, "j1": 7}, [7.0, 70.0, INF]),
         (None, [INF, INF, INF]),
@@ -65,6 +71,8 @@ def test_urdf_has_no_acceleration():
         (None, [-INF] * 3, [INF] * 3),
         ({"j1": [-1.0, 1.0], "j3": None}, [-1.0, -3.0, -INF], [1.0, 2.9, INF]),
         ([[-1.0, 1.0], None, FROM_URDF], [-1.0, -INF, -3.0], [1.0, INF, 2.9]),
+        (np.array([[-1.0, 1.0]] * 3), [-1.0] * 3, [1.0] * 3),
+        ({"j2": np.array([-1.0, 1.0])}, [-3.0, -1.0, -3.0], [2.9, 1.0, 2.9]),
     ],
     ids=str,
 )
@@ -104,10 +112,32 @@ def test_limit_of_the_task_that_is_not_positive(kind, value):
     assert f"{kind} limit in the task is not positive; found {value:g}" in str(caught.value)
 
 
-@pytest.mark.parametrize("factor", [0.0, -1.0, float("nan")])
+@pytest.mark.parametrize("value", ["ten", {"j1": "ten"}, {"j1": [1.0]}], ids=str)
+def test_limit_that_is_no_number(value):
+    with pytest.raises(LimitError, match="torque limit in the task is not a number") as caught:
+        limits_of(torque=value)
+    assert caught.value.key == "robot.limits.torque.j1"
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, float("nan"), "half"])
 def test_scale_that_is_not_positive(factor):
     with pytest.raises(InputError, match="scale"):
         limits_of(scale={"torque": factor})
+
+
+def test_what_a_program_says_of_limits_is_what_a_task_keeps():
+    given = {"torque": np.array([1.0, 2.0, 3.0]), "position": {"j1": np.array([-1.0, 1.0])}, "scale": {"velocity": 0.5}}
+    robot = planar_robot("RRR", limits=LimitSpec(**given))
+    assert robot.settings.limits == LimitSpec(**given | {"torque": {"j1": 1.0, "j2": 2.0, "j3": 3.0}})
+    again = robot_from_settings(robot.settings, urdf_text=robot.urdf)
+    assert again.settings.limits == robot.settings.limits
+    np.testing.assert_array_equal(again.limits.torque, robot.limits.torque)
+
+
+@pytest.mark.parametrize("wrong", [{"torque": True}, {"acceleration": np.inf}, {"scale": {"torque": True}}], ids=str)
+def test_what_a_task_could_not_keep_is_refused(wrong):
+    with pytest.raises(TaskError, match=f"limits.{next(iter(wrong))}"):
+        limits_of(**wrong)
 
 
 def test_unknown_scale():
@@ -154,7 +184,7 @@ def test_empty_range():
         with_limit(lower=1.0, upper=0.5)
 
 
-@pytest.mark.parametrize("value", [[-1.0, 1.0, 2.0], {"j1": 1.0}, {"j1": [1.0]}], ids=str)
+@pytest.mark.parametrize("value", [[-1.0, 1.0, 2.0], {"j1": 1.0}, {"j1": [1.0]}, {"j1": ["a", 1.0]}], ids=str)
 def test_range_of_a_wrong_shape(value):
     with pytest.raises(InputError, match="position"):
         limits_of(position=value)

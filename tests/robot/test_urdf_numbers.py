@@ -6,8 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from brachis import LimitSpec
 from brachis.errors import UrdfError
-from brachis.robot import LimitSpec, Robot
+from brachis.robot import Robot
 from brachis.robot.urdf_bodies import check_bodies, stated_bodies
 from brachis.robot.urdf_numbers import check_numbers
 from brachis.robot.urdf_tree import read_tree

@@ -8,8 +8,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from brachis import LimitSpec
 from brachis.errors import InputError, LimitError, UnknownNameError, UrdfError
-from brachis.robot import LimitSpec, Robot
+from brachis.robot import Robot
 from brachis.robot.urdf import last_common_link
 from support.chains import INERTIAL, Joint, chain_urdf, planar_robot, planar_urdf
 

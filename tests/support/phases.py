@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from brachis.nlp import Phase, Program
-from brachis.robot import FROM_URDF, LimitSpec
+from brachis.task import FROM_URDF, LimitSpec
 from support.chains import planar_robot, program_of
 from support.starts import starting_points
 

@@ -172,6 +172,20 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
         {"robot": {"urdff": "a"}},
         ["task: robot.urdff: unknown key", "allowed: urdf, tool_frame", "Did you mean 'urdf'?"],
     ),
+    ({"robot": {"limits": 10}}, ["task: robot.limits: wrong type; found 10; allowed: a mapping"]),
+    (
+        {"robot": {"limits": {"torqe": 1}}},
+        [
+            "task: robot.limits.torqe: unknown key",
+            "allowed: torque, velocity",
+            "position, scale",
+            "Did you mean 'torque'?",
+        ],
+    ),
+    (
+        {"robot": {"limits": {"scale": {"torqe": 1}}}},
+        ["robot.limits.scale.torqe: unknown key", "allowed: torque, velocity, acceleration", "Did you mean 'torque'?"],
+    ),
     ({"robot": {"limits": {"torque": "10"}}}, ["robot.limits.torque: ", "found '10' (a string)", "a number > 0"]),
     ({"robot": {"limits": {"torque": True}}}, ["robot.limits.torque: ", "found true (a boolean)"]),
     ({"robot": {"limits": {"torque": 0}}}, ["robot.limits.torque: out of range; found 0; allowed: > 0"]),

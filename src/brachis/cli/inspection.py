@@ -16,10 +16,11 @@ from brachis import ik
 from brachis.cli.output import print_json, result_console
 from brachis.errors import InputError
 from brachis.plausibility import of_robot
-from brachis.robot import LimitSpec, Robot, bind
+from brachis.robot import Robot, bind
 from brachis.robot.limits import UrdfLimit
 from brachis.robot.task_map.rows import AXES, POSE_ROWS, YAW
 from brachis.robot.urdf import last_common_link, read_file
+from brachis.task import LimitSpec
 
 _PARALLEL = 1e-9
 _LISTED = 12

@@ -12,11 +12,11 @@ import numpy as np
 from brachis.errors import InputError, TaskError
 from brachis.robot.free_roll import with_free_roll
 from brachis.robot.friction import Friction
-from brachis.robot.from_task import limit_spec, robot_from_settings
+from brachis.robot.from_task import robot_from_settings
 from brachis.robot.limits import MAGNITUDES, Limits, per_joint_values, resolve_limits
 from brachis.robot.robot import ROLL_JOINT, Robot
 from brachis.robot.urdf import read_chain
-from brachis.task import FrictionSettings, LimitSettings, RobotSettings
+from brachis.task import FrictionSettings, LimitSpec, RobotSettings
 from brachis.task.fields import Model
 
 _FRAMES = ("tool_frame", "base_frame", "locked_joints")
@@ -69,8 +69,7 @@ def _stated(robot: Robot) -> RobotSettings:
     names = _own_joints(robot)
     n = len(names)
     changes: dict[str, object] = {}
-    spec = limit_spec(settings.limits)
-    if not _same(resolve_limits(spec, names, robot.stated_limits[:n]), robot.limits, n):
+    if not _same(resolve_limits(settings.limits, names, robot.stated_limits[:n]), robot.limits, n):
         changes["limits"] = _limits(robot.limits, names)
     if not _same(Friction.of(names, **settings.friction.model_dump()), robot.friction, n):
         changes["friction"] = _friction(robot.friction, names)
@@ -92,15 +91,15 @@ def _same(first: Limits | Friction, second: Limits | Friction, n: int) -> bool:
     )
 
 
-def _limits(limits: Limits, names: Sequence[str]) -> LimitSettings:
+def _limits(limits: Limits, names: Sequence[str]) -> LimitSpec:
     """Spell limits out joint by joint."""
 
     def finite(values: np.ndarray) -> list[float | None]:
         return [float(value) if np.isfinite(value) else None for value in values[: len(names)]]
 
     ranges = zip(finite(limits.position_lower), finite(limits.position_upper), strict=True)
-    magnitudes = {kind: dict(zip(names, finite(getattr(limits, kind)), strict=True)) for kind in MAGNITUDES}
-    return LimitSettings.model_validate({"position": dict(zip(names, ranges, strict=True)), **magnitudes})
+    spelled: dict[str, Any] = {kind: finite(getattr(limits, kind)) for kind in MAGNITUDES} | {"position": ranges}
+    return LimitSpec(**{kind: dict(zip(names, values, strict=True)) for kind, values in spelled.items()})
 
 
 def _friction(friction: Friction, names: Sequence[str]) -> FrictionSettings:
@@ -141,12 +140,13 @@ def _merged(key: str, given: Any, asked: Any, default: Any, names: Sequence[str]
     """
     if asked == given:
         return given
-    if isinstance(given, Model):
+    if isinstance(given, Model | LimitSpec):
+        written = asked.model_fields_set if isinstance(asked, Model) else [each.name for each in fields(asked)]
         parts = {
             name: _merged(f"{key}.{name}", getattr(given, name), getattr(asked, name), getattr(default, name), names)
-            for name in asked.model_fields_set
+            for name in written
         }
-        return given.model_copy(update=parts)
+        return given.model_copy(update=parts) if isinstance(given, Model) else replace(given, **parts)
     if given == default:
         return asked
     own, other = given, asked

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import os
-from dataclasses import fields
 
 from brachis.errors import TaskError
-from brachis.robot.limits import LimitSpec
 from brachis.robot.robot import Robot
-from brachis.task import LimitSettings, RobotSettings
+from brachis.task import RobotSettings
 
 
 def robot_from_settings(
@@ -42,12 +40,6 @@ def robot_from_settings(
         base_frame=settings.base_frame,
         gravity=settings.gravity,
         locked_joints=settings.locked_joints,
-        limits=limit_spec(settings.limits),
+        limits=settings.limits,
         friction=settings.friction.model_dump(),
     )
-
-
-def limit_spec(limits: LimitSettings) -> LimitSpec:
-    """Return the limits of a task as `Robot.from_urdf` takes them."""
-    given = {field.name: getattr(limits, field.name) for field in fields(LimitSpec)}
-    return LimitSpec(**given | {"scale": limits.scale.model_dump()})

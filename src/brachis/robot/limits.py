@@ -3,42 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
+from typing import TypeGuard
 
 import numpy as np
 
 from brachis.arrays import freeze
 from brachis.errors import InputError, LimitError, UnknownNameError
+from brachis.task import FROM_URDF, LimitScale, LimitSpec
 
-FROM_URDF = "urdf"
-"""Marks a limit that is taken from the URDF (the default of every `LimitSpec` entry)."""
 LEAST, LARGEST = 1e-6, 1e12
 """No drive has a smaller or larger torque, velocity or acceleration limit, in SI units; products and squares of such
 figures are still numbers."""
 FARTHEST = 1e6
 """No position is farther from zero, rad or m: there the rounding of numbers is a tenth of a nanometre."""
 _NARROWEST = 1e-9
-
-PerJoint = float | Sequence[float | None] | Mapping[str, float | None] | None | str
-Range = Sequence[float | None] | None
-PerJointRange = Sequence[Range] | Mapping[str, Range] | None | str
-
-
-@dataclass(frozen=True)
-class LimitSpec:
-    """What the user says about limits; the URDF fills the rest.
-
-    Each entry is ``FROM_URDF``, None (not limited), one number for all joints, a list in chain order, or a mapping
-    from joint name to number or None. A URDF has no acceleration limits. Units: torque Nm or N, velocity rad/s or m/s,
-    acceleration rad/s^2 or m/s^2, position rad or m. ``scale`` multiplies torque, velocity and acceleration limits
-    after all else.
-    """
-
-    torque: PerJoint = FROM_URDF
-    velocity: PerJoint = FROM_URDF
-    acceleration: PerJoint = None
-    position: PerJointRange = FROM_URDF
-    scale: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -134,19 +113,23 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
     return Limits(position_lower=lower, position_upper=upper, **scaled)
 
 
-def _check_scale(scale: Mapping[str, float]) -> None:
-    for kind, factor in scale.items():
+def _check_scale(scale: LimitScale) -> None:
+    for kind, factor in vars(scale).items():
         if kind not in MAGNITUDES:
             raise UnknownNameError("limit to scale", kind, MAGNITUDES, where="robot.limits.scale")
-        if not (np.isfinite(factor) and factor > 0.0):
+        if not (_is_number(factor) and 0.0 < factor < np.inf):
             raise InputError(
                 "is not a factor", where=f"robot.limits.scale.{kind}", found=factor, allowed="a finite number > 0"
             )
 
 
-def _scaled(kind: str, limits: np.ndarray, scale: Mapping[str, float], names: Sequence[str]) -> np.ndarray:
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float)
+
+
+def _scaled(kind: str, limits: np.ndarray, scale: LimitScale, names: Sequence[str]) -> np.ndarray:
     """Multiply limits, (n,), by their factor."""
-    factor = scale.get(kind, 1.0)
+    factor = getattr(scale, kind)
     for name, limit in zip(names, limits, strict=True):
         if np.isfinite(limit):
             _check_size(kind, float(limit) * factor, name, f"robot.limits.scale.{kind}", "scaled ")
@@ -192,7 +175,7 @@ def per_joint_values(key: str, value: object, names: Sequence[str], missing: obj
     return [value] * len(names)
 
 
-def _per_joint(kind: str, value: PerJoint, names: list[str], urdf: Sequence[float | None]) -> np.ndarray:
+def _per_joint(kind: str, value: object, names: list[str], urdf: Sequence[float | None]) -> np.ndarray:
     """Spread one kind of limit over the joints; inf where not limited."""
     key = f"robot.limits.{kind}"
     listed = per_joint_values(key, value, names, FROM_URDF)
@@ -201,23 +184,22 @@ def _per_joint(kind: str, value: PerJoint, names: list[str], urdf: Sequence[floa
         chosen = stated if entry == FROM_URDF else entry
         if chosen is None:
             continue
-        number = float(chosen)  # type: ignore[arg-type]
-        if not number > 0.0:
+        if not (_is_number(chosen) and chosen > 0.0):
             where = "the URDF" if entry == FROM_URDF else "the task"
             raise LimitError(
-                f"{kind} limit in {where} is not positive",
+                f"{kind} limit in {where} is not {'positive' if _is_number(chosen) else 'a number'}",
                 joint=name,
                 key=f"{key}.{name}",
-                found=f"{number:g}",
+                found=f"{chosen:g}" if _is_number(chosen) else repr(chosen),
                 allowed="a number > 0, or null for no limit",
             )
-        if np.isfinite(number):
-            _check_size(kind, number, name, f"{key}.{name}", "")
-        limit[i] = number
+        if np.isfinite(chosen):
+            _check_size(kind, chosen, name, f"{key}.{name}", "")
+        limit[i] = chosen
     return limit
 
 
-def _ranges(value: PerJointRange, names: list[str], urdf: Sequence[UrdfLimit]) -> tuple[np.ndarray, np.ndarray]:
+def _ranges(value: object, names: list[str], urdf: Sequence[UrdfLimit]) -> tuple[np.ndarray, np.ndarray]:
     """Spread the position ranges over the joints; infinite where not limited."""
     listed = per_joint_values("robot.limits.position", value, names, FROM_URDF)
     lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
@@ -232,13 +214,13 @@ def _ranges(value: PerJointRange, names: list[str], urdf: Sequence[UrdfLimit]) -
             )
         if chosen is None:
             continue
-        ends = chosen if isinstance(chosen, Sequence) else ()
-        if len(ends) != 2:  # noqa: PLR2004
+        ends = list(chosen) if isinstance(chosen, Sequence) else []
+        if len(ends) != 2 or not all(end is None or _is_number(end) for end in ends):  # noqa: PLR2004
             raise LimitError(
                 "position range is not a pair",
                 joint=name,
                 key=f"robot.limits.position.{name}",
-                found=chosen,
+                found=ends or chosen,
                 allowed="[lower, upper]",
             )
         lower[i] = -np.inf if ends[0] is None else float(ends[0])

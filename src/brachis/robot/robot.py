@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -14,19 +15,15 @@ from brachis.errors import InputError, UrdfError
 from brachis.robot.friction import Friction
 from brachis.robot.limits import (
     FARTHEST,
-    FROM_URDF,
     LARGEST,
-    MAGNITUDES,
-    STATED,
     Limits,
-    LimitSpec,
     UrdfLimit,
     per_joint_values,
     resolve_limits,
 )
 from brachis.robot.urdf import read_chain, read_file
 from brachis.robot.urdf_bodies import check_bodies
-from brachis.task import RobotSettings, check_robot_settings
+from brachis.task import FROM_URDF, LimitSpec, RobotSettings, check_robot_settings
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 ROLL_JOINT = "tool_roll"
@@ -238,6 +235,9 @@ def _settings(
     friction: Mapping[str, object] | None,
 ) -> RobotSettings:
     """Keep the arguments as the ``robot`` part of a task."""
+    by_name: dict[str, Any] = {
+        each.name: _by_name(getattr(limits, each.name), names, each.default) for each in fields(limits)
+    }
     return check_robot_settings(
         {
             "urdf": str(Path(path).absolute()),
@@ -245,14 +245,7 @@ def _settings(
             "base_frame": base_frame,
             "gravity": gravity,
             "locked_joints": dict(locked_joints or {}),
-            "limits": {
-                **{
-                    kind: _by_name(getattr(limits, kind), names, FROM_URDF if kind in STATED else None)
-                    for kind in MAGNITUDES
-                },
-                "position": _by_name(limits.position, names, FROM_URDF),
-                "scale": dict(limits.scale),
-            },
+            "limits": replace(limits, **by_name),
             "friction": dict(friction or {}),
         }
     )
@@ -260,7 +253,7 @@ def _settings(
 
 def _by_name(value: object, names: Sequence[str], absent: object) -> object:
     """Return a limit that is given joint by joint as a mapping, without the joints that take the URDF's."""
-    if value is None or isinstance(value, (str, float, int)):
+    if not isinstance(value, tuple | dict):
         return value
     listed = per_joint_values("limits", value, names, FROM_URDF)
     kept = {name: entry for name, entry in zip(names, listed, strict=True) if not isinstance(entry, str)}

@@ -23,7 +23,7 @@ from brachis.task.orientation import (
     ToRotationVector,
     TurnTo,
 )
-from brachis.task.robot_models import FROM_URDF, FrictionSettings, LimitScale, LimitSettings, RobotSettings
+from brachis.task.robot_models import FROM_URDF, FrictionSettings, LimitScale, LimitSpec, RobotSettings
 from brachis.task.schema import json_schema
 from brachis.task.segments import (
     ArcCenter,
@@ -60,7 +60,7 @@ __all__ = [
     "CsvSegment",
     "FrictionSettings",
     "LimitScale",
-    "LimitSettings",
+    "LimitSpec",
     "LineBy",
     "LineHeading",
     "LineSegment",

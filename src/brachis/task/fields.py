@@ -7,6 +7,7 @@ written ``<like this>`` because they appear in pydantic's error locations; `brac
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from typing import Annotated
 
@@ -27,7 +28,8 @@ LARGEST = 1e12
 class Model(BaseModel):
     """Base class of all parts of a task: frozen, without unknown keys, without NaN or infinity."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    # Instances are checked again, because a program can make limits that nobody has checked.
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, revalidate_instances="always")
 
 
 # Strict: the string "3" or the boolean true where a number belongs is a slip of the user's, not a number. Whole numbers
@@ -39,6 +41,18 @@ Count = Annotated[int, Strict()]
 Flag = Annotated[bool, Strict()]
 Name = Annotated[str, Strict(), Field(min_length=1)]
 Vector = Annotated[tuple[Number, ...], Field(min_length=1)]
+
+
+def plain(value: object, sequence: type[list[object] | tuple[object, ...]] = list) -> object:
+    """Return `value` with arrays and sequences as `sequence`, array scalars as numbers, and path objects as strings."""
+    # An array is known by its method and not by its class: this stage has no need for NumPy.
+    to_list = getattr(value, "tolist", None)
+    value = to_list() if callable(to_list) else value
+    if isinstance(value, Mapping):
+        return {key: plain(one, sequence) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return sequence(plain(one, sequence) for one in value)
+    return os.fspath(value) if isinstance(value, os.PathLike) else value
 
 
 def refuse(

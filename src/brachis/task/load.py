@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from brachis.errors import TaskError
 from brachis.task.csv_path import expand_csv_files
+from brachis.task.fields import plain
 from brachis.task.messages import show, task_error
 from brachis.task.models import Task
 from brachis.task.robot_models import RobotSettings
@@ -80,7 +81,7 @@ def check_robot_settings(content: Mapping[str, object]) -> RobotSettings:
         The mapping is wrong.
     """
     try:
-        return RobotSettings.model_validate(_plain(content))
+        return RobotSettings.model_validate(plain(content))
     except ValidationError as error:
         raise task_error(error, "robot", RobotSettings) from None
 
@@ -90,7 +91,7 @@ def _task_from(content: object, source: str, folder: Path) -> Task:
         problem = "a task is a mapping"
         raise TaskError(problem, found=show(content), allowed=", ".join(Task.model_fields), where=source)
     try:
-        task = Task.model_validate(_plain(content))
+        task = Task.model_validate(plain(content))
     except ValidationError as error:
         raise task_error(error, source, Task) from None
     except RecursionError:
@@ -102,16 +103,3 @@ def _task_from(content: object, source: str, folder: Path) -> Task:
     # Not Path.resolve: a linked folder keeps its name, beside which the URDF's meshes may be.
     urdf = os.path.abspath(folder / task.robot.urdf)  # noqa: PTH100
     return task.model_copy(update={"robot": task.robot.model_copy(update={"urdf": urdf})})
-
-
-def _plain(value: object) -> object:
-    """Return `value` with arrays as lists, array scalars as numbers, and path objects as strings."""
-    if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    # By its method and not by its class: this stage has no need for NumPy.
-    to_list = getattr(value, "tolist", None)
-    return to_list() if callable(to_list) else value

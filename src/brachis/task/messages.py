@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any, Final, get_args
+from dataclasses import dataclass, is_dataclass
+from typing import Any, Final, get_args, get_type_hints
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -89,24 +89,31 @@ def _dotted(location: tuple[str | int, ...]) -> str:
     return text.removeprefix(".")
 
 
-def _models_in(annotation: object) -> Iterator[type[Model]]:
-    if isinstance(annotation, type) and issubclass(annotation, Model):
+def _models_in(annotation: object) -> Iterator[type]:
+    if isinstance(annotation, type) and (issubclass(annotation, Model) or is_dataclass(annotation)):
         yield annotation
     for part in get_args(annotation):
         yield from _models_in(part)
 
 
+def _fields_of(model: type) -> Mapping[str, object]:
+    """Return the names of a model's fields, or of a dataclass's, and what they are annotated with."""
+    if issubclass(model, Model):
+        return {name: field.annotation for name, field in model.model_fields.items()}
+    return get_type_hints(model)
+
+
 def _keys_at(location: tuple[str | int, ...], model: type[Model]) -> list[str]:
     """Return the keys that are allowed at a location: the fields of the models that the way there leads to."""
-    models = [model]
+    models: list[type] = [model]
     for part in location:
         if _is_tag(part):
             chosen = [one for one in models if f"<{one.__name__}>" == part]
             models = chosen or models
         elif isinstance(part, str):
-            fields = [one.model_fields[part].annotation for one in models if part in one.model_fields]
+            fields = [_fields_of(one).get(part) for one in models]
             models = [found for annotation in fields for found in _models_in(annotation)]
-    return [name for one in models for name in one.model_fields]
+    return [name for one in models for name in _fields_of(one)]
 
 
 def _is_echo(detail: ErrorDetails) -> bool:
@@ -169,6 +176,7 @@ _DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Complaint]
     WRONG_KEYS: _wrong_keys,
     "missing": _missing,
     "extra_forbidden": _unknown,
+    "unexpected_keyword_argument": _unknown,
     "float_type": _plain("wrong type", "a number"),
     "int_type": _plain("wrong type", "a whole number"),
     "bool_type": _plain("wrong type", "true or false"),
@@ -176,6 +184,7 @@ _DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Complaint]
     "tuple_type": _plain("wrong type", "a list"),
     "dict_type": _plain("wrong type", "a mapping"),
     "model_type": _plain("wrong type", "a mapping"),
+    "dataclass_type": _plain("wrong type", "a mapping"),
     "none_required": _plain("wrong type", "null"),
     "finite_number": _plain("not a finite number", "a finite number"),
     "greater_than": _plain("out of range", "> {gt:g}"),

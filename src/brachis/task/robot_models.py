@@ -10,14 +10,24 @@ joint that a mapping leaves out keeps the limit of the URDF. A URDF has no ``acc
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Any, Final, Literal, Protocol
 
 from pydantic import AfterValidator, Field, Tag
 
-from brachis.task.fields import Model, Name, NonNegative, Number, Positive, by_form, refuse
+from brachis.task.fields import Model, Name, NonNegative, Number, Positive, by_form, plain, refuse
 
 FROM_URDF: Final = "urdf"
 """The value of a limit whose key is absent: the URDF supplies it."""
+
+
+class Array(Protocol):
+    """What a NumPy array or scalar is to this stage, which does not import NumPy."""
+
+    def tolist(self) -> Any:  # noqa: ANN401
+        """Return plain numbers."""
+
 
 _LIMIT_FORMS = (
     "a number > 0 for all joints, a list of numbers > 0, a mapping of joint name to number > 0 or null, null (no limit)"
@@ -69,6 +79,11 @@ JointValues = Annotated[
     by_form("a list of numbers in the order of the chain, or a mapping of joint name to number"),
 ]
 
+# What a program may give: NumPy arrays stand for lists and numbers too.
+StatedLimit = float | Array | Sequence[float | None] | Mapping[str, float | None] | str | None
+_StatedPair = Array | Sequence[float | None] | None
+StatedRange = Array | Sequence[_StatedPair] | Mapping[str, _StatedPair] | str | None
+
 
 class LimitScale(Model):
     """Factors on the limits, to keep a distance from them."""
@@ -78,20 +93,51 @@ class LimitScale(Model):
     acceleration: Positive = Field(default=1.0, description="Factor on all acceleration limits.")
 
 
-class LimitSettings(Model):
+@dataclass(frozen=True, init=False)
+class LimitSpec:
     """Joint limits: an absent key takes the URDF's, null removes the limit (see the module's documentation)."""
 
-    torque: UrdfLimit = Field(
-        default=FROM_URDF, description="Largest torque, N m (force, N). Absent: URDF. Null: none."
+    torque: Annotated[UrdfLimit, Field(description="Largest torque, N m (force, N). Absent: URDF. Null: none.")] = (
+        FROM_URDF
     )
-    velocity: UrdfLimit = Field(default=FROM_URDF, description="Largest speed, rad/s (m/s). Absent: URDF. Null: none.")
-    acceleration: OwnLimit = Field(
-        default=None, description="Largest acceleration, rad/s^2 (m/s^2). Absent or null: none."
+    velocity: Annotated[UrdfLimit, Field(description="Largest speed, rad/s (m/s). Absent: URDF. Null: none.")] = (
+        FROM_URDF
     )
-    position: PositionLimit = Field(
-        default=FROM_URDF, description="[low, high], rad (m); null for an open end. Absent: URDF. Null: none."
-    )
-    scale: LimitScale = Field(default_factory=LimitScale, description="Factors on the limits.")
+    acceleration: Annotated[
+        OwnLimit, Field(description="Largest acceleration, rad/s^2 (m/s^2). Absent or null: none.")
+    ] = None
+    position: Annotated[
+        PositionLimit, Field(description="[low, high], rad (m); null for an open end. Absent: URDF. Null: none.")
+    ] = FROM_URDF
+    scale: Annotated[LimitScale, Field(description="Factors on the limits.")] = field(default_factory=LimitScale)
+
+    __pydantic_config__ = Model.model_config
+
+    def __init__(
+        self,
+        torque: StatedLimit = FROM_URDF,
+        velocity: StatedLimit = FROM_URDF,
+        acceleration: StatedLimit = None,
+        position: StatedRange = FROM_URDF,
+        scale: Mapping[str, float] | LimitScale | None = None,
+    ) -> None:
+        """Take limits from a program; they are checked when a robot is made with them, where its joints are known.
+
+        Parameters
+        ----------
+        torque, velocity, acceleration : float, sequence, array, mapping or None, optional
+            Nm or N; rad/s or m/s; rad/s^2 or m/s^2. One number for all joints, one for each in chain order, or numbers
+            by joint name; None, also for a single joint: not limited; `FROM_URDF`: as in the URDF.
+        position : sequence, array, mapping or None, optional
+            Pairs [lower, upper], rad or m, likewise; an end that is None is open.
+        scale : mapping or LimitScale, optional
+            Factors on torque, velocity and acceleration limits, applied after all else.
+        """
+        if not isinstance(scale, LimitScale):
+            scale = LimitScale().model_copy(update={kind: plain(factor) for kind, factor in (scale or {}).items()})
+        stated = (torque, velocity, acceleration, position, scale)
+        for each, value in zip(fields(self), stated, strict=True):
+            object.__setattr__(self, each.name, plain(value, tuple))
 
 
 class FrictionSettings(Model):
@@ -117,5 +163,5 @@ class RobotSettings(Model):
         default=(0.0, 0.0, -9.81), description="Gravity, m/s^2, world frame."
     )
     locked_joints: dict[Name, Number] = Field(default={}, description="Joints that stay at a value, rad (m), by name.")
-    limits: LimitSettings = Field(default_factory=LimitSettings, description="Joint limits.")
+    limits: LimitSpec = Field(default_factory=LimitSpec, description="Joint limits.")
     friction: FrictionSettings = Field(default_factory=FrictionSettings, description="Drive inertia and friction.")
