@@ -177,6 +177,19 @@ def known_joint_path(task: Mapping[str, object], task_map: TaskMap, wish: np.nda
     return followed(task_map, targets, wish)
 
 
+def corrected(task_map: TaskMap, q: np.ndarray, target: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, bool]:
+    """Move from a posture, (n,), to a target nearby, (c,), a little towards `wanted`, (n,); tell whether it is met."""
+    for correction in range(8):
+        miss = task_map.difference(target, task_map.value(q))
+        if correction and np.abs(miss).max() < EXACT:
+            return q, True
+        jacobian = task_map.jacobian(task_map.twists(q[None]))[0]
+        inverse = jacobian.T @ np.linalg.inv(jacobian @ jacobian.T + 1e-8 * np.eye(len(miss)))
+        pull = 0.1 * (wanted - q) if correction == 0 else np.zeros_like(q)
+        q = q + inverse @ (miss - jacobian @ pull) + pull
+    return q, False
+
+
 def followed(task_map: TaskMap, targets: np.ndarray, wish: np.ndarray) -> np.ndarray | None:
     """Follow targets, (K, c), from the first posture of `wish`, (K, n), as near to it as they allow.
 
@@ -191,15 +204,8 @@ def followed(task_map: TaskMap, targets: np.ndarray, wish: np.ndarray) -> np.nda
     joint_path = []
     for target, wanted in zip(targets, wish, strict=True):
         before = q
-        for correction in range(8):
-            miss = task_map.difference(target, task_map.value(q))
-            if correction and np.abs(miss).max() < EXACT:
-                break
-            jacobian = task_map.jacobian(task_map.twists(q[None]))[0]
-            inverse = jacobian.T @ np.linalg.inv(jacobian @ jacobian.T + 1e-8 * np.eye(len(miss)))
-            pull = 0.1 * (wanted - q) if correction == 0 else np.zeros_like(q)
-            q = q + inverse @ (miss - jacobian @ pull) + pull
-        else:
+        q, met = corrected(task_map, q, target, wanted)
+        if not met:
             return None
         inside = np.all((q >= limits.position_lower + clear) & (q <= limits.position_upper - clear))
         if not inside or np.abs(q - before).max() > FASTEST:
