@@ -44,12 +44,13 @@ def planned(case: mixed_cases.Case, time_limit: float | None) -> dict[str, objec
     if time_limit is not None:
         task = task.model_copy(update={"search": task.search.model_copy(update={"time_limit": time_limit})})
     began, busy = time.perf_counter(), sum(os.times()[:4])
-    t_end, message = None, ""
+    t_end, message, search = None, "", {}
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PlausibilityWarning)  # limits are scaled at will
             result = plan(None, task)
         t_end = result.t_end
+        search = {"attempts": len(result.candidates), "interrupted": result.interrupted}
         failed = [check.name for check in result.verification.checks if not check.passed]
         message = f"unverified: {', '.join(failed)}" if failed else ""
     except BrachisError as error:
@@ -66,6 +67,7 @@ def planned(case: mixed_cases.Case, time_limit: float | None) -> dict[str, objec
         "t_end": t_end,
         "seconds": round(seconds, 3),
         "cpu": round(cpu, 3),
+        **search,
         "message": message,
     }
 
@@ -90,7 +92,7 @@ def compare(before: list[dict[str, object]], after: list[dict[str, object]]) -> 
         old = known.get(result["task"])
         if old is None:
             continue
-        times.append(result["cpu"] / max(old["cpu"], 1e-3))
+        times.append([result[clock] / max(old[clock], 1e-3) for clock in ("seconds", "cpu")])
         if old["verified"] and result["verified"]:
             ends.append((result["t_end"] / old["t_end"], result["task"]))
         elif old["verified"] != result["verified"]:
@@ -99,7 +101,8 @@ def compare(before: list[dict[str, object]], after: list[dict[str, object]]) -> 
         if abs(ratio - 1.0) > 1e-3:
             print(f"  {name}: t_end times {ratio:.4f}")
     if times:
-        print(f"compared: {len(times)} tasks; processor time times {np.exp(np.mean(np.log(times))):.3f} on average")
+        wall, busy = np.exp(np.mean(np.log(times), axis=0))
+        print(f"compared: {len(times)} tasks; plan times times {wall:.3f} on average, processor times {busy:.3f}")
     if ends:
         ratios = np.array([ratio for ratio, _ in ends])
         print(
