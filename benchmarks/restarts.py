@@ -88,7 +88,7 @@ def main() -> None:
     if found:
         best, restart, x = min(found, key=lambda each: each[0])
         beyond, off = program.in_between(x)
-        print(f"best of all joints: {best:.4f} s (restart {restart}); limits +{beyond:.1e}, path {off:.1e} in between")
+        print(f"best of all joints: {best:.4f} s (restart {restart}); limits {beyond:+.1e}, path {off:.1e} in between")
     began = time.perf_counter()
     try:
         result = plan(None, task)
