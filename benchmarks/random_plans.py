@@ -222,7 +222,7 @@ def _spread(value: object, names: list[str], missing: object) -> np.ndarray:
 
 def urdf_of(name: str) -> Path:
     """URDF of a robot."""
-    return random_poses.panda_urdf() if name == "panda" else ROOT / f"robots/{name}/robot.urdf"
+    return random_poses.stored_urdf(random_poses.PANDA) if name == "panda" else ROOT / f"robots/{name}/robot.urdf"
 
 
 def random_task(name: str, seed: int, number: int, folder: Path, time_limit: float = 15.0) -> dict[str, object]:

@@ -24,15 +24,16 @@ from brachis import BrachisError, Robot, ik, plan
 from brachis.robot import dynamics, task_map_of
 
 ROOT = Path(__file__).parents[1]
+PANDA = "panda_description/urdf/panda.urdf"
 REACH = 0.5  # rad and m
 STEPS = 200
 DAMPING = 1e-4
 
 
-def panda_urdf() -> Path:
-    """URDF of the Panda in the package example-robot-data."""
+def stored_urdf(place: str) -> Path:
+    """URDF in the package example-robot-data, by its path there."""
     for folder in map(Path, sys.path):
-        found = folder / "cmeel.prefix/share/example-robot-data/robots/panda_description/urdf/panda.urdf"
+        found = folder / "cmeel.prefix/share/example-robot-data/robots" / place
         if found.is_file():
             return found
     raise SystemExit("the package example-robot-data is not installed")
@@ -42,7 +43,7 @@ def robots() -> dict[str, Robot]:
     """Every spatial robot, and the Panda where its URDF is installed."""
     folders = {name: ROOT / f"robots/{name}/robot.urdf" for name in ("tx90l_rail", "ur10_rail", "iiwa14")}
     return {name: Robot.from_urdf(path) for name, path in folders.items()} | {
-        "panda": Robot.from_urdf(panda_urdf(), tool_frame="panda_hand_tcp")
+        "panda": Robot.from_urdf(stored_urdf(PANDA), tool_frame="panda_hand_tcp")
     }
 
 

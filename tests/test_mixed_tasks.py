@@ -1,0 +1,81 @@
+"""Random tasks of mixed kinds have the solution that they are made from; so does the plain transcription beside them.
+
+The full counts are `benchmarks/mixed_tasks.py` and `benchmarks/restarts.py`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brachis.problem import Problem
+from brachis.robot.combine import robot_for
+from brachis.task import load_task
+
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+CASES = [*(("tx90l_rail", number) for number in range(6)), ("planar4", 1), ("scara3", 2)]
+
+
+@pytest.fixture(scope="module")
+def bench():
+    sys.path.insert(0, str(BENCHMARKS))
+    try:
+        yield importlib.import_module
+    finally:
+        sys.path.remove(str(BENCHMARKS))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("tasks")
+
+
+def problem_of(case):
+    task = load_task(case.task)
+    return Problem.of(robot_for(None, task.robot), task)
+
+
+@pytest.mark.parametrize(("robot", "number"), CASES)
+def test_the_known_joint_path_is_on_the_path_within_ranges_from_start_to_end(bench, robot, number, folder):
+    case = bench("mixed_cases").case(robot, 0, number, folder)
+    problem, joint_path = problem_of(case), case.joint_path
+    targets = problem.path.sample(np.linspace(0.0, 1.0, len(joint_path))).target
+    assert np.abs(problem.task_map.difference(targets, problem.task_map.values(joint_path))).max() < 1e-8
+    limits = problem.robot.limits
+    assert np.all((joint_path >= limits.position_lower) & (joint_path <= limits.position_upper))
+    for given, own in ((problem.start, joint_path[0]), (problem.end, joint_path[-1])):
+        assert given is None or np.allclose(given, own, rtol=0.0, atol=1e-9)
+
+
+def test_the_same_arguments_make_the_same_task(bench, tmp_path):
+    make = bench("mixed_cases").case
+    first, again = (make("tx90l_rail", 3, 5, tmp_path / folder).task for folder in ("one", "two"))
+    assert first.read_bytes() == again.read_bytes()
+    assert first.with_suffix(".csv").read_bytes() == again.with_suffix(".csv").read_bytes()
+
+
+def test_a_comparison_tells_what_became_faster_and_what_was_lost(bench, capsys):
+    before = [{"task": name, "verified": True, "t_end": 2.0, "seconds": 8.0, "cpu": 4.0} for name in ("a", "b")]
+    after = [{**before[0], "t_end": 1.0, "cpu": 1.0}, {**before[1], "verified": False, "t_end": None}]
+    bench("mixed_tasks").compare(before, after)
+    said = capsys.readouterr().out
+    assert "a: t_end times 0.5000" in said
+    assert "plan times times 1.000 on average, processor times 0.500" in said
+    assert "before and not now: b" in said
+
+
+@pytest.mark.parametrize(("robot", "number"), [("tx90l_rail", 1), ("planar4", 1)])
+def test_derivatives_of_the_plain_transcription(bench, robot, number, folder):
+    case = bench("mixed_cases").case(robot, 0, number, folder)
+    program = bench("full_space").FullSpace(problem_of(case), 3)
+    x, rng = program.starting_point(case.joint_path, 2.0), np.random.default_rng(0)
+    x[1:] += 1e-3 * rng.normal(size=len(x) - 1)
+    step = rng.normal(size=len(x))
+    slope = (program.rows(x + 1e-6 * step) - program.rows(x - 1e-6 * step)) / 2e-6
+    entries = program.jacobian(x) * step[program.jacobian_columns]
+    exact = np.bincount(program.jacobian_rows, weights=entries, minlength=len(program.lower))
+    assert np.abs(slope - exact).max() < 1e-6 * np.abs(exact).max()
