@@ -4,7 +4,18 @@ from brachis.nlp.curves import Boundary
 from brachis.nlp.grid import FixedGrid
 from brachis.nlp.link import Link
 from brachis.nlp.motion import Motion
+from brachis.nlp.objective import EndTime, LeastAcceleration, Objective
 from brachis.nlp.phase import Phase
 from brachis.nlp.program import Program
 
-__all__ = ["Boundary", "FixedGrid", "Link", "Motion", "Phase", "Program"]
+__all__ = [
+    "Boundary",
+    "EndTime",
+    "FixedGrid",
+    "LeastAcceleration",
+    "Link",
+    "Motion",
+    "Objective",
+    "Phase",
+    "Program",
+]

@@ -36,10 +36,18 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
     import ipyopt  # noqa: PLC0415  (a solver is imported when it is used)
 
     watch = Watch(problem, options, progress)
-    gradient = problem.gradient()
 
-    def objective_gradient(_x: np.ndarray, out: np.ndarray) -> None:
-        out[:] = gradient
+    def objective(point: np.ndarray) -> float:
+        try:
+            return watch.objective(point)
+        except UnreachableError:
+            return float("nan")
+
+    def objective_gradient(point: np.ndarray, out: np.ndarray) -> None:
+        try:
+            out[:] = watch.gradient(point)
+        except UnreachableError:
+            out[:] = np.nan
 
     def rows(point: np.ndarray, out: np.ndarray) -> None:
         try:
@@ -66,7 +74,7 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
         np.clip(problem.upper, -_INFINITY, _INFINITY),
         (problem.jacobian_rows, problem.jacobian_columns),
         (np.array([], dtype=int), np.array([], dtype=int)),
-        problem.objective,
+        objective,
         objective_gradient,
         rows,
         jacobian,
