@@ -32,15 +32,17 @@ from brachis.verify import Verification
 
 AS_FAST = 1e-4
 """Motions whose end times differ by a smaller fraction are equally fast."""
-_REFINEMENT_SHARE = 0.1e-4
-"""Part of the end time that is kept for refinement, which may lengthen it."""
+_KEPT_BACK = 0.1e-4
+"""Part of the end time by which refinement may still lengthen the motion."""
 _WORTH_IT = 0.05
-"""A motion whose accelerations are lower by less than this fraction is not worth refining."""
-_ITERATIONS = 100
-_PROGRESS, _PATIENCE = 1e-3, 5
-"""The solve ends where so many iterations lower the mean square by less than this fraction."""
+"""A motion whose accelerations are lower by less than this fraction does not replace the fastest one."""
+_TOLERANCE, _ITERATIONS = 1e-5, 60
+_PROGRESS, _PATIENCE = 1e-2, 5
+"""A solve ends where so many iterations lower the mean square by less than this fraction: near enough will do."""
 _TIME = 0.5
 """Part of the remaining time that may be used."""
+_LEAST_TIME = 0.1
+"""Seconds left to a solve that is begun."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,31 +104,40 @@ def calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMo
 
 
 def _calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMotion:
-    start, refined = fastest.start, fastest.refined
-    assert start is not None and refined is not None  # noqa: PT018, S101  (it is finished)
+    """Solve, and complete what came of it if it is worth it."""
+    start, before = fastest.start, fastest.refined
+    assert start is not None and before is not None  # noqa: PT018, S101  (it is finished)
     task = start.decomposition.problem.task
     slower = max(task.search.slower, AS_FAST)
-    if not fastest.verified or deadline.passed:
-        return _kept(fastest, "no time was left" if deadline.passed else "the fastest motion is not verified")
-    objective = least_acceleration(refined.program, refined.x, slower - _REFINEMENT_SHARE)
-    program = refined.program.minimising(objective)
-    soon = deadline.part(_TIME)
-    solve = _solver(start.solver, task.solver.tolerance, soon, listener)
-    first = solve(program, program.time_scaled(refined.x, 1.0 + slower - _REFINEMENT_SHARE))
-    reduction = _reduction(refined.program, objective, refined.x, first.x)
-    if not first.status.usable or reduction < _WORTH_IT:
-        return _kept(fastest, f"nothing to gain ({100.0 * max(reduction, 0.0):.2g} %)", (first,))
-    settings, longest = task.refinement, refined.t_end * (1.0 + slower)
-    options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, soon, longest)
+    if not fastest.verified:
+        return _kept(fastest, "the fastest motion is not verified")
+    if deadline.passed:
+        return _kept(fastest, "no time was left")
+    objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
+    program, soon = before.program.minimising(objective), deadline.part(_TIME)
+    solve = _solver(start.solver, soon, listener)
+    first = solve(program, program.time_scaled(before.x, 1.0 + slower - _KEPT_BACK))
+    if not first.status.usable:
+        return _kept(fastest, f"the fastest motion stays: {first.status.value}", (first,))
+    if 1.0 - np.sqrt(first.objective) < _WORTH_IT:
+        return _kept(fastest, "the fastest motion stays: hardly any other is calmer", (first,))
+    settings = task.refinement
+    options = RefinementOptions(
+        settings.tolerance, settings.density, settings.max_rounds, soon, before.t_end * (1.0 + slower)
+    )
     found = completed(fastest, program, (first,), solve, options)
-    if found.refined is None or found.trajectory is None or found.verification is None or not found.verified:
-        return _kept(fastest, "a calmer motion was not verified", found.reports)
-    reduction = _reduction(refined.program, objective, refined.x, found.refined.x)
+    return _better(fastest, found, 1.0 - np.sqrt(program.objective(found.refined.x)) if found.refined else 0.0)
+
+
+def _better(fastest: Attempt, found: Attempt, reduction: float) -> LeastMotion:
+    """Take the motion that was found if it is verified and calmer by a fraction that is worth it."""
+    if found.trajectory is None or found.verification is None or not found.verified:
+        return _kept(fastest, "the fastest motion stays: a calmer one was not verified", found.reports)
     if reduction < _WORTH_IT:
-        return _kept(fastest, "nothing to gain", found.reports)
+        return _kept(fastest, "the fastest motion stays: hardly any other is calmer", found.reports)
     later = found.t_end / fastest.t_end - 1.0
     status = f"joint accelerations (rms) {100.0 * reduction:.2g} % lower at {100.0 * later:+.2g} % end time"
-    return LeastMotion(found.trajectory, found.verification, reduction, later, status, found.reports)
+    return LeastMotion(found.trajectory, found.verification, float(reduction), later, status, found.reports)
 
 
 def _kept(fastest: Attempt, status: str, reports: tuple[SolverReport, ...] = ()) -> LeastMotion:
@@ -141,38 +152,28 @@ def least_acceleration(program: Program, x: np.ndarray, slower: float) -> LeastA
     Every joint's acceleration counts in proportion to its largest velocity: that of its limit; without one the largest
     that any such joint of its unit has at x. Joints that nothing limits, the virtual roll of a tool, do not count.
     """
-    robot = program.phases[0].joint_map.robot
-    states = program.states(x)
-    middle = states[0].q[len(states[0].q) // 2]
-    by_acceleration, weights = reciprocals_near(robot, program.limits, middle)
-    speed = np.max([np.abs(state.qdot).max(axis=0) for state in states], axis=0)
-    without, units = (weights == 0.0) & (by_acceleration > 0.0), np.array(robot.position_units)
+    robot, states = program.phases[0].joint_map.robot, program.states(x)
+    by_acceleration, weights = reciprocals_near(robot, program.limits, states[0].q[len(states[0].q) // 2])
+    speeds, units = np.max([np.abs(state.qdot).max(axis=0) for state in states], axis=0), np.array(robot.position_units)
     for unit in set(robot.position_units):
-        own = without & (units == unit)
-        weights[own] = 1.0 / speed[own].max(initial=np.inf if not speed[own].any() else 0.0)
-    durations = np.array([part[0] for _, part in program.split(x)])
-    longest = durations * (1.0 + slower)
+        own = (units == unit) & (weights == 0.0) & (by_acceleration > 0.0)
+        if speeds[own].any():
+            weights[own] = 1.0 / speeds[own].max()
+    longest = np.array([part[0] for _, part in program.split(x)]) * (1.0 + slower)
     size = program.minimising(LeastAcceleration(weights, longest)).objective(x)
     return LeastAcceleration(weights / np.sqrt(size) if size > 0.0 else weights, longest)
 
 
-def _reduction(program: Program, objective: LeastAcceleration, before: np.ndarray, after: np.ndarray) -> float:
-    """Fraction by which root mean square accelerations at the collocation points of a program are lower."""
-    measured = program.minimising(objective)
-    return 1.0 - float(np.sqrt(measured.objective(after) / max(measured.objective(before), np.finfo(float).tiny)))
-
-
-def _solver(name: str, tolerance: float, deadline: Deadline, listener: Listener) -> Solve:
-    """Make a function that solves with a backend; a feasible motion that is calmer counts, however the solve ended."""
+def _solver(name: str, deadline: Deadline, listener: Listener) -> Solve:
+    """Make a function that solves with a backend; any feasible motion will do, however the solve ended."""
     (backend,) = solver_named(name)
 
     def progress(iteration: int, objective: float) -> None:
         listener(f"least motion: iteration {iteration}, joint accelerations (rms) {100.0 * objective**0.5:.1f} %")
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        options = SolverOptions(tolerance, _ITERATIONS, max(deadline.left, 0.1), _PROGRESS, _PATIENCE)
+        options = SolverOptions(_TOLERANCE, _ITERATIONS, max(deadline.left, _LEAST_TIME), _PROGRESS, _PATIENCE)
         report = backend.solve(program, x, options, progress)
-        calmer = report.feasible and report.objective < program.objective(x)
-        return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if calmer else report
+        return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if report.feasible else report
 
     return solve

@@ -51,9 +51,7 @@ class EndTime:
 
 @dataclass(frozen=True, eq=False)
 class LeastAcceleration:
-    """Joint accelerations, squared, by the trapezoidal rule over a phase's normalised time:
-
-        sum over points k and joints i of    w_k (weights_i qddot_ki)^2
+    """Mean over a phase's time of the sum over the joints of (weights_i qddot_i)^2, by the trapezoidal rule.
 
     Attributes
     ----------

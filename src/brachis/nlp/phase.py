@@ -252,7 +252,7 @@ class Phase:
         return np.bincount(np.concatenate([of_time, *of_curves, of_lengths]), slopes, self.variables)
 
     def _chained(self, functions: Sequence[Partials], x: np.ndarray) -> Iterator[np.ndarray]:
-        """Differentiate each function of the joint motion by T, by each curve's variables and by h, (places, c) each."""
+        """Differentiate each function of the joint motion by T, each curve's variables and h, (places, c) each."""
         state, exact = self.state(x), self._derivatives(x)
         bases = [timed(basis, x[0]) for basis in self._bases(x)]
         slopes = np.hstack(timed(self.grid.slopes(x[self._lengths], self._control_points(x)), x[0]))
@@ -265,7 +265,7 @@ class Phase:
             yield np.concatenate(by, axis=2)[self.grid.point] @ slopes[:, :, None]
 
     def _derivatives(self, x: np.ndarray) -> JointDerivatives:
-        """Derivatives of the state at x; kept until x changes, as the state is."""
+        """Differentiate the state at x; kept until x changes, as the state is."""
         state = self.state(x)
         if self._exact is None or self._exact[0] is not state:
             self._exact = state, self.joint_map.derivatives(state)

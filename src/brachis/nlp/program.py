@@ -45,9 +45,7 @@ class Program:
         Fixed sparsity pattern; each place occurs once.
     """
 
-    def __init__(
-        self, phases: Iterable[Phase], links: Sequence[Link] = (), objective: Objective | None = None
-    ) -> None:
+    def __init__(self, phases: Iterable[Phase], links: Sequence[Link] = (), objective: Objective | None = None) -> None:
         self.phases, self.links, self.minimised = tuple(phases), tuple(links), objective or EndTime()
         first = np.cumsum([0, *(phase.variables for phase in self.phases)]).tolist()
         self._parts = [slice(a, b) for a, b in itertools.pairwise(first)]

@@ -11,7 +11,7 @@ from brachis.errors import UnreachableError
 from brachis.solvers.apart import apart_if_large
 from brachis.solvers.one_at_a_time import one_at_a_time
 from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
-from brachis.solvers.watch import Watch, from_finite_numbers
+from brachis.solvers.watch import Watch, from_finite_numbers, objective_at
 
 name = "ipopt"
 
@@ -38,10 +38,7 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
     watch = Watch(problem, options, progress)
 
     def objective(point: np.ndarray) -> float:
-        try:
-            return watch.objective(point)
-        except UnreachableError:
-            return float("nan")
+        return objective_at(problem, point, np.nan)
 
     def objective_gradient(point: np.ndarray, out: np.ndarray) -> None:
         try:

@@ -50,10 +50,7 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
         return np.concatenate([dense[below], -dense[above]])
 
     def objective(point: np.ndarray) -> float:
-        try:
-            return watch.objective(point)
-        except UnreachableError:  # the rows say how bad the point is
-            return objective_at(problem, last)
+        return objective_at(problem, point, objective_at(problem, last))  # the rows say how bad an unreachable point is
 
     def callback(point: np.ndarray) -> None:
         last[:] = point

@@ -231,14 +231,14 @@ def _usable(values: np.ndarray) -> bool:
     return bool(np.abs(values).max(initial=0.0) <= _LARGEST)
 
 
-def objective_at(problem: Problem, x: np.ndarray) -> float:
-    """Objective at x; infinite where x cannot be evaluated."""
+def objective_at(problem: Problem, x: np.ndarray, otherwise: float = np.inf) -> float:
+    """Objective at x; another value where x cannot be evaluated."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             value = problem.objective(x)
     except UnreachableError:
-        return np.inf
-    return np.inf if np.isnan(value) else value
+        return otherwise
+    return otherwise if np.isnan(value) else value
 
 
 def residual(problem: Problem, x: np.ndarray) -> float:
