@@ -36,8 +36,12 @@ _PERCENT = re.compile(r"^(100(\.0*)?|[0-9]{1,2}(\.[0-9]*)?) ?%$")
 
 def _from_percent(value: object) -> object:
     """Read ``1 %`` as 0.01."""
-    percent = _PERCENT.match(value) if isinstance(value, str) else None
-    return value if percent is None else float(percent[1]) / 100.0
+    if not isinstance(value, str):
+        return value
+    percent = _PERCENT.match(value)
+    if percent is None:
+        raise refuse("no share", found=value, allowed="from 0 to 100 %, or a number from 0 to 1")
+    return float(percent[1]) / 100.0
 
 
 # Strict: the string "3" or the boolean true where a number belongs is a slip of the user's, not a number. Whole numbers
