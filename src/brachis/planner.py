@@ -123,7 +123,8 @@ def _plan(
     assert best is not None and best.start is not None  # noqa: PT018, S101  (else nothing would have come back)
     assert best.trajectory is not None and best.verification is not None  # noqa: PT018, S101
     searched = time.perf_counter()
-    least = calmest(best, deadline, listener) if task.search.least_motion else None
+    over = Deadline(0.0) if found.interrupted else deadline
+    least = calmest(best, over, listener) if task.search.least_motion else None
     calmed = time.perf_counter()
     end_time = plausibility.of_end_time(best.t_end, SHORTEST_TIME)
     remarks += plausibility.tell(end_time, strict=strict, stacklevel=4)
