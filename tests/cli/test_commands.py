@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from brachis import __version__, planner, plots
+from brachis import __version__, completion, planner, plots
 from brachis.cli import planning
 from brachis.errors import InputError
 from brachis.trajectory import Trajectory
@@ -142,12 +142,12 @@ def test_folder_in_the_place_of_a_result(run, task, write, tmp_path):
 
 
 def test_json_knows_no_nan(run, task, write, tmp_path, monkeypatch):
-    honest = planner.verify_trajectory
+    honest = completion.verify_trajectory
 
     def endless(trajectory, options, **more):
         return replace(honest(trajectory, options, **more), worst_ratio=math.inf, path_error=math.nan)
 
-    monkeypatch.setattr(planner, "verify_trajectory", endless)
+    monkeypatch.setattr(completion, "verify_trajectory", endless)
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
     for text in (outcome.out, (tmp_path / "out/result.json").read_text()):
         data = json.loads(text, parse_constant=pytest.fail)

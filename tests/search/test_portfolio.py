@@ -19,7 +19,6 @@ from brachis import planner
 from brachis.errors import PlanningError, TaskError, UnknownNameError
 from brachis.plots import plot_candidates
 from brachis.search import record, schedule, starts
-from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.levels import SEARCH_LEVELS
 from brachis.solvers import apart, uno
 

@@ -6,8 +6,9 @@ The self-motion of the arm is measured by r linear functions of the joints,
 
 whose rows C (r, n) are transversal to the self-motion along the reference q_ref(s): J_aug = [J; C] is regular there,
 and as far around it as its least singular value stays away from zero. Where one C does for the whole path, it is
-constant and p = 0. The decomposition of the paper is the case of rows of C that each select a joint, with the closed form in
-place of Newton's method (`closed_form`). With xi = dz/ds, e = C' q - p' and e' = C'' q - p'' (derivatives by s alone):
+constant and p = 0. The decomposition of the paper is the case of rows of C that each select a joint, with the closed
+form in place of Newton's method (`closed_form`). With xi = dz/ds and derivatives by s alone, e = C' q - p' and
+e' = C'' q - p'':
 
     G = dq/dy       = J_aug^-1 [xi, 0; -e, I]
     qdot            = G ydot
