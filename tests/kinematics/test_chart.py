@@ -134,7 +134,9 @@ def test_margins(motion):
     s = state.y[:, 0]
     margins = chart.margins(state)
     np.testing.assert_allclose(margins[:, 0], least_singular(chart, state.q, s), rtol=1e-9)
-    np.testing.assert_allclose(chart.start_margins(), least_singular(chart, chart.reference[:1], np.zeros(1)), rtol=1e-9)
+    np.testing.assert_allclose(
+        chart.start_margins(), least_singular(chart, chart.reference[:1], np.zeros(1)), rtol=1e-9
+    )
     by_q, by_s = chart.margin_gradient(state)
     for joint in range(chart.robot.n):
         step = h * np.eye(chart.robot.n)[joint]
@@ -177,7 +179,9 @@ def test_rows_that_select_joints_are_the_closed_form_of_these(name):
     closed = joint_map(robot, rows, segments, start, redundant)
     sway = Sway(closed, amplitude=0.1)
     s = np.linspace(0.0, 1.0, PLACES)
-    reference = closed.postures(np.column_stack([s, np.broadcast_to(closed.start[list(closed.redundant)], (PLACES, closed.r))]))
+    reference = closed.postures(
+        np.column_stack([s, np.broadcast_to(closed.start[list(closed.redundant)], (PLACES, closed.r))])
+    )
     select = ChartRows.constant(np.eye(robot.n)[list(closed.redundant)])
     chart = ChartMap(closed.task_map, closed.path, select, s, reference)
     assert chart.redundant_joints == closed.redundant_joints

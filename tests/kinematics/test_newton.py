@@ -108,7 +108,9 @@ def test_without_redundancy_there_are_no_rows():
     _, task_map = bind(planar_robot("RR"), ["x", "y"])
     there = np.array([[0.5, 1.1], [0.3, 1.3]])
     q, none = there + 0.05, np.zeros((2, 0, 2))
-    np.testing.assert_allclose(Newton(task_map).solve(task_map.values(there), q, none, np.zeros((2, 0))), there, atol=1e-12)
+    np.testing.assert_allclose(
+        Newton(task_map).solve(task_map.values(there), q, none, np.zeros((2, 0))), there, atol=1e-12
+    )
 
 
 def test_no_postures_at_all():

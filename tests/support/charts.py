@@ -31,7 +31,7 @@ def jacobian(task_map: TaskMap, q: np.ndarray) -> np.ndarray:
 
 
 def least_motion(task_map: TaskMap, path: Path, start: Any, s: np.ndarray) -> np.ndarray:
-    """Postures (S, n): from each to the next by damped steps of the pseudo-inverse, without Newton's method of the charts."""
+    """Postures (S, n), from each to the next by steps of the pseudo-inverse."""
     q = [np.array(start, dtype=float)]
     for target in path.sample(s[1:]).target:
         here = q[-1]
@@ -56,7 +56,7 @@ def turned_null_spaces(task_map: TaskMap, q: np.ndarray) -> np.ndarray:
 def chart_of(
     robot: Robot, rows: str | Sequence[str], segments: list[dict[str, Any]], start: Any, kind: str
 ) -> ChartMap:
-    """Chart along the least motion, whose rows are ``constant``, ``following`` the null space or ``swinging`` about it."""
+    """Chart along the least motion; its rows are ``constant``, ``following`` the null space or ``swinging`` about it."""
     task_map, path = path_from(robot, rows, segments, start)
     s = np.linspace(0.0, 1.0, PLACES)
     reference = least_motion(task_map, path, start, s)
