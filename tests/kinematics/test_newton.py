@@ -1,4 +1,4 @@
-"""Newton's method: tool placement and Jacobian as Pinocchio has them, targets met to rounding, NaN where they cannot be."""
+"""Newton's method: placement and Jacobian as Pinocchio has them, targets met to rounding, NaN where they cannot be."""
 
 from __future__ import annotations
 

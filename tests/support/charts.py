@@ -56,7 +56,7 @@ def turned_null_spaces(task_map: TaskMap, q: np.ndarray) -> np.ndarray:
 def chart_of(
     robot: Robot, rows: str | Sequence[str], segments: list[dict[str, Any]], start: Any, kind: str
 ) -> ChartMap:
-    """Chart along the least motion; its rows are ``constant``, ``following`` the null space or ``swinging`` about it."""
+    """Chart along the least motion; its rows are ``constant``, ``following`` the null space or ``swinging``."""
     task_map, path = path_from(robot, rows, segments, start)
     s = np.linspace(0.0, 1.0, PLACES)
     reference = least_motion(task_map, path, start, s)
