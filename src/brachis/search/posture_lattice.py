@@ -202,7 +202,11 @@ class PostureLattice(Lattice):
         single = [sign * step * row for row in np.eye(self._r) for step in _STEPS for sign in (-1.0, 1.0)]
         offsets = np.vstack([np.zeros((1, self._r)), single, rng.normal(0.0, _SPREAD, (_RANDOM, self._r))])
         aside = np.einsum("kij,oj->koi", null, offsets) * self._size
-        parent = np.repeat(np.arange(len(q)), len(offsets))
+        if self._to_end:  # one more: a part of the way to the given end
+            left = self.problem.end - q
+            homing = np.einsum("kir,kjr,kj->ki", null, null, left) / max(1, len(self.s) - station)
+            aside = np.concatenate([aside, homing[:, None]], axis=1)
+        parent = np.repeat(np.arange(len(q)), aside.shape[1])
         begun = ((q + needed)[:, None] + aside).reshape(len(parent), -1)
         rows = np.swapaxes(null, 1, 2)[parent]
         found = self._met(begun, rows, _product(rows, begun), station)
@@ -219,7 +223,10 @@ class PostureLattice(Lattice):
         if not held.any():
             return refused
         kept = layer[held]
-        return kept if self._r <= 1 else kept.bounded(self._nodes, self._robot, self.problem.limits)
+        if self._r <= 1:
+            return kept
+        left = self._lengths(kept.q, self.problem.end - kept.q, np.arange(len(kept.q))) if self._to_end else 0.0
+        return kept.bounded(self._nodes, kept.length + left, self._robot, self.problem.limits)
 
 
 def _layer(q: np.ndarray) -> Layer:
