@@ -84,7 +84,7 @@ class PostureLattice(Lattice):
         Of several redundant joints the nodes are samples, among which there are no such minima.
         """
         if self._r > 1:
-            return distinct(found, max(1, most // self._r))
+            return distinct(found, most)
         apart = self._step(ends.q[:, None], ends.q[None]) / self._size
         around = np.all(np.abs(apart) < _AROUND, axis=2)
         least = np.where(around, ends.length, np.inf).min(axis=1) >= ends.length
@@ -139,11 +139,11 @@ class PostureLattice(Lattice):
         wanted = self.problem.task_map.difference(self._targets[station][None], values)
         needed = np.einsum("kij,kj->ki", np.linalg.pinv(jacobian), wanted)
         if self._r <= 1:
-            parent, q = _pairs(len(before.q), self._at_cells(before.q, jacobian, null, wanted, station))
+            parent, q = self._pairs(before.q, self._at_cells(before.q, jacobian, null, wanted, station))
         else:
             parent, q = self._sampled(before.q, null, needed, station, rng)
         if self._to_end and station == len(self.s) - 1:
-            own, end = _pairs(len(before.q), np.array([self.problem.end]))
+            own, end = self._pairs(before.q, np.array([self.problem.end]))
             parent, q = np.append(parent, own), np.vstack([q, end])
         if not len(q):
             return {NO_ANSWER: len(before.q)}
@@ -167,6 +167,18 @@ class PostureLattice(Lattice):
         nothing = np.zeros(len(parent), dtype=int)
         layer = Layer(nothing[:, None], nothing, before.q[parent] + step, low[good], high[good], length, parent)
         return self._kept(layer[shortest(length, self._key(q, _SAME))])
+
+    def _pairs(self, before: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes, (E,), with postures (E, n) of those given, (C, n), to which no joint moves far."""
+        from scipy.spatial import KDTree  # noqa: PLC0415  (a fifth of a second that closed forms need not wait)
+
+        box = np.where(self._modulo, TURN, 0.0)
+        trees = (
+            KDTree(np.where(self._modulo, np.remainder(each, TURN) % TURN, each), boxsize=box) for each in (before, q)
+        )
+        first, second = trees
+        pairs = first.sparse_distance_matrix(second, LARGEST_STEP, p=np.inf, output_type="ndarray")
+        return pairs["i"], q[pairs["j"]]
 
     def _step(self, before: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Return the steps, (E, n), from postures to others; modulo 2 pi where nobody asks for turns."""
@@ -233,11 +245,6 @@ def _layer(q: np.ndarray) -> Layer:
     """Nodes, (K, n), with which joint paths begin."""
     nothing = np.zeros(len(q), dtype=int)
     return Layer(nothing[:, None], nothing, q, q, q, np.zeros(len(q)), nothing)
-
-
-def _pairs(nodes: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Every node with every posture, (C, n): indices of nodes and postures, (E,) and (E, n)."""
-    return np.repeat(np.arange(nodes), len(q)), np.tile(q, (nodes, 1))
 
 
 def _product(rows: np.ndarray, q: np.ndarray) -> np.ndarray:
