@@ -22,7 +22,7 @@ from brachis.search.starts import PIECES, fine_places, lattice_starts, smoothed
 
 CHART = "chart"
 _FINER = 2
-_SCREENED, _KEPT = 3, 3
+_SCREENED, _KEPT = 4, 3
 """So many times the joint paths that a level asks for are looked at; so many at most are planned."""
 _HOPELESS = 3.0
 """Joint paths whose estimated time is so many times the least one are left out."""

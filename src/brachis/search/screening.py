@@ -18,21 +18,22 @@ from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap
 from brachis.nlp import Program
 from brachis.nlp.guess import starting_point
-from brachis.problem import program_of
+from brachis.problem import Problem, program_of
 from brachis.refine import Solve
 from brachis.search.processes import each, processes
 from brachis.search.recentring import solved_in_chart
 from brachis.search.solving import Listener
 from brachis.solvers import SolverOptions, SolverReport, SolveStatus, solver_named
 
-_INTERVALS = 8
+_INTERVALS, _DEGREE = 12, 2
+"""Parabolas jump from one acceleration to the next, as fastest motions do: so few say most."""
 _TOLERANCE, _ITERATIONS, _NEARLY = 1e-3, 25, 1e-2
 _LEAST_TIME = 0.1
 """Seconds left to a solve that is begun."""
 _PLACES = 97
-_SAME_TIME, _SAME_PATH = 0.01, 0.15
+_SAME_TIME, _SAME_PATH = 0.02, 0.15
 """Starts are the same where their end times differ by less than this fraction, and no joint by more, rad or m."""
-_SLOWER = 1.15
+_SLOWER = 1.05
 """Starts that are slower than the fastest one by this factor are left out."""
 
 
@@ -71,11 +72,12 @@ def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
     hopeless = dataclasses.replace(start, estimate=np.inf)
     if deadline.passed:
         return start
-    program = program_of(start.problem, start.joint_map, np.linspace(0.0, 1.0, _INTERVALS + 1))
+    problem = _roughly(start.problem)
+    program = program_of(problem, start.joint_map, np.linspace(0.0, 1.0, _INTERVALS + 1))
     x = starting_point(program, [start.joint_path])
     if x is None:
         return hopeless
-    program, reports = solved_in_chart(start.problem, program, x, _solver(start, deadline))
+    program, reports = solved_in_chart(problem, program, x, _solver(start, deadline))
     last = reports[-1]
     if not last.status.usable:
         return hopeless
@@ -87,6 +89,12 @@ def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
         )
     except UnreachableError:
         return hopeless
+
+
+def _roughly(problem: Problem) -> Problem:
+    """Return the problem with splines that are at rest at both ends in their velocity alone."""
+    spline = problem.task.spline.model_copy(update={"degree": _DEGREE, "rest": "velocity"})
+    return dataclasses.replace(problem, task=problem.task.model_copy(update={"spline": spline}))
 
 
 def _solver(start: Start, deadline: Deadline) -> Solve:
