@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import null_space
 
 import brachis
 from brachis.errors import ResultFileError
 from brachis.kinematics import ChartRows
+from brachis.robot import task_map_of
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
+from support.charts import jacobian
 
 ROOT = Path(__file__).parents[1]
 START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
@@ -75,6 +79,23 @@ def test_an_arm_without_a_closed_form():
     np.testing.assert_allclose(end.translation - begin.translation, [0.0, 0.15, 0.05], atol=1e-9)
     np.testing.assert_allclose(end.rotation, begin.rotation, atol=1e-9)
     np.testing.assert_allclose(result.trajectory.position(0.0), start, atol=1e-9)
+
+
+@pytest.mark.parametrize("redundant", ["auto", ["j1"]])
+def test_an_end_posture_may_be_rounded(result, redundant):
+    """The motion ends at the posture on the path that is nearest to the given one, and is held to that."""
+    exact = result.trajectory.position(result.t_end)
+    end = np.round(exact, 7)
+    assert np.abs(end - exact).max() > 1e-9
+    reached = scara_line(270, end={"joints": end.tolist()}, redundant_joints=redundant)
+    assert reached.verified
+    assert 1e-9 < np.abs(reached.trajectory.position(reached.t_end) - end).max() < 1e-6
+    robot = reached.trajectory.robot
+    self_motion = null_space(jacobian(task_map_of(robot, ["x", "y"]), end[None])[0])[:, 0]
+    other = reached.task.to_dict() | {"end": {"joints": (end + 1e-5 * self_motion).tolist()}}
+    aside = brachis.load_task(other)
+    checks = verify_trajectory(dataclasses.replace(reached.trajectory, task=aside)).checks
+    assert [check.name for check in checks if not check.passed] == ["end posture"]
 
 
 def test_a_saved_motion_is_loaded_and_verified(result, saved):
