@@ -38,7 +38,7 @@ from brachis.kinematics.newton import Newton
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
 
-_NEAR = 0.2
+_NEAR = 0.4
 """rad or m; the last state tells about postures no farther from it."""
 _SUBSTEPS = 6
 """Steps in which sigma is led away from the reference where one does not find a posture."""

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.attempt import Attempt
+from brachis.kinematics import ChartMap
 from brachis.problem import Decomposition
 from brachis.search.joint_path import DeadEnd
 
@@ -20,6 +21,8 @@ SAME_MOTION = "same motion as another"
 _WORTH_IT = 2e-4
 """An attempt is finished if it may be faster than the best one by more than this fraction."""
 _SAME_TIME = 1e-4
+_SAME_TIME_IN_CHARTS = 3e-3
+"""Splines of different measures of self-motion come to end times that differ by so much for the same motion."""
 _SAME_MOTION = 0.1  # rad or m
 _GAIN_SLACK = 0.005
 """Better knots shorten a motion when it is finished; an attempt may gain this part more by them than any one so far."""
@@ -158,7 +161,9 @@ def rounded(time: float) -> float:
 def _agree(first: Attempt, second: Attempt) -> bool:
     """Tell whether two attempts of a choice are the same motion."""
     same = (first.redundant_joints, first.branch) == (second.redundant_joints, second.branch)
-    if not same or abs(first.coarse - second.coarse) > _SAME_TIME * second.coarse:
+    in_charts = isinstance(first.start and first.start.joint_map, ChartMap)
+    near = (_SAME_TIME_IN_CHARTS if in_charts else _SAME_TIME) * second.coarse
+    if not same or abs(first.coarse - second.coarse) > near:
         return False
     postures = []
     for attempt in (first, second):
