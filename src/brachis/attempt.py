@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from brachis.kinematics import ChartMap, ClosedFormMap
+from brachis.kinematics import CHART, ChartMap, ClosedFormMap
 from brachis.nlp import Program
 from brachis.problem import Problem
 from brachis.refine import Refined
 from brachis.solvers import SolverReport
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
+
+
+def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
+    """Say in which coordinates a motion is planned beside s: redundant joints, a chart's own, or none."""
+    return ", ".join(redundant_joints) or (CHART if branch == CHART else "none")
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 from brachis.attempt import Start
 from brachis.deadline import NEVER, Deadline
 from brachis.errors import PathError, UnreachableError
-from brachis.kinematics import ChartMap, ClosedFormMap, Newton, chart_around, null_spaces
+from brachis.kinematics import CHART, ChartMap, ClosedFormMap, Newton, chart_around, null_spaces
 from brachis.problem import Decomposition, Problem
 from brachis.search.joint_path import DeadEnd, JointPath
 from brachis.search.lattice import LARGEST_STEP
@@ -18,7 +18,6 @@ from brachis.search.phase_plane import least_time
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.starts import PIECES, fine_places, lattice_starts, smoothed
 
-CHART = "chart"
 _FINER, _DENSER = 2, 2.0
 
 
