@@ -14,9 +14,9 @@ from brachis.errors import PathError, PlanningError
 from brachis.problem import Problem, decompositions_of
 from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
+from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.explain import no_motion
 from brachis.search.joint_path import DeadEnd
-from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.starts import lattice_starts
 from support.pose_arms import panda
@@ -159,7 +159,7 @@ def test_what_eaik_might_add_is_said_where_it_is_missing(monkeypatch):
     monkeypatch.setattr("brachis.ik.eaik.installed", lambda: False)
     task = {"start": {"joints": [0.3, -0.5, 0.2, -2.2, 0.3, 1.9, 0.8]}, "task_space": "pose"}
     given = problem(panda(), path=[{"line": {"by": [0.0, 0.05, 0.0]}}], **task)
-    reason = no_motion(decompositions_of(given), [], {"panda_joint4": DeadEnd(0.4, {"the branch ends": 1})})
+    reason = no_motion(given, decompositions_of(given), [], {"panda_joint4": DeadEnd(0.4, {"the branch ends": 1})})
     assert isinstance(reason, PathError)
     assert "EAIK is not installed" in str(reason)
     assert "[panda_joint5], [panda_joint6]" in str(reason)

@@ -11,8 +11,8 @@ import pytest
 import brachis
 from brachis.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_from_settings
-from brachis.search.joint_path import DeadEnd
 from brachis.search.closed_form_lattice import ClosedFormLattice
+from brachis.search.joint_path import DeadEnd
 from brachis.search.stations import stations
 
 ROOT = Path(__file__).parents[2]
