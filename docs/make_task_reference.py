@@ -184,7 +184,9 @@ def _default(field: FieldInfo) -> str:
     value = field.get_default(call_default_factory=True)
     if value is PydanticUndefined or isinstance(value, BaseModel | LimitSpec):
         return "see below"
-    return "`null`" if value is None else f"`{list(value) if isinstance(value, tuple) else value}`"
+    if value is None or isinstance(value, bool):
+        return {None: "`null`", False: "`false`", True: "`true`"}[value]
+    return f"`{list(value) if isinstance(value, tuple) else value}`"
 
 
 def page() -> str:

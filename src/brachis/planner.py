@@ -1,14 +1,13 @@
 """The whole pipeline on one page.
 
 task -> robot -> path, limits -> decompositions -> joint paths (search) -> `solved` at the first collocation points
--> `finished`: mesh, refinement, trajectory, verification -> result.
+-> `finished`: mesh, refinement, trajectory, verification -> the calmest motion that is as fast -> result.
 
 The search decides what is solved and finished, and in which order; the two functions say how.
 """
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import os
 import time
@@ -19,17 +18,17 @@ from threadpoolctl import ThreadpoolController
 
 from brachis import ik, plausibility
 from brachis.attempt import Attempt, Start
+from brachis.completion import completed
 from brachis.custom_limits import LimitModel
 from brachis.deadline import Deadline
-from brachis.errors import UnreachableError
-from brachis.extract import extract, where_it_failed
 from brachis.kinematics import ChartMap
+from brachis.least_motion import calmest
 from brachis.mesh import adapt_mesh, coarsest
 from brachis.nlp import Program
 from brachis.nlp.guess import starting_point
 from brachis.nlp.layout import SHORTEST_TIME
 from brachis.problem import Problem, breaks_of, decompositions_of, phase_in, program_of
-from brachis.refine import Refined, RefinementOptions, Solve, refine
+from brachis.refine import RefinementOptions, Solve
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.combine import robot_for
@@ -44,16 +43,13 @@ from brachis.search import (
     solve_with,
     solved_in_chart,
 )
-from brachis.solvers import SolverReport, SolveStatus, solver_named
+from brachis.solvers import SolveStatus, solver_named
 from brachis.task import Task, load_task
-from brachis.verify import VerifyOptions, verify_trajectory
 
 _MANY_VARIABLES = 150
 """Above this a cold solve takes seconds, and the program is first solved over some of its knots."""
 _KNOT_TIME = 0.4
 """Part of the remaining time that may go into the knots."""
-_SECOND_LOOKS = 4
-"""Times that a motion which the verification refuses is refined again where it failed."""
 
 
 def plan(
@@ -137,15 +133,25 @@ def _plan(
     best = found.best
     assert best is not None and best.start is not None  # noqa: PT018, S101  (else nothing would have come back)
     assert best.trajectory is not None and best.verification is not None  # noqa: PT018, S101
+    searched = time.perf_counter()
+    over = Deadline(0.0) if found.interrupted else deadline
+    least = calmest(best, over, listener) if task.search.least_motion else None
+    calmed = time.perf_counter()
     end_time = plausibility.of_end_time(best.t_end, SHORTEST_TIME)
     remarks += plausibility.tell(end_time, strict=strict, stacklevel=4)
     return Result(
         task=task,
-        trajectory=best.trajectory,
-        verification=best.verification,
+        trajectory=best.trajectory if least is None else least.trajectory,
+        verification=best.verification if least is None else least.verification,
         family=best.start.family,
         attempt=best.without_programs(),
-        timing={"load": loaded - began, "total": time.perf_counter() - began},
+        least_motion=least,
+        timing={
+            "load": loaded - began,
+            "search": searched - loaded,
+            "least_motion": calmed - searched,
+            "total": time.perf_counter() - began,
+        },
         candidates=found.in_order(),
         interrupted=found.interrupted,
         undone=found.undone(),
@@ -215,37 +221,7 @@ def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attemp
     adapted = adapt_mesh(program, reports, solve, task.spline, options, target=target)
     attempt = dataclasses.replace(attempt, undone=adapted.undone)
     options, solve = dataclasses.replace(options, deadline=deadline), _solver(start, deadline, listener)
-    refined = refine(adapted.program, adapted.reports[-1], solve, options)
-    done = _verified(attempt, adapted.reports[:-1], refined)
-    for _ in range(_SECOND_LOOKS if options.max_rounds else 0):
-        finer = None if deadline.passed else where_it_failed(done)
-        if finer is None:
-            break
-        report = solve(finer, refined.x)
-        if not report.status.usable:
-            break
-        refined = refine(finer, report, solve, options)
-        done = _verified(attempt, adapted.reports[:-1], refined)
-    return done
-
-
-def _verified(attempt: Attempt, before: tuple[SolverReport, ...], refined: Refined) -> Attempt:
-    """Make the trajectory of a refined program and verify it; `before` are the reports of earlier solves."""
-    start = attempt.start
-    assert start is not None  # noqa: S101
-    problem, trajectory, verification = start.problem, None, None
-    if refined.converged and np.isfinite(refined.violation):
-        with contextlib.suppress(UnreachableError):
-            trajectory = extract(start, refined)
-            options = VerifyOptions(ratio_tolerance=problem.task.refinement.tolerance)
-            verification = verify_trajectory(trajectory, options, limits=problem.further)
-    return attempt.finished(
-        reports=(*before, *refined.reports),
-        refined=refined,
-        trajectory=trajectory,
-        verification=verification,
-        tolerance=problem.task.refinement.tolerance,
-    )
+    return completed(attempt, adapted.program, adapted.reports, solve, options)
 
 
 def _in_words(status: SolveStatus) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from brachis.attempt import Attempt
+from brachis.least_motion import LeastMotion
 from brachis.plausibility import Remark
 from brachis.solvers import SolverReport
 from brachis.task import Task
@@ -26,7 +27,9 @@ class Result:
     family : str
         Family of the closed form.
     attempt : Attempt
-        The one that gave the trajectory, with its solved program.
+        The fastest one, with its solved program and its motion.
+    least_motion : LeastMotion or None
+        How the calmest motion that is as fast was found; None where it was not asked for.
     timing : dict of str to float
         Wall time of every stage, s.
     candidates : tuple of Attempt
@@ -44,6 +47,7 @@ class Result:
     verification: Verification
     family: str
     attempt: Attempt
+    least_motion: LeastMotion | None = None
     timing: dict[str, float] = field(default_factory=dict)
     candidates: tuple[Attempt, ...] = ()
     interrupted: bool = False
@@ -83,6 +87,7 @@ class Result:
             "refinement_rounds": last.refinement_rounds,
             "collocation_points": last.collocation_points,
             "time_scaled": last.time_scaled,
+            "least_motion": None if self.least_motion is None else self.least_motion.to_dict(),
             "candidates": [candidate.to_dict() for candidate in self.candidates],
             "interrupted": self.interrupted,
             "undone": list(self.undone),

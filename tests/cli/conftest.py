@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from brachis import planner
+from brachis import completion
 from brachis.cli.main import main
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification, VerifyOptions
@@ -56,14 +56,14 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> C
 @pytest.fixture
 def too_strict(monkeypatch: pytest.MonkeyPatch) -> None:
     """A verification that passes nothing, and after which the time for further attempts is up."""
-    honest, now = planner.verify_trajectory, [0.0]
+    honest, now = completion.verify_trajectory, [0.0]
     strict = VerifyOptions(ratio_tolerance=-0.5)
 
     def refusing(trajectory: Trajectory, _options: VerifyOptions, **more: object) -> Verification:
         now[0] += 90.0
         return honest(trajectory, strict, **more)
 
-    monkeypatch.setattr(planner, "verify_trajectory", refusing)
+    monkeypatch.setattr(completion, "verify_trajectory", refusing)
     monkeypatch.setattr("brachis.deadline.time.monotonic", lambda: now[0])
 
 

@@ -174,7 +174,7 @@ def test_jacobian_of_a_path_and_a_free_move(case, knots):
     there = starting_point(Program([back]), [np.vstack([q[-1], q[0]])])
     x = np.concatenate([x, there + 0.01 * rng.uniform(-1.0, 1.0, len(there))])
     assert program.end_time(x) == x[0] + x[path.variables]
-    np.testing.assert_array_equal(np.flatnonzero(program.gradient()), [0, path.variables])
+    np.testing.assert_array_equal(np.flatnonzero(program.gradient(x)), [0, path.variables])
     places = program.jacobian_rows * program.variables + program.jacobian_columns
     assert len(np.unique(places)) == len(places)
     exact = np.zeros((len(program.lower), program.variables))
@@ -194,7 +194,7 @@ def test_one_phase_is_the_program():
     (x,) = reachable_points(phase, 1)
     assert program.variables == phase.variables
     assert program.objective(x) == program.end_time(x) == x[0]
-    np.testing.assert_array_equal(program.gradient(), np.eye(program.variables)[0])
+    np.testing.assert_array_equal(program.gradient(x), np.eye(program.variables)[0])
     for name in ("x_lower", "x_upper", "lower", "upper", "jacobian_rows", "jacobian_columns"):
         np.testing.assert_array_equal(getattr(program, name), getattr(phase, name))
     np.testing.assert_array_equal(program.rows(x), phase.rows(x))

@@ -11,7 +11,7 @@ from brachis.errors import UnknownNameError, UnreachableError
 from brachis.solvers import AUTO_ORDER, NAMES, SolverOptions, SolveStatus, residual, solver_named
 from brachis.solvers.registry import TABLE
 from brachis.solvers.watch import Watch
-from support.programs import bounded, corner, disc, impossible
+from support.programs import bounded, corner, curved, disc, impossible
 
 OPTIONS = SolverOptions()
 MULTIPLIERS = ("uno", "ipopt")
@@ -34,6 +34,7 @@ def solve(name, problem, x, options=OPTIONS, progress=None):
         (disc, [9.0, 9.0], [1.0, 1.0], [-0.25]),
         (corner, [0.0, 0.0], [3.0, 1.0], [1.0 / 3.0, 2.0 / 3.0]),
         (bounded, [1.0, 3.0], [4.0, 0.5], [0.25]),
+        (curved, [3.0, 0.5], [4.2, 2.6], [-0.75]),
     ],
 )
 def test_known_optima(name, make, start, optimum, multipliers):
@@ -112,6 +113,7 @@ def test_iteration_limit(name):
     assert "max_iterations" in report.status.value
 
 
+@pytest.mark.usefixtures("wall_clock")
 def test_time_limit(name):
     problem = disc(pause=0.03)
     report = solve(name, problem, [40.0, -30.0], SolverOptions(time_limit=0.1))

@@ -15,7 +15,10 @@ Rows = Callable[[np.ndarray], np.ndarray]
 
 @dataclass
 class Program:
-    """Minimise ``costs @ x`` under rows of which every entry may differ from zero."""
+    """Minimise ``costs @ x`` under rows of which every entry may differ from zero.
+
+    Where a place `near` is given, half the squared distance from it is added.
+    """
 
     costs: np.ndarray
     row_values: Rows
@@ -27,6 +30,7 @@ class Program:
     reachable: Callable[[np.ndarray], bool] = lambda _x: True
     pause: float = 0.0
     interrupt_at: int | None = None
+    near: np.ndarray | None = None
     evaluations: list[np.ndarray] = field(default_factory=list)
     refusals: int = 0
 
@@ -35,10 +39,10 @@ class Program:
         self.jacobian_rows, self.jacobian_columns = rows.ravel(), columns.ravel()
 
     def objective(self, x):
-        return float(self.costs @ x)
+        return float(self.costs @ x) + (0.0 if self.near is None else 0.5 * float((x - self.near) @ (x - self.near)))
 
-    def gradient(self):
-        return self.costs.copy()
+    def gradient(self, x):
+        return self.costs + (0.0 if self.near is None else x - self.near)
 
     def rows(self, x):
         self._visit(x)
@@ -74,6 +78,16 @@ def disc(**more) -> Program:
         x_upper=np.array([50.0, np.inf]),
         **more,
     )
+
+
+def curved() -> Program:
+    """The point of the disc nearest to (6, 5): (4.2, 2.6), and its row's multiplier is -3/4.
+
+    x - (6, 5) = 2 mu (x - (3, 1)) with x = (3, 1) + 2 (3, 4) / 5 gives mu = -3/4.
+    """
+    problem = disc()
+    problem.costs, problem.near = np.zeros(2), np.array([6.0, 5.0])
+    return problem
 
 
 def corner() -> Program:

@@ -150,6 +150,13 @@ def test_arrays_and_paths_are_accepted_in_mappings() -> None:
     assert task.robot.urdf == str(Path.cwd() / "a.urdf")
 
 
+@pytest.mark.parametrize(("value", "share"), [("1 %", 0.01), ("0.5%", 0.005), ("100 %", 1.0), (0.02, 0.02), (0, 0.0)])
+def test_a_share_is_a_fraction_or_a_percentage(value: object, share: float) -> None:
+    task = load_task(minimal(search={"slower": value}))
+    assert task.search.slower == pytest.approx(share, rel=1e-15)
+    assert load_task(task.to_dict()) == task
+
+
 def test_a_task_is_frozen(complete: Task) -> None:
     with pytest.raises(ValidationError, match="frozen"):
         complete.branch = "auto"
@@ -199,6 +206,12 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ({"robot": {"limits": {"scale": {"torque": 0}}}}, ["robot.limits.scale.torque: out of range", "> 0"]),
     ({"robot": {"gravity": [0, 0]}}, ["robot.gravity[2]: the list is too short"]),
     ({"robot": {"gravity": [0, 0, float("inf")]}}, ["robot.gravity[2]: not a finite number; found inf"]),
+    ({"search": {"slower": "150 %"}}, ["search.slower: no share; found '150 %'", "100 %"]),
+    ({"search": {"slower": 1.5}}, ["search.slower: out of range; found 1.5; allowed: <= 1"]),
+    (
+        {"search": {"slower": 0.1, "least_motion": False}},
+        ["search.slower: a slower motion is of use for least motion alone", "least_motion: true"],
+    ),
     ({"refinement": {"tolerance": 1e-6}}, ["refinement.tolerance: out of range; found 1e-06; allowed: >= 1e-05"]),
     ({"robot": {"friction": {"viscous": -1}}}, ["robot.friction.viscous: out of range; found -1; allowed: >= 0"]),
     ({"robot": {"friction": {"coulomb_velocity": 0}}}, ["coulomb_velocity: out of range; found 0; allowed: > 0"]),

@@ -39,7 +39,9 @@ def validator() -> Any:
     return cls(schema)
 
 
-@pytest.mark.parametrize("change", [{}, {"task_space": "position"}, {"end": {"joints": [1]}}])
+@pytest.mark.parametrize(
+    "change", [{}, {"task_space": "position"}, {"end": {"joints": [1]}}, {"search": {"slower": "1 %"}}]
+)
 def test_the_schema_accepts_what_the_loader_accepts(validator: Any, change: dict[str, Any]) -> None:
     load_task(task(**change))
     assert validator.is_valid(task(**change))
@@ -61,6 +63,7 @@ def test_the_schema_accepts_a_saved_task(validator: Any) -> None:
         {"robot": {"limits": {"torque": -1}}},
         {"task_space": "posse"},
         {"spline": {"degree": 8}},
+        {"search": {"slower": "150 %"}},
     ],
 )
 def test_the_schema_refuses_what_the_loader_refuses(validator: Any, change: dict[str, Any]) -> None:

@@ -69,14 +69,14 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
     room = np.concatenate([(rows - program.lower)[below], (program.upper - rows)[above]])
     lowest = np.clip(program.x_lower - x, -_LARGEST_STEP, 0.0)
     highest = np.clip(program.x_upper - x, 0.0, _LARGEST_STEP)
-    kept = room < _NEAR
+    kept, gradient = room < _NEAR, program.gradient(x)
     while True:
-        step = _solved(program.gradient(), slopes[np.flatnonzero(kept)].toarray(), room[kept], lowest, highest)
+        step = _solved(gradient, slopes[np.flatnonzero(kept)].toarray(), room[kept], lowest, highest)
         if step is None:
             return None
         overrun = slopes @ step > room + _TOUCHED
         if not (overrun & ~kept).any():
-            return float(program.gradient() @ step)
+            return float(gradient @ step)
         kept |= overrun
 
 

@@ -167,7 +167,7 @@ def multipliers_of(program: Program, x: np.ndarray, given: np.ndarray | None = N
     """
     tried: list[Multipliers] = []
     for near in ACTIVE:
-        tried.append(_balancing(ActiveSet.at(program, x, near), program.gradient(), given))
+        tried.append(_balancing(ActiveSet.at(program, x, near), program.gradient(x), given))
         if tried[-1].residual <= _GOOD:
             break
     return min(tried, key=lambda multipliers: multipliers.residual)

@@ -24,7 +24,7 @@ from brachis.solvers import solver_named
 from brachis.trajectory import Trajectory
 
 _SAME = 1e-3
-"""End times that differ by a larger fraction are those of two motions."""
+"""End times that differ by a larger fraction, beyond what the task gave away, are those of two motions."""
 _KEPT = 1e-4
 """A motion keeps a branch margin of which it falls short by less: solvers and interpolation are not exact."""
 
@@ -53,7 +53,7 @@ def solved_again(trajectory: Trajectory) -> Refined:
         program, x = _problem(trajectory)
         found = list(_answers(program, x, trajectory))
     for refined in found:
-        if abs(refined.t_end / trajectory.t_end - 1.0) <= _SAME:
+        if _came_back(refined, trajectory):
             return refined
     ends = ", ".join(f"{refined.reports[-1].solver}: {refined.t_end:.6g} s" for refined in found)
     raise PlanningError(
@@ -92,6 +92,12 @@ def _chart(problem: Problem, trajectory: Trajectory) -> ChartMap:
     return chart_around(problem.task_map, problem.path, s, trajectory.q, rows)
 
 
+def _came_back(refined: Refined, trajectory: Trajectory) -> bool:
+    """Tell whether an answer is the fastest motion that a saved one was made from."""
+    slower = trajectory.t_end / refined.t_end - 1.0
+    return -_SAME <= slower <= trajectory.task.search.slower + _SAME
+
+
 def _answers(program: Program, x: np.ndarray, trajectory: Trajectory) -> Iterator[Refined]:
     """Solve and refine with one backend after the other, until one comes back to the motion."""
     task = trajectory.task
@@ -107,5 +113,5 @@ def _answers(program: Program, x: np.ndarray, trajectory: Trajectory) -> Iterato
             continue
         if refined.converged:
             yield refined
-            if abs(refined.t_end / trajectory.t_end - 1.0) <= _SAME:
+            if _came_back(refined, trajectory):
                 return

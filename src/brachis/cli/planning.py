@@ -90,6 +90,7 @@ def _show(result: Result, data: dict[str, Any]) -> None:
         "iterations": f"{sum(r.iterations for r in attempt.reports)} in {len(attempt.reports)} solves (refined to "
         f"{attempt.collocation_points} collocation points)",
         "wall time": f"{1e3 * result.timing['total']:.0f} ms",
+        "least motion": "off" if result.least_motion is None else result.least_motion.status,
         "worst ratio to a limit": f"{result.verification.worst_ratio:.6f}",
         "path error": f"{result.verification.path_error:.1e} m or rad",
         "verified": "yes" if result.verified else "NO",

@@ -6,8 +6,9 @@ The self-motion of the arm is measured by r linear functions of the joints,
 
 whose rows C (r, n) are transversal to the self-motion along the reference q_ref(s): J_aug = [J; C] is regular there,
 and as far around it as its least singular value stays away from zero. Where one C does for the whole path, it is
-constant and p = 0. The decomposition of the paper is the case of rows of C that each select a joint, with the closed form in
-place of Newton's method (`closed_form`). With xi = dz/ds, e = C' q - p' and e' = C'' q - p'' (derivatives by s alone):
+constant and p = 0. The decomposition of the paper is the case of rows of C that each select a joint, with the closed
+form in place of Newton's method (`closed_form`). With xi = dz/ds and derivatives by s alone, e = C' q - p' and
+e' = C'' q - p'':
 
     G = dq/dy       = J_aug^-1 [xi, 0; -e, I]
     qdot            = G ydot
@@ -91,6 +92,10 @@ class ChartMap:
         self.s, self.reference = s, reference
         self.start = np.asarray(reference[0])
         self._newton = Newton(task_map)
+        jacobian = self._newton.placed(reference)[1]
+        least = np.linalg.svd(np.concatenate([jacobian, rows.at(s)[0]], axis=1), compute_uv=False)[:, -1]
+        self._typical = float(np.median(least))
+        self._start_margin = float(least[0]) / self._typical
         self._last: JointState | None = None
 
     @property
@@ -223,13 +228,11 @@ class ChartMap:
 
     def start_margins(self) -> np.ndarray:
         """See `JointMap`."""
-        jacobian = self.task_map.jacobian(self.task_map.twists(self.reference[:1]))
-        augmented = np.concatenate([jacobian, self.rows.at(self.s[:1])[0]], axis=1)
-        return np.asarray(np.linalg.svd(augmented, compute_uv=False)[0, -1:])
+        return np.array([self._start_margin])
 
     def margins(self, state: ChartState) -> np.ndarray:
-        """See `JointMap`: the least singular value of J_aug, (K, 1)."""
-        return _least_singular(state.inverse)[0][:, None]
+        """See `JointMap`: the least singular value of J_aug, (K, 1), as a part of its median along the reference."""
+        return _least_singular(state.inverse)[0][:, None] / self._typical
 
     def margin_gradient(self, state: ChartState) -> tuple[np.ndarray, np.ndarray]:
         """See `JointMap`: for singular vectors u and v of the least singular value it changes by u^T dJ_aug v."""
@@ -238,7 +241,8 @@ class ChartMap:
         m = self.task_map.m
         moved = self.task_map.derivatives(state.twists, v, np.zeros_like(v)).velocity_q
         by_s = np.einsum("ki,kij,kj->k", u[:, m:], state.rows[1], v)
-        return np.einsum("ki,kij->kj", u[:, :m], moved)[:, None], by_s[:, None]
+        by_q = np.einsum("ki,kij->kj", u[:, :m], moved)
+        return by_q[:, None] / self._typical, by_s[:, None] / self._typical
 
 
 def _least_singular(inverse: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -13,12 +13,12 @@ d/dydot = p_v G + p_a dqddot/dydot and d/dyddot = p_a G, with G and the rest fro
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from brachis.kinematics import JointMap, JointState
-from brachis.limits import Limit, Role, branch_margin
+from brachis.kinematics import JointDerivatives, JointMap, JointState
+from brachis.limits import Limit, Partials, Role, branch_margin
 from brachis.limits.branch_margin import MARGIN
 from brachis.nlp.chain import by_time, chain, timed
 from brachis.nlp.curves import Boundary, LocalBasis
@@ -74,6 +74,7 @@ class Phase:
         self.jacobian_rows, self.jacobian_columns = layout.jacobian_rows, layout.jacobian_columns
         self._entries: tuple[LocalBasis, list[np.ndarray]] | None = None
         self._last: tuple[bytes, JointState] | None = None
+        self._exact: tuple[JointState, JointDerivatives] | None = None
         self.evaluations = {"states": 0, "jacobians": 0}
 
     def over(self, grid: Grid, boundary: Boundary | None = None) -> Phase:
@@ -231,20 +232,44 @@ class Phase:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `state` does."""
         state = self.state(x)
         self.evaluations["jacobians"] += 1
-        exact = self.joint_map.derivatives(state)
-        bases = [timed(basis, x[0]) for basis in self._bases(x)]
-        slopes = np.hstack(timed(self.grid.slopes(x[self._lengths], self._control_points(x)), x[0]))
-        entries: list[np.ndarray] = []
-        for limit in self.limits:
-            by = chain(limit.partials(state), state, exact)
-            entries.append(by_time(by, state).ravel() / -x[0])
-            for j, (places, basis) in enumerate(zip(self._places, bases, strict=True)):
-                parts = (part[places.point, :, j] * values[:, None] for part, values in zip(by, basis, strict=True))
-                entries.append(sum(parts, start=np.zeros(())).ravel())
-            entries.append((np.concatenate(by, axis=2)[self.grid.point] @ slopes[:, :, None]).ravel())
+        entries = [part.ravel() for part in self._chained([limit.partials(state) for limit in self.limits], x)]
         steps = len(x[self._s][1:])
         ones = np.ones(len(self.grid.lower))
         return np.concatenate([*entries, np.full(steps, -1.0), np.ones(steps), ones])
+
+    def gradient(self, partials: Partials, x: np.ndarray) -> np.ndarray:
+        """Gradient, (v,), of a sum over the collocation points; raises UnreachableError as `state` does.
+
+        Parameters
+        ----------
+        partials : Partials
+            Of its terms with respect to the joints, one term a point: (K, 1, n).
+        x : (v,) ndarray
+        """
+        of_curves = [place.variable + part.start for place, part in zip(self._places, self.slices, strict=True)]
+        of_time, of_lengths = np.zeros(len(self.t_norm), dtype=int), self.grid.variable + self._lengths.start
+        slopes = np.concatenate([part.ravel() for part in self._chained([partials], x)])
+        return np.bincount(np.concatenate([of_time, *of_curves, of_lengths]), slopes, self.variables)
+
+    def _chained(self, functions: Sequence[Partials], x: np.ndarray) -> Iterator[np.ndarray]:
+        """Differentiate each function of the joint motion by T, each curve's variables and h, (places, c) each."""
+        state, exact = self.state(x), self._derivatives(x)
+        bases = [timed(basis, x[0]) for basis in self._bases(x)]
+        slopes = np.hstack(timed(self.grid.slopes(x[self._lengths], self._control_points(x)), x[0]))
+        for partials in functions:
+            by = chain(partials, state, exact)
+            yield by_time(by, state) / -x[0]
+            for j, (places, basis) in enumerate(zip(self._places, bases, strict=True)):
+                parts = (part[places.point, :, j] * values[:, None] for part, values in zip(by, basis, strict=True))
+                yield sum(parts, start=np.zeros(()))
+            yield np.concatenate(by, axis=2)[self.grid.point] @ slopes[:, :, None]
+
+    def _derivatives(self, x: np.ndarray) -> JointDerivatives:
+        """Differentiate the state at x; kept until x changes, as the state is."""
+        state = self.state(x)
+        if self._exact is None or self._exact[0] is not state:
+            self._exact = state, self.joint_map.derivatives(state)
+        return self._exact[1]
 
     def _bases(self, x: np.ndarray) -> list[np.ndarray]:
         """Basis functions of every curve's free variables, (3, z) each; computed anew where the grid's change."""

@@ -1,6 +1,6 @@
-"""The nonlinear program: minimum end time of a motion in phases.
+"""The nonlinear program: the best motion in phases, by an objective that is the end time unless said otherwise.
 
-    minimise    t_E = sum of the phases' durations
+    minimise    objective(x), for example t_E = sum of the phases' durations
     over        x = the variables of the first phase, then of the second, ...
     subject to  lower <= rows(x) <= upper,   x_lower <= x <= x_upper
 
@@ -19,6 +19,7 @@ from brachis.kinematics import JointState
 from brachis.limits import Bound, Limit, Role
 from brachis.nlp.link import Link
 from brachis.nlp.motion import Motion
+from brachis.nlp.objective import EndTime, Objective
 from brachis.nlp.phase import Phase
 
 
@@ -29,11 +30,14 @@ class Program:
     ----------
     phases : iterable of Phase
     links : sequence of Link, optional
+    objective : Objective, optional
+        What is minimised; the end time.
 
     Attributes
     ----------
     phases : tuple of Phase
     links : tuple of Link
+    minimised : Objective
     x_lower, x_upper : (v,) ndarray
     lower, upper : (c,) ndarray
         Bounds of the rows.
@@ -41,13 +45,14 @@ class Program:
         Fixed sparsity pattern; each place occurs once.
     """
 
-    def __init__(self, phases: Iterable[Phase], links: Sequence[Link] = ()) -> None:
-        self.phases, self.links = tuple(phases), tuple(links)
+    def __init__(self, phases: Iterable[Phase], links: Sequence[Link] = (), objective: Objective | None = None) -> None:
+        self.phases, self.links, self.minimised = tuple(phases), tuple(links), objective or EndTime()
         first = np.cumsum([0, *(phase.variables for phase in self.phases)]).tolist()
         self._parts = [slice(a, b) for a, b in itertools.pairwise(first)]
         self._durations = first[:-1]
         self.x_lower = np.concatenate([phase.x_lower for phase in self.phases])
         self.x_upper = np.concatenate([phase.x_upper for phase in self.phases])
+        self.x_upper[self._durations] = self.minimised.longest
         joined = np.zeros(sum(len(link.joints) for link in self.links))
         self.lower = np.concatenate([*(phase.lower for phase in self.phases), joined])
         self.upper = np.concatenate([*(phase.upper for phase in self.phases), joined])
@@ -89,14 +94,16 @@ class Program:
         return x
 
     def objective(self, x: np.ndarray) -> float:
-        """Value to be minimised: the end time, s."""
-        return self.end_time(x)
+        """Value to be minimised; raises UnreachableError as `states` does where it depends on the joints."""
+        return float(sum(self.minimised.value(phase, part) for phase, part in self.split(x)))
 
-    def gradient(self) -> np.ndarray:
-        """Gradient of the objective (constant)."""
-        unit = np.zeros(self.variables)
-        unit[self._durations] = 1.0
-        return unit
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """Gradient of the objective, (v,); raises as `objective` does."""
+        return np.concatenate([self.minimised.gradient(phase, part) for phase, part in self.split(x)])
+
+    def minimising(self, objective: Objective) -> Program:
+        """Return the same program with another objective."""
+        return Program(self.phases, self.links, objective)
 
     def states(self, x: np.ndarray) -> list[JointState]:
         """Joint motion of every phase at its collocation points.
@@ -144,8 +151,8 @@ class Program:
         return np.concatenate([phase.variables_from(motion) for phase, motion in pairs])
 
     def with_phases(self, phases: Iterable[Phase]) -> Program:
-        """Return the program with other phases for the present ones, linked as they are."""
-        return Program(phases, self.links)
+        """Return the program with other phases for the present ones, all else as it is."""
+        return Program(phases, self.links, self.minimised)
 
     def resampled(self, t_norm: Sequence[np.ndarray]) -> Program:
         """Return the same program with other collocation points of every phase; see `Phase.resampled`."""

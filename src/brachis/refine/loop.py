@@ -38,12 +38,15 @@ class RefinementOptions:
         Solves after the first one; with 0 the first answer is left as it is.
     deadline : Deadline
         No solve is begun after it.
+    longest : float
+        End time beyond which it is not lengthened, s.
     """
 
     tolerance: float = 1e-4
     density: int = 10
     max_rounds: int = 10
     deadline: Deadline = NEVER
+    longest: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,8 @@ def refine(program: Program, first: SolverReport, solve: Solve, options: Refinem
     for _ in range(options.max_rounds):
         answer = reports[-1].x
         violation, places = violations(dense, answer, goal)
-        x, remaining = _time_scaled(dense, answer, violation, goal, options.tolerance)
+        longest = min(program.end_time(answer) * (1.0 + options.tolerance), options.longest)
+        x, remaining = _time_scaled(dense, answer, violation, goal, longest)
         if remaining <= goal:
             return Refined(program, tuple(reports), x, remaining, program.end_time(x) / program.end_time(answer))
         extended = [merged(phase, extra) for phase, extra in zip(program.phases, places, strict=True)]
@@ -119,7 +123,8 @@ def refine(program: Program, first: SolverReport, solve: Solve, options: Refinem
         reports.append(report)
     answer = reports[-1].x
     violation, _ = violations(dense, answer, goal)
-    x, remaining = _time_scaled(dense, answer, violation, goal, _LONGEST if options.max_rounds else 0.0)
+    longest = min(program.end_time(answer) * (1.0 + (_LONGEST if options.max_rounds else 0.0)), options.longest)
+    x, remaining = _time_scaled(dense, answer, violation, goal, longest)
     return Refined(program, tuple(reports), x, remaining, program.end_time(x) / program.end_time(answer))
 
 
@@ -129,14 +134,13 @@ def _still_good(report: SolverReport, before: SolverReport) -> bool:
 
 
 def _time_scaled(
-    dense: Program, x: np.ndarray, violation: float, goal: float, largest: float
+    dense: Program, x: np.ndarray, violation: float, goal: float, longest: float
 ) -> tuple[np.ndarray, float]:
-    """Lengthen the time by a fraction of up to `largest` where that brings the violation to the goal.
+    """Lengthen the time to `longest`, s, at most where that brings the violation to the goal.
 
     A longer time relieves torques that only accelerate by twice its own fraction, velocities by as much; those that
     gravity or friction add to by less. So this is tried, not trusted.
     """
-    longest = dense.end_time(x) * (1.0 + largest)
     while goal < violation:
         factor = 1.0 + violation - 0.5 * goal
         if not dense.end_time(x) * factor <= longest:

@@ -18,7 +18,9 @@ from brachis.search.phase_plane import least_time
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.starts import PIECES, fine_places, lattice_starts, smoothed
 
-_FINER, _DENSER = 2, 2.0
+_FINER = 2
+_HOPELESS = 3.0
+"""Joint paths whose estimated time is so many times the least one are left out."""
 
 
 def chart_starts(
@@ -42,26 +44,26 @@ def chart_starts(
     list of Start or DeadEnd
         Those with the least estimated times first; empty where the time was up.
     """
-    seed, most = problem.task.search.seed, level.joint_paths
-    cells, nodes = level.cells_per_turn, level.nodes
-    found = PostureLattice(
-        problem, decompositions, cells_per_turn=cells, nodes=nodes, seed=seed, deadline=deadline
-    ).joint_paths(most)
-    if isinstance(found, DeadEnd):
-        found = PostureLattice(
+    for finer in (1, _FINER):
+        lattice = PostureLattice(
             problem,
             decompositions,
-            cells_per_turn=_FINER * cells,
-            density=_DENSER,
-            nodes=_FINER * nodes,
-            seed=seed,
+            cells_per_turn=finer * level.cells_per_turn,
+            density=float(finer),
+            nodes=finer * level.nodes // 2,
+            only_minima=level.only_minima,
+            seed=problem.task.search.seed,
             deadline=deadline,
-        ).joint_paths(most)
+        )
+        found = lattice.joint_paths(level.joint_paths)
+        if not isinstance(found, DeadEnd):
+            break
     if isinstance(found, DeadEnd):
         return found
     newton = Newton(problem.task_map)
     starts = (_start_along(newton, joint_path, f"lattice {number}") for number, joint_path in enumerate(found, 1))
-    return sorted((start for start in starts if start is not None), key=lambda start: start.estimate)
+    ranked = sorted((start for start in starts if start is not None), key=lambda start: start.estimate)
+    return [start for start in ranked if start.estimate <= _HOPELESS * ranked[0].estimate or start is ranked[0]]
 
 
 def _start_along(newton: Newton, joint_path: JointPath, origin: str) -> Start | None:

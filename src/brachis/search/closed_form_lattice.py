@@ -144,4 +144,4 @@ class ClosedFormLattice(Lattice):
         if not held.any():
             return refused | ({OTHER_BRANCH: int((~clear).sum())} if not clear.all() else {})
         kept = layer[np.flatnonzero(clear)[held]]
-        return kept if self._cells.r <= 1 else kept.bounded(self._nodes, self._robot, self.problem.limits)
+        return kept if self._cells.r <= 1 else kept.bounded(self._nodes, kept.length, self._robot, self.problem.limits)

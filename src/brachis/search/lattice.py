@@ -128,6 +128,10 @@ class Lattice(ABC):
             JointPath(self.problem, self.s, joint_path, float(length), int(branch))
             for branch, joint_path, length in zip(branches, q, lengths, strict=True)
         ]
+        return self._chosen(found, layers[-1][ends], most)
+
+    def _chosen(self, found: list[JointPath], _ends: Layer, most: int) -> list[JointPath]:
+        """Choose up to `most` of the joint paths found, which end at these nodes: some that differ."""
         return distinct(found, most)
 
     def _ends(self, last: Layer) -> np.ndarray:

@@ -43,11 +43,11 @@ class Layer:
         """Return some of the nodes, by index or mask."""
         return Layer(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
-    def bounded(self, most: int, robot: Robot, limits: Sequence[Limit]) -> Layer:
-        """Keep `most` nodes: half of them the nearest, the others far from each other and from those."""
+    def bounded(self, most: int, cost: np.ndarray, robot: Robot, limits: Sequence[Limit]) -> Layer:
+        """Keep `most` nodes: half of them those of least `cost`, (K,), the others far from each other and from those."""
         if len(self.branch) <= most:
             return self
-        order = np.argsort(self.length, kind="stable")
+        order = np.argsort(cost, kind="stable")
         half = most // 2
         nearest, others = self[order[:half]], self[order[half:]]
         # Farthest points: each further node is the one that is farthest from all that are kept.

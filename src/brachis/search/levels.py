@@ -26,6 +26,8 @@ class SearchLevel:
         Plans that are refined and verified at most, as long as they may beat the best one.
     cells_per_turn, nodes : int
         Of the lattice.
+    only_minima : bool
+        Whether of the lattice of all postures only joint paths of locally least length are taken.
     last_resort : bool
         Whether it is gone through only while no motion is verified.
     """
@@ -38,6 +40,7 @@ class SearchLevel:
     refined: int
     cells_per_turn: int
     nodes: int
+    only_minima: bool = True
     last_resort: bool = False
 
 
@@ -49,10 +52,26 @@ _LEVELS = {
         6, polynomial=False, joint_paths=4, numeric=0, plans=24, refined=4, cells_per_turn=72, nodes=120
     ),
     "thorough": SearchLevel(
-        20, polynomial=True, joint_paths=8, numeric=8, plans=100, refined=12, cells_per_turn=96, nodes=300
+        20,
+        polynomial=True,
+        joint_paths=8,
+        numeric=8,
+        plans=100,
+        refined=12,
+        cells_per_turn=96,
+        nodes=300,
+        only_minima=False,
     ),
     "exhaustive": SearchLevel(
-        10_000, polynomial=True, joint_paths=30, numeric=8, plans=10_000, refined=40, cells_per_turn=144, nodes=600
+        10_000,
+        polynomial=True,
+        joint_paths=30,
+        numeric=8,
+        plans=10_000,
+        refined=40,
+        cells_per_turn=144,
+        nodes=600,
+        only_minima=False,
     ),
 }
 

@@ -20,7 +20,7 @@ from brachis.kinematics import Newton, null_spaces
 from brachis.problem import Decomposition, Problem
 from brachis.robot.joint_space import TURN
 from brachis.search.cells import Cells
-from brachis.search.joint_path import NO_ANSWER, beyond_ranges, causes_of
+from brachis.search.joint_path import NO_ANSWER, JointPath, beyond_ranges, causes_of, distinct
 from brachis.search.lattice import LARGEST_STEP, Lattice, shortest
 from brachis.search.layer import Layer
 
@@ -30,6 +30,7 @@ _STEPS, _RANDOM, _SPREAD = (1.0, 4.0), 6, 2.5  # cells
 _COARSE, _SAME = 0.5, 1e-3  # rad or m
 _ALONG = 0.7
 """Least part of a step that is self-motion; postures across a fold of the manifold differ in other directions."""
+_AROUND = 3.0  # cells
 _STARTS = 4  # times the nodes of a layer
 _DRAWN = 10.0
 """Reach of what is drawn for joints without ranges, rad or m."""
@@ -45,6 +46,8 @@ class PostureLattice(Lattice):
         Whose closed forms give the first layer where neither end is given.
     cells_per_turn : int, optional
         Cells of a turn of a revolute joint; a metre of a prismatic joint has a third as many.
+    only_minima : bool, optional
+        Whether of one redundant joint only joint paths of locally least length are taken.
     density, nodes, seed, deadline
         See `Lattice`.
     """
@@ -57,10 +60,12 @@ class PostureLattice(Lattice):
         cells_per_turn: int = 72,
         density: float = 1.0,
         nodes: int = 120,
+        only_minima: bool = True,
         seed: int = 0,
         deadline: Deadline = NEVER,
     ) -> None:
         super().__init__(problem, problem.robot.revolute, density=density, nodes=nodes, seed=seed, deadline=deadline)
+        self._only_minima = only_minima
         self._decompositions, self._cells_per_turn = decompositions, cells_per_turn
         revolute = problem.robot.revolute
         self._r = problem.robot.n - problem.task_map.m
@@ -72,6 +77,19 @@ class PostureLattice(Lattice):
         """See `Lattice`."""
         assert self.problem.end is not None  # noqa: S101
         return np.asarray(np.abs(last.q - self.problem.end).max(axis=1) < _SAME)
+
+    def _chosen(self, found: list[JointPath], ends: Layer, most: int) -> list[JointPath]:
+        """See `Lattice`: those that are no longer than any to a node around theirs, then others that differ.
+
+        Of several redundant joints the nodes are samples, among which there are no such minima.
+        """
+        if self._r > 1:
+            return distinct(found, max(1, most // self._r))
+        apart = self._step(ends.q[:, None], ends.q[None]) / self._size
+        around = np.all(np.abs(apart) < _AROUND, axis=2)
+        least = np.where(around, ends.length, np.inf).min(axis=1) >= ends.length
+        minima = [joint_path for joint_path, is_one in zip(found, least, strict=True) if is_one][:most]
+        return minima if self._only_minima else minima + distinct(found, most - len(minima))
 
     def _first_layer(self, rng: np.random.Generator) -> Layer | dict[str, int]:
         """See `Lattice`."""
@@ -184,7 +202,11 @@ class PostureLattice(Lattice):
         single = [sign * step * row for row in np.eye(self._r) for step in _STEPS for sign in (-1.0, 1.0)]
         offsets = np.vstack([np.zeros((1, self._r)), single, rng.normal(0.0, _SPREAD, (_RANDOM, self._r))])
         aside = np.einsum("kij,oj->koi", null, offsets) * self._size
-        parent = np.repeat(np.arange(len(q)), len(offsets))
+        if self._to_end:  # one more: a part of the way to the given end
+            left = self.problem.end - q
+            homing = np.einsum("kir,kjr,kj->ki", null, null, left) / max(1, len(self.s) - station)
+            aside = np.concatenate([aside, homing[:, None]], axis=1)
+        parent = np.repeat(np.arange(len(q)), aside.shape[1])
         begun = ((q + needed)[:, None] + aside).reshape(len(parent), -1)
         rows = np.swapaxes(null, 1, 2)[parent]
         found = self._met(begun, rows, _product(rows, begun), station)
@@ -201,7 +223,10 @@ class PostureLattice(Lattice):
         if not held.any():
             return refused
         kept = layer[held]
-        return kept if self._r <= 1 else kept.bounded(self._nodes, self._robot, self.problem.limits)
+        if self._r <= 1:
+            return kept
+        left = self._lengths(kept.q, self.problem.end - kept.q, np.arange(len(kept.q))) if self._to_end else 0.0
+        return kept.bounded(self._nodes, kept.length + left, self._robot, self.problem.limits)
 
 
 def _layer(q: np.ndarray) -> Layer:

@@ -20,7 +20,7 @@ from brachis.nlp.guess import fitted, shortest_time
 from brachis.problem import Problem, phase_in
 from brachis.refine import Solve
 from brachis.search.solving import HELD_BACK, MARGINS, continued
-from brachis.solvers import SolverReport
+from brachis.solvers import SolverReport, SolveStatus
 
 _TRANSVERSAL = 0.5
 """Least transversality along the motion with which a chart is kept."""
@@ -55,6 +55,9 @@ def solved_in_chart(problem: Problem, program: Program, x: np.ndarray, solve: So
     """
     first, further = MARGINS[:1], MARGINS[1:]
     program, reports = continued(program, x, solve, first)
+    if not reports[-1].status.usable and reports[-1].status is not SolveStatus.TIME_LIMIT:
+        program, more = continued(program, x, solve, further)
+        reports += more
     for _ in range(_RECENTRINGS):
         if not reports[-1].status.usable or _follows(program, reports[-1].x):
             break

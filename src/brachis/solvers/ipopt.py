@@ -11,7 +11,7 @@ from brachis.errors import UnreachableError
 from brachis.solvers.apart import apart_if_large
 from brachis.solvers.one_at_a_time import one_at_a_time
 from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
-from brachis.solvers.watch import Watch, from_finite_numbers
+from brachis.solvers.watch import Watch, from_finite_numbers, objective_at
 
 name = "ipopt"
 
@@ -36,10 +36,15 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
     import ipyopt  # noqa: PLC0415  (a solver is imported when it is used)
 
     watch = Watch(problem, options, progress)
-    gradient = problem.gradient()
 
-    def objective_gradient(_x: np.ndarray, out: np.ndarray) -> None:
-        out[:] = gradient
+    def objective(point: np.ndarray) -> float:
+        return objective_at(problem, point, np.nan)
+
+    def objective_gradient(point: np.ndarray, out: np.ndarray) -> None:
+        try:
+            out[:] = watch.gradient(point)
+        except UnreachableError:
+            out[:] = np.nan
 
     def rows(point: np.ndarray, out: np.ndarray) -> None:
         try:
@@ -66,7 +71,7 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
         np.clip(problem.upper, -_INFINITY, _INFINITY),
         (problem.jacobian_rows, problem.jacobian_columns),
         (np.array([], dtype=int), np.array([], dtype=int)),
-        problem.objective,
+        objective,
         objective_gradient,
         rows,
         jacobian,

@@ -43,11 +43,11 @@ class Problem(Protocol):
     jacobian_columns: np.ndarray
 
     def objective(self, x: np.ndarray) -> float:
-        """Value to be minimised."""
+        """Value to be minimised; raises UnreachableError where it does not exist."""
         ...
 
-    def gradient(self) -> np.ndarray:
-        """Gradient of the objective."""
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """Gradient of the objective; raises UnreachableError as `objective` does."""
         ...
 
     def rows(self, x: np.ndarray) -> np.ndarray:
@@ -70,11 +70,17 @@ class SolverOptions:
     max_iterations : int
     time_limit : float
         s.
+    progress : float
+        Relative change of the objective over the last feasible iterates below which a solve has stagnated.
+    patience : int
+        How many iterates these are.
     """
 
     tolerance: float = 1e-6
     max_iterations: int = 300
     time_limit: float = 20.0
+    progress: float = 1e-6
+    patience: int = 15
 
 
 @dataclass(frozen=True)
@@ -88,7 +94,7 @@ class SolverReport:
         Judged by the residuals below, not by the backend's word alone.
     x : (v,) ndarray
     objective : float
-        s.
+        s, where it is the end time; infinite if `x` cannot be evaluated.
     violation : float
         Largest violation of rows and bounds, recomputed by brachis; infinite if `x` cannot be evaluated.
     multipliers : (c,) ndarray

@@ -8,7 +8,7 @@ from scipy import sparse
 from brachis.errors import UnreachableError
 from brachis.solvers.apart import apart_if_large
 from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
-from brachis.solvers.watch import Watch, from_finite_numbers
+from brachis.solvers.watch import Watch, from_finite_numbers, objective_at
 
 name = "slsqp"
 
@@ -49,19 +49,22 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
         dense = sparse.coo_array((entries, (problem.jacobian_rows, problem.jacobian_columns)), shape=shape).toarray()
         return np.concatenate([dense[below], -dense[above]])
 
+    def objective(point: np.ndarray) -> float:
+        return objective_at(problem, point, objective_at(problem, last))  # the rows say how bad an unreachable point is
+
     def callback(point: np.ndarray) -> None:
         last[:] = point
-        if watch.between_iterations(problem.objective(point)):
+        if watch.between_iterations(objective(point)):
             raise _StopSolveError
 
     try:
         with watch:
             watch.rows(x)  # from a start that cannot be evaluated there is nothing to back off to
             result = minimize(  # type: ignore[call-overload]  # the stubs know neither Bounds nor this callback
-                problem.objective,
+                objective,
                 x,
                 method="SLSQP",
-                jac=lambda _x: problem.gradient(),
+                jac=watch.gradient,
                 bounds=Bounds(problem.x_lower, problem.x_upper),
                 constraints=[{"type": "ineq", "fun": rows, "jac": jacobian}],
                 callback=callback,
@@ -95,6 +98,6 @@ def _is_stationary(problem: Problem, x: np.ndarray) -> bool:
     lower = np.concatenate([problem.lower, problem.x_lower])
     upper = np.concatenate([problem.upper, problem.x_upper])
     pushing = np.vstack([slopes[values <= lower + _ACTIVE], -slopes[values >= upper - _ACTIVE]])
-    gradient = problem.gradient()
+    gradient = problem.gradient(x)
     _, distance = nnls(pushing.T, gradient) if len(pushing) else (None, np.linalg.norm(gradient))
     return bool(distance <= _STATIONARY * np.linalg.norm(gradient))

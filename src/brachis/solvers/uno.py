@@ -14,7 +14,7 @@ import numpy as np
 from brachis.solvers.apart import apart_if_large
 from brachis.solvers.one_at_a_time import one_at_a_time
 from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
-from brachis.solvers.watch import Watch, from_finite_numbers
+from brachis.solvers.watch import Watch, from_finite_numbers, objective_at
 
 name = "uno"
 
@@ -76,7 +76,7 @@ class _Stall:
     def __call__(self, point: np.ndarray, *rest: object) -> bool:
         *_, infeasibility, stationarity, _complementarity = rest
         problem = self._watch.problem
-        objective = problem.objective(point[: len(problem.x_lower)])  # in restoration Uno appends elastic variables
+        objective = objective_at(problem, point[: len(problem.x_lower)])  # in restoration Uno appends elastic variables
         self._objectives.append(objective)
         stop = self._watch.between_iterations(objective) or self._watch.iterations >= self._watch.options.max_iterations
         stop = self._watch.has_settled(objective, infeasibility) or stop  # type: ignore[arg-type]
@@ -99,10 +99,9 @@ def _run(watch: Watch, x: np.ndarray, radius: float, terminate: _Stall) -> Any: 
     model = unopy.Model(
         unopy.PROBLEM_NONLINEAR, len(x), problem.x_lower.tolist(), problem.x_upper.tolist(), unopy.ZERO_BASED_INDEXING
     )
-    gradient = problem.gradient()
 
-    def objective_gradient(_x: np.ndarray, out: np.ndarray) -> None:
-        out[:] = gradient
+    def objective_gradient(point: np.ndarray, out: np.ndarray) -> None:
+        out[:] = watch.gradient(point)
 
     def rows(point: np.ndarray, out: np.ndarray) -> None:
         out[:] = watch.rows(point)
@@ -110,7 +109,7 @@ def _run(watch: Watch, x: np.ndarray, radius: float, terminate: _Stall) -> Any: 
     def jacobian(point: np.ndarray, out: np.ndarray) -> None:
         out[:] = watch.jacobian(point)
 
-    model.set_objective(unopy.MINIMIZE, problem.objective, objective_gradient)
+    model.set_objective(unopy.MINIMIZE, watch.objective, objective_gradient)
     model.set_constraints(
         len(problem.lower),
         rows,

@@ -6,6 +6,7 @@ import functools
 import signal
 import threading
 import time
+from collections.abc import Callable
 from typing import Any, Self
 
 import numpy as np
@@ -16,8 +17,6 @@ from brachis.solvers.protocol import Problem, Progress, Solve, SolverOptions, So
 
 _EVALUATIONS = 10
 """Evaluations for each iteration allowed, on average: a solver that needs more cannot leave a point out of reach."""
-_STAGNATED_ITERATIONS = 15
-_STAGNATED_PROGRESS = 1e-6
 _LARGEST = 1e30
 """Backends multiply what they get: the square of a larger number may overflow, and end the interpreter."""
 _FEASIBLE = 10.0
@@ -95,9 +94,9 @@ class Watch:
         within which a solver wanders without ever seeing its conditions of optimality hold.
         """
         self._feasible = [*self._feasible, objective] if infeasibility <= self.options.tolerance else []
-        recent = self._feasible[-_STAGNATED_ITERATIONS:]
+        recent = self._feasible[-self.options.patience :]
         spread = max(recent, default=0.0) - min(recent, default=0.0)
-        self.stagnated = len(recent) == _STAGNATED_ITERATIONS and spread <= _STAGNATED_PROGRESS * abs(objective)
+        self.stagnated = len(recent) == self.options.patience and spread <= self.options.progress * abs(objective)
         return self.stagnated
 
     def must_stop(self) -> bool:
@@ -105,6 +104,14 @@ class Watch:
         self.timed_out = self.timed_out or self.elapsed > self.options.time_limit
         self.exhausted = self._evaluations > _EVALUATIONS * self.options.max_iterations
         return self.timed_out or self.exhausted or self.interrupt is not None
+
+    def objective(self, x: np.ndarray) -> float:
+        """Objective at x, finite; raises UnreachableError else."""
+        return float(self._finite(self.problem.objective, x))
+
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """Gradient of the objective at x, finite; raises UnreachableError else."""
+        return self._finite(self.problem.gradient, x)
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Rows at x, all finite; raises UnreachableError else, and everywhere once the solve has to stop."""
@@ -114,22 +121,25 @@ class Watch:
         """Jacobian entries at x; raises as `rows` does."""
         return self._evaluate(self.problem.jacobian, x)
 
-    def _evaluate(self, function: object, x: np.ndarray) -> np.ndarray:
+    def _evaluate(self, function: Callable[[np.ndarray], Any], x: np.ndarray) -> np.ndarray:
         if self._handler is not None:  # a backend may have put a handler of its own in place since
             signal.signal(signal.SIGINT, self._during)
         if self.must_stop():
             raise UnreachableError("the solve has to stop")
         self._evaluations += 1
+        return self._finite(function, x)
+
+    def _finite(self, function: Callable[[np.ndarray], Any], x: np.ndarray) -> np.ndarray:
         if not _usable(x):
             raise UnreachableError("the solver asked for a point that is not finite")
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # what comes of it is looked at
-                values = np.asarray(function(np.array(x)))  # type: ignore[operator]
+                values = np.asarray(function(np.array(x)))
         except KeyboardInterrupt as interrupt:
             self.interrupt = interrupt
             raise UnreachableError("the solve has to stop") from interrupt
         if not _usable(values):
-            raise UnreachableError("a row or a slope is not a finite number there")
+            raise UnreachableError("a value or a slope is not a finite number there")
         return values
 
     def report(
@@ -160,7 +170,7 @@ class Watch:
             solver=solver,
             status=status,
             x=x,
-            objective=self.problem.objective(x),
+            objective=objective_at(self.problem, x),
             violation=violation,
             multipliers=np.zeros(len(self.problem.lower)) if multipliers is None else multipliers,
             iterations=self.iterations,
@@ -193,7 +203,7 @@ def ended(
         solver,
         status,
         x,
-        problem.objective(x),
+        objective_at(problem, x),
         residual(problem, x),
         none,
         iterations=0,
@@ -219,6 +229,16 @@ def from_finite_numbers(solve: Solve) -> Solve:
 def _usable(values: np.ndarray) -> bool:
     """Tell whether all values are finite, and not so large that products of them are not; NaN is neither."""
     return bool(np.abs(values).max(initial=0.0) <= _LARGEST)
+
+
+def objective_at(problem: Problem, x: np.ndarray, otherwise: float = np.inf) -> float:
+    """Objective at x; another value where x cannot be evaluated."""
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            value = problem.objective(x)
+    except UnreachableError:
+        return otherwise
+    return otherwise if np.isnan(value) else value
 
 
 def residual(problem: Problem, x: np.ndarray) -> float:

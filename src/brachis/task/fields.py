@@ -8,10 +8,11 @@ written ``<like this>`` because they appear in pydantic's error locations; `brac
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Strict
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Strict, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 REFUSED = "brachis_refused"
@@ -32,12 +33,39 @@ class Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, revalidate_instances="always")
 
 
+_PERCENT = re.compile(r"^(100(\.0*)?|[0-9]{1,2}(\.[0-9]*)?) ?%$")
+
+
+def _from_percent(value: object) -> object:
+    """Read ``1 %`` as 0.01."""
+    if not isinstance(value, str):
+        return value
+    percent = _PERCENT.match(value)
+    if percent is None:
+        raise refuse("no share", found=value, allowed="from 0 to 100 %, or a number from 0 to 1")
+    return float(percent[1]) / 100.0
+
+
 # Strict: the string "3" or the boolean true where a number belongs is a slip of the user's, not a number. Whole numbers
 # are accepted as real ones.
 Number = Annotated[float, Strict(), Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Strict(), Field(gt=0)]
 NonNegative = Annotated[float, Strict(), Field(ge=0)]
 Count = Annotated[int, Strict()]
+Share = Annotated[
+    float,
+    BeforeValidator(_from_percent),
+    Strict(),
+    Field(ge=0, le=1),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "minimum": 0, "maximum": 1},
+                {"type": "string", "pattern": _PERCENT.pattern},
+            ]
+        }
+    ),
+]
 Flag = Annotated[bool, Strict()]
 Name = Annotated[str, Strict(), Field(min_length=1)]
 Vector = Annotated[tuple[Number, ...], Field(min_length=1)]

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, JsonValue, Tag, field_validator, model_validator
 
-from brachis.task.fields import Count, Model, Name, Number, Positive, by_form, refuse
+from brachis.task.fields import Count, Flag, Model, Name, Number, Positive, Share, by_form, refuse
 from brachis.task.robot_models import JointValues, RobotSettings
 from brachis.task.segments import Segment
 from brachis.task.tool_limits import ToolLimits
@@ -138,6 +138,21 @@ class SearchSettings(Model):
         description="Time after which the best motion so far is returned, s; one that is not verified where none is.",
     )
     seed: Count = Field(default=0, ge=0, description="Seed of what is drawn at random.")
+    least_motion: Flag = Field(
+        default=True,
+        description="Whether, of motions that are as fast as the fastest one to 1e-4, the calmest one is taken: that "
+        "with the least joint accelerations.",
+    )
+    slower: Share = Field(
+        default=0.0, description="How much slower the calmest motion may be, for example 1 %, or 0.01."
+    )
+
+    @model_validator(mode="after")
+    def _slower_is_for_least_motion(self) -> SearchSettings:
+        if self.slower and not self.least_motion:
+            problem = "a slower motion is of use for least motion alone"
+            raise refuse(problem, key=".slower", found=self.slower, allowed="0, or least_motion: true")
+        return self
 
 
 class SolverSettings(Model):

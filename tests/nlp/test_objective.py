@@ -1,0 +1,66 @@
+"""What a program minimises: values, exact gradients against differences, and bounds on durations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brachis.nlp import LeastAcceleration, Link, Program
+from support.phases import CASES, phase_of, reachable_points
+
+
+def differences(program: Program, x: np.ndarray, h: float = 1e-5) -> np.ndarray:
+    """Central differences of fourth order of the objective."""
+    slopes = []
+    for unit in np.eye(len(x)):
+        near = program.objective(x + h * unit) - program.objective(x - h * unit)
+        far = program.objective(x + 2.0 * h * unit) - program.objective(x - 2.0 * h * unit)
+        slopes.append((8.0 * near - far) / (12.0 * h))
+    return np.array(slopes)
+
+
+def weights_of(case: str) -> np.ndarray:
+    return np.linspace(0.5, 2.0, len(CASES[case][0]))
+
+
+@pytest.mark.parametrize("knots", ["uniform", "free"])
+@pytest.mark.parametrize("case", CASES)
+def test_gradient_of_least_acceleration_equals_differences(case, knots):
+    phase = phase_of(case)
+    if knots == "free":
+        phase = phase.with_free_knots(0.1)
+    program = Program([phase]).minimising(LeastAcceleration(weights_of(case), np.array([5.0])))
+    for x in reachable_points(phase, 2):
+        exact, expected = program.gradient(x), differences(program, x)
+        assert np.count_nonzero(exact) > 0.9 * len(exact)
+        np.testing.assert_allclose(exact, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_phases_add_up():
+    phase = phase_of("r1")
+    first, second = reachable_points(phase, 2)
+    objective = LeastAcceleration(weights_of("r1"), np.array([3.0, 4.0]))
+    both = Program([phase, phase], [Link(0, 1, (2,))], objective)
+    x = np.concatenate([first, second])
+    shares = [objective.value(phase, part) for part in (first, second)]
+    assert both.objective(x) == pytest.approx(sum(shares), rel=1e-14)
+    np.testing.assert_allclose(both.gradient(x), differences(both, x), atol=1e-6 * np.abs(both.gradient(x)).max())
+    np.testing.assert_array_equal(both.x_upper[[0, phase.variables]], [3.0, 4.0])
+    finer = both.resampled([np.linspace(0.0, 1.0, 31)] * 2)
+    assert finer.minimised is objective
+    np.testing.assert_array_equal(finer.x_upper, both.x_upper)
+
+
+def test_value_is_the_mean_square_over_time():
+    phase = phase_of("r1").resampled(np.union1d(np.linspace(0.0, 1.0, 4001), [0.123, 0.1231, 0.7]))
+    weights = weights_of("r1")
+    (x,) = reachable_points(phase, 1)
+    t_norm = np.linspace(0.0, 1.0, 4001)
+    qddot = phase.resampled(t_norm).state(x).qddot
+    expected = np.mean(0.5 * ((qddot[1:] * weights) ** 2 + (qddot[:-1] * weights) ** 2).sum(axis=1))
+    assert LeastAcceleration(weights, np.array([5.0])).value(phase, x) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_program_without_an_objective_minimises_the_end_time_unbounded():
+    phase = phase_of("r1")
+    assert Program([phase]).x_upper[0] == np.inf
