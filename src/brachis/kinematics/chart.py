@@ -38,6 +38,8 @@ from brachis.kinematics.newton import Newton
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
 
+CHART = "chart"
+"""Label in the place of a branch's."""
 _NEAR = 0.4
 """rad or m; the last state tells about postures no farther from it."""
 _SUBSTEPS = 6
@@ -109,7 +111,7 @@ class ChartMap:
     @property
     def branch_label(self) -> str:
         """What the margin is called."""
-        return "chart"
+        return CHART
 
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Value of y = (s, sigma), (1 + r,), in a posture, (n,); NaN in a posture that is not known."""

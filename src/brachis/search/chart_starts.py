@@ -9,7 +9,7 @@ import numpy as np
 from brachis.attempt import Start
 from brachis.deadline import NEVER, Deadline
 from brachis.errors import PathError, UnreachableError
-from brachis.kinematics import ChartMap, ClosedFormMap, Newton, chart_around, null_spaces
+from brachis.kinematics import CHART, ChartMap, ClosedFormMap, Newton, chart_around, null_spaces
 from brachis.problem import Decomposition, Problem
 from brachis.search.joint_path import DeadEnd, JointPath
 from brachis.search.lattice import LARGEST_STEP
@@ -20,7 +20,6 @@ from brachis.search.screening import screened
 from brachis.search.solving import Listener
 from brachis.search.starts import PIECES, fine_places, lattice_starts, smoothed
 
-CHART = "chart"
 _FINER = 2
 _SCREENED, _KEPT = 4, 3
 """So many times the joint paths that a level asks for are looked at; so many at most are planned."""

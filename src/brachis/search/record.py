@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.attempt import Attempt
-from brachis.kinematics import ChartMap
 from brachis.problem import Decomposition
 from brachis.search.joint_path import DeadEnd
 
@@ -105,6 +104,8 @@ class Record:
         """Tell whether an attempt may be faster than the best motion."""
         if self.best is None or not self.content:
             return True
+        if attempt.keeps_knots and self.best.keeps_knots and attempt.in_chart and self.best.in_chart:
+            return attempt.coarse < (1.0 - _WORTH_IT) * self.best.coarse  # what else they gain, both gain
         return attempt.coarse * self._gain < (1.0 - _WORTH_IT) * self.best.t_end
 
     def drop(self, solved: Sequence[Numbered]) -> None:
@@ -161,8 +162,7 @@ def rounded(time: float) -> float:
 def _agree(first: Attempt, second: Attempt) -> bool:
     """Tell whether two attempts of a choice are the same motion."""
     same = (first.redundant_joints, first.branch) == (second.redundant_joints, second.branch)
-    in_charts = isinstance(first.start and first.start.joint_map, ChartMap)
-    near = (_SAME_TIME_IN_CHARTS if in_charts else _SAME_TIME) * second.coarse
+    near = (_SAME_TIME_IN_CHARTS if first.in_chart else _SAME_TIME) * second.coarse
     if not same or abs(first.coarse - second.coarse) > near:
         return False
     postures = []

@@ -35,11 +35,14 @@ def end_checks(trajectory: Trajectory, robot: Robot, options: VerifyOptions) -> 
     """Check that the motion begins and ends as the task says."""
     task = trajectory.task
     checks = []
-    wanted = {"start": (0.0, task.start), "end": (trajectory.t_end, task.end)}
-    for name, (time, posture) in wanted.items():
+    wanted = {
+        "start": (0.0, task.start, options.posture_tolerance),
+        "end": (trajectory.t_end, task.end, options.end_posture_tolerance),
+    }
+    for name, (time, posture, near) in wanted.items():
         if posture != "free":
             miss = np.abs(trajectory.position(time) - robot.posture(posture.joints, f"{name}.joints"))
-            checks.append(_worst_joint(f"{name} posture", miss, options.posture_tolerance, "rad, m", robot, time))
+            checks.append(_worst_joint(f"{name} posture", miss, near, "rad, m", robot, time))
         speed, allowed = np.abs(trajectory.velocity(time)), options.rest_velocity_tolerance
         checks.append(_worst_joint(f"{name} velocity", speed, allowed, "rad/s, m/s", robot, time))
         if task.spline.rest == "full":
