@@ -20,9 +20,7 @@ class VerifyOptions:
     progress_tolerance : float
         Largest backward path velocity (1/s), and largest error of s at the ends (dimensionless).
     posture_tolerance : float
-        Largest error of the start posture, from which the path begins, rad or m.
-    end_posture_tolerance : float
-        Largest error of the end posture, rad or m: it lies on the path no more exactly than it is written down.
+        Largest error of the start and end postures, rad or m.
     rest_velocity_tolerance : float
         Largest joint velocity at the ends, rad/s or m/s.
     rest_acceleration_tolerance : float
@@ -38,7 +36,6 @@ class VerifyOptions:
     points_per_interval: int = 32
     progress_tolerance: float = 1e-9
     posture_tolerance: float = 1e-9
-    end_posture_tolerance: float = 1e-6
     rest_velocity_tolerance: float = 1e-8
     rest_acceleration_tolerance: float = 1e-6
     jump_tolerance: float = 1e-6
