@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import signal
 import sys
+import time
+from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 _TESTS = Path(__file__).resolve().parent
 _LONG = ("test_readme.py", "test_random_poses.py", "test_random_lines.py", "test_fuzz.py", "test_auto_on_robots.py")
 """Tests of these files take up to a minute each: they come first, so that no worker is left alone with one at last."""
+_WITH_DEADLINES = ("brachis.deadline", "brachis.solvers.watch", "brachis.bottleneck.reference")
+"""Modules that look at the clock to see whether the time is up."""
 if str(_TESTS) not in sys.path:
     sys.path.append(str(_TESTS))
 
@@ -22,6 +27,23 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Let long tests come first."""
     items.sort(key=lambda item: item.path.name not in _LONG)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _busy_machine_takes_no_time() -> Iterator[None]:
+    """Let deadlines count this process's own time, so that no plan runs out of time because others are at work."""
+    own = SimpleNamespace(monotonic=time.process_time, perf_counter=time.process_time)
+    with pytest.MonkeyPatch.context() as patch:
+        for module in _WITH_DEADLINES:
+            patch.setattr(f"{module}.time", own)
+        yield
+
+
+@pytest.fixture
+def wall_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let deadlines be moments that other processes know, too."""
+    for module in _WITH_DEADLINES:
+        monkeypatch.setattr(f"{module}.time", time)
 
 
 @pytest.fixture(scope="session")

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from brachis.kinematics import ChartMap, ClosedFormMap
+from brachis.kinematics import CHART, ChartMap, ClosedFormMap
 from brachis.nlp import Program
 from brachis.problem import Problem
 from brachis.refine import Refined
 from brachis.solvers import SolverReport
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
+
+
+def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
+    """Say in which coordinates a motion is planned beside s: redundant joints, a chart's own, or none."""
+    return ", ".join(redundant_joints) or (CHART if branch == CHART else "none")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +122,11 @@ class Attempt:
     def usable(self) -> bool:
         """True where there is a first plan that can be finished."""
         return self.program is not None and bool(self.reports) and self.reports[-1].status.usable
+
+    @property
+    def in_chart(self) -> bool:
+        """Whether it is planned in a chart."""
+        return self.start is not None and isinstance(self.start.joint_map, ChartMap)
 
     @property
     def keeps_knots(self) -> bool:

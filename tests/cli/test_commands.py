@@ -170,11 +170,22 @@ def test_lengthened_end_time_is_said(run, task, write, monkeypatch):
         assert ("0.004 % to meet the limits between collocation points" in text) is expected
 
 
-def test_candidates_are_listed(run, task, write):
-    outcome = run("plan", write({**task, "redundant_joints": "auto"}))
-    data = json.loads(run("plan", write({**task, "redundant_joints": "auto"}), "--json").out)
+CHOICES = {
+    "in charts": ({}, {()}, "chart"),
+    "of every choice": ({"search": {"guesses": "numeric"}}, {("j1",), ("j2",), ("j3",)}, "j2"),
+}
+
+
+@pytest.mark.parametrize("case", CHOICES)
+def test_candidates_are_listed(run, task, write, case):
+    more, choices, name = CHOICES[case]
+    outcome = run("plan", write({**task, "redundant_joints": "auto", **more}))
+    data = json.loads(run("plan", write({**task, "redundant_joints": "auto", **more}), "--json").out)
     assert f"candidates ({len(data['candidates'])}" in outcome.out
-    assert {tuple(candidate["redundant_joints"]) for candidate in data["candidates"]} == {("j1",), ("j2",), ("j3",)}
+    assert {tuple(candidate["redundant_joints"]) for candidate in data["candidates"]} == choices
+    rows = outcome.out[outcome.out.index("candidates (") :]
+    assert f"│ {name} " in rows
+    assert "none" not in rows
     first = data["candidates"][0]
     assert first["verified"]
     assert first["t_end"] == data["t_end"]

@@ -28,8 +28,10 @@ def test_every_joint_is_a_curve():
 def test_nothing_guards_it():
     free = DirectJointMap(planar_robot("RRP"), np.zeros(3))
     assert branch_margin.build(free) == ()
-    state = free.state(*(np.zeros((4, 3)) for _ in range(3)))
-    assert free.margins(state).shape == (4, 0)
+    still = np.zeros((4, 3))
+    state = free.state(still, still, still, t=np.linspace(0.0, 1.0, 4))
     by_q, by_s = free.margin_gradient(state)
     assert by_q.shape == (4, 0, 3)
     assert by_s is None
+    assert free.margins(state).shape == (4, 0)
+    assert free.start_margins().shape == (0,)

@@ -159,7 +159,7 @@ def test_what_eaik_might_add_is_said_where_it_is_missing(monkeypatch):
     monkeypatch.setattr("brachis.ik.eaik.installed", lambda: False)
     task = {"start": {"joints": [0.3, -0.5, 0.2, -2.2, 0.3, 1.9, 0.8]}, "task_space": "pose"}
     given = problem(panda(), path=[{"line": {"by": [0.0, 0.05, 0.0]}}], **task)
-    reason = no_motion(decompositions_of(given), [], {"panda_joint4": DeadEnd(0.4, {"the branch ends": 1})})
+    reason = no_motion(given, decompositions_of(given), [], {"panda_joint4": DeadEnd(0.4, {"the branch ends": 1})})
     assert isinstance(reason, PathError)
     assert "EAIK is not installed" in str(reason)
     assert "[panda_joint5], [panda_joint6]" in str(reason)

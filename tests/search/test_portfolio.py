@@ -17,9 +17,13 @@ import pytest
 import brachis
 from brachis import planner
 from brachis.errors import PlanningError, TaskError, UnknownNameError
+from brachis.kinematics import CHART
 from brachis.plots import plot_candidates
-from brachis.search import record, schedule, starts
+from brachis.search import chart_starts, record, schedule, starts
+from brachis.search.closed_form_lattice import ClosedFormLattice
+from brachis.search.joint_path import DeadEnd
 from brachis.search.levels import SEARCH_LEVELS
+from brachis.search.posture_lattice import PostureLattice
 from brachis.solvers import apart, uno
 
 ROOT = Path(__file__).parents[2]
@@ -27,6 +31,9 @@ START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
 FEW_POINTS = {"intervals": 10, "points_per_interval": 1}
 """With so few the limits are exceeded in between by far."""
 HERE = [math.sqrt(3.0), 0.0]
+BRANCH = {"branch": "elbow_positive"}
+"""With a branch asked for, the closed forms of all choices of the redundant joint are searched, not charts."""
+EVERY_CHOICE = {"start": "free", "path_start": HERE, **BRANCH}
 TIMES = ("estimate", "coarse", "t_end")
 
 
@@ -52,13 +59,21 @@ def to_nine_digits(result: brachis.Result) -> list[dict[str, Any]]:
     return [row | {name: float(f"{row[name]:.9g}") for name in TIMES} for row in rows]
 
 
-def test_every_candidate_is_listed_the_fastest_first(robot):
-    result = brachis.plan(robot, task())
+@pytest.mark.parametrize(
+    ("asked", "choices"),
+    [({}, {()}), (EVERY_CHOICE, {("j1",), ("j2",), ("j3",)}), ({"redundant_joints": ["j1"]}, {("j1",)})],
+)
+def test_every_candidate_is_listed_the_fastest_first(robot, asked, choices):
+    result = brachis.plan(robot, task(**asked))
     first = result.candidates[0]
     assert first.verified
     assert first.t_end == result.t_end
-    assert first.redundant_joints == result.trajectory.redundant_joints
-    assert {candidate.redundant_joints for candidate in result.candidates} == {("j1",), ("j2",), ("j3",)}
+    assert first.redundant_joints in {(), result.trajectory.redundant_joints}, "a chart's rows may select joints"
+    assert first.branch == result.trajectory.branch
+    assert {candidate.redundant_joints for candidate in result.candidates} == choices
+    assert len({(candidate.redundant_joints, candidate.origin) for candidate in result.candidates}) == len(
+        result.candidates
+    )
     finished = [candidate for candidate in result.candidates if candidate.verified]
     assert result.t_end == min(candidate.t_end for candidate in finished)
     # Refinement only adds rows: nothing that was left unfinished could have been faster.
@@ -68,9 +83,11 @@ def test_every_candidate_is_listed_the_fastest_first(robot):
     assert len(plot_candidates(result.candidates).axes) == 1
 
 
-def test_the_same_candidates_whatever_the_number_of_processes(robot):
-    one = brachis.plan(robot, task(search={"jobs": 1}))
-    two = brachis.plan(robot, task(search={"jobs": 2}))
+@pytest.mark.usefixtures("wall_clock")
+@pytest.mark.parametrize("asked", [{}, BRANCH])
+def test_the_same_candidates_whatever_the_number_of_processes(robot, asked):
+    one = brachis.plan(robot, task(search={"jobs": 1}, **asked))
+    two = brachis.plan(robot, task(search={"jobs": 2}, **asked))
     assert one.t_end == pytest.approx(two.t_end, rel=1e-9)
     assert to_nine_digits(one) == to_nine_digits(two)
     np.testing.assert_allclose(one.trajectory.control_points, two.trajectory.control_points, atol=1e-7)
@@ -92,6 +109,12 @@ def test_a_free_start_is_faster_and_on_the_path(robot):
     assert free.t_end < 0.9 * given.t_end
     begun = robot.tool_placement(free.trajectory.position(0.0)).translation[:2]
     np.testing.assert_allclose(begun, HERE, atol=1e-9)
+    assert {candidate.branch for candidate in free.candidates} == {CHART}
+
+
+def test_a_free_start_is_on_every_branch(robot):
+    free = brachis.plan(robot, task(start="free", path_start=HERE, redundant_joints=["j1"]))
+    assert free.verified
     labels = {candidate.branch for candidate in free.candidates}
     assert labels == {"elbow_positive", "elbow_negative"}
 
@@ -126,23 +149,36 @@ def test_numeric_guesses_stay_an_option(robot):
     result = brachis.plan(robot, task(search={"guesses": "numeric"}))
     assert result.verified
     assert all(candidate.origin.startswith("numeric") for candidate in result.candidates)
+    assert {candidate.redundant_joints for candidate in result.candidates} == {("j1",), ("j2",), ("j3",)}
 
 
-def test_numeric_guesses_step_in_where_the_lattice_has_no_course(robot, monkeypatch):
-    from brachis.search.joint_path import DeadEnd  # noqa: PLC0415
+class NoPosture:
+    """A lattice that ends halfway."""
 
-    class Nothing:
-        def __init__(self, *_arguments: object, **_options: object) -> None:
-            pass
+    def __init__(self, *_arguments: object, **_options: object) -> None:
+        pass
 
-        def joint_paths(self, _most: int) -> DeadEnd:
-            return DeadEnd(0.5, {"nothing": 1})
+    def joint_paths(self, _most: int) -> DeadEnd:
+        return DeadEnd(0.5, {"nothing": 1})
 
-    monkeypatch.setattr(starts, "Lattice", Nothing)
+
+def test_closed_forms_step_in_where_the_lattice_of_all_postures_has_no_joint_path(robot, monkeypatch):
+    monkeypatch.setattr(chart_starts, "PostureLattice", NoPosture)
     result = brachis.plan(robot, task())
     assert result.verified
+    assert {candidate.redundant_joints for candidate in result.candidates} == {(), ("j1",), ("j2",), ("j3",)}
+    assert result.t_end <= 1.001 * brachis.plan(robot, task(redundant_joints=["j1"])).t_end
+    assert [candidate.status for candidate in result.candidates if not candidate.branch] == ["from s = 0.5 on nothing"]
+
+
+@pytest.mark.parametrize(("asked", "lattices"), [({}, 4), ({"redundant_joints": ["j2"]}, 1)])
+def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(robot, monkeypatch, asked, lattices):
+    monkeypatch.setattr(starts, "ClosedFormLattice", NoPosture)
+    monkeypatch.setattr(chart_starts, "PostureLattice", NoPosture)
+    result = brachis.plan(robot, task(**asked))
+    assert result.verified
     assert result.candidates[0].origin.startswith("numeric")
-    assert sum(candidate.status == "from s = 0.5 on nothing" for candidate in result.candidates) == 3
+    assert sum(candidate.status == "from s = 0.5 on nothing" for candidate in result.candidates) == lattices
 
 
 def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
@@ -150,7 +186,7 @@ def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
 
     def interrupted(*arguments: Any) -> Any:
         calls.append(arguments)
-        if len(calls) == 20:
+        if len(calls) == 8:
             raise KeyboardInterrupt
         return honest(*arguments)
 
@@ -158,13 +194,14 @@ def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
     result = brachis.plan(robot, task(search={"effort": "thorough"}))
     assert result.interrupted
     assert result.verified
-    assert len(calls) == 20
+    assert len(calls) == 8
     calls.clear()
-    calls.extend([()] * 19)
+    calls.extend([()] * 7)
     with pytest.raises(KeyboardInterrupt):
         brachis.plan(robot, task())
 
 
+@pytest.mark.usefixtures("wall_clock")
 def test_a_real_ctrl_c_ends_worker_processes(robot):
     """Pressed as soon as a motion is verified, while another process plans on."""
 
@@ -231,16 +268,38 @@ def test_the_time_limit_gives_the_best_motion_so_far(robot, clock):
     assert result.undone[-1] == "what search.effort asks for was not tried to its end"
 
 
-def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(robot, clock):
+@pytest.mark.parametrize(("asked", "candidates"), [({}, 4), (BRANCH, 8)])
+def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
+    robot, clock, monkeypatch, asked, candidates
+):
+    monkeypatch.setattr(schedule, "_SIZE", 4)
     clock.jump(planner, "solved", at=2)
-    result = brachis.plan(robot, task(spline=FEW_POINTS))
+    result = brachis.plan(robot, task(spline=FEW_POINTS, **asked))
     assert result.interrupted
     assert not result.verified
     assert result.verification.worst_ratio > 1.0
     planned = [candidate.coarse for candidate in result.candidates if math.isfinite(candidate.coarse)]
     assert len(planned) == 2
     assert result.t_end <= 1.01 * min(planned)
-    assert "of 24 candidates 22 not planned, 1 not refined" in result.undone, "two batches of a dozen each"
+    left = f"of {candidates} candidates {candidates - 2} not planned, 1 not refined"
+    assert left in result.undone, "closed forms: two batches of four each"
+
+
+def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(robot, clock):
+    calls = clock.jump(PostureLattice, "_next", at=5)
+    message = r"within the time limit of 60 s: the lattice of all postures was not searched to its end; .*\. Raise"
+    with pytest.raises(PlanningError, match=message):
+        brachis.plan(robot, task())
+    assert len(calls) == 5
+
+
+def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(robot, clock):
+    clock.jump(PostureLattice, "_first_layer", at=2)
+    result = brachis.plan(robot, task(search={"effort": "thorough"}))
+    assert result.verified
+    assert result.interrupted
+    assert "the lattice of all postures was not searched to its end" in result.undone
+    assert len(result.candidates) == len(brachis.plan(robot, task(search={"time_limit": 600.0})).candidates)
 
 
 def test_a_time_limit_that_is_too_short_says_what_was_left_undone(robot, clock):
@@ -250,19 +309,19 @@ def test_a_time_limit_that_is_too_short_says_what_was_left_undone(robot, clock):
         r"of \d+ candidates \d+ not planned; .*\. Raise search\.time_limit"
     )
     with pytest.raises(PlanningError, match=message):
-        brachis.plan(robot, task())
+        brachis.plan(robot, task(**EVERY_CHOICE))
 
 
 def test_starts_that_were_found_in_their_part_of_the_time_are_planned(robot, clock):
     clock.jump(schedule, "lattice_starts", at=1, by=30.0)
-    result = brachis.plan(robot, task())
+    result = brachis.plan(robot, task(**EVERY_CHOICE))
     assert result.verified
     assert len({candidate.redundant_joints for candidate in result.candidates}) == 1
     assert any(undone.startswith("the lattice of") for undone in result.undone)
 
 
 def test_a_lattice_ends_between_its_layers(robot, clock):
-    calls = clock.jump(Lattice, "_next", at=5)
+    calls = clock.jump(ClosedFormLattice, "_next", at=5)
     with pytest.raises(PlanningError, match="was not searched to its end"):
         brachis.plan(robot, task(redundant_joints=["j1"]))
     assert len(calls) == 5
@@ -279,6 +338,7 @@ def test_only_one_second_of_grace_for_what_fails(robot, monkeypatch, clock):
     assert sum(calls) <= math.ceil((1.5 + 1.0) / 0.6) + 3, "three more are only verified at last"
 
 
+@pytest.mark.usefixtures("wall_clock")
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what is patched here is only forked there")
 def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(robot, monkeypatch):
     honest = uno._run

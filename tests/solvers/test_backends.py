@@ -113,6 +113,7 @@ def test_iteration_limit(name):
     assert "max_iterations" in report.status.value
 
 
+@pytest.mark.usefixtures("wall_clock")
 def test_time_limit(name):
     problem = disc(pause=0.03)
     report = solve(name, problem, [40.0, -30.0], SolverOptions(time_limit=0.1))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from brachis import bottleneck, planner
+from brachis.attempt import coordinates
 from brachis.cli.folder import Writer, Written, make_folder, write_files, write_text
 from brachis.cli.output import (
     exit_code,
@@ -110,7 +111,7 @@ def _write(motion: _Motion, data: dict[str, Any], out: Path) -> Written:
 def _show(trajectory: Trajectory, found: bottleneck.BottleneckReport, files: tuple[str, ...]) -> None:
     """Print the report for a person."""
     console = result_console()
-    redundant = ", ".join(trajectory.redundant_joints) or "none"
+    redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
     console.print(f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}")
     console.print(str(found))
     for name in files:

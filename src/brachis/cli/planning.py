@@ -9,6 +9,7 @@ from typing import Any
 from rich.table import Table
 
 from brachis import planner
+from brachis.attempt import coordinates
 from brachis.cli.folder import Writer, Written, make_folder, write_files, write_text
 from brachis.cli.output import (
     exit_code,
@@ -77,12 +78,12 @@ def _write(result: Result, data: dict[str, object], out: Path) -> Written:
 def _show(result: Result, data: dict[str, Any]) -> None:
     """Print the plan for a person."""
     console = result_console()
-    attempt = result.attempt
+    attempt, trajectory = result.attempt, result.trajectory
     table = Table(show_header=False, title="plan", title_justify="left")
     rows = {
         "end time t_E": f"{result.t_end:.4f} s",
-        "redundant joints": ", ".join(result.trajectory.redundant_joints) or "none",
-        "branch": f"{result.trajectory.branch} ({result.family})",
+        "redundant joints": coordinates(trajectory.redundant_joints, trajectory.branch),
+        "branch": result.family if trajectory.branch == result.family else f"{trajectory.branch} ({result.family})",
         "start posture": _posture(data, "start_posture"),
         "end posture": _posture(data, "end_posture"),
         "solver": f"{result.report.solver}, {result.report.status.value}",
@@ -128,7 +129,7 @@ def _candidates_table(result: Result) -> Table:
     for candidate in shown[:_MANY]:
         times = (candidate.coarse, candidate.t_end)
         table.add_row(
-            ", ".join(candidate.redundant_joints) or "none",
+            coordinates(candidate.redundant_joints, candidate.branch),
             candidate.branch,
             candidate.origin,
             *(f"{time:.4f}" if math.isfinite(time) else "" for time in times),

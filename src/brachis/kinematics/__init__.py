@@ -1,6 +1,6 @@
 """Joint maps: joint motion and its derivatives from curves y, such as (s, q_r)."""
 
-from brachis.kinematics.chart import ChartMap
+from brachis.kinematics.chart import CHART, ChartMap
 from brachis.kinematics.chart_rows import ChartRows
 from brachis.kinematics.charting import chart_around, null_spaces, transversality
 from brachis.kinematics.closed_form import ClosedFormMap
@@ -10,6 +10,7 @@ from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
 from brachis.kinematics.newton import Newton
 
 __all__ = [
+    "CHART",
     "ChartMap",
     "ChartRows",
     "ClosedFormMap",

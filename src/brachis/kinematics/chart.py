@@ -38,7 +38,9 @@ from brachis.kinematics.newton import Newton
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
 
-_NEAR = 0.2
+CHART = "chart"
+"""Label in the place of a branch's."""
+_NEAR = 0.4
 """rad or m; the last state tells about postures no farther from it."""
 _SUBSTEPS = 6
 """Steps in which sigma is led away from the reference where one does not find a posture."""
@@ -109,7 +111,7 @@ class ChartMap:
     @property
     def branch_label(self) -> str:
         """What the margin is called."""
-        return "chart"
+        return CHART
 
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Value of y = (s, sigma), (1 + r,), in a posture, (n,); NaN in a posture that is not known."""

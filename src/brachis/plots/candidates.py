@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from brachis.attempt import Attempt
+from brachis.attempt import Attempt, coordinates
 from brachis.errors import InputError
 from brachis.plots import style
 
@@ -64,8 +64,9 @@ def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
 
 
 def _row(candidate: Attempt) -> str:
-    joints = ", ".join(candidate.redundant_joints) or "no redundant joint"
-    return f"{joints}: {candidate.branch}" if candidate.branch else joints
+    found = coordinates(candidate.redundant_joints, candidate.branch)
+    joints = "no redundant joint" if found == "none" else found
+    return f"{joints}: {candidate.branch}" if candidate.branch not in {"", joints} else joints
 
 
 def _time(candidate: Attempt, edge: float) -> float:

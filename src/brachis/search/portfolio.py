@@ -131,7 +131,7 @@ class _Search:
             if batch.last_resort and self.record.content:
                 return
             if self._deadline.passed:
-                self.record.begin(len(batch.starts))
+                self.record.begin(0 if batch.last_resort else len(batch.starts))
                 self.record.interrupted = True
                 break
             if batch.last_resort and not refused:

@@ -111,7 +111,7 @@ class PostureLattice(Lattice):
         return _layer(*self._told_apart(q[held])) if held.any() else refused
 
     def _told_apart(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return starts, (K, n), and labels, (K,): joint paths from starts of different labels do not displace each other.
+        """Return starts, (K, n), and labels, (K,): joint paths of different labels do not displace each other.
 
         Of one redundant joint the parts of the self-motion manifold, which hang together; of several, a few postures
         far from each other, each for itself.
