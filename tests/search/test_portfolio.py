@@ -268,7 +268,7 @@ def test_the_time_limit_gives_the_best_motion_so_far(robot, clock):
     assert result.undone[-1] == "what search.effort asks for was not tried to its end"
 
 
-@pytest.mark.parametrize(("asked", "candidates"), [({}, 4), (BRANCH, 8)])
+@pytest.mark.parametrize(("asked", "candidates"), [({"start": "free", "path_start": HERE}, 4), (BRANCH, 8)])
 def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
     robot, clock, monkeypatch, asked, candidates
 ):
