@@ -18,7 +18,7 @@ import pinocchio as pin
 from brachis.bspline import clamped_knots, spread
 from brachis.kinematics import DirectJointMap, JointState
 from brachis.nlp import Boundary, FixedGrid, Motion, Phase, Program
-from brachis.nlp.curves import LocalBasis, SparsityPattern
+from brachis.nlp.boundary import LocalBasis, SparsityPattern
 from brachis.path import Path
 from brachis.problem import Problem, breaks_of
 from brachis.robot import TaskMap

@@ -155,7 +155,7 @@ def test_arrays_are_frozen_copies(trajectory):
     assert own.flags.writeable
     arrays = [getattr(copy, field.name) for field in fields(copy)]
     arrays = [array for array in arrays if isinstance(array, np.ndarray)]
-    assert len(arrays) == 7
+    assert len(arrays) == 9
     for array in [*arrays, copy.pieces.c, copy.pieces.x]:
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0.0
@@ -225,7 +225,7 @@ BROKEN = {
     "meta not JSON": ({"meta": np.array("{")}, "not a brachis result"),
     "meta a list": ({"meta": np.array("[1]")}, "no mapping"),
     "meta an array": ({"meta": np.zeros(3)}, "not a brachis result"),
-    "other schema": ({"schema": 99}, "unknown schema version; found 99; allowed: 1"),
+    "other schema": ({"schema": 99}, "unknown schema version; found 99; allowed: 2"),
     "no schema": ({"schema": None}, "unknown schema version"),
     "array missing": ({"qddot": None}, "qddot"),
     "degree a string": ({"degree": "3"}, "degree: wrong type; found str; allowed: int"),

@@ -124,6 +124,11 @@ class Attempt:
         return self.program is not None and bool(self.reports) and self.reports[-1].status.usable
 
     @property
+    def in_chart(self) -> bool:
+        """Whether it is planned in a chart."""
+        return self.start is not None and isinstance(self.start.joint_map, ChartMap)
+
+    @property
     def keeps_knots(self) -> bool:
         """True where the finished plan has the same knots, so that its end time is no shorter."""
         if self.start is None or self.program is None or self.target is None:

@@ -1,4 +1,4 @@
-"""What makes a task impossible, and where: start and end posture, branch, reach, torque against gravity."""
+"""Start and end postures that are refused at once: out of range, too heavy to hold, off the path, on another branch."""
 
 from __future__ import annotations
 

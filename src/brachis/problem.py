@@ -12,13 +12,16 @@ from brachis.bspline import clamped_knots, spread
 from brachis.custom_limits import LimitModel
 from brachis.errors import DecompositionError, StartError, UnknownNameError
 from brachis.feasibility import branch_of, check_end_branch, check_postures
-from brachis.kinematics import ClosedFormMap, JointMap
+from brachis.kinematics import ClosedFormMap, JointMap, Newton, null_spaces
 from brachis.limits import Limit, limits_of
 from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Boundary, FixedGrid, Grid, Phase, Program
 from brachis.path import Path, path_of
 from brachis.robot import ROLL_JOINT, Robot, TaskMap, bind
 from brachis.task import Task
+
+_EXACT = 1e-12
+"""m or rad."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,8 @@ class Problem:
     task_map : TaskMap
     path : Path
     start, end : (n,) ndarray or None
-        Postures, None where free.
+        Postures, None where free. The end is the posture nearest to the given one that is on the path, which that one
+        may miss by what its digits leave out.
     limits : tuple of Limit
     further : tuple of LimitModel
         Those of the limits that are not in the task, as the user gave them.
@@ -70,7 +74,20 @@ class Problem:
         path = path_of(task_map, task)
         limits = limits_of(robot, task, further)
         check_postures(task_map, limits, start, end, path)
+        if end is not None:
+            end = _on_path(task_map, end, path)
         return cls(task, robot, task_map, path, start, end, limits, tuple(further))
+
+
+def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
+    """Return the posture nearest to a given one, (n,), at the end of the path; the given one if it is there already."""
+    newton, place = Newton(task_map), path.sample(np.ones(1)).target
+    values, jacobian = newton.placed(posture[None])
+    if task_map.robot.n < task_map.m or np.abs(task_map.difference(place, values)).max() < _EXACT:
+        return posture
+    rows = np.swapaxes(null_spaces(jacobian), 1, 2)
+    (found,) = newton.solve(place, posture[None], rows, rows @ posture)
+    return found if np.isfinite(found).all() else posture
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
 from brachis.bspline import clamped_uniform_knots
-from brachis.nlp.curves import BoundarySpline
+from brachis.nlp.boundary import BoundarySpline
 from support.phases import CASES, phase_of, reachable_points
 
 

@@ -40,7 +40,7 @@ from brachis.robot import TaskMap
 
 CHART = "chart"
 """Label in the place of a branch's."""
-_NEAR = 0.2
+_NEAR = 0.4
 """rad or m; the last state tells about postures no farther from it."""
 _SUBSTEPS = 6
 """Steps in which sigma is led away from the reference where one does not find a posture."""

@@ -50,7 +50,7 @@ def chart_around(
     Raises
     ------
     UnreachableError
-        The Jacobian loses rank along the joint path, so that no chart follows it.
+        The null space turns faster than rows can follow, as it does beside singularities of the arm.
     """
     kept = _growing(s)
     s, reference = s[kept], reference[kept]

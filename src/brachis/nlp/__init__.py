@@ -1,6 +1,6 @@
 """The nonlinear program: phases, links and initial guesses."""
 
-from brachis.nlp.curves import Boundary
+from brachis.nlp.boundary import Boundary
 from brachis.nlp.grid import FixedGrid, Grid
 from brachis.nlp.link import Link
 from brachis.nlp.motion import Motion

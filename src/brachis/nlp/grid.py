@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from brachis.bspline import basis_derivatives, basis_functions, clamped_knots
-from brachis.nlp.curves import ORDERS, LocalBasis
+from brachis.nlp.boundary import ORDERS, LocalBasis
 
 
 class Grid(Protocol):

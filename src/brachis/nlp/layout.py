@@ -1,7 +1,7 @@
 """Where variables, rows and entries of the Jacobian stand in a phase.
 
-Variables: the duration T in seconds, then the free control points (see `curves`) of each curve: of s(t) where there is
-a path, then of each joint that is chosen freely, in chain order. Boundary conditions are built into the control points
+Variables: the duration T in seconds, then the free control points (see `boundary`) of each curve: of s(t) where there
+is a path, then of each joint that is chosen freely, in chain order. Boundary conditions are built into the control points
 and have no rows. Where the knots are free, the interval lengths h in normalised time come last (see `grid`).
 
 Rows: for each limit, in the order of the list, its c values at collocation point 0, then at point 1, and so on; along a
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.limits import Limit
-from brachis.nlp.curves import BoundarySpline, SparsityPattern
+from brachis.nlp.boundary import BoundarySpline, SparsityPattern
 from brachis.nlp.grid import Grid
 
 SHORTEST_TIME = 1e-4

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.bspline import insert_knots
-from brachis.nlp.curves import LocalBasis
+from brachis.nlp.boundary import LocalBasis
 
 _BISECTIONS = 45
 _SAME_TIME = 1e-13

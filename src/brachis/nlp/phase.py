@@ -20,8 +20,8 @@ import numpy as np
 from brachis.kinematics import JointDerivatives, JointMap, JointState
 from brachis.limits import Limit, Partials, Role, branch_margin
 from brachis.limits.branch_margin import MARGIN
+from brachis.nlp.boundary import Boundary, LocalBasis
 from brachis.nlp.chain import by_time, chain, timed
-from brachis.nlp.curves import Boundary, LocalBasis
 from brachis.nlp.grid import FixedGrid, FreeGrid, Grid
 from brachis.nlp.layout import Layout
 from brachis.nlp.motion import Motion

@@ -16,9 +16,13 @@ from brachis.search.lattice import LARGEST_STEP
 from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.phase_plane import least_time
 from brachis.search.posture_lattice import PostureLattice
+from brachis.search.screening import screened
+from brachis.search.solving import Listener
 from brachis.search.starts import PIECES, fine_places, lattice_starts, smoothed
 
 _FINER = 2
+_SCREENED, _KEPT = 4, 3
+"""So many times the joint paths that a level asks for are looked at; so many at most are planned."""
 _HOPELESS = 3.0
 """Joint paths whose estimated time is so many times the least one are left out."""
 
@@ -28,6 +32,7 @@ def chart_starts(
     decompositions: Sequence[Decomposition],
     level: SearchLevel,
     deadline: Deadline = NEVER,
+    listener: Listener = lambda _text: None,
 ) -> list[Start] | DeadEnd:
     """Take the shortest distinct joint paths from the lattice of all postures; from a finer one where it ends.
 
@@ -38,6 +43,7 @@ def chart_starts(
         Whose closed forms give postures to begin with where neither end is given.
     level : SearchLevel
     deadline : Deadline, optional
+    listener : callable, optional
 
     Returns
     -------
@@ -55,7 +61,7 @@ def chart_starts(
             seed=problem.task.search.seed,
             deadline=deadline,
         )
-        found = lattice.joint_paths(level.joint_paths)
+        found = lattice.joint_paths(_SCREENED * level.joint_paths)
         if not isinstance(found, DeadEnd):
             break
     if isinstance(found, DeadEnd):
@@ -63,7 +69,8 @@ def chart_starts(
     newton = Newton(problem.task_map)
     starts = (_start_along(newton, joint_path, f"lattice {number}") for number, joint_path in enumerate(found, 1))
     ranked = sorted((start for start in starts if start is not None), key=lambda start: start.estimate)
-    return [start for start in ranked if start.estimate <= _HOPELESS * ranked[0].estimate or start is ranked[0]]
+    hopeful = [start for start in ranked if start.estimate <= _HOPELESS * ranked[0].estimate or start is ranked[0]]
+    return screened(hopeful, min(level.joint_paths, _KEPT), deadline, listener) if hopeful else []
 
 
 def _start_along(newton: Newton, joint_path: JointPath, origin: str) -> Start | None:

@@ -12,7 +12,7 @@ from brachis.attempt import Attempt
 from brachis.errors import BrachisError, PathError, PlanningError
 from brachis.problem import Decomposition, Problem
 from brachis.search.joint_path import DeadEnd
-from brachis.search.reach import explain_failure
+from brachis.search.reach import reason_out_of_reach
 from brachis.task import SolverSettings, Task
 
 _GOOD_PART = 0.1
@@ -136,7 +136,7 @@ def _reason(decomposition: Decomposition) -> BrachisError | str:
     problem = decomposition.problem
     given = problem.end if problem.start is None else problem.start
     posture = np.zeros(problem.robot.n) if given is None else given
-    return explain_failure(
+    return reason_out_of_reach(
         decomposition.joint_map(posture, decomposition.branches[0]),
         problem.limits,
         any_branch=given is None,

@@ -20,7 +20,7 @@ class Layer:
     ----------
     cell : (K, r) int ndarray
     branch : (K,) int ndarray
-        Index into the closed form's branches.
+        What joint paths keep: index into the closed form's branches, or where they began.
     q : (K, n) ndarray
         Postures, rad or m, continuous along the joint paths there.
     low, high : (K, n) ndarray
@@ -44,18 +44,22 @@ class Layer:
         return Layer(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     def bounded(self, most: int, cost: np.ndarray, robot: Robot, limits: Sequence[Limit]) -> Layer:
-        """Keep `most` nodes: half of them those of least `cost`, (K,), the others far from each other and from those."""
+        """Keep `most` nodes: half of them of least `cost`, (K,), the others far from each other and from those."""
         if len(self.branch) <= most:
             return self
         order = np.argsort(cost, kind="stable")
         half = most // 2
         nearest, others = self[order[:half]], self[order[half:]]
-        # Farthest points: each further node is the one that is farthest from all that are kept.
         weights = weights_near(robot, limits, self.q[order[0]])
-        places, kept = others.q * weights, nearest.q * weights
-        distance = np.abs(places[:, None] - kept[None]).max(axis=2).min(axis=1)
-        chosen: list[int] = []
-        for _ in range(most - half):
-            chosen.append(int(np.argmax(distance)))
-            distance = np.minimum(distance, np.abs(places - places[chosen[-1]]).max(axis=1))
+        chosen = farthest(others.q * weights, nearest.q * weights, most - half)
         return self[np.sort(np.concatenate([order[:half], order[half:][np.unique(chosen)]]))]
+
+
+def farthest(places: np.ndarray, kept: np.ndarray, count: int) -> list[int]:
+    """Choose among places (K, n), one after the other, the one that is farthest from all that are kept, (H, n)."""
+    distance = np.abs(places[:, None] - kept[None]).max(axis=2).min(axis=1)
+    chosen: list[int] = []
+    for _ in range(count):
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.abs(places - places[chosen[-1]]).max(axis=1))
+    return chosen

@@ -12,6 +12,7 @@ are sampled, and a layer keeps a bounded number of nodes.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from brachis.robot.joint_space import TURN
 from brachis.search.cells import Cells
 from brachis.search.joint_path import NO_ANSWER, JointPath, beyond_ranges, causes_of, distinct
 from brachis.search.lattice import LARGEST_STEP, Lattice, shortest
-from brachis.search.layer import Layer
+from brachis.search.layer import Layer, farthest
 
 _CELLS_PER_METRE = 1.0 / 3.0  # of those of a turn
 _NEIGHBOURS = (-2, -1, 0, 1, 2)
@@ -31,6 +32,8 @@ _COARSE, _SAME = 0.5, 1e-3  # rad or m
 _ALONG = 0.7
 """Least part of a step that is self-motion; postures across a fold of the manifold differ in other directions."""
 _AROUND = 3.0  # cells
+_BEGINNINGS, _LEAST_NODES = 12, 10
+"""Free starts of several redundant joints, and nodes that the joint paths from each keep at least."""
 _STARTS = 4  # times the nodes of a layer
 _DRAWN = 10.0
 """Reach of what is drawn for joints without ranges, rad or m."""
@@ -84,9 +87,9 @@ class PostureLattice(Lattice):
         Of several redundant joints the nodes are samples, among which there are no such minima.
         """
         if self._r > 1:
-            return distinct(found, max(1, most // self._r))
+            return distinct(found, most)
         apart = self._step(ends.q[:, None], ends.q[None]) / self._size
-        around = np.all(np.abs(apart) < _AROUND, axis=2)
+        around = np.all(np.abs(apart) < _AROUND, axis=2) & (ends.branch[:, None] == ends.branch)
         least = np.where(around, ends.length, np.inf).min(axis=1) >= ends.length
         minima = [joint_path for joint_path, is_one in zip(found, least, strict=True) if is_one][:most]
         return minima if self._only_minima else minima + distinct(found, most - len(minima))
@@ -94,7 +97,7 @@ class PostureLattice(Lattice):
     def _first_layer(self, rng: np.random.Generator) -> Layer | dict[str, int]:
         """See `Lattice`."""
         if self._origin is not None:
-            return _layer(self._origin[None].astype(float))
+            return _layer(self._origin[None].astype(float), np.zeros(1, dtype=int))
         q = self._seeds(rng)
         if not len(q):
             return {NO_ANSWER: 1}
@@ -103,7 +106,26 @@ class PostureLattice(Lattice):
         within = self._inside(q, q)
         if not within.all(axis=1).any():
             return beyond_ranges(self._robot, within)
-        return self._kept(_layer(q[within.all(axis=1)]))
+        q = q[within.all(axis=1)]
+        held, refused = self._held(q)
+        return _layer(*self._told_apart(q[held])) if held.any() else refused
+
+    def _told_apart(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return starts, (K, n), and labels, (K,): joint paths of different labels do not displace each other.
+
+        Of one redundant joint the parts of the self-motion manifold, which hang together; of several, a few postures
+        far from each other, each for itself.
+        """
+        if self._r > 1:
+            scaled = q / self._size
+            chosen = np.unique([0, *farthest(scaled, scaled[:1], _BEGINNINGS - 1)])
+            return q[chosen], np.arange(len(chosen))
+        from scipy.sparse import coo_array  # noqa: PLC0415
+        from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
+        first, second = self._near(q, q, _AROUND * float(self._size.max()))
+        graph = coo_array((np.ones(len(first)), (first, second)), shape=(len(q), len(q)))
+        return q, connected_components(graph, directed=False)[1]
 
     def _seeds(self, rng: np.random.Generator) -> np.ndarray:
         """Postures, (K, n), at the beginning of the path, all over the self-motion manifold."""
@@ -139,11 +161,11 @@ class PostureLattice(Lattice):
         wanted = self.problem.task_map.difference(self._targets[station][None], values)
         needed = np.einsum("kij,kj->ki", np.linalg.pinv(jacobian), wanted)
         if self._r <= 1:
-            parent, q = _pairs(len(before.q), self._at_cells(before.q, jacobian, null, wanted, station))
+            parent, q = self._pairs(before.q, self._at_cells(before.q, jacobian, null, wanted, station))
         else:
             parent, q = self._sampled(before.q, null, needed, station, rng)
         if self._to_end and station == len(self.s) - 1:
-            own, end = _pairs(len(before.q), np.array([self.problem.end]))
+            own, end = self._pairs(before.q, np.array([self.problem.end]))
             parent, q = np.append(parent, own), np.vstack([q, end])
         if not len(q):
             return {NO_ANSWER: len(before.q)}
@@ -164,9 +186,25 @@ class PostureLattice(Lattice):
             return causes_of(self._robot, every, every, inside, near)
         parent, step, q = parent[good], step[good], q[good]
         length = before.length[parent] + self._lengths(before.q, step, parent)
-        nothing = np.zeros(len(parent), dtype=int)
-        layer = Layer(nothing[:, None], nothing, before.q[parent] + step, low[good], high[good], length, parent)
-        return self._kept(layer[shortest(length, self._key(q, _SAME))])
+        branch = before.branch[parent]
+        layer = Layer(branch[:, None], branch, before.q[parent] + step, low[good], high[good], length, parent)
+        return self._kept(layer[shortest(length, np.column_stack([branch, self._key(q, _SAME)]))])
+
+    def _pairs(self, before: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes, (E,), with postures (E, n) of those given, (C, n), to which no joint moves far."""
+        node, posture = self._near(before, q, LARGEST_STEP)
+        return node, q[posture]
+
+    def _near(self, first: np.ndarray, second: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs, (E,) and (E,), of postures between which no joint moves farther than `reach`."""
+        from scipy.spatial import KDTree  # noqa: PLC0415  (a fifth of a second that closed forms need not wait)
+
+        box = np.where(self._modulo, TURN, 0.0)
+        one, other = (
+            KDTree(np.where(self._modulo, np.remainder(q, TURN) % TURN, q), boxsize=box) for q in (first, second)
+        )
+        pairs = one.sparse_distance_matrix(other, reach, p=np.inf, output_type="ndarray")
+        return pairs["i"], pairs["j"]
 
     def _step(self, before: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Return the steps, (E, n), from postures to others; modulo 2 pi where nobody asks for turns."""
@@ -225,19 +263,18 @@ class PostureLattice(Lattice):
         kept = layer[held]
         if self._r <= 1:
             return kept
-        left = self._lengths(kept.q, self.problem.end - kept.q, np.arange(len(kept.q))) if self._to_end else 0.0
-        return kept.bounded(self._nodes, kept.length + left, self._robot, self.problem.limits)
+        cost = kept.length
+        if self._to_end:
+            cost = cost + self._lengths(kept.q, self.problem.end - kept.q, np.arange(len(kept.q)))
+        own = [np.flatnonzero(kept.branch == branch) for branch in np.unique(kept.branch)]
+        most = max(_LEAST_NODES, self._nodes // len(own))
+        parts = [kept[nodes].bounded(most, cost[nodes], self._robot, self.problem.limits) for nodes in own]
+        return Layer(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Layer)))
 
 
-def _layer(q: np.ndarray) -> Layer:
-    """Nodes, (K, n), with which joint paths begin."""
-    nothing = np.zeros(len(q), dtype=int)
-    return Layer(nothing[:, None], nothing, q, q, q, np.zeros(len(q)), nothing)
-
-
-def _pairs(nodes: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Every node with every posture, (C, n): indices of nodes and postures, (E,) and (E, n)."""
-    return np.repeat(np.arange(nodes), len(q)), np.tile(q, (nodes, 1))
+def _layer(q: np.ndarray, branch: np.ndarray) -> Layer:
+    """Nodes, (K, n), with which joint paths begin, and what tells these apart, (K,)."""
+    return Layer(branch[:, None], branch, q, q, q, np.zeros(len(q)), np.zeros(len(q), dtype=int))
 
 
 def _product(rows: np.ndarray, q: np.ndarray) -> np.ndarray:

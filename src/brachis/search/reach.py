@@ -20,7 +20,7 @@ _HELD_CHECKS = 60
 _FAR = 10.0  # m
 
 
-def explain_failure(
+def reason_out_of_reach(
     joint_map: ClosedFormMap, limits: Sequence[Limit], *, any_branch: bool = False, given: str = "start"
 ) -> BrachisError | str:
     """Why no motion was found: an error where the path is out of reach or too heavy to hold, else advice.

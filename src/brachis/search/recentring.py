@@ -27,8 +27,8 @@ _TRANSVERSAL = 0.5
 _RECENTRINGS = 3
 _SELECTABLE = 0.05
 """Least transversality along the motion of joints that may take the place of the chart's rows."""
-_SELECTED = 3
-"""Choices of joints that are tried at most."""
+_SELECTED = (0, 3, 1)
+"""Choices of joints that are tried at most with no, one and several redundant joints: these solves take longest."""
 _DENSE = 4
 
 Solved = tuple[Program, tuple[SolverReport, ...]]
@@ -159,4 +159,4 @@ def _selections(program: Program, x: np.ndarray) -> list[ChartRows]:
     n, r = phase.joint_map.robot.n, phase.joint_map.r
     choices = [ChartRows.constant(np.eye(n)[list(joints)]) for joints in itertools.combinations(range(n), r)]
     ranked = sorted(((_transversal(program, x, rows), number) for number, rows in enumerate(choices)), reverse=True)
-    return [choices[number] for least, number in ranked[:_SELECTED] if least >= _SELECTABLE]
+    return [choices[number] for least, number in ranked[: _SELECTED[min(r, 2)]] if least >= _SELECTABLE]

@@ -20,6 +20,8 @@ SAME_MOTION = "same motion as another"
 _WORTH_IT = 2e-4
 """An attempt is finished if it may be faster than the best one by more than this fraction."""
 _SAME_TIME = 1e-4
+_SAME_TIME_IN_CHARTS = 3e-3
+"""Splines of different measures of self-motion come to end times that differ by so much for the same motion."""
 _SAME_MOTION = 0.1  # rad or m
 _GAIN_SLACK = 0.005
 """Better knots shorten a motion when it is finished; an attempt may gain this part more by them than any one so far."""
@@ -102,6 +104,8 @@ class Record:
         """Tell whether an attempt may be faster than the best motion."""
         if self.best is None or not self.content:
             return True
+        if attempt.keeps_knots and self.best.keeps_knots and attempt.in_chart and self.best.in_chart:
+            return attempt.coarse < (1.0 - _WORTH_IT) * self.best.coarse  # what else they gain, both gain
         return attempt.coarse * self._gain < (1.0 - _WORTH_IT) * self.best.t_end
 
     def drop(self, solved: Sequence[Numbered]) -> None:
@@ -158,7 +162,8 @@ def rounded(time: float) -> float:
 def _agree(first: Attempt, second: Attempt) -> bool:
     """Tell whether two attempts of a choice are the same motion."""
     same = (first.redundant_joints, first.branch) == (second.redundant_joints, second.branch)
-    if not same or abs(first.coarse - second.coarse) > _SAME_TIME * second.coarse:
+    near = (_SAME_TIME_IN_CHARTS if first.in_chart else _SAME_TIME) * second.coarse
+    if not same or abs(first.coarse - second.coarse) > near:
         return False
     postures = []
     for attempt in (first, second):

@@ -146,7 +146,7 @@ def _in_charts(
         if level.last_resort:
             yield Batch((), 0, last_resort=True)
         listener("looking for joint paths on the lattice of all postures")
-        starts = chart_starts(problem, decompositions, level, deadline.part(_LATTICE_SHARE))
+        starts = chart_starts(problem, decompositions, level, deadline.part(_LATTICE_SHARE), listener)
         if isinstance(starts, DeadEnd):
             note(None, starts)
             continue

@@ -153,6 +153,9 @@ def _content(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Content:
     if meta["redundant_joints"] != redundant:
         allowed = f"some of {', '.join(robot.joint_names)}, in this order"
         raise InputError("unknown joints", where="redundant_joints", found=meta["redundant_joints"], allowed=allowed)
+    for name, array in arrays.items():
+        if array.dtype.kind not in "fiu" or not np.isfinite(array).all():
+            raise InputError("not all are finite numbers", where=name)
     r = _redundancy(arrays, robot.n, len(redundant))
     _check_arrays(arrays, robot.n, r, meta["degree"])
     return Content(task, meta["urdf"], robot, tuple(redundant), meta["branch"], meta["degree"], arrays)
@@ -161,34 +164,35 @@ def _content(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Content:
 def _redundancy(arrays: dict[str, np.ndarray], n: int, named: int) -> int:
     """Degree of redundancy, after a check of the chart that says it where joints do not."""
     rows, knots = arrays["chart_rows"], arrays["chart_knots"]
-    if not rows.size and not len(rows):
+    if rows.shape[:1] == (0,) and not knots.size:
         return named
-    count = 0 if len(rows) == 1 else len(rows) + CHART_DEGREE + 1
-    if rows.ndim != 3 or rows.shape[2] != n + 1 or knots.shape != (count,) or (np.diff(knots) < 0.0).any():  # noqa: PLR2004
-        allowed = f"rows (B, r, {n + 1}), and B + {CHART_DEGREE + 1} ascending knots where B is not 1"
+    fits = rows.ndim == 3 and rows.shape[2] == n + 1  # noqa: PLR2004
+    if fits and len(rows) == 1:
+        fits = knots.shape == (0,)
+    elif fits:  # the reference begins at s = 0 and ends at 1 to rounding
+        fits = knots.shape == (len(rows) + CHART_DEGREE + 1,) and _are_knots(np.round(knots, 9), CHART_DEGREE)
+    if not fits:
+        allowed = f"rows (B, r, {n + 1}), and B + {CHART_DEGREE + 1} knots from 0 to 1 where B is not 1"
         raise InputError("no chart", where="chart_rows", found=f"{rows.shape}, knots {knots.shape}", allowed=allowed)
     if named not in (0, rows.shape[1]):
         raise InputError("other joints than the chart's", where="redundant_joints", found=named, allowed=rows.shape[1])
     return int(rows.shape[1])
 
 
+def _are_knots(knots: np.ndarray, degree: int) -> bool:
+    """Tell whether these are the knots of splines of a degree over [0, 1]."""
+    outer = degree + 1
+    long = degree >= 1 and knots.ndim == 1 and len(knots) >= 2 * outer
+    ends = long and not knots[:outer].any() and bool((knots[-outer:] == 1.0).all())
+    return ends and bool((np.diff(knots) >= 0.0).all())
+
+
 def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) -> None:
-    """Check shapes, finiteness and order."""
-    for name, array in arrays.items():
-        if array.dtype.kind not in "fiu" or not np.isfinite(array).all():
-            raise InputError("not all are finite numbers", where=name)
+    """Check shapes and order."""
     times, knots = arrays["times"], arrays["knots"]
     if times.ndim != 1 or len(times) < 2 or times[0] != 0.0 or not (np.diff(times) > 0.0).all():  # noqa: PLR2004
         raise InputError("not times", where="times", found=_extent(times), allowed="ascending numbers from 0")
-    outer = degree + 1
-    if (
-        degree < 1
-        or knots.ndim != 1
-        or len(knots) < 2 * outer
-        or (np.diff(knots) < 0.0).any()
-        or knots[:outer].any()
-        or (knots[-outer:] != 1.0).any()
-    ):
+    if not _are_knots(knots, degree):
         allowed = "ascending numbers from 0 to 1, either degree + 1 times"
         raise InputError(
             f"not the knots of a spline of degree {degree}", where="knots", found=_extent(knots), allowed=allowed
@@ -196,7 +200,7 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
     if not (np.diff(knots[degree : len(knots) - degree]) > 0.0).all():
         raise InputError("internal knots are repeated", where="knots", allowed="every internal knot once")
     shapes = dict.fromkeys(("q", "qdot", "qddot", "qddot_before"), (len(times), n))
-    shapes["control_points"] = (1 + r, len(knots) - outer)
+    shapes["control_points"] = (1 + r, len(knots) - degree - 1)
     for name, shape in shapes.items():
         if arrays[name].shape != shape:
             raise InputError("wrong shape", where=name, found=arrays[name].shape, allowed=shape)

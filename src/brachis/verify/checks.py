@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.robot import Robot
+from brachis.path import Path
+from brachis.robot import Robot, TaskMap
 from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
 from brachis.verify.motion import Pieces, States
 from brachis.verify.options import VerifyOptions
 from brachis.verify.report import Check
+
+_ROUNDING = 1e-6
+"""m or rad by which a task's postures may be off its path, since they are written with so many digits."""
 
 
 def progress_checks(trajectory: Trajectory, t: np.ndarray, options: VerifyOptions) -> list[Check]:
@@ -31,14 +35,18 @@ def progress_checks(trajectory: Trajectory, t: np.ndarray, options: VerifyOption
     ]
 
 
-def end_checks(trajectory: Trajectory, robot: Robot, options: VerifyOptions) -> list[Check]:
+def end_checks(
+    trajectory: Trajectory, robot: Robot, task_map: TaskMap, path: Path, options: VerifyOptions
+) -> list[Check]:
     """Check that the motion begins and ends as the task says."""
     task = trajectory.task
     checks = []
     wanted = {"start": (0.0, task.start), "end": (trajectory.t_end, task.end)}
     for name, (time, posture) in wanted.items():
         if posture != "free":
-            miss = np.abs(trajectory.position(time) - robot.posture(posture.joints, f"{name}.joints"))
+            given = robot.posture(posture.joints, f"{name}.joints")
+            place = path.sample(np.array([time / trajectory.t_end])).target
+            miss = np.abs(trajectory.position(time) - _on_path(given, task_map, place))
             checks.append(_worst_joint(f"{name} posture", miss, options.posture_tolerance, "rad, m", robot, time))
         speed, allowed = np.abs(trajectory.velocity(time)), options.rest_velocity_tolerance
         checks.append(_worst_joint(f"{name} velocity", speed, allowed, "rad/s, m/s", robot, time))
@@ -46,6 +54,15 @@ def end_checks(trajectory: Trajectory, robot: Robot, options: VerifyOptions) -> 
             bend, allowed = np.abs(trajectory.acceleration(time)), options.rest_acceleration_tolerance
             checks.append(_worst_joint(f"{name} acceleration", bend, allowed, "rad/s2, m/s2", robot, time))
     return checks
+
+
+def _on_path(given: np.ndarray, task_map: TaskMap, place: np.ndarray) -> np.ndarray:
+    """Return the posture nearest to a given one, (n,), whose tool is at a place, (1, c), that it misses by rounding."""
+    miss = task_map.difference(place, task_map.values(given[None]))[0]
+    if np.abs(miss).max(initial=0.0) > _ROUNDING:
+        return given
+    jacobian = task_map.jacobian(task_map.twists(given[None]))[0]
+    return np.asarray(given + np.linalg.lstsq(jacobian, miss, rcond=None)[0])
 
 
 def spline_checks(trajectory: Trajectory, robot: Robot, states: States, options: VerifyOptions) -> list[Check]:

@@ -78,7 +78,7 @@ def verify_trajectory(
         path_check,
         *ratios,
         *progress_checks(trajectory, states.t, options),
-        *end_checks(trajectory, robot, options),
+        *end_checks(trajectory, robot, task_map, path, options),
         *spline_checks(trajectory, robot, states, options),
         *continuity_checks(trajectory, pieces, robot, options),
     ]

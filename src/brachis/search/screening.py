@@ -1,0 +1,128 @@
+"""Which of many starts are worth a plan: each is solved quickly over few knots, and the fastest that differ are kept.
+
+The length of a joint path, and the least time along it, tell little about the motion that an optimiser makes of it
+where several redundant joints are free to move. A solve over few knots, stopped early, tells more and costs little; and
+the plan then begins at the joint path where it ended.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from brachis.attempt import Start
+from brachis.deadline import Deadline
+from brachis.errors import UnreachableError
+from brachis.kinematics import ChartMap
+from brachis.nlp import Program
+from brachis.nlp.guess import starting_point
+from brachis.problem import Problem, program_of
+from brachis.refine import Solve
+from brachis.search.processes import each, processes
+from brachis.search.recentring import solved_in_chart
+from brachis.search.solving import Listener
+from brachis.solvers import SolverOptions, SolverReport, SolveStatus, solver_named
+
+_INTERVALS, _DEGREE = 12, 2
+"""Parabolas jump from one acceleration to the next, as fastest motions do: so few say most."""
+_TOLERANCE, _ITERATIONS, _NEARLY = 1e-3, 25, 1e-2
+_LEAST_TIME = 0.1
+"""Seconds left to a solve that is begun."""
+_PLACES = 97
+_SAME_TIME, _SAME_PATH = 0.02, 0.15
+"""Starts are the same where their end times differ by less than this fraction, and no joint by more, rad or m."""
+_SLOWER = 1.05
+"""Starts that are slower than the fastest one by this factor are left out."""
+
+
+def screened(starts: Sequence[Start], most: int, deadline: Deadline, listener: Listener) -> list[Start]:
+    """Choose the most promising of starts in charts.
+
+    Parameters
+    ----------
+    starts : sequence of Start
+        At least one.
+    most : int
+        How many to keep at most; not more than so many are not looked at.
+    deadline : Deadline
+    listener : callable
+
+    Returns
+    -------
+    list of Start
+        With the joint paths that the quick solves led to, and their end times as estimates; the fastest first.
+    """
+    if len(starts) <= most:
+        return list(starts)
+    jobs = processes(starts[0].problem.task.search.jobs)
+    listener(f"solving quickly from {len(starts)} joint paths")
+    looked_at = list(each(_quickly, starts, deadline, jobs=jobs, listener=listener))
+    kept: list[Start] = []
+    for start in sorted(looked_at, key=lambda start: start.estimate):
+        slow = bool(kept) and start.estimate > _SLOWER * kept[0].estimate
+        if len(kept) < most and not slow and not any(_same(start, other) for other in kept):
+            kept.append(start)
+    return kept
+
+
+def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
+    """Solve from a start over few knots; where that fails the start stays, with an infinite estimate."""
+    hopeless = dataclasses.replace(start, estimate=np.inf)
+    if deadline.passed:
+        return start
+    problem = _roughly(start.problem)
+    program = program_of(problem, start.joint_map, np.linspace(0.0, 1.0, _INTERVALS + 1))
+    x = starting_point(program, [start.joint_path])
+    if x is None:
+        return hopeless
+    program, reports = solved_in_chart(problem, program, x, _solver(start, deadline))
+    last = reports[-1]
+    if not last.status.usable:
+        return hopeless
+    chart = program.phases[0].joint_map
+    assert isinstance(chart, ChartMap)  # noqa: S101
+    try:
+        return dataclasses.replace(
+            start, joint_map=chart, joint_path=_curves(program, last.x), estimate=float(last.objective)
+        )
+    except UnreachableError:
+        return hopeless
+
+
+def _roughly(problem: Problem) -> Problem:
+    """Return the problem with splines that are at rest at both ends in their velocity alone."""
+    spline = problem.task.spline.model_copy(update={"degree": _DEGREE, "rest": "velocity"})
+    return dataclasses.replace(problem, task=problem.task.model_copy(update={"spline": spline}))
+
+
+def _solver(start: Start, deadline: Deadline) -> Solve:
+    """Make a function that solves roughly: an answer that nearly holds the limits will do."""
+    backend = solver_named(start.problem.task.solver.name)[0]
+
+    def solve(program: Program, x: np.ndarray) -> SolverReport:
+        options = SolverOptions(_TOLERANCE, _ITERATIONS, max(deadline.left, _LEAST_TIME))
+        report = backend.solve(program, x, options, None)
+        nearly = report.violation < _NEARLY and not report.status.usable
+        return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if nearly else report
+
+    return solve
+
+
+def _curves(program: Program, x: np.ndarray) -> np.ndarray:
+    """Successive values of a motion's curves, (S, 1 + r), evenly spread over the way that they go."""
+    (motion,) = program.motions(x)
+    y, _, _ = motion.at(np.linspace(0.0, motion.t_end, 4 * _PLACES))
+    steps = np.abs(np.diff(y, axis=0)) / np.maximum(np.ptp(y, axis=0), 1e-12)
+    way = np.append(0.0, np.cumsum(steps.max(axis=1)))
+    places = np.linspace(0.0, way[-1], _PLACES)
+    return np.column_stack([np.interp(places, way, curve) for curve in y.T])
+
+
+def _same(first: Start, second: Start) -> bool:
+    """Tell whether two starts are the same joint path, nearly."""
+    if abs(first.estimate - second.estimate) > _SAME_TIME * second.estimate:
+        return False
+    postures = [start.joint_map.postures(start.joint_path) for start in (first, second)]
+    return bool(np.nanmax(np.abs(postures[0] - postures[1])) < _SAME_PATH)

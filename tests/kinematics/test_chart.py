@@ -1,0 +1,242 @@
+"""The chart's motion against differences in time and against the closed form's, its derivatives against differences."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+from brachis.errors import UnreachableError
+from brachis.kinematics import ChartMap, ChartRows
+from brachis.robot import Robot
+from support.chains import planar_robot
+from support.charts import PLACES, chart_of, jacobian, least_motion, path_from
+from support.motions import Sway, joint_map
+from support.screw_arms import seven_joints
+from support.spatial import START, rail_arm
+
+PLANAR = {
+    "r = 0, 2R": ("RR", "xz", ["x", "z"], [0.4, 1.2], []),
+    "r = 0, 3R with yaw": ("RRR", "xy", ["x", "y", "yaw"], [0.4, 1.8, 0.5], []),
+    "r = 1, 3R": ("RRR", "xy", ["x", "y"], [0.4, 1.0, 0.5], ["j2"]),
+    "r = 1, RPR": ("RPR", "tilted", ["x", "y"], [0.4, 0.2, 0.9], ["j1"]),
+    "r = 1, 4R with yaw": ("RRRR", "xz", ["x", "z", "yaw"], [0.4, -0.6, 1.4, 0.8], ["j1"]),
+    "r = 2, 4R": ("RRRR", "xz", ["x", "z"], [0.4, 0.8, 0.7, 0.5], ["j1", "j4"]),
+    "r = 2, PPRR": ("PPRR", "xy", ["x", "y"], [0.1, 0.2, 0.7, -0.1], ["j1", "j3"]),
+}
+SEVEN = [0.3, -0.7, 0.4, 1.3, 0.5, -0.9, 0.2]
+SPATIAL = {
+    "r = 1, 7R, pose": (seven_joints, "pose", SEVEN, ["j1"]),
+    "r = 1, rail, pose": (rail_arm, "pose", list(START), ["j1"]),
+    "r = 4, 7R, position": (seven_joints, "position", SEVEN, None),
+    "r = 2, rail, free roll": (rail_arm, "pose_free_roll", [*START, 0.0], None),
+}
+
+
+def curved(robot, rows, start):
+    """An arc about a point near the tool, with yaw along the tangent: all derivatives of the path differ from zero."""
+    tool = robot.tool_placement(np.array(start, dtype=float)).translation[["xyz".index(row) for row in rows[:2]]]
+    arc = {"center": (tool + np.array([0.12, -0.1])).tolist(), "angle_deg": 35.0}
+    return [{"arc": {**arc, "yaw": "tangent"} if "yaw" in rows else arc}]
+
+
+def bent(robot, start):
+    """A circular arc in space near the tool, along which the orientation is kept."""
+    tool = robot.tool_placement(np.array(start[: robot.n], dtype=float)).translation
+    via, to = tool + np.array([0.06, 0.05, -0.04]), tool + np.array([0.02, 0.12, -0.1])
+    return [{"arc": {"via": via.tolist(), "to": to.tolist()}}]
+
+
+def given(name):
+    """Robot, rows, segments, start posture and redundant joints of a case."""
+    if name in PLANAR:
+        pattern, plane, rows, start, redundant = PLANAR[name]
+        robot = planar_robot(pattern, plane)
+        return robot, rows, curved(robot, rows, start), start, redundant
+    make, rows, start, redundant = SPATIAL[name]
+    robot = make()
+    return robot, rows, bent(robot, start), start, redundant
+
+
+CASES = [(name, kind) for name in (*PLANAR, *SPATIAL) for kind in ("constant", "following")]
+CASES += [(name, "swinging") for name in ("r = 1, 3R", "r = 2, PPRR", "r = 1, 7R, pose", "r = 4, 7R, position")]
+T = np.linspace(0.02, 0.98, 25)
+
+
+@pytest.fixture(params=CASES, ids=str, scope="module")
+def motion(request):
+    name, kind = request.param
+    robot, rows, segments, start, _ = given(name)
+    return Sway(chart_of(robot, rows, segments, start, kind), amplitude=0.1)
+
+
+def test_path_is_met_exactly(motion):
+    chart = motion.joint_map
+    y, _, _ = motion(T)
+    q = chart.postures(y)
+    targets = chart.path.sample(y[:, 0]).target
+    assert np.abs(chart.task_map.difference(targets, chart.task_map.values(q))).max() < 1e-12
+    np.testing.assert_allclose(chart.curves(y[:, 0], q), y, atol=1e-12)
+
+
+def test_motion_is_the_time_derivative_of_the_postures(motion):
+    chart, h = motion.joint_map, 1e-4
+    state = chart.state(*motion(T))
+    before, here, after = (chart.postures(motion(T + step)[0]) for step in (-h, 0.0, h))
+    np.testing.assert_allclose(state.q, here, atol=1e-12)
+    speed, bend = (after - before) / (2.0 * h), (after - 2.0 * here + before) / h**2
+    assert np.abs(speed).max() > 0.1
+    assert np.abs(bend).max() > 0.1
+    np.testing.assert_allclose(state.qdot, speed, atol=1e-5 * np.abs(speed).max())
+    np.testing.assert_allclose(state.qddot, bend, atol=1e-5 * np.abs(bend).max())
+
+
+def test_derivatives(motion):
+    chart, h = motion.joint_map, 1e-5
+    parts = motion(T)
+    state = chart.state(*parts)
+    exact = chart.derivatives(state)
+
+    def difference(place, column):
+        """Central differences of q, qdot and qddot by one column of y, ydot or yddot."""
+        sides = []
+        for sign in (1.0, -1.0):
+            moved = [part.copy() for part in parts]
+            moved[place][:, column] += sign * h
+            sides.append(chart.state(*moved))
+        return [(getattr(sides[0], name) - getattr(sides[1], name)) / (2.0 * h) for name in ("q", "qdot", "qddot")]
+
+    for column in range(1 + chart.r):
+        by_y, by_ydot, by_yddot = (difference(place, column) for place in range(3))
+        gradient = state.gradient[:, :, column]
+        for value, expected in (
+            (gradient, by_y[0]),
+            (exact.qdot_y[:, :, column], by_y[1]),
+            (exact.qddot_y[:, :, column], by_y[2]),
+            (gradient, by_ydot[1]),
+            (exact.qddot_ydot[:, :, column], by_ydot[2]),
+            (gradient, by_yddot[2]),
+        ):
+            np.testing.assert_allclose(value, expected, atol=2e-7 * max(1.0, np.abs(expected).max()))
+    assert min(np.abs(part).max() for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot)) > 0.05
+
+
+def least_singular(chart, q, s):
+    """Least singular value of J over C, (K,), from Pinocchio's Jacobian."""
+    augmented = np.concatenate([jacobian(chart.task_map, q), chart.rows.at(s)[0]], axis=1)
+    return np.linalg.svd(augmented, compute_uv=False)[:, -1]
+
+
+def test_margins(motion):
+    """They are the least singular value as a part of the reference's median one."""
+    chart, h = motion.joint_map, 1e-6
+    state = chart.state(*motion(T))
+    along = least_singular(chart, chart.reference, chart.s)
+
+    def expected(q, s):
+        return least_singular(chart, q, s) / np.median(along)
+
+    s, q = state.y[:, 0], state.q
+    np.testing.assert_allclose(chart.margins(state)[:, 0], expected(q, s), rtol=1e-9)
+    np.testing.assert_allclose(chart.start_margins(), along[:1] / np.median(along), rtol=1e-9)
+    by_q, by_s = chart.margin_gradient(state)
+    for joint, step in enumerate(h * np.eye(chart.robot.n)):
+        difference = (expected(q + step, s) - expected(q - step, s)) / (2.0 * h)
+        np.testing.assert_allclose(by_q[:, 0, joint], difference, atol=2e-7 * max(1.0, np.abs(by_q).max()))
+    difference = (expected(q, s + h) - expected(q, s - h)) / (2.0 * h)
+    np.testing.assert_allclose(by_s[:, 0], difference, atol=2e-7 * max(1.0, np.abs(by_s).max()))
+
+
+def test_history_does_not_matter(motion):
+    """Near the reference or as far as the margin allows: a map that was asked much before answers like a new one."""
+    used = motion.joint_map
+    rng = np.random.default_rng(7)
+    for amplitude in (0.05, 0.15, 0.3):
+        y = np.column_stack([rng.uniform(0.0, 1.0, 60), rng.normal(0.0, amplitude, (60, used.r))])
+        y[:, 1:] += used.coordinates(0.0, used.start)[1:]
+        fresh = ChartMap(used.task_map, used.path, used.rows, used.s, used.reference).postures(y)
+        good = np.isfinite(fresh).all(axis=1)
+        good[good] = least_singular(used, fresh[good], y[good, 0]) > 0.05
+        y, fresh = y[good], fresh[good]
+        assert len(y) > 20
+        zero = np.zeros_like(y)
+        for order in (rng.permutation(len(y)), rng.permutation(len(y)), np.arange(len(y))):
+            np.testing.assert_allclose(used.state(y[order], zero, zero).q, fresh[order], atol=1e-11)
+
+
+def test_a_copy_by_pickle_answers_alike(motion):
+    chart = motion.joint_map
+    parts = motion(T)
+    copy = pickle.loads(pickle.dumps(chart))  # noqa: S301  (our own)
+    first, second = chart.state(*parts), copy.state(*parts)
+    for name in ("q", "qdot", "qddot", "gradient"):
+        np.testing.assert_allclose(getattr(second, name), getattr(first, name), atol=1e-10)
+    np.testing.assert_array_equal(copy.start, chart.start)
+
+
+@pytest.mark.parametrize("name", [*PLANAR, "r = 1, 7R, pose", "r = 1, rail, pose"])
+def test_rows_that_select_joints_are_the_closed_form_of_these(name):
+    robot, rows, segments, start, redundant = given(name)
+    closed = joint_map(robot, rows, segments, start, redundant)
+    sway = Sway(closed, amplitude=0.1)
+    s = np.linspace(0.0, 1.0, PLACES)
+    reference = closed.postures(
+        np.column_stack([s, np.broadcast_to(closed.start[list(closed.redundant)], (PLACES, closed.r))])
+    )
+    select = ChartRows.constant(np.eye(robot.n)[list(closed.redundant)])
+    chart = ChartMap(closed.task_map, closed.path, select, s, reference)
+    assert chart.redundant_joints == closed.redundant_joints
+    np.testing.assert_array_equal(chart.coordinates(0.3, reference[5])[1:], closed.coordinates(0.3, reference[5])[1:])
+    parts = sway(T)
+    expected, found = closed.state(*parts), chart.state(*parts)
+    for part in ("q", "qdot", "qddot", "gradient"):
+        size = max(1.0, np.abs(getattr(expected, part)).max())
+        np.testing.assert_allclose(getattr(found, part), getattr(expected, part), atol=1e-10 * size)
+    exact, derived = closed.derivatives(expected), chart.derivatives(found)
+    for part in ("qdot_y", "qddot_y", "qddot_ydot"):
+        size = max(1.0, np.abs(getattr(exact, part)).max())
+        np.testing.assert_allclose(getattr(derived, part), getattr(exact, part), atol=1e-10 * size)
+
+
+@pytest.mark.parametrize("turns", [-3, 0, 2])
+def test_angles_stay_in_the_turns_of_the_reference(scara_urdf, turns):
+    """Joint 1 follows a circle about the base three times, from any turn on."""
+    robot = Robot.from_urdf(scara_urdf)
+    start = np.array([0.2 + 2.0 * np.pi * turns, 1.0, 0.6])
+    task_map, path = path_from(robot, ["x", "y"], [{"circle": {"center": [0.0, 0.0], "turns": 3}}], start)
+    s = np.linspace(0.0, 1.0, 200)
+    reference = start + np.outer(6.0 * np.pi * s, [1.0, 0.0, 0.0])
+    chart = ChartMap(task_map, path, ChartRows.constant(np.array([[0.3, 0.6, 0.7]])), s, reference)
+    fine = np.linspace(0.0, 1.0, 777)
+    expected = start + np.outer(6.0 * np.pi * fine, [1.0, 0.0, 0.0])
+    y = chart.curves(fine, expected)
+    np.testing.assert_allclose(chart.postures(y), expected, atol=1e-9)
+    np.testing.assert_allclose(chart.postures(y[::-1]), expected[::-1], atol=1e-9)
+    np.testing.assert_allclose(chart.coordinates(1.0, expected[-1]), y[-1], atol=1e-12)
+    assert chart.coordinates(1.0, expected[-1])[1] != pytest.approx(chart.coordinates(1.0, expected[0])[1], abs=1.0)
+
+
+def test_coordinates_of_what_is_not_known_are_not_known():
+    robot, rows, segments, start, _ = given("r = 2, 4R")
+    chart = chart_of(robot, rows, segments, start, "following")
+    assert np.isnan(chart.coordinates(0.4, np.full(4, np.nan))[1:]).all()
+    assert chart.coordinates(0.4, np.full(4, np.nan))[0] == 0.4
+    # Rows that follow the reference measure the way aside from it.
+    np.testing.assert_allclose(chart.curves(chart.s, chart.reference)[:, 1:], 0.0, atol=1e-12)
+
+
+def test_no_posture_beyond_reach_nor_beyond_the_self_motion(scara_urdf):
+    robot = Robot.from_urdf(scara_urdf)
+    start = np.array([0.2, 1.0, 0.6])
+    task_map, path = path_from(robot, ["x", "y"], [{"line": {"by": [3.0, 0.0]}}], start)
+    s = np.linspace(0.0, 0.1, 9)
+    reference = least_motion(task_map, path, start, s)
+    chart = ChartMap(task_map, path, ChartRows.constant(np.array([[0.0, 0.0, 1.0]])), s, reference)
+    y = np.array([[0.0, 0.6], [1.0, 0.6], [0.05, 9.0]])
+    np.testing.assert_array_equal(np.isfinite(chart.postures(y)).all(axis=1), [True, False, False])
+    zero = np.zeros((1, 2))
+    chart.state(y[:1], zero, zero)
+    for beyond in (y[1:2], y[2:]):
+        with pytest.raises(UnreachableError, match="no posture"):
+            chart.state(beyond, zero, zero)

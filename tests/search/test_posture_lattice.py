@@ -1,0 +1,286 @@
+"""The lattice of all postures: its joint paths are motions of the arm, and it goes wherever the arm can."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.deadline import Deadline
+from brachis.problem import Problem, decompositions_of
+from brachis.robot import dynamics
+from brachis.robot.from_task import robot_from_settings
+from brachis.search.closed_form_lattice import ClosedFormLattice
+from brachis.search.joint_path import DeadEnd
+from brachis.search.posture_lattice import PostureLattice
+from support.chains import planar_robot
+from support.screw_arms import seven_joints
+from support.spatial import START as RAIL_START
+from support.spatial import rail_arm
+
+ROOT = Path(__file__).parents[2]
+SCARA = ROOT / "robots/scara3/robot.urdf"
+START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
+SEVEN = [0.3, -0.7, 0.4, 1.3, 0.5, -0.9, 0.2]
+TURN = 2.0 * math.pi
+
+
+def scara(limits: dict[str, Any] | None = None, **options: Any) -> brachis.Robot:
+    spec = brachis.LimitSpec(**({"torque": 10.0, "velocity": None} | (limits or {})))
+    return brachis.Robot.from_urdf(SCARA, limits=spec, **({"gravity": [0, 0, 0]} | options))
+
+
+def problem(robot: brachis.Robot, rows: Any = ("x", "y"), **task: Any) -> Problem:
+    rows = rows if isinstance(rows, str) else list(rows)
+    return Problem.of(robot, brachis.load_task({"brachis": 1, "task_space": rows} | task))
+
+
+def line(robot: brachis.Robot, start: list[float], by: list[float], rows: Any = ("x", "y"), **task: Any) -> Problem:
+    return problem(robot, rows, start={"joints": start}, path=[{"line": {"by": by}}], **task)
+
+
+def lengthened(given: Problem, **options: Any) -> Any:
+    return PostureLattice(given, [], **options).joint_paths(4)
+
+
+CASES = {
+    "r = 0, 2R": lambda: line(scara(locked_joints={"j3": 0.4}), START[:2], [0.1, 0.4]),
+    "r = 1, 3R": lambda: line(scara(), START, [0.0, 1.0]),
+    "r = 1, ranges": lambda: line(
+        scara({"position": {"j1": [-0.5, 1.5], "j2": [-3.0, 0.0], "j3": [0.0, 3.5]}}), START, [0.0, 1.0]
+    ),
+    "r = 1, gravity": lambda: line(
+        scara({"torque": [330.0, 200.0, 70.0]}, gravity=[0.0, -9.81, 0.0]), START, [0.3, 0.9]
+    ),
+    "r = 1, RPR": lambda: line(planar_robot("RPR", "tilted"), [0.4, 0.2, 0.9], [0.2, 0.1]),
+    "r = 1, 7R, pose": lambda: line(seven_joints(), SEVEN, [0.1, 0.2, 0.1], "pose"),
+    "r = 1, rail, pose": lambda: line(rail_arm(), list(RAIL_START), [0.1, 0.9, 0.1], "pose"),
+    "r = 2, 4R": lambda: line(planar_robot("RRRR"), [0.4, 0.8, 0.7, 0.5], [-0.6, 0.3]),
+    "r = 2, rail, free roll": lambda: line(rail_arm(), list(RAIL_START), [0.1, 0.5, 0.1], "pose_free_roll"),
+    "r = 3, 5R": lambda: line(planar_robot("RRRRR"), [0.4, 0.8, -0.7, 0.5, 0.6], [-0.6, 0.3]),
+    "r = 4, 7R, position": lambda: line(seven_joints(), SEVEN, [0.1, 0.2, 0.1], "position"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_joint_paths_are_motions_of_the_robot(case):
+    given = CASES[case]()
+    limits = given.robot.limits
+    joint_paths = lengthened(given, nodes=60)
+    assert not isinstance(joint_paths, DeadEnd), str(joint_paths)
+    assert joint_paths
+    for joint_path in joint_paths:
+        q = joint_path.q
+        np.testing.assert_array_equal(joint_path.s[[0, -1]], [0.0, 1.0])
+        miss = given.task_map.difference(given.task_map.values(q), given.path.sample(joint_path.s).target)
+        assert np.abs(miss).max() < 1e-10
+        assert np.abs(np.diff(q, axis=0)).max() <= 0.8 + 1e-12
+        assert np.all((q >= limits.position_lower - 1e-9) & (q <= limits.position_upper + 1e-9))
+        still = np.zeros_like(q)
+        assert np.all(np.abs(dynamics.torque(given.robot, q, still, still)) <= limits.torque + 1e-9)
+        np.testing.assert_array_equal(q[0], given.start)
+
+
+def test_gravity_turns_joint_paths_away():
+    """Without the torque limit the shortest joint path goes where the torques of the case above could not hold it."""
+    held, free = CASES["r = 1, gravity"](), scara({"torque": 1e4}, gravity=[0.0, -9.81, 0.0])
+    (shortest, *_) = lengthened(line(free, START, [0.3, 0.9]))
+    still = np.zeros_like(shortest.q)
+    assert np.any(np.abs(dynamics.torque(free, shortest.q, still, still)) > held.robot.limits.torque)
+
+
+def test_ranges_turn_joint_paths_away():
+    bounded = CASES["r = 1, ranges"]().robot.limits
+    (shortest, *_) = lengthened(line(scara(), START, [0.0, 1.0]))
+    assert np.any((shortest.q < bounded.position_lower) | (shortest.q > bounded.position_upper))
+
+
+def test_it_goes_on_where_the_branch_of_a_closed_form_ends():
+    """With joint 3 redundant the elbow of joints 1 and 2 would have to stretch: the branch ends, the arm goes on."""
+    start = [-0.919, -1.53, 2.225]
+    robot = scara({"position": {"j1": [start[0] - 0.6, start[0] + 0.6]}})
+    path = [{"line": {"length": 1.652, "angle_deg": 58.5}}]
+    given = problem(robot, start={"joints": start}, path=path)
+    (by_j3,) = decompositions_of(problem(robot, start={"joints": start}, path=path, redundant_joints=["j3"]))
+    for finer in (1, 3):
+        end = ClosedFormLattice(by_j3, cells_per_turn=72 * finer, density=float(finer)).joint_paths(4)
+        assert isinstance(end, DeadEnd)
+        assert 0.5 < end.s < 1.0
+    (first, *_) = lengthened(given)
+    assert first.q[0, 1] < 0.0 < first.q[-1, 1], "the elbow has changed its side"
+
+
+@pytest.mark.parametrize("angle", range(0, 360, 45))
+def test_the_shortest_joint_path_is_about_as_short_as_the_best_of_all_closed_forms(angle):
+    given = problem(scara(), start={"joints": START}, path=[{"line": {"length": 1.0, "angle_deg": angle}}])
+    best = min(ClosedFormLattice(one).joint_paths(1)[0].length for one in decompositions_of(given))
+    assert lengthened(given)[0].length < 1.15 * best
+
+
+def component(q: np.ndarray) -> int:
+    """Of the self-motion of three links of 1 m: nearer than 1 m to the base, joint 2 never stretches nor folds."""
+    return int(np.sign(np.sin(q[1])))
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["closed forms", "random postures"])
+def test_a_free_start_finds_both_components_of_the_self_motion(known):
+    given = problem(scara(), start="free", path_start=[0.5, 0.2], path=[{"line": {"by": [-0.3, 0.1]}}])
+    decompositions = decompositions_of(given)
+    expected = {
+        component(joint_path.q[0])
+        for one in decompositions
+        for joint_path in ClosedFormLattice(one, cells_per_turn=36).joint_paths(6)
+    }
+    assert expected == {-1, 1}
+    joint_paths = PostureLattice(given, decompositions if known else [], cells_per_turn=36).joint_paths(6)
+    for joint_path in joint_paths:
+        assert len({component(q) for q in joint_path.q}) == 1
+    assert {component(joint_path.q[0]) for joint_path in joint_paths} == expected
+    best = min(ClosedFormLattice(one).joint_paths(1)[0].length for one in decompositions)
+    assert joint_paths[0].length < 1.15 * best
+
+
+def test_a_free_start_of_seven_joints_is_as_good_as_the_best_branch():
+    robot = seven_joints()
+    path_start = pose_of(robot, SEVEN)
+    given = problem(robot, "pose", start="free", path_start=path_start, path=[{"line": {"by": [0.0, 0.15, 0.05]}}])
+    decompositions = [one for one in decompositions_of(given) if one.redundant == (2,)]
+    found = PostureLattice(given, decompositions, cells_per_turn=24).joint_paths(8)
+    best = [ClosedFormLattice(one, cells_per_turn=24).joint_paths(8) for one in decompositions]
+    lengths = [joint_paths[0].length for joint_paths in best if not isinstance(joint_paths, DeadEnd)]
+    assert lengths
+    assert found[0].length < 1.15 * min(lengths)
+    assert len({tuple(np.sign(joint_path.q[0, [1, 3, 5]])) for joint_path in found}) > 1
+
+
+def pose_of(robot: brachis.Robot, q: Any) -> list[float]:
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415
+
+    placement = robot.tool_placement(np.array(q, dtype=float))
+    x, y, z, w = Rotation.from_matrix(placement.rotation).as_quat()
+    return [*placement.translation, w, x, y, z]
+
+
+CIRCLE = [{"circle": {"center": [0.0, 0.0], "turns": 1}}]
+COARSE = {"cells_per_turn": 36, "density": 0.3}
+
+
+RANGE = {"position": {"j1": [START[0] - 7.0, START[0] + 13.0]}}
+
+
+@pytest.mark.parametrize(("turns", "reached"), [(1, True), (0, False), (2, False)])
+def test_the_end_is_reached_in_its_own_turn(turns, reached):
+    """Once round the base, so far from it that no other joint can turn in place of the first."""
+    end = START + TURN * turns * np.eye(3)[0]
+    given = problem(scara(RANGE), path=CIRCLE, start={"joints": START}, end={"joints": end.tolist()})
+    found = lengthened(given, **COARSE)
+    assert isinstance(found, list) is reached
+    for joint_path in found if reached else []:
+        np.testing.assert_allclose(joint_path.q[-1], end, atol=1e-3)
+        np.testing.assert_array_equal(joint_path.q[0], START)
+
+
+@pytest.mark.parametrize(("turns", "reached"), [(0, True), (2, True), (-1, False)])
+def test_a_given_end_is_reached_from_the_turn_before(turns, reached):
+    """Back from the end: the free start is a turn before it, where that is within the range."""
+    robot = scara(RANGE)
+    end = START + TURN * turns * np.eye(3)[0]
+    path_start = robot.tool_placement(end).translation[:2].tolist()
+    given = problem(robot, path=CIRCLE, start="free", path_start=path_start, end={"joints": end.tolist()})
+    found = lengthened(given, **COARSE)
+    assert isinstance(found, list) is reached
+    for joint_path in found if reached else []:
+        np.testing.assert_array_equal(joint_path.q[-1], end)
+        assert joint_path.q[-1, 0] - joint_path.q[0, 0] == pytest.approx(TURN, abs=1.6)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_free_start_may_be_in_any_turn_of_a_range(way):
+    """A circle and a half about the base fits into the range only from one of its ends on."""
+    robot = scara({"position": {"j1": [-TURN, TURN]}}, locked_joints={"j3": 0.4})
+    start = np.array([way * (-TURN + 0.2), 0.9])
+    here = robot.tool_placement(start).translation[:2].tolist()
+    turns = [{"circle": {"center": [0.0, 0.0], "turns": 1.5 * way}}]
+    given = problem(robot, start="free", path_start=here, path=turns)
+    joint_paths = PostureLattice(given, decompositions_of(given), density=0.3).joint_paths(4)
+    assert all(-TURN <= q <= TURN for joint_path in joint_paths for q in joint_path.q[:, 0])
+    assert min(abs(joint_path.q[0, 0] - start[0]) for joint_path in joint_paths) < 1e-6
+    turns[0]["circle"]["turns"] = 2.1 * way
+    given = problem(robot, start="free", path_start=here, path=turns)
+    end = PostureLattice(given, decompositions_of(given), density=0.3).joint_paths(4)
+    assert isinstance(end, DeadEnd)
+    assert 1.8 / 2.1 < end.s < 1.0
+    assert "the range of joint 'j1' ends" in end.causes
+
+
+@pytest.mark.parametrize("turned", [{}, {"shoulder_pan_joint": -1}, {"wrist_1_joint": 1, "wrist_3_joint": -1}], ids=str)
+def test_back_from_a_given_end_in_its_own_turns(turned):
+    task = brachis.load_task(ROOT / "examples/04_ur10_rail_weld.yaml").to_dict()
+    robot = robot_from_settings(brachis.load_task(task).robot)
+    end = np.array(task["start"]["joints"])
+    for joint, turns in turned.items():
+        end[robot.joint_names.index(joint)] += TURN * turns
+    by = np.array([0.0, 0.4, 0.0])
+    x, y, z, *quaternion = pose_of(robot, end)
+    path = {"start": "free", "path_start": [*(np.array([x, y, z]) - by), *quaternion], "path": [{"line": {"by": by}}]}
+    task |= path | {"end": {"joints": end.tolist()}, "redundant_joints": "auto", "branch": "auto"}
+    joint_paths = lengthened(Problem.of(robot, brachis.load_task(task)))
+    assert joint_paths
+    for joint_path in joint_paths:
+        np.testing.assert_array_equal(joint_path.q[-1], end)
+        assert np.all(joint_path.q >= robot.limits.position_lower - 1e-9)
+
+
+def test_back_from_a_given_end_of_a_circle_of_positions_in_ranges_of_two_turns():
+    """Four redundant joints, all but one of which may be in two turns: the end stays in the turn that is given."""
+    robot = seven_joints()
+    end = SEVEN + TURN * (np.eye(7)[0] - np.eye(7)[2])
+    wide = {name: [-TURN - 1.0, TURN + 1.0] for name in robot.joint_names}
+    robot = brachis.Robot.from_urdf("wide", urdf_text=robot.urdf, limits=brachis.LimitSpec(position=wide))
+    here = robot.tool_placement(end).translation
+    path = [{"circle": {"center": np.add(here, [0.05, 0.03, 0.0]).tolist(), "turns": -1.0, "normal": [0.0, 0.0, 1.0]}}]
+    given = problem(robot, "position", start="free", path_start=here.tolist(), end={"joints": end.tolist()}, path=path)
+    joint_paths = lengthened(given, nodes=40)
+    assert joint_paths
+    for joint_path in joint_paths:
+        np.testing.assert_array_equal(joint_path.q[-1], end)
+        assert np.abs(np.diff(joint_path.q, axis=0)).max() <= 0.8
+
+
+@pytest.mark.parametrize(
+    ("make", "reason"),
+    [
+        (lambda: line(scara(), START, [3.0, 0.0]), "it is out of reach"),
+        (
+            lambda: line(scara({"position": {"j1": [0.3, 0.8], "j2": [-2.2, -1.9]}}), START, [0.0, 1.0]),
+            "range of joint",
+        ),
+        (
+            lambda: line(scara({"torque": [280.0, 200.0, 100.0]}, gravity=[0, -9.81, 0]), START, [1.1, 0.0]),
+            "the torque limit cannot hold",
+        ),
+    ],
+    ids=["reach", "ranges", "gravity"],
+)
+def test_where_it_ends_and_why(make, reason):
+    end = lengthened(make())
+    assert isinstance(end, DeadEnd)
+    assert 0.0 < end.s <= 1.0
+    assert reason in " ".join(end.causes)
+
+
+def test_the_same_seed_gives_the_same_joint_paths():
+    given = CASES["r = 2, 4R"]()
+    first, again, other = (lengthened(given, seed=seed, nodes=60) for seed in (3, 3, 4))
+    assert len(first) == len(again)
+    for one, two in zip(first, again, strict=True):
+        np.testing.assert_array_equal(one.q, two.q)
+    assert any(np.abs(one.q - two.q).max() > 1e-6 for one, two in zip(first, other, strict=False))
+
+
+def test_no_layer_is_begun_after_the_deadline():
+    assert lengthened(CASES["r = 1, 3R"](), deadline=Deadline.after(0.0)) == []

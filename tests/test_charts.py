@@ -1,0 +1,182 @@
+"""Plans in charts, from the task to the saved motion and its bottlenecks."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import null_space
+
+import brachis
+from brachis.errors import ResultFileError
+from brachis.kinematics import ChartRows
+from brachis.robot import task_map_of
+from brachis.trajectory import Trajectory
+from brachis.verify import verify_trajectory
+from support.charts import jacobian
+
+ROOT = Path(__file__).parents[1]
+START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
+
+
+def scara_line(angle: float, **changes: Any) -> brachis.Result:
+    limits = brachis.LimitSpec(torque=10.0, velocity=None)
+    robot = brachis.Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
+    task = {
+        "brachis": 1,
+        "start": {"joints": START},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"length": 1.0, "angle_deg": angle}}],
+        "spline": {"degree": 3, "intervals": 20, "rest": "full"},
+    }
+    return brachis.plan(robot, task | changes)
+
+
+@pytest.fixture(scope="module")
+def result():
+    return scara_line(270)
+
+
+@pytest.fixture
+def saved(result, tmp_path):
+    path = tmp_path / "result.npz"
+    result.trajectory.save(path)
+    return path
+
+
+def test_the_line_at_270_degrees(result):
+    """The best closed form of a single joint comes to 1.5754 s at these knots: joint 3, before its limits are held."""
+    assert result.verified
+    assert result.t_end <= 1.572
+    assert result.trajectory.branch == "chart"
+
+
+def test_the_best_choice_of_joints_is_no_faster(result):
+    other = scara_line(270, redundant_joints=["j3"])
+    assert other.trajectory.redundant_joints == ("j3",)
+    assert not len(other.trajectory.chart_rows)
+    assert result.t_end <= other.t_end * 1.0005
+
+
+def test_an_arm_without_a_closed_form():
+    robot = brachis.Robot.from_urdf(ROOT / "robots/gen3/robot.urdf")
+    start = [0.2, 0.5, 0.1, 1.4, 0.1, 1.0, 0.3]
+    task = {
+        "brachis": 1,
+        "start": {"joints": start},
+        "task_space": "pose",
+        "path": [{"line": {"by": [0.0, 0.15, 0.05]}}],
+        "spline": {"intervals": 10},
+    }
+    result = brachis.plan(robot, task)
+    assert result.verified
+    assert result.trajectory.branch == "chart"
+    begin, end = (robot.tool_placement(q) for q in result.trajectory.position(np.array([0.0, result.t_end])))
+    np.testing.assert_allclose(end.translation - begin.translation, [0.0, 0.15, 0.05], atol=1e-9)
+    np.testing.assert_allclose(end.rotation, begin.rotation, atol=1e-9)
+    np.testing.assert_allclose(result.trajectory.position(0.0), start, atol=1e-9)
+
+
+@pytest.mark.parametrize("redundant", ["auto", ["j1"]])
+def test_an_end_posture_may_be_rounded(result, redundant):
+    """The motion ends at the posture on the path that is nearest to the given one, and is held to that."""
+    exact = result.trajectory.position(result.t_end)
+    end = np.round(exact, 7)
+    assert np.abs(end - exact).max() > 1e-9
+    reached = scara_line(270, end={"joints": end.tolist()}, redundant_joints=redundant)
+    assert reached.verified
+    assert 1e-9 < np.abs(reached.trajectory.position(reached.t_end) - end).max() < 1e-6
+    robot = reached.trajectory.robot
+    self_motion = null_space(jacobian(task_map_of(robot, ["x", "y"]), end[None])[0])[:, 0]
+    other = reached.task.to_dict() | {"end": {"joints": (end + 1e-5 * self_motion).tolist()}}
+    aside = brachis.load_task(other)
+    checks = verify_trajectory(dataclasses.replace(reached.trajectory, task=aside)).checks
+    assert [check.name for check in checks if not check.passed] == ["end posture"]
+
+
+def test_a_saved_motion_is_loaded_and_verified(result, saved):
+    loaded = Trajectory.load(saved)
+    assert loaded.branch == "chart"
+    assert loaded.redundant_joints == result.trajectory.redundant_joints
+    np.testing.assert_array_equal(loaded.chart_rows, result.trajectory.chart_rows)
+    np.testing.assert_array_equal(loaded.chart_knots, result.trajectory.chart_knots)
+    t = np.linspace(0.0, loaded.t_end, 50)
+    np.testing.assert_array_equal(loaded.position(t), result.trajectory.position(t))
+    assert verify_trajectory(loaded).passed
+    # The curves of the chart describe the motion: sigma = C q - p.
+    rows = ChartRows.of_arrays(loaded.chart_rows, loaded.chart_knots)
+    sigma = rows.values(loaded.path_coordinate(loaded.times), loaded.q)
+    np.testing.assert_allclose(loaded.redundant_spline(loaded.times), sigma, atol=1e-8)
+
+
+def test_bottlenecks_of_a_saved_motion_are_those_that_solving_again_finds(result, saved):
+    fresh = brachis.bottleneck.report(result)
+    report = brachis.bottleneck.report(Trajectory.load(saved), check=True)
+    assert report.sensitivities.reliable
+    large = [entry for entry in report.check.entries if entry.predicted < -1e-4]
+    assert len(large) >= 2
+    for entry in large:
+        assert entry.optimal
+        assert entry.predicted == pytest.approx(entry.re_solved, rel=0.05)
+    for entry in fresh.sensitivities.limits:
+        other = report.sensitivities.of(entry.label.subject, entry.label.kind, entry.bound.end)
+        assert other.change(0.1) == pytest.approx(entry.change(0.1), rel=1e-2, abs=1e-5)
+
+
+def with_arrays(path: Path, **changed: Any) -> None:
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    arrays |= {name: change(arrays[name]) if callable(change) else change for name, change in changed.items()}
+    np.savez(path, **arrays)
+
+
+BROKEN = {
+    "rows NaN": {"chart_rows": lambda a: a * np.nan},
+    "rows of fewer joints": {"chart_rows": lambda a: a[:, :, 1:]},
+    "rows flat": {"chart_rows": lambda a: a.ravel()},
+    "rows a number": {"chart_rows": np.array(3.0)},
+    "rows text": {"chart_rows": np.array([[["a", "b", "c", "d"]]])},
+    "rows complex": {"chart_rows": lambda a: a + 1j},
+    "more rows": {"chart_rows": lambda a: np.repeat(a, 2, axis=1)},
+    "no rows": {"chart_rows": lambda a: a[:0]},
+    "several rows without knots": {"chart_rows": lambda a: np.repeat(a, 8, axis=0)},
+    "knots of constant rows": {"chart_knots": np.linspace(0.0, 1.0, 7)},
+    "knots without rows": {"chart_rows": np.empty((0, 0, 0)), "chart_knots": np.linspace(0.0, 1.0, 7)},
+    "knots a number": {"chart_knots": np.array(0.5)},
+    "knots text": {"chart_knots": np.array(["a", "b"])},
+    "knots descending": {
+        "chart_rows": lambda a: np.repeat(a, 8, axis=0),
+        "chart_knots": np.linspace(1.0, 0.0, 14),
+    },
+    "knots infinite": {
+        "chart_rows": lambda a: np.repeat(a, 8, axis=0),
+        "chart_knots": np.concatenate([np.zeros(6), [0.4, 0.6], np.ones(5), [np.inf]]),
+    },
+    "splines with knots of text": {
+        "chart_rows": lambda a: np.repeat(a, 8, axis=0),
+        "chart_knots": np.array(["a"] * 14),
+    },
+    "knots all the same": {
+        "chart_rows": lambda a: np.repeat(a, 8, axis=0),
+        "chart_knots": np.zeros(14),
+    },
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_a_broken_chart_is_refused(case, saved):
+    with_arrays(saved, **BROKEN[case])
+    with pytest.raises(ResultFileError, match=r"the result file is broken|not a brachis result") as caught:
+        Trajectory.load(saved)
+    assert caught.value.where == str(saved)
+
+
+def test_a_chart_that_is_not_broken_is_read(saved):
+    """The same rows as splines."""
+    knots = np.concatenate([np.zeros(6), [0.4, 0.6], np.ones(6)])
+    with_arrays(saved, chart_rows=lambda a: np.repeat(a, 8, axis=0), chart_knots=knots)
+    assert len(Trajectory.load(saved).chart_knots) == 14
