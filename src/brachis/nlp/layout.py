@@ -1,8 +1,8 @@
 """Where variables, rows and entries of the Jacobian stand in a phase.
 
 Variables: the duration T in seconds, then the free control points (see `boundary`) of each curve: of s(t) where there
-is a path, then of each joint that is chosen freely, in chain order. Boundary conditions are built into the control points
-and have no rows. Where the knots are free, the interval lengths h in normalised time come last (see `grid`).
+is a path, then of each joint that is chosen freely, in chain order. Boundary conditions are built into the control
+points and have no rows. Where the knots are free, the interval lengths h in normalised time come last (see `grid`).
 
 Rows: for each limit, in the order of the list, its c values at collocation point 0, then at point 1, and so on; along a
 path then the differences of successive control points of s, which are >= 0 so that ds/dt >= 0 holds at all times; where

@@ -21,8 +21,8 @@ from brachis.search.solving import Listener
 from brachis.search.starts import PIECES, fine_places, lattice_starts, smoothed
 
 _FINER = 2
-_SCREENED, _KEPT = 4, 3
-"""So many times the joint paths that a level asks for are looked at; so many at most are planned."""
+_SCREENED = 4
+"""So many times the joint paths that a level plans are looked at."""
 _HOPELESS = 3.0
 """Joint paths whose estimated time is so many times the least one are left out."""
 
@@ -61,7 +61,7 @@ def chart_starts(
             seed=problem.task.search.seed,
             deadline=deadline,
         )
-        found = lattice.joint_paths(_SCREENED * level.joint_paths)
+        found = lattice.joint_paths(_SCREENED * level.in_charts)
         if not isinstance(found, DeadEnd):
             break
     if isinstance(found, DeadEnd):
@@ -70,7 +70,7 @@ def chart_starts(
     starts = (_start_along(newton, joint_path, f"lattice {number}") for number, joint_path in enumerate(found, 1))
     ranked = sorted((start for start in starts if start is not None), key=lambda start: start.estimate)
     hopeful = [start for start in ranked if start.estimate <= _HOPELESS * ranked[0].estimate or start is ranked[0]]
-    return screened(hopeful, min(level.joint_paths, _KEPT), deadline, listener) if hopeful else []
+    return screened(hopeful, level.in_charts, deadline, listener) if hopeful else []
 
 
 def _start_along(newton: Newton, joint_path: JointPath, origin: str) -> Start | None:

@@ -20,8 +20,10 @@ class SearchLevel:
         Joint paths taken from the lattice of a decomposition, for each branch on which the motion may begin.
     numeric : int
         Joint paths by numeric inverse kinematics beside them, where the start posture is given.
+    in_charts : int
+        Plans in charts; four times as many joint paths are looked at.
     plans : int
-        Coarse plans; those with the least estimated time come first.
+        Coarse plans in closed forms; those with the least estimated time come first.
     refined : int
         Plans that are refined and verified at most, as long as they may beat the best one.
     cells_per_turn, nodes : int
@@ -36,6 +38,7 @@ class SearchLevel:
     polynomial: bool
     joint_paths: int
     numeric: int
+    in_charts: int
     plans: int
     refined: int
     cells_per_turn: int
@@ -46,16 +49,17 @@ class SearchLevel:
 
 _LEVELS = {
     "single": SearchLevel(
-        1, polynomial=False, joint_paths=1, numeric=0, plans=1, refined=1, cells_per_turn=72, nodes=120
+        1, polynomial=False, joint_paths=1, numeric=0, in_charts=1, plans=1, refined=1, cells_per_turn=72, nodes=120
     ),
     "fast": SearchLevel(
-        6, polynomial=False, joint_paths=4, numeric=0, plans=24, refined=4, cells_per_turn=72, nodes=120
+        6, polynomial=False, joint_paths=4, numeric=0, in_charts=4, plans=24, refined=4, cells_per_turn=72, nodes=120
     ),
     "thorough": SearchLevel(
         20,
         polynomial=True,
         joint_paths=8,
         numeric=8,
+        in_charts=8,
         plans=100,
         refined=12,
         cells_per_turn=96,
@@ -67,6 +71,7 @@ _LEVELS = {
         polynomial=True,
         joint_paths=30,
         numeric=8,
+        in_charts=30,
         plans=10_000,
         refined=40,
         cells_per_turn=144,
