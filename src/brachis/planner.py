@@ -217,7 +217,6 @@ def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attemp
     if attempt.keeps_knots and isinstance(start.joint_map, ChartMap) and not deadline.passed:
         program, further = best_of_joints(start.problem, program, reports[-1], solve)
         reports, target = (*reports[:-1], *further), program
-        attempt = dataclasses.replace(attempt, coarse=reports[-1].objective)
     adapted = adapt_mesh(program, reports, solve, task.spline, options, target=target)
     attempt = dataclasses.replace(attempt, undone=adapted.undone)
     options, solve = dataclasses.replace(options, deadline=deadline), _solver(start, deadline, listener)
