@@ -14,7 +14,7 @@ import pinocchio as pin
 from brachis.ik import ChainGeometry
 from brachis.robot import TaskMap
 
-_MET = 1e-7
+_MET = 1e-10
 """Miss, in m or rad, after which one more step meets the target to rounding: Newton's method squares it."""
 _LARGEST_STEP = 0.5
 """rad or m; longer steps are shortened, since the linear model says little about postures so far away."""

@@ -160,10 +160,10 @@ def rounded(time: float) -> float:
 
 
 def _agree(first: Attempt, second: Attempt) -> bool:
-    """Tell whether two attempts of a choice are the same motion."""
+    """Tell whether an attempt is the same motion as another, and not faster."""
     same = (first.redundant_joints, first.branch) == (second.redundant_joints, second.branch)
-    near = (_SAME_TIME_IN_CHARTS if first.in_chart else _SAME_TIME) * second.coarse
-    if not same or abs(first.coarse - second.coarse) > near:
+    slower = (_SAME_TIME_IN_CHARTS if first.in_chart else _SAME_TIME) * second.coarse
+    if not same or not -_WORTH_IT * second.coarse <= first.coarse - second.coarse <= slower:
         return False
     postures = []
     for attempt in (first, second):
