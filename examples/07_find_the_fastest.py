@@ -42,7 +42,7 @@ def markdown_table(results: dict[tuple[int, str], brachis.Result]) -> str:
         cells = []
         for name in (*JOINTS, "auto", "free start"):
             result = results[angle, name]
-            note = "" if name in JOINTS else f" ({', '.join(result.trajectory.redundant_joints)})"
+            note = "" if name in JOINTS else f" ({', '.join(result.trajectory.redundant_joints) or 'chart'})"
             cells.append(f"{result.t_end:.3f} s{note}" + ("" if result.verified else " (unverified)"))
         lines.append(f"| {angle} deg | {' | '.join(cells)} |")
     return "\n".join(lines)
