@@ -70,7 +70,7 @@ CASES = {
 def test_joint_paths_are_motions_of_the_robot(case):
     given = CASES[case]()
     limits = given.robot.limits
-    joint_paths = lengthened(given, nodes=60)
+    joint_paths = lengthened(given, nodes=40)
     assert not isinstance(joint_paths, DeadEnd), str(joint_paths)
     assert joint_paths
     for joint_path in joint_paths:
@@ -114,7 +114,7 @@ def test_it_goes_on_where_the_branch_of_a_closed_form_ends():
     assert first.q[0, 1] < 0.0 < first.q[-1, 1], "the elbow has changed its side"
 
 
-@pytest.mark.parametrize("angle", range(0, 360, 45))
+@pytest.mark.parametrize("angle", range(0, 360, 90))
 def test_the_shortest_joint_path_is_about_as_short_as_the_best_of_all_closed_forms(angle):
     given = problem(scara(), start={"joints": START}, path=[{"line": {"length": 1.0, "angle_deg": angle}}])
     best = min(ClosedFormLattice(one).joint_paths(1)[0].length for one in decompositions_of(given))
@@ -166,7 +166,7 @@ def pose_of(robot: brachis.Robot, q: Any) -> list[float]:
 
 
 CIRCLE = [{"circle": {"center": [0.0, 0.0], "turns": 1}}]
-COARSE = {"cells_per_turn": 36, "density": 0.3}
+COARSE = {"cells_per_turn": 24, "density": 0.2}
 
 
 RANGE = {"position": {"j1": [START[0] - 7.0, START[0] + 13.0]}}
@@ -206,18 +206,18 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way):
     here = robot.tool_placement(start).translation[:2].tolist()
     turns = [{"circle": {"center": [0.0, 0.0], "turns": 1.5 * way}}]
     given = problem(robot, start="free", path_start=here, path=turns)
-    joint_paths = PostureLattice(given, decompositions_of(given), density=0.3).joint_paths(4)
+    joint_paths = PostureLattice(given, decompositions_of(given), density=0.2).joint_paths(4)
     assert all(-TURN <= q <= TURN for joint_path in joint_paths for q in joint_path.q[:, 0])
     assert min(abs(joint_path.q[0, 0] - start[0]) for joint_path in joint_paths) < 1e-6
     turns[0]["circle"]["turns"] = 2.1 * way
     given = problem(robot, start="free", path_start=here, path=turns)
-    end = PostureLattice(given, decompositions_of(given), density=0.3).joint_paths(4)
+    end = PostureLattice(given, decompositions_of(given), density=0.2).joint_paths(4)
     assert isinstance(end, DeadEnd)
     assert 1.8 / 2.1 < end.s < 1.0
     assert "the range of joint 'j1' ends" in end.causes
 
 
-@pytest.mark.parametrize("turned", [{}, {"shoulder_pan_joint": -1}, {"wrist_1_joint": 1, "wrist_3_joint": -1}], ids=str)
+@pytest.mark.parametrize("turned", [{"shoulder_pan_joint": -1}, {"wrist_1_joint": 1, "wrist_3_joint": -1}], ids=str)
 def test_back_from_a_given_end_in_its_own_turns(turned):
     task = brachis.load_task(ROOT / "examples/04_ur10_rail_weld.yaml").to_dict()
     robot = robot_from_settings(brachis.load_task(task).robot)

@@ -202,7 +202,9 @@ class Task(Model):
         "elsewhere is refused. With start: free it must be given.",
     )
     end: FreePosture = Field(
-        default="free", description="Configuration at the end of the path: free, or {joints: ...}."
+        default="free",
+        description="Configuration at the end of the path: free, or {joints: ...}. Where its tool is up to 1e-6 m or "
+        "rad off the path's end, the nearest posture on the path is taken; where it is farther off, it is refused.",
     )
     task_space: TaskSpace = Field(
         description="What the path prescribes: rows out of x, y, z, yaw (yaw last, with two others); position (all "
