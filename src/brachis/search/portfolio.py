@@ -1,11 +1,11 @@
-"""The search: choices of redundant joints x branches x starts, solved coarsely, ranked, the best finished.
+"""The search: starts from lattices, solved coarsely, ranked, the best finished.
 
-1. The lattice of every choice gives starts; those with the least estimated times are solved at the first collocation
-   points.
+1. Lattices give starts (see `schedule`); they are solved at the first collocation points.
 2. Attempts that agree are merged. In the order of their end times the others are refined and verified, as long as they
-   may beat the best verified one: refinement adds rows, so that the coarse end time of an optimum bounds its refined
-   one from below.
-3. Only while nothing is verified, other solvers and numeric guesses are tried.
+   may beat the best verified one: refinement adds rows, so that over the same knots and in the same coordinates the
+   coarse end time of an optimum bounds its refined one from below. In charts, where the coordinates may still be
+   changed, coarse end times are compared with each other.
+3. Only while nothing is verified, other solvers, the closed forms of single choices and numeric guesses are tried.
 
 What comes out does not depend on the number of processes: work that one process would not have done is thrown away.
 """
