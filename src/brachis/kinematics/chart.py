@@ -42,6 +42,8 @@ CHART = "chart"
 """Label in the place of a branch's."""
 _NEAR = 0.4
 """rad or m; the last state tells about postures no farther from it."""
+_SINGULAR = 1e-9
+"""A reference with a smaller least singular value is singular all along; its chart has no margin anywhere."""
 _SUBSTEPS = 6
 """Steps in which sigma is led away from the reference where one does not find a posture."""
 
@@ -94,7 +96,7 @@ class ChartMap:
         self._newton = Newton(task_map)
         jacobian = self._newton.placed(reference)[1]
         least = np.linalg.svd(np.concatenate([jacobian, rows.at(s)[0]], axis=1), compute_uv=False)[:, -1]
-        self._typical = float(np.median(least))
+        self._typical = max(float(np.median(least)), _SINGULAR)
         self._start_margin = float(least[0]) / self._typical
         self._last: JointState | None = None
 

@@ -8,7 +8,7 @@ import numpy as np
 
 ORDERS = 4
 """Value and three derivatives by s."""
-_DEGREE = 5
+DEGREE = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class ChartRows:
         from scipy.interpolate import make_interp_spline  # noqa: PLC0415  (imports in 0.3 s)
 
         offset = np.einsum("sij,sj->si", rows, reference)
-        spline = make_interp_spline(s, np.concatenate([rows, offset[:, :, None]], axis=2), k=_DEGREE)
+        spline = make_interp_spline(s, np.concatenate([rows, offset[:, :, None]], axis=2), k=DEGREE)
         return cls(np.asarray(spline.c), np.asarray(spline.t))
 
     @classmethod
@@ -69,7 +69,7 @@ class ChartRows:
             return values
         from scipy.interpolate import BSpline  # noqa: PLC0415
 
-        spline = BSpline(self.knots, self.coefficients, _DEGREE)
+        spline = BSpline(self.knots, self.coefficients, DEGREE)
         return np.array([spline(s, nu=order) for order in range(orders)])
 
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from brachis.errors import UnreachableError
 from brachis.kinematics.chart import ChartMap
-from brachis.kinematics.chart_rows import ChartRows
+from brachis.kinematics.chart_rows import DEGREE, ChartRows
 from brachis.kinematics.newton import Newton
 from brachis.path import Path
 from brachis.robot import TaskMap
@@ -64,6 +64,8 @@ def chart_around(
     following = np.swapaxes(_continued(null), 1, 2)
     for count in _PLACES:
         places = np.unique(np.linspace(0, len(s) - 1, min(count, len(s))).round().astype(int))
+        if len(places) <= DEGREE:
+            continue
         chosen = ChartRows.along(s[places], following[places], reference[places])
         if transversality(chosen.at(s)[0], null).min() >= _ENOUGH:
             return ChartMap(task_map, path, chosen, s, reference)
