@@ -21,7 +21,7 @@ from brachis.search.solving import Listener
 from brachis.search.starts import PIECES, fine_places, lattice_starts, smoothed
 
 _FINER = 2
-_SCREENED = 4
+SCREENED = 4
 """So many times the joint paths that a level plans are looked at."""
 _HOPELESS = 3.0
 """Joint paths whose estimated time is so many times the least one are left out."""
@@ -61,7 +61,7 @@ def chart_starts(
             seed=problem.task.search.seed,
             deadline=deadline,
         )
-        found = lattice.joint_paths(_SCREENED * level.in_charts)
+        found = lattice.joint_paths(SCREENED * level.in_charts)
         if not isinstance(found, DeadEnd):
             break
     if isinstance(found, DeadEnd):

@@ -22,7 +22,7 @@ class SearchLevel:
         Joint paths by numeric inverse kinematics beside them, where the start posture is given.
     in_charts : int
         Plans in charts; four times as many joint paths are looked at.
-    plans : int
+    in_closed_forms : int
         Coarse plans in closed forms; those with the least estimated time come first.
     refined : int
         Plans that are refined and verified at most, as long as they may beat the best one.
@@ -39,7 +39,7 @@ class SearchLevel:
     joint_paths: int
     numeric: int
     in_charts: int
-    plans: int
+    in_closed_forms: int
     refined: int
     cells_per_turn: int
     nodes: int
@@ -49,10 +49,26 @@ class SearchLevel:
 
 _LEVELS = {
     "single": SearchLevel(
-        1, polynomial=False, joint_paths=1, numeric=0, in_charts=1, plans=1, refined=1, cells_per_turn=72, nodes=120
+        1,
+        polynomial=False,
+        joint_paths=1,
+        numeric=0,
+        in_charts=1,
+        in_closed_forms=1,
+        refined=1,
+        cells_per_turn=72,
+        nodes=120,
     ),
     "fast": SearchLevel(
-        6, polynomial=False, joint_paths=4, numeric=0, in_charts=4, plans=24, refined=4, cells_per_turn=72, nodes=120
+        6,
+        polynomial=False,
+        joint_paths=4,
+        numeric=0,
+        in_charts=4,
+        in_closed_forms=24,
+        refined=4,
+        cells_per_turn=72,
+        nodes=120,
     ),
     "thorough": SearchLevel(
         20,
@@ -60,7 +76,7 @@ _LEVELS = {
         joint_paths=8,
         numeric=8,
         in_charts=8,
-        plans=100,
+        in_closed_forms=100,
         refined=12,
         cells_per_turn=96,
         nodes=300,
@@ -72,7 +88,7 @@ _LEVELS = {
         joint_paths=30,
         numeric=8,
         in_charts=12,
-        plans=10_000,
+        in_closed_forms=10_000,
         refined=40,
         cells_per_turn=144,
         nodes=600,

@@ -193,7 +193,9 @@ def _from_lattices(
         own = [dataclasses.replace(start, problem=decomposition.problem) for start in outcome]
         own = sorted(own, key=lambda start: start.estimate) + numeric_starts(decomposition, level.numeric, deadline)
         ranked += [(place, start.estimate, next(number), start) for place, start in enumerate(own)]
-    return [start for *_, start in sorted(ranked, key=lambda item: item[:-1])[: max(1, level.plans // redundancy)]]
+    return [
+        start for *_, start in sorted(ranked, key=lambda item: item[:-1])[: max(1, level.in_closed_forms // redundancy)]
+    ]
 
 
 def _starts_of(
