@@ -198,8 +198,11 @@ class Attempt:
                 found = "too sharp for a trajectory" if verification is None else "the verification fails"
             rounds = len(refined.reports) - 1
             status = f"{last.solver}: t_E = {refined.t_end:.4f} s after {rounds} refinement rounds, {found}"
+        (phase,) = refined.program.phases
         return dataclasses.replace(
             self,
+            redundant_joints=phase.joint_map.redundant_joints,
+            branch=phase.joint_map.branch_label,
             status=status,
             reports=reports,
             refined=refined,

@@ -22,6 +22,7 @@ from brachis import interrupts
 from brachis.attempt import Attempt
 from brachis.completion import completed
 from brachis.deadline import Deadline
+from brachis.errors import UnreachableError
 from brachis.nlp import LeastAcceleration, Program
 from brachis.refine import RefinementOptions, Solve
 from brachis.search import Listener
@@ -98,6 +99,8 @@ def calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMo
     """
     try:
         return _calmest(fastest, deadline, listener)
+    except UnreachableError as error:
+        return _kept(fastest, f"the fastest motion stays: {error}")
     except KeyboardInterrupt:
         interrupts.forget()
         return _kept(fastest, "interrupted")

@@ -150,7 +150,8 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
     DecompositionError
         No closed form fits.
     StartError
-        The start posture is singular everywhere, or on another branch than the task's or the end posture's.
+        A given posture is singular, or on another branch than the task's or the end posture's where a branch or named
+        joints bind the motion to one.
     UnknownNameError
         There is no such joint or branch.
     """
@@ -160,7 +161,8 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
         return [_decomposition(problem, ik.find(robot, task_map, wanted, families=families))]
     found = ik.find_all(robot, task_map, families=families)
     matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
-    if not matches and (task.branch != "auto" or robot.n < task_map.m):
+    asked = task.branch != "auto" or task.search.guesses != "lattice"
+    if not matches and (asked or robot.n < task_map.m or _lacks_a_direction(task_map)):
         if len(found) <= 1:  # nothing to choose: the reasons of the only choice, or the wrong number of joints
             return [_decomposition(problem, ik.find(robot, task_map, (), families=families))]
         raise DecompositionError(
@@ -176,11 +178,36 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
             allowed.append(_decomposition(problem, match))
         except (StartError, UnknownNameError) as error:
             refusals.append(error)
-    if refusals and not allowed and (task.branch != "auto" or robot.n == task_map.m):
+    if refusals and not allowed and (asked or robot.n == task_map.m or _singular(problem)):
         raise refusals[0]
+    if not matches and _singular(problem):
+        raise StartError(
+            "a given posture is singular",
+            where="start.joints" if problem.start is not None else "end.joints",
+            found="a posture in which the tool cannot move in all directions of the task space",
+            allowed="another posture",
+            hint="Bend the arm a little",
+        )
     return sorted(
         allowed, key=lambda decomposition: (decomposition.match.solver.kind != "closed_form", -decomposition.clearance)
     )
+
+
+def _singular(problem: Problem) -> bool:
+    """Tell whether a given posture is a singularity of the arm itself: no coordinates describe motions from there."""
+    given = [posture for posture in (problem.start, problem.end) if posture is not None]
+    return bool(given) and _least_singular_value(problem.task_map, np.array(given)) < _REGULAR
+
+
+def _lacks_a_direction(task_map: TaskMap) -> bool:
+    """Tell whether the arm can nowhere move its tool in all directions of the task space."""
+    postures = np.random.default_rng(0).uniform(-1.0, 1.0, (_TRIED, task_map.robot.n))
+    jacobian = Newton(task_map).placed(postures)[1]
+    return bool(np.linalg.svd(jacobian, compute_uv=False)[:, -1].max() < _REGULAR)
+
+
+def _least_singular_value(task_map: TaskMap, postures: np.ndarray) -> float:
+    return float(np.linalg.svd(Newton(task_map).placed(postures)[1], compute_uv=False)[:, -1].min())
 
 
 def _with_roll(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -242,3 +269,8 @@ def breaks_of(task: Task) -> np.ndarray:
     """Return the ends of the task's uniform intervals, (N + 1,); of the first mesh where their number is left open."""
     intervals = COARSE_INTERVALS if task.spline.intervals == "auto" else task.spline.intervals
     return np.linspace(0.0, 1.0, intervals + 1)
+
+
+_REGULAR = 1e-6
+"""Least singular value of the Jacobian, in m and rad, below which a posture is a singularity of the arm."""
+_TRIED = 20

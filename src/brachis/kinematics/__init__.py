@@ -7,7 +7,7 @@ from brachis.kinematics.closed_form import ClosedFormMap
 from brachis.kinematics.direct import DirectJointMap
 from brachis.kinematics.interpolation import Nodes, interpolate
 from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
-from brachis.kinematics.newton import Newton
+from brachis.kinematics.newton import Newton, solved_each
 
 __all__ = [
     "CHART",
@@ -23,5 +23,6 @@ __all__ = [
     "chart_around",
     "interpolate",
     "null_spaces",
+    "solved_each",
     "transversality",
 ]

@@ -40,8 +40,10 @@ from brachis.robot import TaskMap
 
 CHART = "chart"
 """Label in the place of a branch's."""
-_NEAR = 0.4
-"""rad or m; the last state tells about postures no farther from it."""
+_NEAR = 0.8
+"""rad or m; how far from the reference its own self-motion tells where a posture is."""
+_PLACES = 33
+"""Places along the reference at which its typical least singular value is taken."""
 _SINGULAR = 1e-9
 """A reference with a smaller least singular value is singular all along; its chart has no margin anywhere."""
 _SUBSTEPS = 6
@@ -94,11 +96,30 @@ class ChartMap:
         self.s, self.reference = s, reference
         self.start = np.asarray(reference[0])
         self._newton = Newton(task_map)
-        jacobian = self._newton.placed(reference)[1]
-        least = np.linalg.svd(np.concatenate([jacobian, rows.at(s)[0]], axis=1), compute_uv=False)[:, -1]
+        null_motion = self._inverse_at(s, reference)[:, :, task_map.m :]
+        self._table = np.concatenate([reference, rows.values(s, reference), null_motion.reshape(len(s), -1)], axis=1)
+        even = np.linspace(0.0, 1.0, _PLACES)
+        augmented = self._augmented_at(even, self._between(even)[0])
+        least = np.linalg.svd(augmented, compute_uv=False)[:, -1]
         self._typical = max(float(np.median(least)), _SINGULAR)
         self._start_margin = float(least[0]) / self._typical
-        self._last: JointState | None = None
+        self._side = float(np.sign(np.linalg.det(augmented[0])))
+
+    def _augmented_at(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """J_aug, (K, n, n), in postures (K, n) at path coordinates (K,)."""
+        return np.concatenate([self._newton.placed(q)[1], self.rows.at(s)[0]], axis=1)
+
+    def _inverse_at(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """J_aug^-1, (K, n, n); a pseudo-inverse, as some are singular where a reference is not regular throughout."""
+        return np.asarray(np.linalg.pinv(self._augmented_at(s, q), rcond=_SINGULAR))
+
+    def _between(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Postures (K, n), sigma (K, r) and dq/dsigma (K, n, r) of the reference, by straight lines in between."""
+        right = np.clip(np.searchsorted(self.s, s, side="right"), 1, len(self.s) - 1)
+        part = ((s - self.s[right - 1]) / (self.s[right] - self.s[right - 1])).clip(0.0, 1.0)[:, None]
+        n, r = self.robot.n, self.r
+        table = (1.0 - part) * self._table[right - 1] + part * self._table[right]
+        return table[:, :n], table[:, n : n + r], table[:, n + r :].reshape(len(s), n, r)
 
     @property
     def r(self) -> int:
@@ -147,8 +168,10 @@ class ChartMap:
         wanted = y[:, 1:] + offset
         if near is not None:
             return self._newton.solve(targets, near, rows, wanted)
-        reference = np.column_stack([np.interp(s, self.s, joint) for joint in self.reference.T])
-        q = self._newton.solve(targets, self._predicted(y, reference), rows, wanted)
+        reference, sigma, null_motion = self._between(s)
+        aside = np.einsum("kij,kj->ki", null_motion, y[:, 1:] - sigma)
+        near_enough = np.abs(aside).max(axis=1, initial=0.0) < _NEAR
+        q = self._newton.solve(targets, np.where(near_enough[:, None], reference + aside, reference), rows, wanted)
         lost = np.flatnonzero(np.isnan(q).any(axis=1))
         if len(lost):
             begun, own = np.einsum("kij,kj->ki", rows[lost], reference[lost]), reference[lost]
@@ -156,15 +179,6 @@ class ChartMap:
                 own = self._newton.solve(targets[lost], own, rows[lost], begun + part * (wanted[lost] - begun))
             q[lost] = own
         return q
-
-    def _predicted(self, y: np.ndarray, reference: np.ndarray) -> np.ndarray:
-        """Postures, (K, n), to begin with: those of the last state moved on where they are near, else the reference."""
-        last = self._last
-        if last is None or last.y.shape != y.shape:
-            return reference
-        step = np.einsum("kij,kj->ki", last.gradient, y - last.y)
-        near = np.abs(step).max(axis=1, initial=0.0) < _NEAR
-        return np.where(near[:, None], last.q + step, reference)
 
     def state(
         self,
@@ -182,8 +196,11 @@ class ChartMap:
             raise UnreachableError("the chart has no posture there")
         twists = self.task_map.twists(q)
         rows, drift = self.rows.orders(y[:, 0], q)
+        augmented = np.concatenate([self.task_map.jacobian(twists), rows[0]], axis=1)
+        if (np.sign(np.linalg.det(augmented)) != self._side).any():
+            raise UnreachableError("the motion leaves the sheet of postures that the chart is laid on")
         try:
-            inverse = np.linalg.inv(np.concatenate([self.task_map.jacobian(twists), rows[0]], axis=1))
+            inverse = np.linalg.inv(augmented)
         except np.linalg.LinAlgError as error:
             raise UnreachableError("the chart is singular") from error
         m, sdot = self.task_map.m, ydot[:, :1]
@@ -195,9 +212,7 @@ class ChartMap:
         bent = -2.0 * sdot * np.einsum("kij,kj->ki", rows[1], qdot) - drift[1] * sdot**2
         given = np.concatenate([sample.xi_ds * sdot**2 - self.task_map.bias(twists, qdot), bent], axis=1)
         qddot = np.einsum("kij,kj->ki", gradient, yddot) + np.einsum("kij,kj->ki", inverse, given)
-        state = ChartState(y, ydot, yddot, q, qdot, qddot, gradient, sample, twists, inverse, rows, drift)
-        self._last = state
-        return state
+        return ChartState(y, ydot, yddot, q, qdot, qddot, gradient, sample, twists, inverse, rows, drift)
 
     def derivatives(self, state: ChartState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""

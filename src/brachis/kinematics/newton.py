@@ -73,7 +73,7 @@ class Newton:
                 [self._task_map.difference(targets[left], values), levels[left] - np.einsum("kij,kj->ki", own, q)],
                 axis=1,
             )
-            step = _solved(np.concatenate([jacobian, own], axis=1), miss)
+            step = solved_each(np.concatenate([jacobian, own], axis=1), miss)
             size = np.abs(step).max(axis=1, initial=0.0)
             q = q + step * np.minimum(1.0, _LARGEST_STEP / np.maximum(size, _LARGEST_STEP))[:, None]
             met = np.abs(miss).max(axis=1, initial=0.0) < _MET
@@ -83,7 +83,7 @@ class Newton:
         return found
 
 
-def _solved(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
+def solved_each(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve K linear systems, (K, n, n) and (K, n); those of singular matrices by NaN."""
     try:
         return np.asarray(np.linalg.solve(matrices, right[:, :, None])[:, :, 0])

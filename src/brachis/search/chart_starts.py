@@ -11,7 +11,7 @@ from brachis.deadline import NEVER, Deadline
 from brachis.errors import PathError, UnreachableError
 from brachis.kinematics import CHART, ChartMap, ClosedFormMap, Newton, chart_around, null_spaces
 from brachis.problem import Decomposition, Problem
-from brachis.search.joint_path import DeadEnd, JointPath
+from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
 from brachis.search.lattice import LARGEST_STEP
 from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.phase_plane import least_time
@@ -67,8 +67,13 @@ def chart_starts(
     if isinstance(found, DeadEnd):
         return found
     newton = Newton(problem.task_map)
-    starts = (_start_along(newton, joint_path, f"lattice {number}") for number, joint_path in enumerate(found, 1))
+    starts = (
+        None if number > 1 and deadline.passed else _start_along(newton, joint_path, f"lattice {number}")
+        for number, joint_path in enumerate(found, 1)
+    )
     ranked = sorted((start for start in starts if start is not None), key=lambda start: start.estimate)
+    if not ranked and not deadline.passed:
+        return DeadEnd(0.0, {NO_CHART: len(found)})
     hopeful = [start for start in ranked if start.estimate <= _HOPELESS * ranked[0].estimate or start is ranked[0]]
     return screened(hopeful, level.in_charts, deadline, listener) if hopeful else []
 
@@ -128,4 +133,5 @@ def first_map(problem: Problem, decompositions: Sequence[Decomposition]) -> tupl
     )
     if isinstance(found, DeadEnd):
         raise PathError(f"no joint path was found: {found}", s_interval=found.interval)
+    assert found  # noqa: S101  (there is no time limit here)
     return found[0].joint_map, found[0].family

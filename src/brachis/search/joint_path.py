@@ -16,6 +16,7 @@ _TINY = 1e-9
 
 NO_ANSWER = "it is out of reach"
 OTHER_BRANCH = "the branch ends"
+NO_CHART = "the arm stays too near a singularity of its own"
 JUMPS = "no posture is near enough to continue"
 
 

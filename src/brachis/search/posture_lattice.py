@@ -17,7 +17,7 @@ from dataclasses import fields
 import numpy as np
 
 from brachis.deadline import NEVER, Deadline
-from brachis.kinematics import Newton, null_spaces
+from brachis.kinematics import Newton, null_spaces, solved_each
 from brachis.problem import Decomposition, Problem
 from brachis.robot.joint_space import TURN
 from brachis.search.cells import Cells
@@ -88,9 +88,11 @@ class PostureLattice(Lattice):
         """
         if self._r > 1:
             return distinct(found, most)
-        apart = self._step(ends.q[:, None], ends.q[None]) / self._size
-        around = np.all(np.abs(apart) < _AROUND, axis=2) & (ends.branch[:, None] == ends.branch)
-        least = np.where(around, ends.length, np.inf).min(axis=1) >= ends.length
+        first, second = self._near(ends.q, ends.q, _AROUND * float(self._size.max()))
+        own = ends.branch[first] == ends.branch[second]
+        around = np.full(len(ends.q), np.inf)
+        np.minimum.at(around, first[own], ends.length[second[own]])
+        least = around >= ends.length
         minima = [joint_path for joint_path, is_one in zip(found, least, strict=True) if is_one][:most]
         return minima if self._only_minima else minima + distinct(found, most - len(minima))
 
@@ -142,9 +144,11 @@ class PostureLattice(Lattice):
             found.append(q[np.isfinite(q).all(axis=3)])
         if found:
             return np.concatenate(found)
-        lower, upper = self._lower, self._upper
         reach = np.where(self._robot.revolute, np.pi, _DRAWN)
-        low, high = np.maximum(lower, -reach), np.minimum(upper, reach)
+        low = np.where(
+            np.isfinite(self._lower), self._lower, np.where(np.isfinite(self._upper), self._upper, reach) - 2.0 * reach
+        )
+        high = np.where(np.isfinite(self._upper), self._upper, low + 2.0 * reach)
         drawn = rng.uniform(low, high, (_STARTS * self._nodes, self._robot.n))
         rows = np.swapaxes(null_spaces(self._newton.placed(drawn)[1]), 1, 2)
         q = self._newton.solve(np.repeat(target[None], len(drawn), axis=0), drawn, rows, _product(rows, drawn))
@@ -224,11 +228,14 @@ class PostureLattice(Lattice):
         moved = levels - at[:, None]
         right = np.concatenate([np.broadcast_to(wanted[:, None], (*moved.shape[:2], wanted.shape[1])), moved], axis=2)
         augmented = np.concatenate([jacobian, rows], axis=1)
-        begun = q[:, None] + np.linalg.solve(augmented[:, None], right[..., None])[..., 0]
         which = np.repeat(np.arange(len(q)), len(offsets))
-        begun, cells, levels = (part.reshape(len(which), -1) for part in (begun, cells, levels))
+        cells, levels, right = (part.reshape(len(which), -1) for part in (cells, levels, right))
+        begun = q[which] + solved_each(augmented[which], right)
+        regular = np.isfinite(begun).all(axis=1)
+        which, begun, cells, levels = (part[regular] for part in (which, begun, cells, levels))
         keys = np.concatenate([joints[which], cells, self._key(begun, _COARSE)], axis=1)
-        chosen = shortest(np.tile(np.abs(offsets).sum(axis=1), len(q)).astype(float), keys)
+        far = np.tile(np.abs(offsets).sum(axis=1), len(q))[regular]
+        chosen = shortest(far.astype(float), keys)
         found = self._met(begun[chosen], rows[which[chosen]], levels[chosen], station)
         found = found[np.isfinite(found).all(axis=1)]
         return np.asarray(found[np.unique(self._key(found, _SAME), axis=0, return_index=True)[1]])

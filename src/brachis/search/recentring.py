@@ -29,6 +29,8 @@ _SELECTABLE = 0.05
 """Least transversality along the motion of joints that may take the place of the chart's rows."""
 _SELECTED = (0, 3, 1)
 """Choices of joints that are tried at most with no, one and several redundant joints: these solves take longest."""
+_CHOICES = 500
+"""Choices of joints that are looked at, at most."""
 _DENSE = 4
 
 Solved = tuple[Program, tuple[SolverReport, ...]]
@@ -66,12 +68,14 @@ def solved_in_chart(problem: Problem, program: Program, x: np.ndarray, solve: So
             break
         other, more = continued(*moved, solve, first)
         if not more[-1].status.usable:
+            reports = (*more, *reports)
             break
         program, reports = other, reports + more
     if reports[-1].status.usable and program.safeguard_slack(reports[-1].x) <= HELD_BACK:
         other, more = continued(program, reports[-1].x, solve, further)
         if more[-1].status.usable:
             return other, reports + more
+        reports = (*more, *reports)
     return program, reports
 
 
@@ -139,24 +143,31 @@ def moved_to(
         return None
 
 
-def _transversal(program: Program, x: np.ndarray, rows: ChartRows | None = None) -> float:
-    """Least transversality of rows, or of the chart's own, along a motion."""
+def _self_motion(program: Program, x: np.ndarray) -> np.ndarray:
+    """Bases of the null spaces of the task Jacobian, (K, n, r), along a motion."""
     (state,), (phase,) = program.states(x), program.phases
     chart = phase.joint_map
     assert isinstance(chart, ChartMap)  # noqa: S101
-    null = null_spaces(Newton(chart.task_map).placed(state.q)[1])
-    return float(transversality((rows or chart.rows).at(state.y[:, 0])[0], null).min())
+    return null_spaces(Newton(chart.task_map).placed(state.q)[1])
 
 
 def _follows(program: Program, x: np.ndarray) -> bool:
     """Tell whether the chart still does for the motion."""
-    return program.safeguard_slack(x) > HELD_BACK and _transversal(program, x) >= _TRANSVERSAL
+    try:
+        (phase,), null = program.phases, _self_motion(program, x)
+        chart, s = phase.joint_map, program.states(x)[0].y[:, 0]
+        assert isinstance(chart, ChartMap)  # noqa: S101
+        own = transversality(chart.rows.at(s)[0], null).min()
+        return program.safeguard_slack(x) > HELD_BACK and bool(own >= _TRANSVERSAL)
+    except UnreachableError:
+        return False
 
 
 def _selections(program: Program, x: np.ndarray) -> list[ChartRows]:
     """Rows that select joints and are transversal along the motion, the most transversal ones first."""
-    (phase,) = program.phases
-    n, r = phase.joint_map.robot.n, phase.joint_map.r
-    choices = [ChartRows.constant(np.eye(n)[list(joints)]) for joints in itertools.combinations(range(n), r)]
-    ranked = sorted(((_transversal(program, x, rows), number) for number, rows in enumerate(choices)), reverse=True)
-    return [choices[number] for least, number in ranked[: _SELECTED[min(r, 2)]] if least >= _SELECTABLE]
+    null = _self_motion(program, x)
+    n, r = null.shape[1:]
+    choices = [list(joints) for joints in itertools.islice(itertools.combinations(range(n), r), _CHOICES)]
+    least = [float(transversality(np.eye(n)[joints][None], null).min()) for joints in choices]
+    ranked = sorted(range(len(choices)), key=lambda number: -least[number])[: _SELECTED[min(r, 2)]]
+    return [ChartRows.constant(np.eye(n)[choices[number]]) for number in ranked if least[number] >= _SELECTABLE]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.attempt import Attempt
+from brachis.errors import UnreachableError
 from brachis.problem import Decomposition
 from brachis.search.joint_path import DeadEnd
 
@@ -168,6 +169,9 @@ def _agree(first: Attempt, second: Attempt) -> bool:
     postures = []
     for attempt in (first, second):
         if attempt.program is not None:
-            (state,) = attempt.program.states(attempt.reports[-1].x)
+            try:
+                (state,) = attempt.program.states(attempt.reports[-1].x)
+            except UnreachableError:
+                return False
             postures.append(state.q)
     return bool(np.abs(postures[0] - postures[1]).max() < _SAME_MOTION)

@@ -68,16 +68,19 @@ def screened(starts: Sequence[Start], most: int, deadline: Deadline, listener: L
 
 
 def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
-    """Solve from a start over few knots; where that fails the start stays, with an infinite estimate."""
+    """Solve from a start over few knots; where that fails the start stays as it is, with an infinite estimate."""
     hopeless = dataclasses.replace(start, estimate=np.inf)
     if deadline.passed:
-        return start
+        return hopeless
     problem = _roughly(start.problem)
     program = program_of(problem, start.joint_map, np.linspace(0.0, 1.0, _INTERVALS + 1))
     x = starting_point(program, [start.joint_path])
     if x is None:
         return hopeless
-    program, reports = solved_in_chart(problem, program, x, _solver(start, deadline))
+    try:
+        program, reports = solved_in_chart(problem, program, x, _solver(start, deadline))
+    except ImportError:  # the backend is not installed: the plan says so
+        return hopeless
     last = reports[-1]
     if not last.status.usable:
         return hopeless
@@ -121,7 +124,9 @@ def _curves(program: Program, x: np.ndarray) -> np.ndarray:
 
 
 def _same(first: Start, second: Start) -> bool:
-    """Tell whether two starts are the same joint path, nearly."""
+    """Tell whether two starts that were solved are the same joint path, nearly."""
+    if not np.isfinite([first.estimate, second.estimate]).all():
+        return False
     if abs(first.estimate - second.estimate) > _SAME_TIME * second.estimate:
         return False
     postures = [start.joint_map.postures(start.joint_path) for start in (first, second)]
