@@ -12,7 +12,7 @@ import pytest
 from scipy.linalg import null_space
 
 import brachis
-from brachis.errors import ResultFileError
+from brachis.errors import DecompositionError, ResultFileError, StartError
 from brachis.kinematics import ChartRows
 from brachis.robot import task_map_of
 from brachis.trajectory import Trajectory
@@ -180,3 +180,37 @@ def test_a_chart_that_is_not_broken_is_read(saved):
     knots = np.concatenate([np.zeros(6), [0.4, 0.6], np.ones(6)])
     with_arrays(saved, chart_rows=lambda a: np.repeat(a, 8, axis=0), chart_knots=knots)
     assert len(Trajectory.load(saved).chart_knots) == 14
+
+
+@pytest.mark.parametrize(
+    ("urdf", "start", "space", "line"),
+    [
+        ("scara3", [0.0, 0.0, 0.0], ["x", "y"], [-0.3, 0.2]),
+        ("gen3", [0.0] * 7, "pose", [0.0, 0.1, -0.1]),
+    ],
+)
+def test_a_singular_start_is_refused(urdf, start, space, line):
+    task = {"brachis": 1, "start": {"joints": start}, "task_space": space, "path": [{"line": {"by": line}}]}
+    with pytest.raises(StartError, match="singular"):
+        brachis.plan(ROOT / "robots" / urdf / "robot.urdf", task)
+
+
+def test_directions_that_the_arm_lacks_are_refused():
+    line = {"line": {"by": [-0.1, 0.1, 0.0]}}
+    task = {"brachis": 1, "start": {"joints": [0.2, 0.6, 0.4]}, "task_space": "position", "path": [line]}
+    with pytest.raises(DecompositionError):
+        brachis.plan(ROOT / "robots" / "scara3/robot.urdf", task)
+
+
+def test_numeric_guesses_need_a_closed_form():
+    start = [0.3, 0.4, 0.3, -1.2, 0.3, -0.9, 0.2]
+    line = {"line": {"by": [0.0, 0.05, -0.05]}}
+    task = {
+        "brachis": 1,
+        "start": {"joints": start},
+        "task_space": "pose",
+        "path": [line],
+        "search": {"guesses": "numeric"},
+    }
+    with pytest.raises(DecompositionError):
+        brachis.plan(ROOT / "robots" / "gen3/robot.urdf", task)

@@ -35,7 +35,7 @@ class Start:
     joint_path : (S, 1 + r) ndarray
         Successive values of the map's curves: s and the redundant joints, or s and the chart's sigma.
     estimate : float
-        Least time along the joint path from the phase plane, s; infinite where there is none.
+        Least time along the joint path from the phase plane, or of a quick solve, s; infinite where there is none.
     origin : str
         Where it is from, in plain words, for example ``lattice 2``.
     family : str
@@ -190,7 +190,7 @@ class Attempt:
         elif not refined.converged:
             status = f"{last.solver}: {last.status.value}"
         elif not np.isfinite(refined.violation):
-            status = f"{last.solver}: the motion leaves the branch between collocation points"
+            status = f"{last.solver}: the motion leaves the branch, or the chart, between collocation points"
         else:
             if refined.violation > tolerance:
                 found = f"limits exceeded by {100.0 * refined.violation:.2g} %"

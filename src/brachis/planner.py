@@ -177,7 +177,7 @@ def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
     program = coarsest(target) if target.variables > _MANY_VARIABLES else target
     x = starting_point(program, [start.joint_path])
     if x is None:
-        return Attempt.of(start, "the splines through the joint path leave the branch")
+        return Attempt.of(start, "the splines through the joint path leave the branch, or the chart")
     solve = _solver(start, deadline, listener)
     try:
         if isinstance(start.joint_map, ChartMap):

@@ -25,7 +25,7 @@ class Result:
     trajectory : Trajectory
     verification : Verification
     family : str
-        Family of the closed form.
+        Family of the closed form; ``chart`` where there was none.
     attempt : Attempt
         The fastest one, with its solved program and its motion.
     least_motion : LeastMotion or None

@@ -182,7 +182,8 @@ def test_candidates_are_listed(run, task, write, case):
     outcome = run("plan", write({**task, "redundant_joints": "auto", **more}))
     data = json.loads(run("plan", write({**task, "redundant_joints": "auto", **more}), "--json").out)
     assert f"candidates ({len(data['candidates'])}" in outcome.out
-    assert {tuple(candidate["redundant_joints"]) for candidate in data["candidates"]} == choices
+    found = {tuple(candidate["redundant_joints"]) for candidate in data["candidates"]}
+    assert choices <= found <= choices | {tuple(data["redundant_joints"])}, "the fastest one in its last coordinates"
     rows = outcome.out[outcome.out.index("candidates (") :]
     assert f"│ {name} " in rows
     assert "none" not in rows

@@ -137,7 +137,7 @@ class ChartMap:
         return CHART
 
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
-        """Value of y = (s, sigma), (1 + r,), in a posture, (n,); NaN in a posture that is not known."""
+        """Value of y = (s, sigma), (1 + r,), in a posture, (n,); NaN where that is NaN."""
         return self.curves(np.array([s]), q[None])[0]
 
     def curves(self, s: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from brachis import ik
 from brachis.attempt import Attempt
 from brachis.errors import BrachisError, PathError, PlanningError
 from brachis.problem import Decomposition, Problem
-from brachis.search.joint_path import DeadEnd
+from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.reach import reason_out_of_reach
 from brachis.task import SolverSettings, Task
 
@@ -76,9 +76,8 @@ def no_motion(
         return reason
     if dead_ends and not joint_path:
         name, furthest = min(dead_ends.items(), key=lambda item: np.diff(item[1].interval)[0])
-        others = (
-            f" (redundant joints {name}; {len(dead_ends) - 1} other choices end sooner)" if len(dead_ends) > 1 else ""
-        )
+        own = name if name == ALL_POSTURES else f"redundant joints {name}"
+        others = f" ({own}; {len(dead_ends) - 1} other lattices end sooner)" if len(dead_ends) > 1 else ""
         start = "" if problem.start is None else "start in another posture, "
         return PathError(
             f"no joint path was found: {furthest}{others}",

@@ -14,6 +14,8 @@ from brachis.robot import Robot
 _APART = 0.02
 _TINY = 1e-9
 
+ALL_POSTURES = "all postures"
+"""What the lattice is called that keeps to no choice of redundant joints."""
 NO_ANSWER = "it is out of reach"
 OTHER_BRANCH = "the branch ends"
 NO_CHART = "the arm stays too near a singularity of its own"

@@ -10,12 +10,10 @@ import numpy as np
 from brachis.attempt import Attempt
 from brachis.errors import UnreachableError
 from brachis.problem import Decomposition
-from brachis.search.joint_path import DeadEnd
+from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 
 NOT_TRIED = "not tried: the time was up"
 """Status of an attempt for which there was no time."""
-ALL_POSTURES = "all postures"
-"""What the lattice is called that keeps to no choice of redundant joints."""
 SAME_MOTION = "same motion as another"
 """Status of an attempt that agrees with one that ranks before it."""
 _WORTH_IT = 2e-4

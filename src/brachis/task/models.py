@@ -126,7 +126,7 @@ class SearchSettings(Model):
     )
     guesses: Literal["lattice", "numeric"] = Field(
         default="lattice",
-        description="Where initial guesses come from: a lattice of closed-form postures, or numeric inverse kinematics "
+        description="Where initial guesses come from: a lattice of postures, or numeric inverse kinematics "
         "from the start posture.",
     )
     jobs: Count = Field(

@@ -1,0 +1,90 @@
+"""Screening: the fastest starts that differ, whatever time or backend is missing."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brachis.deadline import NEVER, Deadline
+from brachis.problem import Problem, decompositions_of
+from brachis.robot import Robot
+from brachis.search import screening
+from brachis.search.chart_starts import chart_starts
+from brachis.search.levels import SEARCH_LEVELS
+from brachis.task import load_task
+
+MOST = 2
+URDF = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
+
+
+def quiet(_text: str) -> None:
+    """Listen to nothing."""
+
+
+@pytest.fixture(scope="module")
+def starts():
+    """Starts of a free start posture, as the lattice gives them."""
+    task = load_task(
+        {
+            "brachis": 1,
+            "robot": {"gravity": [0, 0, 0], "limits": {"torque": 10, "velocity": None}},
+            "start": "free",
+            "path_start": [1.2, 0.4],
+            "task_space": ["x", "y"],
+            "path": [{"line": {"by": [-1.2, 0.9]}}],
+        }
+    )
+    robot = Robot.from_urdf(URDF, gravity=[0, 0, 0], limits=task.robot.limits)
+    problem = Problem.of(robot, task)
+    (level,) = SEARCH_LEVELS["fast"]
+    many = dataclasses.replace(level, in_charts=100, only_minima=False, joint_paths=8)
+    found = chart_starts(problem, decompositions_of(problem), many)
+    assert isinstance(found, list)
+    assert len(found) > MOST
+    return found
+
+
+def test_the_fastest_that_differ_are_kept(starts):
+    kept = screening.screened(starts, MOST, NEVER, quiet)
+    assert 1 <= len(kept) <= MOST
+    estimates = [start.estimate for start in kept]
+    assert estimates == sorted(estimates)
+    assert max(estimates) <= 1.05 * min(estimates)
+    for start in kept:
+        q = start.joint_map.postures(start.joint_path)
+        targets = start.problem.path.sample(start.joint_path[:, 0]).target
+        np.testing.assert_allclose(start.problem.task_map.values(q), targets, atol=1e-9)
+
+
+def test_few_starts_are_not_looked_at(starts):
+    assert screening.screened(starts[:MOST], MOST, NEVER, quiet) == starts[:MOST]
+
+
+def test_without_time_or_backend_starts_are_kept_as_they_come(starts, monkeypatch):
+    late = screening.screened(starts, MOST, Deadline(0.0), quiet)
+    assert [start.origin for start in late] == [start.origin for start in starts[:MOST]]
+
+    def missing(*_arguments: object) -> None:
+        raise ImportError("unopy")
+
+    monkeypatch.setattr(screening, "solved_in_chart", missing)
+    without = screening.screened(starts, MOST, NEVER, quiet)
+    assert [start.origin for start in without] == [start.origin for start in starts[:MOST]]
+
+
+def test_those_for_which_there_was_no_time_come_after_the_others(starts, monkeypatch):
+    solved = iter([True, *[False] * len(starts)])
+    honest = screening.solved_in_chart
+
+    def once(*arguments: object) -> object:
+        if next(solved):
+            return honest(*arguments)
+        raise ImportError("unopy")
+
+    monkeypatch.setattr(screening, "solved_in_chart", once)
+    first, *others = screening.screened(starts, MOST, NEVER, quiet)
+    assert first.origin == starts[0].origin
+    assert others == [], "what was not solved is slower for all that is known"
