@@ -16,6 +16,8 @@ from brachis.solvers import SolverOptions, solver_named
 
 ROOT = Path(__file__).parents[2]
 RESTARTS = 12
+LINES_DEG = (0, 90, 135, 180, 270)
+"""Those whose plans with different redundant joints differ most, and the easiest one."""
 spec = importlib.util.spec_from_file_location("scara_table", ROOT / "examples/02_scara_table.py")
 table = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(table)
@@ -53,7 +55,7 @@ def solve(program, x):
     return solver_named("uno")[0].solve(program, x, SolverOptions(max_iterations=100, time_limit=5.0), None)
 
 
-@pytest.mark.parametrize("angle", table.ANGLES_DEG)
+@pytest.mark.parametrize("angle", LINES_DEG)
 def test_auto_is_at_the_best_optimum_of_random_restarts(angle):
     robot, task = table.robot_and_task(angle, "auto")
     result = brachis.plan(robot, task)
