@@ -52,6 +52,11 @@ class Start:
     family: str
     solver: str = ""
 
+    @property
+    def in_chart(self) -> bool:
+        """Whether the coordinates are a chart's."""
+        return isinstance(self.joint_map, ChartMap)
+
     def with_solver(self, name: str) -> Start:
         """Return the same start for a solver."""
         return dataclasses.replace(self, solver=name)
@@ -126,7 +131,7 @@ class Attempt:
     @property
     def in_chart(self) -> bool:
         """Whether it is planned in a chart."""
-        return self.start is not None and isinstance(self.start.joint_map, ChartMap)
+        return self.start is not None and self.start.in_chart
 
     @property
     def keeps_knots(self) -> bool:

@@ -16,6 +16,10 @@ from brachis.robot.joint_space import complement, difference
 
 _RANGE_SLACK = 1e-9
 _SAME_POSTURE = 1e-5
+_REGULAR = 1e-6
+"""Least singular value of the Jacobian, in m and rad, below which a posture is a singularity of the arm."""
+_TRIED = 20
+"""Postures by which it is told whether the arm lacks a direction everywhere."""
 
 
 def check_postures(
@@ -97,6 +101,36 @@ def _in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
     ends = {bound.end: f"{bound.figure:.4g}" for bound in bounds}
     allowed = " to ".join(ends.get(end, "any") for end in ("lower", "upper"))
     return f"{first.figure + (value - level) / first.per_unit:.4g}", allowed
+
+
+def check_regular(task_map: TaskMap, start: np.ndarray | None, end: np.ndarray | None) -> None:
+    """Refuse a start or end posture that is a singularity of the arm: no coordinates describe motions from there.
+
+    Raises
+    ------
+    StartError
+    """
+    for name, posture in (("start", start), ("end", end)):
+        if posture is not None and _least_singular_values(task_map, posture[None])[0] < _REGULAR:
+            raise StartError(
+                f"the {name} posture is singular",
+                where=f"{name}.joints",
+                found="a posture in which the tool cannot move in all directions of the task space",
+                allowed="a posture in which it can",
+                hint="Bend the arm a little",
+            )
+
+
+def lacks_a_direction(task_map: TaskMap) -> bool:
+    """Tell whether the arm can nowhere move its tool in all directions of the task space."""
+    postures = np.random.default_rng(0).uniform(-1.0, 1.0, (_TRIED, task_map.robot.n))
+    return bool(_least_singular_values(task_map, postures).max() < _REGULAR)
+
+
+def _least_singular_values(task_map: TaskMap, postures: np.ndarray) -> np.ndarray:
+    """Least singular values of the task Jacobian, (K,), in postures (K, n)."""
+    jacobian = task_map.jacobian(task_map.twists(postures))
+    return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[:, -1])
 
 
 def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, wanted: str, *, name: str = "start") -> int:

@@ -42,8 +42,6 @@ _PROGRESS, _PATIENCE = 1e-2, 5
 """A solve ends where so many iterations lower the mean square by less than this fraction: near enough will do."""
 _TIME = 0.5
 """Part of the remaining time that may be used."""
-_LEAST_TIME = 0.1
-"""Seconds left to a solve that is begun."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +173,7 @@ def _solver(name: str, deadline: Deadline, listener: Listener) -> Solve:
         listener(f"least motion: iteration {iteration}, joint accelerations (rms) {100.0 * objective**0.5:.1f} %")
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        options = SolverOptions(_TOLERANCE, _ITERATIONS, max(deadline.left, _LEAST_TIME), _PROGRESS, _PATIENCE)
+        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.for_a_solve, _PROGRESS, _PATIENCE)
         report = backend.solve(program, x, options, progress)
         return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if report.feasible else report
 

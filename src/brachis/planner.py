@@ -21,7 +21,6 @@ from brachis.attempt import Attempt, Start
 from brachis.completion import completed
 from brachis.custom_limits import LimitModel
 from brachis.deadline import Deadline
-from brachis.kinematics import ChartMap
 from brachis.least_motion import calmest
 from brachis.mesh import adapt_mesh, coarsest
 from brachis.nlp import Program
@@ -180,7 +179,7 @@ def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
         return Attempt.of(start, "the splines through the joint path leave the branch, or the chart")
     solve = _solver(start, deadline, listener)
     try:
-        if isinstance(start.joint_map, ChartMap):
+        if start.in_chart:
             program, reports = solved_in_chart(problem, program, x, solve)
             joint_map = program.phases[0].joint_map
             target = target.with_phases(phase_in(problem, joint_map, phase.grid) for phase in target.phases)
@@ -214,7 +213,7 @@ def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attemp
     options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, soon)
     solve = _solver(start, soon, listener)
     reports, target = attempt.reports, attempt.target
-    if attempt.keeps_knots and isinstance(start.joint_map, ChartMap) and not deadline.passed:
+    if attempt.keeps_knots and start.in_chart and not deadline.passed:
         program, further = best_of_joints(start.problem, program, reports[-1], solve)
         reports, target = (*reports[:-1], *further), program
     adapted = adapt_mesh(program, reports, solve, task.spline, options, target=target)

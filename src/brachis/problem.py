@@ -11,8 +11,8 @@ from brachis import ik
 from brachis.bspline import clamped_knots, spread
 from brachis.custom_limits import LimitModel
 from brachis.errors import DecompositionError, StartError, UnknownNameError
-from brachis.feasibility import branch_of, check_end_branch, check_postures
-from brachis.kinematics import ClosedFormMap, JointMap, Newton, null_spaces
+from brachis.feasibility import branch_of, check_end_branch, check_postures, check_regular, lacks_a_direction
+from brachis.kinematics import ClosedFormMap, JointMap, Newton
 from brachis.limits import Limit, limits_of
 from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Boundary, FixedGrid, Grid, Phase, Program
@@ -82,11 +82,10 @@ class Problem:
 def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
     """Return the posture nearest to a given one, (n,), at the end of the path; the given one if it is there already."""
     newton, place = Newton(task_map), path.sample(np.ones(1)).target
-    values, jacobian = newton.placed(posture[None])
-    if task_map.robot.n < task_map.m or np.abs(task_map.difference(place, values)).max() < _EXACT:
+    miss = task_map.difference(place, task_map.values(posture[None]))
+    if task_map.robot.n < task_map.m or np.abs(miss).max() < _EXACT:
         return posture
-    rows = np.swapaxes(null_spaces(jacobian), 1, 2)
-    (found,) = newton.solve(place, posture[None], rows, rows @ posture)
+    (found,) = newton.nearest(place, posture[None])
     return found if np.isfinite(found).all() else posture
 
 
@@ -162,7 +161,7 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
     found = ik.find_all(robot, task_map, families=families)
     matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
     asked = task.branch != "auto" or task.search.guesses != "lattice"
-    if not matches and (asked or robot.n < task_map.m or _lacks_a_direction(task_map)):
+    if not matches and (asked or robot.n < task_map.m or lacks_a_direction(task_map)):
         if len(found) <= 1:  # nothing to choose: the reasons of the only choice, or the wrong number of joints
             return [_decomposition(problem, ik.find(robot, task_map, (), families=families))]
         raise DecompositionError(
@@ -178,36 +177,13 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
             allowed.append(_decomposition(problem, match))
         except (StartError, UnknownNameError) as error:
             refusals.append(error)
-    if refusals and not allowed and (asked or robot.n == task_map.m or _singular(problem)):
+    if refusals and not allowed and (asked or robot.n == task_map.m):
         raise refusals[0]
-    if not matches and _singular(problem):
-        raise StartError(
-            "a given posture is singular",
-            where="start.joints" if problem.start is not None else "end.joints",
-            found="a posture in which the tool cannot move in all directions of the task space",
-            allowed="another posture",
-            hint="Bend the arm a little",
-        )
+    if not allowed:
+        check_regular(task_map, problem.start, problem.end)
     return sorted(
         allowed, key=lambda decomposition: (decomposition.match.solver.kind != "closed_form", -decomposition.clearance)
     )
-
-
-def _singular(problem: Problem) -> bool:
-    """Tell whether a given posture is a singularity of the arm itself: no coordinates describe motions from there."""
-    given = [posture for posture in (problem.start, problem.end) if posture is not None]
-    return bool(given) and _least_singular_value(problem.task_map, np.array(given)) < _REGULAR
-
-
-def _lacks_a_direction(task_map: TaskMap) -> bool:
-    """Tell whether the arm can nowhere move its tool in all directions of the task space."""
-    postures = np.random.default_rng(0).uniform(-1.0, 1.0, (_TRIED, task_map.robot.n))
-    jacobian = Newton(task_map).placed(postures)[1]
-    return bool(np.linalg.svd(jacobian, compute_uv=False)[:, -1].max() < _REGULAR)
-
-
-def _least_singular_value(task_map: TaskMap, postures: np.ndarray) -> float:
-    return float(np.linalg.svd(Newton(task_map).placed(postures)[1], compute_uv=False)[:, -1].min())
 
 
 def _with_roll(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -269,8 +245,3 @@ def breaks_of(task: Task) -> np.ndarray:
     """Return the ends of the task's uniform intervals, (N + 1,); of the first mesh where their number is left open."""
     intervals = COARSE_INTERVALS if task.spline.intervals == "auto" else task.spline.intervals
     return np.linspace(0.0, 1.0, intervals + 1)
-
-
-_REGULAR = 1e-6
-"""Least singular value of the Jacobian, in m and rad, below which a posture is a singularity of the arm."""
-_TRIED = 20

@@ -12,7 +12,7 @@ from brachis.kinematics import ChartMap, ChartRows
 from brachis.robot import Robot
 from support.chains import planar_robot
 from support.charts import PLACES, chart_of, jacobian, least_motion, path_from
-from support.motions import Sway, joint_map
+from support.motions import Sway, check_derivatives, check_time_derivatives, joint_map
 from support.screw_arms import seven_joints
 from support.spatial import START, rail_arm
 
@@ -81,44 +81,11 @@ def test_path_is_met_exactly(motion):
 
 
 def test_motion_is_the_time_derivative_of_the_postures(motion):
-    chart, h = motion.joint_map, 1e-4
-    state = chart.state(*motion(T))
-    before, here, after = (chart.postures(motion(T + step)[0]) for step in (-h, 0.0, h))
-    np.testing.assert_allclose(state.q, here, atol=1e-12)
-    speed, bend = (after - before) / (2.0 * h), (after - 2.0 * here + before) / h**2
-    assert np.abs(speed).max() > 0.1
-    assert np.abs(bend).max() > 0.1
-    np.testing.assert_allclose(state.qdot, speed, atol=1e-5 * np.abs(speed).max())
-    np.testing.assert_allclose(state.qddot, bend, atol=1e-5 * np.abs(bend).max())
+    check_time_derivatives(motion, T, exact=1e-12)
 
 
 def test_derivatives(motion):
-    chart, h = motion.joint_map, 1e-5
-    parts = motion(T)
-    state = chart.state(*parts)
-    exact = chart.derivatives(state)
-
-    def difference(place, column):
-        """Central differences of q, qdot and qddot by one column of y, ydot or yddot."""
-        sides = []
-        for sign in (1.0, -1.0):
-            moved = [part.copy() for part in parts]
-            moved[place][:, column] += sign * h
-            sides.append(chart.state(*moved))
-        return [(getattr(sides[0], name) - getattr(sides[1], name)) / (2.0 * h) for name in ("q", "qdot", "qddot")]
-
-    for column in range(1 + chart.r):
-        by_y, by_ydot, by_yddot = (difference(place, column) for place in range(3))
-        gradient = state.gradient[:, :, column]
-        for value, expected in (
-            (gradient, by_y[0]),
-            (exact.qdot_y[:, :, column], by_y[1]),
-            (exact.qddot_y[:, :, column], by_y[2]),
-            (gradient, by_ydot[1]),
-            (exact.qddot_ydot[:, :, column], by_ydot[2]),
-            (gradient, by_yddot[2]),
-        ):
-            np.testing.assert_allclose(value, expected, atol=2e-7 * max(1.0, np.abs(expected).max()))
+    exact = check_derivatives(motion, T)
     assert min(np.abs(part).max() for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot)) > 0.05
 
 

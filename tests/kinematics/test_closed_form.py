@@ -8,7 +8,7 @@ import pytest
 from brachis.errors import UnreachableError
 from brachis.robot import Robot
 from support.chains import planar_robot
-from support.motions import Sway, joint_map
+from support.motions import Sway, check_derivatives, check_time_derivatives, joint_map
 
 CASES = {
     "r = 0, 2R": ("RR", "xz", ["x", "z"], [0.4, 1.2], []),
@@ -46,48 +46,11 @@ def test_path_is_met_exactly(motion):
 
 
 def test_motion_is_the_time_derivative_of_the_postures(motion):
-    chain, h = motion.joint_map, 1e-4
-    state = chain.state(*motion(T))
-    before, here, after = (chain.postures(motion(T + step)[0]) for step in (-h, 0.0, h))
-    np.testing.assert_allclose(state.q, here, atol=1e-14)
-    speed, bend = (after - before) / (2.0 * h), (after - 2.0 * here + before) / h**2
-    assert np.abs(speed).max() > 0.1
-    assert np.abs(bend).max() > 0.1
-    np.testing.assert_allclose(state.qdot, speed, atol=1e-5 * np.abs(speed).max())
-    np.testing.assert_allclose(state.qddot, bend, atol=1e-5 * np.abs(bend).max())
+    check_time_derivatives(motion, T, exact=1e-14)
 
 
 def test_derivatives(motion):
-    chain, h = motion.joint_map, 1e-5
-    parts = motion(T)
-    state = chain.state(*parts)
-    exact = chain.derivatives(state)
-
-    def difference(place, column):
-        """Central differences of q, qdot and qddot by one column of y, ydot or yddot."""
-        sides = []
-        for sign in (1.0, -1.0):
-            moved = [part.copy() for part in parts]
-            moved[place][:, column] += sign * h
-            sides.append(chain.state(*moved))
-        return [(getattr(sides[0], name) - getattr(sides[1], name)) / (2.0 * h) for name in ("q", "qdot", "qddot")]
-
-    for column in range(1 + chain.r):
-        by_y, by_ydot, by_yddot = (difference(place, column) for place in range(3))
-        gradient = state.gradient[:, :, column]
-        # Zeros: position does not hang on speed, nor speed on acceleration.
-        for value, expected in (
-            (gradient, by_y[0]),
-            (exact.qdot_y[:, :, column], by_y[1]),
-            (exact.qddot_y[:, :, column], by_y[2]),
-            (0.0 * gradient, by_ydot[0]),
-            (gradient, by_ydot[1]),
-            (exact.qddot_ydot[:, :, column], by_ydot[2]),
-            (0.0 * gradient, by_yddot[0]),
-            (0.0 * gradient, by_yddot[1]),
-            (gradient, by_yddot[2]),
-        ):
-            np.testing.assert_allclose(value, expected, atol=2e-7 * max(1.0, np.abs(expected).max()))
+    exact = check_derivatives(motion, T)
     assert min(np.abs(part).max() for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot)) > 0.1
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from brachis.feasibility import branch_of
 from brachis.ik import find
-from brachis.kinematics import ChartMap, ClosedFormMap
+from brachis.kinematics import ChartMap, ClosedFormMap, JointDerivatives
 from brachis.path import build_path
 from brachis.robot import Robot, task_map_of
 from brachis.task import load_task
@@ -51,3 +51,49 @@ class Sway:
             columns.append((q + a * np.sin(rate * t), a * rate * np.cos(rate * t), -a * rate**2 * np.sin(rate * t)))
         y, ydot, yddot = (np.stack(parts, axis=1) for parts in zip(*columns, strict=True))
         return y, ydot, yddot
+
+
+def check_time_derivatives(motion: Any, t: np.ndarray, exact: float) -> None:
+    """Positions are the postures', to `exact`; velocities and accelerations their differences over time."""
+    joint_map, h = motion.joint_map, 1e-4
+    state = joint_map.state(*motion(t))
+    before, here, after = (joint_map.postures(motion(t + step)[0]) for step in (-h, 0.0, h))
+    np.testing.assert_allclose(state.q, here, atol=exact)
+    speed, bend = (after - before) / (2.0 * h), (after - 2.0 * here + before) / h**2
+    assert np.abs(speed).max() > 0.1
+    assert np.abs(bend).max() > 0.1
+    np.testing.assert_allclose(state.qdot, speed, atol=1e-5 * np.abs(speed).max())
+    np.testing.assert_allclose(state.qddot, bend, atol=1e-5 * np.abs(bend).max())
+
+
+def check_derivatives(motion: Any, t: np.ndarray) -> JointDerivatives:
+    """Compare the derivatives of a joint map with central differences by every column of y, ydot and yddot."""
+    joint_map, h, parts = motion.joint_map, 1e-5, motion(t)
+    state = joint_map.state(*parts)
+    exact = joint_map.derivatives(state)
+
+    def difference(place: int, column: int) -> list[np.ndarray]:
+        sides = []
+        for sign in (1.0, -1.0):
+            moved = [part.copy() for part in parts]
+            moved[place][:, column] += sign * h
+            sides.append(joint_map.state(*moved))
+        return [(getattr(sides[0], name) - getattr(sides[1], name)) / (2.0 * h) for name in ("q", "qdot", "qddot")]
+
+    for column in range(1 + joint_map.r):
+        by_y, by_ydot, by_yddot = (difference(place, column) for place in range(3))
+        gradient = state.gradient[:, :, column]
+        # Zeros: position does not hang on speed, nor speed on acceleration.
+        for value, expected in (
+            (gradient, by_y[0]),
+            (exact.qdot_y[:, :, column], by_y[1]),
+            (exact.qddot_y[:, :, column], by_y[2]),
+            (0.0 * gradient, by_ydot[0]),
+            (gradient, by_ydot[1]),
+            (exact.qddot_ydot[:, :, column], by_ydot[2]),
+            (0.0 * gradient, by_yddot[0]),
+            (0.0 * gradient, by_yddot[1]),
+            (gradient, by_yddot[2]),
+        ):
+            np.testing.assert_allclose(value, expected, atol=2e-7 * max(1.0, np.abs(expected).max()))
+    return exact

@@ -2,12 +2,12 @@
 
 from brachis.kinematics.chart import CHART, ChartMap
 from brachis.kinematics.chart_rows import ChartRows
-from brachis.kinematics.charting import chart_around, null_spaces, transversality
+from brachis.kinematics.charting import chart_around, moving_most, transversality
 from brachis.kinematics.closed_form import ClosedFormMap
 from brachis.kinematics.direct import DirectJointMap
 from brachis.kinematics.interpolation import Nodes, interpolate
 from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
-from brachis.kinematics.newton import Newton, solved_each
+from brachis.kinematics.newton import Newton, null_spaces, solved_each
 
 __all__ = [
     "CHART",
@@ -22,6 +22,7 @@ __all__ = [
     "Nodes",
     "chart_around",
     "interpolate",
+    "moving_most",
     "null_spaces",
     "solved_each",
     "transversality",

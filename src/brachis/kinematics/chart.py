@@ -33,7 +33,7 @@ import numpy as np
 
 from brachis.errors import UnreachableError
 from brachis.kinematics.chart_rows import ChartRows
-from brachis.kinematics.joint_map import JointDerivatives, JointState
+from brachis.kinematics.joint_map import JointDerivatives, PathState
 from brachis.kinematics.newton import Newton
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
@@ -51,25 +51,17 @@ _SUBSTEPS = 6
 
 
 @dataclass(frozen=True)
-class ChartState(JointState):
-    """Motion of all joints along a path at K times.
+class ChartState(PathState):
+    """Motion of all joints along a path at K times; `inverse` is J_aug^-1, (K, n, n).
 
     Attributes
     ----------
-    path : PathSample
-    twists : (6, K, n) ndarray
-        Columns of the tool frame's Jacobian; see `TaskMap.twists`.
-    inverse : (K, n, n) ndarray
-        J_aug^-1.
     rows : (4, K, r, n) ndarray
         C and its derivatives by s.
     drift : (3, K, r) ndarray
         e, e' and e''.
     """
 
-    path: PathSample
-    twists: np.ndarray
-    inverse: np.ndarray
     rows: np.ndarray
     drift: np.ndarray
 

@@ -15,7 +15,7 @@ import numpy as np
 from brachis.errors import UnreachableError
 from brachis.kinematics.chart import ChartMap
 from brachis.kinematics.chart_rows import DEGREE, ChartRows
-from brachis.kinematics.newton import Newton
+from brachis.kinematics.newton import Newton, null_spaces
 from brachis.path import Path
 from brachis.robot import TaskMap
 
@@ -80,17 +80,23 @@ def _growing(s: np.ndarray) -> np.ndarray:
     return np.flatnonzero(grown)
 
 
-def null_spaces(jacobian: np.ndarray) -> np.ndarray:
-    """Orthonormal bases (K, n, r) of the null spaces of Jacobians (K, m, n)."""
-    m = jacobian.shape[1]
-    return np.asarray(np.swapaxes(np.linalg.svd(jacobian)[2][:, m:], 1, 2))
-
-
 def transversality(rows: np.ndarray, null: np.ndarray) -> np.ndarray:
     """Least singular value of C N, (K,), of rows (K, r, n) and bases (K, n, r); infinite without redundancy."""
     if not null.shape[2]:
         return np.full(len(null), np.inf)
     return np.asarray(np.linalg.svd(rows @ null, compute_uv=False)[:, -1])
+
+
+def moving_most(null: np.ndarray) -> np.ndarray:
+    """For null spaces, (K, n, r), the r joints, (K, r), ascending, whose rows span most, by pivoting."""
+    left, chosen = null.copy(), []
+    for _ in range(null.shape[2]):
+        joint = np.argmax(np.linalg.norm(left, axis=2), axis=1)
+        chosen.append(joint)
+        row = left[np.arange(len(left)), joint]
+        unit = row / np.maximum(np.linalg.norm(row, axis=1, keepdims=True), 1e-300)
+        left = left - np.einsum("knr,kr->kn", left, unit)[:, :, None] * unit[:, None]
+    return np.sort(np.array(chosen, dtype=int).reshape(null.shape[2], len(null)).T, axis=1)
 
 
 def _continued(null: np.ndarray) -> np.ndarray:

@@ -19,37 +19,17 @@ constant: their derivatives vanish.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from brachis.errors import UnreachableError
 from brachis.ik import IKSolver, margin_gradient
-from brachis.kinematics.joint_map import JointDerivatives, JointState
+from brachis.kinematics.joint_map import JointDerivatives, JointState, PathState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
 from brachis.robot.joint_space import TURN, complement, difference, in_turn_of
 
 _SURE = 0.25
 """A step that differs from its prediction by more than this part of a turn is not counted."""
-
-
-@dataclass(frozen=True)
-class PathState(JointState):
-    """Motion of all joints along a path at K times.
-
-    Attributes
-    ----------
-    path : PathSample
-    twists : (6, K, n) ndarray
-        Columns of the tool frame's Jacobian; see `TaskMap.twists`.
-    inverse : (K, m, m) ndarray
-        J_nr^-1.
-    """
-
-    path: PathSample
-    twists: np.ndarray
-    inverse: np.ndarray
 
 
 class ClosedFormMap:

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from brachis.path import Path
+from brachis.path import Path, PathSample
 from brachis.robot import Robot
 
 
@@ -35,6 +35,24 @@ class JointState:
     qdot: np.ndarray
     qddot: np.ndarray
     gradient: np.ndarray
+
+
+@dataclass(frozen=True)
+class PathState(JointState):
+    """Motion of all joints along a path at K times.
+
+    Attributes
+    ----------
+    path : PathSample
+    twists : (6, K, n) ndarray
+        Columns of the tool frame's Jacobian; see `TaskMap.twists`.
+    inverse : (K, a, a) ndarray
+        Of the matrix that is solved for the joints which follow: J_nr^-1 with a = m, or J_aug^-1 with a = n.
+    """
+
+    path: PathSample
+    twists: np.ndarray
+    inverse: np.ndarray
 
 
 @dataclass(frozen=True)

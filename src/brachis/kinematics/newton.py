@@ -82,6 +82,17 @@ class Newton:
             left, q = left[kept], q[kept]
         return found
 
+    def nearest(self, targets: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Find the postures that meet targets, (K, c), without self-motion from given ones; (K, n), NaN where none."""
+        rows = np.swapaxes(null_spaces(self.placed(q)[1]), 1, 2)
+        return self.solve(targets, q, rows, np.einsum("kij,kj->ki", rows, q))
+
+
+def null_spaces(jacobian: np.ndarray) -> np.ndarray:
+    """Orthonormal bases (K, n, r) of the null spaces of Jacobians (K, m, n)."""
+    m = jacobian.shape[1]
+    return np.asarray(np.swapaxes(np.linalg.svd(jacobian)[2][:, m:], 1, 2))
+
 
 def solved_each(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve K linear systems, (K, n, n) and (K, n); those of singular matrices by NaN."""

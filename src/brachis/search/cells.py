@@ -51,7 +51,7 @@ class Cells:
         given, joints = decomposition.problem, list(decomposition.redundant)
         turning = given.robot.revolute[joints]
         low, high = given.robot.limits.position_lower[joints], given.robot.limits.position_upper[joints]
-        size = np.where(turning, TURN, 1.0 / _CELLS_PER_METRE) / cells_per_turn
+        size = cell_sizes(turning, cells_per_turn)
         if posture is not None:
             origin = posture[joints]
         else:
@@ -94,6 +94,11 @@ class Cells:
         single = [sign * step * row for row in np.eye(self.r, dtype=int) for step in _SINGLE for sign in (-1, 1)]
         random = np.rint(rng.normal(0.0, _SPREAD, (_RANDOM, self.r))).astype(int)
         return np.unique(np.vstack([np.zeros((1, self.r), dtype=int), single, random]), axis=0)
+
+
+def cell_sizes(revolute: np.ndarray, cells_per_turn: int) -> np.ndarray:
+    """Sizes of the cells of joints, (n,), rad or m, of which a mask tells the revolute ones."""
+    return np.where(revolute, TURN, 1.0 / _CELLS_PER_METRE) / cells_per_turn
 
 
 def unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 from brachis.attempt import Start
 from brachis.deadline import NEVER, Deadline
 from brachis.errors import PathError, UnreachableError
-from brachis.kinematics import CHART, ChartMap, ClosedFormMap, Newton, chart_around, null_spaces
+from brachis.kinematics import CHART, ChartMap, ClosedFormMap, Newton, chart_around
 from brachis.problem import Decomposition, Problem
 from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
 from brachis.search.lattice import LARGEST_STEP
@@ -101,9 +101,7 @@ def _followed(newton: Newton, joint_path: JointPath, places: np.ndarray, pieces:
         q = np.column_stack([np.interp(places, joint_path.s, joint) for joint in joint_path.q.T])
     else:
         q = smoothed(joint_path.s, joint_path.q, places, pieces)
-    rows = np.swapaxes(null_spaces(newton.placed(q)[1]), 1, 2)
-    targets = joint_path.problem.path.sample(places).target
-    q = newton.solve(targets, q, rows, np.einsum("kij,kj->ki", rows, q))
+    q = newton.nearest(joint_path.problem.path.sample(places).target, q)
     given = joint_path.problem.start, joint_path.problem.end
     for place, posture in zip((0, -1), given, strict=True):
         if posture is not None:

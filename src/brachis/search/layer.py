@@ -19,6 +19,7 @@ class Layer:
     Attributes
     ----------
     cell : (K, r) int ndarray
+        Of the redundant joints of a closed form; (K, 0) without one.
     branch : (K,) int ndarray
         What joint paths keep: index into the closed form's branches, or where they began.
     q : (K, n) ndarray

@@ -17,15 +17,15 @@ from dataclasses import fields
 import numpy as np
 
 from brachis.deadline import NEVER, Deadline
-from brachis.kinematics import Newton, null_spaces, solved_each
+from brachis.kinematics import Newton, moving_most, null_spaces, solved_each
 from brachis.problem import Decomposition, Problem
 from brachis.robot.joint_space import TURN
-from brachis.search.cells import Cells
+from brachis.search.beginnings import beginnings
+from brachis.search.cells import cell_sizes
 from brachis.search.joint_path import NO_ANSWER, JointPath, beyond_ranges, causes_of, distinct
 from brachis.search.lattice import LARGEST_STEP, Lattice, shortest
 from brachis.search.layer import Layer, farthest
 
-_CELLS_PER_METRE = 1.0 / 3.0  # of those of a turn
 _NEIGHBOURS = (-2, -1, 0, 1, 2)
 _STEPS, _RANDOM, _SPREAD = (1.0, 4.0), 6, 2.5  # cells
 _COARSE, _SAME = 0.5, 1e-3  # rad or m
@@ -35,8 +35,6 @@ _AROUND = 3.0  # cells
 _BEGINNINGS, _LEAST_NODES = 12, 10
 """Free starts of several redundant joints, and nodes that the joint paths from each keep at least."""
 _STARTS = 4  # times the nodes of a layer
-_DRAWN = 10.0
-"""Reach of what is drawn for joints without ranges, rad or m."""
 
 
 class PostureLattice(Lattice):
@@ -72,7 +70,7 @@ class PostureLattice(Lattice):
         self._decompositions, self._cells_per_turn = decompositions, cells_per_turn
         revolute = problem.robot.revolute
         self._r = problem.robot.n - problem.task_map.m
-        self._size = np.where(revolute, TURN, 1.0 / _CELLS_PER_METRE) / cells_per_turn
+        self._size = cell_sizes(revolute, cells_per_turn)
         self._newton = Newton(problem.task_map)
         self._modulo = revolute & ~self._telling
 
@@ -94,13 +92,17 @@ class PostureLattice(Lattice):
         np.minimum.at(around, first[own], ends.length[second[own]])
         least = around >= ends.length
         minima = [joint_path for joint_path, is_one in zip(found, least, strict=True) if is_one][:most]
-        return minima if self._only_minima else minima + distinct(found, most - len(minima))
+        if self._only_minima:
+            return minima
+        others = [each for each in distinct(found, most) if not any(each is one for one in minima)]
+        return minima + others[: most - len(minima)]
 
     def _first_layer(self, rng: np.random.Generator) -> Layer | dict[str, int]:
         """See `Lattice`."""
         if self._origin is not None:
             return _layer(self._origin[None].astype(float), np.zeros(1, dtype=int))
-        q = self._seeds(rng)
+        count = _STARTS * self._nodes
+        q = beginnings(self.problem, self._decompositions, self._newton, self._cells_per_turn, count, rng)
         if not len(q):
             return {NO_ANSWER: 1}
         _, kept = np.unique(self._key(q, self._size), axis=0, return_index=True)
@@ -129,31 +131,6 @@ class PostureLattice(Lattice):
         graph = coo_array((np.ones(len(first)), (first, second)), shape=(len(q), len(q)))
         return q, connected_components(graph, directed=False)[1]
 
-    def _seeds(self, rng: np.random.Generator) -> np.ndarray:
-        """Postures, (K, n), at the beginning of the path, all over the self-motion manifold."""
-        target, found = self._targets[0], []
-        for decomposition in self._decompositions:
-            cells = Cells.of(decomposition, self._cells_per_turn, None)
-            some = cells.everywhere(_STARTS * self._nodes, rng)
-            q_r = cells.positions(some)
-            answers = decomposition.match.solver.solve(np.repeat(target[None], len(some), axis=0), q_r)
-            q = np.empty((*answers.shape[:3], self._robot.n))
-            redundant = list(decomposition.redundant)
-            q[..., redundant] = q_r[:, None, None]
-            q[..., np.setdiff1d(np.arange(self._robot.n), redundant)] = answers
-            found.append(q[np.isfinite(q).all(axis=3)])
-        if found:
-            return np.concatenate(found)
-        reach = np.where(self._robot.revolute, np.pi, _DRAWN)
-        low = np.where(
-            np.isfinite(self._lower), self._lower, np.where(np.isfinite(self._upper), self._upper, reach) - 2.0 * reach
-        )
-        high = np.where(np.isfinite(self._upper), self._upper, low + 2.0 * reach)
-        drawn = rng.uniform(low, high, (_STARTS * self._nodes, self._robot.n))
-        rows = np.swapaxes(null_spaces(self._newton.placed(drawn)[1]), 1, 2)
-        q = self._newton.solve(np.repeat(target[None], len(drawn), axis=0), drawn, rows, _product(rows, drawn))
-        return q[np.isfinite(q).all(axis=1)]
-
     def _key(self, q: np.ndarray, size: np.ndarray | float) -> np.ndarray:
         """Whole numbers, (K, n), by which postures are told apart at a spacing; turns that nobody asks for left out."""
         return np.rint(np.where(self._modulo, np.remainder(q, TURN), q) / size).astype(int)
@@ -163,7 +140,9 @@ class PostureLattice(Lattice):
         values, jacobian = self._newton.placed(before.q)
         null = null_spaces(jacobian)
         wanted = self.problem.task_map.difference(self._targets[station][None], values)
-        needed = np.einsum("kij,kj->ki", np.linalg.pinv(jacobian), wanted)
+        still = np.zeros((len(null), self._r))  # without self-motion
+        square = np.concatenate([jacobian, np.swapaxes(null, 1, 2)], axis=1)
+        needed = solved_each(square, np.concatenate([wanted, still], axis=1))
         if self._r <= 1:
             parent, q = self._pairs(before.q, self._at_cells(before.q, jacobian, null, wanted, station))
         else:
@@ -191,7 +170,7 @@ class PostureLattice(Lattice):
         parent, step, q = parent[good], step[good], q[good]
         length = before.length[parent] + self._lengths(before.q, step, parent)
         branch = before.branch[parent]
-        layer = Layer(branch[:, None], branch, before.q[parent] + step, low[good], high[good], length, parent)
+        layer = Layer(_no_cells(branch), branch, before.q[parent] + step, low[good], high[good], length, parent)
         return self._kept(layer[shortest(length, np.column_stack([branch, self._key(q, _SAME)]))])
 
     def _pairs(self, before: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -219,7 +198,7 @@ class PostureLattice(Lattice):
         self, q: np.ndarray, jacobian: np.ndarray, null: np.ndarray, wanted: np.ndarray, station: int
     ) -> np.ndarray:
         """Postures (C, n) at the cells around nodes with postures (K, n), on the way to the next station's target."""
-        joints = _moving_most(null / self._size[:, None])
+        joints = moving_most(null / self._size[:, None])
         rows, size = np.eye(self._robot.n)[joints], self._size[joints]
         at = np.take_along_axis(q, joints, axis=1)
         offsets = np.array(_NEIGHBOURS)[:, None] if self._r else np.zeros((1, 0), dtype=int)
@@ -281,20 +260,13 @@ class PostureLattice(Lattice):
 
 def _layer(q: np.ndarray, branch: np.ndarray) -> Layer:
     """Nodes, (K, n), with which joint paths begin, and what tells these apart, (K,)."""
-    return Layer(branch[:, None], branch, q, q, q, np.zeros(len(q)), np.zeros(len(q), dtype=int))
+    return Layer(_no_cells(branch), branch, q, q, q, np.zeros(len(q)), np.zeros(len(q), dtype=int))
+
+
+def _no_cells(branch: np.ndarray) -> np.ndarray:
+    """Cells of nodes that have none, (K, 0)."""
+    return np.zeros((len(branch), 0), dtype=int)
 
 
 def _product(rows: np.ndarray, q: np.ndarray) -> np.ndarray:
     return np.asarray(np.einsum("kij,kj->ki", rows, q))
-
-
-def _moving_most(null: np.ndarray) -> np.ndarray:
-    """For null spaces, (K, n, r), the r joints, (K, r), ascending, whose rows span most, by pivoting."""
-    left, chosen = null.copy(), []
-    for _ in range(null.shape[2]):
-        joint = np.argmax(np.linalg.norm(left, axis=2), axis=1)
-        chosen.append(joint)
-        row = left[np.arange(len(left)), joint]
-        unit = row / np.maximum(np.linalg.norm(row, axis=1, keepdims=True), 1e-300)
-        left = left - np.einsum("knr,kr->kn", left, unit)[:, :, None] * unit[:, None]
-    return np.sort(np.array(chosen, dtype=int).reshape(null.shape[2], len(null)).T, axis=1)

@@ -28,8 +28,6 @@ from brachis.solvers import SolverOptions, SolverReport, SolveStatus, solver_nam
 _INTERVALS, _DEGREE = 12, 2
 """Parabolas jump from one acceleration to the next, as fastest motions do: so few say most."""
 _TOLERANCE, _ITERATIONS, _NEARLY = 1e-3, 25, 1e-2
-_LEAST_TIME = 0.1
-"""Seconds left to a solve that is begun."""
 _PLACES = 97
 _SAME_TIME, _SAME_PATH = 0.02, 0.15
 """Starts are the same where their end times differ by less than this fraction, and no joint by more, rad or m."""
@@ -105,7 +103,7 @@ def _solver(start: Start, deadline: Deadline) -> Solve:
     backend = solver_named(start.problem.task.solver.name)[0]
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        options = SolverOptions(_TOLERANCE, _ITERATIONS, max(deadline.left, _LEAST_TIME))
+        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.for_a_solve)
         report = backend.solve(program, x, options, None)
         nearly = report.violation < _NEARLY and not report.status.usable
         return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if nearly else report
@@ -130,4 +128,4 @@ def _same(first: Start, second: Start) -> bool:
     if abs(first.estimate - second.estimate) > _SAME_TIME * second.estimate:
         return False
     postures = [start.joint_map.postures(start.joint_path) for start in (first, second)]
-    return bool(np.nanmax(np.abs(postures[0] - postures[1])) < _SAME_PATH)
+    return bool(np.abs(postures[0] - postures[1]).max() < _SAME_PATH)

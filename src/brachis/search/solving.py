@@ -25,8 +25,6 @@ _PATIENCE = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess, unless the task says otherwise."""
 _WORTH_IT = 2e-4
 """A smaller branch margin that shortens the motion by less than this fraction is not worth its sharper turns."""
-_LEAST_TIME = 0.1
-"""Seconds left to a solve that is begun."""
 
 
 def continued(
@@ -107,7 +105,7 @@ def solve_with(
         listener(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s")
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        remaining = max(min(deadline.left, settings.time_limit), _LEAST_TIME)
+        remaining = deadline.within(settings.time_limit).for_a_solve
         return solver.solve(program, x, SolverOptions(settings.tolerance, patience, remaining), progress)
 
     return solve
