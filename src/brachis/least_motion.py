@@ -38,7 +38,7 @@ _KEPT_BACK = 0.1e-4
 _WORTH_IT = 0.05
 """A motion whose accelerations are lower by less than this fraction does not replace the fastest one."""
 _TOLERANCE, _ITERATIONS = 1e-5, 60
-_PROGRESS, _PATIENCE = 1e-2, 5
+_PROGRESS, _PATIENCE = 1e-2, 3
 """A solve ends where so many iterations lower the mean square by less than this fraction: near enough will do."""
 _TIME = 0.5
 """Part of the remaining time that may be used."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from brachis.kinematics import JointDerivatives, JointState
@@ -28,7 +30,7 @@ def chain(partials: Partials, state: JointState, exact: JointDerivatives) -> tup
     return by_y, by_ydot, by_yddot
 
 
-def by_time(by: tuple[np.ndarray, np.ndarray, np.ndarray], state: JointState) -> np.ndarray:
+def by_time(by: Sequence[np.ndarray], state: JointState) -> np.ndarray:
     """Add up what `chain` found to -t_E d/dt_E of the limit, (K, c): a longer time slows the curves down."""
     of_rates = np.einsum("kcj,kj->kc", by[1], state.ydot)
     return np.asarray(of_rates + 2.0 * np.einsum("kcj,kj->kc", by[2], state.yddot))

@@ -252,17 +252,17 @@ class Phase:
         return np.bincount(np.concatenate([of_time, *of_curves, of_lengths]), slopes, self.variables)
 
     def _chained(self, functions: Sequence[Partials], x: np.ndarray) -> Iterator[np.ndarray]:
-        """Differentiate each function of the joint motion by T, each curve's variables and h, (places, c) each."""
+        """Differentiate functions of the joint motion by T, each curve's variables and h, (places, c) all together."""
         state, exact = self.state(x), self._derivatives(x)
         bases = [timed(basis, x[0]) for basis in self._bases(x)]
         slopes = np.hstack(timed(self.grid.slopes(x[self._lengths], self._control_points(x)), x[0]))
-        for partials in functions:
-            by = chain(partials, state, exact)
-            yield by_time(by, state) / -x[0]
-            for j, (places, basis) in enumerate(zip(self._places, bases, strict=True)):
-                parts = (part[places.point, :, j] * values[:, None] for part, values in zip(by, basis, strict=True))
-                yield sum(parts, start=np.zeros(()))
-            yield np.concatenate(by, axis=2)[self.grid.point] @ slopes[:, :, None]
+        each = [chain(partials, state, exact) for partials in functions]
+        by = [np.concatenate(parts, axis=1) for parts in zip(*each, strict=True)]
+        yield by_time(by, state) / -x[0]
+        for j, (places, basis) in enumerate(zip(self._places, bases, strict=True)):
+            parts = (part[places.point, :, j] * values[:, None] for part, values in zip(by, basis, strict=True))
+            yield sum(parts, start=np.zeros(()))
+        yield np.concatenate(by, axis=2)[self.grid.point] @ slopes[:, :, None]
 
     def _derivatives(self, x: np.ndarray) -> JointDerivatives:
         """Differentiate the state at x; kept until x changes, as the state is."""
