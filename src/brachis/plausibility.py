@@ -162,7 +162,7 @@ def place_hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str 
 def _limits(robot: Robot) -> Iterator[Remark]:
     """Look at velocity limits and position ranges."""
     limits, stated = robot.limits, {"rad": "degrees", "m": "mm"}
-    unscaled = limits.velocity / robot.settings.limits.scale.velocity
+    unscaled = limits.velocity / robot.settings.limits.scale.velocity / robot.settings.speed_override
     columns = zip(
         robot.joint_names,
         robot.position_units,

@@ -239,8 +239,8 @@ def test_a_range_of_no_width_is_empty():
     ("friction", "where"),
     [
         ({"coulomb_velocity": 1e-308}, "robot.friction.coulomb_velocity"),
-        ({"armature": 1e300}, "robot.friction.armature"),
-        ({"viscous": float("inf")}, "robot.friction.viscous"),
+        ({"armature": 1e300}, "robot.friction.armature.j1"),
+        ({"viscous": float("inf")}, "robot.friction.viscous.j1"),
     ],
 )
 def test_friction_that_no_drive_has_is_refused(friction, where):

@@ -69,9 +69,10 @@ def _stated(robot: Robot) -> RobotSettings:
     names = _own_joints(robot)
     n = len(names)
     changes: dict[str, object] = {}
-    if not _same(resolve_limits(settings.limits, names, robot.stated_limits[:n]), robot.limits, n):
-        changes["limits"] = _limits(robot.limits, names)
-    if not _same(Friction.of(names, **settings.friction.model_dump()), robot.friction, n):
+    made = resolve_limits(settings.limits, names, robot.stated_limits[:n], settings.speed_override)
+    if not _same(made, robot.limits, n):
+        changes |= {"limits": _limits(robot.limits, names), "speed_override": 1.0}
+    if not _same(Friction.of(names, robot.stated.friction, **settings.friction.model_dump()), robot.friction, n):
         changes["friction"] = _friction(robot.friction, names)
     gravity = tuple(float(component) for component in robot.model.gravity.linear)
     if gravity != settings.gravity:
@@ -140,7 +141,7 @@ def _merged(key: str, given: Any, asked: Any, default: Any, names: Sequence[str]
     """
     if asked == given:
         return given
-    if isinstance(given, Model | LimitSpec):
+    if isinstance(given, Model | LimitSpec) and default is not None:
         written = asked.model_fields_set if isinstance(asked, Model) else [each.name for each in fields(asked)]
         parts = {
             name: _merged(f"{key}.{name}", getattr(given, name), getattr(asked, name), getattr(default, name), names)

@@ -42,4 +42,8 @@ def robot_from_settings(
         locked_joints=settings.locked_joints,
         limits=settings.limits,
         friction=settings.friction.model_dump(),
+        payload=settings.payload,
+        tool_offset=settings.tool_offset,
+        mounting=settings.mounting,
+        speed_override=settings.speed_override,
     )

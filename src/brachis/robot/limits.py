@@ -71,7 +71,9 @@ class UrdfLimit:
     """True where a revolute or prismatic joint states no range, so that the task has to."""
 
 
-def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[UrdfLimit]) -> Limits:
+def resolve_limits(
+    spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[UrdfLimit], speed_override: float = 1.0
+) -> Limits:
     """Combine the user's limits with the URDF's.
 
     Parameters
@@ -82,6 +84,8 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
         The chain's joints.
     urdf : sequence of UrdfLimit
         The URDF's limits of the same joints.
+    speed_override : float, optional
+        Factor on velocity limits, beside those of `spec`.
 
     Returns
     -------
@@ -92,6 +96,8 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
     LimitError
         A limit is not positive or, before or after scaling, outside [`LEAST`, `LARGEST`]; a joint has neither a torque
         nor an acceleration limit; a range is empty or ends beyond `FARTHEST`.
+    InputError
+        There is a speed override and no velocity limit.
     UnknownNameError
         A limit names a joint that is not of the chain.
     """
@@ -110,6 +116,14 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
             )
     lower, upper = _ranges(spec.position, names, urdf)
     scaled = {kind: _scaled(kind, limits, spec.scale, names) for kind, limits in found.items()}
+    if speed_override != 1.0 and np.isinf(scaled["velocity"]).all():
+        raise InputError(
+            "has no velocity limit to act on",
+            where="robot.speed_override",
+            found=f"{speed_override:g}",
+            hint="Give robot.limits.velocity, or leave the override away",
+        )
+    scaled["velocity"] = scaled["velocity"] * speed_override
     return Limits(position_lower=lower, position_upper=upper, **scaled)
 
 

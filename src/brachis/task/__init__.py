@@ -9,6 +9,7 @@ from brachis.task.models import (
     SplineSettings,
     Task,
 )
+from brachis.task.mounting_models import InertiaMatrix, Payload, Placement
 from brachis.task.orientation import (
     AlongTangent,
     Attitude,
@@ -59,6 +60,7 @@ __all__ = [
     "CsvFile",
     "CsvSegment",
     "FrictionSettings",
+    "InertiaMatrix",
     "LimitScale",
     "LimitSpec",
     "LineBy",
@@ -66,6 +68,8 @@ __all__ = [
     "LineSegment",
     "LineTo",
     "MovingSegment",
+    "Payload",
+    "Placement",
     "Posture",
     "Quaternion",
     "RefinementSettings",

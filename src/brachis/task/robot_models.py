@@ -5,7 +5,8 @@ Limits
 For ``torque``, ``velocity`` and ``position`` three cases differ: the key is absent, and the limit comes from the URDF;
 the key is null, and there is no limit; the key has a value. The models write the absent key as the word `FROM_URDF`,
 which a task file may also spell out. Thus absent and null stay distinguishable in comparisons and in saved tasks. A
-joint that a mapping leaves out keeps the limit of the URDF. A URDF has no ``acceleration``: absent means none.
+joint that a mapping leaves out keeps the limit of the URDF. A URDF has no ``acceleration``: absent means none. Friction
+is written likewise: absent, it is what the URDF's ``<dynamics>`` says.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from typing import Annotated, Any, Final, Literal, Protocol
 
 from pydantic import AfterValidator, Field, Tag
 
-from brachis.task.fields import Model, Name, NonNegative, Number, Positive, by_form, plain, refuse
+from brachis.task.fields import Model, Name, NonNegative, Number, Positive, Share, by_form, plain, refuse
+from brachis.task.mounting_models import Mounting, Payload, Placement
 
 FROM_URDF: Final = "urdf"
 """The value of a limit whose key is absent: the URDF supplies it."""
@@ -72,6 +74,18 @@ PerJoint = Annotated[
 PerJointPositive = Annotated[
     _Number | _List | Annotated[dict[Name, Positive], Tag("<mapping>")],
     by_form("a number > 0 for all joints, a list of numbers, a mapping of joint name to number"),
+]
+UrdfFriction = Annotated[
+    _Word
+    | Annotated[NonNegative, Tag("<number>")]
+    | Annotated[Annotated[tuple[NonNegative, ...], Field(min_length=1)], Tag("<list>")]
+    | Annotated[dict[Name, NonNegative], Tag("<mapping>")]
+    | _Null,
+    by_form(
+        "a number >= 0 for all joints, a list of numbers, a mapping of joint name to number, null (none), "
+        "urdf (as in the URDF)",
+        FROM_URDF,
+    ),
 ]
 JointValues = Annotated[
     Annotated[Annotated[tuple[Number, ...], Field(min_length=1)], Tag("<list>")]
@@ -144,8 +158,20 @@ class FrictionSettings(Model):
     """Drive inertia and friction at the joints: each a number for all joints, a list, or a mapping by joint name."""
 
     armature: PerJoint = Field(default=0.0, description="Inertia of the drive seen at the joint, kg m^2 (kg).")
-    viscous: PerJoint = Field(default=0.0, description="Viscous friction, N m s/rad (N s/m).")
-    coulomb: PerJoint = Field(default=0.0, description="Coulomb friction, N m (N).")
+    rotor_inertia: PerJoint = Field(
+        default=0.0,
+        description="Inertia of the rotor about its own axis, kg m^2. With gear_ratio it takes the place of armature, "
+        "which is rotor_inertia * gear_ratio^2.",
+    )
+    gear_ratio: PerJointPositive | None = Field(
+        default=None, description="Turns of the rotor per turn of the joint (prismatic: rad per m). Null: none."
+    )
+    viscous: UrdfFriction = Field(
+        default=FROM_URDF, description="Viscous friction, N m s/rad (N s/m). Absent: URDF's damping. Null: none."
+    )
+    coulomb: UrdfFriction = Field(
+        default=FROM_URDF, description="Coulomb friction, N m (N). Absent: URDF's friction. Null: none."
+    )
     coulomb_velocity: PerJointPositive = Field(
         default=0.01, description="Speed at which Coulomb friction is developed to 76 % (tanh 1), rad/s (m/s)."
     )
@@ -158,10 +184,26 @@ class RobotSettings(Model):
         default=None, description="URDF file, relative to the task file's folder. Required in a task file."
     )
     tool_frame: Name | None = Field(default=None, description="Frame that follows the path. Null: the only leaf link.")
+    tool_offset: Placement = Field(
+        default_factory=Placement,
+        description="Where the frame that follows the path is in the tool frame of the URDF: {xyz: ..., rpy_deg: ...}.",
+    )
     base_frame: Name | None = Field(default=None, description="First frame of the chain. Null: the root of the URDF.")
+    mounting: Mounting = Field(
+        default_factory=Placement,
+        description="Where the URDF's root link is in the world: floor, wall (its z axis along the world's x axis), "
+        "ceiling (upside down, about x), or {xyz: ..., rpy_deg: ...}. Gravity and the path are in the world frame.",
+    )
     gravity: tuple[Number, Number, Number] = Field(
         default=(0.0, 0.0, -9.81), description="Gravity, m/s^2, world frame."
     )
     locked_joints: dict[Name, Number] = Field(default={}, description="Joints that stay at a value, rad (m), by name.")
+    payload: Payload | None = Field(default=None, description="Rigid body held to the tool frame. Null: none.")
     limits: LimitSpec = Field(default_factory=LimitSpec, description="Joint limits.")
+    speed_override: Annotated[Share, Field(gt=0.0)] = Field(
+        default=1.0,
+        description="Factor on all joint velocity limits beside limits.scale, for example 50 %, or 0.5. The motion is "
+        "planned anew for the slower joints, and is not the same motion played more slowly; torque, acceleration and "
+        "tool limits stay what they are.",
+    )
     friction: FrictionSettings = Field(default_factory=FrictionSettings, description="Drive inertia and friction.")
