@@ -129,8 +129,8 @@ def _locks(lock: list[str]) -> dict[str, float]:
 
 def _with_stated_speeds(robot: Robot) -> Robot:
     """Return the robot with the velocity limits of its URDF, which need not be usable ones."""
-    stated = [np.inf if limit.velocity is None else limit.velocity for limit in robot.stated_limits]
-    return replace(robot, limits=replace(robot.limits, velocity=np.array(stated)))
+    stated = np.array([np.inf if limit.velocity is None else limit.velocity for limit in robot.stated_limits])
+    return replace(robot, limits=robot.limits.with_magnitudes(velocity=stated))
 
 
 def _joints(robot: Robot) -> list[dict[str, Any]]:

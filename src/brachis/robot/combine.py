@@ -99,7 +99,10 @@ def _limits(limits: Limits, names: Sequence[str]) -> LimitSpec:
         return [float(value) if np.isfinite(value) else None for value in values[: len(names)]]
 
     ranges = zip(finite(limits.position_lower), finite(limits.position_upper), strict=True)
-    spelled: dict[str, Any] = {kind: finite(getattr(limits, kind)) for kind in MAGNITUDES} | {"position": ranges}
+    spelled: dict[str, Any] = {"position": ranges}
+    for kind in MAGNITUDES:
+        pairs = zip(*(finite(ends) for ends in limits.both_ways(kind)), strict=True)
+        spelled[kind] = [upper if lower is None or -lower == upper else (lower, upper) for lower, upper in pairs]
     return LimitSpec(**{kind: dict(zip(names, values, strict=True)) for kind, values in spelled.items()})
 
 

@@ -45,14 +45,37 @@ def _increasing(pair: tuple[float | None, float | None]) -> tuple[float | None, 
 
 Interval = Annotated[tuple[Number | None, Number | None], AfterValidator(_increasing)]
 
+
+def _around_zero(pair: tuple[float, float]) -> tuple[float, float]:
+    if not pair[0] < 0.0 < pair[1]:
+        problem = "a pair of limits lies around zero"
+        raise refuse(problem, found=list(pair), allowed="[lower, upper] with lower < 0 < upper")
+    return pair
+
+
 _Number = Annotated[Positive, Tag("<number>")]
+_Pair = Annotated[Annotated[tuple[Number, Number], AfterValidator(_around_zero)], Tag("<list>")]
+_Entry = Annotated[_Number | _Pair, by_form("a number > 0, or a pair [lower, upper] around zero")]
+_EntryOrNull = Annotated[
+    _Number | _Pair | Annotated[None, Tag("<null>")],
+    by_form("a number > 0, a pair [lower, upper] around zero, null (no limit)"),
+]
 _List = Annotated[Annotated[tuple[Positive, ...], Field(min_length=1)], Tag("<list>")]
 _Mapping = Annotated[dict[Name, Positive | None], Tag("<mapping>")]
 _Null = Annotated[None, Tag("<null>")]
 _Word = Annotated[Literal["urdf"], Tag("<word>")]
 
 UrdfLimit = Annotated[
-    _Word | _Number | _List | _Mapping | _Null, by_form(_LIMIT_FORMS + ", urdf (as in the URDF)", FROM_URDF)
+    _Word
+    | _Number
+    | Annotated[Annotated[tuple[_Entry, ...], Field(min_length=1)], Tag("<list>")]
+    | Annotated[dict[Name, _EntryOrNull], Tag("<mapping>")]
+    | _Null,
+    by_form(
+        "a number > 0 for all joints; a list, or a mapping of joint name to a number > 0, a pair [lower, upper] around "
+        "zero or null; null (no limit), urdf (as in the URDF)",
+        FROM_URDF,
+    ),
 ]
 OwnLimit = Annotated[_Number | _List | _Mapping | _Null, by_form(_LIMIT_FORMS)]
 PositionLimit = Annotated[
@@ -94,8 +117,8 @@ JointValues = Annotated[
 ]
 
 # What a program may give: NumPy arrays stand for lists and numbers too.
-StatedLimit = float | Array | Sequence[float | None] | Mapping[str, float | None] | str | None
 _StatedPair = Array | Sequence[float | None] | None
+StatedLimit = float | Array | Sequence[float | _StatedPair] | Mapping[str, float | _StatedPair] | str | None
 StatedRange = Array | Sequence[_StatedPair] | Mapping[str, _StatedPair] | str | None
 
 
@@ -111,12 +134,14 @@ class LimitScale(Model):
 class LimitSpec:
     """Joint limits: an absent key takes the URDF's, null removes the limit (see the module's documentation)."""
 
-    torque: Annotated[UrdfLimit, Field(description="Largest torque, N m (force, N). Absent: URDF. Null: none.")] = (
-        FROM_URDF
-    )
-    velocity: Annotated[UrdfLimit, Field(description="Largest speed, rad/s (m/s). Absent: URDF. Null: none.")] = (
-        FROM_URDF
-    )
+    torque: Annotated[
+        UrdfLimit,
+        Field(description="Largest torque, N m (force, N), or [lower, upper] by joint. Absent: URDF. Null: none."),
+    ] = FROM_URDF
+    velocity: Annotated[
+        UrdfLimit,
+        Field(description="Largest speed, rad/s (m/s), or [lower, upper] by joint. Absent: URDF. Null: none."),
+    ] = FROM_URDF
     acceleration: Annotated[
         OwnLimit, Field(description="Largest acceleration, rad/s^2 (m/s^2). Absent or null: none.")
     ] = None
@@ -141,7 +166,8 @@ class LimitSpec:
         ----------
         torque, velocity, acceleration : float, sequence, array, mapping or None, optional
             Nm or N; rad/s or m/s; rad/s^2 or m/s^2. One number for all joints, one for each in chain order, or numbers
-            by joint name; None, also for a single joint: not limited; `FROM_URDF`: as in the URDF.
+            by joint name; for torque and velocity a pair [lower, upper] around zero in the place of a joint's number;
+            None, also for a single joint: not limited; `FROM_URDF`: as in the URDF.
         position : sequence, array, mapping or None, optional
             Pairs [lower, upper], rad or m, likewise; an end that is None is open.
         scale : mapping or LimitScale, optional
