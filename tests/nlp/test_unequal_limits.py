@@ -42,7 +42,7 @@ def test_a_slide_that_brakes_less_than_it_pushes(way):
 
 
 def test_the_plan_with_equal_limits_breaks_the_unequal_ones_and_sensitivities_name_the_end():
-    free, bound = plan({"torque": PUSH}, intervals=20), plan({"torque": {"j1": [-BRAKE, PUSH]}}, intervals=20)
+    free, bound = plan({"torque": PUSH}, intervals=20), plan({"torque": {"j1": [-BRAKE, PUSH]}})
     assert free.t_end < 0.9 * bound.t_end
     (check,) = [
         check for check in verify_trajectory(free.trajectory, robot=bound.trajectory.robot).checks if not check.passed
