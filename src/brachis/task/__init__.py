@@ -1,5 +1,6 @@
 """What is asked: the task file as frozen models, its loader and its schema. No numerics."""
 
+from brachis.task.limits_file import LimitsFile, read_limits
 from brachis.task.load import check_robot_settings, load_task
 from brachis.task.models import (
     Posture,
@@ -63,6 +64,7 @@ __all__ = [
     "InertiaMatrix",
     "LimitScale",
     "LimitSpec",
+    "LimitsFile",
     "LineBy",
     "LineHeading",
     "LineSegment",
@@ -97,4 +99,5 @@ __all__ = [
     "check_robot_settings",
     "json_schema",
     "load_task",
+    "read_limits",
 ]

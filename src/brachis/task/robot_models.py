@@ -225,6 +225,11 @@ class RobotSettings(Model):
     )
     locked_joints: dict[Name, Number] = Field(default={}, description="Joints that stay at a value, rad (m), by name.")
     payload: Payload | None = Field(default=None, description="Rigid body held to the tool frame. Null: none.")
+    limits_file: Name | None = Field(
+        default=None,
+        description="File of joint limits, relative to the task file's folder, such as a maker's. What limits says "
+        "itself counts, joint by joint where it names joints. Null: none.",
+    )
     limits: LimitSpec = Field(default_factory=LimitSpec, description="Joint limits.")
     speed_override: Annotated[Share, Field(gt=0.0)] = Field(
         default=1.0,
