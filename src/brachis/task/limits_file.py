@@ -28,7 +28,7 @@ class LimitsFile(Model):
     source: Name = Field(description="Where the figures are from.")
     joints: Annotated[tuple[Name, ...], Field(min_length=1)] = Field(description="The joints that the file limits.")
     limits: LimitSpec = Field(
-        description="As robot.limits, without scale: a list is in the order of joints, one number holds for all of them."
+        description="As robot.limits, without scale; a list is in the order of joints, one number holds for all."
     )
 
 
@@ -74,7 +74,10 @@ def with_limits_of_file(content: Mapping[str, Any], source: str, folder: Path) -
     if not isinstance(own, Mapping):
         return content
     stated = _by_joint(folder / file, f"{source}: robot.limits_file", folder, str(file))
-    merged = {kind: {name: limit for name, limit in each.items() if name not in (locked or ())} for kind, each in stated.items()}
+    merged = {
+        kind: {name: limit for name, limit in each.items() if name not in (locked or ())}
+        for kind, each in stated.items()
+    }
     for kind, value in own.items():
         both = isinstance(value, Mapping) and isinstance(merged.get(kind), Mapping)
         merged[kind] = {**merged[kind], **value} if both else value
@@ -95,7 +98,9 @@ def _by_joint(path: Path, where: str, folder: Path, found: str | None) -> dict[s
         raise task_error(error, str(path), LimitsFile) from None
     if file.limits.scale != LimitSpec().scale:
         raise TaskError(
-            "factors on limits belong to the task", where=f"{path}: limits.scale", allowed="robot.limits.scale of the task"
+            "factors on limits belong to the task",
+            where=f"{path}: limits.scale",
+            allowed="robot.limits.scale of the task",
         )
     kinds = [each for each in fields(LimitSpec) if each.name != "scale"]
     stated = {each.name: getattr(file.limits, each.name) for each in kinds}
