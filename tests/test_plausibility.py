@@ -95,6 +95,15 @@ def test_velocities_and_ranges_in_degrees():
     assert told(wide) == [("robot.limits.position.j1", "the position range looks like degrees")]
 
 
+def test_damping_that_stands_for_a_simulator():
+    joints = [Joint("revolute", xyz=(0.4, 0.0, 0.0), extra=f"<dynamics damping='{damping}'/>") for damping in (19, 21)]
+    text = chain_urdf(joints, tool=(0.4, 0.0, 0.0))  # 60 Nm at 3 rad/s
+    message = "the damping of the URDF takes more than the largest torque at the largest speed"
+    assert told(Robot.from_urdf("x", urdf_text=text)) == [("robot.friction.viscous.j2", message)]
+    for chosen in (None, 21.5):  # the task's own figure is meant
+        assert told(Robot.from_urdf("x", urdf_text=text, friction={"viscous": chosen})) == []
+
+
 def test_rails_in_mm():
     robot = arm(slide=True)
     rail = replace(
