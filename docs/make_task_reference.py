@@ -80,7 +80,7 @@ open (`null`).
 Friction is written likewise: absent, `viscous` and `coulomb` are `damping` and `friction` of the URDF's `<dynamics>`;
 `null` switches them off. Payload, tool offset and mounting change the robot without the URDF: the payload's `com` and
 `inertia` and the tool offset are in the tool frame of the URDF, mounting and gravity in the world frame. What is in use
-is printed with a plan, stands under `robot` in its JSON, and is saved with the motion; `brachis inspect task.yaml`
+is printed with a plan, stands under `in_use` in its JSON, and is saved with the motion; `brachis inspect task.yaml`
 shows it without planning.
 
 `brachis.plan(robot, task)` with a `Robot` adds what the task's `robot` part sets to what the robot was made with; the

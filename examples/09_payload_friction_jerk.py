@@ -24,7 +24,7 @@ def main() -> dict[str, brachis.Result]:
             del task["robot"][key]
         result = results[name] = brachis.plan(None, task)
         print(f"{name}: {result.t_end:.3f} s, verified: {result.verified}")
-    for name, text in result.to_dict()["robot"].items():
+    for name, text in result.to_dict()["in_use"].items():
         print(f"  {name}: {text}")
     return results
 

@@ -81,7 +81,7 @@ class Result:
             "end_posture": self.trajectory.position(self.t_end).tolist(),
             "position_units": list(self.trajectory.robot.position_units),
             "family": self.family,
-            "robot": in_use(self.trajectory.robot),
+            "in_use": in_use(self.trajectory.robot),
             "status": self.report.status.name.lower(),
             "advice": self.report.status.value,
             "solver": self.report.solver,

@@ -100,6 +100,6 @@ def test_a_motion_without_friction_exceeds_the_torque_of_a_drive_that_rubs(urdf)
 
 
 def test_the_friction_in_use_is_said_in_the_result():
-    said = plan(slide(VISCOUS, COULOMB), FEW).to_dict()["robot"]
+    said = plan(slide(VISCOUS, COULOMB), FEW).to_dict()["in_use"]
     assert said["viscous friction"] == "j1 12 N s/m (as the URDF states it)"
     assert said["Coulomb friction"] == "j1 20 N (as the URDF states it)"

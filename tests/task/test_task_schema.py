@@ -57,6 +57,7 @@ DYNAMICS = {
         {"end": {"joints": [1]}},
         {"search": {"slower": "1 %"}},
         {"robot": DYNAMICS},
+        {"robot": {"urdf": "robot.urdf", "limits": {"torque": {"j1": [-5, 7], "j2": 3}, "velocity": [[-1, 2], 3]}}},
         {"robot": {"urdf": "robot.urdf", "mounting": {"xyz": [1, 2, 3], "rpy_deg": [0, 30, 0]}}},
     ],
 )
@@ -75,6 +76,7 @@ def test_the_schema_accepts_a_saved_task(validator: Any) -> None:
         {"pth": []},
         {"brachis": 2},
         {"robot": {"mounting": "roof"}},
+        {"robot": {"limits": {"torque": {"j1": [-5]}}}},
         {"robot": {"payload": {"com": [0, 0, 0]}}},
         {"path": []},
         {"path": [{"lien": {"to": [1]}}]},
