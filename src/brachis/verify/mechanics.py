@@ -62,8 +62,13 @@ def tool_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def torques(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
     """Joint torques (K, n) from states (K, n), Nm or N; that of a free roll of the tool is zero."""
-    f, bodies = robot.friction, robot.stated.bodies
-    tau = f.armature * qddot + f.viscous * qdot + f.coulomb * np.tanh(qdot / f.v_eps)
+    f = robot.friction
+    return _rigid(robot, q, qdot, qddot) + f.armature * qddot + f.viscous * qdot + f.coulomb * np.tanh(qdot / f.v_eps)
+
+
+def _rigid(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+    """Torques (K, n) without armature and friction."""
+    tau, bodies = np.zeros_like(q), robot.stated.bodies
     motions = _motions(robot, q, qdot, qddot)
     force, moment = np.zeros((3, len(q))), np.zeros((3, len(q)))
     for joint in reversed(range(len(bodies))):
@@ -71,7 +76,7 @@ def torques(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) ->
         for weight in _weights(robot, joint):
             push, turn = weight.resistance(motions[joint])
             force, moment = force + push, moment + turn
-        tau[:, joint] += body.axis @ (force if body.sliding else moment)
+        tau[:, joint] = body.axis @ (force if body.sliding else moment)
         if body.sliding:
             moment = moment + cross(body.axis[:, None] * q[:, joint], force)
         else:
