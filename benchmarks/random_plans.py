@@ -70,9 +70,7 @@ class SavedMotion:
         self.model = _model(self.meta["urdf"], names, settings)
         self.data = self.model.createData()
         self.limits = _limits(self.meta["urdf"], names, settings["limits"])
-        friction = settings["friction"]
-        defaults = {"armature": 0.0, "viscous": 0.0, "coulomb": 0.0, "coulomb_velocity": 0.01}
-        self.friction = {key: _spread(friction[key], names, value) for key, value in defaults.items()}
+        self.friction = _friction(self.meta["urdf"], names, settings["friction"])
         self.nodes, self.h = arrays["q"], np.diff(arrays["times"])[:, None]
         self.powers = _powers(arrays, self.h)
         self.pieces = len(self.h)
@@ -205,6 +203,19 @@ def _limits(urdf: str, names: list[str], settings: Mapping[str, object]) -> dict
             lower[i] = -np.inf if low is None else low
             upper[i] = np.inf if high is None else high
     return {**limits, "lower": lower, "upper": upper}
+
+
+def _friction(urdf: str, names: list[str], settings: Mapping[str, object]) -> dict[str, np.ndarray]:
+    """Friction of every joint; the URDF's where the task does not say."""
+    stated = {joint.get("name"): joint.find("dynamics") for joint in ET.fromstring(urdf).iter("joint")}  # noqa: S314
+    terms = {
+        key: _spread(settings[key], names, value) for key, value in (("armature", 0.0), ("coulomb_velocity", 0.01))
+    }
+    for key, word in (("viscous", "damping"), ("coulomb", "friction")):
+        rubbing = [0.0 if stated[name] is None else float(stated[name].get(word, "0")) for name in names]
+        own = settings[key]
+        terms[key] = _spread(rubbing if own == "urdf" else 0.0 if own is None else own, names, rubbing)
+    return terms
 
 
 def _spread(value: object, names: list[str], missing: object) -> np.ndarray:

@@ -12,8 +12,12 @@ from pydantic_core import PydanticUndefined
 
 from brachis.task import (
     FrictionSettings,
+    InertiaMatrix,
     LimitScale,
+    LimitsFile,
     LimitSpec,
+    Payload,
+    Placement,
     RefinementSettings,
     RobotSettings,
     SearchSettings,
@@ -42,6 +46,9 @@ PARTS: dict[str, type] = {
     "robot.limits": dataclass(LimitSpec),
     "robot.limits.scale": LimitScale,
     "robot.friction": FrictionSettings,
+    "robot.payload": Payload,
+    "robot.payload.inertia": InertiaMatrix,
+    "robot.tool_offset, robot.mounting": Placement,
     "tool_limits": ToolLimits,
     "spline": SplineSettings,
     "search": SearchSettings,
@@ -65,8 +72,16 @@ JSON schema that editors use for completion: put `# yaml-language-server: $schem
 file, with the schema saved beside it by `brachis schema --out task.schema.json`.
 
 Limits: an absent key takes the URDF's limit, `null` removes it, a number holds for all joints, a list is in the order
-of the chain, a mapping names joints (others keep the URDF's). Torque, velocity and acceleration limits lie between 1e-6
-and 1e12 in SI units, scaled ones too; ends of position ranges within 1e6 rad or m of zero, or open (`null`).
+of the chain, a mapping names joints (others keep the URDF's). Torque and velocity limits may differ in both directions:
+in a list or mapping a pair `[lower, upper]`, lower < 0 < upper, stands for a number. Torque, velocity and acceleration
+limits lie between 1e-6 and 1e12 in SI units, scaled ones too; ends of position ranges within 1e6 rad or m of zero, or
+open (`null`).
+
+Friction is written likewise: absent, `viscous` and `coulomb` are `damping` and `friction` of the URDF's `<dynamics>`;
+`null` switches them off. Payload, tool offset and mounting change the robot without the URDF: the payload's `com` and
+`inertia` and the tool offset are in the tool frame of the URDF, mounting and gravity in the world frame. What is in use
+is printed with a plan, stands under `in_use` in its JSON, and is saved with the motion; `brachis inspect task.yaml`
+shows it without planning.
 
 `brachis.plan(robot, task)` with a `Robot` adds what the task's `robot` part sets to what the robot was made with; the
 robot stands for the `urdf` key, and what contradicts it is refused with its key.
@@ -76,6 +91,14 @@ planner's least) are warned of on standard error and listed as `warnings` in the
 `--strict`, or `brachis.plan(..., strict=True)`, they are errors.
 """
 
+LIMITS_FILE = """
+## Limits files
+
+`robot.limits_file` names a YAML file of joint limits, such as `robots/panda_limits.yaml`, which has the published
+figures of the Franka Emika Panda. Limits count in this order: what the task says in `robot.limits`, the file, the URDF;
+where the task names joints, joint by joint. Joints that the task locks are left out of the file. The file is read with
+the task: a saved task does not need it any more. In Python: `brachis.read_limits(path)` gives a `LimitSpec`.
+"""
 PATH = """
 ## `path`
 
@@ -194,7 +217,7 @@ def page() -> str:
     parts = [INTRODUCTION, "## The file\n", *rows(Task)]
     for key, model in PARTS.items():
         parts += [f"\n## `{key}`\n", *rows(model)]
-    parts += [PATH, *rows(MovingSegment)]
+    parts += [LIMITS_FILE, *rows(LimitsFile), PATH, *rows(MovingSegment)]
     for kind, shapes in SEGMENTS.items():
         for shape in shapes:
             keys = ", ".join(f"{name}: ..." for name, field in shape.model_fields.items() if field.is_required())

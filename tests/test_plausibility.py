@@ -65,7 +65,7 @@ def with_stated_speeds(file: Path) -> Robot | None:
     except BrachisError:
         return None
     speeds = [np.inf if limit.velocity is None else limit.velocity for limit in robot.stated_limits]
-    return replace(robot, limits=replace(robot.limits, velocity=np.array(speeds)))
+    return replace(robot, limits=robot.limits.with_magnitudes(velocity=np.array(speeds)))
 
 
 @pytest.mark.parametrize("file", [*OWN, *FOREIGN], ids=lambda file: f"{file.parent.name}/{file.name}")
@@ -82,7 +82,7 @@ def test_velocities_and_ranges_in_degrees():
     robot = arm()
     assert told(robot) == []
     limits = robot.limits
-    fast = replace(robot, limits=replace(limits, velocity=np.array([180.0, 59.0, 1000.0])))
+    fast = replace(robot, limits=limits.with_magnitudes(velocity=np.array([180.0, 59.0, 1000.0])))
     assert told(fast) == [("robot.limits.velocity.j1", "the velocity limit looks like degrees per second")]
     wide = replace(
         robot,
@@ -95,13 +95,21 @@ def test_velocities_and_ranges_in_degrees():
     assert told(wide) == [("robot.limits.position.j1", "the position range looks like degrees")]
 
 
+def test_damping_that_stands_for_a_simulator():
+    joints = [Joint("revolute", xyz=(0.4, 0.0, 0.0), extra=f"<dynamics damping='{damping}'/>") for damping in (19, 21)]
+    text = chain_urdf(joints, tool=(0.4, 0.0, 0.0))  # 60 Nm at 3 rad/s
+    message = "the damping of the URDF takes more than the largest torque at the largest speed"
+    assert told(Robot.from_urdf("x", urdf_text=text)) == [("robot.friction.viscous.j2", message)]
+    for chosen in (None, 21.5):  # the task's own figure is meant
+        assert told(Robot.from_urdf("x", urdf_text=text, friction={"viscous": chosen})) == []
+
+
 def test_rails_in_mm():
     robot = arm(slide=True)
     rail = replace(
         robot,
         limits=replace(
-            robot.limits,
-            velocity=np.array([1500.0, 3.0, 3.0]),
+            robot.limits.with_magnitudes(velocity=np.array([1500.0, 3.0, 3.0])),
             position_lower=np.array([-2000.0, -3.0, -3.0]),
             position_upper=np.array([2000.0, 3.0, 3.0]),
         ),

@@ -12,8 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 import brachis
+from brachis.task import check_robot_settings
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -112,6 +114,16 @@ def check_table(name: str, made: str) -> None:
     assert ours == pytest.approx(theirs, abs=0.003)
 
 
+def test_robot_part_of_the_readme_is_one(clone):
+    (text,) = [block for block in blocks(ROOT / "README.md", "yml") if "payload" in block]
+    robot = yaml.safe_load(text)["robot"]
+    assert (clone / "robots" / robot["limits_file"]).is_file()
+    settings = check_robot_settings(robot)
+    assert settings.payload.mass == 0.8
+    assert settings.friction.coulomb is None
+    assert settings.mounting.rpy_deg == (180.0, 0.0, 0.0)
+
+
 def test_example_03():
     module = load(ROOT / "examples/03_tx90l_rail_line.py")
     results = module.plan_all()
@@ -163,6 +175,14 @@ def test_example_07():
         mirrored = results[360 - angle, "free start"].t_end
         assert results[angle, "free start"].t_end == pytest.approx(mirrored, rel=2e-3)
     check_table("examples/07_find_the_fastest.py", module.markdown_table(results))
+
+
+def test_example_09():
+    results = load(ROOT / "examples/09_payload_friction_jerk.py").main()
+    assert all(result.verified for result in results.values())
+    times = [result.t_end for result in results.values()]
+    assert times == sorted(times)
+    assert times[-1] > 1.5 * times[0]
 
 
 def test_published_figure_lies_between_16_and_17_intervals():

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from brachis.task import LimitSpec as LimitSpec
     from brachis.task import Task as Task
     from brachis.task import load_task as load_task
+    from brachis.task import read_limits as read_limits
     from brachis.trajectory import Trajectory as Trajectory
     from brachis.verify import Verification as Verification
     from brachis.verify import verify_trajectory as verify_trajectory
@@ -49,6 +50,7 @@ _HOME = {
     "Verification": "brachis.verify",
     "load_task": "brachis.task",
     "plan": "brachis.planner",
+    "read_limits": "brachis.task",
     "task_map_of": "brachis.robot",
     "transcribe": "brachis.planner",
     "verify_trajectory": "brachis.verify",
@@ -73,6 +75,7 @@ __all__ = [
     "compose",
     "load_task",
     "plan",
+    "read_limits",
     "task_map_of",
     "transcribe",
     "verify_trajectory",

@@ -89,8 +89,8 @@ def tell(remarks: tuple[Remark, ...], *, strict: bool, stacklevel: int = 2) -> t
 
 
 def of_robot(robot: Robot) -> tuple[Remark, ...]:
-    """Look at limits, lengths and masses of a robot."""
-    return (*_limits(robot), *_scales(robot), *_lengths(robot), *_masses(robot))
+    """Look at limits, friction, lengths and masses of a robot."""
+    return (*_limits(robot), *_scales(robot), *_friction(robot), *_lengths(robot), *_masses(robot))
 
 
 def of_places(
@@ -162,7 +162,7 @@ def place_hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str 
 def _limits(robot: Robot) -> Iterator[Remark]:
     """Look at velocity limits and position ranges."""
     limits, stated = robot.limits, {"rad": "degrees", "m": "mm"}
-    unscaled = limits.velocity / robot.settings.limits.scale.velocity
+    unscaled = limits.velocity / robot.settings.limits.scale.velocity / robot.settings.speed_override
     columns = zip(
         robot.joint_names,
         robot.position_units,
@@ -191,6 +191,19 @@ def _scales(robot: Robot) -> Iterator[Remark]:
             yield Remark(
                 f"robot.limits.scale.{kind}", message, f"{factor:g}", "0.1 to 1; a percentage is divided by 100"
             )
+
+
+def _friction(robot: Robot) -> Iterator[Remark]:
+    """Look at damping of the URDF, which is often there to calm a simulation."""
+    limits, stated = robot.limits, robot.stated.friction["viscous"]
+    for i, damping in enumerate(stated):
+        fastest, torque = limits.velocity[i], limits.torque[i]
+        slow = np.isfinite([fastest, torque]).all() and fastest <= _FASTEST[robot.position_units[i]]
+        if slow and damping == robot.friction.viscous[i] and damping * fastest > torque:
+            unit = {"rad": "Nm s/rad", "m": "N s/m"}[robot.position_units[i]]
+            message = "the damping of the URDF takes more than the largest torque at the largest speed"
+            usual = f"below {torque / fastest:.3g} {unit}; viscous: null leaves it out"
+            yield Remark(f"robot.friction.viscous.{robot.joint_names[i]}", message, f"{damping:.6g} {unit}", usual)
 
 
 def _lengths(robot: Robot) -> Iterator[Remark]:

@@ -8,6 +8,7 @@ from typing import Any
 from brachis.attempt import Attempt
 from brachis.least_motion import LeastMotion
 from brachis.plausibility import Remark
+from brachis.robot import in_use
 from brachis.solvers import SolverReport
 from brachis.task import Task
 from brachis.trajectory import Trajectory
@@ -80,6 +81,7 @@ class Result:
             "end_posture": self.trajectory.position(self.t_end).tolist(),
             "position_units": list(self.trajectory.robot.position_units),
             "family": self.family,
+            "in_use": in_use(self.trajectory.robot),
             "status": self.report.status.name.lower(),
             "advice": self.report.status.value,
             "solver": self.report.solver,

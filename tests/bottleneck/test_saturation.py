@@ -88,7 +88,7 @@ def test_positions_are_measured_by_their_distance_from_an_end(made):
 
 def test_unlimited_joints_are_left_out(made):
     trajectory = made([0.0, T], [1.0, 1.0], [1.0, 1.0])
-    limits = dataclasses.replace(trajectory.robot.limits, torque=np.array([FORCE, np.inf]))
+    limits = trajectory.robot.limits.with_magnitudes(torque=np.array([FORCE, np.inf]))
     trajectory = dataclasses.replace(trajectory, robot=dataclasses.replace(trajectory.robot, limits=limits))
     names = [str(label) for label in limit_ratios(trajectory).labels]
     assert "j1 torque" in names

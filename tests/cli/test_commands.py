@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+import yaml
 
 from brachis import __version__, completion, planner, plots
 from brachis.cli import planning
@@ -314,7 +315,34 @@ def test_inspect(run):
     assert data["degree_of_redundancy"] == 1
     assert [row["redundant joints"] for row in data["decompositions"]] == ["j1", "j2", "j3"]
     assert {row["branches"] for row in data["decompositions"]} == {2}
-    assert data["joints"][0]["effort"] == "10 Nm"
+    assert data["joints"][0]["torque"] == "10 Nm"
+
+
+def test_inspect_of_a_task_shows_what_is_in_use(run, tmp_path):
+    task = yaml.safe_load((SCARA.parents[2] / "examples/01_scara_line.yaml").read_text())
+    task["robot"] |= {
+        "urdf": str(SCARA),
+        "limits": {"torque": {"j1": [-5, 7]}, "velocity": 4, "acceleration": {"j2": 30}},
+        "friction": {"viscous": {"j3": 0.25}, "rotor_inertia": 1e-4, "gear_ratio": 100},
+        "payload": {"mass": 2.5},
+        "mounting": "ceiling",
+        "speed_override": "50 %",
+    }
+    path = tmp_path / "task.yaml"
+    path.write_text(yaml.safe_dump(task))
+    data = json.loads(run("inspect", path, "--json").out)
+    keys = ("velocity", "acceleration", "torque", "mass", "viscous", "coulomb", "armature")
+    assert [[row[key] for key in keys] for row in data["joints"]] == [
+        ["2 rad/s", "none", "-5 to 7 Nm", "10 kg", "none", "none", "1 kg m^2"],
+        ["2 rad/s", "30 rad/s^2", "10 Nm", "10 kg", "none", "none", "1 kg m^2"],
+        ["2 rad/s", "none", "10 Nm", "12.5 kg", "0.25 Nm s/rad", "none", "1 kg m^2"],
+    ]
+    assert data["in_use"]["payload"] == "2.5 kg at [0, 0, 0] m in the tool frame, a point mass"
+    assert data["in_use"]["speed override"] == "50 % of the joint velocity limits"
+    assert "mounting: at [0, 0, 0] m, roll, pitch, yaw [180, 0, 0] deg" in run("inspect", path).out
+    outcome = run("inspect", path, "--lock", "j3=0.5")
+    assert outcome.code == 2
+    assert "--lock" in outcome.err
 
 
 def test_inspect_says_why_not(run):

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from brachis import LimitSpec
 from brachis.limits import TABLE, Label, Limit, Moments, Partials, limits_of
 from support.chains import planar_robot
 from support.phases import FRICTION
@@ -60,7 +61,7 @@ def test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit):
         for moves, end in ((low, "upper"), (high, "lower")):
             assert not np.delete(moves, bound.column).any()
             assert moves[bound.column] == pytest.approx(0.0) if bound.end == end else moves[bound.column] >= 0.0
-        assert max(low[bound.column], high[bound.column]) > 0.05
+        assert max(low[bound.column], high[bound.column]) > 0.01
 
 
 def test_ratios_are_one_at_the_bounds_and_violations_begin_there(limit):
@@ -123,3 +124,40 @@ def test_a_ratio_is_above_one_exactly_where_a_bound_is_violated(lower, upper):
     for bound, sign in ((lower, -1.0), (upper, 1.0)):
         if np.isfinite(bound):
             assert limit.ratio(np.array([[bound]]))[0, 0] == sign
+
+
+PAIRS = {"torque": {"j1": [-20.0, 60.0], "j2": [-70.0, 5.0]}, "velocity": {"j2": [-1.0, 4.0], "j3": 3.0}}
+
+
+def pairs(kind: str) -> Limit:
+    robot = planar_robot("RRP", "xz", friction={**FRICTION, "viscous": 1.0}, limits=LimitSpec(**PAIRS))
+    return TABLE[kind](robot, TASK)
+
+
+@pytest.mark.parametrize("kind", ["torque", "velocity"])
+def test_pairs_of_limits_are_the_bounds_of_what_is_limited(kind):
+    limit, same = pairs(kind), TABLE[kind](ROBOT, TASK)
+    test_partials_equal_differences(limit)
+    test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit)
+    figures = {(str(limit.labels[bound.column]), bound.end): bound.figure for bound in limit.bounds}
+    first = {"torque": ("j1 torque", -20.0, 60.0), "velocity": ("j2 velocity", -1.0, 4.0)}[kind]
+    assert (figures[first[0], "lower"], figures[first[0], "upper"]) == first[1:]
+    assert figures["j3 torque" if kind == "torque" else "j3 velocity", None] > 0.0
+    column = [str(label) for label in limit.labels].index(first[0])
+    quantity = same.values(STATES)[:, column] * same.bounds[column].figure
+    middle, half = 0.5 * (first[1] + first[2]), 0.5 * (first[2] - first[1])
+    np.testing.assert_allclose(limit.values(STATES)[:, column], (quantity - middle) / half)
+    beyond = np.maximum(quantity - first[2], first[1] - quantity) / min(first[2], -first[1])
+    np.testing.assert_allclose(limit.violation(limit.values(STATES))[:, column], beyond)
+
+
+def test_pairs_of_limits_bound_the_phase_plane_by_the_direction_of_motion():
+    torque, velocity = pairs("torque"), pairs("velocity")
+    q, q_ds, q_dds = (RNG.normal(size=(5, 3)) for _ in range(3))
+    squares = velocity.lines(q, q_ds, q_dds).x[:, 1]
+    np.testing.assert_allclose(np.sqrt(squares), np.maximum(q_ds[:, 1] / 4.0, -q_ds[:, 1] / 1.0))
+    still = planar_robot("RRP", "xz", limits=LimitSpec(**PAIRS))
+    torque, u, speed = TABLE["torque"](still, TASK), 0.7, 1.3
+    lines = torque.lines(q, q_ds, q_dds)
+    values = torque.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2))
+    np.testing.assert_allclose(lines.u * u + lines.x * speed**2 + lines.constant, values, atol=1e-9)

@@ -6,6 +6,7 @@ import pytest
 
 from brachis.planner import plan
 from brachis.robot import Robot
+from brachis.robot.limits import MAGNITUDES
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "01_scara_line.yaml"
 
@@ -72,8 +73,8 @@ def with_limits():
 
     def change(trajectory, **limits):
         robot = trajectory.robot
-        return dataclasses.replace(
-            trajectory, robot=dataclasses.replace(robot, limits=dataclasses.replace(robot.limits, **limits))
-        )
+        other = {kind: limits.pop(kind) for kind in MAGNITUDES if kind in limits}
+        changed = dataclasses.replace(robot.limits.with_magnitudes(**other), **limits)
+        return dataclasses.replace(trajectory, robot=dataclasses.replace(robot, limits=changed))
 
     return change

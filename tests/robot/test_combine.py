@@ -153,7 +153,7 @@ def test_unknown_joints_of_the_task_are_named():
 
 def test_replaced_limits_are_kept_and_the_task_of_the_result_has_them():
     robot = scara()
-    weak = replace(robot, limits=replace(robot.limits, torque=np.array([4.0, 5.0, 90.0])))
+    weak = replace(robot, limits=robot.limits.with_magnitudes(torque=np.array([4.0, 5.0, 90.0])))
     result = brachis.plan(weak, line())
     assert result.task.robot.limits.torque == {"j1": 4.0, "j2": 5.0, "j3": 90.0}
     assert result.t_end > brachis.plan(robot, line()).t_end

@@ -121,7 +121,7 @@ def test_one_joint_alone():
     np.testing.assert_allclose(dynamics.torque_derivatives(robot, q, qdot, qddot).qddot, np.full((12, 1, 1), 2.0))
 
 
-def test_pinocchio_adds_the_armature_of_the_model_but_not_friction_and_damping_of_the_urdf():
+def test_pinocchio_adds_the_armature_of_the_model_but_neither_friction_and_damping_nor_rotors():
     plain = chain_urdf([Joint("revolute", xyz=(0.4, 0.0, 0.0))])
     damped = plain.replace("</joint>", "<dynamics damping='7' friction='3'/></joint>", 2)
     models = [pin.buildModelFromXML(text) for text in (plain, damped)]
@@ -129,27 +129,31 @@ def test_pinocchio_adds_the_armature_of_the_model_but_not_friction_and_damping_o
     args = (np.array([0.3]), np.array([2.0]), np.array([5.0]))
     tau = [pin.rnea(model, model.createData(), *args)[0] for model in models]
     assert tau[1] == tau[0]
+    assert models[1].friction[0] == models[1].upperDryFrictionLimit[0] == 3.0
+    models[1].rotorInertia, models[1].rotorGearRatio = np.array([1e-3]), np.array([100.0])
+    assert pin.rnea(models[1], models[1].createData(), *args)[0] == tau[0]
     models[0].armature = np.array([0.6])
     assert pin.rnea(models[0], models[0].createData(), *args)[0] == pytest.approx(tau[0] + 0.6 * 5.0)
 
 
-def test_brachis_counts_armature_once_and_leaves_the_damping_of_the_urdf_out():
+def test_brachis_counts_armature_once():
     plain = chain_urdf([Joint("revolute", xyz=(0.4, 0.0, 0.0))])
-    damped = plain.replace("</joint>", "<dynamics damping='7' friction='3'/></joint>", 2)
     args = (np.array([[0.3]]), np.array([[2.0]]), np.array([[5.0]]))
     tau = [
-        dynamics.torque(Robot.from_urdf("x", urdf_text=text, friction=friction), *args)[0, 0]
-        for text, friction in ((plain, None), (damped, None), (plain, {"armature": 0.6}))
+        dynamics.torque(Robot.from_urdf("x", urdf_text=plain, friction=friction), *args)[0, 0]
+        for friction in (None, {"armature": 0.6})
     ]
-    assert tau[1] == tau[0]
-    assert tau[2] == pytest.approx(tau[0] + 0.6 * 5.0)
+    assert tau[1] == pytest.approx(tau[0] + 0.6 * 5.0)
 
 
 @pytest.mark.parametrize(
     ("friction", "words"),
     [
-        ({"viscous": -1.0}, r"robot\.friction\.viscous: is negative"),
-        ({"armature": [0.0, float("nan"), 0.0]}, r"robot\.friction\.armature: is negative, too large or not a number"),
+        ({"viscous": -1.0}, r"robot\.friction\.viscous\.j1: is negative"),
+        (
+            {"armature": [0.0, float("nan"), 0.0]},
+            r"robot\.friction\.armature\.j2: is negative, too large or not a number",
+        ),
         ({"coulomb_velocity": 0.0}, r"robot\.friction\.coulomb_velocity: is not a usable speed"),
         ({"coulomb": [1.0]}, r"robot\.friction\.coulomb: has the wrong number of values"),
     ],

@@ -112,7 +112,7 @@ def test_limit_of_the_task_that_is_not_positive(kind, value):
     assert f"{kind} limit in the task is not positive; found {value:g}" in str(caught.value)
 
 
-@pytest.mark.parametrize("value", ["ten", {"j1": "ten"}, {"j1": [1.0]}], ids=str)
+@pytest.mark.parametrize("value", ["ten", {"j1": "ten"}], ids=str)
 def test_limit_that_is_no_number(value):
     with pytest.raises(LimitError, match="torque limit in the task is not a number") as caught:
         limits_of(torque=value)
@@ -239,8 +239,8 @@ def test_a_range_of_no_width_is_empty():
     ("friction", "where"),
     [
         ({"coulomb_velocity": 1e-308}, "robot.friction.coulomb_velocity"),
-        ({"armature": 1e300}, "robot.friction.armature"),
-        ({"viscous": float("inf")}, "robot.friction.viscous"),
+        ({"armature": 1e300}, "robot.friction.armature.j1"),
+        ({"viscous": float("inf")}, "robot.friction.viscous.j1"),
     ],
 )
 def test_friction_that_no_drive_has_is_refused(friction, where):
@@ -256,3 +256,30 @@ def test_positions_and_gravity_that_no_robot_has_are_refused():
         planar_robot("RR", gravity=[0.0, 0.0, -1e300])
     with pytest.raises(InputError, match=r"robot\.locked_joints\.j2"):
         planar_robot("RR", locked_joints={"j2": 1e300})
+
+
+@pytest.mark.parametrize(
+    ("value", "lower", "upper"),
+    [
+        ({"j2": [-5.0, 7.0]}, [-80.0, -5.0, -60.0], [80.0, 7.0, 60.0]),
+        ([[-5.0, 7.0], 9.0, None], [-5.0, -9.0, -INF], [7.0, 9.0, INF]),
+        (np.array([[-1.0, 2.0], [-3.0, 4.0], [-5.0, 6.0]]), [-1.0, -3.0, -5.0], [2.0, 4.0, 6.0]),
+    ],
+    ids=str,
+)
+def test_pairs_of_limits(value, lower, upper):
+    robot = planar_robot("RRR", limits=LimitSpec(torque=value, acceleration=9.0, scale={"torque": 0.5}))
+    np.testing.assert_array_equal(robot.limits.torque_lower, 0.5 * np.array(lower))
+    np.testing.assert_array_equal(robot.limits.torque_upper, 0.5 * np.array(upper))
+    np.testing.assert_array_equal(robot.limits.torque, 0.5 * np.minimum(upper, -np.array(lower)))
+    again = robot_from_settings(robot.settings, urdf_text=robot.urdf)
+    np.testing.assert_array_equal(again.limits.torque_lower, robot.limits.torque_lower)
+
+
+@pytest.mark.parametrize("pair", [[1.0], [1.0, 2.0], [-2.0, -1.0], [-1.0, 0.0], [-1.0, None]], ids=str)
+def test_pairs_that_are_none_around_zero(pair):
+    with pytest.raises(LimitError, match="torque limit in the task is no pair around zero") as caught:
+        limits_of(torque={"j2": pair})
+    assert "robot.limits.torque.j2" in str(caught.value)
+    with pytest.raises(LimitError, match="acceleration limit in the task is not a number"):
+        limits_of(acceleration={"j2": [-1.0, 1.0]})

@@ -9,7 +9,7 @@ import pytest
 from brachis import LimitSpec
 from brachis.errors import UrdfError
 from brachis.robot import Robot
-from brachis.robot.urdf_bodies import check_bodies, stated_bodies
+from brachis.robot.urdf_bodies import check_bodies, stated_chain
 from brachis.robot.urdf_numbers import check_numbers
 from brachis.robot.urdf_tree import read_tree
 from support.chains import INERTIAL, Joint, chain_urdf, planar_urdf
@@ -98,7 +98,7 @@ def test_numbers_that_do_not_count_are_not_read():
 )
 def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
     robot = Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool", locked_joints={})
-    bodies = stated_bodies(read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.3})
+    bodies = stated_chain(read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.3}, "tool").bodies
     assert [body.joint for body in bodies] == list(robot.joint_names)
     for body, inertia in zip(bodies, list(robot.model.inertias)[1:], strict=True):
         assert body.mass == pytest.approx(inertia.mass, rel=1e-14)
@@ -108,7 +108,7 @@ def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
         assert bodies[0].links == ("link1", "aside")
         assert bodies[0].mass == 3.5
         # The held flap counts where it is held: another position is another body.
-        other = stated_bodies(read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.4})
+        other = stated_chain(read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.4}, "tool").bodies
         assert np.abs(other[0].com - bodies[0].com).max() > 1e-3
 
 
@@ -117,7 +117,7 @@ def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
 )
 def test_a_model_that_weighs_something_else_is_refused(kind, change):
     robot = Robot.from_urdf("file.urdf", urdf_text=TEXT, tool_frame="tool")
-    bodies = stated_bodies(read_tree(TEXT, "file.urdf"), robot.joint_names, {"flap": 0.3})
+    bodies = stated_chain(read_tree(TEXT, "file.urdf"), robot.joint_names, {"flap": 0.3}, "tool").bodies
     model, old = robot.model.copy(), robot.model.inertias[2]
     mass, lever, moment = change
     model.inertias[2] = pin.Inertia(old.mass + mass, old.lever + lever, old.inertia + moment * np.eye(3))
@@ -134,7 +134,7 @@ def test_long_chains_are_summed_up_without_recursion():
     )
     tree = read_tree(f"<robot name='long'>{links}{joints}</robot>", "file.urdf")
     check_numbers(tree, "file.urdf")
-    assert stated_bodies(tree, (), {}) == ()
+    assert stated_chain(tree, (), {}, tree.root).bodies == ()
 
 
 def test_ghost_links_are_named():

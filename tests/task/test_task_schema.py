@@ -39,8 +39,27 @@ def validator() -> Any:
     return cls(schema)
 
 
+DYNAMICS = {
+    "urdf": "robot.urdf",
+    "payload": {"mass": 2, "inertia": {"ixx": 1, "iyy": 1, "izz": 1}},
+    "tool_offset": {"xyz": [0, 0, 0.1]},
+    "mounting": "wall",
+    "speed_override": "50 %",
+    "friction": {"viscous": None, "coulomb": "urdf", "rotor_inertia": 1e-4, "gear_ratio": {"j1": 100}},
+}
+
+
 @pytest.mark.parametrize(
-    "change", [{}, {"task_space": "position"}, {"end": {"joints": [1]}}, {"search": {"slower": "1 %"}}]
+    "change",
+    [
+        {},
+        {"task_space": "position"},
+        {"end": {"joints": [1]}},
+        {"search": {"slower": "1 %"}},
+        {"robot": DYNAMICS},
+        {"robot": {"urdf": "robot.urdf", "limits": {"torque": {"j1": [-5, 7], "j2": 3}, "velocity": [[-1, 2], 3]}}},
+        {"robot": {"urdf": "robot.urdf", "mounting": {"xyz": [1, 2, 3], "rpy_deg": [0, 30, 0]}}},
+    ],
 )
 def test_the_schema_accepts_what_the_loader_accepts(validator: Any, change: dict[str, Any]) -> None:
     load_task(task(**change))
@@ -56,6 +75,9 @@ def test_the_schema_accepts_a_saved_task(validator: Any) -> None:
     [
         {"pth": []},
         {"brachis": 2},
+        {"robot": {"mounting": "roof"}},
+        {"robot": {"limits": {"torque": {"j1": [-5]}}}},
+        {"robot": {"payload": {"com": [0, 0, 0]}}},
         {"path": []},
         {"path": [{"lien": {"to": [1]}}]},
         {"path": [{"line": {"to": [1], "by": [1]}}]},

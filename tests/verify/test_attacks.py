@@ -11,6 +11,7 @@ import yaml
 import brachis
 from brachis.bspline import insert_knots
 from brachis.robot import dynamics
+from brachis.robot.limits import MAGNITUDES
 from brachis.verify import verify_trajectory
 
 MIDDLE = 60
@@ -41,7 +42,9 @@ def changed(trajectory, name, place, by):
 
 def with_limits(trajectory, **limits):
     robot = trajectory.robot
-    return replace(trajectory, robot=replace(robot, limits=replace(robot.limits, **limits)))
+    other = {kind: limits.pop(kind) for kind in MAGNITUDES if kind in limits}
+    changed = replace(robot.limits.with_magnitudes(**other), **limits)
+    return replace(trajectory, robot=replace(robot, limits=changed))
 
 
 def with_node(trajectory, t, **offsets):

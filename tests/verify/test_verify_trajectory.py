@@ -9,6 +9,7 @@ import pytest
 
 from brachis.errors import InputError
 from brachis.robot import Robot
+from brachis.robot.limits import MAGNITUDES
 from brachis.task import Posture
 from brachis.trajectory import Trajectory
 from brachis.verify import VerifyOptions, verify_trajectory
@@ -36,7 +37,9 @@ def faster(trajectory, factor):
 
 def with_limits(trajectory, **limits):
     robot = trajectory.robot
-    return replace(trajectory, robot=replace(robot, limits=replace(robot.limits, **limits)))
+    other = {kind: limits.pop(kind) for kind in MAGNITUDES if kind in limits}
+    changed = replace(robot.limits.with_magnitudes(**other), **limits)
+    return replace(trajectory, robot=replace(robot, limits=changed))
 
 
 def with_task(trajectory, **parts):

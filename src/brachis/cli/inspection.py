@@ -13,15 +13,17 @@ from rich.console import Console
 from rich.table import Table
 
 from brachis import ik
+from brachis.cli.joint_table import NONE, joint_rows
 from brachis.cli.output import print_json, result_console
 from brachis.errors import InputError
 from brachis.plausibility import of_robot
-from brachis.robot import Robot, bind
-from brachis.robot.limits import UrdfLimit
+from brachis.robot import Robot, bind, in_use
+from brachis.robot.from_task import robot_from_settings
 from brachis.robot.task_map.rows import AXES, POSE_ROWS, YAW
 from brachis.robot.urdf import last_common_link, read_file
-from brachis.task import LimitSpec
+from brachis.task import LimitSpec, load_task
 
+_TASK_FILES = (".yaml", ".yml")
 _PARALLEL = 1e-9
 _LISTED = 12
 _OTHER_TASKS = (
@@ -34,7 +36,7 @@ _OTHER_TASKS = (
 
 
 def inspect_command(
-    urdf: Path,
+    source: Path,
     *,
     task_space: str | None,
     tool_frame: str | None,
@@ -44,14 +46,16 @@ def inspect_command(
     as_json: bool,
 ) -> None:
     """Print a robot's joints and its decompositions."""
-    # Which limits are missing is for the plan to say; here any robot is shown.
-    unlimited = LimitSpec(torque=None, velocity=None, acceleration=1.0)
     remarks: list[str] = []
-    tool = tool_frame or _tool(urdf, remarks)
-    robot = Robot.from_urdf(urdf, tool_frame=tool, base_frame=base_frame, locked_joints=_locks(lock), limits=unlimited)
-    robot, rows = bind(robot, _space(task_space) if task_space else _natural_space(robot, remarks))
-    remarks += [f"warning: {remark}" for remark in of_robot(_with_stated_speeds(robot))]
-    joints = _joints(robot)
+    if source.suffix in _TASK_FILES:
+        given = {"--tool-frame": tool_frame, "--base-frame": base_frame, "--lock": lock}
+        robot, space = _of_task(source, [option for option, value in given.items() if value])
+    else:
+        robot, space = _of_urdf(source, tool_frame or _tool(source, remarks), base_frame, lock), None
+    space = _space(task_space) if task_space else space or _natural_space(robot, remarks)
+    robot, rows = bind(robot, space)
+    remarks += [f"warning: {remark}" for remark in of_robot(robot)]
+    joints, acting = joint_rows(robot), in_use(robot)
     candidates = ik.find_all(robot, rows)
     remarks += _remarks_on_closed_forms(candidates)
     decompositions = _decompositions(candidates)
@@ -60,28 +64,58 @@ def inspect_command(
     if as_json:
         print_json(
             {
-                "robot": str(urdf),
+                "robot": str(source),
                 "tool_frame": robot.tool_frame,
                 "base_frame": robot.base_frame,
                 "task_space": list(rows.rows),
                 "degree_of_redundancy": robot.n - rows.m,
                 "remarks": remarks,
+                "in_use": acting,
                 "joints": joints,
                 "decompositions": decompositions,
             }
         )
         return
     console = result_console()
-    console.print(f"{urdf}: {robot.base_frame} -> {robot.tool_frame}, {robot.n} joints")
+    console.print(f"{source}: {robot.base_frame} -> {robot.tool_frame}, {robot.n} joints")
     for remark in remarks:
         console.print(remark)
-    console.print(_table("joints", joints))
+    shown = [key for key in joints[0] if any(row[key] != NONE for row in joints)]
+    console.print(_table("joints", [{key: row[key] for key in shown} for row in joints]))
+    for name, text in acting.items():
+        console.print(f"{name}: {text}")
     r = robot.n - rows.m
     console.print(f"task space [{', '.join(rows.rows)}]: degree of redundancy {r}")
     if r < 0:
         console.print("The robot has fewer joints than the task space has rows; prescribe fewer rows.")
         return
     _print_decompositions(console, decompositions)
+
+
+def _of_task(path: Path, options: Sequence[str]) -> tuple[Robot, str | Sequence[str]]:
+    """Make the robot of a task file; its task space besides."""
+    if options:
+        hint = "Leave the option away, or inspect the URDF"
+        raise InputError("is for URDFs; a task says it itself", where=options[0], hint=hint)
+    task = load_task(path)
+    return robot_from_settings(task.robot), task.task_space
+
+
+def _of_urdf(path: Path, tool_frame: str, base_frame: str | None, lock: list[str]) -> Robot:
+    """Make the robot of a URDF with the limits that the file states, which need not be usable ones."""
+    # Which limits are missing is for the plan to say; here any robot is shown.
+    unlimited = LimitSpec(torque=None, velocity=None, acceleration=1.0)
+    robot = Robot.from_urdf(
+        path, tool_frame=tool_frame, base_frame=base_frame, locked_joints=_locks(lock), limits=unlimited
+    )
+    stated = {
+        kind: np.array([np.inf if value is None else value for value in values])
+        for kind, values in (
+            ("velocity", [limit.velocity for limit in robot.stated_limits]),
+            ("torque", [limit.effort for limit in robot.stated_limits]),
+        )
+    }
+    return replace(robot, limits=robot.limits.with_magnitudes(acceleration=np.full(robot.n, np.inf), **stated))
 
 
 def _tool(urdf: Path, remarks: list[str]) -> str:
@@ -125,39 +159,6 @@ def _locks(lock: list[str]) -> dict[str, float]:
         except ValueError as error:
             raise InputError("is not understood", where="--lock", found=text, allowed="name=value, rad or m") from error
     return locked
-
-
-def _with_stated_speeds(robot: Robot) -> Robot:
-    """Return the robot with the velocity limits of its URDF, which need not be usable ones."""
-    stated = [np.inf if limit.velocity is None else limit.velocity for limit in robot.stated_limits]
-    return replace(robot, limits=replace(robot.limits, velocity=np.array(stated)))
-
-
-def _joints(robot: Robot) -> list[dict[str, Any]]:
-    """Name, type, axis and the URDF's limits of every joint."""
-    geometry = ik.ChainGeometry.of(robot)
-    rows = []
-    for i, name in enumerate(robot.joint_names):
-        stated, unit = robot.stated_limits[i], robot.position_units[i]
-        rows.append(
-            {
-                "joint": name,
-                "type": "revolute" if geometry.revolute[i] else "prismatic",
-                "axis at zero": " ".join(f"{round(component, 6) + 0.0:.4g}" for component in geometry.axes[i]),
-                "range": _range(stated, unit),
-                "velocity": _figure(stated.velocity, f"{unit}/s"),
-                "effort": _figure(stated.effort, "Nm" if unit == "rad" else "N"),
-            }
-        )
-    return rows
-
-
-def _range(limit: UrdfLimit, unit: str) -> str:
-    return "unlimited" if limit.lower is None else f"{limit.lower:.4g} to {limit.upper:.4g} {unit}"
-
-
-def _figure(value: float | None, unit: str) -> str:
-    return "not stated" if value is None else f"{value:.4g} {unit}"
 
 
 def _remarks_on_closed_forms(candidates: Sequence[ik.Candidate]) -> list[str]:

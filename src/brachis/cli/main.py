@@ -193,12 +193,18 @@ def plot(
 
 @app.command()
 def inspect(
-    urdf: Annotated[Path, typer.Argument(help="URDF file.", metavar="URDF")],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            help="URDF file, or a task file (.yaml): the robot as the task has it, with the limits and masses in use.",
+            metavar="URDF|TASK",
+        ),
+    ],
     task_space: Annotated[
         str | None,
         typer.Option(
             help="What the path prescribes: rows such as x,y or x,z,yaw, or position, pose or pose_free_roll. "
-            "Default: all that the robot can."
+            "Default: the task's, or all that the robot can."
         ),
     ] = None,
     tool_frame: Annotated[str | None, typer.Option(help="Link at the chain's end.")] = None,
@@ -209,12 +215,12 @@ def inspect(
     lock: Annotated[list[str] | None, typer.Option(help="Joint held at a position: name=value, repeatable.")] = None,
     json: Json = False,
 ) -> None:
-    """List a robot's joints, and which choices of redundant joints have a closed form."""
+    """List a robot's joints, limits, masses and friction, and which choices of redundant joints have a closed form."""
     with interrupts.postponed():
         from brachis.cli import inspection  # noqa: PLC0415
 
     inspection.inspect_command(
-        urdf,
+        source,
         task_space=task_space,
         tool_frame=tool_frame,
         base_frame=base_frame,

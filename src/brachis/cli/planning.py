@@ -86,6 +86,7 @@ def _show(result: Result, data: dict[str, Any]) -> None:
         "branch": result.family if trajectory.branch == result.family else f"{trajectory.branch} ({result.family})",
         "start posture": _posture(data, "start_posture"),
         "end posture": _posture(data, "end_posture"),
+        **data["in_use"],
         "solver": f"{result.report.solver}, {result.report.status.value}",
         "iterations": f"{sum(r.iterations for r in attempt.reports)} in {len(attempt.reports)} solves (refined to "
         f"{attempt.collocation_points} collocation points)",

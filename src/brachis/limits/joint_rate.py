@@ -1,4 +1,4 @@
-"""|qdot| <= v_max and |qddot| <= a_max, as ratios in [-1, 1]."""
+"""Joint velocities between v_min and v_max, and |qddot| <= a_max."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from brachis.task import Task
 
 
 class _JointRateLimit(JointRatioLimit):
-    """Joint velocities or accelerations over their limits.
+    """Joint velocities or accelerations within their limits.
 
     Parameters
     ----------
     robot : Robot
     joints : (c,) int ndarray
         The limited joints.
-    figures : (c,) ndarray
-        Their limits.
+    figures : (c,) or (2, c) ndarray
+        Their limits; see `JointRatioLimit`.
     """
 
     _per_time: str
@@ -34,22 +34,24 @@ class _JointRateLimit(JointRatioLimit):
 
 
 class VelocityLimit(_JointRateLimit):
-    """Joint velocities over their limits; see `_JointRateLimit`."""
+    """Joint velocities within their limits; see `_JointRateLimit`."""
 
     kind = "velocity"
     _per_time = "/s"
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        return motion.qdot[:, self._joints] * self._scale
+        return self._normalised(motion.qdot)
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
         return Partials(qdot=self._rows(len(motion.q)))
 
     def lines(self, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
-        """See `Limit.lines`: the square of the ratio, q_ds^2 x / v_max^2."""
-        squares = (q_ds[:, self._joints] * self._scale) ** 2
+        """See `Limit.lines`: the square of the ratio, q_ds^2 x / v^2, to the limit of the direction."""
+        low, high = self._figures
+        tangent = q_ds[:, self._joints]
+        squares = (tangent / np.where(tangent > 0.0, high, low)) ** 2
         return PhaseLines(None, squares, np.zeros((len(q), len(self.lower))))
 
     def step_rows(self, q: np.ndarray) -> tuple[None, np.ndarray]:
@@ -65,7 +67,7 @@ class AccelerationLimit(_JointRateLimit):
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        return motion.qddot[:, self._joints] * self._scale
+        return self._normalised(motion.qddot)
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
@@ -83,8 +85,9 @@ class AccelerationLimit(_JointRateLimit):
 
 def build_velocity(robot: Robot, _task: Task) -> VelocityLimit | None:
     """Build the limit for the joints with a finite velocity limit."""
-    joints = np.flatnonzero(np.isfinite(robot.limits.velocity))
-    return VelocityLimit(robot, joints, robot.limits.velocity[joints]) if len(joints) else None
+    figures = robot.limits.both_ways("velocity")
+    joints = np.flatnonzero(np.isfinite(figures[1]))
+    return VelocityLimit(robot, joints, figures[:, joints]) if len(joints) else None
 
 
 def build_acceleration(robot: Robot, _task: Task) -> AccelerationLimit | None:

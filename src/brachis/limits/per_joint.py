@@ -1,4 +1,7 @@
-"""Limits of one number > 0 for each joint, as ratios in [-1, 1]."""
+"""Limits below and above zero for each joint, as (value - middle) / half the way between them, in [-1, 1].
+
+With the same limit in both directions that is the ratio to it.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +21,8 @@ class JointRatioLimit(Limit):
     robot : Robot
     joints : (c,) int ndarray
         The limited joints.
-    figures : (c,) ndarray
-        Their limits.
+    figures : (c,) or (2, c) ndarray
+        Their limits, the same in both directions; or lower and upper ones.
     units : sequence of str
         Of the limits of all joints of the robot.
     """
@@ -27,14 +30,29 @@ class JointRatioLimit(Limit):
     time_scaling = True
 
     def __init__(self, robot: Robot, joints: np.ndarray, figures: np.ndarray, units: Sequence[str]) -> None:
-        self._joints, self._scale = joints, 1.0 / figures
+        low, high = self._figures = figures if figures.ndim > 1 else np.array([-figures, figures])
+        self._joints, self._middle, self._scale = joints, 0.5 * (high + low), 2.0 / (high - low)
         names = [robot.joint_names[i] for i in joints]
         self.labels = tuple(
             Label(name, self.kind, units[i], f"robot.limits.{self.kind}.{name}")
             for i, name in zip(joints, names, strict=True)
         )
         self.lower, self.upper = -np.ones(len(joints)), np.ones(len(joints))
-        self._bounds = tuple(Bound(c, limit, limit, 1.0 / limit) for c, limit in enumerate(figures.tolist()))
+        self._violation_scale = 0.5 * (high - low) / np.minimum(high, -low)
+        self._bounds = tuple(
+            Bound(column, figure, abs(figure), float(self._scale[column]), end)
+            for column, (below, above) in enumerate(zip(low.tolist(), high.tolist(), strict=True))
+            for end, figure in (((None, above),) if -below == above else (("lower", below), ("upper", above)))
+        )
+
+    def _normalised(self, quantity: np.ndarray) -> np.ndarray:
+        """Values, (K, c), from a quantity of all joints, (K, n)."""
+        return np.asarray((quantity[:, self._joints] - self._middle) * self._scale)
+
+    @property
+    def violation_scale(self) -> np.ndarray:
+        """See `Limit`: a violation is a part of the smaller one of both limits."""
+        return self._violation_scale
 
     @property
     def bounds(self) -> tuple[Bound, ...]:

@@ -1,4 +1,4 @@
-"""|tau| <= tau_max, as tau / tau_max in [-1, 1]."""
+"""Joint torques between tau_min and tau_max."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from brachis.task import Task
 
 
 class TorqueLimit(JointRatioLimit):
-    """Joint torques over their limits.
+    """Joint torques within their limits.
 
     Parameters
     ----------
@@ -26,12 +26,12 @@ class TorqueLimit(JointRatioLimit):
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
         units = [{"rad": "Nm", "m": "N"}[unit] for unit in robot.position_units]
-        super().__init__(robot, joints, robot.limits.torque[joints], units)
+        super().__init__(robot, joints, robot.limits.both_ways("torque")[:, joints], units)
         self._robot = robot
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        return dynamics.torque(self._robot, motion.q, motion.qdot, motion.qddot)[:, self._joints] * self._scale
+        return self._normalised(dynamics.torque(self._robot, motion.q, motion.qdot, motion.qddot))
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
@@ -45,14 +45,15 @@ class TorqueLimit(JointRatioLimit):
         held = dynamics.rigid_torque(robot, q, still, still)
         by_u = dynamics.rigid_torque(robot, q, still, q_ds) - held + robot.friction.armature * q_ds
         by_x = dynamics.rigid_torque(robot, q, q_ds, q_dds) - held + robot.friction.armature * q_dds
-        return PhaseLines(*(part[:, self._joints] * self._scale for part in (by_u, by_x, held)))
+        slope, curve = (part[:, self._joints] * self._scale for part in (by_u, by_x))
+        return PhaseLines(slope, curve, self._normalised(held))
 
     def step_rows(self, q: np.ndarray) -> tuple[np.ndarray, None]:
-        """See `Limit.step_rows`: M / tau_max."""
+        """See `Limit.step_rows`: M over half the way between both limits."""
         return dynamics.mass_matrices(self._robot, q)[:, self._joints] * self._scale[:, None], None
 
 
 def build(robot: Robot, _task: Task) -> TorqueLimit | None:
     """Build the limit for the joints with a finite torque limit."""
-    joints = np.flatnonzero(np.isfinite(robot.limits.torque))
+    joints = np.flatnonzero(np.isfinite(robot.limits.torque_upper))
     return TorqueLimit(robot, joints) if len(joints) else None

@@ -58,7 +58,7 @@ def draw_velocities(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
     """Draw joint velocities and their limits."""
     robot = trajectory.robot
     _draw_joints(ax, trajectory, samples.t, samples.qdot)
-    _draw_limits(ax, np.array([-robot.limits.velocity, robot.limits.velocity]), samples.qdot)
+    _draw_limits(ax, robot.limits.both_ways("velocity"), samples.qdot)
     _dress(ax, trajectory, rf"$\dot{{q}}$ ({style.unit_of(robot.position_units, '/s')})")
 
 

@@ -45,14 +45,14 @@ def plot_torques(trajectory: Trajectory) -> Figure:
 
 def draw_torques(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
     """Draw the torques into axes; one labelled line per joint, in chain order."""
-    limits = trajectory.robot.limits.torque
-    limited = np.isfinite(limits)
+    lower, upper = trajectory.robot.limits.both_ways("torque")
+    limited = np.isfinite(upper)
     if limited.any():
         shown = np.flatnonzero(limited)
-        values, label = samples.tau / limits, r"$\tau / \tau_\mathrm{max}$"
+        values, label = samples.tau / np.where(samples.tau > 0.0, upper, -lower), r"$\tau / \tau_\mathrm{max}$"
         _draw_band(ax, np.abs(values[:, shown]).max())
     else:
-        shown = np.arange(len(limits))
+        shown = np.arange(len(upper))
         units = [{"rad": "Nm", "m": "N"}[unit] for unit in trajectory.robot.position_units]
         values, label = samples.tau, rf"$\tau$ ({style.unit_of(units)})"
     for joint in shown.tolist():

@@ -69,9 +69,10 @@ def _stated(robot: Robot) -> RobotSettings:
     names = _own_joints(robot)
     n = len(names)
     changes: dict[str, object] = {}
-    if not _same(resolve_limits(settings.limits, names, robot.stated_limits[:n]), robot.limits, n):
-        changes["limits"] = _limits(robot.limits, names)
-    if not _same(Friction.of(names, **settings.friction.model_dump()), robot.friction, n):
+    made = resolve_limits(settings.limits, names, robot.stated_limits[:n], settings.speed_override)
+    if not _same(made, robot.limits, n):
+        changes |= {"limits": _limits(robot.limits, names), "speed_override": 1.0}
+    if not _same(Friction.of(names, robot.stated.friction, **settings.friction.model_dump()), robot.friction, n):
         changes["friction"] = _friction(robot.friction, names)
     gravity = tuple(float(component) for component in robot.model.gravity.linear)
     if gravity != settings.gravity:
@@ -98,7 +99,10 @@ def _limits(limits: Limits, names: Sequence[str]) -> LimitSpec:
         return [float(value) if np.isfinite(value) else None for value in values[: len(names)]]
 
     ranges = zip(finite(limits.position_lower), finite(limits.position_upper), strict=True)
-    spelled: dict[str, Any] = {kind: finite(getattr(limits, kind)) for kind in MAGNITUDES} | {"position": ranges}
+    spelled: dict[str, Any] = {"position": ranges}
+    for kind in MAGNITUDES:
+        pairs = zip(*(finite(ends) for ends in limits.both_ways(kind)), strict=True)
+        spelled[kind] = [upper if lower is None or -lower == upper else (lower, upper) for lower, upper in pairs]
     return LimitSpec(**{kind: dict(zip(names, values, strict=True)) for kind, values in spelled.items()})
 
 
@@ -140,7 +144,7 @@ def _merged(key: str, given: Any, asked: Any, default: Any, names: Sequence[str]
     """
     if asked == given:
         return given
-    if isinstance(given, Model | LimitSpec):
+    if isinstance(given, Model | LimitSpec) and default is not None:
         written = asked.model_fields_set if isinstance(asked, Model) else [each.name for each in fields(asked)]
         parts = {
             name: _merged(f"{key}.{name}", getattr(given, name), getattr(asked, name), getattr(default, name), names)

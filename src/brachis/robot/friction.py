@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from brachis.arrays import freeze
 from brachis.errors import InputError
 from brachis.robot.limits import LARGEST, per_joint_values
+from brachis.task import FROM_URDF
 
 _LEAST_SPEED = 1e-9
 
@@ -20,7 +21,8 @@ class Friction:
 
     The joint torque is ``rnea(q, qdot, qddot) + armature * qddot + viscous * qdot + coulomb * tanh(qdot / v_eps)``.
     Pinocchio's ``rnea`` would add ``model.armature``; brachis keeps that at zero and adds the term here. Pinocchio
-    reads ``damping`` and ``friction`` of a URDF but its ``rnea`` does not use them, and neither does brachis.
+    reads ``damping`` and ``friction`` of a URDF but its ``rnea`` does not use them; here they are the viscous and the
+    Coulomb term, unless the task says otherwise.
 
     Attributes
     ----------
@@ -47,27 +49,42 @@ class Friction:
     def of(
         cls,
         joint_names: Sequence[str],
+        stated: Mapping[str, np.ndarray] | None = None,
         *,
         armature: object = 0.0,
-        viscous: object = 0.0,
-        coulomb: object = 0.0,
+        rotor_inertia: object = 0.0,
+        gear_ratio: object = None,
+        viscous: object = FROM_URDF,
+        coulomb: object = FROM_URDF,
         coulomb_velocity: object = 0.01,
     ) -> Friction:
-        """Spread scalars, lists or mappings over the joints of a chain."""
-        given = {"armature": armature, "viscous": viscous, "coulomb": coulomb}
-        spread = {}
-        for key, value in given.items():
-            where = f"robot.friction.{key}"
-            spread[key] = np.array(per_joint_values(where, value, list(joint_names), 0.0), dtype=float)
-            if not np.all((spread[key] >= 0.0) & (spread[key] <= LARGEST)):
-                allowed = f"numbers from 0 to {LARGEST:g}"
-                raise InputError("is negative, too large or not a number", where=where, found=value, allowed=allowed)
+        """Spread scalars, lists or mappings over the joints of a chain.
+
+        Parameters
+        ----------
+        joint_names : sequence of str
+        stated : mapping of str to (n,) ndarray, optional
+            What the URDF states as ``viscous`` and ``coulomb``; zero where left out.
+        armature, rotor_inertia, gear_ratio, viscous, coulomb, coulomb_velocity : optional
+            As in `FrictionSettings`.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+        """
+        names = list(joint_names)
+        urdf = {kind: np.zeros(len(names)) for kind in ("viscous", "coulomb")} | dict(stated or {})
+        given = {"armature": armature, "rotor_inertia": rotor_inertia}
+        terms = {key: _spread(key, value, names, np.zeros(len(names))) for key, value in given.items()}
+        rubbing = {"viscous": viscous, "coulomb": coulomb}
+        terms |= {key: _spread(key, value, names, urdf[key]) for key, value in rubbing.items()}
+        geared = _geared(terms.pop("rotor_inertia"), gear_ratio, terms["armature"], names)
         where = "robot.friction.coulomb_velocity"
-        v_eps = np.array(per_joint_values(where, coulomb_velocity, list(joint_names), 0.01), dtype=float)
+        v_eps = np.array(per_joint_values(where, coulomb_velocity, names, 0.01), dtype=float)
         if not np.all((v_eps >= _LEAST_SPEED) & (v_eps <= LARGEST)):
             allowed = f"{_LEAST_SPEED:g} to {LARGEST:g} rad/s or m/s"
             raise InputError("is not a usable speed", where=where, found=coulomb_velocity, allowed=allowed)
-        return cls(**spread, v_eps=v_eps)
+        return cls(**(terms | {"armature": terms["armature"] + geared}), v_eps=v_eps)
 
     def check_against(self, joint_names: Sequence[str], limits: np.ndarray) -> None:
         """Refuse Coulomb friction that the torque limits, (n,), cannot overcome: the joint could only creep.
@@ -93,3 +110,43 @@ class Friction:
     def velocity_derivative(self, qdot: np.ndarray) -> np.ndarray:
         """Differentiate `torque` with respect to qdot (diagonal), (..., n)."""
         return self.viscous + self.coulomb / self.v_eps / np.cosh(np.clip(qdot / self.v_eps, -350.0, 350.0)) ** 2
+
+
+def _spread(key: str, value: object, names: list[str], urdf: np.ndarray) -> np.ndarray:
+    """Spread one term over the joints, (n,); `urdf` where it is not given, nothing where it is None."""
+    where = f"robot.friction.{key}"
+    listed = per_joint_values(where, value, names, FROM_URDF)
+    chosen = [stated if entry == FROM_URDF else entry for entry, stated in zip(listed, urdf, strict=True)]
+    terms = np.array([0.0 if entry is None else entry for entry in chosen], dtype=float)
+    for name, term, entry in zip(names, terms, listed, strict=True):
+        if not 0.0 <= term <= LARGEST:
+            raise InputError(
+                "is negative, too large or not a number",
+                where=f"{where}.{name}",
+                found=f"{term:g}" + (" in the URDF" if entry == FROM_URDF else ""),
+                allowed=f"numbers from 0 to {LARGEST:g}",
+            )
+    return terms
+
+
+def _geared(rotor: np.ndarray, gear_ratio: object, armature: np.ndarray, names: list[str]) -> np.ndarray:
+    """Inertias of rotors, (n,), as the joints feel them through their gears."""
+    key = "robot.friction.gear_ratio"
+    ratios = [0.0 if ratio is None else ratio for ratio in per_joint_values(key, gear_ratio, names, None)]
+    ratio = np.array(ratios, dtype=float)
+    for name, inertia, turns, other in zip(names, rotor, ratio, armature, strict=True):
+        if inertia > 0.0 and not 0.0 < turns <= LARGEST:
+            raise InputError(
+                f"the rotor of joint {name!r} has no gear ratio",
+                where=f"{key}.{name}",
+                found=f"{turns:g}" if turns else None,
+                allowed=f"turns of the rotor per turn of the joint, > 0, at most {LARGEST:g}; 1 for a direct drive",
+            )
+        if inertia > 0.0 and other > 0.0:
+            raise InputError(
+                f"armature and rotor_inertia of joint {name!r} say the same",
+                where=f"robot.friction.rotor_inertia.{name}",
+                found=f"armature {other:g}, rotor inertia {inertia:g} at a gear ratio of {turns:g}",
+                allowed="one of them",
+            )
+    return np.asarray(rotor * ratio**2)

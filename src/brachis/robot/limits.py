@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import TypeGuard
 
 import numpy as np
@@ -28,33 +28,69 @@ class Limits:
     ----------
     position_lower, position_upper : (n,) ndarray
         rad or m.
-    velocity : (n,) ndarray
-        rad/s or m/s.
+    velocity_lower, velocity_upper : (n,) ndarray
+        Below and above zero, rad/s or m/s.
     acceleration : (n,) ndarray
         rad/s^2 or m/s^2.
-    torque : (n,) ndarray
-        Nm or N.
+    torque_lower, torque_upper : (n,) ndarray
+        Below and above zero, Nm or N.
     """
 
     position_lower: np.ndarray
     position_upper: np.ndarray
-    velocity: np.ndarray
+    velocity_lower: np.ndarray
+    velocity_upper: np.ndarray
     acceleration: np.ndarray
-    torque: np.ndarray
+    torque_lower: np.ndarray
+    torque_upper: np.ndarray
 
     def __post_init__(self) -> None:
         """Take copies that nobody can write to."""
         freeze(self, *(each.name for each in fields(self)))
 
+    @property
+    def velocity(self) -> np.ndarray:
+        """Speeds, (n,), that every joint reaches in both directions, rad/s or m/s."""
+        return np.minimum(self.velocity_upper, -self.velocity_lower)
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Torques, (n,), that every joint reaches in both directions, Nm or N."""
+        return np.minimum(self.torque_upper, -self.torque_lower)
+
+    def both_ways(self, kind: str) -> np.ndarray:
+        """Lower and upper limits, (2, n), of one of `MAGNITUDES`."""
+        if kind in PAIRS:
+            return np.array([getattr(self, f"{kind}_lower"), getattr(self, f"{kind}_upper")])
+        return np.array([-getattr(self, kind), getattr(self, kind)])
+
+    def with_magnitudes(self, **magnitudes: np.ndarray) -> Limits:
+        """Return the limits with other ones of some of `MAGNITUDES`, (n,), the same in both directions."""
+        ends = {
+            name: sign * values
+            for kind, values in magnitudes.items()
+            for name, sign in (((f"{kind}_lower", -1.0), (f"{kind}_upper", 1.0)) if kind in PAIRS else ((kind, 1.0),))
+        }
+        return replace(self, **ends)
+
     def with_free_joint(self) -> Limits:
         """Return the limits with those of a further joint, which has none."""
         values = {each.name: getattr(self, each.name) for each in fields(self)}
-        return Limits(**{name: np.append(old, -np.inf if name == _LOWEST else np.inf) for name, old in values.items()})
+        return Limits(
+            **{name: np.append(old, -np.inf if name.endswith("_lower") else np.inf) for name, old in values.items()}
+        )
 
 
-_LOWEST = "position_lower"
-MAGNITUDES = tuple(each.name for each in fields(Limits) if not each.name.startswith("position_"))
-"""Kinds of limits that are one number > 0 for each joint."""
+PAIRS = ("velocity", "torque")
+"""Kinds of limits that may differ in both directions: a number > 0 for each joint, or [lower, upper] around zero."""
+MAGNITUDES = tuple(
+    dict.fromkeys(
+        each.name.removesuffix("_lower").removesuffix("_upper")
+        for each in fields(Limits)
+        if not each.name.startswith("position_")
+    )
+)
+"""These, and the kinds that are one number > 0 for each joint."""
 STATED = {"torque": "effort", "velocity": "velocity"}
 """Those of them that a URDF states, and its words for them."""
 
@@ -71,7 +107,9 @@ class UrdfLimit:
     """True where a revolute or prismatic joint states no range, so that the task has to."""
 
 
-def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[UrdfLimit]) -> Limits:
+def resolve_limits(
+    spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[UrdfLimit], speed_override: float = 1.0
+) -> Limits:
     """Combine the user's limits with the URDF's.
 
     Parameters
@@ -82,6 +120,8 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
         The chain's joints.
     urdf : sequence of UrdfLimit
         The URDF's limits of the same joints.
+    speed_override : float, optional
+        Factor on velocity limits, beside those of `spec`.
 
     Returns
     -------
@@ -92,6 +132,8 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
     LimitError
         A limit is not positive or, before or after scaling, outside [`LEAST`, `LARGEST`]; a joint has neither a torque
         nor an acceleration limit; a range is empty or ends beyond `FARTHEST`.
+    InputError
+        There is a speed override and no velocity limit.
     UnknownNameError
         A limit names a joint that is not of the chain.
     """
@@ -101,7 +143,7 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
         kind: _per_joint(kind, getattr(spec, kind), names, [getattr(u, STATED.get(kind, ""), None) for u in urdf])
         for kind in MAGNITUDES
     }
-    for name, tau, acc in zip(names, found["torque"], found["acceleration"], strict=True):
+    for name, tau, acc in zip(names, found["torque"][1], found["acceleration"][1], strict=True):
         if np.isinf(tau) and np.isinf(acc):
             raise LimitError(
                 "has neither a torque nor an acceleration limit, so its time would go to zero",
@@ -110,7 +152,18 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
             )
     lower, upper = _ranges(spec.position, names, urdf)
     scaled = {kind: _scaled(kind, limits, spec.scale, names) for kind, limits in found.items()}
-    return Limits(position_lower=lower, position_upper=upper, **scaled)
+    if speed_override != 1.0 and np.isinf(scaled["velocity"]).all():
+        raise InputError(
+            "has no velocity limit to act on",
+            where="robot.speed_override",
+            found=f"{speed_override:g}",
+            hint="Give robot.limits.velocity, or leave the override away",
+        )
+    scaled["velocity"] = scaled["velocity"] * speed_override
+    values = {kind: limits[1] for kind, limits in scaled.items() if kind not in PAIRS}
+    for kind in PAIRS:
+        values |= dict(zip((f"{kind}_lower", f"{kind}_upper"), scaled[kind], strict=True))
+    return Limits(position_lower=lower, position_upper=upper, **values)
 
 
 def _check_scale(scale: LimitScale) -> None:
@@ -128,11 +181,11 @@ def _is_number(value: object) -> TypeGuard[float]:
 
 
 def _scaled(kind: str, limits: np.ndarray, scale: LimitScale, names: Sequence[str]) -> np.ndarray:
-    """Multiply limits, (n,), by their factor."""
+    """Multiply limits, (2, n), by their factor."""
     factor = getattr(scale, kind)
-    for name, limit in zip(names, limits, strict=True):
-        if np.isfinite(limit):
-            _check_size(kind, float(limit) * factor, name, f"robot.limits.scale.{kind}", "scaled ")
+    for name, pair in zip(names, limits.T, strict=True):
+        for limit in pair[np.isfinite(pair)]:
+            _check_size(kind, abs(float(limit)) * factor, name, f"robot.limits.scale.{kind}", "scaled ")
     return np.asarray(limits * factor)
 
 
@@ -176,27 +229,34 @@ def per_joint_values(key: str, value: object, names: Sequence[str], missing: obj
 
 
 def _per_joint(kind: str, value: object, names: list[str], urdf: Sequence[float | None]) -> np.ndarray:
-    """Spread one kind of limit over the joints; inf where not limited."""
+    """Spread one kind of limit over the joints: lower and upper ones, (2, n); infinite where not limited."""
     key = f"robot.limits.{kind}"
     listed = per_joint_values(key, value, names, FROM_URDF)
-    limit = np.full(len(names), np.inf)
+    limits = np.tile([[-np.inf], [np.inf]], len(names))
     for i, (name, entry, stated) in enumerate(zip(names, listed, urdf, strict=True)):
-        chosen = stated if entry == FROM_URDF else entry
+        chosen = stated if isinstance(entry, str) and entry == FROM_URDF else entry
         if chosen is None:
             continue
-        if not (_is_number(chosen) and chosen > 0.0):
-            where = "the URDF" if entry == FROM_URDF else "the task"
+        pair = list(chosen) if kind in PAIRS and isinstance(chosen, Sequence) and not isinstance(chosen, str) else None
+        ends = pair or [-chosen if _is_number(chosen) else chosen, chosen]
+        numbers = len(ends) == 2 and all(_is_number(end) for end in ends)  # noqa: PLR2004
+        if not (numbers and ends[0] < 0.0 < ends[1]):
+            where = "the URDF" if chosen is not entry else "the task"
+            problem = "is no pair around zero" if pair else f"is not {'positive' if numbers else 'a number'}"
             raise LimitError(
-                f"{kind} limit in {where} is not {'positive' if _is_number(chosen) else 'a number'}",
+                f"{kind} limit in {where} {problem}",
                 joint=name,
                 key=f"{key}.{name}",
                 found=f"{chosen:g}" if _is_number(chosen) else repr(chosen),
-                allowed="a number > 0, or null for no limit",
+                allowed="a number > 0, "
+                + ("[lower, upper] with lower < 0 < upper, " if kind in PAIRS else "")
+                + "or null for no limit",
             )
-        if np.isfinite(chosen):
-            _check_size(kind, chosen, name, f"{key}.{name}", "")
-        limit[i] = chosen
-    return limit
+        for end in ends:
+            if np.isfinite(end):
+                _check_size(kind, abs(end), name, f"{key}.{name}", "")
+        limits[:, i] = ends
+    return limits
 
 
 def _ranges(value: object, names: list[str], urdf: Sequence[UrdfLimit]) -> tuple[np.ndarray, np.ndarray]:

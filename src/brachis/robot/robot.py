@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from brachis.errors import InputError, UrdfError
+from brachis.errors import InputError
 from brachis.robot.friction import Friction
 from brachis.robot.limits import (
     FARTHEST,
@@ -21,9 +21,10 @@ from brachis.robot.limits import (
     per_joint_values,
     resolve_limits,
 )
+from brachis.robot.model import build_model
 from brachis.robot.urdf import read_chain, read_file
-from brachis.robot.urdf_bodies import check_bodies
-from brachis.task import FROM_URDF, LimitSpec, RobotSettings, check_robot_settings
+from brachis.robot.urdf_bodies import StatedChain
+from brachis.task import FROM_URDF, LimitSpec, Payload, Placement, RobotSettings, check_robot_settings
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 ROLL_JOINT = "tool_roll"
@@ -37,7 +38,7 @@ class Robot:
     Attributes
     ----------
     model : pinocchio.Model
-        The chain alone; ``nq == nv == n``. Treat it as read-only.
+        The chain alone, mounted, with payload and tool offset; ``nq == nv == n``. Treat it as read-only.
     joint_names : tuple of str
         Names of the n joints, from base to tool.
     tool_frame, base_frame : str
@@ -46,6 +47,8 @@ class Robot:
         Limits of the n joints.
     stated_limits : tuple of UrdfLimit
         Limits as the URDF states them.
+    stated : StatedChain
+        Joints, bodies and friction as the URDF states them, without payload, mounting and tool offset.
     friction : Friction
         Torque terms beside the rigid-body model's.
     settings : RobotSettings
@@ -64,6 +67,7 @@ class Robot:
     base_frame: str
     limits: Limits
     stated_limits: tuple[UrdfLimit, ...]
+    stated: StatedChain
     friction: Friction
     settings: RobotSettings
     source: str
@@ -82,6 +86,10 @@ class Robot:
         locked_joints: Mapping[str, float] | None = None,
         limits: LimitSpec | None = None,
         friction: Mapping[str, object] | None = None,
+        payload: Mapping[str, object] | Payload | None = None,
+        tool_offset: Mapping[str, object] | Placement | None = None,
+        mounting: str | Mapping[str, object] | Placement = "floor",
+        speed_override: float = 1.0,
     ) -> Robot:
         """Build the model of the chain base -> tool; every joint off the chain is locked.
 
@@ -94,8 +102,8 @@ class Robot:
         tool_frame : str, optional
             Link at the end of the chain; the only leaf link if left out.
         base_frame : str, optional
-            Link at the beginning of the chain; the root link if left out. Positions stay those of the URDF's root
-            link, called the world frame.
+            Link at the beginning of the chain; the root link if left out. Positions are those in the world frame,
+            which is the URDF's root link unless `mounting` says otherwise.
         gravity : (3,) sequence of float, optional
             Gravitational acceleration in the world frame, m/s^2.
         locked_joints : mapping of str to float, optional
@@ -103,7 +111,15 @@ class Robot:
         limits : LimitSpec, optional
             Limits that override or complete the URDF's.
         friction : mapping, optional
-            Keyword arguments of `Friction.of`.
+            Keyword arguments of `Friction.of`; what it leaves out is taken from the URDF.
+        payload : mapping or Payload, optional
+            ``mass``, kg; ``com``, (3,) m, and ``inertia`` about it, kg m^2, in the tool frame of the URDF.
+        tool_offset : mapping or Placement, optional
+            ``xyz``, m, and ``rpy_deg``: where the frame that follows the path is in the tool frame of the URDF.
+        mounting : {"floor", "wall", "ceiling"}, mapping or Placement, optional
+            Where the URDF's root link is in the world.
+        speed_override : float, optional
+            Factor in (0, 1] on all velocity limits.
 
         Returns
         -------
@@ -112,23 +128,25 @@ class Robot:
         Raises
         ------
         UrdfError, UnknownNameError, LimitError, InputError
+            TaskError, one of them, where payload, tool offset, mounting or speed override are not what they should be.
         """
+        added = check_robot_settings(
+            {
+                "payload": payload,
+                "tool_offset": tool_offset or {},
+                "mounting": mounting,
+                "speed_override": speed_override,
+            }
+        )
         spec = limits or LimitSpec()
         vector = _vector(gravity)
         text = read_file(Path(path)) if urdf_text is None else urdf_text
         chain = read_chain(
             text, str(path), tool_frame=tool_frame, base_frame=base_frame, locked_joints=dict(locked_joints or {})
         )
-        model = _build_model(chain.xml, chain.locked, str(path))
-        model.gravity.linear = vector
-        model.armature = np.zeros(model.nv)
-        names = tuple(str(name) for name in list(model.names)[1:])
-        if names != chain.joint_names or model.nq != model.nv:
-            raise UrdfError(
-                "the chain is not serial", where=str(path), found=list(names), allowed=list(chain.joint_names)
-            )
-        check_bodies(model, chain.bodies, str(path))
-        resolved, terms = resolve_limits(spec, names, chain.limits), Friction.of(names, **dict(friction or {}))
+        model, names = build_model(chain, vector, added, str(path)), chain.joint_names
+        resolved = resolve_limits(spec, names, chain.limits, added.speed_override)
+        terms = Friction.of(names, chain.stated.friction, **dict(friction or {}))
         terms.check_against(names, resolved.torque)
         return cls(
             model=model,
@@ -137,8 +155,9 @@ class Robot:
             base_frame=chain.base_frame,
             limits=resolved,
             stated_limits=chain.limits,
+            stated=chain.stated,
             friction=terms,
-            settings=_settings(path, names, tool_frame, base_frame, vector, locked_joints, spec, friction),
+            settings=_settings(added, path, names, tool_frame, base_frame, vector, locked_joints, spec, friction),
             source=str(path),
             urdf=text,
         )
@@ -225,6 +244,7 @@ def _vector(gravity: Sequence[float]) -> np.ndarray:
 
 
 def _settings(
+    added: RobotSettings,
     path: str | os.PathLike[str],
     names: Sequence[str],
     tool_frame: str | None,
@@ -247,6 +267,7 @@ def _settings(
             "locked_joints": dict(locked_joints or {}),
             "limits": replace(limits, **by_name),
             "friction": dict(friction or {}),
+            **{name: getattr(added, name) for name in ("payload", "tool_offset", "mounting", "speed_override")},
         }
     )
 
@@ -258,20 +279,3 @@ def _by_name(value: object, names: Sequence[str], absent: object) -> object:
     listed = per_joint_values("limits", value, names, FROM_URDF)
     kept = {name: entry for name, entry in zip(names, listed, strict=True) if not isinstance(entry, str)}
     return kept or absent
-
-
-def _build_model(xml: str, locked: Mapping[str, float], where: str) -> pin.Model:
-    """Let Pinocchio parse the plain URDF and lock the joints off the chain."""
-    try:
-        full = pin.buildModelFromXML(xml)
-        return _locked(full, {name: value for name, value in locked.items() if full.existJointName(name)})
-    except (ValueError, RuntimeError) as error:
-        raise UrdfError("Pinocchio cannot build the model", where=where, found=str(error)) from error
-
-
-def _locked(full: pin.Model, locked: Mapping[str, float]) -> pin.Model:
-    """Hold joints at positions, rad or m."""
-    reference = pin.neutral(full)
-    for name, value in locked.items():
-        reference[full.idx_qs[full.getJointId(name)]] = value
-    return pin.buildReducedModel(full, [full.getJointId(name) for name in locked], reference)

@@ -15,7 +15,7 @@ from lxml import etree
 from brachis import files
 from brachis.errors import UnknownNameError, UrdfError
 from brachis.robot.limits import FARTHEST, UrdfLimit
-from brachis.robot.urdf_bodies import Body, stated_bodies
+from brachis.robot.urdf_bodies import StatedChain, stated_chain
 from brachis.robot.urdf_checks import MOVING_TYPES, check_inertias, check_joints
 from brachis.robot.urdf_numbers import check_numbers
 from brachis.robot.urdf_tree import UrdfTree, read_tree
@@ -44,8 +44,8 @@ class UrdfChain:
     xml : str
         The URDF that Pinocchio reads: ``continuous`` joints have become ``revolute`` ones without range, so that
         every joint has one coordinate, and unsupported joints off the chain have become fixed.
-    bodies : tuple of Body
-        What each joint of the chain moves, summed up from the file.
+    stated : StatedChain
+        The chain as the text states it, read without Pinocchio.
     """
 
     joint_names: tuple[str, ...]
@@ -54,7 +54,7 @@ class UrdfChain:
     tool_frame: str
     base_frame: str
     xml: str
-    bodies: tuple[Body, ...]
+    stated: StatedChain
 
 
 def read_chain(
@@ -116,7 +116,7 @@ def read_chain(
     check_inertias(urdf, chain, parents, where)
     limits = tuple(_limit_of(joint) for joint in chain)
     names = tuple(joint.name for joint in chain)
-    return UrdfChain(names, limits, locked, tool, base, _plain_xml(urdf), stated_bodies(tree, names, locked))
+    return UrdfChain(names, limits, locked, tool, base, _plain_xml(urdf), stated_chain(tree, names, locked, tool))
 
 
 def last_common_link(text: str, where: str) -> tuple[str, tuple[str, ...]]:

@@ -1,4 +1,4 @@
-"""Masses and inertias of a URDF's moving bodies, summed up from the file alone, to compare a model with."""
+"""A URDF's chain as its text states it, read without Pinocchio: to compare a model with, and to verify motions by."""
 
 from __future__ import annotations
 
@@ -23,6 +23,12 @@ class Body:
     Attributes
     ----------
     joint : str
+    placement : (4, 4) ndarray
+        Of the joint at zero in the frame of the joint before it, of the first one in the root link.
+    axis : (3,) ndarray
+        Unit vector of the joint's axis in its own frame.
+    sliding : bool
+        Whether the joint is prismatic.
     links : tuple of str
     mass : float
         kg.
@@ -35,6 +41,9 @@ class Body:
     """
 
     joint: str
+    placement: np.ndarray
+    axis: np.ndarray
+    sliding: bool
     links: tuple[str, ...]
     mass: float
     com: np.ndarray
@@ -42,8 +51,27 @@ class Body:
     size: float
 
 
-def stated_bodies(tree: UrdfTree, chain: Sequence[str], locked: Mapping[str, float]) -> tuple[Body, ...]:
-    """Sum up the inertias of a checked URDF.
+@dataclass(frozen=True, eq=False)
+class StatedChain:
+    """What a URDF says of a chain.
+
+    Attributes
+    ----------
+    bodies : tuple of Body
+        What each joint moves, in the order of the chain.
+    tool : (4, 4) ndarray
+        Placement of the tool frame in the frame of the last joint.
+    friction : dict of str to (n,) ndarray
+        ``viscous``: damping, Nm s/rad or N s/m; ``coulomb``: friction, Nm or N. Zero where nothing is said.
+    """
+
+    bodies: tuple[Body, ...]
+    tool: np.ndarray
+    friction: dict[str, np.ndarray]
+
+
+def stated_chain(tree: UrdfTree, chain: Sequence[str], locked: Mapping[str, float], tool: str) -> StatedChain:
+    """Read a chain of a checked URDF, and sum up the inertias of what each joint moves.
 
     Parameters
     ----------
@@ -53,11 +81,8 @@ def stated_bodies(tree: UrdfTree, chain: Sequence[str], locked: Mapping[str, flo
         Moving joints.
     locked : mapping of str to float
         Where the others are held, rad or m.
-
-    Returns
-    -------
-    tuple of Body
-        In the order of `chain`.
+    tool : str
+        Link at the chain's end.
     """
     placed: dict[str, tuple[str | None, np.ndarray]] = {tree.root: (None, np.eye(4))}
     for link in tree.links:
@@ -68,7 +93,16 @@ def stated_bodies(tree: UrdfTree, chain: Sequence[str], locked: Mapping[str, flo
         carrier, _ = placed[link]
         if carrier is not None:
             carried[carrier].append(link)
-    return tuple(_body(name, [(link, tree.links[link], placed[link][1]) for link in carried[name]]) for name in chain)
+    bodies = []
+    for name in chain:
+        joint, links = tree.joints[name], [(link, tree.links[link], placed[link][1]) for link in carried[name]]
+        before = placed[str(end_of(joint, "parent"))][1] @ _origin(joint, "origin")
+        bodies.append(_body(name, before, joint, links))
+    friction = {
+        kind: np.array([numbers_of(tree.joints[name], "dynamics", word, "0")[0] for name in chain])
+        for kind, word in (("viscous", "damping"), ("coulomb", "friction"))
+    }
+    return StatedChain(tuple(bodies), placed[tool][1], friction)
 
 
 def _unplaced(tree: UrdfTree, link: str, placed: Mapping[str, object]) -> list[str]:
@@ -130,8 +164,8 @@ def check_bodies(model: pin.Model, bodies: Sequence[Body], where: str) -> None:
                 )
 
 
-def _body(joint: str, links: Sequence[tuple[str, Element, np.ndarray]]) -> Body:
-    """Sum up links with their placements."""
+def _body(name: str, placement: np.ndarray, joint: Element, links: Sequence[tuple[str, Element, np.ndarray]]) -> Body:
+    """Sum up links with their placements in the joint's frame."""
     mass, moment, second = 0.0, np.zeros(3), np.zeros((3, 3))
     for _, element, placed in links:
         inertial = element.find("inertial")
@@ -144,8 +178,23 @@ def _body(joint: str, links: Sequence[tuple[str, Element, np.ndarray]]) -> Body:
         moment += weight * lever
         second += rotation @ _inertia(inertial) @ rotation.T + weight * _spread(lever)
     com = moment / mass if mass > 0.0 else np.zeros(3)
-    names = tuple(name for name, _, _ in links)
-    return Body(joint, names, mass, com, second - mass * _spread(com), float(np.trace(np.abs(second))))
+    return Body(
+        joint=name,
+        placement=placement,
+        axis=_axis(joint),
+        sliding=joint.get("type") == "prismatic",
+        links=tuple(link for link, _, _ in links),
+        mass=mass,
+        com=com,
+        inertia=second - mass * _spread(com),
+        size=float(np.trace(np.abs(second))),
+    )
+
+
+def _axis(joint: Element) -> np.ndarray:
+    """Return the unit vector of a joint's axis, (3,)."""
+    axis = np.array(numbers_of(joint, "axis", "xyz", "1 0 0"))
+    return np.asarray(axis / np.linalg.norm(axis))
 
 
 def _inertia(inertial: Element) -> np.ndarray:
@@ -176,8 +225,7 @@ def _held(joint: Element, position: float) -> np.ndarray:
     placed = np.eye(4)
     if position == 0.0:
         return placed
-    axis = np.array(numbers_of(joint, "axis", "xyz", "1 0 0"))
-    axis = axis / np.linalg.norm(axis)
+    axis = _axis(joint)
     if joint.get("type") == "prismatic":
         placed[:3, 3] = position * axis
     elif joint.get("type") in ("revolute", "continuous"):

@@ -1,5 +1,6 @@
 """What is asked: the task file as frozen models, its loader and its schema. No numerics."""
 
+from brachis.task.limits_file import LimitsFile, read_limits
 from brachis.task.load import check_robot_settings, load_task
 from brachis.task.models import (
     Posture,
@@ -9,6 +10,7 @@ from brachis.task.models import (
     SplineSettings,
     Task,
 )
+from brachis.task.mounting_models import InertiaMatrix, Payload, Placement
 from brachis.task.orientation import (
     AlongTangent,
     Attitude,
@@ -59,13 +61,17 @@ __all__ = [
     "CsvFile",
     "CsvSegment",
     "FrictionSettings",
+    "InertiaMatrix",
     "LimitScale",
     "LimitSpec",
+    "LimitsFile",
     "LineBy",
     "LineHeading",
     "LineSegment",
     "LineTo",
     "MovingSegment",
+    "Payload",
+    "Placement",
     "Posture",
     "Quaternion",
     "RefinementSettings",
@@ -93,4 +99,5 @@ __all__ = [
     "check_robot_settings",
     "json_schema",
     "load_task",
+    "read_limits",
 ]

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from brachis.errors import TaskError
 from brachis.task.csv_path import expand_csv_files
 from brachis.task.fields import plain
+from brachis.task.limits_file import with_limits_of_file
 from brachis.task.messages import show, task_error
 from brachis.task.models import Task
 from brachis.task.robot_models import RobotSettings
@@ -35,13 +36,14 @@ def load_task(source: str | os.PathLike[str] | Mapping[str, object] | Task) -> T
     Task
         The validated task. The path of the URDF is absolute: it was relative to the file's folder, or to the current
         folder for a mapping. CSV files of waypoints, relative to the same folder, are read; what comes back has splines
-        in their place and needs the files no more.
+        in their place and needs the files no more. So it is with a file of limits.
 
     Raises
     ------
     TaskError
         The file cannot be read or is not YAML, or the task is wrong. All mistakes are in one message, a line each, with
-        file, key, what was found and what is allowed. Or a CSV file is wrong; the message names its line.
+        file, key, what was found and what is allowed. Or a CSV file or a file of limits is wrong; the message names
+        its line or key.
 
     Examples
     --------
@@ -91,7 +93,7 @@ def _task_from(content: object, source: str, folder: Path) -> Task:
         problem = "a task is a mapping"
         raise TaskError(problem, found=show(content), allowed=", ".join(Task.model_fields), where=source)
     try:
-        task = Task.model_validate(plain(content))
+        task = Task.model_validate(plain(with_limits_of_file(content, source, folder)))
     except ValidationError as error:
         raise task_error(error, source, Task) from None
     except RecursionError:

@@ -5,7 +5,8 @@ Limits
 For ``torque``, ``velocity`` and ``position`` three cases differ: the key is absent, and the limit comes from the URDF;
 the key is null, and there is no limit; the key has a value. The models write the absent key as the word `FROM_URDF`,
 which a task file may also spell out. Thus absent and null stay distinguishable in comparisons and in saved tasks. A
-joint that a mapping leaves out keeps the limit of the URDF. A URDF has no ``acceleration``: absent means none.
+joint that a mapping leaves out keeps the limit of the URDF. A URDF has no ``acceleration``: absent means none. Friction
+is written likewise: absent, it is what the URDF's ``<dynamics>`` says.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from typing import Annotated, Any, Final, Literal, Protocol
 
 from pydantic import AfterValidator, Field, Tag
 
-from brachis.task.fields import Model, Name, NonNegative, Number, Positive, by_form, plain, refuse
+from brachis.task.fields import Model, Name, NonNegative, Number, Positive, Share, by_form, plain, refuse
+from brachis.task.mounting_models import Mounting, Payload, Placement
 
 FROM_URDF: Final = "urdf"
 """The value of a limit whose key is absent: the URDF supplies it."""
@@ -43,14 +45,37 @@ def _increasing(pair: tuple[float | None, float | None]) -> tuple[float | None, 
 
 Interval = Annotated[tuple[Number | None, Number | None], AfterValidator(_increasing)]
 
+
+def _around_zero(pair: tuple[float, float]) -> tuple[float, float]:
+    if not pair[0] < 0.0 < pair[1]:
+        problem = "a pair of limits lies around zero"
+        raise refuse(problem, found=list(pair), allowed="[lower, upper] with lower < 0 < upper")
+    return pair
+
+
 _Number = Annotated[Positive, Tag("<number>")]
+_Pair = Annotated[Annotated[tuple[Number, Number], AfterValidator(_around_zero)], Tag("<list>")]
+_Entry = Annotated[_Number | _Pair, by_form("a number > 0, or a pair [lower, upper] around zero")]
+_EntryOrNull = Annotated[
+    _Number | _Pair | Annotated[None, Tag("<null>")],
+    by_form("a number > 0, a pair [lower, upper] around zero, null (no limit)"),
+]
 _List = Annotated[Annotated[tuple[Positive, ...], Field(min_length=1)], Tag("<list>")]
 _Mapping = Annotated[dict[Name, Positive | None], Tag("<mapping>")]
 _Null = Annotated[None, Tag("<null>")]
 _Word = Annotated[Literal["urdf"], Tag("<word>")]
 
 UrdfLimit = Annotated[
-    _Word | _Number | _List | _Mapping | _Null, by_form(_LIMIT_FORMS + ", urdf (as in the URDF)", FROM_URDF)
+    _Word
+    | _Number
+    | Annotated[Annotated[tuple[_Entry, ...], Field(min_length=1)], Tag("<list>")]
+    | Annotated[dict[Name, _EntryOrNull], Tag("<mapping>")]
+    | _Null,
+    by_form(
+        "a number > 0 for all joints; a list, or a mapping of joint name to a number > 0, a pair [lower, upper] around "
+        "zero or null; null (no limit), urdf (as in the URDF)",
+        FROM_URDF,
+    ),
 ]
 OwnLimit = Annotated[_Number | _List | _Mapping | _Null, by_form(_LIMIT_FORMS)]
 PositionLimit = Annotated[
@@ -73,6 +98,18 @@ PerJointPositive = Annotated[
     _Number | _List | Annotated[dict[Name, Positive], Tag("<mapping>")],
     by_form("a number > 0 for all joints, a list of numbers, a mapping of joint name to number"),
 ]
+UrdfFriction = Annotated[
+    _Word
+    | Annotated[NonNegative, Tag("<number>")]
+    | Annotated[Annotated[tuple[NonNegative, ...], Field(min_length=1)], Tag("<list>")]
+    | Annotated[dict[Name, NonNegative], Tag("<mapping>")]
+    | _Null,
+    by_form(
+        "a number >= 0 for all joints, a list of numbers, a mapping of joint name to number, null (none), "
+        "urdf (as in the URDF)",
+        FROM_URDF,
+    ),
+]
 JointValues = Annotated[
     Annotated[Annotated[tuple[Number, ...], Field(min_length=1)], Tag("<list>")]
     | Annotated[Annotated[dict[Name, Number], Field(min_length=1)], Tag("<mapping>")],
@@ -80,8 +117,8 @@ JointValues = Annotated[
 ]
 
 # What a program may give: NumPy arrays stand for lists and numbers too.
-StatedLimit = float | Array | Sequence[float | None] | Mapping[str, float | None] | str | None
 _StatedPair = Array | Sequence[float | None] | None
+StatedLimit = float | Array | Sequence[float | _StatedPair] | Mapping[str, float | _StatedPair] | str | None
 StatedRange = Array | Sequence[_StatedPair] | Mapping[str, _StatedPair] | str | None
 
 
@@ -97,12 +134,14 @@ class LimitScale(Model):
 class LimitSpec:
     """Joint limits: an absent key takes the URDF's, null removes the limit (see the module's documentation)."""
 
-    torque: Annotated[UrdfLimit, Field(description="Largest torque, N m (force, N). Absent: URDF. Null: none.")] = (
-        FROM_URDF
-    )
-    velocity: Annotated[UrdfLimit, Field(description="Largest speed, rad/s (m/s). Absent: URDF. Null: none.")] = (
-        FROM_URDF
-    )
+    torque: Annotated[
+        UrdfLimit,
+        Field(description="Largest torque, N m (force, N), or [lower, upper] by joint. Absent: URDF. Null: none."),
+    ] = FROM_URDF
+    velocity: Annotated[
+        UrdfLimit,
+        Field(description="Largest speed, rad/s (m/s), or [lower, upper] by joint. Absent: URDF. Null: none."),
+    ] = FROM_URDF
     acceleration: Annotated[
         OwnLimit, Field(description="Largest acceleration, rad/s^2 (m/s^2). Absent or null: none.")
     ] = None
@@ -127,7 +166,8 @@ class LimitSpec:
         ----------
         torque, velocity, acceleration : float, sequence, array, mapping or None, optional
             Nm or N; rad/s or m/s; rad/s^2 or m/s^2. One number for all joints, one for each in chain order, or numbers
-            by joint name; None, also for a single joint: not limited; `FROM_URDF`: as in the URDF.
+            by joint name; for torque and velocity a pair [lower, upper] around zero in the place of a joint's number;
+            None, also for a single joint: not limited; `FROM_URDF`: as in the URDF.
         position : sequence, array, mapping or None, optional
             Pairs [lower, upper], rad or m, likewise; an end that is None is open.
         scale : mapping or LimitScale, optional
@@ -144,8 +184,20 @@ class FrictionSettings(Model):
     """Drive inertia and friction at the joints: each a number for all joints, a list, or a mapping by joint name."""
 
     armature: PerJoint = Field(default=0.0, description="Inertia of the drive seen at the joint, kg m^2 (kg).")
-    viscous: PerJoint = Field(default=0.0, description="Viscous friction, N m s/rad (N s/m).")
-    coulomb: PerJoint = Field(default=0.0, description="Coulomb friction, N m (N).")
+    rotor_inertia: PerJoint = Field(
+        default=0.0,
+        description="Inertia of the rotor about its own axis, kg m^2. With gear_ratio it takes the place of armature, "
+        "which is rotor_inertia * gear_ratio^2.",
+    )
+    gear_ratio: PerJointPositive | None = Field(
+        default=None, description="Turns of the rotor per turn of the joint (prismatic: rad per m). Null: none."
+    )
+    viscous: UrdfFriction = Field(
+        default=FROM_URDF, description="Viscous friction, N m s/rad (N s/m). Absent: URDF's damping. Null: none."
+    )
+    coulomb: UrdfFriction = Field(
+        default=FROM_URDF, description="Coulomb friction, N m (N). Absent: URDF's friction. Null: none."
+    )
     coulomb_velocity: PerJointPositive = Field(
         default=0.01, description="Speed at which Coulomb friction is developed to 76 % (tanh 1), rad/s (m/s)."
     )
@@ -158,10 +210,31 @@ class RobotSettings(Model):
         default=None, description="URDF file, relative to the task file's folder. Required in a task file."
     )
     tool_frame: Name | None = Field(default=None, description="Frame that follows the path. Null: the only leaf link.")
+    tool_offset: Placement = Field(
+        default_factory=Placement,
+        description="Where the frame that follows the path is in the tool frame of the URDF: {xyz: ..., rpy_deg: ...}.",
+    )
     base_frame: Name | None = Field(default=None, description="First frame of the chain. Null: the root of the URDF.")
+    mounting: Mounting = Field(
+        default_factory=Placement,
+        description="Where the URDF's root link is in the world: floor, wall (its z axis along the world's x axis), "
+        "ceiling (upside down, about x), or {xyz: ..., rpy_deg: ...}. Gravity and the path are in the world frame.",
+    )
     gravity: tuple[Number, Number, Number] = Field(
         default=(0.0, 0.0, -9.81), description="Gravity, m/s^2, world frame."
     )
     locked_joints: dict[Name, Number] = Field(default={}, description="Joints that stay at a value, rad (m), by name.")
+    payload: Payload | None = Field(default=None, description="Rigid body held to the tool frame. Null: none.")
+    limits_file: Name | None = Field(
+        default=None,
+        description="File of joint limits, relative to the task file's folder, such as a maker's. What limits says "
+        "itself counts, joint by joint where it names joints. Null: none.",
+    )
     limits: LimitSpec = Field(default_factory=LimitSpec, description="Joint limits.")
+    speed_override: Annotated[Share, Field(gt=0.0)] = Field(
+        default=1.0,
+        description="Factor on all joint velocity limits beside limits.scale, for example 50 %, or 0.5. The motion is "
+        "planned anew for the slower joints, and is not the same motion played more slowly; torque, acceleration and "
+        "tool limits stay what they are.",
+    )
     friction: FrictionSettings = Field(default_factory=FrictionSettings, description="Drive inertia and friction.")

@@ -18,6 +18,7 @@ from brachis.robot import Robot, TaskMap, bind
 from brachis.trajectory import Trajectory
 from brachis.verify.checks import continuity_checks, end_checks, progress_checks, spline_checks
 from brachis.verify.limits import Given, limit_checks
+from brachis.verify.mechanics import tool_placements
 from brachis.verify.motion import Pieces, States
 from brachis.verify.options import VerifyOptions
 from brachis.verify.places import reversals, sharpest, spread_out, within_path_pieces
@@ -97,7 +98,8 @@ def _path_error(
     once = np.append(np.diff(states.t) > 0.0, True)  # not both sides of a node
     t, q = states.t[once], states.q[once]
     targets = path.sample(np.clip(trajectory.path_spline(t), 0.0, 1.0)).target
-    errors = np.maximum(*task_map.norms(task_map.difference(task_map.values(q), targets)))
+    found = task_map.of_placements(*tool_placements(task_map.robot, q))
+    errors = np.maximum(*task_map.norms(task_map.difference(found, targets)))
     worst = int(np.argmax(errors))
     tolerance = options.path_tolerance
     return Check(

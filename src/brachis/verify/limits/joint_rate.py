@@ -1,4 +1,4 @@
-"""|qdot| <= v_max and |qddot| <= a_max, exactly: the saved motion is polynomial."""
+"""v_min <= qdot <= v_max and |qddot| <= a_max, exactly: the saved motion is polynomial."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from brachis.verify.limits.protocol import Given, Worst
 
 def worst_velocity(given: Given) -> Worst | None:
     """Find the largest velocity ratio, anywhere."""
-    return _worst(given, given.pieces.velocity, given.robot.limits.velocity)
+    limits = given.robot.limits
+    return _worst(given, given.pieces.velocity, limits.velocity_lower, limits.velocity_upper)
 
 
 def worst_acceleration(given: Given) -> Worst | None:
     """Find the largest acceleration ratio, anywhere."""
-    return _worst(given, given.pieces.acceleration, given.robot.limits.acceleration)
+    limit = given.robot.limits.acceleration
+    return _worst(given, given.pieces.acceleration, -limit, limit)
 
 
-def _worst(given: Given, rates: np.ndarray, limit: np.ndarray) -> Worst | None:
-    """Compare polynomials in Bernstein form, (m + 1, L, n), with limits, (n,)."""
-    if not np.isfinite(limit).any():
+def _worst(given: Given, rates: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Worst | None:
+    """Compare polynomials in Bernstein form, (m + 1, L, n), with limits below and above zero, (n,) each."""
+    if not np.isfinite(upper).any():
         return None
-    ratio = rates / limit
-    return largest(given, ratio, -ratio)
+    return largest(given, rates / upper, rates / lower)

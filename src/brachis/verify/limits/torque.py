@@ -1,4 +1,4 @@
-"""|tau| <= tau_max."""
+"""tau_min <= tau <= tau_max, with limits below and above zero."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from brachis.verify.limits.protocol import Given, Worst
 
 def worst(given: Given) -> Worst | None:
     """Find the largest torque ratio, at the states and between them."""
-    limit = given.robot.limits.torque
-    if not np.isfinite(limit).any():
+    lower, upper = given.robot.limits.torque_lower, given.robot.limits.torque_upper
+    if not np.isfinite(upper).any():
         return None
-    return worst_between(given, lambda states: np.abs(states.tau) / limit, given.robot.joint_names)
+    return worst_between(
+        given, lambda states: np.maximum(states.tau / upper, states.tau / lower), given.robot.joint_names
+    )

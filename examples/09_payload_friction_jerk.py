@@ -1,0 +1,33 @@
+"""What payload, friction and a slower robot cost: the same line with more and more of what the task says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import brachis
+
+TASK = Path(__file__).with_suffix(".yaml")
+LEFT_OUT = {
+    "the arm alone": ("payload", "friction", "speed_override"),
+    "with payload": ("friction", "speed_override"),
+    "and friction and rotors": ("speed_override",),
+    "and the speed override": (),
+}
+
+
+def main() -> dict[str, brachis.Result]:
+    """Plan the four, and print their end times and what was in use."""
+    results = {}
+    for name, left_out in LEFT_OUT.items():
+        task = brachis.load_task(TASK).to_dict()
+        for key in left_out:
+            del task["robot"][key]
+        result = results[name] = brachis.plan(None, task)
+        print(f"{name}: {result.t_end:.3f} s, verified: {result.verified}")
+    for name, text in result.to_dict()["in_use"].items():
+        print(f"  {name}: {text}")
+    return results
+
+
+if __name__ == "__main__":
+    main()

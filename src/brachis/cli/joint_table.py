@@ -1,0 +1,55 @@
+"""The joints of a robot with what is in use: limits, masses, friction."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis import ik
+from brachis.robot import Robot
+
+NONE = "none"
+_TORQUE = {"rad": "Nm", "m": "N"}
+_FRICTION = {
+    "viscous": {"rad": "Nm s/rad", "m": "N s/m"},
+    "coulomb": {"rad": "Nm", "m": "N"},
+    "armature": {"rad": "kg m^2", "m": "kg"},
+}
+
+
+def joint_rows(robot: Robot) -> list[dict[str, str]]:
+    """Name, type, axis, limits, mass and friction of every joint, with units; `NONE` where there is none.
+
+    The mass is that of the links that the joint carries up to the next one, with the payload at the last one.
+    """
+    geometry, limits = ik.ChainGeometry.of(robot), robot.limits
+    rows = []
+    for i, (name, unit) in enumerate(zip(robot.joint_names, robot.position_units, strict=True)):
+        friction = {key: getattr(robot.friction, key)[i] for key in _FRICTION}
+        rows.append(
+            {
+                "joint": name,
+                "type": "revolute" if geometry.revolute[i] else "prismatic",
+                "axis at zero": " ".join(f"{round(component, 6) + 0.0:.4g}" for component in geometry.axes[i]),
+                "range": _range(limits.position_lower[i], limits.position_upper[i], unit),
+                "velocity": _limit(limits.both_ways("velocity")[:, i], f"{unit}/s"),
+                "acceleration": _limit(limits.both_ways("acceleration")[:, i], f"{unit}/s^2"),
+                "torque": _limit(limits.both_ways("torque")[:, i], _TORQUE[unit]),
+                "mass": f"{robot.model.inertias[i + 1].mass:.4g} kg",
+                **{key: f"{value:.4g} {_FRICTION[key][unit]}" if value else NONE for key, value in friction.items()},
+            }
+        )
+    return rows
+
+
+def _range(lower: float, upper: float, unit: str) -> str:
+    if np.isinf([lower, upper]).all():
+        return NONE
+    return f"{lower:.4g} to {upper:.4g} {unit}"
+
+
+def _limit(pair: np.ndarray, unit: str) -> str:
+    """Write a limit, or two where they differ in both directions."""
+    lower, upper = pair
+    if np.isinf(upper):
+        return NONE
+    return f"{upper:.4g} {unit}" if -lower == upper else f"{lower:.4g} to {upper:.4g} {unit}"

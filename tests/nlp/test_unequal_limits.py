@@ -1,0 +1,68 @@
+"""Drives that are stronger or faster in one direction: known optima, and that the limits hold on both sides."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.bottleneck import report
+from brachis.verify import verify_trajectory
+from support.chains import INERTIAL, Joint, chain_urdf
+
+MASS, LENGTH, PUSH, BRAKE = 4.0, 1.2, 50.0, 20.0
+LIMIT = {"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": PUSH}
+SLIDE = chain_urdf(
+    [Joint("prismatic", axis=(1.0, 0.0, 0.0), limit=LIMIT, inertial=INERTIAL.format(mass=MASS))], tool=(0.1, 0.2, 0.3)
+)
+
+
+def plan(limits: dict, way: float = LENGTH, intervals: int = 70) -> brachis.Result:
+    task = {
+        "brachis": 1,
+        "robot": {"limits": limits, "gravity": [0, 0, 0], "tool_frame": "tool"},
+        "start": {"joints": [0.0]},
+        "task_space": ["x"],
+        "path": [{"line": {"by": [way]}}],
+        "spline": {"intervals": intervals, "rest": "velocity"},
+    }
+    return brachis.plan(brachis.Robot.from_urdf("slide", urdf_text=SLIDE), task)
+
+
+@pytest.mark.parametrize("way", [LENGTH, -LENGTH])
+def test_a_slide_that_brakes_less_than_it_pushes(way):
+    # Switched at a part F- / (F+ + F-) of the time, whichever way it goes: t^2 = 2 m L (1 / F+ + 1 / F-).
+    result = plan({"torque": {"j1": [-BRAKE, PUSH]}}, way)
+    best = np.sqrt(2.0 * MASS * LENGTH * (1.0 / PUSH + 1.0 / BRAKE))
+    assert result.verified
+    assert best * (1.0 - 1e-4) < result.t_end < 1.001 * best
+    tau = result.trajectory.torque(np.linspace(0.0, result.t_end, 5001))
+    assert -BRAKE * (1.0 + 1e-4) <= tau.min() < -0.999 * BRAKE
+    assert 0.999 * PUSH < tau.max() <= PUSH * (1.0 + 1e-4)
+
+
+def test_the_plan_with_equal_limits_breaks_the_unequal_ones_and_sensitivities_name_the_end():
+    free, bound = plan({"torque": PUSH}, intervals=20), plan({"torque": {"j1": [-BRAKE, PUSH]}})
+    assert free.t_end < 0.9 * bound.t_end
+    (check,) = [
+        check for check in verify_trajectory(free.trajectory, robot=bound.trajectory.robot).checks if not check.passed
+    ]
+    assert check.name == "torque ratio"
+    assert check.value == pytest.approx(PUSH / BRAKE, rel=1e-3)
+    entries = report(bound).sensitivities.limits
+    told = {entry.bound.end: entry.derivative for entry in entries if entry.limit.kind == "torque"}
+    for end, figure in (("lower", -BRAKE), ("upper", PUSH)):
+        # t^2 = 2 m L (1 / |F1| + 1 / F2), so that dt / d|F| = -m L / (t F^2)
+        slope = MASS * LENGTH / (bound.t_end * figure**2)
+        assert told[end] == pytest.approx(-np.sign(figure) * slope, rel=0.05)
+
+
+def test_a_slide_that_is_faster_one_way():
+    limits = {"velocity": {"j1": [-1.0, 2.0]}}
+    out, back = plan(limits), plan(limits, -LENGTH)
+    for result, speed in ((out, 2.0), (back, 1.0)):
+        trapezoid = LENGTH / speed + speed * MASS / PUSH
+        assert result.verified
+        assert trapezoid * (1.0 - 1e-4) < result.t_end < 1.001 * trapezoid
+    checks = verify_trajectory(plan({}, -LENGTH, 20).trajectory, robot=back.trajectory.robot).checks
+    assert [check.name for check in checks if not check.passed] == ["velocity ratio"]

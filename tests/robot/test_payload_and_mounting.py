@@ -1,0 +1,244 @@
+"""Payload, tool offset, mounting, armature, friction of the URDF: against URDFs edited by hand and by formulas."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.errors import InputError, LimitError, TaskError
+from brachis.robot import Robot, bind, dynamics, in_use
+from brachis.robot.combine import robot_for
+from brachis.robot.from_task import robot_from_settings
+from brachis.task import check_robot_settings
+from support.chains import Joint, chain_urdf, planar_urdf
+
+ROOT = Path(__file__).parents[2]
+IIWA = (ROOT / "robots/iiwa14/robot.urdf").read_text()
+TOOL = "tool"
+PAYLOAD = {
+    "mass": 4.5,
+    "com": [0.05, -0.02, 0.11],
+    "inertia": {"ixx": 0.03, "iyy": 0.04, "izz": 0.02, "ixy": 0.004, "ixz": -0.002, "iyz": 0.003},
+}
+LOAD = """
+  <link name="load"><inertial><origin xyz="0.05 -0.02 0.11"/><mass value="4.5"/>
+    <inertia ixx="0.03" ixy="0.004" ixz="-0.002" iyy="0.04" iyz="0.003" izz="0.02"/></inertial></link>
+  <joint name="load_mount" type="fixed"><parent link="{tool}"/><child link="load"/></joint>
+"""
+TIP = """
+  <link name="tip"/>
+  <joint name="tip_mount" type="fixed"><parent link="{tool}"/><child link="tip"/>
+    <origin xyz="0.1 0.02 0.3" rpy="0.3 -0.7 1.1"/></joint>
+"""
+HALL = """
+  <link name="hall"/>
+  <joint name="hall_mount" type="fixed"><parent link="hall"/><child link="{root}"/>
+    <origin xyz="1 -2 3" rpy="0.4 1.2 -0.6"/></joint>
+"""
+OFFSET = {"xyz": [0.1, 0.02, 0.3], "rpy_deg": np.degrees([0.3, -0.7, 1.1])}
+PLACE = {"xyz": [1, -2, 3], "rpy_deg": np.degrees([0.4, 1.2, -0.6])}
+
+
+def states(n: int, count: int = 20) -> tuple[np.ndarray, ...]:
+    rng = np.random.default_rng(2)
+    return tuple(scale * rng.uniform(-1.0, 1.0, (count, n)) for scale in (2.0, 3.0, 8.0))
+
+
+def edited(*parts: str, text: str = IIWA, tool: str = TOOL, root: str = "base") -> str:
+    more = "".join(part.format(tool=tool, root=root) for part in parts)
+    return text.replace("</robot>", more + "</robot>")
+
+
+def of(text: str, **options: object) -> Robot:
+    return Robot.from_urdf("x", urdf_text=text, **{"tool_frame": TOOL, **options})
+
+
+@pytest.mark.parametrize(
+    ("parts", "options", "tool"),
+    [
+        ((LOAD,), {"payload": PAYLOAD}, TOOL),
+        ((TIP,), {"tool_offset": OFFSET}, "tip"),
+        ((HALL,), {"mounting": PLACE}, TOOL),
+        ((LOAD, TIP, HALL), {"payload": PAYLOAD, "tool_offset": OFFSET, "mounting": PLACE}, "tip"),
+    ],
+    ids=["payload", "tool offset", "mounting", "all"],
+)
+def test_a_urdf_edited_by_hand_moves_alike(parts, options, tool):
+    root = re.search(r'<link name="(\w+)"', IIWA).group(1)
+    plain, mine, other = of(IIWA), of(IIWA, **options), of(edited(*parts, root=root), tool_frame=tool)
+    q, qdot, qddot = states(7)
+    expected = dynamics.torque(other, q, qdot, qddot)
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(dynamics.torque(mine, q, qdot, qddot), expected, atol=1e-9 * scale)
+    exact, hand = (dynamics.torque_derivatives(robot, q, qdot, qddot) for robot in (mine, other))
+    for part in ("q", "qdot", "qddot"):
+        np.testing.assert_allclose(getattr(exact, part), getattr(hand, part), atol=1e-9 * scale)
+    for here, there in zip(mine.tool_placements(q), other.tool_placements(q), strict=True):
+        np.testing.assert_allclose(here, there, atol=1e-12)
+    changes_torque = np.abs(dynamics.torque(plain, q, qdot, qddot) - expected).max() > 0.01 * scale
+    assert changes_torque == (options.keys() != {"tool_offset"})
+
+
+def line(**robot: object) -> dict:
+    return {
+        "brachis": 1,
+        "robot": {"gravity": [0, -9.81, 0], "limits": {"torque": 450, "velocity": None}, **robot},
+        "start": {"joints": [0.5, -2.0, 2.0]},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"by": [-0.4, 0.3]}}],
+        "redundant_joints": ["j3"],
+        "spline": {"intervals": 8},
+        "search": {"effort": "single"},
+    }
+
+
+def test_the_plan_with_a_payload_is_that_of_the_edited_urdf_and_differs_without(scara_urdf, tmp_path):
+    text = scara_urdf.read_text()
+    hand = tmp_path / "hand.urdf"
+    hand.write_text(edited(LOAD, text=text, tool="tool"))
+    mine = brachis.plan(scara_urdf, line(tool_frame="tool", payload=PAYLOAD))
+    other = brachis.plan(hand, line(tool_frame="tool"))
+    assert mine.verified
+    assert mine.t_end == pytest.approx(other.t_end, rel=1e-9)
+    assert mine.t_end > 1.02 * brachis.plan(scara_urdf, line(tool_frame="tool")).t_end
+    mine.trajectory.save(tmp_path / "result.npz")
+    loaded = brachis.Trajectory.load(tmp_path / "result.npz")
+    assert loaded.robot.settings.payload == mine.task.robot.payload
+    assert brachis.verify_trajectory(loaded).passed
+    without = brachis.verify_trajectory(loaded, robot=Robot.from_urdf(scara_urdf, gravity=[0, -9.81, 0]))
+    assert [check.name for check in without.checks if not check.passed] == ["torque ratio"]
+
+
+@pytest.mark.parametrize(("word", "direction"), [("floor", [0, 0, 1]), ("wall", [1, 0, 0]), ("ceiling", [0, 0, -1])])
+def test_where_the_base_points(word, direction):
+    arm = chain_urdf([Joint("prismatic")], tool=(0.0, 0.0, 0.5))
+    robot = Robot.from_urdf("x", urdf_text=arm, tool_frame="tool", mounting=word)
+    positions, _ = robot.tool_placements(np.array([[0.7]]))
+    np.testing.assert_allclose(positions[0], 1.2 * np.array(direction), atol=1e-15)
+    held = dynamics.torque(robot, *np.zeros((3, 1, 1)))[0, 0]
+    assert held == pytest.approx(2.0 * 9.81 * direction[2])
+
+
+def test_a_rotor_behind_a_gear_counts_as_armature():
+    chain = planar_urdf("RRP", "xz")
+    geared = {"rotor_inertia": {"j1": 2e-4, "j3": 1e-3}, "gear_ratio": {"j1": 100, "j3": 50.0}}
+    robot = of(chain, tool_frame="tool", friction=geared)
+    np.testing.assert_allclose(robot.friction.armature, [2.0, 0.0, 2.5])
+    same = of(chain, tool_frame="tool", friction={"armature": [2.0, 0.0, 2.5]})
+    np.testing.assert_array_equal(*(dynamics.torque(each, *states(3)) for each in (robot, same)))
+    again = robot_from_settings(robot.settings, urdf_text=chain)
+    np.testing.assert_array_equal(again.friction.armature, robot.friction.armature)
+
+
+@pytest.mark.parametrize(
+    ("friction", "words"),
+    [
+        ({"rotor_inertia": 1e-4}, r"robot\.friction\.gear_ratio\.j1: the rotor of joint 'j1' has no gear ratio"),
+        (
+            {"rotor_inertia": 1e-4, "gear_ratio": 50, "armature": {"j2": 1.0}},
+            r"rotor_inertia\.j2: armature and rotor_inertia of joint 'j2' say the same",
+        ),
+        ({"rotor_inertia": -1e-4, "gear_ratio": 50}, "is negative"),
+    ],
+)
+def test_rotors_that_cannot_be(friction, words):
+    with pytest.raises(InputError, match=words):
+        of(planar_urdf("RRP"), tool_frame="tool", friction=friction)
+
+
+DAMPED = chain_urdf(
+    [Joint("revolute", xyz=(0.4, 0.0, 0.0), extra="<dynamics damping='7' friction='3'/>"), Joint("prismatic")]
+)
+
+
+def test_friction_is_the_urdfs_unless_the_task_says_otherwise():
+    cases = {
+        "default": ({}, [7, 0], [3, 0]),
+        "off": ({"viscous": None, "coulomb": None}, [0, 0], [0, 0]),
+        "by joint": ({"viscous": {"j2": 4}}, [7, 4], [3, 0]),
+        "given": ({"viscous": 1.5, "coulomb": 0}, [1.5, 1.5], [0, 0]),
+        "said": ({"viscous": "urdf"}, [7, 0], [3, 0]),
+    }
+    for friction, viscous, coulomb in cases.values():
+        robot = robot_for(
+            of(DAMPED, tool_frame="tool", friction=friction), check_robot_settings({"friction": friction})
+        )
+        np.testing.assert_array_equal(robot.friction.viscous, viscous)
+        np.testing.assert_array_equal(robot.friction.coulomb, coulomb)
+    said = in_use(of(DAMPED, tool_frame="tool"))
+    assert said["viscous friction"] == "j1 7 Nm s/rad, j2 0 N s/m (as the URDF states it)"
+    off = in_use(of(DAMPED, tool_frame="tool", friction={"viscous": None}))
+    assert off["viscous friction"] == "none (other than the URDF's)"
+
+
+def test_friction_of_the_urdf_that_cannot_be():
+    with pytest.raises(InputError, match=r"viscous\.j1: is negative.*-7 in the URDF"):
+        of(DAMPED.replace("damping='7'", "damping='-7'"), tool_frame="tool")
+    with pytest.raises(InputError, match="holds joint 'j1' against its largest torque"):
+        of(DAMPED.replace("friction='3'", "friction='70'"), tool_frame="tool")
+
+
+def test_speed_override_is_a_factor_on_all_velocity_limits_and_nothing_else():
+    plain = planar_urdf("RRP")
+    full, half = (of(plain, tool_frame="tool", speed_override=factor) for factor in (1.0, 0.5))
+    np.testing.assert_array_equal(half.limits.velocity, 0.5 * full.limits.velocity)
+    np.testing.assert_array_equal(half.limits.torque, full.limits.torque)
+    slow = robot_for(half, check_robot_settings({"limits": {"scale": {"velocity": 0.5}}}))
+    np.testing.assert_array_equal(slow.limits.velocity, 0.25 * full.limits.velocity)
+    assert check_robot_settings({"speed_override": "30 %"}).speed_override == pytest.approx(0.3)
+    for wrong in (0.0, 1.2, -1.0):
+        with pytest.raises(TaskError, match="speed_override: out of range"):
+            of(plain, tool_frame="tool", speed_override=wrong)
+    with pytest.raises(InputError, match="has no velocity limit to act on"):
+        of(plain, tool_frame="tool", speed_override=0.5, limits=brachis.LimitSpec(velocity=None))
+
+
+def test_everything_is_combined_with_a_task():
+    asked = check_robot_settings(
+        {"payload": PAYLOAD, "tool_offset": {"xyz": [0, 0, 0.2]}, "mounting": "wall", "speed_override": 0.5}
+    )
+    made = robot_for(of(IIWA), asked)
+    alone = of(
+        IIWA, payload=PAYLOAD, tool_offset={"xyz": [0, 0, 0.2]}, mounting={"rpy_deg": [0, 90, 0]}, speed_override=0.5
+    )
+    assert made.settings == alone.settings
+    assert made.model == alone.model
+    assert robot_for(alone, asked).model == alone.model
+    rolling, _ = bind(alone, "pose_free_roll")
+    assert robot_for(rolling, asked).settings == alone.settings
+
+
+@pytest.mark.parametrize(
+    ("given", "asked", "key"),
+    [
+        ({"payload": PAYLOAD}, {"payload": {"mass": 2}}, "robot.payload"),
+        ({"tool_offset": {"xyz": [0, 0, 1]}}, {"tool_offset": {"xyz": [0, 0, 2]}}, "robot.tool_offset.xyz"),
+        ({"mounting": "wall"}, {"mounting": "ceiling"}, "robot.mounting.rpy_deg"),
+        ({"mounting": "wall"}, {"mounting": "floor"}, "robot.mounting.rpy_deg"),
+        ({"speed_override": 0.5}, {"speed_override": 0.7}, "robot.speed_override"),
+        ({"friction": {"coulomb": None}}, {"friction": {"coulomb": 1.0}}, "robot.friction.coulomb"),
+    ],
+)
+def test_contradictions_are_refused_with_their_key(given, asked, key):
+    with pytest.raises(TaskError, match="contradict") as caught:
+        robot_for(of(IIWA, **given), check_robot_settings(asked))
+    assert caught.value.where.startswith(key)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"payload": {"mass": -1}}, r"robot.*payload\.mass: out of range"),
+        ({"payload": {"com": [0, 0, 0]}}, "mass"),
+        ({"payload": {"mass": 1, "inertia": {"ixx": 1, "iyy": 1, "izz": 9}}}, r"payload\.inertia: is none of a rigid"),
+        ({"mounting": "roof"}, "mounting: no mounting.*floor, wall, ceiling"),
+        ({"tool_offset": {"xyz": [0, 0]}}, r"tool_offset\.xyz"),
+    ],
+)
+def test_what_cannot_be_is_refused(options, words):
+    with pytest.raises((InputError, LimitError), match=words):
+        of(IIWA, **options)

@@ -1,0 +1,125 @@
+"""Limits from a file: where they count, what the task still says, and what is refused."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import brachis
+from brachis.errors import InputError, TaskError, UnknownNameError
+from brachis.robot import Robot
+from brachis.robot.from_task import robot_from_settings
+from brachis.task import RobotSettings, load_task, read_limits
+
+ROOT = Path(__file__).parents[2]
+PANDA = ROOT / "robots/panda_limits.yaml"
+URDF = "cmeel.prefix/share/example-robot-data/robots/panda_description/urdf/panda.urdf"
+FILE = {
+    "brachis_limits": 1,
+    "source": "the maker",
+    "joints": ["j1", "j2", "j3"],
+    "limits": {"torque": [5, 6, [-7, 8]], "acceleration": 20, "velocity": {"j2": 2}},
+}
+
+
+@pytest.fixture
+def loaded(tmp_path):
+    """Load a task whose robot part is given, beside a limits file."""
+
+    def load(robot: dict, **changes: object) -> brachis.Task:
+        (tmp_path / "limits.yaml").write_text(yaml.safe_dump(FILE | changes), encoding="utf-8")
+        task = {
+            "brachis": 1,
+            "robot": {"urdf": str(ROOT / "robots/scara3/robot.urdf"), "limits_file": "limits.yaml", **robot},
+            "start": {"joints": [0.5, -2.0, 2.0]},
+            "task_space": ["x", "y"],
+            "path": [{"line": {"length": 0.5, "angle_deg": 90}}],
+        }
+        path = tmp_path / "task.yaml"
+        path.write_text(yaml.safe_dump(task), encoding="utf-8")
+        return load_task(path)
+
+    return load
+
+
+def test_the_limits_of_the_file_count_and_what_the_task_says_counts_more(loaded):
+    limits = loaded({}).robot.limits
+    assert limits.torque == {"j1": 5.0, "j2": 6.0, "j3": (-7.0, 8.0)}
+    assert limits.acceleration == {"j1": 20.0, "j2": 20.0, "j3": 20.0}
+    assert limits.velocity == {"j2": 2.0}
+    assert limits.position == "urdf"
+    own = loaded({"limits": {"torque": {"j2": 1}, "acceleration": None, "scale": {"torque": 0.5}}}).robot
+    assert own.limits.torque == {"j1": 5.0, "j2": 1.0, "j3": (-7.0, 8.0)}
+    assert own.limits.acceleration is None
+    np.testing.assert_array_equal(robot_from_settings(own).limits.torque_upper, [2.5, 0.5, 4.0])
+    assert loaded({"limits": {"torque": 3}}).robot.limits.torque == 3.0
+
+
+def test_a_loaded_task_needs_the_file_no_more(loaded):
+    task = loaded({})
+    assert task.robot.limits_file is None
+    assert load_task(task.to_dict()) == task
+
+
+def test_joints_that_the_task_locks_are_left_out(loaded):
+    robot = robot_from_settings(loaded({"locked_joints": {"j1": 0.1}}).robot)
+    np.testing.assert_array_equal(robot.limits.torque_upper, [6.0, 8.0])
+
+
+def test_a_program_reads_the_file_too(tmp_path):
+    path = tmp_path / "limits.yaml"
+    path.write_text(yaml.safe_dump(FILE), encoding="utf-8")
+    robot = Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", limits=brachis.read_limits(path))
+    np.testing.assert_array_equal(robot.limits.torque_lower, [-5.0, -6.0, -7.0])
+    np.testing.assert_array_equal(robot.limits.acceleration, 20.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"brachis_limits": 2}, ["limits.yaml: brachis_limits"]),
+        ({"source": None}, ["limits.yaml: source"]),
+        ({"limits": {"torqe": 1}}, ["limits.torqe: unknown key", "Did you mean 'torque'"]),
+        ({"limits": {"torque": [1, 2]}}, ["limits.torque: has the wrong number of values; found 2", "j1, j2, j3"]),
+        ({"limits": {"torque": {"j4": 1}}}, ["limits.torque", "'j4'", "j1, j2, j3"]),
+        ({"limits": {"torque": [1, 2, -3]}}, ["limits.torque[2]: out of range; found -3"]),
+        ({"limits": {"torque": [1, 2, [3, 4]]}}, ["limits.torque[2]: a pair of limits lies around zero"]),
+        ({"limits": {"scale": {"torque": 0.5}}}, ["limits.scale: factors on limits belong to the task"]),
+    ],
+    ids=str,
+)
+def test_a_wrong_file_is_refused_with_its_key(loaded, changes, words):
+    with pytest.raises(InputError) as caught:
+        loaded({}, **changes)
+    assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+def test_files_that_are_none(tmp_path, loaded):
+    with pytest.raises(TaskError, match=r"robot\.limits_file: there is no such file"):
+        loaded({"limits_file": "nowhere.yaml"})
+    (tmp_path / "list.yaml").write_text("[1, 2]", encoding="utf-8")
+    with pytest.raises(TaskError, match="a limits file is a mapping"):
+        read_limits(tmp_path / "list.yaml")
+    with pytest.raises(TaskError, match="the file of limits was not read"):
+        robot_from_settings(RobotSettings(urdf="x.urdf", limits_file="limits.yaml"))
+
+
+def test_joints_that_the_robot_does_not_have_are_named(loaded):
+    task = loaded({}, joints=["a1", "j2", "j3"], limits={"torque": 5})
+    with pytest.raises(UnknownNameError, match="'a1'"):
+        robot_from_settings(task.robot)
+
+
+def test_the_published_limits_of_the_panda_are_those_of_its_urdf():
+    folder = next((Path(folder) for folder in sys.path if (Path(folder) / URDF).is_file()), None)
+    if folder is None:
+        pytest.skip("example-robot-data is not installed")
+    stated = Robot.from_urdf(folder / URDF, tool_frame="panda_hand_tcp").limits
+    published = Robot.from_urdf(folder / URDF, tool_frame="panda_hand_tcp", limits=read_limits(PANDA)).limits
+    for name in ("position_lower", "position_upper", "velocity", "torque"):
+        np.testing.assert_allclose(getattr(published, name), getattr(stated, name), rtol=1e-12)
+    np.testing.assert_array_equal(published.acceleration, [15, 7.5, 10, 12.5, 15, 20, 20])
