@@ -9,13 +9,29 @@ import numpy as np
 import pytest
 
 from brachis.limits import TABLE, Label, Limit, Moments, Partials, limits_of
+from brachis.task import LimitSpec, SpeedTable, ToolLimits
 from support.chains import planar_robot
 from support.phases import FRICTION
 
-ROBOT = planar_robot("RRP", "xz", friction={**FRICTION, "viscous": 1.0})
-TASK = SimpleNamespace(tool_limits=SimpleNamespace(speed=0.7), custom_limits={})
+FALLING = {"j1": [[0, 90], [1, 80], [2, 40]], "j3": [[0, 100], [1, 100], [2, 20]]}
+ROBOT = planar_robot(
+    "RRP",
+    "xz",
+    friction={**FRICTION, "viscous": 1.0},
+    limits=LimitSpec(power=[40, None, 60], total_power=70, rms_torque=[30, 20, None], torque_speed=FALLING),
+)
+PARTS = [{"speed": 0.3, "s": [0.1, 0.3]}, {"speed": 0.8, "s": [0.6, 0.9], "tolerance": "20 %"}]
+TOOL = ToolLimits(
+    speed=SpeedTable(s=[0.0, 0.5, 0.5, 1.0], speed=[0.7, 1.0, 0.9, 1.1]),
+    acceleration=2.0,
+    angular_speed=1.5,
+    process_speed=PARTS,
+)
+TASK = SimpleNamespace(tool_limits=TOOL, custom_limits={})
 RNG = np.random.default_rng(3)
-STATES = Moments(*(RNG.normal(size=(6, 3)) for _ in range(3)))
+# The path coordinates lie off all kinks.
+STATES = Moments(*(RNG.normal(size=(6, 3)) for _ in range(3)), s=np.array([0.085, 0.15, 0.315, 0.59, 0.7, 0.93]))
+BY = ("q", "qdot", "qddot", "s")
 
 
 @pytest.fixture(params=sorted(TABLE))
@@ -29,16 +45,17 @@ def limit(request):
 def test_partials_equal_differences(limit):
     h, found = 1e-4, limit.partials(STATES)
     assert any(getattr(found, part) is not None for part in ("q", "qdot", "qddot"))
-    for part in ("q", "qdot", "qddot"):
+    for part in BY:
         exact = getattr(found, part)
-        for joint in range(3):
+        for column in range(1 if part == "s" else 3):
+            which = ... if part == "s" else (slice(None), column)
             moved = []
             for step in (2.0, 1.0, -1.0, -2.0):
-                arrays = {name: getattr(STATES, name).copy() for name in ("q", "qdot", "qddot")}
-                arrays[part][:, joint] += step * h
+                arrays = {name: getattr(STATES, name).copy() for name in BY}
+                arrays[part][which] += step * h
                 moved.append(limit.values(Moments(**arrays)))
             expected = (-moved[0] + 8.0 * moved[1] - 8.0 * moved[2] + moved[3]) / (12.0 * h)
-            mine = np.zeros_like(expected) if exact is None else exact[:, :, joint]
+            mine = np.zeros_like(expected) if exact is None else exact if part == "s" else exact[:, :, column]
             np.testing.assert_allclose(mine, expected, atol=1e-6 * max(1.0, np.abs(expected).max()))
 
 

@@ -55,9 +55,14 @@ def _followed(phase: Phase, joint_path: np.ndarray) -> np.ndarray:
     return fitted(phase, 1.0, t_norm, _timed(joint_path, t_norm))
 
 
+def smooth_motion(t_norm: np.ndarray) -> np.ndarray:
+    """Share of the way that a smooth motion from rest to rest has gone at normalised times, (K,)."""
+    return np.asarray(t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2))
+
+
 def _timed(joint_path: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
     """Follow a joint path, (S, c), with a smooth motion from rest to rest: the places at `t_norm`, (K, c)."""
-    u = t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
+    u = smooth_motion(t_norm)
     grid = np.linspace(0.0, 1.0, len(joint_path))
     return np.column_stack([np.interp(u, grid, column) for column in joint_path.T])
 

@@ -4,12 +4,13 @@ Variables: the duration T in seconds, then the free control points (see `boundar
 is a path, then of each joint that is chosen freely, in chain order. Boundary conditions are built into the control
 points and have no rows. Where the knots are free, the interval lengths h in normalised time come last (see `grid`).
 
-Rows: for each limit, in the order of the list, its c values at collocation point 0, then at point 1, and so on; along a
-path then the differences of successive control points of s, which are >= 0 so that ds/dt >= 0 holds at all times; where
-the knots are free, last the sum of h, which is 1. All rows are dimensionless.
+Rows: for each limit, in the order of the list, its c values at collocation point 0, then at point 1, and so on, or
+their c means over time where it is held over the whole motion; along a path then the differences of successive control
+points of s, which are >= 0 so that ds/dt >= 0 holds at all times; where the knots are free, last the sum of h, which is
+1. All rows are dimensionless.
 
 Entries of the Jacobian: for each limit those by T, by the variables of each curve and by h, all points of a place
-together; then -1 and 1 for each difference; last 1 for each of h.
+together, or of a mean those by all variables; then -1 and 1 for each difference; last 1 for each of h.
 """
 
 from __future__ import annotations
@@ -78,11 +79,16 @@ class Layout:
         return cls(slices, s, lengths, places, x_lower, x_upper, *_bounds(grid, limits, len(steps)), *pattern)
 
 
+def height(limit: Limit, count: int) -> int:
+    """Return how many times a limit's c values are rows, with `count` collocation points."""
+    return 1 if limit.where == "whole" else count
+
+
 def _bounds(grid: Grid, limits: Sequence[Limit], steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Bounds of the rows, (c,) each, with `steps` differences of control points of s."""
     count = len(grid.t_norm)
-    lower = [*(np.tile(each.lower, count) for each in limits), np.zeros(steps), grid.total]
-    upper = [*(np.tile(each.upper, count) for each in limits), np.full(steps, np.inf), grid.total]
+    lower = [*(np.tile(each.lower, height(each, count)) for each in limits), np.zeros(steps), grid.total]
+    upper = [*(np.tile(each.upper, height(each, count)) for each in limits), np.full(steps, np.inf), grid.total]
     return np.concatenate(lower), np.concatenate(upper)
 
 
@@ -102,11 +108,15 @@ def _pattern(
     rows, columns = [], []
     first = 0
     for limit in limits:
-        size = len(limit.lower)
-        numbers = first + np.arange(count * size).reshape(count, size)
-        rows += [numbers[point].ravel() for point, _ in patterns]
-        columns += [np.repeat(variable, size) for _, variable in patterns]
-        first += count * size
+        size, times = len(limit.lower), height(limit, count)
+        numbers = first + np.arange(times * size).reshape(times, size)
+        if limit.where == "whole":
+            rows.append(np.repeat(numbers, lengths.stop))
+            columns.append(np.tile(np.arange(lengths.stop), size))
+        else:
+            rows += [numbers[point].ravel() for point, _ in patterns]
+            columns += [np.repeat(variable, size) for _, variable in patterns]
+        first += times * size
     differences, of_h = first + np.arange(len(steps)), np.arange(lengths.start, lengths.stop)
     rows += [differences, differences, np.full(len(of_h), first + len(steps))]
     columns += [steps, steps + 1, of_h]

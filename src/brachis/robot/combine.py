@@ -85,10 +85,14 @@ def _own_joints(robot: Robot) -> list[str]:
 
 
 def _same(first: Limits | Friction, second: Limits | Friction, n: int) -> bool:
-    """Compare all arrays at the first n joints."""
-    return all(
-        np.array_equal(getattr(first, field.name)[:n], getattr(second, field.name)[:n]) for field in fields(first)
-    )
+    """Compare what is stated joint by joint at the first n joints, and all else as it is."""
+
+    def same(one: Any, other: Any) -> bool:  # noqa: ANN401
+        if isinstance(one, np.ndarray):
+            return np.array_equal(one[:n], other[:n])
+        return bool(one[:n] == other[:n]) if isinstance(one, tuple) else bool(one == other)
+
+    return all(same(getattr(first, each.name), getattr(second, each.name)) for each in fields(first))
 
 
 def _limits(limits: Limits, names: Sequence[str]) -> LimitSpec:
@@ -99,7 +103,10 @@ def _limits(limits: Limits, names: Sequence[str]) -> LimitSpec:
 
     ranges = zip(finite(limits.position_lower), finite(limits.position_upper), strict=True)
     spelled: dict[str, Any] = {kind: finite(getattr(limits, kind)) for kind in MAGNITUDES} | {"position": ranges}
-    return LimitSpec(**{kind: dict(zip(names, values, strict=True)) for kind, values in spelled.items()})
+    by_name = {kind: dict(zip(names, values, strict=True)) for kind, values in spelled.items()}
+    curves = {name: curve for name, curve in zip(names, limits.torque_speed, strict=False) if curve}
+    total = limits.total_power if np.isfinite(limits.total_power) else None
+    return LimitSpec(**by_name, total_power=total, torque_speed=curves or None)
 
 
 def _friction(friction: Friction, names: Sequence[str]) -> FrictionSettings:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import TypeGuard
+from dataclasses import dataclass, replace
+from typing import Any, TypeGuard
 
 import numpy as np
 
 from brachis.arrays import freeze
 from brachis.errors import InputError, LimitError, UnknownNameError
+from brachis.robot.torque_curves import Curve, resolve_curves
 from brachis.task import FROM_URDF, LimitScale, LimitSpec
 
 LEAST, LARGEST = 1e-6, 1e12
@@ -34,6 +35,14 @@ class Limits:
         rad/s^2 or m/s^2.
     torque : (n,) ndarray
         Nm or N.
+    power : (n,) ndarray
+        W.
+    rms_torque : (n,) ndarray
+        Root mean square over the motion, Nm or N.
+    total_power : float
+        Of the sum over all joints, W.
+    torque_speed : (n,) tuple of tuple of pairs
+        Points (speed, torque), rad/s or m/s and Nm or N, of the torque that falls with speed; none where it does not.
     """
 
     position_lower: np.ndarray
@@ -41,19 +50,24 @@ class Limits:
     velocity: np.ndarray
     acceleration: np.ndarray
     torque: np.ndarray
+    power: np.ndarray
+    rms_torque: np.ndarray
+    total_power: float
+    torque_speed: tuple[Curve, ...]
 
     def __post_init__(self) -> None:
         """Take copies that nobody can write to."""
-        freeze(self, *(each.name for each in fields(self)))
+        freeze(self, *RANGES, *MAGNITUDES)
 
     def with_free_joint(self) -> Limits:
         """Return the limits with those of a further joint, which has none."""
-        values = {each.name: getattr(self, each.name) for each in fields(self)}
-        return Limits(**{name: np.append(old, -np.inf if name == _LOWEST else np.inf) for name, old in values.items()})
+        free: dict[str, Any] = {name: np.append(getattr(self, name), np.inf) for name in (*RANGES, *MAGNITUDES)}
+        free["position_lower"][-1] = -np.inf
+        return replace(self, **free, torque_speed=(*self.torque_speed, ()))
 
 
-_LOWEST = "position_lower"
-MAGNITUDES = tuple(each.name for each in fields(Limits) if not each.name.startswith("position_"))
+RANGES = ("position_lower", "position_upper")
+MAGNITUDES = ("velocity", "acceleration", "torque", "power", "rms_torque")
 """Kinds of limits that are one number > 0 for each joint."""
 STATED = {"torque": "effort", "velocity": "velocity"}
 """Those of them that a URDF states, and its words for them."""
@@ -94,6 +108,8 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
         nor an acceleration limit; a range is empty or ends beyond `FARTHEST`.
     UnknownNameError
         A limit names a joint that is not of the chain.
+    InputError
+        The total power is none, or a torque curve does not fall ever more steeply.
     """
     names = list(joint_names)
     _check_scale(spec.scale)
@@ -101,6 +117,10 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
         kind: _per_joint(kind, getattr(spec, kind), names, [getattr(u, STATED.get(kind, ""), None) for u in urdf])
         for kind in MAGNITUDES
     }
+    curves, factor = resolve_curves(spec.torque_speed, names, spec.scale.torque), spec.scale.torque
+    # A torque that falls with speed is at its largest at rest, which is a plain limit.
+    at_rest = np.array([curve[0][1] / factor if curve else np.inf for curve in curves])
+    found["torque"] = np.minimum(found["torque"], at_rest)
     for name, tau, acc in zip(names, found["torque"], found["acceleration"], strict=True):
         if np.isinf(tau) and np.isinf(acc):
             raise LimitError(
@@ -110,7 +130,13 @@ def resolve_limits(spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[U
             )
     lower, upper = _ranges(spec.position, names, urdf)
     scaled = {kind: _scaled(kind, limits, spec.scale, names) for kind, limits in found.items()}
-    return Limits(position_lower=lower, position_upper=upper, **scaled)
+    return Limits(
+        position_lower=lower,
+        position_upper=upper,
+        total_power=_total_power(spec),
+        torque_speed=curves,
+        **scaled,
+    )
 
 
 def _check_scale(scale: LimitScale) -> None:
@@ -134,6 +160,17 @@ def _scaled(kind: str, limits: np.ndarray, scale: LimitScale, names: Sequence[st
         if np.isfinite(limit):
             _check_size(kind, float(limit) * factor, name, f"robot.limits.scale.{kind}", "scaled ")
     return np.asarray(limits * factor)
+
+
+def _total_power(spec: LimitSpec) -> float:
+    """Return the limit of the sum of the joints' powers, W; infinite where there is none."""
+    stated, key = spec.total_power, "robot.limits.total_power"
+    if stated is None:
+        return np.inf
+    if not (_is_number(stated) and LEAST <= stated * spec.scale.power <= LARGEST):
+        allowed = f"a number from {LEAST:g} to {LARGEST:g}, scaled too, or null for no limit"
+        raise InputError("is no power in W", where=key, found=stated, allowed=allowed)
+    return float(stated) * spec.scale.power
 
 
 def _check_size(kind: str, limit: float, joint: str, key: str, what: str) -> None:

@@ -45,7 +45,7 @@ from brachis.task.segments import (
     SplineThrough,
     TurnSegment,
 )
-from brachis.task.tool_limits import ToolLimits
+from brachis.task.tool_limits import ProcessSpeed, SpeedTable, ToolLimits
 
 __all__ = [
     "FROM_URDF",
@@ -67,6 +67,7 @@ __all__ = [
     "LineTo",
     "MovingSegment",
     "Posture",
+    "ProcessSpeed",
     "Quaternion",
     "RefinementSettings",
     "RobotSettings",
@@ -79,6 +80,7 @@ __all__ = [
     "SegmentModel",
     "Shape",
     "SolverSettings",
+    "SpeedTable",
     "SplineSegment",
     "SplineSettings",
     "SplineThrough",
