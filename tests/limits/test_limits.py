@@ -88,20 +88,31 @@ def test_ratios_are_one_at_the_bounds_and_violations_begin_there(limit):
         np.testing.assert_allclose(limit.violation(values)[0, on], 0.0, atol=1e-12)
 
 
+NO_LINES = {"position", "power", "total_power", "torque_speed", "rms_torque"}
+
+
 def test_lines_of_the_phase_plane_are_the_limit_along_a_path(limit):
     """Without velocity friction: values (or, for ceilings, their squares) are a u + b x + c."""
     free = dataclasses.replace(ROBOT, friction=planar_robot("RRP", "xz").friction, limits=limit_source(limit))
     limit = TABLE[limit.kind](free, TASK)
     q, q_ds, q_dds = (RNG.normal(size=(5, 3)) for _ in range(3))
-    lines = limit.lines(q, q_ds, q_dds)
+    s, u, speed = np.array([0.1, 0.2, 0.5, 0.65, 0.95]), 0.7, 1.3
+    lines = limit.lines(s, q, q_ds, q_dds)
     if lines is None:
-        assert limit.kind == "position"
+        assert limit.kind in NO_LINES
         return
-    u, speed = 0.7, 1.3
-    values = limit.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2))
-    of_u = 0.0 if lines.u is None else lines.u * u
+    values = limit.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, s))
+    found = (0.0 if lines.u is None else lines.u * u) + lines.x * speed**2 + lines.constant
+    if limit.kind == "tool_acceleration":  # components of it
+        found = np.linalg.norm(found, axis=1)[:, None]
+    elif "process_speed" in limit.kind:  # within the parts alone, from 1 at the tolerance
+        side = 1.0 if limit.kind == "process_speed" else -1.0
+        inside = np.array([[True, False], [True, False], [False, False], [False, True], [False, False]])
+        tolerance = np.array([0.01, 0.2])
+        values = np.where(inside, (1.0 + values) / (1.0 + side * tolerance), 0.0)
+        found = np.where(inside & (side < 0.0), 2.0 - found, found)
     expected = values**2 if lines.u is None else values
-    np.testing.assert_allclose(of_u + lines.x * speed**2 + lines.constant, expected, atol=1e-9)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def limit_source(limit):
@@ -111,9 +122,10 @@ def limit_source(limit):
 
 def test_limits_come_in_the_order_of_the_table_and_only_where_there_is_one():
     kinds = [limit.kind for limit in limits_of(ROBOT, TASK)]
-    assert kinds == ["torque", "velocity", "position", "tool_speed"]
-    open_task = SimpleNamespace(tool_limits=SimpleNamespace(speed=None), custom_limits={})
-    assert "tool_speed" not in [limit.kind for limit in limits_of(ROBOT, open_task)]
+    assert kinds == [kind for kind in TABLE if kind != "acceleration"]
+    open_task = SimpleNamespace(tool_limits=ToolLimits(), custom_limits={})
+    kinds = [limit.kind for limit in limits_of(planar_robot("RRP", "xz"), open_task)]
+    assert kinds == ["torque", "velocity", "position"]
 
 
 @pytest.mark.parametrize(("lower", "upper"), [(0.0, 0.3), (-0.1, -0.05), (-np.inf, 0.2), (0.5, np.inf), (-3.0, 4.0)])
