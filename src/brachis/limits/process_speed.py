@@ -52,11 +52,11 @@ class _ProcessSpeedLimit(Limit):
 
     @property
     def bounds(self) -> tuple[Bound, ...]:
-        """See `Limit`: the speed at this side of the tolerance."""
+        """See `Limit`: the speed at this side of the tolerance; a change by 100 % is one by the tolerance."""
         figures = self._speeds * (1.0 + self._side * self._tolerances)
         end = "upper" if self._side > 0.0 else "lower"
-        pairs = enumerate(zip(figures.tolist(), self._speeds.tolist(), strict=True))
-        return tuple(Bound(column, figure, speed, 1.0 / speed, end) for column, (figure, speed) in pairs)
+        rows = zip(figures.tolist(), self._speeds.tolist(), self._tolerances.tolist(), strict=True)
+        return tuple(Bound(c, figure, share * v, 1.0 / v, end) for c, (figure, v, share) in enumerate(rows))
 
     def _window(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How much of each bound is in force, and its derivative by s, (K, c)."""
