@@ -23,6 +23,8 @@ _EVERYWHERE = slice(5, None, 10)
 """Of the dense grid's times: one more between neighbouring collocation points."""
 _JUST_BEFORE = 1e-7
 """How long before a knot the acceleration before its jump is looked at, in normalised time."""
+_BESIDE = np.array([-12.0, -8.0, -5.0, -3.0, -1.5, -0.5, 0.5, 1.5, 3.0, 5.0, 8.0, 12.0])
+"""Points around an abrupt change, in steps of the dense grid."""
 _CONTINUOUS_ACCELERATION = 3
 """Least degree without such jumps."""
 
@@ -57,7 +59,8 @@ def _of_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarr
         centres = _suspects(t_norm, table, dense.knots, goal - _NEAR)
         heights = table.max(axis=1)[np.searchsorted(t_norm, centres - _SAME_TIME).clip(max=len(t_norm) - 1)]
         if table.max() > _COARSE * goal:  # the grid's own peaks will do until they are nearly held down
-            return max(float(table.max()), of_means), _around(centres[heights > goal], t_norm)
+            missing = _around(centres[heights > goal], t_norm)
+            return max(float(table.max()), of_means), np.union1d(missing, _beside_breaks(dense, x, missing))
         reach = _spacing(t_norm, centres)
         for _ in range(_ZOOMS):
             if not len(centres):
@@ -71,6 +74,7 @@ def _of_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarr
         return np.inf, _unreachable(dense, x)
     largest = max(table.max(), heights.max(initial=-np.inf), worst.max(initial=-np.inf), of_means)
     missing = np.union1d(_around(centres[heights > goal], t_norm), places[worst > goal])
+    missing = np.union1d(missing, _beside_breaks(dense, x, missing))
     # A mean that is wrong has too few points everywhere.
     return float(largest), np.union1d(missing, t_norm[_EVERYWHERE]) if of_means > goal else missing
 
@@ -88,6 +92,19 @@ def _at_breaks(dense: Phase, x: np.ndarray) -> np.ndarray:
     """List t_norm at which the path coordinate is where a limit changes abruptly."""
     breaks, motion = np.concatenate([limit.breaks for limit in dense.limits]), dense.motion(x)
     return motion.times_of(breaks) / motion.t_end
+
+
+def _beside_breaks(dense: Phase, x: np.ndarray, missing: np.ndarray) -> np.ndarray:
+    """Spread points t_norm around the abrupt changes near which points are missing.
+
+    The time of a change moves with every solve: single points would follow it for many rounds.
+    """
+    at = _at_breaks(dense, x)
+    steps = _spacing(dense.t_norm, at)
+    if not (len(at) and len(missing)):
+        return np.empty(0)
+    near = np.abs(at[:, None] - missing).min(axis=1) <= _BESIDE[-1] * steps
+    return np.clip(at[near, None] + steps[near, None] * _BESIDE, 0.0, 1.0).ravel()
 
 
 def _within_friction(dense: Phase, x: np.ndarray) -> np.ndarray:
