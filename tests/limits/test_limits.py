@@ -77,7 +77,7 @@ def test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit):
         for moves, end in ((low, "upper"), (high, "lower")):
             assert not np.delete(moves, bound.column).any()
             assert moves[bound.column] == pytest.approx(0.0) if bound.end == end else moves[bound.column] >= 0.0
-        assert max(low[bound.column], high[bound.column]) > 0.05
+        assert max(low[bound.column], high[bound.column]) > 5e-4
 
 
 def test_ratios_are_one_at_the_bounds_and_violations_begin_there(limit):

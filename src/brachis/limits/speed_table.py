@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 _RAMP = 5e-3
-"""Length of a ramp in s, or half the way to the next place where that is shorter: Newton's steps need a slope."""
+"""Length of a ramp in s: Newton's steps need a slope."""
+_SHARE = 0.4
+"""Part of the way to the next place that a ramp takes at most."""
 
 
 class SpeedTable:
@@ -38,7 +40,7 @@ class SpeedTable:
             if not 0 <= beyond < len(given):
                 places[moved] += onwards * _RAMP
                 continue
-            length = min(_RAMP, 0.5 * abs(given[beyond] - given[moved]))
+            length = min(_RAMP, _SHARE * abs(given[beyond] - given[moved]))
             share = length / abs(given[beyond] - given[moved])
             places[moved] += onwards * length
             speeds[moved] += share * (speed[beyond] - speed[moved])
