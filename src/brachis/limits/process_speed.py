@@ -1,9 +1,9 @@
 """A constant speed v of the tool over parts of the path: (1 - tolerance) v <= |velocity| <= (1 + tolerance) v there.
 
-A bound that sets in at once would have no slope by which a solver could see it coming. So each side fades out over a
-short way d beyond the part, in s:
+A bound that sets in at once would have no slope by which a solver could see it coming, and one that sets in with a kink
+would be met at the collocation points alone. So each side fades out smoothly over a short way d beyond the part, in s:
 
-    |velocity| >= v (1 - tolerance - g),   |velocity| <= v (1 + tolerance + g),   g = exp(d / width) - 1,
+    |velocity| >= v (1 - tolerance - g),   |velocity| <= v (1 + tolerance + g),   g = cosh(d / width) - 1,
 
 as rows (|velocity| / v - 1) tolerance / (tolerance + g) >= -tolerance, and <= tolerance. What that costs is about the
 time for one width at the process speed on either side, where the arm could have braked or gathered speed faster.
@@ -20,8 +20,9 @@ from brachis.limits.tool import ToolSpeed
 from brachis.robot import Robot
 from brachis.task import ProcessSpeed, Task
 
-_WIDTH, _WIDEST = 0.06, 0.02
-"""As a part of the part's length, and in s."""
+_WIDEST, _OF_LENGTH, _OF_REST = 0.01, 0.02, 0.2
+"""Width in s, as a share of the part's own length, and of the path before or behind it, on which the tool is at rest
+somewhere; the least of them counts."""
 _FARTHEST = 40.0
 """In widths: beyond it nothing is left of the bounds."""
 
@@ -43,7 +44,9 @@ class _ProcessSpeedLimit(Limit):
         self._tool = ToolSpeed(robot)
         self._speeds, self._tolerances = (np.array([getattr(part, name) for part in parts]) for name in _FIGURES)
         self._begin, self._end = np.array([part.s for part in parts]).T
-        self._width = np.minimum(_WIDTH * (self._end - self._begin), _WIDEST)
+        beside = np.minimum(self._begin, 1.0 - self._end)
+        widths = (np.full(len(parts), _WIDEST), _OF_LENGTH * (self._end - self._begin), _OF_REST * beside)
+        self._width = np.min(widths, axis=0)
         self.breaks = np.concatenate([self._begin, self._end])
         what = "process speed" if self._side > 0.0 else "least process speed"
         subjects = ["tool"] if len(parts) == 1 else [f"tool, s = {part.s[0]:g} to {part.s[1]:g}" for part in parts]
@@ -64,9 +67,9 @@ class _ProcessSpeedLimit(Limit):
         before, behind = self._begin - s[:, None], s[:, None] - self._end
         way = np.maximum(np.maximum(before, behind), 0.0) / self._width
         sign = np.where(way <= 0.0, 0.0, np.where(before > behind, -1.0, 1.0)) / self._width
-        grown = np.exp(np.minimum(way, _FARTHEST))
-        force = self._tolerances / (self._tolerances + grown - 1.0)
-        slope = -(force**2) / self._tolerances * grown * sign
+        near = np.minimum(way, _FARTHEST)
+        force = self._tolerances / (self._tolerances + np.cosh(near) - 1.0)
+        slope = -(force**2) / self._tolerances * np.sinh(near) * sign
         return force, np.where(way < _FARTHEST, slope, 0.0)
 
     def values(self, motion: JointMotion) -> np.ndarray:
