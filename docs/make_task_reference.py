@@ -14,10 +14,12 @@ from brachis.task import (
     FrictionSettings,
     LimitScale,
     LimitSpec,
+    ProcessSpeed,
     RefinementSettings,
     RobotSettings,
     SearchSettings,
     SolverSettings,
+    SpeedTable,
     SplineSettings,
     Task,
     ToolLimits,
@@ -43,6 +45,8 @@ PARTS: dict[str, type] = {
     "robot.limits.scale": LimitScale,
     "robot.friction": FrictionSettings,
     "tool_limits": ToolLimits,
+    "tool_limits.speed": SpeedTable,
+    "tool_limits.process_speed": ProcessSpeed,
     "spline": SplineSettings,
     "search": SearchSettings,
     "solver": SolverSettings,
@@ -65,8 +69,8 @@ JSON schema that editors use for completion: put `# yaml-language-server: $schem
 file, with the schema saved beside it by `brachis schema --out task.schema.json`.
 
 Limits: an absent key takes the URDF's limit, `null` removes it, a number holds for all joints, a list is in the order
-of the chain, a mapping names joints (others keep the URDF's). Torque, velocity and acceleration limits lie between 1e-6
-and 1e12 in SI units, scaled ones too; ends of position ranges within 1e6 rad or m of zero, or open (`null`).
+of the chain, a mapping names joints (others keep the URDF's). Limits of one number for each joint lie between 1e-6 and
+1e12 in SI units, scaled ones too; ends of position ranges within 1e6 rad or m of zero, or open (`null`).
 
 `brachis.plan(robot, task)` with a `Robot` adds what the task's `robot` part sets to what the robot was made with; the
 robot stands for the `urdf` key, and what contradicts it is refused with its key.

@@ -107,8 +107,8 @@ def test_a_speed_table_is_a_staircase_of_cruises(slide):
     table = {"s": [0.0, step, step, 1.0], "speed": [fast, fast, slow, slow]}
     way = step * LENGTH - (fast**2 + fast**2 - slow**2) / (2.0 * a)
     expected = (2.0 * fast) / a + way / fast + ((1.0 - step) * LENGTH - slow**2 / (2.0 * a)) / slow
-    result = slide(FORCE, tool={"speed": table}, intervals="auto", tolerance=2e-4)
-    assert result.t_end == pytest.approx(expected, rel=NEAR)
+    result = slide(FORCE, tool={"speed": table}, intervals=60, degree=2)
+    assert result.t_end == pytest.approx(expected, rel=5e-3)  # the speed changes at three places, off the knots
     motion = result.trajectory.at(np.linspace(0.0, result.t_end, 20_001))
     speed, s = np.abs(motion.qdot[:, 0]), motion.s
     assert speed[s >= step].max() <= slow * (1.0 + 1e-4)
@@ -148,7 +148,9 @@ def limited(task, kind, free):
     if kind in ("acceleration", "angular_speed"):
         tool = {kind: 0.7 * free[kind]}
     elif kind == "speed":
-        tool = {"speed": {"s": [0.0, 0.4, 0.6, 1.0], "speed": (free["speed"] * np.array([1.0, 0.5, 0.6, 1.0])).tolist()}}
+        tool = {
+            "speed": {"s": [0.0, 0.4, 0.6, 1.0], "speed": (free["speed"] * np.array([1.0, 0.5, 0.6, 1.0])).tolist()}
+        }
     elif kind == "torque_speed":
         at_rest, fastest = free["tau"], free["qdot"]
         points = zip(("j1", "j2", "j3"), fastest.tolist(), at_rest.tolist(), strict=True)
@@ -187,7 +189,9 @@ def test_an_arm_without_it_violates_it_and_with_it_meets_it_and_is_slower(arm, k
     (entry,) = own[:1]
     assert entry.re_solved < -1e-4
     assert entry.deviation < 0.05
-    assert any(label.split(" from")[0].split()[0] in str(line.label) and line.share > 0.01 for line in report.saturations)
+    assert any(
+        label.split(" from")[0].split()[0] in str(line.label) and line.share > 0.01 for line in report.saturations
+    )
 
 
 def test_an_arm_keeps_the_rms_torques_of_its_motors(arm):

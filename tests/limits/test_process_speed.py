@@ -1,4 +1,4 @@
-"""A constant speed of the tool over a part of the path, and tables of its speed: task, plan, start, knots, verification."""
+"""A constant speed of the tool over a part of the path: task, plan, start, knots, verification; tables of speed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from brachis.limits.speed_table import SpeedTable
 from brachis.verify import verify_trajectory
 
 ROOT = Path(__file__).parents[2]
-SPEED, BEGIN, END, LENGTH = 0.6, 0.3, 0.6, 1.2
+SPEED, BEGIN, END, LENGTH = 1.0, 0.25, 0.75, 1.2
 ACCELERATION = 200.0 / 25.0
 """Of the gantry's bridge and tool."""
 
@@ -63,22 +63,22 @@ def test_the_speed_is_constant_within_its_tolerance_and_reached_and_left_fast(re
     s, speed = sampled(result.trajectory)
     inside = (s > BEGIN) & (s < END)
     assert np.abs(speed[inside] / SPEED - 1.0).max() <= 0.01 * 1.01
-    assert speed[s < 0.9 * BEGIN].max() > 2.0 * SPEED, "on the way to it the tool is as fast as it can"
+    assert speed[s < 0.9 * BEGIN].max() > 1.4 * SPEED, "on the way to it the tool is as fast as it can"
     fastest = leg(BEGIN * LENGTH, 1.01 * SPEED) + leg((1.0 - END) * LENGTH, 1.01 * SPEED)
     fastest += (END - BEGIN) * LENGTH / (1.01 * SPEED)
-    assert fastest <= result.t_end < 1.05 * fastest
+    assert fastest <= result.t_end < 1.1 * fastest
 
 
 def test_with_enough_knots_it_is_the_optimum():
     fastest = leg(BEGIN * LENGTH, 1.01 * SPEED) + leg((1.0 - END) * LENGTH, 1.01 * SPEED)
     fastest += (END - BEGIN) * LENGTH / (1.01 * SPEED)
-    result = brachis.plan(None, task(PART, intervals="auto", tolerance=3e-4))
+    result = brachis.plan(None, task(PART, intervals="auto", tolerance=5e-4))
     assert result.verified
     assert result.t_end == pytest.approx(fastest, rel=1e-3)
 
 
 def test_verification_looks_at_both_sides(result):
-    for factor, side in ((1.02, "least process speed ratio"), (0.98, "process speed ratio")):
+    for factor, side in ((1.03, "least process speed ratio"), (0.98, "process speed ratio")):
         part = result.task.tool_limits.process_speed[0].model_copy(update={"speed": factor * SPEED})
         tool = result.task.tool_limits.model_copy(update={"process_speed": (part,)})
         other = result.task.model_copy(update={"tool_limits": tool})
@@ -100,7 +100,7 @@ def test_its_tolerance_costs_what_is_said(result):
 
 def test_a_part_soon_after_the_start_is_reached_over_few_knots():
     """Uniform intervals would be longer than the time to reach the speed."""
-    result = brachis.plan(None, task({"speed": 0.3, "s": [0.02, 0.5]}, intervals=40))
+    result = brachis.plan(None, task({"speed": 0.3, "s": [0.02, 0.5]}))
     assert result.verified
     lengths = np.diff(np.unique(result.trajectory.knots))
     assert lengths[0] < 0.3 * lengths.max()
@@ -108,7 +108,7 @@ def test_a_part_soon_after_the_start_is_reached_over_few_knots():
 
 def test_two_parts_with_tolerances_of_their_own():
     parts = [{"speed": 0.5, "s": [0.2, 0.35], "tolerance": "2 %"}, {"speed": 0.8, "s": [0.6, 0.8], "tolerance": 0.05}]
-    result = brachis.plan(None, task(parts, intervals=40))
+    result = brachis.plan(None, task(parts))
     assert result.verified
     s, speed = sampled(result.trajectory)
     for part, tolerance in zip(parts, (0.02, 0.05), strict=True):
@@ -123,10 +123,10 @@ def test_two_parts_with_tolerances_of_their_own():
         ({"process_speed": {"speed": 0.1, "s": [0.6, 0.3]}}, "process_speed[0].s", "begin < end"),
         ({"process_speed": {"speed": 0.1, "s": [0.0, 0.3]}}, "process_speed[0].s[0]", "> 0"),
         ({"process_speed": {"speed": 0.1, "s": [0.1, 0.3], "tolerance": 1e-5}}, "process_speed[0].tolerance", "0.001"),
-        ({"process_speed": [PART, {"speed": 0.1, "s": [0.5, 0.9]}]}, "process_speed[1].s", "begin above 0.6"),
+        ({"process_speed": [PART, {"speed": 0.1, "s": [0.6, 0.9]}]}, "process_speed[1].s", "begin above 0.75"),
         ({"process_speed": PART, "speed": 0.5}, "process_speed[0].speed", "at most 0.5 m/s"),
         (
-            {"process_speed": PART, "speed": {"s": [0.2, 0.4, 0.5], "speed": [2, 1, 0.2]}},
+            {"process_speed": PART, "speed": {"s": [0.2, 0.4, 0.5], "speed": [2.0, 1.0, 0.2]}},
             "process_speed[0].speed",
             "at most 0.2 m/s",
         ),

@@ -117,7 +117,7 @@ class LimitSpec:
     ] = FROM_URDF
     scale: Annotated[LimitScale, Field(description="Factors on the limits.")] = field(default_factory=LimitScale)
     power: Annotated[
-        OwnLimit, Field(description="Largest mechanical power |torque x speed|, W. Absent or null: none.")
+        OwnLimit, Field(description="Largest mechanical power, torque x speed either way, W. Absent or null: none.")
     ] = None
     total_power: Annotated[
         Positive | None,
