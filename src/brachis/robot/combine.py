@@ -140,6 +140,11 @@ def _only(settings: RobotSettings, names: Sequence[str]) -> RobotSettings:
     return RobotSettings(**{name: getattr(settings, name) for name in names if name in settings.model_fields_set})
 
 
+def _changed(asked: LimitSpec, default: LimitSpec) -> list[str]:
+    """List the fields that differ; a limit that is left out cannot be told from one that is as by default."""
+    return [each.name for each in fields(asked) if getattr(asked, each.name) != getattr(default, each.name)]
+
+
 def _merged(key: str, given: Any, asked: Any, default: Any, names: Sequence[str]) -> Any:  # noqa: ANN401
     """Take what is set on one side or, alike, on both.
 
@@ -148,7 +153,7 @@ def _merged(key: str, given: Any, asked: Any, default: Any, names: Sequence[str]
     if asked == given:
         return given
     if isinstance(given, Model | LimitSpec):
-        written = asked.model_fields_set if isinstance(asked, Model) else [each.name for each in fields(asked)]
+        written = asked.model_fields_set if isinstance(asked, Model) else _changed(asked, default)
         parts = {
             name: _merged(f"{key}.{name}", getattr(given, name), getattr(asked, name), getattr(default, name), names)
             for name in written
