@@ -32,7 +32,7 @@ def test_its_torque_at_rest_is_a_plain_limit_and_all_are_scaled():
 
 
 def test_a_curve_is_torque_limit_enough():
-    curves = {name: CURVE for name in ("j1", "j2", "j3")}
+    curves = dict.fromkeys(("j1", "j2", "j3"), CURVE)
     np.testing.assert_array_equal(robot(torque=None, torque_speed=curves).limits.torque, 50.0)
     with pytest.raises(LimitError, match="neither a torque nor an acceleration limit"):
         robot(torque=None, torque_speed={"j1": CURVE})
