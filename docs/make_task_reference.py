@@ -18,10 +18,12 @@ from brachis.task import (
     LimitSpec,
     Payload,
     Placement,
+    ProcessSpeed,
     RefinementSettings,
     RobotSettings,
     SearchSettings,
     SolverSettings,
+    SpeedTable,
     SplineSettings,
     Task,
     ToolLimits,
@@ -50,6 +52,8 @@ PARTS: dict[str, type] = {
     "robot.payload.inertia": InertiaMatrix,
     "robot.tool_offset, robot.mounting": Placement,
     "tool_limits": ToolLimits,
+    "tool_limits.speed": SpeedTable,
+    "tool_limits.process_speed": ProcessSpeed,
     "spline": SplineSettings,
     "search": SearchSettings,
     "solver": SolverSettings,
@@ -73,9 +77,8 @@ file, with the schema saved beside it by `brachis schema --out task.schema.json`
 
 Limits: an absent key takes the URDF's limit, `null` removes it, a number holds for all joints, a list is in the order
 of the chain, a mapping names joints (others keep the URDF's). Torque and velocity limits may differ in both directions:
-in a list or mapping a pair `[lower, upper]`, lower < 0 < upper, stands for a number. Torque, velocity and acceleration
-limits lie between 1e-6 and 1e12 in SI units, scaled ones too; ends of position ranges within 1e6 rad or m of zero, or
-open (`null`).
+in a list or mapping a pair `[lower, upper]`, lower < 0 < upper, stands for a number. Such numbers lie between 1e-6 and
+1e12 in SI units, scaled ones too; ends of position ranges within 1e6 rad or m of zero, or open (`null`).
 
 Friction is written likewise: absent, `viscous` and `coulomb` are `damping` and `friction` of the URDF's `<dynamics>`;
 `null` switches them off. Payload, tool offset and mounting change the robot without the URDF: the payload's `com` and

@@ -24,7 +24,6 @@ from brachis.deadline import Deadline
 from brachis.least_motion import calmest
 from brachis.mesh import adapt_mesh, coarsest
 from brachis.nlp import Program
-from brachis.nlp.guess import starting_point
 from brachis.nlp.layout import SHORTEST_TIME
 from brachis.problem import Problem, breaks_of, decompositions_of, phase_in, program_of
 from brachis.refine import RefinementOptions, Solve
@@ -38,7 +37,9 @@ from brachis.search import (
     best_of_joints,
     continued,
     find_fastest,
+    first_breaks,
     first_map,
+    first_point,
     solve_with,
     solved_in_chart,
 )
@@ -172,9 +173,9 @@ def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
     Attempt
     """
     problem = start.problem
-    target = program_of(problem, start.joint_map, breaks_of(problem.task))
+    target = program_of(problem, start.joint_map, first_breaks(start))
     program = coarsest(target) if target.variables > _MANY_VARIABLES else target
-    x = starting_point(program, [start.joint_path], timed=start.timed)
+    x = first_point(program, start)
     if x is None:
         return Attempt.of(start, "the splines through the joint path leave the branch, or the chart")
     solve = _solver(start, deadline, listener)

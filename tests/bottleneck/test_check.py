@@ -129,7 +129,7 @@ def test_a_raised_limit_that_no_solver_copes_with_leaves_the_answer(scara, monke
             broken = program.limits != refined.program.limits
             return dataclasses.replace(answer, violation=np.inf) if broken else answer
 
-    monkeypatch.setattr(check, "solver_named", lambda _name: (Broken,))
+    monkeypatch.setattr(check, "solver_named", lambda _name, **_order: (Broken,))
     found = [entry for entry in check_sensitivities(refined).entries if entry.predicted]
     assert found
     for entry in found:

@@ -8,15 +8,30 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from brachis import LimitSpec
 from brachis.limits import TABLE, Label, Limit, Moments, Partials, limits_of
+from brachis.task import LimitSpec, SpeedTable, ToolLimits
 from support.chains import planar_robot
 from support.phases import FRICTION
 
-ROBOT = planar_robot("RRP", "xz", friction={**FRICTION, "viscous": 1.0})
-TASK = SimpleNamespace(tool_limits=SimpleNamespace(speed=0.7), custom_limits={})
+FALLING = {"j1": [[0, 90], [1, 80], [2, 40]], "j3": [[0, 100], [1, 100], [2, 20]]}
+ROBOT = planar_robot(
+    "RRP",
+    "xz",
+    friction={**FRICTION, "viscous": 1.0},
+    limits=LimitSpec(power=[40, None, 60], total_power=70, rms_torque=[30, 20, None], torque_speed=FALLING),
+)
+PARTS = [{"speed": 0.3, "s": [0.1, 0.3]}, {"speed": 0.8, "s": [0.6, 0.9], "tolerance": "20 %"}]
+TOOL = ToolLimits(
+    speed=SpeedTable(s=[0.0, 0.5, 0.5, 1.0], speed=[0.7, 1.0, 0.9, 1.1]),
+    acceleration=2.0,
+    angular_speed=1.5,
+    process_speed=PARTS,
+)
+TASK = SimpleNamespace(tool_limits=TOOL, custom_limits={})
 RNG = np.random.default_rng(3)
-STATES = Moments(*(RNG.normal(size=(6, 3)) for _ in range(3)))
+# The path coordinates lie off all kinks.
+STATES = Moments(*(RNG.normal(size=(6, 3)) for _ in range(3)), s=np.array([0.085, 0.15, 0.315, 0.59, 0.7, 0.93]))
+BY = ("q", "qdot", "qddot", "s")
 
 
 @pytest.fixture(params=sorted(TABLE))
@@ -30,16 +45,17 @@ def limit(request):
 def test_partials_equal_differences(limit):
     h, found = 1e-4, limit.partials(STATES)
     assert any(getattr(found, part) is not None for part in ("q", "qdot", "qddot"))
-    for part in ("q", "qdot", "qddot"):
+    for part in BY:
         exact = getattr(found, part)
-        for joint in range(3):
+        for column in range(1 if part == "s" else 3):
+            which = ... if part == "s" else (slice(None), column)
             moved = []
             for step in (2.0, 1.0, -1.0, -2.0):
-                arrays = {name: getattr(STATES, name).copy() for name in ("q", "qdot", "qddot")}
-                arrays[part][:, joint] += step * h
+                arrays = {name: getattr(STATES, name).copy() for name in BY}
+                arrays[part][which] += step * h
                 moved.append(limit.values(Moments(**arrays)))
             expected = (-moved[0] + 8.0 * moved[1] - 8.0 * moved[2] + moved[3]) / (12.0 * h)
-            mine = np.zeros_like(expected) if exact is None else exact[:, :, joint]
+            mine = np.zeros_like(expected) if exact is None else exact if part == "s" else exact[:, :, column]
             np.testing.assert_allclose(mine, expected, atol=1e-6 * max(1.0, np.abs(expected).max()))
 
 
@@ -61,7 +77,7 @@ def test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit):
         for moves, end in ((low, "upper"), (high, "lower")):
             assert not np.delete(moves, bound.column).any()
             assert moves[bound.column] == pytest.approx(0.0) if bound.end == end else moves[bound.column] >= 0.0
-        assert max(low[bound.column], high[bound.column]) > 0.01
+        assert max(low[bound.column], high[bound.column]) > 5e-4
 
 
 def test_ratios_are_one_at_the_bounds_and_violations_begin_there(limit):
@@ -72,20 +88,31 @@ def test_ratios_are_one_at_the_bounds_and_violations_begin_there(limit):
         np.testing.assert_allclose(limit.violation(values)[0, on], 0.0, atol=1e-12)
 
 
+NO_LINES = {"position", "power", "total_power", "torque_speed", "rms_torque"}
+
+
 def test_lines_of_the_phase_plane_are_the_limit_along_a_path(limit):
     """Without velocity friction: values (or, for ceilings, their squares) are a u + b x + c."""
     free = dataclasses.replace(ROBOT, friction=planar_robot("RRP", "xz").friction, limits=limit_source(limit))
     limit = TABLE[limit.kind](free, TASK)
     q, q_ds, q_dds = (RNG.normal(size=(5, 3)) for _ in range(3))
-    lines = limit.lines(q, q_ds, q_dds)
+    s, u, speed = np.array([0.1, 0.2, 0.5, 0.65, 0.95]), 0.7, 1.3
+    lines = limit.lines(s, q, q_ds, q_dds)
     if lines is None:
-        assert limit.kind == "position"
+        assert limit.kind in NO_LINES
         return
-    u, speed = 0.7, 1.3
-    values = limit.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2))
-    of_u = 0.0 if lines.u is None else lines.u * u
+    values = limit.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, s))
+    found = (0.0 if lines.u is None else lines.u * u) + lines.x * speed**2 + lines.constant
+    if limit.kind == "tool_acceleration":  # components of it
+        found = np.linalg.norm(found, axis=1)[:, None]
+    elif "process_speed" in limit.kind:  # within the parts alone, from 1 at the tolerance
+        side = 1.0 if limit.kind == "process_speed" else -1.0
+        inside = np.array([[True, False], [True, False], [False, False], [False, True], [False, False]])
+        tolerance = np.array([0.01, 0.2])
+        values = np.where(inside, (1.0 + values) / (1.0 + side * tolerance), 0.0)
+        found = np.where(inside & (side < 0.0), 2.0 - found, found)
     expected = values**2 if lines.u is None else values
-    np.testing.assert_allclose(of_u + lines.x * speed**2 + lines.constant, expected, atol=1e-9)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def limit_source(limit):
@@ -95,9 +122,10 @@ def limit_source(limit):
 
 def test_limits_come_in_the_order_of_the_table_and_only_where_there_is_one():
     kinds = [limit.kind for limit in limits_of(ROBOT, TASK)]
-    assert kinds == ["torque", "velocity", "position", "tool_speed"]
-    open_task = SimpleNamespace(tool_limits=SimpleNamespace(speed=None), custom_limits={})
-    assert "tool_speed" not in [limit.kind for limit in limits_of(ROBOT, open_task)]
+    assert kinds == [kind for kind in TABLE if kind != "acceleration"]
+    open_task = SimpleNamespace(tool_limits=ToolLimits(), custom_limits={})
+    kinds = [limit.kind for limit in limits_of(planar_robot("RRP", "xz"), open_task)]
+    assert kinds == ["torque", "velocity", "position"]
 
 
 @pytest.mark.parametrize(("lower", "upper"), [(0.0, 0.3), (-0.1, -0.05), (-np.inf, 0.2), (0.5, np.inf), (-3.0, 4.0)])
@@ -153,11 +181,12 @@ def test_pairs_of_limits_are_the_bounds_of_what_is_limited(kind):
 
 def test_pairs_of_limits_bound_the_phase_plane_by_the_direction_of_motion():
     torque, velocity = pairs("torque"), pairs("velocity")
+    s = np.linspace(0.0, 1.0, 5)
     q, q_ds, q_dds = (RNG.normal(size=(5, 3)) for _ in range(3))
-    squares = velocity.lines(q, q_ds, q_dds).x[:, 1]
+    squares = velocity.lines(s, q, q_ds, q_dds).x[:, 1]
     np.testing.assert_allclose(np.sqrt(squares), np.maximum(q_ds[:, 1] / 4.0, -q_ds[:, 1] / 1.0))
     still = planar_robot("RRP", "xz", limits=LimitSpec(**PAIRS))
     torque, u, speed = TABLE["torque"](still, TASK), 0.7, 1.3
-    lines = torque.lines(q, q_ds, q_dds)
-    values = torque.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2))
+    lines = torque.lines(s, q, q_ds, q_dds)
+    values = torque.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, s))
     np.testing.assert_allclose(lines.u * u + lines.x * speed**2 + lines.constant, values, atol=1e-9)

@@ -114,7 +114,7 @@ def program_of(
     redundant: Sequence[str],
     *,
     end: Sequence[float] | None = None,
-    tool_speed: float | None = None,
+    tool_limits: Mapping[str, Any] | None = None,
     **spline: Any,
 ) -> Program:
     """Program of a task for a given robot; `spline` is the task's ``spline`` part."""
@@ -127,7 +127,7 @@ def program_of(
             "path": list(path),
             "redundant_joints": list(redundant),
             "spline": spline,
-            "tool_limits": {"speed": tool_speed},
+            "tool_limits": dict(tool_limits or {}),
         }
     )
     return transcribe(robot, task)[0]

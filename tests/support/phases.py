@@ -12,6 +12,12 @@ from support.chains import planar_robot, program_of
 from support.starts import starting_points
 
 FRICTION = {"armature": 0.2, "viscous": [1.0], "coulomb": 2.0, "coulomb_velocity": 0.5}
+TOOL_LIMITS = {
+    "speed": {"s": [0.0, 0.5, 1.0], "speed": [2.0, 1.5, 1.8]},
+    "acceleration": 5.0,
+    "angular_speed": 2.0,
+    "process_speed": {"speed": 0.2, "s": [0.35, 0.65], "tolerance": 0.3},
+}
 CASES: dict[str, tuple[str, list[str], list[float], list[str]]] = {
     "r0": ("RR", ["x", "z"], [0.4, 1.2], []),
     "r0_yaw": ("RRR", ["x", "z", "yaw"], [0.4, 1.8, 0.5], []),
@@ -25,11 +31,19 @@ def phase_of(case: str, *, end: list[float] | None = None, position: Any = FROM_
     """A bent path in the vertical plane under gravity, friction, and limits of every kind."""
     pattern, rows, start, redundant = CASES[case]
     friction = {**FRICTION, "viscous": [1.0 + 0.1 * i for i in range(len(pattern))]}
-    robot = planar_robot(pattern, "xz", friction=friction, limits=LimitSpec(acceleration=20.0, position=position))
+    limits = LimitSpec(
+        acceleration=20.0,
+        position=position,
+        power=50.0,
+        total_power=90.0,
+        rms_torque=70.0,
+        torque_speed={"j1": [[0.0, 100.0], [1.0, 90.0], [3.0, 40.0]]},
+    )
+    robot = planar_robot(pattern, "xz", friction=friction, limits=limits)
     through = [[-0.05, 0.05, 0.1], [-0.1, 0.06, 0.15], [-0.13, 0.03, 0.2]]
     path = [{"spline": {"through": [point[: len(rows)] for point in through], "relative": True}}]
     settings = {"degree": 3, "intervals": 5, "points_per_interval": 2, **spline}
-    (phase,) = program_of(robot, rows, path, start, redundant, end=end, tool_speed=2.0, **settings).phases
+    (phase,) = program_of(robot, rows, path, start, redundant, end=end, tool_limits=TOOL_LIMITS, **settings).phases
     return phase
 
 

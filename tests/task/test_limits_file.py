@@ -123,3 +123,11 @@ def test_the_published_limits_of_the_panda_are_those_of_its_urdf():
     for name in ("position_lower", "position_upper", "velocity", "torque"):
         np.testing.assert_allclose(getattr(published, name), getattr(stated, name), rtol=1e-12)
     np.testing.assert_array_equal(published.acceleration, [15, 7.5, 10, 12.5, 15, 20, 20])
+
+
+def test_a_file_states_torque_curves_and_the_power_of_all_joints_too(loaded):
+    limits = {"torque": 30, "total_power": 70, "torque_speed": {"j2": [[0, 20], [2, 10]]}}
+    assert loaded({}, limits=limits).robot.limits.total_power == 70.0
+    robot = robot_from_settings(loaded({"limits": {"total_power": 50}}, limits=limits).robot)
+    assert robot.limits.total_power == 50.0
+    np.testing.assert_array_equal(robot.limits.torque, [30.0, 20.0, 30.0])

@@ -215,7 +215,8 @@ def _solved_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
         No backend found a feasible point, and x is none.
     """
     answers: list[np.ndarray] = []
-    for solver in solver_named("auto"):
+    curved = any(limit.where == "whole" for limit in program.limits)
+    for solver in solver_named("auto", curved=curved):
         try:
             report = solver.solve(program, x, SolverOptions(_TOLERANCE, _ITERATIONS, _SECONDS), None)
         except ImportError:

@@ -103,7 +103,8 @@ def _answers(program: Program, x: np.ndarray, trajectory: Trajectory) -> Iterato
     task = trajectory.task
     deadline, settings = Deadline.after(task.search.time_limit), task.refinement
     options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, deadline)
-    for backend in solver_named(task.solver.name):
+    curved = any(limit.where == "whole" for limit in program.limits)
+    for backend in solver_named(task.solver.name, curved=curved):
         if deadline.passed:
             return
         solve = solve_with(backend, task.solver, program.phases[0].joint_map.r, deadline, lambda _text: None)

@@ -6,9 +6,16 @@ import numpy as np
 
 from brachis import ik
 from brachis.robot import Robot
+from brachis.robot.limits import MAGNITUDES
 
 NONE = "none"
-_TORQUE = {"rad": "Nm", "m": "N"}
+_LIMITS = {
+    "velocity": {"rad": "rad/s", "m": "m/s"},
+    "acceleration": {"rad": "rad/s^2", "m": "m/s^2"},
+    "torque": {"rad": "Nm", "m": "N"},
+    "power": {"rad": "W", "m": "W"},
+    "rms_torque": {"rad": "Nm", "m": "N"},
+}
 _FRICTION = {
     "viscous": {"rad": "Nm s/rad", "m": "N s/m"},
     "coulomb": {"rad": "Nm", "m": "N"},
@@ -31,9 +38,10 @@ def joint_rows(robot: Robot) -> list[dict[str, str]]:
                 "type": "revolute" if geometry.revolute[i] else "prismatic",
                 "axis at zero": " ".join(f"{round(component, 6) + 0.0:.4g}" for component in geometry.axes[i]),
                 "range": _range(limits.position_lower[i], limits.position_upper[i], unit),
-                "velocity": _limit(limits.both_ways("velocity")[:, i], f"{unit}/s"),
-                "acceleration": _limit(limits.both_ways("acceleration")[:, i], f"{unit}/s^2"),
-                "torque": _limit(limits.both_ways("torque")[:, i], _TORQUE[unit]),
+                **{
+                    kind.replace("_", " "): _limit(limits.both_ways(kind)[:, i], _LIMITS[kind][unit])
+                    for kind in MAGNITUDES
+                },
                 "mass": f"{robot.model.inertias[i + 1].mass:.4g} kg",
                 **{key: f"{value:.4g} {_FRICTION[key][unit]}" if value else NONE for key, value in friction.items()},
             }

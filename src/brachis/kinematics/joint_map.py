@@ -36,6 +36,11 @@ class JointState:
     qddot: np.ndarray
     gradient: np.ndarray
 
+    @property
+    def s(self) -> np.ndarray:
+        """Path coordinate, (K,); NaN where there is no path."""
+        return np.full(len(self.y), np.nan)
+
 
 @dataclass(frozen=True)
 class PathState(JointState):
@@ -53,6 +58,11 @@ class PathState(JointState):
     path: PathSample
     twists: np.ndarray
     inverse: np.ndarray
+
+    @property
+    def s(self) -> np.ndarray:
+        """Path coordinate, (K,)."""
+        return self.y[:, 0]
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Limits on the motion: one kind per file, listed in `TABLE`.
 
-A limit is a function of q, qdot and qddot. A new kind is its model in `task` (of joints, its field in `robot.limits`
+A limit is a function of q, qdot, qddot and s. A new kind is its model in `task` (of joints, its field in `robot.limits`
 as well), its file here with a line in `TABLE`, and a file in `verify.limits` with a line in the table there. Nothing
 else asks which kind a limit is. Joint ranges are known elsewhere too: postures and turns are chosen within them.
 """
@@ -10,7 +10,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from brachis.custom_limits import LimitModel, custom_limits
-from brachis.limits import branch_margin, joint_rate, position, tool_speed, torque
+from brachis.limits import (
+    branch_margin,
+    joint_rate,
+    position,
+    power,
+    process_speed,
+    rms_torque,
+    tool_acceleration,
+    tool_angular_speed,
+    tool_speed,
+    torque,
+    torque_speed,
+)
 from brachis.limits.checks import bound_limits
 from brachis.limits.protocol import (
     Bound,
@@ -34,6 +46,14 @@ TABLE: dict[str, Build] = {
     "acceleration": joint_rate.build_acceleration,
     "position": position.build,
     "tool_speed": tool_speed.build,
+    "tool_acceleration": tool_acceleration.build,
+    "tool_angular_speed": tool_angular_speed.build,
+    "process_speed": process_speed.build_greatest,
+    "least_process_speed": process_speed.build_least,
+    "power": power.build,
+    "total_power": power.build_total,
+    "torque_speed": torque_speed.build,
+    "rms_torque": rms_torque.build,
 }
 
 

@@ -77,8 +77,14 @@ def _check(limit: Limit, n: int, where: str) -> None:
         _check_shape(f"{where}.{name}", np.asarray(getattr(limit, name)), (count,), finite=False)
     if not np.all(np.asarray(limit.lower) < limit.upper):
         raise InputError("lower is not below upper", where=where, found=[limit.lower, limit.upper])
-    rng = np.random.default_rng(0)
-    moments = Moments(*(rng.uniform(-0.1, 0.1, (_MOMENTS, n)) for _ in range(3)))
+    _check_functions(limit, n, where)
+
+
+def _check_functions(limit: Limit, n: int, where: str) -> None:
+    """Refuse values and partials of the wrong shape, or that are not finite."""
+    count, rng = len(limit.labels), np.random.default_rng(0)
+    q, qdot, qddot = rng.uniform(-0.1, 0.1, (3, _MOMENTS, n))
+    moments = Moments(q, qdot, qddot, np.linspace(0.0, 0.5, _MOMENTS))
     _check_shape(f"{where}.values", limit.values(moments), (_MOMENTS, count))
     partials = limit.partials(moments)
     if not isinstance(partials, Partials):
@@ -89,6 +95,8 @@ def _check(limit: Limit, n: int, where: str) -> None:
     for name, part in given.items():
         if part is not None:
             _check_shape(f"{where}.partials.{name}", part, (_MOMENTS, count, n))
+    if partials.s is not None:
+        _check_shape(f"{where}.partials.s", partials.s, (_MOMENTS, count))
 
 
 def _check_shape(where: str, array: object, shape: tuple[int, ...], *, finite: bool = True) -> None:

@@ -47,7 +47,7 @@ class VelocityLimit(_JointRateLimit):
         """See `Limit.partials`."""
         return Partials(qdot=self._rows(len(motion.q)))
 
-    def lines(self, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
+    def lines(self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
         """See `Limit.lines`: the square of the ratio, q_ds^2 x / v^2, to the limit of the direction."""
         low, high = self._figures
         tangent = q_ds[:, self._joints]
@@ -73,7 +73,7 @@ class AccelerationLimit(_JointRateLimit):
         """See `Limit.partials`."""
         return Partials(qddot=self._rows(len(motion.q)))
 
-    def lines(self, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:
+    def lines(self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
         """See `Limit.lines`."""
         by_u, by_x = (part[:, self._joints] * self._scale for part in (q_ds, q_dds))
         return PhaseLines(by_u, by_x, np.zeros((len(q), len(self.lower))))

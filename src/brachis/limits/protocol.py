@@ -15,9 +15,12 @@ import copy
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol, Self
+from typing import Literal, Protocol, Self
 
 import numpy as np
+
+Where = Literal["points", "whole"]
+"""Where the rows of a limit are: its values at every moment, or their mean over the whole motion."""
 
 
 class JointMotion(Protocol):
@@ -27,6 +30,8 @@ class JointMotion(Protocol):
     ----------
     q, qdot, qddot : (K, n) ndarray
         rad or m, and per second.
+    s : (K,) ndarray
+        Path coordinate; NaN where there is no path, or its place is not known.
     """
 
     @property
@@ -35,6 +40,8 @@ class JointMotion(Protocol):
     def qdot(self) -> np.ndarray: ...  # noqa: D102
     @property
     def qddot(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def s(self) -> np.ndarray: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -44,12 +51,13 @@ class Moments:
     q: np.ndarray
     qdot: np.ndarray
     qddot: np.ndarray
+    s: np.ndarray
 
     @classmethod
     def at_rest(cls, q: np.ndarray) -> Moments:
-        """Stand still in postures, (K, n)."""
+        """Stand still in postures, (K, n), somewhere on the path."""
         still = np.zeros_like(q)
-        return cls(q, still, still)
+        return cls(q, still, still, np.full(len(q), np.nan))
 
 
 class Role(Enum):
@@ -136,7 +144,8 @@ class PhaseLines:
     Attributes
     ----------
     u : (S, c) ndarray or None
-        a; None where the limit does not ask for the acceleration, so that it is a ceiling for x.
+        a; None where the limit does not ask for the acceleration. Then b x + c <= 1 alone holds: a ceiling for x where
+        b is positive, a floor where it is negative.
     x, constant : (S, c) ndarray
         b and c.
     """
@@ -147,12 +156,14 @@ class PhaseLines:
 
 
 class Limit(ABC):
-    """c values of the joint motion at every moment, held between bounds.
+    """c values of the joint motion at every moment, or their means over time, held between bounds.
 
     Attributes
     ----------
     kind : str
         Name of the kind, unique.
+    where : {"points", "whole"}
+        Whether the values are held at every moment, or their means over the whole motion are.
     role : Role
     labels : tuple of Label
         Of each of the c values.
@@ -164,6 +175,8 @@ class Limit(ABC):
         Whether it says something about an arm that stands still: position, torque against gravity.
     whole_turns : bool
         Whether it asks in which turn (multiple of 2 pi) an angle is.
+    breaks : (b,) ndarray
+        Path coordinates at which it changes so abruptly that the motion is to be looked at just there.
     violation_scale : (c,) ndarray
         Violation of a value that is beyond its bound by 1; 1 unless values are measured otherwise (see the module).
     bounds : tuple of Bound
@@ -173,6 +186,7 @@ class Limit(ABC):
     """
 
     kind: str
+    where: Where = "points"
     role: Role = Role.ROBOT
     labels: tuple[Label, ...]
     lower: np.ndarray
@@ -180,6 +194,7 @@ class Limit(ABC):
     time_scaling: bool = False
     static: bool = False
     whole_turns: bool = False
+    breaks: np.ndarray = np.empty(0)
     refusal: str = "is exceeded at rest"
 
     @abstractmethod
@@ -188,7 +203,7 @@ class Limit(ABC):
 
     @abstractmethod
     def partials(self, motion: JointMotion) -> Partials:
-        """Differentiate `values` with respect to q, qdot, qddot, each taken as independent."""
+        """Differentiate `values` with respect to q, qdot, qddot and s, each taken as independent."""
 
     @property
     def name(self) -> str:
@@ -211,8 +226,14 @@ class Limit(ABC):
             if np.isfinite(level)
         )
 
-    def lines(self, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines | None:  # noqa: ARG002
-        """Write the limit in the phase plane, along a joint path whose postures, (S, n), and derivatives are given.
+    def lines(
+        self,
+        s: np.ndarray,  # noqa: ARG002
+        q: np.ndarray,  # noqa: ARG002
+        q_ds: np.ndarray,  # noqa: ARG002
+        q_dds: np.ndarray,  # noqa: ARG002
+    ) -> PhaseLines | None:
+        """Write the limit in the phase plane, along a joint path: postures, (S, n), at s, (S,), and derivatives by s.
 
         None where it says nothing there.
         """
@@ -245,3 +266,13 @@ class Limit(ABC):
         """How near values, (K, c), are to their bounds; see the module."""
         above, below = (values - self.upper) * self.violation_scale, (self.lower - values) * self.violation_scale
         return np.where(above >= below, np.maximum(1.0 + above, 0.0), -np.maximum(1.0 + below, 0.0))
+
+    def ratios(self, motion: JointMotion, t: np.ndarray) -> np.ndarray:
+        """How near a whole motion is to the bounds at times t, (K,), dense and ascending, s: (K, c).
+
+        What is held over the whole motion is equally near at all times.
+        """
+        values = self.values(motion)
+        if self.where == "whole":
+            values = np.broadcast_to(np.trapezoid(values, t, axis=0) / (t[-1] - t[0]), values.shape)
+        return self.ratio(values)

@@ -39,7 +39,7 @@ class TorqueLimit(JointRatioLimit):
         parts = (part[:, self._joints] * self._scale[:, None] for part in (exact.q, exact.qdot, exact.qddot))
         return Partials(*parts)
 
-    def lines(self, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:
+    def lines(self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
         """See `Limit.lines`: a = M q_ds, b = M q_dds + C(q, q_ds) q_ds, c the torque at rest; no velocity friction."""
         robot, still = self._robot, np.zeros_like(q)
         held = dynamics.rigid_torque(robot, q, still, still)

@@ -8,12 +8,14 @@ it. Both kinds of grid answer for both cases: a fixed one has no variables, no r
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from brachis.bspline import basis_derivatives, basis_functions, clamped_knots
 from brachis.nlp.boundary import ORDERS, LocalBasis
+from brachis.nlp.quadrature import interval_weights
 
 
 class Grid(Protocol):
@@ -67,6 +69,15 @@ class Grid(Protocol):
         """Return the grid with its knots fixed where they are at `h`."""
         ...
 
+    def mean_weights(self, h: np.ndarray) -> np.ndarray:
+        """Weights, (K,), of the mean over time of what is known at the collocation points."""
+        ...
+
+    @property
+    def mean_slopes(self) -> np.ndarray:
+        """Derivatives of `mean_weights` by h, (v, K)."""
+        ...
+
 
 class FixedGrid:
     """Knots that are given; see `Grid`."""
@@ -101,6 +112,20 @@ class FixedGrid:
     def frozen(self, _h: np.ndarray) -> FixedGrid:
         """See `Grid`."""
         return self
+
+    def mean_weights(self, _h: np.ndarray) -> np.ndarray:
+        """See `Grid`."""
+        return self._weights
+
+    @property
+    def mean_slopes(self) -> np.ndarray:
+        """See `Grid`."""
+        return np.empty((0, len(self.t_norm)))
+
+    @cached_property
+    def _weights(self) -> np.ndarray:
+        breaks = self.knots[self.degree : len(self.knots) - self.degree]
+        return np.asarray(np.diff(breaks) @ interval_weights(breaks, self.t_norm, self.degree))
 
 
 class FreeGrid:
@@ -165,3 +190,13 @@ class FreeGrid:
         """See `Grid`."""
         t_norm = self.t_norm_at(h)
         return FixedGrid(self.knots_at(h), self.degree, t_norm / t_norm[-1])
+
+    def mean_weights(self, h: np.ndarray) -> np.ndarray:
+        """See `Grid`."""
+        return np.asarray(h @ self.mean_slopes)
+
+    @cached_property
+    def mean_slopes(self) -> np.ndarray:
+        """See `Grid`: points keep their places in their intervals."""
+        breaks = self.knots[self.degree : len(self.knots) - self.degree]
+        return interval_weights(breaks, self.t_norm, self.degree)

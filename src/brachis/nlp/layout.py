@@ -4,12 +4,14 @@ Variables: the duration T in seconds, then the free control points (see `boundar
 is a path, then of each joint that is chosen freely, in chain order. Boundary conditions are built into the control
 points and have no rows. Where the knots are free, the interval lengths h in normalised time come last (see `grid`).
 
-Rows: for each limit, in the order of the list, its c values at collocation point 0, then at point 1, and so on; along a
-path then the differences of successive control points of s, which are >= 0 so that ds/dt >= 0 holds at all times; where
-the knots are free, last the sum of h, which is 1. All rows are dimensionless.
+Rows: for each limit, in the order of the list, its c values at collocation point 0, then at point 1, and so on, or
+their c means over time where it is held over the whole motion; along a path then the differences of successive control
+points of s, which are >= 0 so that ds/dt >= 0 holds at all times; where the knots are free, last the sum of h, which is
+1. All rows are dimensionless.
 
-Entries of the Jacobian: those of all limits by T, by the variables of each curve and by h, all points of a place
-together; then -1 and 1 for each difference; last 1 for each of h.
+Entries of the Jacobian: for each of `batches` those of all its limits by T, by the variables of each curve and by h,
+all points of a place together, or of means those by all variables; then -1 and 1 for each difference; last 1 for each
+of h.
 """
 
 from __future__ import annotations
@@ -78,11 +80,22 @@ class Layout:
         return cls(slices, s, lengths, places, x_lower, x_upper, *_bounds(grid, limits, len(steps)), *pattern)
 
 
+def height(limit: Limit, count: int) -> int:
+    """Return how many times a limit's c values are rows, with `count` collocation points."""
+    return 1 if limit.where == "whole" else count
+
+
+def batches(limits: Sequence[Limit]) -> list[list[Limit]]:
+    """Limits that are differentiated together: those held at every point, and those whose means are."""
+    kinds = dict.fromkeys(limit.where for limit in limits)
+    return [[limit for limit in limits if limit.where == where] for where in kinds]
+
+
 def _bounds(grid: Grid, limits: Sequence[Limit], steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Bounds of the rows, (c,) each, with `steps` differences of control points of s."""
     count = len(grid.t_norm)
-    lower = [*(np.tile(each.lower, count) for each in limits), np.zeros(steps), grid.total]
-    upper = [*(np.tile(each.upper, count) for each in limits), np.full(steps, np.inf), grid.total]
+    lower = [*(np.tile(each.lower, height(each, count)) for each in limits), np.zeros(steps), grid.total]
+    upper = [*(np.tile(each.upper, height(each, count)) for each in limits), np.full(steps, np.inf), grid.total]
     return np.concatenate(lower), np.concatenate(upper)
 
 
@@ -99,12 +112,21 @@ def _pattern(
     patterns = [(np.arange(count), np.zeros(count, dtype=int))]
     patterns += [(place.point, place.variable + part.start) for place, part in zip(places, slices, strict=True)]
     patterns.append((grid.point, grid.variable + lengths.start))
-    sizes = [len(limit.lower) for limit in limits]
-    ends = count * np.cumsum([0, *sizes])
-    blocks = [np.arange(*pair).reshape(count, -1) for pair in itertools.pairwise(ends)]
-    numbers = np.concatenate([np.empty((count, 0), dtype=int), *blocks], axis=1)
-    rows = [numbers[point].ravel() for point, _ in patterns]
-    columns = [np.repeat(variable, sum(sizes)) for _, variable in patterns]
+    counts = [height(limit, count) for limit in limits]
+    ends = np.cumsum([0, *(times * len(limit.lower) for times, limit in zip(counts, limits, strict=True))])
+    numbers = {
+        id(limit): np.arange(*pair).reshape(times, -1)
+        for limit, times, pair in zip(limits, counts, itertools.pairwise(ends), strict=True)
+    }
+    rows, columns = [], []
+    for batch in batches(limits):
+        together = np.concatenate([numbers[id(limit)] for limit in batch], axis=1)
+        if batch[0].where == "whole":
+            rows.append(np.repeat(together, lengths.stop))
+            columns.append(np.tile(np.arange(lengths.stop), together.size))
+        else:
+            rows += [together[point].ravel() for point, _ in patterns]
+            columns += [np.repeat(variable, together.shape[1]) for _, variable in patterns]
     first = int(ends[-1])
     differences, of_h = first + np.arange(len(steps)), np.arange(lengths.start, lengths.stop)
     rows += [differences, differences, np.full(len(of_h), first + len(steps))]

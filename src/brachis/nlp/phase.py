@@ -23,7 +23,7 @@ from brachis.limits.branch_margin import MARGIN
 from brachis.nlp.boundary import Boundary, LocalBasis
 from brachis.nlp.chain import by_time, chain, timed
 from brachis.nlp.grid import FixedGrid, FreeGrid, Grid
-from brachis.nlp.layout import Layout
+from brachis.nlp.layout import Layout, batches, height
 from brachis.nlp.motion import Motion
 
 
@@ -186,25 +186,36 @@ class Phase:
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (c,); raises UnreachableError as `state` does."""
-        state = self.state(x)
-        values = [limit.values(state).ravel() for limit in self.limits]
+        values = [self._held(limit, x).ravel() for limit in self.limits]
         totals = np.full(len(self.grid.total), x[self._lengths].sum())
         return np.concatenate([*values, np.diff(x[self._s]), totals])
+
+    def _held(self, limit: Limit, x: np.ndarray) -> np.ndarray:
+        """Values of a limit that are rows, (K, c), or (1, c) where their means are."""
+        values = limit.values(self.state(x))
+        return self.grid.mean_weights(x[self._lengths])[None] @ values if limit.where == "whole" else values
 
     def has(self, limit: Limit) -> bool:
         """Tell whether a limit is one of the phase's, the very object."""
         return any(each is limit for each in self.limits)
 
     def rows_of(self, limit: Limit) -> np.ndarray:
-        """Numbers of the rows of one of the limits, (K, c)."""
+        """Numbers of the rows of one of the limits, (K, c), or (1, c) where its means are rows."""
         before = self.limits[: [each is limit for each in self.limits].index(True)]
-        count, size = len(self.t_norm), len(limit.lower)
-        return count * sum(len(each.lower) for each in before) + np.arange(count * size).reshape(count, size)
+        count = len(self.t_norm)
+        first = sum(height(each, count) * len(each.lower) for each in before)
+        return first + np.arange(height(limit, count) * len(limit.lower)).reshape(-1, len(limit.lower))
+
+    def violation_of_means(self, x: np.ndarray) -> float:
+        """How far the limits that hold over the whole motion are violated; -inf where there are none."""
+        means = [limit.violation(self._held(limit, x)).max() for limit in self.limits if limit.where == "whole"]
+        return float(max(means, default=-np.inf))
 
     def violation(self, x: np.ndarray) -> np.ndarray:
         """How far the limits are violated at every collocation point, (K, c); negative inside.
 
-        Safeguards are left out: falling a little short of one harms nobody. Raises UnreachableError as `state` does.
+        Those that hold over the whole motion are left out. So are safeguards: falling a little short of one harms
+        nobody. Raises UnreachableError as `state` does.
         """
         return self._violation(self.state(x))
 
@@ -216,7 +227,7 @@ class Phase:
         return self._violation(self.joint_map.state(*motion.at(t_norm * motion.t_end), near=near))
 
     def _violation(self, state: JointState) -> np.ndarray:
-        own = [limit for limit in self.limits if limit.role is not Role.SAFEGUARD]
+        own = [limit for limit in self.limits if limit.role is not Role.SAFEGUARD and limit.where == "points"]
         return np.concatenate([limit.violation(limit.values(state)) for limit in own], axis=1)
 
     def time_scaling_ratios(self, x: np.ndarray) -> np.ndarray:
@@ -224,15 +235,14 @@ class Phase:
 
         Raises UnreachableError as `state` does.
         """
-        state = self.state(x)
         scaling = [limit for limit in self.limits if limit.time_scaling]
-        return np.concatenate([limit.ratio(limit.values(state)) for limit in scaling], axis=1)
+        ratios = [limit.ratio(self._held(limit, x)) for limit in scaling]
+        return np.concatenate([np.broadcast_to(own, (len(self.t_norm), own.shape[1])) for own in ratios], axis=1)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `state` does."""
-        state = self.state(x)
         self.evaluations["jacobians"] += 1
-        entries = [part.ravel() for part in self._chained([limit.partials(state) for limit in self.limits], x)]
+        entries = [part.ravel() for batch in batches(self.limits) for part in self._of_rows(batch, x)]
         steps = len(x[self._s][1:])
         ones = np.ones(len(self.grid.lower))
         return np.concatenate([*entries, np.full(steps, -1.0), np.ones(steps), ones])
@@ -246,10 +256,26 @@ class Phase:
             Of its terms with respect to the joints, one term a point: (K, 1, n).
         x : (v,) ndarray
         """
+        return self._summed(list(self._chained([partials], x)), np.ones(len(self.t_norm)))[0]
+
+    def _of_rows(self, batch: Sequence[Limit], x: np.ndarray) -> list[np.ndarray]:
+        """Entries of the rows of limits that are differentiated together."""
+        state = self.state(x)
+        slopes = list(self._chained([limit.partials(state) for limit in batch], x))
+        if batch[0].where == "points":
+            return slopes
+        entries = self._summed(slopes, self.grid.mean_weights(x[self._lengths]))
+        values = np.concatenate([limit.values(state) for limit in batch], axis=1)
+        entries[:, self._lengths] += values.T @ self.grid.mean_slopes.T
+        return [entries]
+
+    def _summed(self, slopes: Sequence[np.ndarray], weights: np.ndarray) -> np.ndarray:
+        """Add up what `_chained` gives over the collocation points, with weights (K,): (c, v)."""
+        points = [np.arange(len(self.t_norm)), *(place.point for place in self._places), self.grid.point]
         of_curves = [place.variable + part.start for place, part in zip(self._places, self.slices, strict=True)]
-        of_time, of_lengths = np.zeros(len(self.t_norm), dtype=int), self.grid.variable + self._lengths.start
-        slopes = np.concatenate([part.ravel() for part in self._chained([partials], x)])
-        return np.bincount(np.concatenate([of_time, *of_curves, of_lengths]), slopes, self.variables)
+        variables = [np.zeros_like(points[0]), *of_curves, self.grid.variable + self._lengths.start]
+        terms = np.concatenate(slopes) * weights[np.concatenate(points)][:, None]
+        return np.array([np.bincount(np.concatenate(variables), term, self.variables) for term in terms.T])
 
     def _chained(self, functions: Sequence[Partials], x: np.ndarray) -> Iterator[np.ndarray]:
         """Differentiate functions of the joint motion by T, each curve's variables and h, (places, c) all together."""
@@ -262,7 +288,7 @@ class Phase:
         for j, (places, basis) in enumerate(zip(self._places, bases, strict=True)):
             parts = (part[places.point, :, j] * values[:, None] for part, values in zip(by, basis, strict=True))
             yield sum(parts, start=np.zeros(()))
-        yield np.concatenate(by, axis=2)[self.grid.point] @ slopes[:, :, None]
+        yield (np.concatenate(by, axis=2)[self.grid.point] @ slopes[:, :, None])[:, :, 0]
 
     def _derivatives(self, x: np.ndarray) -> JointDerivatives:
         """Differentiate the state at x; kept until x changes, as the state is."""

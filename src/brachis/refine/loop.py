@@ -139,14 +139,16 @@ def _time_scaled(
     """Lengthen the time to `longest`, s, at most where that brings the violation to the goal.
 
     A longer time relieves torques that only accelerate by twice its own fraction, velocities by as much; those that
-    gravity or friction add to by less. So this is tried, not trusted.
+    gravity or friction add to by less, and least speeds not at all. So this is tried, and the best is kept.
     """
+    best = x, violation
     while goal < violation:
         factor = 1.0 + violation - 0.5 * goal
         if not dense.end_time(x) * factor <= longest:
             break
         x = dense.time_scaled(x, factor)
         before, (violation, _) = violation, violations(dense, x, goal)
+        best = min(best, (x, violation), key=lambda pair: pair[1])
         if violation > 0.99 * before:
             break
-    return x, violation
+    return best

@@ -19,8 +19,12 @@ _PIECE_POINTS = 9
 _CLOSEST = 1e-5
 """Collocation points are at least so far apart, in normalised time."""
 _SAME_TIME = 1e-9
+_EVERYWHERE = slice(5, None, 10)
+"""Of the dense grid's times: one more between neighbouring collocation points."""
 _JUST_BEFORE = 1e-7
 """How long before a knot the acceleration before its jump is looked at, in normalised time."""
+_BESIDE = np.array([-12.0, -8.0, -5.0, -3.0, -1.5, -0.5, 0.5, 1.5, 3.0, 5.0, 8.0, 12.0])
+"""Points around an abrupt change, in steps of the dense grid."""
 _CONTINUOUS_ACCELERATION = 3
 """Least degree without such jumps."""
 
@@ -51,11 +55,12 @@ def _of_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarr
     """Largest violation of a phase, and where points are missing."""
     t_norm = dense.t_norm
     try:
-        table = dense.violation(x)
+        table, of_means = dense.violation(x), dense.violation_of_means(x)
         centres = _suspects(t_norm, table, dense.knots, goal - _NEAR)
         heights = table.max(axis=1)[np.searchsorted(t_norm, centres - _SAME_TIME).clip(max=len(t_norm) - 1)]
         if table.max() > _COARSE * goal:  # the grid's own peaks will do until they are nearly held down
-            return float(table.max()), _around(centres[heights > goal], t_norm)
+            missing = _around(centres[heights > goal], t_norm)
+            return max(float(table.max()), of_means), np.union1d(missing, _beside_breaks(dense, x, missing))
         reach = _spacing(t_norm, centres)
         for _ in range(_ZOOMS):
             if not len(centres):
@@ -63,12 +68,15 @@ def _of_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarr
             centres, heights = _zoomed(dense, x, centres, reach)
             kept = heights > goal - 0.1 * _NEAR
             centres, heights, reach = centres[kept], heights[kept], reach[kept] * 2.0 / (_FINE - 1)
-        places = np.union1d(_within_pieces(dense, x), _within_friction(dense, x))
+        places = np.unique(np.concatenate([_within_pieces(dense, x), _within_friction(dense, x), _at_breaks(dense, x)]))
         worst = dense.violation_at(x, places).max(axis=1) if len(places) else places
     except UnreachableError:
         return np.inf, _unreachable(dense, x)
-    largest = max(table.max(), heights.max(initial=-np.inf), worst.max(initial=-np.inf))
-    return float(largest), np.union1d(_around(centres[heights > goal], t_norm), places[worst > goal])
+    largest = max(table.max(), heights.max(initial=-np.inf), worst.max(initial=-np.inf), of_means)
+    missing = np.union1d(_around(centres[heights > goal], t_norm), places[worst > goal])
+    missing = np.union1d(missing, _beside_breaks(dense, x, missing))
+    # A mean that is wrong has too few points everywhere.
+    return float(largest), np.union1d(missing, t_norm[_EVERYWHERE]) if of_means > goal else missing
 
 
 def _within_pieces(dense: Phase, x: np.ndarray) -> np.ndarray:
@@ -78,6 +86,25 @@ def _within_pieces(dense: Phase, x: np.ndarray) -> np.ndarray:
     if len(breaks) <= 2:  # noqa: PLR2004  (a single piece, which the grid sees)
         return np.empty(0)
     return motion.times_of(spread(breaks, _PIECE_POINTS - 1)) / motion.t_end
+
+
+def _at_breaks(dense: Phase, x: np.ndarray) -> np.ndarray:
+    """List t_norm at which the path coordinate is where a limit changes abruptly."""
+    breaks, motion = np.concatenate([limit.breaks for limit in dense.limits]), dense.motion(x)
+    return motion.times_of(breaks) / motion.t_end
+
+
+def _beside_breaks(dense: Phase, x: np.ndarray, missing: np.ndarray) -> np.ndarray:
+    """Spread points t_norm around the abrupt changes near which points are missing.
+
+    The time of a change moves with every solve: single points would follow it for many rounds.
+    """
+    at = _at_breaks(dense, x)
+    steps = _spacing(dense.t_norm, at)
+    if not (len(at) and len(missing)):
+        return np.empty(0)
+    near = np.abs(at[:, None] - missing).min(axis=1) <= _BESIDE[-1] * steps
+    return np.clip(at[near, None] + steps[near, None] * _BESIDE, 0.0, 1.0).ravel()
 
 
 def _within_friction(dense: Phase, x: np.ndarray) -> np.ndarray:
@@ -106,7 +133,7 @@ def _unreachable(dense: Phase, x: np.ndarray) -> np.ndarray:
     lost = ~np.all(np.isfinite(dense.joint_map.postures(motion.at(dense.t_norm * motion.t_end)[0])), axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]).astype(int)))
     if not len(edges):  # reachable, but singular or too far apart to count turns: more points everywhere
-        return dense.t_norm[5::10]
+        return dense.t_norm[_EVERYWHERE]
     return dense.t_norm[(edges[::2] + edges[1::2] - 1) // 2]
 
 

@@ -86,10 +86,14 @@ def _own_joints(robot: Robot) -> list[str]:
 
 
 def _same(first: Limits | Friction, second: Limits | Friction, n: int) -> bool:
-    """Compare all arrays at the first n joints."""
-    return all(
-        np.array_equal(getattr(first, field.name)[:n], getattr(second, field.name)[:n]) for field in fields(first)
-    )
+    """Compare what is stated joint by joint at the first n joints, and all else as it is."""
+
+    def same(one: Any, other: Any) -> bool:  # noqa: ANN401
+        if isinstance(one, np.ndarray):
+            return np.array_equal(one[:n], other[:n])
+        return bool(one[:n] == other[:n]) if isinstance(one, tuple) else bool(one == other)
+
+    return all(same(getattr(first, each.name), getattr(second, each.name)) for each in fields(first))
 
 
 def _limits(limits: Limits, names: Sequence[str]) -> LimitSpec:
@@ -103,7 +107,10 @@ def _limits(limits: Limits, names: Sequence[str]) -> LimitSpec:
     for kind in MAGNITUDES:
         pairs = zip(*(finite(ends) for ends in limits.both_ways(kind)), strict=True)
         spelled[kind] = [upper if lower is None or -lower == upper else (lower, upper) for lower, upper in pairs]
-    return LimitSpec(**{kind: dict(zip(names, values, strict=True)) for kind, values in spelled.items()})
+    by_name = {kind: dict(zip(names, values, strict=True)) for kind, values in spelled.items()}
+    curves = {name: curve for name, curve in zip(names, limits.torque_speed, strict=False) if curve}
+    total = limits.total_power if np.isfinite(limits.total_power) else None
+    return LimitSpec(**by_name, total_power=total, torque_speed=curves or None)
 
 
 def _friction(friction: Friction, names: Sequence[str]) -> FrictionSettings:
@@ -137,6 +144,12 @@ def _only(settings: RobotSettings, names: Sequence[str]) -> RobotSettings:
     return RobotSettings(**{name: getattr(settings, name) for name in names if name in settings.model_fields_set})
 
 
+def _written(asked: LimitSpec, default: LimitSpec) -> list[str]:
+    """List the fields that a task may have written: a limit that is as by default counts as left out."""
+    pairs = ((each.name, getattr(asked, each.name)) for each in fields(asked))
+    return [name for name, value in pairs if isinstance(value, Model) or value != getattr(default, name)]
+
+
 def _merged(key: str, given: Any, asked: Any, default: Any, names: Sequence[str]) -> Any:  # noqa: ANN401
     """Take what is set on one side or, alike, on both.
 
@@ -145,7 +158,7 @@ def _merged(key: str, given: Any, asked: Any, default: Any, names: Sequence[str]
     if asked == given:
         return given
     if isinstance(given, Model | LimitSpec) and default is not None:
-        written = asked.model_fields_set if isinstance(asked, Model) else [each.name for each in fields(asked)]
+        written = asked.model_fields_set if isinstance(asked, Model) else _written(asked, default)
         parts = {
             name: _merged(f"{key}.{name}", getattr(given, name), getattr(asked, name), getattr(default, name), names)
             for name in written

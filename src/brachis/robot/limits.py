@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import TypeGuard
+from dataclasses import dataclass, replace
+from typing import Any, TypeGuard
 
 import numpy as np
 
 from brachis.arrays import freeze
 from brachis.errors import InputError, LimitError, UnknownNameError
+from brachis.robot.torque_curves import Curve, resolve_curves
 from brachis.task import FROM_URDF, LimitScale, LimitSpec
 
 LEAST, LARGEST = 1e-6, 1e12
@@ -34,6 +35,14 @@ class Limits:
         rad/s^2 or m/s^2.
     torque_lower, torque_upper : (n,) ndarray
         Below and above zero, Nm or N.
+    power : (n,) ndarray
+        W.
+    rms_torque : (n,) ndarray
+        Root mean square over the motion, Nm or N.
+    total_power : float
+        Of the sum over all joints, W.
+    torque_speed : (n,) tuple of tuple of pairs
+        Points (speed, torque), rad/s or m/s and Nm or N, of the torque that falls with speed; none where it does not.
     """
 
     position_lower: np.ndarray
@@ -43,10 +52,14 @@ class Limits:
     acceleration: np.ndarray
     torque_lower: np.ndarray
     torque_upper: np.ndarray
+    power: np.ndarray
+    rms_torque: np.ndarray
+    total_power: float
+    torque_speed: tuple[Curve, ...]
 
     def __post_init__(self) -> None:
         """Take copies that nobody can write to."""
-        freeze(self, *(each.name for each in fields(self)))
+        freeze(self, *_ARRAYS)
 
     @property
     def velocity(self) -> np.ndarray:
@@ -66,7 +79,7 @@ class Limits:
 
     def with_magnitudes(self, **magnitudes: np.ndarray) -> Limits:
         """Return the limits with other ones of some of `MAGNITUDES`, (n,), the same in both directions."""
-        ends = {
+        ends: dict[str, Any] = {
             name: sign * values
             for kind, values in magnitudes.items()
             for name, sign in (((f"{kind}_lower", -1.0), (f"{kind}_upper", 1.0)) if kind in PAIRS else ((kind, 1.0),))
@@ -75,22 +88,21 @@ class Limits:
 
     def with_free_joint(self) -> Limits:
         """Return the limits with those of a further joint, which has none."""
-        values = {each.name: getattr(self, each.name) for each in fields(self)}
-        return Limits(
-            **{name: np.append(old, -np.inf if name.endswith("_lower") else np.inf) for name, old in values.items()}
-        )
+        free: dict[str, Any] = {
+            name: np.append(getattr(self, name), -np.inf if name.endswith("_lower") else np.inf) for name in _ARRAYS
+        }
+        return replace(self, **free, torque_speed=(*self.torque_speed, ()))
 
 
 PAIRS = ("velocity", "torque")
 """Kinds of limits that may differ in both directions: a number > 0 for each joint, or [lower, upper] around zero."""
-MAGNITUDES = tuple(
-    dict.fromkeys(
-        each.name.removesuffix("_lower").removesuffix("_upper")
-        for each in fields(Limits)
-        if not each.name.startswith("position_")
-    )
-)
+MAGNITUDES = ("velocity", "acceleration", "torque", "power", "rms_torque")
 """These, and the kinds that are one number > 0 for each joint."""
+_ARRAYS = tuple(
+    name
+    for kind in ("position", *MAGNITUDES)
+    for name in ((f"{kind}_lower", f"{kind}_upper") if kind in ("position", *PAIRS) else (kind,))
+)
 STATED = {"torque": "effort", "velocity": "velocity"}
 """Those of them that a URDF states, and its words for them."""
 
@@ -133,7 +145,8 @@ def resolve_limits(
         A limit is not positive or, before or after scaling, outside [`LEAST`, `LARGEST`]; a joint has neither a torque
         nor an acceleration limit; a range is empty or ends beyond `FARTHEST`.
     InputError
-        There is a speed override and no velocity limit.
+        There is a speed override and no velocity limit; the total power is none, or a torque curve does not fall ever
+        more steeply.
     UnknownNameError
         A limit names a joint that is not of the chain.
     """
@@ -143,6 +156,10 @@ def resolve_limits(
         kind: _per_joint(kind, getattr(spec, kind), names, [getattr(u, STATED.get(kind, ""), None) for u in urdf])
         for kind in MAGNITUDES
     }
+    curves, factor = resolve_curves(spec.torque_speed, names, spec.scale.torque), spec.scale.torque
+    # A torque that falls with speed is at its largest at rest, which is a plain limit.
+    at_rest = np.array([curve[0][1] / factor if curve else np.inf for curve in curves])
+    found["torque"] = np.clip(found["torque"], -at_rest, at_rest)
     for name, tau, acc in zip(names, found["torque"][1], found["acceleration"][1], strict=True):
         if np.isinf(tau) and np.isinf(acc):
             raise LimitError(
@@ -160,9 +177,10 @@ def resolve_limits(
             hint="Give robot.limits.velocity, or leave the override away",
         )
     scaled["velocity"] = scaled["velocity"] * speed_override
-    values = {kind: limits[1] for kind, limits in scaled.items() if kind not in PAIRS}
+    values: dict[str, Any] = {kind: limits[1] for kind, limits in scaled.items() if kind not in PAIRS}
     for kind in PAIRS:
         values |= dict(zip((f"{kind}_lower", f"{kind}_upper"), scaled[kind], strict=True))
+    values |= {"total_power": _total_power(spec), "torque_speed": curves}
     return Limits(position_lower=lower, position_upper=upper, **values)
 
 
@@ -187,6 +205,17 @@ def _scaled(kind: str, limits: np.ndarray, scale: LimitScale, names: Sequence[st
         for limit in pair[np.isfinite(pair)]:
             _check_size(kind, abs(float(limit)) * factor, name, f"robot.limits.scale.{kind}", "scaled ")
     return np.asarray(limits * factor)
+
+
+def _total_power(spec: LimitSpec) -> float:
+    """Return the limit of the sum of the joints' powers, W; infinite where there is none."""
+    stated, key = spec.total_power, "robot.limits.total_power"
+    if stated is None:
+        return np.inf
+    if not (_is_number(stated) and LEAST <= stated * spec.scale.power <= LARGEST):
+        allowed = f"a number from {LEAST:g} to {LARGEST:g}, scaled too, or null for no limit"
+        raise InputError("is no power in W", where=key, found=stated, allowed=allowed)
+    return float(stated) * spec.scale.power
 
 
 def _check_size(kind: str, limit: float, joint: str, key: str, what: str) -> None:

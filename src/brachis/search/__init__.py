@@ -1,6 +1,7 @@
 """Search for the fastest motion: joint paths from lattices, a portfolio over decompositions, branches and starts."""
 
 from brachis.search.chart_starts import first_map
+from brachis.search.pacing import first_breaks, first_point
 from brachis.search.portfolio import Stages, find_fastest
 from brachis.search.recentring import best_of_joints, solved_in_chart
 from brachis.search.record import Record
@@ -14,7 +15,9 @@ __all__ = [
     "best_of_joints",
     "continued",
     "find_fastest",
+    "first_breaks",
     "first_map",
+    "first_point",
     "solve_with",
     "solved_in_chart",
 ]

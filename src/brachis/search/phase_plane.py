@@ -5,15 +5,16 @@ With u = d2s/dt2 and x = (ds/dt)^2, limits along a joint path q(s) are lines in 
     a(s) u + b(s) x + c(s)   in [-1, 1],
 
 for torques a = M q_ds / tau_max, b = (M q_dds + C(q, q_ds) q_ds) / tau_max and c the torque at rest; those that do not
-ask for u are ceilings for x. Backwards along the joint path, the largest x from which the next station's interval can
-be reached is kept; forwards, the largest u that stays within is taken (Pham, Pham, IEEE Trans. Robotics 34(3), 2018).
-Torque may jump here, and viscous and Coulomb friction are left out, so the time is an estimate by which joint paths are
-ranked, no bound.
+ask for u are ceilings or floors for x. Backwards along the joint path, the largest x from which the next station's
+interval can be reached is kept; forwards, the largest u that stays within is taken (Pham, Pham, IEEE Trans. Robotics
+34(3), 2018). Torque may jump here, and viscous and Coulomb friction are left out, so the time is an estimate by which
+joint paths are ranked, no bound.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -39,45 +40,79 @@ def least_time(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> float:
     float
         s; infinite where the joint path cannot be followed at any speed.
     """
-    step = s[1] - s[0]
-    slope, offset, ceiling = _lines(limits, q, np.gradient(q, step, axis=0, edge_order=2), step)
-    intervals = _controllable(slope, offset, ceiling, step)
+    times = _times(_lines(limits, s, q), s[1] - s[0])
+    return np.inf if times is None else float(times[-1])
+
+
+def prescribed_times(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+    """Find times along a joint path, (S,), s, where a limit asks for a least speed; None where none does or can.
+
+    A start that is too slow there is no good one. Parameters as for `least_time`.
+    """
+    lines = _lines(limits, s, q)
+    return _times(lines, s[1] - s[0]) if lines.floor.any() else None
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """Limits along a joint path: bounds on u as lines in x, and bounds on x itself.
+
+    Attributes
+    ----------
+    slope, offset : tuple of (S, c) ndarray
+        Of the upper bounds on u, then of the lower ones.
+    floor, ceiling : (S,) ndarray
+        Of x.
+    """
+
+    slope: tuple[np.ndarray, np.ndarray]
+    offset: tuple[np.ndarray, np.ndarray]
+    floor: np.ndarray
+    ceiling: np.ndarray
+
+
+def _times(lines: _Lines, step: float) -> np.ndarray | None:
+    """Find the times at the stations, (S,), s, under the largest u; None where the joint path cannot be followed."""
+    intervals = _controllable(lines, step)
     if intervals is None or intervals[0][0] > 0.0:
-        return np.inf
-    x = _fastest(slope, offset, *intervals, step)
+        return None
+    x = _fastest(lines.slope, lines.offset, *intervals, step)
+    if not x.max() > 0.0:
+        return None
     # Between stations nothing stops; a station where the grid says so is an artefact of its width.
     x[1:-1] = np.maximum(x[1:-1], _STANDING * np.median(x))
     speed = np.sqrt(x)
-    return float(np.sum(2.0 * step / (speed[1:] + speed[:-1]))) if x.max() > 0.0 else np.inf
+    return np.append(0.0, np.cumsum(2.0 * step / (speed[1:] + speed[:-1])))
 
 
-def _lines(
-    limits: Sequence[Limit], q: np.ndarray, q_ds: np.ndarray, step: float
-) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """Bounds on u as lines in x, slope and offset of the upper and the lower ones, each (S, c), and largest x, (S,)."""
-    lines = [limit.lines(q, q_ds, np.gradient(q_ds, step, axis=0, edge_order=2)) for limit in limits]
-    ceiling = np.full(len(q), np.inf)
+def _lines(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> _Lines:
+    """Collect the lines of all limits."""
+    step = s[1] - s[0]
+    q_ds = np.gradient(q, step, axis=0, edge_order=2)
+    lines = [limit.lines(s, q, q_ds, np.gradient(q_ds, step, axis=0, edge_order=2)) for limit in limits]
+    floor, ceiling = np.zeros(len(q)), np.full(len(q), np.inf)
     sloped = []
     for line in lines:
         if line is None:
             continue
         if line.u is None:
             with np.errstate(divide="ignore", invalid="ignore"):
-                ceiling = np.fmin(ceiling, np.fmin.reduce((1.0 - line.constant) / line.x, axis=1))
+                level = (1.0 - line.constant) / line.x
+            ceiling = np.minimum(ceiling, np.where(line.x > 0.0, level, np.inf).min(axis=1))
+            floor = np.maximum(floor, np.where(line.x < 0.0, level, 0.0).max(axis=1))
         else:
             sloped.append((line.u, line.x, line.constant))
     a, b, c = (np.concatenate(parts, axis=1) for parts in zip(*sloped, strict=True))
     # A coefficient of zero would make a vertical line; a tiny one gives bounds far out that do no harm.
     a = np.where(np.abs(a) < _SLOWEST, _SLOWEST, a)
     first, second = (1.0 - c) / a, (-1.0 - c) / a
-    return (-b / a, -b / a), (np.maximum(first, second), np.minimum(first, second)), ceiling
+    return _Lines((-b / a, -b / a), (np.maximum(first, second), np.minimum(first, second)), floor, ceiling)
 
 
-def _controllable(
-    slope: tuple[np.ndarray, np.ndarray], offset: tuple[np.ndarray, np.ndarray], ceiling: np.ndarray, step: float
-) -> tuple[np.ndarray, np.ndarray] | None:
+def _controllable(lines: _Lines, step: float) -> tuple[np.ndarray, np.ndarray] | None:
     """Go backwards: the intervals of x, (S,), from which the end can be reached at rest; None where one is empty."""
-    count = len(ceiling)
+    slope, offset = lines.slope, lines.offset
+    count = len(lines.ceiling)
     low, high = np.zeros(count), np.zeros(count)
     for i in range(count - 2, -1, -1):
         # u >= (low' - x) / 2 step and u <= (high' - x) / 2 step join the lines.
@@ -88,8 +123,8 @@ def _controllable(
         if np.any((clearance < 0.0) & (np.abs(tilt) < _SLOWEST)):
             return None
         falling, rising = tilt < -_SLOWEST, tilt > _SLOWEST
-        high[i] = min(ceiling[i], np.min(clearance[falling] / -tilt[falling], initial=np.inf))
-        low[i] = max(0.0, np.max(-clearance[rising] / tilt[rising], initial=0.0))
+        high[i] = min(lines.ceiling[i], np.min(clearance[falling] / -tilt[falling], initial=np.inf))
+        low[i] = max(lines.floor[i], np.max(-clearance[rising] / tilt[rising], initial=0.0))
         if low[i] > high[i]:
             return None
     return low, high

@@ -70,7 +70,8 @@ def batches(
     ------
     Batch
     """
-    solvers = [solver.name for solver in solver_named(problem.task.solver.name)]
+    curved = any(limit.where == "whole" for limit in problem.limits)
+    solvers = [solver.name for solver in solver_named(problem.task.solver.name, curved=curved)]
     levels = SEARCH_LEVELS[problem.task.search.effort]
     if charts_allowed(problem, decompositions):
         yield from _in_charts(problem, decompositions, solvers, deadline, listener, note)

@@ -17,9 +17,9 @@ from brachis.deadline import Deadline
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap
 from brachis.nlp import Program
-from brachis.nlp.guess import starting_point
 from brachis.problem import Problem, program_of
 from brachis.refine import Solve
+from brachis.search.pacing import first_point
 from brachis.search.processes import each, processes
 from brachis.search.recentring import solved_in_chart
 from brachis.search.solving import Listener
@@ -74,7 +74,7 @@ def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
         return hopeless
     problem = _roughly(start.problem)
     program = program_of(problem, start.joint_map, np.linspace(0.0, 1.0, _INTERVALS + 1))
-    x = starting_point(program, [start.joint_path], timed=start.timed)
+    x = first_point(program, start)
     if x is None:
         return hopeless
     try:
@@ -102,7 +102,8 @@ def _roughly(problem: Problem) -> Problem:
 
 def _solver(start: Start, deadline: Deadline) -> Solve:
     """Make a function that solves roughly: an answer that nearly holds the limits will do."""
-    backend = solver_named(start.problem.task.solver.name)[0]
+    curved = any(limit.where == "whole" for limit in start.problem.limits)
+    backend = solver_named(start.problem.task.solver.name, curved=curved)[0]
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
         options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.for_a_solve, _PROGRESS, _PATIENCE)

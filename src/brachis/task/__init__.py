@@ -47,7 +47,7 @@ from brachis.task.segments import (
     SplineThrough,
     TurnSegment,
 )
-from brachis.task.tool_limits import ToolLimits
+from brachis.task.tool_limits import ProcessSpeed, SpeedTable, ToolLimits
 
 __all__ = [
     "FROM_URDF",
@@ -73,6 +73,7 @@ __all__ = [
     "Payload",
     "Placement",
     "Posture",
+    "ProcessSpeed",
     "Quaternion",
     "RefinementSettings",
     "RobotSettings",
@@ -85,6 +86,7 @@ __all__ = [
     "SegmentModel",
     "Shape",
     "SolverSettings",
+    "SpeedTable",
     "SplineSegment",
     "SplineSettings",
     "SplineThrough",

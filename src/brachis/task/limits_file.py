@@ -19,6 +19,8 @@ from brachis.task.yaml_reader import read_yaml
 
 _LARGEST = 100_000
 """Bytes."""
+_OF_ALL = "total_power"
+"""The limit that is one number for the whole robot."""
 
 
 class LimitsFile(Model):
@@ -76,6 +78,8 @@ def with_limits_of_file(content: Mapping[str, Any], source: str, folder: Path) -
     stated = _by_joint(folder / file, f"{source}: robot.limits_file", folder, str(file))
     merged = {
         kind: {name: limit for name, limit in each.items() if name not in (locked or ())}
+        if isinstance(each, Mapping)
+        else each
         for kind, each in stated.items()
     }
     for kind, value in own.items():
@@ -85,8 +89,8 @@ def with_limits_of_file(content: Mapping[str, Any], source: str, folder: Path) -
     return {**content, "robot": {**rest, "limits": merged}}
 
 
-def _by_joint(path: Path, where: str, folder: Path, found: str | None) -> dict[str, dict[str, Any]]:
-    """Read and check a file; its limits by kind and joint."""
+def _by_joint(path: Path, where: str, folder: Path, found: str | None) -> dict[str, Any]:
+    """Read and check a file; its limits by kind and joint, and the one of all joints together."""
     text = read_text(path, where=where, folder=folder, found=found, largest=_LARGEST)
     content = read_yaml(text, str(path))
     if not isinstance(content, Mapping):
@@ -105,7 +109,9 @@ def _by_joint(path: Path, where: str, folder: Path, found: str | None) -> dict[s
     kinds = [each for each in fields(LimitSpec) if each.name != "scale"]
     stated = {each.name: getattr(file.limits, each.name) for each in kinds}
     return {
-        each.name: _spread(stated[each.name], file.joints, f"{path}: limits.{each.name}")
+        each.name: stated[each.name]
+        if each.name == _OF_ALL
+        else _spread(stated[each.name], file.joints, f"{path}: limits.{each.name}")
         for each in kinds
         if stated[each.name] != each.default
     }

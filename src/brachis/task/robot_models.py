@@ -116,18 +116,24 @@ JointValues = Annotated[
     by_form("a list of numbers in the order of the chain, or a mapping of joint name to number"),
 ]
 
+TorqueCurve = Annotated[tuple[tuple[NonNegative, NonNegative], ...], Field(min_length=2)]
+"""Points [speed, torque]."""
+
 # What a program may give: NumPy arrays stand for lists and numbers too.
 _StatedPair = Array | Sequence[float | None] | None
 StatedLimit = float | Array | Sequence[float | _StatedPair] | Mapping[str, float | _StatedPair] | str | None
+StatedCurves = Mapping[str, Array | Sequence[_StatedPair] | None] | None
 StatedRange = Array | Sequence[_StatedPair] | Mapping[str, _StatedPair] | str | None
 
 
 class LimitScale(Model):
     """Factors on the limits, to keep a distance from them."""
 
-    torque: Positive = Field(default=1.0, description="Factor on all torque and force limits.")
+    torque: Positive = Field(default=1.0, description="Factor on all torque and force limits, curves too.")
     velocity: Positive = Field(default=1.0, description="Factor on all velocity limits.")
     acceleration: Positive = Field(default=1.0, description="Factor on all acceleration limits.")
+    power: Positive = Field(default=1.0, description="Factor on all power limits, the total one too.")
+    rms_torque: Positive = Field(default=1.0, description="Factor on all limits of root-mean-square torques.")
 
 
 @dataclass(frozen=True, init=False)
@@ -149,6 +155,27 @@ class LimitSpec:
         PositionLimit, Field(description="[low, high], rad (m); null for an open end. Absent: URDF. Null: none.")
     ] = FROM_URDF
     scale: Annotated[LimitScale, Field(description="Factors on the limits.")] = field(default_factory=LimitScale)
+    power: Annotated[
+        OwnLimit, Field(description="Largest mechanical power, torque x speed either way, W. Absent or null: none.")
+    ] = None
+    total_power: Annotated[
+        Positive | None,
+        Field(description="Largest sum of the joints' powers, drawn or returned, W. Absent or null: none."),
+    ] = None
+    rms_torque: Annotated[
+        OwnLimit,
+        Field(
+            description="Largest root mean square of the torque over the whole motion, N m (force, N): what heats a "
+            "motor. Absent or null: none."
+        ),
+    ] = None
+    torque_speed: Annotated[
+        dict[Name, TorqueCurve | None] | None,
+        Field(
+            description="Torque limits that fall with speed, by joint name: points [speed, torque] from speed 0 on, "
+            "joined by a line that falls ever more steeply; the last slope goes on. Absent or null: none."
+        ),
+    ] = None
 
     __pydantic_config__ = Model.model_config
 
@@ -159,6 +186,10 @@ class LimitSpec:
         acceleration: StatedLimit = None,
         position: StatedRange = FROM_URDF,
         scale: Mapping[str, float] | LimitScale | None = None,
+        power: StatedLimit = None,
+        total_power: float | None = None,
+        rms_torque: StatedLimit = None,
+        torque_speed: StatedCurves = None,
     ) -> None:
         """Take limits from a program; they are checked when a robot is made with them, where its joints are known.
 
@@ -171,11 +202,17 @@ class LimitSpec:
         position : sequence, array, mapping or None, optional
             Pairs [lower, upper], rad or m, likewise; an end that is None is open.
         scale : mapping or LimitScale, optional
-            Factors on torque, velocity and acceleration limits, applied after all else.
+            Factors on limits, applied after all else.
+        power, rms_torque : float, sequence, array, mapping or None, optional
+            W; Nm or N. As `acceleration`.
+        total_power : float or None, optional
+            W.
+        torque_speed : mapping of str to (p, 2) array or sequence of pairs, optional
+            Points [speed, torque] by joint name.
         """
         if not isinstance(scale, LimitScale):
             scale = LimitScale().model_copy(update={kind: plain(factor) for kind, factor in (scale or {}).items()})
-        stated = (torque, velocity, acceleration, position, scale)
+        stated = (torque, velocity, acceleration, position, scale, power, total_power, rms_torque, torque_speed)
         for each, value in zip(fields(self), stated, strict=True):
             object.__setattr__(self, each.name, plain(value, tuple))
 

@@ -74,7 +74,7 @@ def verify_trajectory(
     places = (np.concatenate(part) for part in zip(*parts, strict=True))
     states = States.at(pieces, robot, *places)
     path_check = _path_error(trajectory, path, task_map, states, options)
-    ratios = limit_checks(Given(robot, trajectory.task, pieces, states), limits, options)
+    ratios = limit_checks(Given(robot, trajectory, pieces, states), limits, options)
     checks = [
         path_check,
         *ratios,

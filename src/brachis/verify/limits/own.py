@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from brachis.custom_limits import LimitModel
@@ -24,8 +26,9 @@ def check_own(model: LimitModel, given: Given) -> tuple[str, Worst]:
 
     def ratios(states: States) -> np.ndarray:
         if independent is None:
-            values = limit.values(states)
-            return 1.0 + np.maximum(values - limit.upper, limit.lower - values) * limit.violation_scale
+            s = given.s_at(states.t)
+            motion = SimpleNamespace(q=states.q, qdot=states.qdot, qddot=states.qddot, s=s)
+            return np.abs(limit.ratios(motion, states.t))
         found = np.abs(independent(given.robot, states.q, states.qdot, states.qddot, states.tau))
         if found.shape != (len(states.t), len(limit.labels)):
             allowed = f"{(len(states.t), len(limit.labels))}, a ratio for every moment and label"
@@ -33,5 +36,10 @@ def check_own(model: LimitModel, given: Given) -> tuple[str, Worst]:
             raise InputError("has the wrong shape", where=where, found=found.shape, allowed=allowed)
         return found
 
-    worst = worst_between(given, ratios, [label.subject for label in limit.labels])
+    subjects = [label.subject for label in limit.labels]
+    if independent is None and limit.where == "whole":
+        whole = ratios(given.states)[0]
+        worst = Worst(float(whole.max()), subjects[int(np.argmax(whole))], float(given.states.t[-1]))
+    else:
+        worst = worst_between(given, ratios, subjects)
     return limit.name, worst if independent else worst._replace(remark=_OWN_FORMULA)

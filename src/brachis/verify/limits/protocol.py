@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numpy as np
+
 from brachis.robot import Robot
-from brachis.task import Task
+from brachis.trajectory import Trajectory
 from brachis.verify.motion import Pieces, States
+
+_BISECTIONS = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,16 +22,42 @@ class Given:
     Attributes
     ----------
     robot : Robot
-    task : Task
+    trajectory : Trajectory
+        What is judged are its pieces; from itself are the task and s(t).
     pieces : Pieces
     states : States
         The motion wherever it is looked at.
     """
 
     robot: Robot
-    task: Task
+    trajectory: Trajectory
     pieces: Pieces
     states: States
+
+    def s_at(self, t: np.ndarray) -> np.ndarray:
+        """Path coordinates, (K,), at times t, (K,), s."""
+        return np.asarray(self.trajectory.path_spline(t))
+
+    def times_of(self, s: np.ndarray) -> np.ndarray:
+        """Find the times, (P,), s, at which path coordinates, (P,), are reached; s(t) does not decrease."""
+        low, high = np.zeros(len(s)), np.full(len(s), self.trajectory.t_end)
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            before = self.s_at(middle) < s
+            low, high = np.where(before, middle, low), np.where(before, high, middle)
+        return 0.5 * (low + high)
+
+    def looking_at(self, s: np.ndarray) -> Given:
+        """Return the same, with the states at further path coordinates, (P,)."""
+        added = States.at(self.pieces, self.robot, *self.pieces.place(self.times_of(s)))
+        return replace(self, states=self.states.merged(added)[0])
+
+    def between(self, begin: float, end: float) -> Given:
+        """Return the same, with no states but those from one path coordinate to another, both included."""
+        more = self.looking_at(np.array([begin, end]))
+        first, last = self.times_of(np.array([begin, end]))
+        inside = (more.states.t >= first) & (more.states.t <= last)
+        return replace(more, states=more.states.only(inside))
 
 
 class Worst(NamedTuple):

@@ -1,0 +1,207 @@
+"""What drives bear, and the tool's motion: known optima of slides, and what the free motion of an arm violates."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import brachis
+from brachis.verify import verify_trajectory
+from support.chains import INERTIAL, Joint, chain_urdf
+
+ROOT = Path(__file__).parents[2]
+MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
+NEAR = 1e-3
+"""Optima are met to 0.1 %."""
+
+
+@pytest.fixture
+def slide(tmp_path):
+    """Plan a slide, or one slide that carries another along the same line, over LENGTH from rest to rest."""
+
+    def plan(*forces, limits=None, tool=None, intervals=40, **spline):
+        ends = [{"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": force} for force in forces]
+        joints = [Joint("prismatic", axis=(1, 0, 0), limit=end, inertial=INERTIAL.format(mass=MASS)) for end in ends]
+        file = tmp_path / "slides.urdf"
+        file.write_text(chain_urdf(joints), encoding="utf-8")
+        task = {
+            "brachis": 1,
+            "robot": {"gravity": [0, 0, 0], "limits": limits or {}},
+            "start": {"joints": [0.0] * len(forces)},
+            "task_space": ["x"],
+            "path": [{"line": {"by": [LENGTH]}}],
+            "redundant_joints": ["j1"] if len(forces) > 1 else [],
+            "tool_limits": tool or {},
+            "spline": {"intervals": intervals, "rest": "velocity", **spline},
+            "search": {"effort": "single", "least_motion": False},
+        }
+        result = brachis.plan(str(file), task)
+        assert result.verified, result.verification
+        return result
+
+    return plan
+
+
+def ratio(result, kind) -> float:
+    return {check.name: check.value for check in result.verification.checks}[f"{kind} ratio"]
+
+
+def test_power_limited_slide(slide):
+    """Full force up to the speed at which it takes the whole power, then m v^2 dv = P dx; braking is the mirror."""
+    power = 100.0
+    v = power / FORCE
+    way = MASS * v**2 / (2.0 * FORCE)
+    top = np.cbrt(3.0 * power / MASS * (LENGTH / 2.0 - way) + v**3)
+    expected = 2.0 * (MASS * v / FORCE + MASS / (2.0 * power) * (top**2 - v**2))
+    for limits in ({"power": power}, {"total_power": power}):
+        result = slide(FORCE, limits=limits)
+        assert result.t_end == pytest.approx(expected, rel=NEAR)
+
+
+def test_torque_that_falls_with_speed(slide):
+    """The slide's equation of motion under full force, up to the middle; braking is the mirror."""
+    curve = [[0.0, FORCE], [1.5, FORCE], [5.0, 10.0]]
+
+    def motion(_t, state):
+        return [state[1], np.interp(state[1], *np.transpose(curve)) / MASS]
+
+    found = solve_ivp(motion, (0.0, 1.0), [0.0, 0.0], dense_output=True, rtol=1e-10, atol=1e-12, max_step=1e-3)
+    expected = 2.0 * brentq(lambda t: found.sol(t)[0] - LENGTH / 2.0, 0.0, 1.0)
+    result = slide(FORCE, limits={"torque_speed": {"j1": curve}})
+    assert result.t_end == pytest.approx(expected, rel=NEAR)
+    assert expected > 1.05 * 2.0 * np.sqrt(LENGTH * MASS / FORCE)
+
+
+def test_rms_force_makes_a_parabola_of_the_speed(slide):
+    """The least mean square of the force over a time T is that of F = F0 (1 - 2 t / T): F0^2 / 3."""
+    rms = 20.0
+    result = slide(FORCE, limits={"rms_torque": rms}, intervals=12)
+    assert result.t_end == pytest.approx(np.sqrt(6.0 * MASS * LENGTH / (np.sqrt(3.0) * rms)), rel=NEAR)
+    assert ratio(result, "rms torque") == pytest.approx(1.0, abs=1e-5)
+    check = brachis.bottleneck.report(result, check=True).check
+    (entry,) = check.larger()
+    assert str(entry.sensitivity.label) == "j1 rms torque"
+    assert entry.deviation < 0.05
+
+
+def test_tool_acceleration_is_bang_bang(slide):
+    result = slide(FORCE, tool={"acceleration": 10.0})
+    assert result.t_end == pytest.approx(2.0 * np.sqrt(LENGTH / 10.0), rel=NEAR)
+
+
+def test_a_macro_slide_spares_the_power_of_the_mini_slide(slide):
+    """The mini slide's force moves the tool; a strong macro slide takes all the speed, so that no power is needed."""
+    expected = 2.0 * np.sqrt(LENGTH * MASS / FORCE)
+    limits = {"power": {"j2": 40.0}}
+    assert slide(5.0 * FORCE, FORCE, limits=limits).t_end == pytest.approx(expected, rel=NEAR)
+    assert slide(FORCE, limits={"power": 40.0}).t_end > 1.3 * expected
+
+
+def test_a_speed_table_is_a_staircase_of_cruises(slide):
+    a, fast, slow, step = FORCE / MASS, 1.5, 0.5, 0.6
+    table = {"s": [0.0, step, step, 1.0], "speed": [fast, fast, slow, slow]}
+    way = step * LENGTH - (fast**2 + fast**2 - slow**2) / (2.0 * a)
+    expected = (2.0 * fast) / a + way / fast + ((1.0 - step) * LENGTH - slow**2 / (2.0 * a)) / slow
+    result = slide(FORCE, tool={"speed": table}, intervals=60, degree=2)
+    assert result.t_end == pytest.approx(expected, rel=5e-3)  # the speed changes at three places, off the knots
+    motion = result.trajectory.at(np.linspace(0.0, result.t_end, 20_001))
+    speed, s = np.abs(motion.qdot[:, 0]), motion.s
+    assert speed[s >= step].max() <= slow * (1.0 + 1e-4)
+    assert speed[s < step].max() == pytest.approx(fast, rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def arm():
+    """The planar arm's task without any of these limits, and its motion."""
+    task = brachis.load_task(ROOT / "examples/01_scara_line.yaml").to_dict()
+    task = {**task, "search": {"effort": "single", "least_motion": False}}
+    return task, brachis.plan(None, task)
+
+
+def peaks(trajectory) -> dict[str, np.ndarray | float]:
+    """Figures of a motion by numpy alone, from samples of the saved motion."""
+    motion = trajectory.at(np.linspace(0.0, trajectory.t_end, 4001))
+    positions, _ = trajectory.robot.tool_placements(motion.q)
+    velocity = np.gradient(positions, motion.t, axis=0)
+    acceleration = np.gradient(velocity, motion.t, axis=0)[5:-5]
+    powers = motion.tau * motion.qdot
+    return {
+        "speed": np.linalg.norm(velocity, axis=1).max(),
+        "acceleration": np.linalg.norm(acceleration, axis=1).max(),
+        "angular_speed": np.abs(motion.qdot.sum(axis=1)).max(),
+        "power": np.abs(powers).max(axis=0),
+        "total_power": np.abs(powers.sum(axis=1)).max(),
+        "rms_torque": np.sqrt(np.trapezoid(motion.tau**2, motion.t, axis=0) / trajectory.t_end),
+        "qdot": np.abs(motion.qdot).max(axis=0),
+        "tau": np.abs(motion.tau).max(axis=0),
+    }
+
+
+def limited(task, kind, free):
+    """The task with a limit that the free motion exceeds."""
+    tool, joints = {}, {}
+    if kind in ("acceleration", "angular_speed"):
+        tool = {kind: 0.7 * free[kind]}
+    elif kind == "speed":
+        tool = {
+            "speed": {"s": [0.0, 0.4, 0.6, 1.0], "speed": (free["speed"] * np.array([1.0, 0.5, 0.6, 1.0])).tolist()}
+        }
+    elif kind == "torque_speed":
+        at_rest, fastest = free["tau"], free["qdot"]
+        points = zip(("j1", "j2", "j3"), fastest.tolist(), at_rest.tolist(), strict=True)
+        joints = {kind: {name: [[0, tau], [0.3 * v, tau], [v, 0.3 * tau]] for name, v, tau in points}}
+    else:
+        joints = {kind: 0.7 * free[kind] if kind == "total_power" else (0.7 * free[kind]).tolist()}
+    robot = {**task["robot"], "limits": {**task["robot"]["limits"], **joints}}
+    return {**task, "robot": robot, "tool_limits": tool}
+
+
+@pytest.mark.parametrize(
+    ("kind", "check", "label"),
+    [
+        ("speed", "tool speed", "tool speed"),
+        ("acceleration", "tool acceleration", "tool acceleration"),
+        ("angular_speed", "tool angular speed", "tool angular speed"),
+        ("power", "power", "j1 power"),
+        ("total_power", "total power", "all joints total power"),
+        ("torque_speed", "torque speed", "j1 driving from"),
+    ],
+)
+def test_an_arm_without_it_violates_it_and_with_it_meets_it_and_is_slower(arm, kind, check, label):
+    task, free = arm
+    result = brachis.plan(None, limited(task, kind, peaks(free.trajectory)))
+    assert result.verified, result.verification
+    assert result.t_end > free.t_end * 1.001
+    assert ratio(result, check) == pytest.approx(1.0, abs=1e-3)
+    assert ratio(result, check) <= 1.0 + 1e-4
+    unaware = dataclasses.replace(free.trajectory, task=result.task)
+    verification = verify_trajectory(unaware, robot=result.trajectory.robot)
+    failed = [each for each in verification.checks if not each.passed]
+    assert [each.name for each in failed] == [f"{check} ratio"]
+    assert failed[0].value > 1.2
+    report = brachis.bottleneck.report(result, check=True)
+    own = [entry for entry in report.check.entries if str(entry.sensitivity.label).startswith(label)]
+    (entry,) = own[:1]
+    assert entry.re_solved < -1e-4
+    assert entry.deviation < 0.05
+    assert any(
+        label.split(" from")[0].split()[0] in str(line.label) and line.share > 0.01 for line in report.saturations
+    )
+
+
+def test_an_arm_keeps_the_rms_torques_of_its_motors(arm):
+    task, free = arm
+    figures = 0.95 * peaks(free.trajectory)["rms_torque"]
+    joints = {**task["robot"]["limits"], "rms_torque": {"j1": figures[0], "j2": figures[1]}}
+    result = brachis.plan(None, {**task, "robot": {**task["robot"], "limits": joints}})
+    assert result.verified, result.verification
+    assert result.t_end > free.t_end * 1.001
+    assert 0.999 < peaks(result.trajectory)["rms_torque"][0] / figures[0] < 1.0 + 1e-4
+    unaware = dataclasses.replace(free.trajectory, task=result.task)
+    verification = verify_trajectory(unaware, robot=result.trajectory.robot)
+    assert [each.name for each in verification.checks if not each.passed] == ["rms torque ratio"]

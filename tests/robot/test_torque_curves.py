@@ -1,0 +1,86 @@
+"""Torque limits that fall with speed, power and root-mean-square torque: from the task to the robot's limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brachis.errors import InputError, LimitError, UnknownNameError
+from brachis.robot import bind
+from brachis.robot.combine import robot_for
+from brachis.task import LimitScale, LimitSpec, RobotSettings
+from support.chains import planar_robot
+from support.spatial import rail_arm
+
+CURVE = [[0.0, 50.0], [1.0, 50.0], [2.0, 20.0]]
+
+
+def robot(**limits):
+    return planar_robot("RRP", limits=LimitSpec(**limits))
+
+
+def test_its_torque_at_rest_is_a_plain_limit_and_all_are_scaled():
+    scale = LimitScale(torque=0.5, power=0.1, rms_torque=0.2)
+    limits = robot(
+        torque_speed={"j2": CURVE}, power=[20.0, None, 30.0], total_power=40.0, rms_torque=5.0, scale=scale
+    ).limits
+    assert limits.torque_speed == ((), ((0.0, 25.0), (1.0, 25.0), (2.0, 10.0)), ())
+    np.testing.assert_allclose(limits.torque, [40.0, 25.0, 65.0])
+    np.testing.assert_allclose(limits.power, [2.0, np.inf, 3.0])
+    np.testing.assert_allclose(limits.rms_torque, 1.0)
+    assert limits.total_power == pytest.approx(4.0)
+
+
+def test_a_curve_is_torque_limit_enough():
+    curves = dict.fromkeys(("j1", "j2", "j3"), CURVE)
+    np.testing.assert_array_equal(robot(torque=None, torque_speed=curves).limits.torque, 50.0)
+    with pytest.raises(LimitError, match="neither a torque nor an acceleration limit"):
+        robot(torque=None, torque_speed={"j1": CURVE})
+
+
+@pytest.mark.parametrize(
+    ("curve", "where", "said"),
+    [
+        ([[0.0, 50.0]], "robot.limits.torque_speed.j1", "two or more points"),
+        ([[0.5, 50.0], [1.0, 20.0]], "robot.limits.torque_speed.j1", "begin at 0"),
+        ([[0.0, 50.0], [2.0, 40.0], [1.0, 20.0]], "robot.limits.torque_speed.j1", "ascend"),
+        ([[0.0, 50.0], [1.0, 60.0]], "robot.limits.torque_speed.j1[1]", "slopes <= 0"),
+        ([[0.0, 50.0], [1.0, 20.0], [2.0, 10.0]], "robot.limits.torque_speed.j1[2]", "robot.limits.power.j1"),
+        ([[0.0, 50.0], [1.0, -1.0]], "robot.limits.torque_speed.j1", "torques >= 0"),
+        ([[0.0, 50.0], [1.0, "much"]], "robot.limits.torque_speed.j1", "two or more points"),
+    ],
+)
+def test_a_curve_that_is_none_is_refused_with_its_key(curve, where, said):
+    with pytest.raises(InputError) as caught:
+        robot(torque_speed={"j1": curve})
+    assert where in str(caught.value)
+    assert said in str(caught.value)
+
+
+def test_other_mistakes_are_refused_with_their_key():
+    with pytest.raises(UnknownNameError, match=r"torque_speed.*elbow"):
+        robot(torque_speed={"elbow": CURVE})
+    with pytest.raises(InputError, match=r"robot.limits.torque_speed: is no mapping"):
+        robot(torque_speed=[CURVE])
+    for wrong in (0.0, -3.0, "much"):
+        with pytest.raises(InputError, match=r"robot.limits.total_power: is no power"):
+            robot(total_power=wrong)
+    with pytest.raises(InputError, match="power limit"):
+        robot(power=-1.0)
+
+
+def test_a_robot_keeps_them_beside_what_a_task_sets():
+    given = robot(torque_speed={"j1": np.array(CURVE)}, power=30.0, total_power=70.0, rms_torque=12.0)
+    both = robot_for(given, RobotSettings(limits=LimitSpec(velocity=1.5)))
+    for name in ("power", "rms_torque", "torque"):
+        np.testing.assert_array_equal(getattr(both.limits, name), getattr(given.limits, name))
+    assert both.limits.torque_speed == given.limits.torque_speed
+    assert both.limits.total_power == 70.0
+    np.testing.assert_array_equal(both.limits.velocity, 1.5)
+
+
+def test_the_virtual_joint_of_a_free_roll_has_none():
+    arm = bind(rail_arm(), "pose_free_roll")[0]
+    assert np.isinf([arm.limits.power[-1], arm.limits.rms_torque[-1], arm.limits.position_upper[-1]]).all()
+    assert arm.limits.position_lower[-1] == -np.inf
+    assert arm.limits.torque_speed[-1] == ()
