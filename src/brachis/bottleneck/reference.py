@@ -29,6 +29,8 @@ INTERVALS = 100
 """Number of intervals of the fine mesh for one redundant joint, rounded to a multiple of the answer's own."""
 MEANING = "the same problem with discontinuous torque allowed; the best value known, not a proven bound"
 _CUBICS, _PARABOLAS = 3, 2
+_CONTINUOUS_VELOCITY = 2
+"""Highest derivative that is bounded where accelerations jump: limits on a higher one are left out."""
 _POINTS = 3
 _BESIDE = 1e-6
 """Parabolas are looked at this much of the whole time before every knot, too: their accelerations jump there."""
@@ -148,7 +150,8 @@ def _on_mesh(phase: Phase, degree: int, intervals: int) -> Phase:
     if degree == _PARABOLAS:
         t_norm = np.union1d(t_norm, np.arange(1, intervals) / intervals - _BESIDE)
     grid = FixedGrid(clamped_uniform_knots(degree, intervals), degree, t_norm)
-    return phase.over(grid, dataclasses.replace(phase.boundary, derivatives=1))
+    bounded = tuple(limit for limit in phase.limits if limit.order <= _CONTINUOUS_VELOCITY)
+    return phase.with_limits(bounded).over(grid, dataclasses.replace(phase.boundary, derivatives=1))
 
 
 def _planned(phase: Phase, motion: Motion, tolerance: float, deadline: float) -> Refined | None:

@@ -177,6 +177,7 @@ class ChartMap:
         y: np.ndarray,
         ydot: np.ndarray,
         yddot: np.ndarray,
+        ydddot: np.ndarray,
         *,
         t: np.ndarray | None = None,  # noqa: ARG002  (the reference tells the turns)
         near: np.ndarray | None = None,
@@ -204,7 +205,7 @@ class ChartMap:
         bent = -2.0 * sdot * np.einsum("kij,kj->ki", rows[1], qdot) - drift[1] * sdot**2
         given = np.concatenate([sample.xi_ds * sdot**2 - self.task_map.bias(twists, qdot), bent], axis=1)
         qddot = np.einsum("kij,kj->ki", gradient, yddot) + np.einsum("kij,kj->ki", inverse, given)
-        return ChartState(y, ydot, yddot, q, qdot, qddot, gradient, sample, twists, inverse, rows, drift)
+        return ChartState(self, y, ydot, yddot, ydddot, q, qdot, qddot, gradient, sample, twists, inverse, rows, drift)
 
     def derivatives(self, state: ChartState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""

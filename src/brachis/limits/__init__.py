@@ -1,8 +1,9 @@
 """Limits on the motion: one kind per file, listed in `TABLE`.
 
-A limit is a function of q, qdot and qddot. A new kind is its model in `task` (of joints, its field in `robot.limits`
-as well), its file here with a line in `TABLE`, and a file in `verify.limits` with a line in the table there. Nothing
-else asks which kind a limit is. Joint ranges are known elsewhere too: postures and turns are chosen within them.
+A limit is a function of q, qdot and qddot, some of qdddot too. A new kind is its model in `task` (of joints, its field
+in `robot.limits` as well), its file here with a line in `TABLE`, and a file in `verify.limits` with a line in the table
+there. Nothing else asks which kind a limit is. Joint ranges are known elsewhere too: postures and turns are chosen
+within them.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from brachis.custom_limits import LimitModel, custom_limits
-from brachis.limits import branch_margin, joint_rate, position, tool_speed, torque
+from brachis.limits import branch_margin, joint_rate, position, tool_speed, torque, torque_rate
 from brachis.limits.checks import bound_limits
 from brachis.limits.protocol import (
     Bound,
@@ -34,6 +35,8 @@ TABLE: dict[str, Build] = {
     "acceleration": joint_rate.build_acceleration,
     "position": position.build,
     "tool_speed": tool_speed.build,
+    "jerk": joint_rate.build_jerk,
+    "torque_rate": torque_rate.build,
 }
 
 

@@ -78,14 +78,14 @@ def _check(limit: Limit, n: int, where: str) -> None:
     if not np.all(np.asarray(limit.lower) < limit.upper):
         raise InputError("lower is not below upper", where=where, found=[limit.lower, limit.upper])
     rng = np.random.default_rng(0)
-    moments = Moments(*(rng.uniform(-0.1, 0.1, (_MOMENTS, n)) for _ in range(3)))
+    moments = Moments(*(rng.uniform(-0.1, 0.1, (_MOMENTS, n)) for _ in range(4)))
     _check_shape(f"{where}.values", limit.values(moments), (_MOMENTS, count))
     partials = limit.partials(moments)
     if not isinstance(partials, Partials):
         raise InputError("is no brachis.limits.Partials", where=f"{where}.partials", found=partials)
-    given = {name: getattr(partials, name) for name in ("q", "qdot", "qddot")}
+    given = {name: getattr(partials, name) for name in ("q", "qdot", "qddot", "qdddot")}
     if all(part is None for part in given.values()):
-        raise InputError("are all None", where=f"{where}.partials", allowed="at least one of q, qdot, qddot")
+        raise InputError("are all None", where=f"{where}.partials", allowed="at least one of q, qdot, qddot, qdddot")
     for name, part in given.items():
         if part is not None:
             _check_shape(f"{where}.partials.{name}", part, (_MOMENTS, count, n))

@@ -25,7 +25,7 @@ class JointMotion(Protocol):
 
     Attributes
     ----------
-    q, qdot, qddot : (K, n) ndarray
+    q, qdot, qddot, qdddot : (K, n) ndarray
         rad or m, and per second.
     """
 
@@ -35,6 +35,8 @@ class JointMotion(Protocol):
     def qdot(self) -> np.ndarray: ...  # noqa: D102
     @property
     def qddot(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def qdddot(self) -> np.ndarray: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -44,12 +46,13 @@ class Moments:
     q: np.ndarray
     qdot: np.ndarray
     qddot: np.ndarray
+    qdddot: np.ndarray
 
     @classmethod
     def at_rest(cls, q: np.ndarray) -> Moments:
         """Stand still in postures, (K, n)."""
         still = np.zeros_like(q)
-        return cls(q, still, still)
+        return cls(q, still, still, still)
 
 
 class Role(Enum):
@@ -126,6 +129,7 @@ class Partials:
     q: np.ndarray | None = None
     qdot: np.ndarray | None = None
     qddot: np.ndarray | None = None
+    qdddot: np.ndarray | None = None
     s: np.ndarray | None = None
 
 
@@ -164,6 +168,9 @@ class Limit(ABC):
         Whether it says something about an arm that stands still: position, torque against gravity.
     whole_turns : bool
         Whether it asks in which turn (multiple of 2 pi) an angle is.
+    order : int
+        Highest time derivative of q that the values ask for: 2, or 3 where they ask for the jerk. The splines' degree
+        must be at least as high.
     violation_scale : (c,) ndarray
         Violation of a value that is beyond its bound by 1; 1 unless values are measured otherwise (see the module).
     bounds : tuple of Bound
@@ -180,6 +187,7 @@ class Limit(ABC):
     time_scaling: bool = False
     static: bool = False
     whole_turns: bool = False
+    order: int = 2
     refusal: str = "is exceeded at rest"
 
     @abstractmethod
@@ -188,7 +196,7 @@ class Limit(ABC):
 
     @abstractmethod
     def partials(self, motion: JointMotion) -> Partials:
-        """Differentiate `values` with respect to q, qdot, qddot, each taken as independent."""
+        """Differentiate `values` with respect to q, qdot, qddot and qdddot, each taken as independent."""
 
     @property
     def name(self) -> str:

@@ -13,8 +13,8 @@ from brachis.errors import InputError, LimitError, UnknownNameError
 from brachis.task import FROM_URDF, LimitScale, LimitSpec
 
 LEAST, LARGEST = 1e-6, 1e12
-"""No drive has a smaller or larger torque, velocity or acceleration limit, in SI units; products and squares of such
-figures are still numbers."""
+"""No drive has a smaller or larger limit of torque, velocity, acceleration or their rates, in SI units; products and
+squares of such figures are still numbers."""
 FARTHEST = 1e6
 """No position is farther from zero, rad or m: there the rounding of numbers is a tenth of a nanometre."""
 _NARROWEST = 1e-9
@@ -34,6 +34,10 @@ class Limits:
         rad/s^2 or m/s^2.
     torque : (n,) ndarray
         Nm or N.
+    jerk : (n,) ndarray
+        rad/s^3 or m/s^3.
+    torque_rate : (n,) ndarray
+        Nm/s or N/s.
     """
 
     position_lower: np.ndarray
@@ -41,6 +45,8 @@ class Limits:
     velocity: np.ndarray
     acceleration: np.ndarray
     torque: np.ndarray
+    jerk: np.ndarray
+    torque_rate: np.ndarray
 
     def __post_init__(self) -> None:
         """Take copies that nobody can write to."""

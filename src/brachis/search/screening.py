@@ -93,9 +93,10 @@ def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
 
 
 def _roughly(problem: Problem) -> Problem:
-    """Return the problem with splines that are at rest at both ends in their velocity alone."""
+    """Return the problem with parabolas at rest in their velocity alone, without limits that they cannot hold."""
     spline = problem.task.spline.model_copy(update={"degree": _DEGREE, "rest": "velocity"})
-    return dataclasses.replace(problem, task=problem.task.model_copy(update={"spline": spline}))
+    limits = tuple(limit for limit in problem.limits if limit.order <= _DEGREE)
+    return dataclasses.replace(problem, task=problem.task.model_copy(update={"spline": spline}), limits=limits)
 
 
 def _solver(start: Start, deadline: Deadline) -> Solve:
@@ -114,7 +115,7 @@ def _solver(start: Start, deadline: Deadline) -> Solve:
 def _curves(program: Program, x: np.ndarray) -> np.ndarray:
     """Successive values of a motion's curves, (S, 1 + r), evenly spread over the way that they go."""
     (motion,) = program.motions(x)
-    y, _, _ = motion.at(np.linspace(0.0, motion.t_end, 4 * _PLACES))
+    y, *_ = motion.at(np.linspace(0.0, motion.t_end, 4 * _PLACES))
     steps = np.abs(np.diff(y, axis=0)) / np.maximum(np.ptp(y, axis=0), 1e-12)
     way = np.append(0.0, np.cumsum(steps.max(axis=1)))
     places = np.linspace(0.0, way[-1], _PLACES)

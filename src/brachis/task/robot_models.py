@@ -5,7 +5,8 @@ Limits
 For ``torque``, ``velocity`` and ``position`` three cases differ: the key is absent, and the limit comes from the URDF;
 the key is null, and there is no limit; the key has a value. The models write the absent key as the word `FROM_URDF`,
 which a task file may also spell out. Thus absent and null stay distinguishable in comparisons and in saved tasks. A
-joint that a mapping leaves out keeps the limit of the URDF. A URDF has no ``acceleration``: absent means none.
+joint that a mapping leaves out keeps the limit of the URDF. A URDF has no ``acceleration``, ``jerk`` or
+``torque_rate``: absent means none.
 """
 
 from __future__ import annotations
@@ -91,6 +92,8 @@ class LimitScale(Model):
     torque: Positive = Field(default=1.0, description="Factor on all torque and force limits.")
     velocity: Positive = Field(default=1.0, description="Factor on all velocity limits.")
     acceleration: Positive = Field(default=1.0, description="Factor on all acceleration limits.")
+    jerk: Positive = Field(default=1.0, description="Factor on all jerk limits.")
+    torque_rate: Positive = Field(default=1.0, description="Factor on all limits of torque rates.")
 
 
 @dataclass(frozen=True, init=False)
@@ -110,6 +113,10 @@ class LimitSpec:
         PositionLimit, Field(description="[low, high], rad (m); null for an open end. Absent: URDF. Null: none.")
     ] = FROM_URDF
     scale: Annotated[LimitScale, Field(description="Factors on the limits.")] = field(default_factory=LimitScale)
+    jerk: Annotated[OwnLimit, Field(description="Largest jerk, rad/s^3 (m/s^3). Absent or null: none.")] = None
+    torque_rate: Annotated[
+        OwnLimit, Field(description="Largest rate of change of the torque, N m/s (force, N/s). Absent or null: none.")
+    ] = None
 
     __pydantic_config__ = Model.model_config
 
@@ -120,6 +127,8 @@ class LimitSpec:
         acceleration: StatedLimit = None,
         position: StatedRange = FROM_URDF,
         scale: Mapping[str, float] | LimitScale | None = None,
+        jerk: StatedLimit = None,
+        torque_rate: StatedLimit = None,
     ) -> None:
         """Take limits from a program; they are checked when a robot is made with them, where its joints are known.
 
@@ -131,11 +140,13 @@ class LimitSpec:
         position : sequence, array, mapping or None, optional
             Pairs [lower, upper], rad or m, likewise; an end that is None is open.
         scale : mapping or LimitScale, optional
-            Factors on torque, velocity and acceleration limits, applied after all else.
+            Factors on torque, velocity, acceleration, jerk and torque rate limits, applied after all else.
+        jerk, torque_rate : float, sequence, array, mapping or None, optional
+            rad/s^3 or m/s^3; Nm/s or N/s; likewise. They need ``spline.degree`` >= 3 and acceleration at rest.
         """
         if not isinstance(scale, LimitScale):
             scale = LimitScale().model_copy(update={kind: plain(factor) for kind, factor in (scale or {}).items()})
-        stated = (torque, velocity, acceleration, position, scale)
+        stated = (torque, velocity, acceleration, position, scale, jerk, torque_rate)
         for each, value in zip(fields(self), stated, strict=True):
             object.__setattr__(self, each.name, plain(value, tuple))
 

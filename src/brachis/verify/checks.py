@@ -50,7 +50,7 @@ def end_checks(
             checks.append(_worst_joint(f"{name} posture", miss, options.posture_tolerance, "rad, m", robot, time))
         speed, allowed = np.abs(trajectory.velocity(time)), options.rest_velocity_tolerance
         checks.append(_worst_joint(f"{name} velocity", speed, allowed, "rad/s, m/s", robot, time))
-        if task.spline.rest == "full":
+        if task.spline.vanishing > 1:
             bend, allowed = np.abs(trajectory.acceleration(time)), options.rest_acceleration_tolerance
             checks.append(_worst_joint(f"{name} acceleration", bend, allowed, "rad/s2, m/s2", robot, time))
     return checks

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from brachis.custom_limits import LimitModel, custom_limits
-from brachis.verify.limits import joint_rate, position, tool_speed, torque
+from brachis.verify.limits import joint_rate, position, tool_speed, torque, torque_rate
 from brachis.verify.limits.own import check_own
 from brachis.verify.limits.protocol import Given, LimitCheck, Worst
 from brachis.verify.options import VerifyOptions
@@ -20,6 +20,8 @@ TABLE: dict[str, LimitCheck] = {
     "acceleration": joint_rate.worst_acceleration,
     "position": position.worst,
     "tool_speed": tool_speed.worst,
+    "jerk": joint_rate.worst_jerk,
+    "torque_rate": torque_rate.worst,
 }
 
 

@@ -1,4 +1,4 @@
-"""|qdot| <= v_max and |qddot| <= a_max, exactly: the saved motion is polynomial."""
+"""|qdot| <= v_max, |qddot| <= a_max and |qdddot| <= j_max, exactly: the saved motion is polynomial."""
 
 from __future__ import annotations
 
@@ -16,6 +16,11 @@ def worst_velocity(given: Given) -> Worst | None:
 def worst_acceleration(given: Given) -> Worst | None:
     """Find the largest acceleration ratio, anywhere."""
     return _worst(given, given.pieces.acceleration, given.robot.limits.acceleration)
+
+
+def worst_jerk(given: Given) -> Worst | None:
+    """Find the largest jerk ratio, anywhere."""
+    return _worst(given, given.pieces.jerk, given.robot.limits.jerk)
 
 
 def _worst(given: Given, rates: np.ndarray, limit: np.ndarray) -> Worst | None:
