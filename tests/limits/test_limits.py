@@ -14,13 +14,15 @@ from support.phases import FRICTION
 
 ROBOT = planar_robot("RRP", "xz", friction={**FRICTION, "viscous": 1.0})
 TASK = SimpleNamespace(tool_limits=SimpleNamespace(speed=0.7), custom_limits={})
+ORDERS = ("q", "qdot", "qddot", "qdddot")
 RNG = np.random.default_rng(3)
-STATES = Moments(*(RNG.normal(size=(6, 3)) for _ in range(3)))
+STATES = Moments(*(RNG.normal(size=(6, 3)) for _ in range(4)))
 
 
 @pytest.fixture(params=sorted(TABLE))
 def limit(request):
-    limits = dataclasses.replace(ROBOT.limits, acceleration=np.array([5.0, np.inf, 7.0]))
+    some = np.array([5.0, np.inf, 7.0])
+    limits = dataclasses.replace(ROBOT.limits, acceleration=some, jerk=10.0 * some, torque_rate=100.0 * some)
     built = TABLE[request.param](dataclasses.replace(ROBOT, limits=limits), TASK)
     assert built.kind == request.param
     return built
@@ -28,13 +30,13 @@ def limit(request):
 
 def test_partials_equal_differences(limit):
     h, found = 1e-4, limit.partials(STATES)
-    assert any(getattr(found, part) is not None for part in ("q", "qdot", "qddot"))
-    for part in ("q", "qdot", "qddot"):
+    assert any(getattr(found, part) is not None for part in ORDERS)
+    for part in ORDERS:
         exact = getattr(found, part)
         for joint in range(3):
             moved = []
             for step in (2.0, 1.0, -1.0, -2.0):
-                arrays = {name: getattr(STATES, name).copy() for name in ("q", "qdot", "qddot")}
+                arrays = {name: getattr(STATES, name).copy() for name in ORDERS}
                 arrays[part][:, joint] += step * h
                 moved.append(limit.values(Moments(**arrays)))
             expected = (-moved[0] + 8.0 * moved[1] - 8.0 * moved[2] + moved[3]) / (12.0 * h)
@@ -78,18 +80,18 @@ def test_lines_of_the_phase_plane_are_the_limit_along_a_path(limit):
     q, q_ds, q_dds = (RNG.normal(size=(5, 3)) for _ in range(3))
     lines = limit.lines(q, q_ds, q_dds)
     if lines is None:
-        assert limit.kind == "position"
+        assert limit.kind in ("position", "jerk", "torque_rate")
         return
     u, speed = 0.7, 1.3
-    values = limit.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2))
+    values = limit.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, np.zeros_like(q)))
     of_u = 0.0 if lines.u is None else lines.u * u
     expected = values**2 if lines.u is None else values
     np.testing.assert_allclose(of_u + lines.x * speed**2 + lines.constant, expected, atol=1e-9)
 
 
 def limit_source(limit):
-    acceleration = np.array([5.0, np.inf, 7.0]) if limit.kind == "acceleration" else ROBOT.limits.acceleration
-    return dataclasses.replace(ROBOT.limits, acceleration=acceleration)
+    given = {kind: np.array([5.0, np.inf, 7.0]) for kind in ("acceleration", "jerk", "torque_rate") if kind == limit.kind}
+    return dataclasses.replace(ROBOT.limits, **given)
 
 
 def test_limits_come_in_the_order_of_the_table_and_only_where_there_is_one():

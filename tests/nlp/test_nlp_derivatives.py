@@ -8,7 +8,7 @@ import pytest
 from brachis import limits
 from support.phases import CASES, phase_of, reachable_points
 
-KINDS = ["torque", "velocity", "acceleration", "position", "tool_speed", "branch_margin"]
+KINDS = ["torque", "velocity", "acceleration", "position", "tool_speed", "jerk", "torque_rate", "branch_margin"]
 
 
 def blocks(phase) -> dict[str, slice]:
@@ -53,7 +53,8 @@ def phase(request):
 
 def test_jacobian_equals_differences(phase):
     parts = blocks(phase)
-    assert list(parts) == [*KINDS, "progress", *(["lengths"] if len(phase.grid.total) else [])]
+    kinds = [kind for kind in KINDS if phase.degree > 2 or kind not in ("jerk", "torque_rate")]
+    assert list(parts) == [*kinds, "progress", *(["lengths"] if len(phase.grid.total) else [])]
     assert list(parts.values())[-1].stop == len(phase.lower)
     assert list(limits.TABLE) == KINDS[:-1]
     for x in reachable_points(phase, 2):
@@ -68,7 +69,7 @@ def test_jacobian_equals_differences(phase):
             error = wrong.max() / scale
             assert error <= 1e-6, f"{kind}: relative error {error:.1e}"
             # Every kind but positions and margins sees the end time.
-            timed = kind in ("torque", "velocity", "acceleration", "tool_speed")
+            timed = kind not in ("position", "branch_margin", "progress", "lengths")
             assert bool(np.abs(exact[rows, 0]).max() > 1e-3) == timed
 
 

@@ -22,13 +22,16 @@ CASES: dict[str, tuple[str, list[str], list[float], list[str]]] = {
 
 
 def phase_of(case: str, *, end: list[float] | None = None, position: Any = FROM_URDF, **spline: Any) -> Phase:
-    """A bent path in the vertical plane under gravity, friction, and limits of every kind."""
+    """A bent path in the vertical plane under gravity, friction, and limits of every kind that the splines can hold."""
     pattern, rows, start, redundant = CASES[case]
     friction = {**FRICTION, "viscous": [1.0 + 0.1 * i for i in range(len(pattern))]}
-    robot = planar_robot(pattern, "xz", friction=friction, limits=LimitSpec(acceleration=20.0, position=position))
+    settings = {"degree": 3, "intervals": 5, "points_per_interval": 2, **spline}
+    bounded = settings["degree"] > 2 and settings.get("rest") != "velocity"
+    rates = {"jerk": 300.0, "torque_rate": 5e3} if bounded else {}
+    limits = LimitSpec(acceleration=20.0, position=position, **rates)
+    robot = planar_robot(pattern, "xz", friction=friction, limits=limits)
     through = [[-0.05, 0.05, 0.1], [-0.1, 0.06, 0.15], [-0.13, 0.03, 0.2]]
     path = [{"spline": {"through": [point[: len(rows)] for point in through], "relative": True}}]
-    settings = {"degree": 3, "intervals": 5, "points_per_interval": 2, **spline}
     (phase,) = program_of(robot, rows, path, start, redundant, end=end, tool_speed=2.0, **settings).phases
     return phase
 

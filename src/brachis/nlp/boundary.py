@@ -14,6 +14,9 @@ import numpy as np
 
 from brachis.bspline import local_basis
 
+_SAME_TIME = 1e-13
+"""Normalised times this near to a knot are at the knot."""
+
 
 @dataclass(frozen=True)
 class BoundarySpline:
@@ -124,8 +127,11 @@ class LocalBasis:
 
     @classmethod
     def of(cls, knots: np.ndarray, degree: int, t_norm: np.ndarray) -> LocalBasis:
-        """Sample the basis at normalised times `t_norm`, (K,)."""
-        first, values = local_basis(knots, degree, t_norm)
+        """Sample the basis at normalised times `t_norm`, (K,); at knots behind them."""
+        breaks = np.unique(knots)
+        near = breaks[np.searchsorted(breaks, t_norm - _SAME_TIME).clip(max=len(breaks) - 1)]
+        # Rounding must not choose the side of a knot: the highest derivative jumps there.
+        first, values = local_basis(knots, degree, np.where(np.abs(near - t_norm) <= _SAME_TIME, near, t_norm))
         return cls(first[:, None] + np.arange(degree + 1), values)
 
     def curves(self, control_points: np.ndarray) -> np.ndarray:

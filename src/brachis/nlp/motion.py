@@ -10,8 +10,6 @@ from brachis.bspline import insert_knots
 from brachis.nlp.boundary import LocalBasis
 
 _BISECTIONS = 45
-_SAME_TIME = 1e-13
-"""Normalised times this near to a knot are at the knot."""
 
 
 def per_second(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, ...]:
@@ -49,10 +47,7 @@ class Motion:
 
         At knots those behind them.
         """
-        t_norm, breaks = t / self.t_end, np.unique(self.knots)
-        behind = breaks[np.searchsorted(breaks, t_norm - _SAME_TIME).clip(max=len(breaks) - 1)]
-        # Rounding must not choose the side of a knot: splines of degree 2 jump in acceleration there.
-        basis = LocalBasis.of(self.knots, self.degree, np.where(np.abs(behind - t_norm) <= _SAME_TIME, behind, t_norm))
+        basis = LocalBasis.of(self.knots, self.degree, t / self.t_end)
         return per_second(basis.curves(self.control_points), self.t_end)
 
     def over(self, knots: np.ndarray) -> Motion:
