@@ -90,7 +90,9 @@ def test_lines_of_the_phase_plane_are_the_limit_along_a_path(limit):
 
 
 def limit_source(limit):
-    given = {kind: np.array([5.0, np.inf, 7.0]) for kind in ("acceleration", "jerk", "torque_rate") if kind == limit.kind}
+    given = {
+        kind: np.array([5.0, np.inf, 7.0]) for kind in ("acceleration", "jerk", "torque_rate") if kind == limit.kind
+    }
     return dataclasses.replace(ROBOT.limits, **given)
 
 

@@ -75,7 +75,7 @@ def check_time_derivatives(motion: Any, t: np.ndarray, exact: float) -> None:
 
 def check_derivatives(motion: Any, t: np.ndarray) -> JointDerivatives:
     """Compare the derivatives of a joint map with central differences by every column of y and its derivatives."""
-    joint_map, h, parts = motion.joint_map, 1e-5, motion(t)
+    joint_map, h, parts = motion.joint_map, 3e-5, motion(t)
     state = joint_map.state(*parts)
     exact = joint_map.derivatives(state)
 
@@ -105,7 +105,9 @@ def check_derivatives(motion: Any, t: np.ndarray) -> JointDerivatives:
             (gradient, by_ydddot[3]),
             (3.0 * exact.qdot_y[:, :, column], by_yddot[3]),
             (3.0 * exact.qddot_y[:, :, column], by_ydot[3]),
-            (state.qdddot_y[:, :, column], by_y[3]),
         ):
             np.testing.assert_allclose(value, expected, atol=2e-7 * max(1.0, np.abs(expected).max()))
+        # A difference of differences, where the highest derivatives of a chart's splines have corners at its knots.
+        value, expected = state.qdddot_y[:, :, column], by_y[3]
+        np.testing.assert_allclose(value, expected, atol=2e-6 * max(1.0, np.abs(expected).max()))
     return exact

@@ -29,7 +29,7 @@ INTERVALS = 100
 """Number of intervals of the fine mesh for one redundant joint, rounded to a multiple of the answer's own."""
 MEANING = "the same problem with discontinuous torque allowed; the best value known, not a proven bound"
 _CUBICS, _PARABOLAS = 3, 2
-_CONTINUOUS_VELOCITY = 2
+_HIGHEST = 2
 """Highest derivative that is bounded where accelerations jump: limits on a higher one are left out."""
 _POINTS = 3
 _BESIDE = 1e-6
@@ -116,7 +116,7 @@ def find_reference(
 def _found(refined: Refined, tolerance: float, intervals: int, time_limit: float) -> Reference | None:
     """Try one mesh after the other."""
     began = time.perf_counter()
-    (phase,), (motion,) = refined.program.phases, refined.program.motions(refined.x)
+    (phase,), (motion,) = refined.program.up_to(_HIGHEST).phases, refined.program.motions(refined.x)
     best: Reference | None = None
     for degree, count in _meshes(phase.intervals, _fine(phase, intervals)):
         if best is not None and time.perf_counter() > began + time_limit:
@@ -150,8 +150,7 @@ def _on_mesh(phase: Phase, degree: int, intervals: int) -> Phase:
     if degree == _PARABOLAS:
         t_norm = np.union1d(t_norm, np.arange(1, intervals) / intervals - _BESIDE)
     grid = FixedGrid(clamped_uniform_knots(degree, intervals), degree, t_norm)
-    bounded = tuple(limit for limit in phase.limits if limit.order <= _CONTINUOUS_VELOCITY)
-    return phase.with_limits(bounded).over(grid, dataclasses.replace(phase.boundary, derivatives=1))
+    return phase.over(grid, dataclasses.replace(phase.boundary, derivatives=1))
 
 
 def _planned(phase: Phase, motion: Motion, tolerance: float, deadline: float) -> Refined | None:

@@ -4,7 +4,7 @@ from brachis.search.chart_starts import first_map
 from brachis.search.portfolio import Stages, find_fastest
 from brachis.search.recentring import best_of_joints, solved_in_chart
 from brachis.search.record import Record
-from brachis.search.solving import MARGINS, Listener, continued, solve_with
+from brachis.search.solving import MARGINS, Listener, continued, eased, solve_with
 
 __all__ = [
     "MARGINS",
@@ -13,6 +13,7 @@ __all__ = [
     "Stages",
     "best_of_joints",
     "continued",
+    "eased",
     "find_fastest",
     "first_map",
     "solve_with",
