@@ -30,7 +30,7 @@ class JointRatioLimit(Limit):
         self._joints, self._scale = joints, 1.0 / figures
         names = [robot.joint_names[i] for i in joints]
         self.labels = tuple(
-            Label(name, self.kind, units[i], f"robot.limits.{self.kind}.{name}")
+            Label(name, self.name, units[i], f"robot.limits.{self.kind}.{name}")
             for i, name in zip(joints, names, strict=True)
         )
         self.lower, self.upper = -np.ones(len(joints)), np.ones(len(joints))

@@ -53,6 +53,9 @@ def end_checks(
         if task.spline.vanishing > 1:
             bend, allowed = np.abs(trajectory.acceleration(time)), options.rest_acceleration_tolerance
             checks.append(_worst_joint(f"{name} acceleration", bend, allowed, "rad/s2, m/s2", robot, time))
+        if task.spline.vanishing > 2:  # noqa: PLR2004  (jerk)
+            jerk = np.abs(trajectory.jerk(time)) / (1.0 + np.abs(trajectory.jerk(trajectory.times)).max())
+            checks.append(_worst_joint(f"{name} jerk", jerk, options.rest_jerk_tolerance, "relative", robot, time))
     return checks
 
 
