@@ -1,13 +1,14 @@
 """An elbow arm of the literature with limits on torques and their rates, beside the published end time.
 
 Path and limits: D. Constantinescu, Smooth time optimal trajectory planning for industrial manipulators, MASc thesis,
-University of British Columbia, 1999. Links of 0.75 m, 6.6 kg and 4.2 kg; the path x = 0.5 m, y = 20 p^3 - 30 p^2 + 10 p,
-z = p - 0.5 (m) for p from 0 to 1; torques up to 140, 140 and 50 Nm, their rates up to 500, 500 and 100 Nm/s.
+University of British Columbia, 1999. Links of 0.75 m, 6.6 kg and 4.2 kg; the path x = 0.5 m,
+y = 20 p^3 - 30 p^2 + 10 p, z = p - 0.5 (m) for p from 0 to 1; torques up to 140, 140 and 50 Nm, their rates up to 500,
+500 and 100 Nm/s.
 
 Assumed, where this script knows no figure: the first joint turns about a vertical axis, the other two about horizontal
-ones at the height z = 0; links are slender uniform rods, and the column below them has no inertia; no payload, no friction, no drive inertia; gravity 9.81 m/s^2;
-the torques begin and end where they hold the arm at rest, and their rates may jump there. The arm is not redundant:
-there is one elbow up and one elbow down, and the faster one is printed.
+ones at the height z = 0; links are slender uniform rods, and the column below them has no inertia; no payload, no
+friction, no drive inertia; gravity 9.81 m/s^2; the torques begin and end where they hold the arm at rest, and their
+rates may jump there. The arm is not redundant: it has two sides and two elbows, and the fastest of the four is printed.
 """
 
 from __future__ import annotations

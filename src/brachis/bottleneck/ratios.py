@@ -61,9 +61,9 @@ def limit_ratios(trajectory: Trajectory, limits: Sequence[Limit] | None = None) 
     grid = (knots[:-1, None] + np.diff(knots)[:, None] * steps).ravel()
     samples = trajectory.at(np.clip(np.union1d(grid, trajectory.times), 0.0, trajectory.t_end))
     behind = (samples.t, samples.q, samples.qdot, samples.qddot, trajectory.jerk(samples.t))
-    before, jumps = _just_before(trajectory), np.zeros(len(trajectory.times) - 1, dtype=bool)
+    before, jumps = _just_before(trajectory), np.any(trajectory.qddot_before != trajectory.qddot, axis=1)[1:]
     if trajectory.degree <= max(limit.order for limit in limits):
-        jumps[:-1] = np.isin(trajectory.times[1:-1], knots)
+        jumps[:-1] |= np.isin(trajectory.times[1:-1], knots)
     t, *motion = (np.concatenate([first[jumps], then]) for first, then in zip(before, behind, strict=True))
     order = np.argsort(t, kind="stable")
     moments = Moments(*(part[order] for part in motion))
