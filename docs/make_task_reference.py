@@ -65,8 +65,11 @@ JSON schema that editors use for completion: put `# yaml-language-server: $schem
 file, with the schema saved beside it by `brachis schema --out task.schema.json`.
 
 Limits: an absent key takes the URDF's limit, `null` removes it, a number holds for all joints, a list is in the order
-of the chain, a mapping names joints (others keep the URDF's). Torque, velocity and acceleration limits lie between 1e-6
-and 1e12 in SI units, scaled ones too; ends of position ranges within 1e6 rad or m of zero, or open (`null`).
+of the chain, a mapping names joints (others keep the URDF's). Limits but those of position lie between 1e-6 and 1e12 in
+SI units, scaled ones too; ends of position ranges within 1e6 rad or m of zero, or open (`null`). Limits on `jerk` and
+`torque_rate` need splines of degree 3 at least and `rest: full`, so that they hold over the ends too; with `rest: jerk`
+(degree 4 at least) both begin and end at zero. Coulomb friction counts in the torque's rate by its slope: give it a
+`coulomb_velocity` over which it may change.
 
 `brachis.plan(robot, task)` with a `Robot` adds what the task's `robot` part sets to what the robot was made with; the
 robot stands for the `urdf` key, and what contradicts it is refused with its key.
