@@ -1,4 +1,4 @@
-"""The paper's eight lines with limits on jerk and on torque rate, and what differences of neighbouring points would miss.
+"""The eight planar lines with limits on jerk and torque rate, and what differences of neighbouring points would miss.
 
 For every line: end times without such limits, with the jerk limited, with the torque's rate limited (s; unverified ones
 are marked); then by how much differences of accelerations of neighbouring collocation points, three an interval,
@@ -31,7 +31,7 @@ def planned(angle_deg: float, **limits: float) -> tuple[brachis.Result, float]:
 def understated(result: brachis.Result) -> np.ndarray:
     """By how much differences understate the jerk between neighbouring points, as parts of the limit."""
     refined = result.attempt.refined
-    assert refined is not None  # noqa: S101  (it was finished)
+    assert refined is not None
     (phase,) = refined.program.phases
     t_norm = np.linspace(0.0, 1.0, 3 * phase.intervals + 1)
     state = phase.resampled(t_norm).state(refined.x)

@@ -75,6 +75,29 @@ def test_verification_finds_what_is_too_fast(kind, result):
     assert steps.max() == pytest.approx(FIGURES[kind], rel=1e-3)
 
 
+def test_verification_finds_a_rate_within_a_microsecond(kind, result):
+    """The rounding of positions hides the third derivative of so short a piece, not how its acceleration changes."""
+    trajectory, change = result.trajectory, np.array([0.1, 0.0, 0.0])
+    t = 0.4321 * trajectory.t_end + np.array([0.0, 1e-6])
+    place = int(np.searchsorted(trajectory.times, t[0]))
+    assert trajectory.times[place] > t[1]
+    at = trajectory.at(t)
+    qddot = at.qddot + np.array([[0.0], [1.0]]) * change
+    new = {"times": at.t, "q": at.q, "qdot": at.qdot, "qddot": qddot, "qddot_before": qddot}
+    arrays = {name: np.insert(getattr(trajectory, name), place, values, axis=0) for name, values in new.items()}
+    checks = {each.name: each for each in verify_trajectory(replace(trajectory, **arrays)).checks}
+    found = checks[f"{kind.replace('_', ' ')} ratio"]
+    inertia = 1.0 if kind == "jerk" else np.abs(trajectory.torque(t[0]) - _torque(trajectory, t[0], change)).max() / 0.1
+    assert found.value == pytest.approx(0.1 / 1e-6 * inertia / FIGURES[kind], rel=1e-2)
+    assert found.time == pytest.approx(t[0], abs=2e-6)
+
+
+def _torque(trajectory, t, change):
+    states = (np.atleast_2d(part(t)) for part in (trajectory.position, trajectory.velocity, trajectory.acceleration))
+    q, qdot, qddot = states
+    return torques(trajectory.robot, q, qdot, qddot + change)[0]
+
+
 @pytest.mark.parametrize(("step", "above"), [(0.01, 1e-4), (0.0005, 5e-6)])
 def test_prediction_is_what_solving_again_gives(kind, result, step, above):
     """Within 1 % other limits take over, here and there; the linearised problem knows, and for small steps none do."""
