@@ -42,6 +42,8 @@ class Start:
         Family of the closed form; ``chart`` where there is none.
     solver : str
         The solver that plans from it; empty while none is chosen.
+    timed : bool
+        Whether the joint path's values are those of a motion, at even times.
     """
 
     problem: Problem
@@ -51,6 +53,7 @@ class Start:
     origin: str
     family: str
     solver: str = ""
+    timed: bool = False
 
     @property
     def in_chart(self) -> bool:

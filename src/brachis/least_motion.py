@@ -38,8 +38,11 @@ _KEPT_BACK = 0.1e-4
 _WORTH_IT = 0.05
 """A motion whose accelerations are lower by less than this fraction does not replace the fastest one."""
 _TOLERANCE, _ITERATIONS = 1e-5, 60
-_PROGRESS, _PATIENCE = 1e-2, 5
-"""A solve ends where so many iterations lower the mean square by less than this fraction: near enough will do."""
+_PROGRESS, _PATIENCE, _ROUND = 1e-2, 5, 2
+"""A solve ends where so many iterations lower the mean square by less than this fraction: near enough will do.
+
+Rounds of refinement begin near enough, and end sooner.
+"""
 _TIME = 0.5
 """Part of the remaining time that may be used."""
 
@@ -116,7 +119,7 @@ def _calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastM
         return _kept(fastest, "no time was left")
     objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
     program, soon = before.program.minimising(objective), deadline.part(_TIME)
-    solve = _solver(start.solver, soon, listener)
+    solve = _solver(start.solver, soon, listener, _PATIENCE)
     first = solve(program, program.time_scaled(before.x, 1.0 + slower - _KEPT_BACK))
     if not first.status.usable:
         return _kept(fastest, f"the fastest motion stays: {first.status.value}", (first,))
@@ -126,6 +129,7 @@ def _calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastM
     options = RefinementOptions(
         settings.tolerance, settings.density, settings.max_rounds, soon, before.t_end * (1.0 + slower)
     )
+    solve = _solver(start.solver, soon, listener, _ROUND)
     found = completed(fastest, program, (first,), solve, options)
     return _better(fastest, found, 1.0 - np.sqrt(program.objective(found.refined.x)) if found.refined else 0.0)
 
@@ -165,7 +169,7 @@ def least_acceleration(program: Program, x: np.ndarray, slower: float) -> LeastA
     return LeastAcceleration(weights / np.sqrt(size) if size > 0.0 else weights, longest)
 
 
-def _solver(name: str, deadline: Deadline, listener: Listener) -> Solve:
+def _solver(name: str, deadline: Deadline, listener: Listener, patience: int) -> Solve:
     """Make a function that solves with a backend; any feasible motion will do, however the solve ended."""
     (backend,) = solver_named(name)
 
@@ -173,7 +177,7 @@ def _solver(name: str, deadline: Deadline, listener: Listener) -> Solve:
         listener(f"least motion: iteration {iteration}, joint accelerations (rms) {100.0 * objective**0.5:.1f} %")
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.for_a_solve, _PROGRESS, _PATIENCE)
+        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.for_a_solve, _PROGRESS, patience)
         report = backend.solve(program, x, options, progress)
         return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if report.feasible else report
 

@@ -175,7 +175,7 @@ def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
     problem = start.problem
     target = program_of(problem, start.joint_map, breaks_of(problem.task))
     program = coarsest(target) if target.variables > _MANY_VARIABLES else target
-    x = starting_point(program, [start.joint_path])
+    x = starting_point(program, [start.joint_path], timed=start.timed)
     if x is None:
         return Attempt.of(start, "the splines through the joint path leave the branch, or the chart")
     solve = _solver(start, deadline, listener)

@@ -40,11 +40,11 @@ def starts():
     robot = Robot.from_urdf(URDF, gravity=[0, 0, 0], limits=task.robot.limits)
     problem = Problem.of(robot, task)
     (level,) = SEARCH_LEVELS["fast"]
-    many = dataclasses.replace(level, in_charts=100, only_minima=False, joint_paths=8)
+    many = dataclasses.replace(level, in_charts=100, only_minima=False, cells_per_turn=24)
     found = chart_starts(problem, decompositions_of(problem), many)
     assert isinstance(found, list)
     assert len(found) > MOST
-    return found
+    return found[:12]
 
 
 def test_the_fastest_that_differ_are_kept(starts):
@@ -52,7 +52,7 @@ def test_the_fastest_that_differ_are_kept(starts):
     assert 1 <= len(kept) <= MOST
     estimates = [start.estimate for start in kept]
     assert estimates == sorted(estimates)
-    assert max(estimates) <= 1.05 * min(estimates)
+    assert max(estimates) <= 1.03 * min(estimates)
     for start in kept:
         q = start.joint_map.postures(start.joint_path)
         targets = start.problem.path.sample(start.joint_path[:, 0]).target

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -36,14 +37,10 @@ class PosedScrews:
 
     def jacobian_columns(self, joints: Sequence[int]) -> np.ndarray:
         """Columns (6, len(joints), K) of the tool's Jacobian: linear, then angular velocity, in world axes."""
-        columns = np.zeros((6, len(joints), self.axes.shape[2]), dtype=self.axes.dtype)
-        for place, i in enumerate(joints):
-            if self.revolute[i]:
-                columns[:3, place] = cross(self.axes[:, i], self.tool_position - self.points[:, i])
-                columns[3:, place] = self.axes[:, i]
-            else:
-                columns[:3, place] = self.axes[:, i]
-        return columns
+        chosen = list(joints)
+        axes, turns = self.axes[:, chosen], self.revolute[chosen][:, None]
+        lever = self.tool_position[:, None] - self.points[:, chosen]
+        return np.concatenate([np.where(turns, cross(axes, lever), axes), np.where(turns, axes, 0.0)])
 
 
 @dataclass(frozen=True)
@@ -95,6 +92,15 @@ class ChainGeometry:
         """Number of joints."""
         return len(self.joint_names)
 
+    @cached_property
+    def _generators(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """For each axis the matrices (3, 3) of Rodrigues' formula that sine and 1 - cosine of the angle go with.
+
+        They act from the left on the columns' index of rotation matrices (3, 3, K or 1): one product for all samples.
+        """
+        skews = [np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]) for x, y, z in self.axes]
+        return [(skew, skew @ skew) for skew in skews]
+
     def posed(self, q: np.ndarray) -> PosedScrews:
         """Screw axes and tool placement at K postures, by the product of exponentials.
 
@@ -132,7 +138,8 @@ class ChainGeometry:
             axes[:, here] = self.axes[here] @ rotation
             points[:, here] = self.points[here] @ rotation + offset[:, None]
             if self.revolute[i]:
-                rotation = _turned(rotation, self.axes[i], q[i])
+                first, second = self._generators[i]
+                rotation = rotation + (first @ rotation) * np.sin(q[i]) + (second @ rotation) * (1.0 - np.cos(q[i]))
                 offset = points[:, i] - (self.points[i, None] @ rotation)[:, 0]
             else:
                 offset = offset + axes[:, i] * q[i]
@@ -144,12 +151,3 @@ class ChainGeometry:
         return PosedScrews(
             axes, points, np.broadcast_to(position, (3, count)), np.broadcast_to(tool, (3, 3, count)), self.revolute
         )
-
-
-def _turned(rotation: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Rotation matrices (3, 3, K or 1) times those about one unit axis (Rodrigues' formula), (3, 3, K).
-
-    Matrices that are the same for all samples act from the left on the columns' index: one product for all samples.
-    """
-    skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    return rotation + (skew.T @ rotation) * np.sin(angle) + (skew @ skew @ rotation) * (1.0 - np.cos(angle))

@@ -60,10 +60,16 @@ class ChartState(PathState):
         C and its derivatives by s.
     drift : (3, K, r) ndarray
         e, e' and e''.
+    least : (K,) ndarray
+        Least singular value of J_aug.
+    singular : (K, n) ndarray
+        Its right singular vector.
     """
 
     rows: np.ndarray
     drift: np.ndarray
+    least: np.ndarray
+    singular: np.ndarray
 
 
 class ChartMap:
@@ -205,7 +211,10 @@ class ChartMap:
         bent = -2.0 * sdot * np.einsum("kij,kj->ki", rows[1], qdot) - drift[1] * sdot**2
         given = np.concatenate([sample.xi_ds * sdot**2 - self.task_map.bias(twists, qdot), bent], axis=1)
         qddot = np.einsum("kij,kj->ki", gradient, yddot) + np.einsum("kij,kj->ki", inverse, given)
-        return ChartState(self, y, ydot, yddot, ydddot, q, qdot, qddot, gradient, sample, twists, inverse, rows, drift)
+        least = _least_singular(inverse)
+        return ChartState(
+            self, y, ydot, yddot, ydddot, q, qdot, qddot, gradient, sample, twists, inverse, rows, drift, *least
+        )
 
     def derivatives(self, state: ChartState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""
@@ -242,12 +251,12 @@ class ChartMap:
 
     def margins(self, state: ChartState) -> np.ndarray:
         """See `JointMap`: the least singular value of J_aug, (K, 1), as a part of its median along the reference."""
-        return _least_singular(state.inverse)[0][:, None] / self._typical
+        return state.least[:, None] / self._typical
 
     def margin_gradient(self, state: ChartState) -> tuple[np.ndarray, np.ndarray]:
         """See `JointMap`: for singular vectors u and v of the least singular value it changes by u^T dJ_aug v."""
-        least, v = _least_singular(state.inverse)
-        u = least[:, None] * np.einsum("kji,kj->ki", state.inverse, v)
+        v = state.singular
+        u = state.least[:, None] * np.einsum("kji,kj->ki", state.inverse, v)
         m = self.task_map.m
         moved = self.task_map.derivatives(state.twists, v, np.zeros_like(v)).velocity_q
         by_s = np.einsum("ki,kij,kj->k", u[:, m:], state.rows[1], v)

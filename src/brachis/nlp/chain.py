@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from brachis.kinematics import JointState
@@ -37,7 +39,7 @@ def chain(partials: Partials, state: JointState) -> tuple[np.ndarray, ...]:
     return by_y, by_ydot, by_yddot, partials.qdddot @ state.gradient
 
 
-def by_time(by: tuple[np.ndarray, ...], state: JointState) -> np.ndarray:
+def by_time(by: Sequence[np.ndarray], state: JointState) -> np.ndarray:
     """Add up what `chain` found to -t_E d/dt_E of the limit, (K, c): a longer time slows the curves down."""
     derivatives = zip(by[1:], (state.ydot, state.yddot, state.ydddot), strict=False)
     return np.asarray(

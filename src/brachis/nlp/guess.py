@@ -6,7 +6,7 @@ The end time is scaled until all limits hold, which gives the solver a feasible 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -21,8 +21,11 @@ _SHRINKAGE = 0.8
 _SHORTEST_TIME, _LONGEST_TIME = 0.01, 200.0
 _FIT_DENSITY = 4
 
+TimeLaw = Callable[[np.ndarray], np.ndarray]
+"""Which part of a joint path is passed at normalised times."""
 
-def starting_point(program: Program, joint_paths: Sequence[np.ndarray]) -> np.ndarray | None:
+
+def starting_point(program: Program, joint_paths: Sequence[np.ndarray], *, timed: bool = False) -> np.ndarray | None:
     """Fit splines to a joint path of every phase, and scale the time until the limits hold.
 
     Control points taken from the joint path itself smooth it; where that leaves the branch, least squares follow it
@@ -33,33 +36,46 @@ def starting_point(program: Program, joint_paths: Sequence[np.ndarray]) -> np.nd
     program : Program
     joint_paths : sequence of (S, c) ndarray
         For each phase, successive values of its curves: along a path of s and the redundant joints.
+    timed : bool, optional
+        Whether they are those of a motion, at even times; otherwise they get a smooth one from rest to rest.
 
     Returns
     -------
     (v,) ndarray or None
         None where the fit is out of reach at a collocation point.
     """
+    passed_at = _evenly if timed else _smooth_from_rest_to_rest
     pairs = list(zip(program.phases, joint_paths, strict=True))
     for fit in (_smoothed, _followed):
         with contextlib.suppress(UnreachableError):
-            return shortest_time(program, np.concatenate([fit(phase, joint_path) for phase, joint_path in pairs]))
+            return shortest_time(
+                program, np.concatenate([fit(phase, joint_path, passed_at) for phase, joint_path in pairs])
+            )
     return None
 
 
-def _smoothed(phase: Phase, joint_path: np.ndarray) -> np.ndarray:
-    return phase.variables_from(Motion(1.0, phase.knots, phase.degree, _timed(joint_path, phase.splines[0].greville).T))
+def _smoothed(phase: Phase, joint_path: np.ndarray, passed_at: TimeLaw) -> np.ndarray:
+    points = _values(joint_path, passed_at(phase.splines[0].greville))
+    return phase.variables_from(Motion(1.0, phase.knots, phase.degree, points.T))
 
 
-def _followed(phase: Phase, joint_path: np.ndarray) -> np.ndarray:
+def _followed(phase: Phase, joint_path: np.ndarray, passed_at: TimeLaw) -> np.ndarray:
     t_norm = np.linspace(0.0, 1.0, _FIT_DENSITY * len(phase.knots))
-    return fitted(phase, 1.0, t_norm, _timed(joint_path, t_norm))
+    return fitted(phase, 1.0, t_norm, _values(joint_path, passed_at(t_norm)))
 
 
-def _timed(joint_path: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
-    """Follow a joint path, (S, c), with a smooth motion from rest to rest: the places at `t_norm`, (K, c)."""
-    u = t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
+def _evenly(t_norm: np.ndarray) -> np.ndarray:
+    return t_norm
+
+
+def _smooth_from_rest_to_rest(t_norm: np.ndarray) -> np.ndarray:
+    return t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
+
+
+def _values(joint_path: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Values (K, c) of a joint path, (S, c), at places from 0 to 1, (K,)."""
     grid = np.linspace(0.0, 1.0, len(joint_path))
-    return np.column_stack([np.interp(u, grid, column) for column in joint_path.T])
+    return np.column_stack([np.interp(places, grid, column) for column in joint_path.T])
 
 
 def fitted(phase: Phase, duration: float, t_norm: np.ndarray, wanted: np.ndarray) -> np.ndarray:

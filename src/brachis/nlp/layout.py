@@ -8,7 +8,7 @@ Rows: for each limit, in the order of the list, its c values at collocation poin
 path then the differences of successive control points of s, which are >= 0 so that ds/dt >= 0 holds at all times; where
 the knots are free, last the sum of h, which is 1. All rows are dimensionless.
 
-Entries of the Jacobian: for each limit those by T, by the variables of each curve and by h, all points of a place
+Entries of the Jacobian: those of all limits by T, by the variables of each curve and by h, all points of a place
 together; then -1 and 1 for each difference; last 1 for each of h.
 """
 
@@ -99,14 +99,13 @@ def _pattern(
     patterns = [(np.arange(count), np.zeros(count, dtype=int))]
     patterns += [(place.point, place.variable + part.start) for place, part in zip(places, slices, strict=True)]
     patterns.append((grid.point, grid.variable + lengths.start))
-    rows, columns = [], []
-    first = 0
-    for limit in limits:
-        size = len(limit.lower)
-        numbers = first + np.arange(count * size).reshape(count, size)
-        rows += [numbers[point].ravel() for point, _ in patterns]
-        columns += [np.repeat(variable, size) for _, variable in patterns]
-        first += count * size
+    sizes = [len(limit.lower) for limit in limits]
+    ends = count * np.cumsum([0, *sizes])
+    blocks = [np.arange(*pair).reshape(count, -1) for pair in itertools.pairwise(ends)]
+    numbers = np.concatenate([np.empty((count, 0), dtype=int), *blocks], axis=1)
+    rows = [numbers[point].ravel() for point, _ in patterns]
+    columns = [np.repeat(variable, sum(sizes)) for _, variable in patterns]
+    first = int(ends[-1])
     differences, of_h = first + np.arange(len(steps)), np.arange(lengths.start, lengths.stop)
     rows += [differences, differences, np.full(len(of_h), first + len(steps))]
     columns += [steps, steps + 1, of_h]

@@ -257,17 +257,19 @@ class Phase:
         return np.bincount(np.concatenate([of_time, *of_curves, of_lengths]), slopes, self.variables)
 
     def _chained(self, functions: Sequence[Partials], x: np.ndarray) -> Iterator[np.ndarray]:
-        """Differentiate each function of the joint motion by T, each curve's variables and h, (places, c) each."""
+        """Differentiate functions of the joint motion by T, each curve's variables and h, (places, c) all together."""
         state = self.state(x)
-        bases = [per_second(basis, x[0]) for basis in self._bases(x)]
-        slopes = per_second(self.grid.slopes(x[self._lengths], self._control_points(x)), x[0])
-        for partials in functions:
-            by = chain(partials, state)  # up to the derivative of the curves that the function asks for
-            yield by_time(by, state) / -x[0]
-            for j, (places, basis) in enumerate(zip(self._places, bases, strict=True)):
-                parts = (part[places.point, :, j] * values[:, None] for part, values in zip(by, basis, strict=False))
-                yield sum(parts, start=np.zeros(()))
-            yield np.concatenate(by, axis=2)[self.grid.point] @ np.hstack(slopes[: len(by)])[:, :, None]
+        each = [chain(partials, state) for partials in functions]
+        orders = max(len(parts) for parts in each)  # up to the derivative of the curves that any function asks for
+        padded = ((*parts, *[np.zeros_like(parts[0])] * (orders - len(parts))) for parts in each)
+        by = [np.concatenate(parts, axis=1) for parts in zip(*padded, strict=True)]
+        slopes = per_second(self.grid.slopes(x[self._lengths], self._control_points(x))[:orders], x[0])
+        yield by_time(by, state) / -x[0]
+        for j, (places, basis) in enumerate(zip(self._places, self._bases(x), strict=True)):
+            values = per_second(basis[:orders], x[0])
+            parts = (part[places.point, :, j] * own[:, None] for part, own in zip(by, values, strict=True))
+            yield sum(parts, start=np.zeros(()))
+        yield np.concatenate(by, axis=2)[self.grid.point] @ np.hstack(slopes)[:, :, None]
 
     def _bases(self, x: np.ndarray) -> list[np.ndarray]:
         """Basis functions of every curve's free variables, (3, z) each; computed anew where the grid's change."""

@@ -19,7 +19,7 @@ from brachis.nlp import Program
 from brachis.nlp.guess import fitted, shortest_time
 from brachis.problem import Problem, phase_in
 from brachis.refine import Solve
-from brachis.search.solving import HELD_BACK, MARGINS, continued
+from brachis.search.solving import HELD_BACK, MARGINS, WORTH_IT, continued
 from brachis.solvers import SolverReport, SolveStatus
 
 _TRANSVERSAL = 0.5
@@ -32,6 +32,7 @@ _SELECTED = (0, 3, 1)
 _CHOICES = 500
 """Choices of joints that are looked at, at most."""
 _DENSE = 4
+_OUT_OF_TIME = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
 
 Solved = tuple[Program, tuple[SolverReport, ...]]
 
@@ -57,7 +58,7 @@ def solved_in_chart(problem: Problem, program: Program, x: np.ndarray, solve: So
     """
     first, further = MARGINS[:1], MARGINS[1:]
     program, reports = continued(program, x, solve, first)
-    if not reports[-1].status.usable and reports[-1].status is not SolveStatus.TIME_LIMIT:
+    if not reports[-1].status.usable and reports[-1].status not in _OUT_OF_TIME:
         program, more = continued(program, x, solve, further)
         reports += more
     for _ in range(_RECENTRINGS):
@@ -70,7 +71,10 @@ def solved_in_chart(problem: Problem, program: Program, x: np.ndarray, solve: So
         if not more[-1].status.usable:
             reports = (*more, *reports)
             break
+        gained = more[-1].objective < (1.0 - WORTH_IT) * reports[-1].objective
         program, reports = other, reports + more
+        if not gained:
+            break
     if reports[-1].status.usable and program.safeguard_slack(reports[-1].x) <= HELD_BACK:
         other, more = continued(program, reports[-1].x, solve, further)
         if more[-1].status.usable:

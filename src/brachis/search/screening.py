@@ -29,9 +29,11 @@ _INTERVALS, _DEGREE = 12, 2
 """Parabolas jump from one acceleration to the next, as fastest motions do: so few say most."""
 _TOLERANCE, _ITERATIONS, _NEARLY = 1e-3, 25, 1e-2
 _PLACES = 97
+_PROGRESS, _PATIENCE = 5e-3, 3
+"""A quick solve ends where so many feasible iterates differ by no more than this fraction."""
 _SAME_TIME, _SAME_PATH = 0.02, 0.15
 """Starts are the same where their end times differ by less than this fraction, and no joint by more, rad or m."""
-_SLOWER = 1.05
+_SLOWER = 1.03
 """Starts that are slower than the fastest one by this factor are left out."""
 
 
@@ -72,7 +74,7 @@ def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
         return hopeless
     problem = _roughly(start.problem)
     program = program_of(problem, start.joint_map, np.linspace(0.0, 1.0, _INTERVALS + 1))
-    x = starting_point(program, [start.joint_path])
+    x = starting_point(program, [start.joint_path], timed=start.timed)
     if x is None:
         return hopeless
     try:
@@ -86,7 +88,7 @@ def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
     assert isinstance(chart, ChartMap)  # noqa: S101
     try:
         return dataclasses.replace(
-            start, joint_map=chart, joint_path=_curves(program, last.x), estimate=float(last.objective)
+            start, joint_map=chart, joint_path=_curves(program, last.x), estimate=float(last.objective), timed=True
         )
     except UnreachableError:
         return hopeless
@@ -104,7 +106,7 @@ def _solver(start: Start, deadline: Deadline) -> Solve:
     backend = solver_named(start.problem.task.solver.name)[0]
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.for_a_solve)
+        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.for_a_solve, _PROGRESS, _PATIENCE)
         report = backend.solve(program, x, options, None)
         nearly = report.violation < _NEARLY and not report.status.usable
         return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if nearly else report
@@ -113,13 +115,9 @@ def _solver(start: Start, deadline: Deadline) -> Solve:
 
 
 def _curves(program: Program, x: np.ndarray) -> np.ndarray:
-    """Successive values of a motion's curves, (S, 1 + r), evenly spread over the way that they go."""
+    """Values of a motion's curves, (S, 1 + r), at even times."""
     (motion,) = program.motions(x)
-    y, *_ = motion.at(np.linspace(0.0, motion.t_end, 4 * _PLACES))
-    steps = np.abs(np.diff(y, axis=0)) / np.maximum(np.ptp(y, axis=0), 1e-12)
-    way = np.append(0.0, np.cumsum(steps.max(axis=1)))
-    places = np.linspace(0.0, way[-1], _PLACES)
-    return np.column_stack([np.interp(places, way, curve) for curve in y.T])
+    return motion.at(np.linspace(0.0, motion.t_end, _PLACES))[0]
 
 
 def _same(first: Start, second: Start) -> bool:

@@ -28,7 +28,7 @@ _EASY = 2
 _ON_ITS_WAY = 1e-3
 _PATIENCE = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess, unless the task says otherwise."""
-_WORTH_IT = 2e-4
+WORTH_IT = 2e-4
 """A smaller branch margin that shortens the motion by less than this fraction is not worth its sharper turns."""
 
 
@@ -67,7 +67,7 @@ def continued(
         bounds.add(tried.safeguard_bounds)
         outcome = tried, solve(tried, x)
         if outcome[1].status.usable:
-            if solved and outcome[1].objective > (1.0 - _WORTH_IT) * solved[-1][1].objective:
+            if solved and outcome[1].objective > (1.0 - WORTH_IT) * solved[-1][1].objective:
                 failed.append(outcome)
                 break
             solved.append(outcome)

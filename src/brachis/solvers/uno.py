@@ -79,7 +79,8 @@ class _Stall:
         objective = objective_at(problem, point[: len(problem.x_lower)])  # in restoration Uno appends elastic variables
         self._objectives.append(objective)
         stop = self._watch.between_iterations(objective) or self._watch.iterations >= self._watch.options.max_iterations
-        stop = self._watch.has_settled(objective, infeasibility) or stop  # type: ignore[arg-type]
+        near = infeasibility if stationarity <= _STALL_STATIONARITY else np.inf  # type: ignore[operator]
+        stop = self._watch.has_settled(objective, near) or stop  # type: ignore[arg-type]
         recent = self._objectives[-_STALL_ITERATIONS:]
         self.seen = (
             not stop

@@ -93,7 +93,7 @@ class Watch:
         A redundant joint that no limit touches, the roll of a tool for example, leaves a set of equally fast motions,
         within which a solver wanders without ever seeing its conditions of optimality hold.
         """
-        self._feasible = [*self._feasible, objective] if infeasibility <= self.options.tolerance else []
+        self._feasible = [*self._feasible, objective] if infeasibility <= _FEASIBLE * self.options.tolerance else []
         recent = self._feasible[-self.options.patience :]
         spread = max(recent, default=0.0) - min(recent, default=0.0)
         self.stagnated = len(recent) == self.options.patience and spread <= self.options.progress * abs(objective)

@@ -16,6 +16,7 @@ from brachis.robot.task_map.twists import tool_bias, tool_motion
 
 _POSITIONS = 3
 _UNIT = 1e-2
+_NEARLY_HALF_A_TURN = 3.0  # rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,14 +52,12 @@ class Pose(TaskMap):
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """See `TaskMap.difference`: the translation and the rotation vector, in the frame of `second`."""
-        from scipy.spatial.transform import Rotation  # noqa: PLC0415  (a fifth of a second that others need not wait)
-
         first, second = np.broadcast_arrays(np.asarray(first, dtype=float), np.asarray(second, dtype=float))
         shape = first.shape[:-1]
         to = first[..., _POSITIONS:].reshape(*shape, 3, 3)
         back = np.swapaxes(second[..., _POSITIONS:].reshape(*shape, 3, 3), -1, -2)
         shift = np.einsum("...ij,...j->...i", back, first[..., :_POSITIONS] - second[..., :_POSITIONS])
-        turn = Rotation.from_matrix((back @ to).reshape(-1, 3, 3)).as_rotvec()
+        turn = _rotation_vectors((back @ to).reshape(-1, 3, 3))
         return np.concatenate([shift, turn.reshape(*shape, 3)], axis=-1)
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
@@ -74,3 +73,18 @@ class Pose(TaskMap):
         tool = tool_motion(twists, qdot, qddot)
         parts = (tool.velocity_q, tool.acceleration_q, tool.acceleration_qdot)
         return TaskDerivatives(*(self.jacobian(part) for part in parts))
+
+
+def _rotation_vectors(rotations: np.ndarray) -> np.ndarray:
+    """Rotation vectors (K, 3) of rotation matrices (K, 3, 3); of one near half a turn by SciPy, through quaternions."""
+    twice = rotations - np.swapaxes(rotations, 1, 2)
+    axes = 0.5 * np.stack([twice[:, 2, 1], twice[:, 0, 2], twice[:, 1, 0]], axis=1)
+    sine, cosine = np.linalg.norm(axes, axis=1), 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0)
+    angles = np.arctan2(sine, cosine)
+    vectors = axes * np.divide(angles, sine, out=np.ones_like(sine), where=sine > 0.0)[:, None]
+    far = angles > _NEARLY_HALF_A_TURN
+    if far.any():
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415  (a fifth of a second that most need not wait)
+
+        vectors[far] = Rotation.from_matrix(rotations[far]).as_rotvec()
+    return np.asarray(vectors)
