@@ -44,10 +44,12 @@ class AllJointsMap(DirectJointMap):
         """See `JointMap`."""
         return y[:, 1:]
 
-    def state(self, y: np.ndarray, ydot: np.ndarray, yddot: np.ndarray, **_turns: object) -> JointState:
+    def state(
+        self, y: np.ndarray, ydot: np.ndarray, yddot: np.ndarray, ydddot: np.ndarray, **_turns: object
+    ) -> JointState:
         """See `JointMap`."""
         gradient = np.broadcast_to(np.eye(self.r, self.r + 1, 1), (len(y), self.r, self.r + 1))
-        return JointState(y, ydot, yddot, y[:, 1:], ydot[:, 1:], yddot[:, 1:], gradient)
+        return JointState(self, y, ydot, yddot, ydddot, y[:, 1:], ydot[:, 1:], yddot[:, 1:], gradient)
 
 
 class FullSpace:
@@ -66,7 +68,7 @@ class FullSpace:
         joint_map, breaks = AllJointsMap(problem), breaks_of(problem.task)
         free = np.full(robot.n, np.nan)
         ends = [free if posture is None else posture for posture in (problem.start, problem.end)]
-        order = 2 if spline.rest == "full" else 1
+        order = spline.vanishing
         boundary = Boundary(joint_map.coordinates(0.0, ends[0]), joint_map.coordinates(1.0, ends[1]), order)
         grid = FixedGrid(clamped_knots(spline.degree, breaks), spline.degree, spread(breaks, points))
         self.task_map, self.path = problem.task_map, problem.path

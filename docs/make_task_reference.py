@@ -78,7 +78,10 @@ file, with the schema saved beside it by `brachis schema --out task.schema.json`
 Limits: an absent key takes the URDF's limit, `null` removes it, a number holds for all joints, a list is in the order
 of the chain, a mapping names joints (others keep the URDF's). Torque and velocity limits may differ in both directions:
 in a list or mapping a pair `[lower, upper]`, lower < 0 < upper, stands for a number. Such numbers lie between 1e-6 and
-1e12 in SI units, scaled ones too; ends of position ranges within 1e6 rad or m of zero, or open (`null`).
+1e12 in SI units, scaled ones too; ends of position ranges within 1e6 rad or m of zero, or open (`null`). Limits on
+`jerk` and `torque_rate` need splines of degree 3 at least and `rest: full`, so that they hold over the ends too; with
+`rest: jerk` (degree 4 at least) both begin and end at zero. Coulomb friction counts in the torque's rate by its slope:
+give it a `coulomb_velocity` over which it may change.
 
 Friction is written likewise: absent, `viscous` and `coulomb` are `damping` and `friction` of the URDF's `<dynamics>`;
 `null` switches them off. Payload, tool offset and mounting change the robot without the URDF: the payload's `com` and

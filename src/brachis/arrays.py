@@ -1,10 +1,15 @@
-"""Arrays that cannot be written to, and products of arrays of vectors."""
+"""Arrays that cannot be written to, products of arrays of vectors, and rates along motions."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+
+_STEP = 3e-5
+"""By so much a motion goes on, in units of its coordinates, to differentiate what depends on it: the error of central
+differences is of the order of its square."""
 
 
 def freeze(owner: Any, *names: str) -> None:  # noqa: ANN401  (any frozen dataclass)
@@ -23,3 +28,33 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     np.subtract(a[2] * b[0], a[0] * b[2], out=product[1, ...])
     np.subtract(a[0] * b[1], a[1] * b[0], out=product[2, ...])
     return product
+
+
+def rates(parts: Callable[..., Sequence[np.ndarray]], motion: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Time derivatives of functions of a motion, by central differences along it.
+
+    Parameters
+    ----------
+    parts : callable
+        ``parts(x, xdot, xddot, xdddot)`` returns arrays (2 K, ...) for arrays (2 K, c).
+    motion : sequence of (K, c) ndarray
+        Value and three time derivatives at K moments.
+
+    Returns
+    -------
+    list of (K, ...) ndarray
+        Per second.
+    """
+    x, *derivatives = motion
+    speeds = [np.abs(part).max(axis=1, initial=0.0) ** (1.0 / order) for order, part in enumerate(derivatives, 1)]
+    h = _STEP / np.maximum(np.max(speeds, axis=0), 1.0)
+    step = np.concatenate([h, -h])[:, None]
+    xdot, xddot, xdddot = (np.tile(part, (2, 1)) for part in derivatives)
+    moved = (
+        np.tile(x, (2, 1)) + step * (xdot + step / 2.0 * (xddot + step / 3.0 * xdddot)),
+        xdot + step * (xddot + step / 2.0 * xdddot),
+        xddot + step * xdddot,
+        xdddot,
+    )
+    sides = (np.split(part, 2) for part in parts(*moved))
+    return [(ahead - behind) / (2.0 * h.reshape(-1, *[1] * (ahead.ndim - 1))) for ahead, behind in sides]

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.errors import StartError, UnknownNameError
+from brachis.errors import InputError, StartError, UnknownNameError
 from brachis.ik import Match
 from brachis.limits import Limit, Moments
 from brachis.path import Path, check_on_path
 from brachis.plausibility import position_hint
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joint_space import complement, difference
+from brachis.task import SplineSettings
 
 _RANGE_SLACK = 1e-9
 _SAME_POSTURE = 1e-5
@@ -87,6 +88,24 @@ def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str) -> N
                 allowed=f"{allowed} {label.unit}",
                 hint=f"Choose another posture{f', or raise {label.key}' if label.key else ''}",
             )
+
+
+def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:
+    """Refuse limits on a derivative that is unbounded, where the one before it jumps: at knots, or at the ends.
+
+    Raises
+    ------
+    InputError
+    """
+    for limit in limits:
+        jumping = {2: "velocity", 3: "acceleration"}[limit.order]
+        asked = f"the {limit.name} limit asks for a continuous {jumping}"
+        if spline.degree < limit.order:
+            found = f"{spline.degree}, with which it jumps at knots"
+            raise InputError(asked, where="spline.degree", found=found, allowed=f">= {limit.order}")
+        if spline.vanishing + 1 < limit.order:
+            found = f"{spline.rest}, with which it jumps at the ends"
+            raise InputError(asked, where="spline.rest", found=found, allowed="full or jerk")
 
 
 def _in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:

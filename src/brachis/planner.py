@@ -36,6 +36,7 @@ from brachis.search import (
     Stages,
     best_of_joints,
     continued,
+    eased,
     find_fastest,
     first_breaks,
     first_map,
@@ -180,6 +181,7 @@ def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
         return Attempt.of(start, "the splines through the joint path leave the branch, or the chart")
     solve = _solver(start, deadline, listener)
     try:
+        x, before = eased(program, x, solve, MARGINS[0])
         if start.in_chart:
             program, reports = solved_in_chart(problem, program, x, solve)
             joint_map = program.phases[0].joint_map
@@ -188,7 +190,7 @@ def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
             program, reports = continued(program, x, solve, MARGINS)
     except ImportError as error:
         return Attempt.of(start, f"{start.solver}: not installed ({error})")
-    last = reports[-1]
+    reports, last = (*before, *reports), reports[-1]
     coarse = last.objective if last.status.usable else np.inf
     return Attempt.of(start, _in_words(last.status), program=program, target=target, reports=reports, coarse=coarse)
 

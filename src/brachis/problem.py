@@ -11,7 +11,14 @@ from brachis import ik
 from brachis.bspline import clamped_knots, spread
 from brachis.custom_limits import LimitModel
 from brachis.errors import DecompositionError, StartError, UnknownNameError
-from brachis.feasibility import branch_of, check_end_branch, check_postures, check_regular, lacks_a_direction
+from brachis.feasibility import (
+    branch_of,
+    check_end_branch,
+    check_postures,
+    check_regular,
+    check_smoothness,
+    lacks_a_direction,
+)
 from brachis.kinematics import ClosedFormMap, JointMap, Newton
 from brachis.limits import Limit, limits_of
 from brachis.mesh import COARSE_INTERVALS
@@ -66,13 +73,15 @@ class Problem:
         Raises
         ------
         InputError
-            Task space, postures, path or a limit of the user's do not fit the robot.
+            Task space, postures, path or a limit of the user's do not fit the robot; the splines are not smooth enough
+            for a limit.
         """
         robot, task_map = bind(robot, task.task_space)
         start = None if task.start == "free" else robot.posture(task.start.joints, "start.joints")
         end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
         path = path_of(task_map, task)
         limits = limits_of(robot, task, further)
+        check_smoothness(limits, task.spline)
         check_postures(task_map, limits, start, end, path)
         if end is not None:
             end = _on_path(task_map, end, path)
@@ -236,8 +245,8 @@ def phase_in(problem: Problem, joint_map: JointMap, grid: Grid) -> Phase:
     """Write the motion along the path down as a phase, in the coordinates of a joint map, over a grid."""
     free = np.full(problem.robot.n, np.nan)
     start, end = (free if posture is None else posture for posture in (problem.start, problem.end))
-    rest = 2 if problem.task.spline.rest == "full" else 1
-    boundary = Boundary(joint_map.coordinates(0.0, start), joint_map.coordinates(1.0, end), rest)
+    ends = joint_map.coordinates(0.0, start), joint_map.coordinates(1.0, end)
+    boundary = Boundary(*ends, problem.task.spline.vanishing)
     return Phase(joint_map, problem.limits, grid, boundary)
 
 

@@ -33,7 +33,7 @@ def test_planar_line(scara):
     state = joint_map.state(*motion.at(t), t=t)
     torque = dynamics.torque(joint_map.robot, state.q, state.qdot, state.qddot)
     assert np.abs(torque / joint_map.robot.limits.torque).max() <= 1.0 + 1e-4
-    y, ydot, _ = motion.at(np.array([0.0, motion.t_end]))
+    y, ydot, *_ = motion.at(np.array([0.0, motion.t_end]))
     np.testing.assert_allclose(y[:, 0], [0.0, 1.0], atol=1e-12)
     np.testing.assert_allclose(ydot, 0.0, atol=1e-9)
     words = str(report)

@@ -8,7 +8,7 @@ from scipy.interpolate import BSpline
 
 from brachis.bspline import basis_matrix, clamped_uniform_knots, local_basis
 
-CASES = [(degree, derivative) for degree in range(2, 7) for derivative in range(3)]
+CASES = [(degree, derivative) for degree in range(2, 7) for derivative in range(min(degree, 3) + 1)]
 
 
 def knots_of(degree: int, *, uniform: bool) -> np.ndarray:
@@ -32,7 +32,7 @@ def test_any_spline_and_its_derivatives(degree, derivative, uniform):
     scale = np.abs(expected).max()
     assert scale > 0.0
     first, values = local_basis(knots, degree, t_norm)
-    assert values.shape == (3, len(t_norm), degree + 1)
+    assert values.shape == (4, len(t_norm), degree + 1)
     mine = np.einsum("kw,kwc->kc", values[derivative], coefficients[first[:, None] + np.arange(degree + 1)])
     np.testing.assert_allclose(mine, expected, atol=1e-12 * scale)
     if derivative == 0:
@@ -48,7 +48,7 @@ def test_partition_of_unity_and_its_vanishing_derivatives(degree):
     _, (values, *derivatives) = local_basis(knots, degree, t_norm)
     assert values.min() >= -1e-15
     np.testing.assert_allclose(values.sum(axis=1), 1.0, atol=1e-13)
-    for slopes in derivatives:
+    for slopes in derivatives[:degree]:
         assert np.abs(slopes).max() > 1.0
         np.testing.assert_allclose(slopes.sum(axis=1), 0.0, atol=1e-12 * np.abs(slopes).max())
 

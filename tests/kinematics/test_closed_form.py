@@ -39,7 +39,7 @@ T = np.linspace(0.02, 0.98, 25)
 
 
 def test_path_is_met_exactly(motion):
-    y, _, _ = motion(T)
+    y, *_ = motion(T)
     chain = motion.joint_map
     targets = chain.path.sample(y[:, 0]).target
     np.testing.assert_allclose(chain.task_map.values(chain.postures(y)), targets, atol=1e-12)
@@ -95,4 +95,4 @@ def test_target_out_of_reach(scara_urdf):
     assert np.isfinite(postures[0]).all()
     assert np.isnan(postures[1, :2]).all()
     with pytest.raises(UnreachableError, match="out of the branch's reach"):
-        chain.state(y, 0.0 * y, 0.0 * y)
+        chain.state(y, 0.0 * y, 0.0 * y, 0.0 * y)

@@ -32,6 +32,7 @@ def test_pieces_agree_with_the_closed_form_at_random_times(pattern, start, redun
     assert np.abs(curve(t) - state.q).max() < 1e-10
     assert np.abs(curve(t, nu=1) - state.qdot).max() < 1e-8
     assert np.abs(curve(t, nu=2) - state.qddot).max() < 1e-5 * np.abs(state.qddot).max()
+    assert np.abs(curve(t, nu=3) - state.qdddot).max() < 1e-5 * np.abs(state.qdddot).max()
 
 
 def test_nodes_contain_the_breaks_and_are_denser_where_the_motion_bends(scara_urdf):
@@ -57,7 +58,7 @@ def test_motion_that_leaves_the_branch_between_the_breaks(scara_urdf):
     def excursion(t):
         s = np.sin(4.0 * np.pi * t) ** 2 * 60.0  # far off at all times but the quarters
         y = np.stack([s, np.full_like(t, 0.6)], axis=1)
-        return y, 0.0 * y, 0.0 * y
+        return y, 0.0 * y, 0.0 * y, 0.0 * y
 
     with pytest.raises(UnreachableError):
         interpolate(chain, excursion, np.array([0.0, 1.0]), jumps=False)

@@ -30,13 +30,15 @@ TOOL = ToolLimits(
 TASK = SimpleNamespace(tool_limits=TOOL, custom_limits={})
 RNG = np.random.default_rng(3)
 # The path coordinates lie off all kinks.
-STATES = Moments(*(RNG.normal(size=(6, 3)) for _ in range(3)), s=np.array([0.085, 0.15, 0.315, 0.59, 0.7, 0.93]))
-BY = ("q", "qdot", "qddot", "s")
+STATES = Moments(*(RNG.normal(size=(6, 3)) for _ in range(4)), s=np.array([0.085, 0.15, 0.315, 0.59, 0.7, 0.93]))
+ORDERS = ("q", "qdot", "qddot", "qdddot")
+BY = (*ORDERS, "s")
 
 
 @pytest.fixture(params=sorted(TABLE))
 def limit(request):
-    limits = dataclasses.replace(ROBOT.limits, acceleration=np.array([5.0, np.inf, 7.0]))
+    some = np.array([5.0, np.inf, 7.0])
+    limits = dataclasses.replace(ROBOT.limits, acceleration=some, jerk=10.0 * some, torque_rate=100.0 * some)
     built = TABLE[request.param](dataclasses.replace(ROBOT, limits=limits), TASK)
     assert built.kind == request.param
     return built
@@ -44,7 +46,7 @@ def limit(request):
 
 def test_partials_equal_differences(limit):
     h, found = 1e-4, limit.partials(STATES)
-    assert any(getattr(found, part) is not None for part in ("q", "qdot", "qddot"))
+    assert any(getattr(found, part) is not None for part in ORDERS)
     for part in BY:
         exact = getattr(found, part)
         for column in range(1 if part == "s" else 3):
@@ -88,7 +90,7 @@ def test_ratios_are_one_at_the_bounds_and_violations_begin_there(limit):
         np.testing.assert_allclose(limit.violation(values)[0, on], 0.0, atol=1e-12)
 
 
-NO_LINES = {"position", "power", "total_power", "torque_speed", "rms_torque"}
+NO_LINES = {"position", "power", "total_power", "torque_speed", "rms_torque", "jerk", "torque_rate"}
 
 
 def test_lines_of_the_phase_plane_are_the_limit_along_a_path(limit):
@@ -101,7 +103,7 @@ def test_lines_of_the_phase_plane_are_the_limit_along_a_path(limit):
     if lines is None:
         assert limit.kind in NO_LINES
         return
-    values = limit.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, s))
+    values = limit.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, np.zeros_like(q), s))
     found = (0.0 if lines.u is None else lines.u * u) + lines.x * speed**2 + lines.constant
     if limit.kind == "tool_acceleration":  # components of it
         found = np.linalg.norm(found, axis=1)[:, None]
@@ -116,13 +118,15 @@ def test_lines_of_the_phase_plane_are_the_limit_along_a_path(limit):
 
 
 def limit_source(limit):
-    acceleration = np.array([5.0, np.inf, 7.0]) if limit.kind == "acceleration" else ROBOT.limits.acceleration
-    return dataclasses.replace(ROBOT.limits, acceleration=acceleration)
+    given = {
+        kind: np.array([5.0, np.inf, 7.0]) for kind in ("acceleration", "jerk", "torque_rate") if kind == limit.kind
+    }
+    return dataclasses.replace(ROBOT.limits, **given)
 
 
 def test_limits_come_in_the_order_of_the_table_and_only_where_there_is_one():
     kinds = [limit.kind for limit in limits_of(ROBOT, TASK)]
-    assert kinds == [kind for kind in TABLE if kind != "acceleration"]
+    assert kinds == [kind for kind in TABLE if kind not in ("acceleration", "jerk", "torque_rate")]
     open_task = SimpleNamespace(tool_limits=ToolLimits(), custom_limits={})
     kinds = [limit.kind for limit in limits_of(planar_robot("RRP", "xz"), open_task)]
     assert kinds == ["torque", "velocity", "position"]
@@ -188,5 +192,5 @@ def test_pairs_of_limits_bound_the_phase_plane_by_the_direction_of_motion():
     still = planar_robot("RRP", "xz", limits=LimitSpec(**PAIRS))
     torque, u, speed = TABLE["torque"](still, TASK), 0.7, 1.3
     lines = torque.lines(s, q, q_ds, q_dds)
-    values = torque.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, s))
+    values = torque.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, 0.0 * q, s))
     np.testing.assert_allclose(lines.u * u + lines.x * speed**2 + lines.constant, values, atol=1e-9)

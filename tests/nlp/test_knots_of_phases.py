@@ -85,7 +85,9 @@ def test_points_move_with_the_knots():
     np.testing.assert_allclose(motion.breaks / motion.t_end, ends, atol=1e-14)
     t_norm = spread(ends, 2)
     state = free.state(there)
-    for mine, theirs in zip((state.y, state.ydot, state.yddot), motion.at(t_norm * motion.t_end), strict=True):
+    for mine, theirs in zip(
+        (state.y, state.ydot, state.yddot, state.ydddot), motion.at(t_norm * motion.t_end), strict=True
+    ):
         np.testing.assert_allclose(mine, theirs, atol=1e-11 * max(1.0, np.abs(theirs).max()))
     np.testing.assert_allclose(free.violation_at(there, t_norm), free.violation(there), atol=1e-9)
 

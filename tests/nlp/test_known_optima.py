@@ -168,6 +168,46 @@ def test_acceleration_limit(slides):
     assert best <= result.t_end < 1.01 * best
 
 
+JERK = 50.0
+
+
+@pytest.mark.parametrize("limit", [{"jerk": JERK}, {"torque_rate": JERK * MASS}], ids=str)
+def test_jerk_limit(slides, limit):
+    # The jerk is J, -J, -J, J over a quarter of the time each: L = J t^3 / 32.
+    urdf, t = slides([X], [FORCE]), np.linspace(0.0, 1.0, 2001)
+    free = plan(urdf, ["x"], [LENGTH], intervals=20, rest="full")
+    assert np.abs(free.trajectory.jerk(t * free.t_end)).max() > 5.0 * JERK
+    result = plan(urdf, ["x"], [LENGTH], intervals=20, rest="full", robot={"limits": limit})
+    assert result.verified
+    assert result.t_end == pytest.approx((32.0 * LENGTH / JERK) ** (1.0 / 3.0), rel=1e-3)
+    assert np.abs(result.trajectory.jerk(t * result.t_end)).max() <= JERK * (1.0 + SLACK)
+    assert result.t_end > 1.3 * free.t_end
+
+
+@pytest.mark.parametrize("acceleration", [None, 8.0])
+def test_jerk_limit_beside_limits_of_velocity_and_acceleration(slides, acceleration):
+    velocity = 1.5
+    limits = {"jerk": JERK, "velocity": velocity, "acceleration": acceleration}
+    result = plan(slides([X], [FORCE]), ["x"], [LENGTH], intervals=48, rest="full", robot={"limits": limits})
+    # The velocity is reached in 2 sqrt(v / J), or in v / a + a / J where the acceleration stays at its limit.
+    ramp = 2.0 * np.sqrt(velocity / JERK) if acceleration is None else velocity / acceleration + acceleration / JERK
+    assert result.verified
+    assert LENGTH / velocity + ramp <= result.t_end < (LENGTH / velocity + ramp) * 1.001
+
+
+def test_rest_in_jerk_too(slides):
+    robot = {"limits": {"jerk": JERK}}
+    result = plan(slides([X], [FORCE]), ["x"], [LENGTH], intervals=40, degree=4, rest="jerk", robot=robot)
+    assert result.verified
+    names = [check.name for check in result.verification.checks]
+    assert {"start jerk", "end jerk"} <= set(names)
+    jerk = result.trajectory.jerk(np.linspace(0.0, result.t_end, 4001))
+    np.testing.assert_allclose(jerk[[0, -1]], 0.0, atol=1e-4)
+    assert np.abs(np.diff(jerk, axis=0)).max() < 0.05 * JERK, "it is continuous"
+    best = (32.0 * LENGTH / JERK) ** (1.0 / 3.0)
+    assert best < result.t_end < 1.03 * best
+
+
 def test_armature_is_carried_like_mass(slides):
     result = plan(
         slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, 0.0], robot={"friction": {"armature": {"j1": 3.0}}}

@@ -43,18 +43,21 @@ class Sway:
     joint_map: ClosedFormMap | ChartMap
     amplitude: float = 0.25
 
-    def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return y, ydot and yddot at times t in [0, 1], each (K, 1 + r)."""
-        columns = [(0.5 - 0.5 * np.cos(np.pi * t), 0.5 * np.pi * np.sin(np.pi * t), 0.5 * np.pi**2 * np.cos(np.pi * t))]
+    def __call__(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return y and three derivatives at times t in [0, 1], each (K, 1 + r)."""
+
+        def swing(rate: float, phase: float) -> np.ndarray:
+            return np.array([rate**order * np.sin(rate * t + phase + order * np.pi / 2.0) for order in range(4)])
+
+        value = np.array([1.0, 0.0, 0.0, 0.0])[:, None]
+        columns = [0.5 * value + 0.5 * swing(np.pi, -np.pi / 2.0)]
         for place, q in enumerate(self.joint_map.coordinates(0.0, self.joint_map.start)[1:]):
-            rate, a = 2.0 + place, self.amplitude
-            columns.append((q + a * np.sin(rate * t), a * rate * np.cos(rate * t), -a * rate**2 * np.sin(rate * t)))
-        y, ydot, yddot = (np.stack(parts, axis=1) for parts in zip(*columns, strict=True))
-        return y, ydot, yddot
+            columns.append(q * value + self.amplitude * swing(2.0 + place, 0.0))
+        return tuple(np.stack(columns, axis=2))
 
 
 def check_time_derivatives(motion: Any, t: np.ndarray, exact: float) -> None:
-    """Positions are the postures', to `exact`; velocities and accelerations their differences over time."""
+    """Positions are the postures', to `exact`; velocities, accelerations and jerks differences over time."""
     joint_map, h = motion.joint_map, 1e-4
     state = joint_map.state(*motion(t))
     before, here, after = (joint_map.postures(motion(t + step)[0]) for step in (-h, 0.0, h))
@@ -64,11 +67,15 @@ def check_time_derivatives(motion: Any, t: np.ndarray, exact: float) -> None:
     assert np.abs(bend).max() > 0.1
     np.testing.assert_allclose(state.qdot, speed, atol=1e-5 * np.abs(speed).max())
     np.testing.assert_allclose(state.qddot, bend, atol=1e-5 * np.abs(bend).max())
+    before, after = (joint_map.state(*motion(t + step), near=here).qddot for step in (-h, h))
+    jerk = (after - before) / (2.0 * h)
+    assert np.abs(jerk).max() > 0.1
+    np.testing.assert_allclose(state.qdddot, jerk, atol=1e-5 * np.abs(jerk).max())
 
 
 def check_derivatives(motion: Any, t: np.ndarray) -> JointDerivatives:
-    """Compare the derivatives of a joint map with central differences by every column of y, ydot and yddot."""
-    joint_map, h, parts = motion.joint_map, 1e-5, motion(t)
+    """Compare the derivatives of a joint map with central differences by every column of y and its derivatives."""
+    joint_map, h, parts = motion.joint_map, 3e-5, motion(t)
     state = joint_map.state(*parts)
     exact = joint_map.derivatives(state)
 
@@ -78,10 +85,11 @@ def check_derivatives(motion: Any, t: np.ndarray) -> JointDerivatives:
             moved = [part.copy() for part in parts]
             moved[place][:, column] += sign * h
             sides.append(joint_map.state(*moved))
-        return [(getattr(sides[0], name) - getattr(sides[1], name)) / (2.0 * h) for name in ("q", "qdot", "qddot")]
+        names = ("q", "qdot", "qddot", "qdddot")
+        return [(getattr(sides[0], name) - getattr(sides[1], name)) / (2.0 * h) for name in names]
 
     for column in range(1 + joint_map.r):
-        by_y, by_ydot, by_yddot = (difference(place, column) for place in range(3))
+        by_y, by_ydot, by_yddot, by_ydddot = (difference(place, column) for place in range(4))
         gradient = state.gradient[:, :, column]
         # Zeros: position does not hang on speed, nor speed on acceleration.
         for value, expected in (
@@ -94,6 +102,12 @@ def check_derivatives(motion: Any, t: np.ndarray) -> JointDerivatives:
             (0.0 * gradient, by_yddot[0]),
             (0.0 * gradient, by_yddot[1]),
             (gradient, by_yddot[2]),
+            (gradient, by_ydddot[3]),
+            (3.0 * exact.qdot_y[:, :, column], by_yddot[3]),
+            (3.0 * exact.qddot_y[:, :, column], by_ydot[3]),
         ):
             np.testing.assert_allclose(value, expected, atol=2e-7 * max(1.0, np.abs(expected).max()))
+        # A difference of differences, where the highest derivatives of a chart's splines have corners at its knots.
+        value, expected = state.qdddot_y[:, :, column], by_y[3]
+        np.testing.assert_allclose(value, expected, atol=2e-6 * max(1.0, np.abs(expected).max()))
     return exact

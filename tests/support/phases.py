@@ -28,9 +28,11 @@ CASES: dict[str, tuple[str, list[str], list[float], list[str]]] = {
 
 
 def phase_of(case: str, *, end: list[float] | None = None, position: Any = FROM_URDF, **spline: Any) -> Phase:
-    """A bent path in the vertical plane under gravity, friction, and limits of every kind."""
+    """A bent path in the vertical plane under gravity, friction, and limits of every kind that the splines can hold."""
     pattern, rows, start, redundant = CASES[case]
     friction = {**FRICTION, "viscous": [1.0 + 0.1 * i for i in range(len(pattern))]}
+    settings = {"degree": 3, "intervals": 5, "points_per_interval": 2, **spline}
+    bounded = settings["degree"] > 2 and settings.get("rest") != "velocity"
     limits = LimitSpec(
         acceleration=20.0,
         position=position,
@@ -38,11 +40,12 @@ def phase_of(case: str, *, end: list[float] | None = None, position: Any = FROM_
         total_power=90.0,
         rms_torque=70.0,
         torque_speed={"j1": [[0.0, 100.0], [1.0, 90.0], [3.0, 40.0]]},
+        jerk=300.0 if bounded else None,
+        torque_rate=5e3 if bounded else None,
     )
     robot = planar_robot(pattern, "xz", friction=friction, limits=limits)
     through = [[-0.05, 0.05, 0.1], [-0.1, 0.06, 0.15], [-0.13, 0.03, 0.2]]
     path = [{"spline": {"through": [point[: len(rows)] for point in through], "relative": True}}]
-    settings = {"degree": 3, "intervals": 5, "points_per_interval": 2, **spline}
     (phase,) = program_of(robot, rows, path, start, redundant, end=end, tool_limits=TOOL_LIMITS, **settings).phases
     return phase
 

@@ -11,6 +11,7 @@ from brachis.arrays import freeze
 from brachis.limits import Label, Limit, Moments, limits_of
 from brachis.robot import bind
 from brachis.trajectory import Trajectory
+from brachis.trajectory.pieces import one_sided_derivatives
 
 _POINTS_PER_INTERVAL = 40
 
@@ -22,7 +23,7 @@ class LimitRatios:
     Attributes
     ----------
     t : (K,) ndarray
-        Ascending, s; a time at which the acceleration jumps occurs twice, before and after the jump.
+        Ascending, s; a time at which a derivative that a limit asks for jumps occurs twice, before and after the jump.
     labels : tuple of Label
         What every column is.
     values : (K, c) ndarray
@@ -59,12 +60,19 @@ def limit_ratios(trajectory: Trajectory, limits: Sequence[Limit] | None = None) 
     steps = np.arange(_POINTS_PER_INTERVAL) / _POINTS_PER_INTERVAL
     grid = (knots[:-1, None] + np.diff(knots)[:, None] * steps).ravel()
     samples = trajectory.at(np.clip(np.union1d(grid, trajectory.times), 0.0, trajectory.t_end))
-    jumps = np.any(trajectory.qddot_before != trajectory.qddot, axis=1)
-    nodes = (trajectory.times, trajectory.q, trajectory.qdot, trajectory.qddot_before)
-    before = (*nodes, trajectory.path_spline(trajectory.times))
-    behind = (samples.t, samples.q, samples.qdot, samples.qddot, samples.s)
+    behind = (samples.t, samples.q, samples.qdot, samples.qddot, trajectory.jerk(samples.t), samples.s)
+    before, jumps = _just_before(trajectory), np.any(trajectory.qddot_before != trajectory.qddot, axis=1)[1:]
+    if trajectory.degree <= max(limit.order for limit in limits):
+        jumps[:-1] |= np.isin(trajectory.times[1:-1], knots)
     t, *motion = (np.concatenate([first[jumps], then]) for first, then in zip(before, behind, strict=True))
     order = np.argsort(t, kind="stable")
     moments = Moments(*(part[order] for part in motion))
     values = [limit.ratios(moments, t[order]) for limit in limits]
     return LimitRatios(t[order], tuple(label for limit in limits for label in limit.labels), np.hstack(values))
+
+
+def _just_before(trajectory: Trajectory) -> tuple[np.ndarray, ...]:
+    """Return times, positions, three derivatives and path coordinates just before every node but the first."""
+    jerk = one_sided_derivatives(trajectory.pieces.c, np.diff(trajectory.times), 3, at_end=True)
+    nodes = (trajectory.times, trajectory.q, trajectory.qdot, trajectory.qddot_before)
+    return *(part[1:] for part in nodes), jerk, trajectory.path_spline(trajectory.times[1:])

@@ -29,6 +29,8 @@ INTERVALS = 100
 """Number of intervals of the fine mesh for one redundant joint, rounded to a multiple of the answer's own."""
 MEANING = "the same problem with discontinuous torque allowed; the best value known, not a proven bound"
 _CUBICS, _PARABOLAS = 3, 2
+_HIGHEST = 2
+"""Highest derivative that is bounded where accelerations jump: limits on a higher one are left out."""
 _POINTS = 3
 _BESIDE = 1e-6
 """Parabolas are looked at this much of the whole time before every knot, too: their accelerations jump there."""
@@ -114,7 +116,7 @@ def find_reference(
 def _found(refined: Refined, tolerance: float, intervals: int, time_limit: float) -> Reference | None:
     """Try one mesh after the other."""
     began = time.perf_counter()
-    (phase,), (motion,) = refined.program.phases, refined.program.motions(refined.x)
+    (phase,), (motion,) = refined.program.up_to(_HIGHEST).phases, refined.program.motions(refined.x)
     best: Reference | None = None
     for degree, count in _meshes(phase.intervals, _fine(phase, intervals)):
         if best is not None and time.perf_counter() > began + time_limit:

@@ -11,11 +11,13 @@ from __future__ import annotations
 
 import numpy as np
 
+ORDERS = 4
+"""Value and three derivatives."""
 _STEP = 1e-30
 
 
 def local_basis(knots: np.ndarray, degree: int, t_norm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Value and two derivatives of the basis functions that differ from zero at given times.
+    """Value and three derivatives of the basis functions that differ from zero at given times.
 
     Parameters
     ----------
@@ -30,7 +32,7 @@ def local_basis(knots: np.ndarray, degree: int, t_norm: np.ndarray) -> tuple[np.
     -------
     first : (K,) int ndarray
         Interval of each time, which is the control point of the first of its basis functions.
-    values : (3, K, d + 1) ndarray
+    values : (4, K, d + 1) ndarray
         Per unit of the knots' time.
     """
     breaks = knots[degree : len(knots) - degree]
@@ -49,7 +51,7 @@ def basis_matrix(knots: np.ndarray, degree: int, t_norm: np.ndarray) -> np.ndarr
 
 
 def basis_functions(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-    """Value and two derivatives of the basis functions that differ from zero at points.
+    """Value and three derivatives of the basis functions that differ from zero at points.
 
     Parameters
     ----------
@@ -60,7 +62,7 @@ def basis_functions(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
 
     Returns
     -------
-    (3, ..., d + 1) ndarray
+    (4, ..., d + 1) ndarray
         Per unit of what the lengths are measured in.
     """
     degree = (lengths.shape[-1] + 1) // 2
@@ -73,9 +75,13 @@ def basis_functions(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     value = [np.ones_like(part)]
     for p in range(1, degree + 1):
         value.append(_raised(value[-1], left, right, p))
-    slope = _slope(value[degree - 1], left, right, degree)
-    bend = _slope(_slope(value[degree - 2], left, right, degree - 1), left, right, degree)
-    return np.array([value[degree], slope, bend])
+    orders = [value[degree]]
+    for order in range(1, ORDERS):
+        part = value[degree - order] if order <= degree else np.zeros_like(value[0])
+        for p in range(max(degree - order, 0) + 1, degree + 1):
+            part = _slope(part, left, right, p)
+        orders.append(part)
+    return np.array(orders)
 
 
 def basis_derivatives(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
@@ -88,7 +94,7 @@ def basis_derivatives(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
 
     Returns
     -------
-    (3, 2 d - 1, K, d + 1) ndarray
+    (4, 2 d - 1, K, d + 1) ndarray
     """
     steps = 1j * _STEP * np.eye(lengths.shape[-1])
     return np.asarray(basis_functions(lengths + steps[:, None], fraction[None]).imag / _STEP)

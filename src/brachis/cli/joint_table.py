@@ -15,6 +15,8 @@ _LIMITS = {
     "torque": {"rad": "Nm", "m": "N"},
     "power": {"rad": "W", "m": "W"},
     "rms_torque": {"rad": "Nm", "m": "N"},
+    "jerk": {"rad": "rad/s^3", "m": "m/s^3"},
+    "torque_rate": {"rad": "Nm/s", "m": "N/s"},
 }
 _FRICTION = {
     "viscous": {"rad": "Nm s/rad", "m": "N s/m"},

@@ -183,6 +183,7 @@ class ChartMap:
         y: np.ndarray,
         ydot: np.ndarray,
         yddot: np.ndarray,
+        ydddot: np.ndarray,
         *,
         t: np.ndarray | None = None,  # noqa: ARG002  (the reference tells the turns)
         near: np.ndarray | None = None,
@@ -211,7 +212,9 @@ class ChartMap:
         given = np.concatenate([sample.xi_ds * sdot**2 - self.task_map.bias(twists, qdot), bent], axis=1)
         qddot = np.einsum("kij,kj->ki", gradient, yddot) + np.einsum("kij,kj->ki", inverse, given)
         least = _least_singular(inverse)
-        return ChartState(y, ydot, yddot, q, qdot, qddot, gradient, sample, twists, inverse, rows, drift, *least)
+        return ChartState(
+            self, y, ydot, yddot, ydddot, q, qdot, qddot, gradient, sample, twists, inverse, rows, drift, *least
+        )
 
     def derivatives(self, state: ChartState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""

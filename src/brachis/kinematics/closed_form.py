@@ -169,6 +169,7 @@ class ClosedFormMap:
         y: np.ndarray,
         ydot: np.ndarray,
         yddot: np.ndarray,
+        ydddot: np.ndarray,
         *,
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
@@ -177,7 +178,7 @@ class ClosedFormMap:
 
         Parameters
         ----------
-        y, ydot, yddot : (K, 1 + r) ndarray
+        y, ydot, yddot, ydddot : (K, 1 + r) ndarray
             Path coordinate and redundant joints, and their time derivatives.
         t : (K,) ndarray, optional
             The times, ascending from the start on, s. Turns by 2 pi are then chosen so that angles follow their own
@@ -212,7 +213,7 @@ class ClosedFormMap:
             q = in_turn_of(q, near, np.isin(np.arange(self.robot.n), self._turns))
         elif t is not None and self._ranged.any():  # otherwise no limit asks which turn an angle is in
             self._follow(q, qdot, qddot, t)
-        return PathState(y, ydot, yddot, q, qdot, qddot, gradient, sample, twists, inverse)
+        return PathState(self, y, ydot, yddot, ydddot, q, qdot, qddot, gradient, sample, twists, inverse)
 
     def _follow(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, t: np.ndarray) -> None:
         """Choose turns of angles, in place, that follow their velocities; the quintic's rule predicts each step."""

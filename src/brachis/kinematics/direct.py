@@ -48,13 +48,14 @@ class DirectJointMap:
         y: np.ndarray,
         ydot: np.ndarray,
         yddot: np.ndarray,
+        ydddot: np.ndarray,
         *,
         t: np.ndarray | None = None,  # noqa: ARG002  (y itself tells the turns)
         near: np.ndarray | None = None,  # noqa: ARG002
     ) -> JointState:
         """See `JointMap`."""
         gradient = np.broadcast_to(np.eye(self.r), (len(y), self.r, self.r))
-        return JointState(y, ydot, yddot, y, ydot, yddot, gradient)
+        return JointState(self, y, ydot, yddot, ydddot, y, ydot, yddot, gradient)
 
     def derivatives(self, state: JointState) -> JointDerivatives:
         """See `JointMap`."""

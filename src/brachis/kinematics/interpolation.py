@@ -3,7 +3,8 @@
 A saved trajectory must be evaluated without the closed form (its family may be a plug-in, and the verification must
 not depend on it). Joint positions, velocities and accelerations at the nodes define quintic Hermite pieces, which join
 with continuous acceleration where the curves have one (splines of degree 2 have not, at knots). Nodes are added until
-the pieces agree with the closed form in between.
+the pieces agree with the closed form in between, and their jerk with its jerk where they begin: there, the third
+derivative of a quintic's error is largest.
 """
 
 from __future__ import annotations
@@ -16,14 +17,16 @@ import numpy as np
 from brachis.errors import UnreachableError
 from brachis.kinematics.joint_map import JointMap, JointState
 
-Curves = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
+Curves = Callable[[np.ndarray], tuple[np.ndarray, ...]]
 
 _PIECES_PER_INTERVAL = 4
 _POSITION_TOLERANCE = 1e-11
-_ACCELERATION_TOLERANCE = 1e-6
+_ACCELERATION_TOLERANCE, _JERK_TOLERANCE = 1e-6, 1e-5
 _LARGEST_ERROR = 1e-9
 _ROUNDS = 8
 _JUST_BEFORE = 1e-11
+_ROUNDING = 60.0 * np.finfo(float).eps
+"""Jerk of a piece of 1 s that comes of the rounding of positions of 1 rad."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ def interpolate(joint_map: JointMap, curves: Curves, breaks: np.ndarray, *, jump
     ----------
     joint_map : JointMap
     curves : callable
-        ``curves(t)`` returns y, ydot, yddot, each (K, 1 + r), at times (K,) in seconds.
+        ``curves(t)`` returns y, ydot, yddot, ydddot, each (K, 1 + r), at times (K,) in seconds.
     breaks : (N + 1,) ndarray
         Times between which the curves are polynomials, s.
     jumps : bool
@@ -85,6 +88,8 @@ def interpolate(joint_map: JointMap, curves: Curves, breaks: np.ndarray, *, jump
         gap_q, gap_qddot = _middle_gaps(times, state, before)
         error = float(gap_q.max())
         bad = (gap_q > _POSITION_TOLERANCE) | (gap_qddot > _ACCELERATION_TOLERANCE * (1.0 + np.abs(state.qddot).max()))
+        if not jumps:
+            bad |= _jerk_gaps(times, state) > _JERK_TOLERANCE * (1.0 + np.abs(state.qdddot).max())
         if not bad.any():
             break
         times = np.union1d(times, middle[bad])
@@ -106,3 +111,16 @@ def _middle_gaps(times: np.ndarray, state: JointState, before: np.ndarray) -> tu
     position = 0.5 * (q[1:] + q[:-1]) - 5.0 * h / 32.0 * np.diff(v, axis=0) + h**2 / 64.0 * ends
     acceleration = 1.5 * np.diff(v, axis=0) / h - 0.25 * ends
     return np.abs(position - state.q[1::2]).max(axis=1), np.abs(acceleration - state.qddot[1::2]).max(axis=1)
+
+
+def _jerk_gaps(times: np.ndarray, state: JointState) -> np.ndarray:
+    """Largest difference of jerk at the beginning of every piece, (L,), beyond what rounding makes of it.
+
+    There a quintic Hermite piece of length h has
+    qdddot = 60 (q1 - q0) / h^3 - (36 v0 + 24 v1) / h^2 - (9 a0 - 3 a1) / h.
+    """
+    h = np.diff(times)[:, None]
+    q, v, a = state.q[::2], state.qdot[::2], state.qddot[::2]
+    jerk = 60.0 * np.diff(q, axis=0) / h**3 - (36.0 * v[:-1] + 24.0 * v[1:]) / h**2 - (9.0 * a[:-1] - 3.0 * a[1:]) / h
+    rounding = _ROUNDING * (1.0 + np.abs(q).max()) / h**3
+    return np.asarray((np.abs(jerk - state.qdddot[:-1:2]) - rounding).max(axis=1))

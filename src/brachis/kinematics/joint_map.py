@@ -1,5 +1,16 @@
 """What a joint map is: curves y(t) in, joint motion and its exact derivatives out.
 
+With qddot = f(y, ydot, yddot) the third order needs no formulas of its own. Where D is d/dt along the motion,
+d(D f)/dy = D(df/dy) and d(D f)/dydot = D(df/dydot) + df/dy, and so on; hence
+
+    qdddot            = f_y ydot + f_ydot yddot + G ydddot
+    dqdddot/dydddot   = G
+    dqdddot/dyddot    = 3 dqdot/dy
+    dqdddot/dydot     = 3 dqddot/dy
+    dqdddot/dy        = D(dqddot/dy)
+
+of which only the last is new; it is taken by differences along the motion.
+
 Along a path y = (s, q_r), and the closed form gives the other joints (`closed_form`). Without a path y = q
 (`direct`). Everything that lays down, solves and refines a program takes any of them.
 """
@@ -7,10 +18,12 @@ Along a path y = (s, q_r), and the closed form gives the other joints (`closed_f
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
 
+from brachis.arrays import rates
 from brachis.path import Path, PathSample
 from brachis.robot import Robot
 
@@ -21,16 +34,20 @@ class JointState:
 
     Attributes
     ----------
-    y, ydot, yddot : (K, c) ndarray
+    joint_map : JointMap
+        That gave it.
+    y, ydot, yddot, ydddot : (K, c) ndarray
         The c curves that are chosen freely, and their time derivatives.
     q, qdot, qddot : (K, n) ndarray
     gradient : (K, n, c) ndarray
         G = dq/dy.
     """
 
+    joint_map: JointMap
     y: np.ndarray
     ydot: np.ndarray
     yddot: np.ndarray
+    ydddot: np.ndarray
     q: np.ndarray
     qdot: np.ndarray
     qddot: np.ndarray
@@ -40,6 +57,28 @@ class JointState:
     def s(self) -> np.ndarray:
         """Path coordinate, (K,); NaN where there is no path."""
         return np.full(len(self.y), np.nan)
+
+    @cached_property
+    def derivatives(self) -> JointDerivatives:
+        """Exact derivatives."""
+        return self.joint_map.derivatives(self)
+
+    @cached_property
+    def qdddot(self) -> np.ndarray:
+        """Jerk of all joints, (K, n)."""
+        exact = self.derivatives
+        pairs = (exact.qddot_y, self.ydot), (exact.qddot_ydot, self.yddot), (self.gradient, self.ydddot)
+        return np.asarray(sum(np.einsum("kij,kj->ki", slope, part) for slope, part in pairs))
+
+    @cached_property
+    def qdddot_y(self) -> np.ndarray:
+        """Differentiate the jerk by y, (K, n, c): the rate of dqddot/dy; raises UnreachableError as `state` does."""
+        near = np.tile(self.q, (2, 1))
+
+        def slopes(*curves: np.ndarray) -> tuple[np.ndarray]:
+            return (self.joint_map.state(*curves, near=near).derivatives.qddot_y,)
+
+        return rates(slopes, (self.y, self.ydot, self.yddot, self.ydddot))[0]
 
 
 @dataclass(frozen=True)
@@ -122,6 +161,7 @@ class JointMap(Protocol):
         y: np.ndarray,
         ydot: np.ndarray,
         yddot: np.ndarray,
+        ydddot: np.ndarray,
         *,
         t: np.ndarray | None = None,
         near: np.ndarray | None = None,
@@ -130,7 +170,7 @@ class JointMap(Protocol):
 
         Parameters
         ----------
-        y, ydot, yddot : (K, c) ndarray
+        y, ydot, yddot, ydddot : (K, c) ndarray
         t : (K,) ndarray, optional
             The times, ascending from the start on, s; by them turns are counted.
         near : (K, n) ndarray, optional

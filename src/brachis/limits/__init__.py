@@ -1,8 +1,9 @@
 """Limits on the motion: one kind per file, listed in `TABLE`.
 
-A limit is a function of q, qdot, qddot and s. A new kind is its model in `task` (of joints, its field in `robot.limits`
-as well), its file here with a line in `TABLE`, and a file in `verify.limits` with a line in the table there. Nothing
-else asks which kind a limit is. Joint ranges are known elsewhere too: postures and turns are chosen within them.
+A limit is a function of q, qdot, qddot and s, some of qdddot too. A new kind is its model in `task` (of joints, its
+field in `robot.limits` as well), its file here with a line in `TABLE`, and a file in `verify.limits` with a line in the
+table there. Nothing else asks which kind a limit is. Joint ranges are known elsewhere too: postures and turns are
+chosen within them.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from brachis.limits import (
     tool_angular_speed,
     tool_speed,
     torque,
+    torque_rate,
     torque_speed,
 )
 from brachis.limits.checks import bound_limits
@@ -54,6 +56,8 @@ TABLE: dict[str, Build] = {
     "total_power": power.build_total,
     "torque_speed": torque_speed.build,
     "rms_torque": rms_torque.build,
+    "jerk": joint_rate.build_jerk,
+    "torque_rate": torque_rate.build,
 }
 
 

@@ -83,15 +83,15 @@ def _check(limit: Limit, n: int, where: str) -> None:
 def _check_functions(limit: Limit, n: int, where: str) -> None:
     """Refuse values and partials of the wrong shape, or that are not finite."""
     count, rng = len(limit.labels), np.random.default_rng(0)
-    q, qdot, qddot = rng.uniform(-0.1, 0.1, (3, _MOMENTS, n))
-    moments = Moments(q, qdot, qddot, np.linspace(0.0, 0.5, _MOMENTS))
+    q, qdot, qddot, qdddot = rng.uniform(-0.1, 0.1, (4, _MOMENTS, n))
+    moments = Moments(q, qdot, qddot, qdddot, np.linspace(0.0, 0.5, _MOMENTS))
     _check_shape(f"{where}.values", limit.values(moments), (_MOMENTS, count))
     partials = limit.partials(moments)
     if not isinstance(partials, Partials):
         raise InputError("is no brachis.limits.Partials", where=f"{where}.partials", found=partials)
-    given = {name: getattr(partials, name) for name in ("q", "qdot", "qddot")}
+    given = {name: getattr(partials, name) for name in ("q", "qdot", "qddot", "qdddot")}
     if all(part is None for part in given.values()):
-        raise InputError("are all None", where=f"{where}.partials", allowed="at least one of q, qdot, qddot")
+        raise InputError("are all None", where=f"{where}.partials", allowed="at least one of q, qdot, qddot, qdddot")
     for name, part in given.items():
         if part is not None:
             _check_shape(f"{where}.partials.{name}", part, (_MOMENTS, count, n))

@@ -1,4 +1,4 @@
-"""Joint velocities between v_min and v_max, and |qddot| <= a_max."""
+"""Joint velocities between v_min and v_max, |qddot| <= a_max and |qdddot| <= j_max."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from brachis.task import Task
 
 
 class _JointRateLimit(JointRatioLimit):
-    """Joint velocities or accelerations within their limits.
+    """Joint velocities, accelerations or jerks within their limits.
 
     Parameters
     ----------
@@ -83,6 +83,22 @@ class AccelerationLimit(_JointRateLimit):
         return self._rows(len(q)), None
 
 
+class JerkLimit(_JointRateLimit):
+    """Joint jerks over their limits; see `_JointRateLimit`."""
+
+    kind = "jerk"
+    order = 3
+    _per_time = "/s^3"
+
+    def values(self, motion: JointMotion) -> np.ndarray:
+        """See `Limit.values`."""
+        return self._normalised(motion.qdddot)
+
+    def partials(self, motion: JointMotion) -> Partials:
+        """See `Limit.partials`."""
+        return Partials(qdddot=self._rows(len(motion.q)))
+
+
 def build_velocity(robot: Robot, _task: Task) -> VelocityLimit | None:
     """Build the limit for the joints with a finite velocity limit."""
     figures = robot.limits.both_ways("velocity")
@@ -94,3 +110,9 @@ def build_acceleration(robot: Robot, _task: Task) -> AccelerationLimit | None:
     """Build the limit for the joints with a finite acceleration limit."""
     joints = np.flatnonzero(np.isfinite(robot.limits.acceleration))
     return AccelerationLimit(robot, joints, robot.limits.acceleration[joints]) if len(joints) else None
+
+
+def build_jerk(robot: Robot, _task: Task) -> JerkLimit | None:
+    """Build the limit for the joints with a finite jerk limit."""
+    joints = np.flatnonzero(np.isfinite(robot.limits.jerk))
+    return JerkLimit(robot, joints, robot.limits.jerk[joints]) if len(joints) else None

@@ -28,7 +28,7 @@ class JointMotion(Protocol):
 
     Attributes
     ----------
-    q, qdot, qddot : (K, n) ndarray
+    q, qdot, qddot, qdddot : (K, n) ndarray
         rad or m, and per second.
     s : (K,) ndarray
         Path coordinate; NaN where there is no path, or its place is not known.
@@ -41,6 +41,8 @@ class JointMotion(Protocol):
     @property
     def qddot(self) -> np.ndarray: ...  # noqa: D102
     @property
+    def qdddot(self) -> np.ndarray: ...  # noqa: D102
+    @property
     def s(self) -> np.ndarray: ...  # noqa: D102
 
 
@@ -51,13 +53,14 @@ class Moments:
     q: np.ndarray
     qdot: np.ndarray
     qddot: np.ndarray
+    qdddot: np.ndarray
     s: np.ndarray
 
     @classmethod
     def at_rest(cls, q: np.ndarray) -> Moments:
         """Stand still in postures, (K, n), somewhere on the path."""
         still = np.zeros_like(q)
-        return cls(q, still, still, np.full(len(q), np.nan))
+        return cls(q, still, still, still, np.full(len(q), np.nan))
 
 
 class Role(Enum):
@@ -134,6 +137,7 @@ class Partials:
     q: np.ndarray | None = None
     qdot: np.ndarray | None = None
     qddot: np.ndarray | None = None
+    qdddot: np.ndarray | None = None
     s: np.ndarray | None = None
 
 
@@ -177,6 +181,9 @@ class Limit(ABC):
         Whether it asks in which turn (multiple of 2 pi) an angle is.
     breaks : (b,) ndarray
         Path coordinates at which it changes so abruptly that the motion is to be looked at just there.
+    order : int
+        Highest time derivative of q that the values ask for: 2, or 3 where they ask for the jerk. The splines' degree
+        must be at least as high.
     violation_scale : (c,) ndarray
         Violation of a value that is beyond its bound by 1; 1 unless values are measured otherwise (see the module).
     bounds : tuple of Bound
@@ -195,6 +202,7 @@ class Limit(ABC):
     static: bool = False
     whole_turns: bool = False
     breaks: np.ndarray = np.empty(0)
+    order: int = 2
     refusal: str = "is exceeded at rest"
 
     @abstractmethod
@@ -203,7 +211,7 @@ class Limit(ABC):
 
     @abstractmethod
     def partials(self, motion: JointMotion) -> Partials:
-        """Differentiate `values` with respect to q, qdot, qddot and s, each taken as independent."""
+        """Differentiate `values` with respect to q, qdot, qddot, qdddot and s, each taken as independent."""
 
     @property
     def name(self) -> str:

@@ -1,7 +1,8 @@
 """Splines whose first and last control points are fixed or tied by the boundary conditions.
 
 For a clamped spline, zero velocity at an end means that the first two control points there are equal, and zero
-acceleration besides that the first three are. Boundary conditions therefore need no rows in the NLP: control points at
+acceleration besides that the first three are, zero
+jerk the first four. Boundary conditions therefore need no rows in the NLP: control points at
 an end share one free variable, or are fixed.
 """
 
@@ -13,8 +14,8 @@ import numpy as np
 
 from brachis.bspline import local_basis
 
-ORDERS = 3
-"""Value and two derivatives."""
+_SAME_TIME = 1e-13
+"""Normalised times this near to a knot are at the knot."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class BoundarySpline:
         knots, degree
             See the attributes.
         derivatives : int
-            How many derivatives vanish at each end: 1 for velocity, 2 for acceleration too.
+            How many derivatives vanish at each end: 1 for velocity, 2 for acceleration too, 3 for jerk.
         start, end : float
             Value at the end in question, NaN where free.
         """
@@ -93,7 +94,7 @@ class Boundary:
     start, end : (c,) ndarray
         Values of the curves there, NaN where free.
     derivatives : int
-        How many derivatives vanish at each end: 1 for velocity, 2 for acceleration too.
+        How many derivatives vanish at each end: 1 for velocity, 2 for acceleration too, 3 for jerk.
     """
 
     start: np.ndarray
@@ -111,13 +112,13 @@ class Boundary:
 
 @dataclass(frozen=True)
 class LocalBasis:
-    """Basis functions of value and two derivatives at K times.
+    """Basis functions of value and three derivatives at K times.
 
     Attributes
     ----------
     columns : (K, d + 1) int ndarray
         Control points that matter at each time.
-    values : (3, K, d + 1) ndarray
+    values : (4, K, d + 1) ndarray
         Per unit of normalised time.
     """
 
@@ -126,12 +127,15 @@ class LocalBasis:
 
     @classmethod
     def of(cls, knots: np.ndarray, degree: int, t_norm: np.ndarray) -> LocalBasis:
-        """Sample the basis at normalised times `t_norm`, (K,)."""
-        first, values = local_basis(knots, degree, t_norm)
+        """Sample the basis at normalised times `t_norm`, (K,); at knots behind them."""
+        breaks = np.unique(knots)
+        near = breaks[np.searchsorted(breaks, t_norm - _SAME_TIME).clip(max=len(breaks) - 1)]
+        # Rounding must not choose the side of a knot: the highest derivative jumps there.
+        first, values = local_basis(knots, degree, np.where(np.abs(near - t_norm) <= _SAME_TIME, near, t_norm))
         return cls(first[:, None] + np.arange(degree + 1), values)
 
     def curves(self, control_points: np.ndarray) -> np.ndarray:
-        """Value and two derivatives (3, K, c) of c splines with control points (c, N + d)."""
+        """Value and three derivatives (4, K, c) of c splines with control points (c, N + d)."""
         return np.asarray(np.einsum("okw,ckw->okc", self.values, control_points[:, self.columns]))
 
 
@@ -159,5 +163,5 @@ class SparsityPattern:
         return cls(unique // spline.free, unique % spline.free, kept, place)
 
     def entries(self, values: np.ndarray) -> np.ndarray:
-        """Differentiate value and two derivatives by the free variables, (3, z); `values` are (3, K, d + 1)."""
+        """Differentiate value and three derivatives by the free variables, (4, z); `values` are (4, K, d + 1)."""
         return np.array([np.bincount(self._place, weights=value[self._kept]) for value in values])

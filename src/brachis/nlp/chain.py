@@ -6,15 +6,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.kinematics import JointDerivatives, JointState
+from brachis.kinematics import JointState
 from brachis.limits import Partials
 
 
-def chain(partials: Partials, state: JointState, exact: JointDerivatives) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Differentiate a limit with respect to y, ydot and yddot, each (K, c, 1 + r), from its partials."""
-    given = next(part for part in (partials.q, partials.qdot, partials.qddot) if part is not None)
-    zeros = np.zeros((*given.shape[:2], state.y.shape[1]))
-    by_y, by_ydot, by_yddot = zeros, zeros, zeros
+def chain(partials: Partials, state: JointState) -> tuple[np.ndarray, ...]:
+    """Differentiate a limit with respect to y, ydot, yddot and, where it asks for the jerk, ydddot, (K, c, 1 + r) each.
+
+    See `joint_map` for the derivatives of the jerk.
+    """
+    exact = state.derivatives
+    given = (partials.q, partials.qdot, partials.qddot, partials.qdddot)
+    shape = next(part.shape[:2] for part in given if part is not None)
+    by_y = by_ydot = by_yddot = np.zeros((*shape, state.y.shape[1]))
     if partials.q is not None:
         by_y = by_y + partials.q @ state.gradient
     if partials.s is not None:
@@ -27,15 +31,17 @@ def chain(partials: Partials, state: JointState, exact: JointDerivatives) -> tup
         by_y = by_y + partials.qddot @ exact.qddot_y
         by_ydot = by_ydot + partials.qddot @ exact.qddot_ydot
         by_yddot = by_yddot + partials.qddot @ state.gradient
-    return by_y, by_ydot, by_yddot
+    if partials.qdddot is None:
+        return by_y, by_ydot, by_yddot
+    by_y = by_y + partials.qdddot @ state.qdddot_y
+    by_ydot = by_ydot + 3.0 * partials.qdddot @ exact.qddot_y
+    by_yddot = by_yddot + 3.0 * partials.qdddot @ exact.qdot_y
+    return by_y, by_ydot, by_yddot, partials.qdddot @ state.gradient
 
 
 def by_time(by: Sequence[np.ndarray], state: JointState) -> np.ndarray:
     """Add up what `chain` found to -t_E d/dt_E of the limit, (K, c): a longer time slows the curves down."""
-    of_rates = np.einsum("kcj,kj->kc", by[1], state.ydot)
-    return np.asarray(of_rates + 2.0 * np.einsum("kcj,kj->kc", by[2], state.yddot))
-
-
-def timed(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Value and two derivatives per second, from those per unit of normalised time."""
-    return orders[0], orders[1] / t_end, orders[2] / t_end**2
+    derivatives = zip(by[1:], (state.ydot, state.yddot, state.ydddot), strict=False)
+    return np.asarray(
+        sum(order * np.einsum("kcj,kj->kc", part, own) for order, (part, own) in enumerate(derivatives, 1))
+    )

@@ -13,8 +13,8 @@ from typing import Protocol
 
 import numpy as np
 
-from brachis.bspline import basis_derivatives, basis_functions, clamped_knots
-from brachis.nlp.boundary import ORDERS, LocalBasis
+from brachis.bspline import ORDERS, basis_derivatives, basis_functions, clamped_knots
+from brachis.nlp.boundary import LocalBasis
 from brachis.nlp.quadrature import interval_weights
 
 
@@ -62,7 +62,7 @@ class Grid(Protocol):
         ...
 
     def slopes(self, h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
-        """Differentiate value and two derivatives of splines (c, N + d) by h, on the pattern, (3, z, c)."""
+        """Differentiate value and three derivatives of splines (c, N + d) by h, on the pattern, (4, z, c)."""
         ...
 
     def frozen(self, h: np.ndarray) -> Grid:

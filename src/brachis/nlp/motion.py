@@ -10,8 +10,11 @@ from brachis.bspline import insert_knots
 from brachis.nlp.boundary import LocalBasis
 
 _BISECTIONS = 45
-_SAME_TIME = 1e-13
-"""Normalised times this near to a knot are at the knot."""
+
+
+def per_second(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, ...]:
+    """Value and derivatives per second, from those per unit of normalised time."""
+    return tuple(part / t_end**order for order, part in enumerate(orders))
 
 
 @dataclass(frozen=True)
@@ -39,14 +42,13 @@ class Motion:
         """Times between which the curves are polynomials, (N + 1,), s."""
         return np.unique(self.knots) * self.t_end
 
-    def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """y, ydot and yddot, each (K, c), at times t, (K,), in seconds; at knots the values behind them."""
-        t_norm, breaks = t / self.t_end, np.unique(self.knots)
-        behind = breaks[np.searchsorted(breaks, t_norm - _SAME_TIME).clip(max=len(breaks) - 1)]
-        # Rounding must not choose the side of a knot: splines of degree 2 jump in acceleration there.
-        basis = LocalBasis.of(self.knots, self.degree, np.where(np.abs(behind - t_norm) <= _SAME_TIME, behind, t_norm))
-        y, ydot, yddot = basis.curves(self.control_points)
-        return y, ydot / self.t_end, yddot / self.t_end**2
+    def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Value y of the curves and three time derivatives, each (K, c), at times t, (K,), in seconds.
+
+        At knots those behind them.
+        """
+        basis = LocalBasis.of(self.knots, self.degree, t / self.t_end)
+        return per_second(basis.curves(self.control_points), self.t_end)
 
     def over(self, knots: np.ndarray) -> Motion:
         """Return the same curves over a clamped knot vector that contains the present one."""

@@ -4,10 +4,11 @@ A phase has variables x = (T, c_1, ..., c_c [, h]), its duration and the free co
 see `layout`. With basis matrices B, B', B'' in normalised time,
 
     dy/dc = B,  dydot/dc = B' / T,  dyddot/dc = B'' / T^2,  dydot/dT = -ydot / T,  dyddot/dT = -2 yddot / T
-    dy/dh = dB/dh c,  dydot/dh = dB'/dh c / T,  dyddot/dh = dB''/dh c / T^2
+    dy/dh = dB/dh c,  dydot/dh = dB'/dh c / T,  dyddot/dh = dB''/dh c / T^2,  and so on
 
 and a limit with partials (p_q, p_v, p_a) has d/dy = p_q G + p_v dqdot/dy + p_a dqddot/dy,
-d/dydot = p_v G + p_a dqddot/dydot and d/dyddot = p_a G, with G and the rest from the joint map.
+d/dydot = p_v G + p_a dqddot/dydot and d/dyddot = p_a G, with G and the rest from the joint map; one that asks for the
+jerk likewise (`chain`, `joint_map`).
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from brachis.kinematics import JointDerivatives, JointMap, JointState
+from brachis.kinematics import JointMap, JointState
 from brachis.limits import Limit, Partials, Role, branch_margin
 from brachis.limits.branch_margin import MARGIN
 from brachis.nlp.boundary import Boundary, LocalBasis
-from brachis.nlp.chain import by_time, chain, timed
+from brachis.nlp.chain import by_time, chain
 from brachis.nlp.grid import FixedGrid, FreeGrid, Grid
 from brachis.nlp.layout import Layout, batches, height
-from brachis.nlp.motion import Motion
+from brachis.nlp.motion import Motion, per_second
 
 
 class Phase:
@@ -74,7 +75,6 @@ class Phase:
         self.jacobian_rows, self.jacobian_columns = layout.jacobian_rows, layout.jacobian_columns
         self._entries: tuple[LocalBasis, list[np.ndarray]] | None = None
         self._last: tuple[bytes, JointState] | None = None
-        self._exact: tuple[JointState, JointDerivatives] | None = None
         self.evaluations = {"states": 0, "jacobians": 0}
 
     def over(self, grid: Grid, boundary: Boundary | None = None) -> Phase:
@@ -135,6 +135,12 @@ class Phase:
         return self.knots[self.degree : len(self.knots) - self.degree]
 
     @property
+    def jumps(self) -> np.ndarray:
+        """Knots, in normalised time, at which the highest derivative that a limit asks for jumps."""
+        order = max((limit.order for limit in self.limits), default=0)
+        return self.breaks[1:-1] if self.degree <= order else np.empty(0)
+
+    @property
     def intervals(self) -> int:
         """Number of knot intervals, N."""
         return len(self.knots) - 2 * self.degree - 1
@@ -179,9 +185,8 @@ class Phase:
         if self._last is None or self._last[0] != key:
             self.evaluations["states"] += 1
             h = x[self._lengths]
-            y, ydot, yddot = self.grid.basis(h).curves(self._control_points(x))
-            ydot, yddot = ydot / x[0], yddot / x[0] ** 2
-            self._last = (key, self.joint_map.state(y, ydot, yddot, t=self.grid.t_norm_at(h) * x[0]))
+            curves = per_second(self.grid.basis(h).curves(self._control_points(x)), x[0])
+            self._last = (key, self.joint_map.state(*curves, t=self.grid.t_norm_at(h) * x[0]))
         return self._last[1]
 
     def rows(self, x: np.ndarray) -> np.ndarray:
@@ -279,23 +284,18 @@ class Phase:
 
     def _chained(self, functions: Sequence[Partials], x: np.ndarray) -> Iterator[np.ndarray]:
         """Differentiate functions of the joint motion by T, each curve's variables and h, (places, c) all together."""
-        state, exact = self.state(x), self._derivatives(x)
-        bases = [timed(basis, x[0]) for basis in self._bases(x)]
-        slopes = np.hstack(timed(self.grid.slopes(x[self._lengths], self._control_points(x)), x[0]))
-        each = [chain(partials, state, exact) for partials in functions]
-        by = [np.concatenate(parts, axis=1) for parts in zip(*each, strict=True)]
-        yield by_time(by, state) / -x[0]
-        for j, (places, basis) in enumerate(zip(self._places, bases, strict=True)):
-            parts = (part[places.point, :, j] * values[:, None] for part, values in zip(by, basis, strict=True))
-            yield sum(parts, start=np.zeros(()))
-        yield (np.concatenate(by, axis=2)[self.grid.point] @ slopes[:, :, None])[:, :, 0]
-
-    def _derivatives(self, x: np.ndarray) -> JointDerivatives:
-        """Differentiate the state at x; kept until x changes, as the state is."""
         state = self.state(x)
-        if self._exact is None or self._exact[0] is not state:
-            self._exact = state, self.joint_map.derivatives(state)
-        return self._exact[1]
+        each = [chain(partials, state) for partials in functions]
+        orders = max(len(parts) for parts in each)  # up to the derivative of the curves that any function asks for
+        padded = ((*parts, *[np.zeros_like(parts[0])] * (orders - len(parts))) for parts in each)
+        by = [np.concatenate(parts, axis=1) for parts in zip(*padded, strict=True)]
+        slopes = per_second(self.grid.slopes(x[self._lengths], self._control_points(x))[:orders], x[0])
+        yield by_time(by, state) / -x[0]
+        for j, (places, basis) in enumerate(zip(self._places, self._bases(x), strict=True)):
+            values = per_second(basis[:orders], x[0])
+            parts = (part[places.point, :, j] * own[:, None] for part, own in zip(by, values, strict=True))
+            yield sum(parts, start=np.zeros(()))
+        yield (np.concatenate(by, axis=2)[self.grid.point] @ np.hstack(slopes)[:, :, None])[:, :, 0]
 
     def _bases(self, x: np.ndarray) -> list[np.ndarray]:
         """Basis functions of every curve's free variables, (3, z) each; computed anew where the grid's change."""

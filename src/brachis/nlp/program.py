@@ -167,6 +167,12 @@ class Program:
         other = self.with_phases(phase.frozen(part) for phase, part in self.split(x))
         return other, other.variables_from(self.motions(x))
 
+    def up_to(self, order: int) -> Program:
+        """Return the same program without limits that ask for a higher derivative; x keeps its meaning."""
+        return self.with_phases(
+            phase.with_limits(tuple(limit for limit in phase.limits if limit.order <= order)) for phase in self.phases
+        )
+
     def with_margin(self, margin: float) -> Program:
         """Return the same program with another least branch margin; x keeps its meaning."""
         return self.with_phases(phase.with_margin(margin) for phase in self.phases)

@@ -22,11 +22,9 @@ _SAME_TIME = 1e-9
 _EVERYWHERE = slice(5, None, 10)
 """Of the dense grid's times: one more between neighbouring collocation points."""
 _JUST_BEFORE = 1e-7
-"""How long before a knot the acceleration before its jump is looked at, in normalised time."""
+"""How long before a knot what jumps there is looked at, in normalised time."""
 _BESIDE = np.array([-12.0, -8.0, -5.0, -3.0, -1.5, -0.5, 0.5, 1.5, 3.0, 5.0, 8.0, 12.0])
 """Points around an abrupt change, in steps of the dense grid."""
-_CONTINUOUS_ACCELERATION = 3
-"""Least degree without such jumps."""
 
 
 def dense_grid(phase: Phase, density: int) -> np.ndarray:
@@ -34,12 +32,7 @@ def dense_grid(phase: Phase, density: int) -> np.ndarray:
     breaks = phase.breaks
     behind = np.searchsorted(phase.t_norm, breaks + _SAME_TIME)
     grid = spread(breaks, density * np.maximum(np.diff(behind), 1))
-    return np.union1d(grid, _jumps(phase) - _JUST_BEFORE)
-
-
-def _jumps(phase: Phase) -> np.ndarray:
-    """Knots at which the acceleration jumps, so that a limit must hold on both sides."""
-    return phase.breaks[1:-1] if phase.degree < _CONTINUOUS_ACCELERATION else np.empty(0)
+    return np.union1d(grid, phase.jumps - _JUST_BEFORE)
 
 
 def violations(dense: Program, x: np.ndarray, goal: float) -> tuple[float, list[np.ndarray]]:
@@ -165,7 +158,7 @@ def _zoomed(dense: Phase, x: np.ndarray, centres: np.ndarray, reach: np.ndarray)
 
 def merged(phase: Phase, extra: np.ndarray) -> np.ndarray:
     """Collocation points of a phase with extra ones, without pairs so close that their rows would be the same."""
-    t_norm, jumps = phase.t_norm, _jumps(phase)
+    t_norm, jumps = phase.t_norm, phase.jumps
     sides = [np.searchsorted(jumps, times, side="right") for times in (extra, t_norm)]
     apart = np.where(sides[0][:, None] == sides[1], np.abs(extra[:, None] - t_norm), np.inf)
     return np.union1d(t_norm, extra[apart.min(axis=1) > _CLOSEST])

@@ -14,8 +14,8 @@ from brachis.robot.torque_curves import Curve, resolve_curves
 from brachis.task import FROM_URDF, LimitScale, LimitSpec
 
 LEAST, LARGEST = 1e-6, 1e12
-"""No drive has a smaller or larger torque, velocity or acceleration limit, in SI units; products and squares of such
-figures are still numbers."""
+"""No drive has a smaller or larger limit of torque, velocity, acceleration or their rates, in SI units; products and
+squares of such figures are still numbers."""
 FARTHEST = 1e6
 """No position is farther from zero, rad or m: there the rounding of numbers is a tenth of a nanometre."""
 _NARROWEST = 1e-9
@@ -39,6 +39,10 @@ class Limits:
         W.
     rms_torque : (n,) ndarray
         Root mean square over the motion, Nm or N.
+    jerk : (n,) ndarray
+        rad/s^3 or m/s^3.
+    torque_rate : (n,) ndarray
+        Nm/s or N/s.
     total_power : float
         Of the sum over all joints, W.
     torque_speed : (n,) tuple of tuple of pairs
@@ -54,6 +58,8 @@ class Limits:
     torque_upper: np.ndarray
     power: np.ndarray
     rms_torque: np.ndarray
+    jerk: np.ndarray
+    torque_rate: np.ndarray
     total_power: float
     torque_speed: tuple[Curve, ...]
 
@@ -96,7 +102,7 @@ class Limits:
 
 PAIRS = ("velocity", "torque")
 """Kinds of limits that may differ in both directions: a number > 0 for each joint, or [lower, upper] around zero."""
-MAGNITUDES = ("velocity", "acceleration", "torque", "power", "rms_torque")
+MAGNITUDES = ("velocity", "acceleration", "torque", "power", "rms_torque", "jerk", "torque_rate")
 """These, and the kinds that are one number > 0 for each joint."""
 _ARRAYS = tuple(
     name

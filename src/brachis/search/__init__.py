@@ -5,7 +5,7 @@ from brachis.search.pacing import first_breaks, first_point
 from brachis.search.portfolio import Stages, find_fastest
 from brachis.search.recentring import best_of_joints, solved_in_chart
 from brachis.search.record import Record
-from brachis.search.solving import MARGINS, Listener, continued, solve_with
+from brachis.search.solving import MARGINS, Listener, continued, eased, solve_with
 
 __all__ = [
     "MARGINS",
@@ -14,6 +14,7 @@ __all__ = [
     "Stages",
     "best_of_joints",
     "continued",
+    "eased",
     "find_fastest",
     "first_breaks",
     "first_map",

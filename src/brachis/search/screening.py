@@ -95,9 +95,10 @@ def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
 
 
 def _roughly(problem: Problem) -> Problem:
-    """Return the problem with splines that are at rest at both ends in their velocity alone."""
+    """Return the problem with parabolas at rest in their velocity alone, without limits that they cannot hold."""
     spline = problem.task.spline.model_copy(update={"degree": _DEGREE, "rest": "velocity"})
-    return dataclasses.replace(problem, task=problem.task.model_copy(update={"spline": spline}))
+    limits = tuple(limit for limit in problem.limits if limit.order <= _DEGREE)
+    return dataclasses.replace(problem, task=problem.task.model_copy(update={"spline": spline}), limits=limits)
 
 
 def _solver(start: Start, deadline: Deadline) -> Solve:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from brachis.deadline import Deadline
+from brachis.errors import UnreachableError
 from brachis.limits.branch_margin import MARGIN
 from brachis.nlp import Program
+from brachis.nlp.guess import shortest_time
 from brachis.refine import Solve
 from brachis.solvers import Solver, SolverOptions, SolverReport, SolveStatus
 from brachis.task import SolverSettings
@@ -20,6 +23,8 @@ MARGINS = (0.1, 0.02, MARGIN)
 """Branch margins that are tried in turn; see `continued`."""
 HELD_BACK = 1e-4
 """A margin that is nearer to its bound than this holds the motion back."""
+_EASY = 2
+"""Order of the limits with which solves from afar are easy; see `eased`."""
 _ON_ITS_WAY = 1e-3
 _PATIENCE = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess, unless the task says otherwise."""
@@ -77,6 +82,38 @@ def continued(
                 x = outcome[1].x
     order = [*failed, *solved]
     return order[-1][0], tuple(report for _, report in order)
+
+
+def eased(program: Program, x: np.ndarray, solve: Solve, margin: float) -> tuple[np.ndarray, tuple[SolverReport, ...]]:
+    """Find a better starting point where limits ask for the third derivative: the answer without them, time-scaled.
+
+    Where the motion must slow down, such limits have local optima in which it all but stops. The fastest motion without
+    them has slowed down where it must; its shape over time, slowed down as a whole, leads past them.
+
+    Parameters
+    ----------
+    program : Program
+    x : (v,) ndarray
+        Starting point.
+    solve : callable
+    margin : float
+        Least branch margin.
+
+    Returns
+    -------
+    x : (v,) ndarray
+        The given point where there are no such limits, or where that solve failed.
+    reports : tuple of SolverReport
+        Of the solve without them.
+    """
+    easier = program.up_to(_EASY)
+    if len(easier.limits) == len(program.limits):
+        return x, ()
+    report = solve(easier.with_margin(margin), x)
+    if report.status.usable:
+        with contextlib.suppress(UnreachableError):
+            x = shortest_time(program, report.x)
+    return x, (report,)
 
 
 def solve_with(

@@ -19,7 +19,7 @@ Row = Literal["x", "y", "z", "yaw"]
 _Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll"]
 POSITION_ROWS: Final[tuple[Row, ...]] = ("x", "y", "z")
 _SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll"
-_FULL_REST_DEGREE = 3
+_VANISHING: Final = {"velocity": 1, "full": 2, "jerk": 3}
 
 
 def _expand_position(space: _Space) -> _Space:
@@ -96,16 +96,31 @@ class SplineSettings(Model):
         lt=1.0,
         description="With knots: free, the least length of an interval, in mean intervals; never less than 5e-5 t_E.",
     )
-    rest: Literal["full", "velocity"] = Field(
-        default="full", description="What vanishes at both ends: velocity and acceleration (full), or velocity alone."
+    rest: Literal["velocity", "full", "jerk"] = Field(
+        default="full",
+        description="What vanishes at both ends: velocity alone; velocity and acceleration (full); or velocity, "
+        "acceleration and jerk, and with them the rates of the torques (jerk; degree 4 at least).",
     )
     points_per_interval: Count = Field(default=3, ge=1, le=100, description="Collocation points per knot interval.")
 
+    @property
+    def vanishing(self) -> int:
+        """How many derivatives of the joint positions vanish at both ends."""
+        return _VANISHING[self.rest]
+
     @model_validator(mode="after")
     def _rest_needs_degree(self) -> SplineSettings:
-        if self.rest == "full" and self.degree < _FULL_REST_DEGREE:
-            problem = "rest: full asks for a continuous acceleration that is zero at the ends: degree 2 cannot give it"
-            raise refuse(problem, key=".degree", found=self.degree, allowed=">= 3, or rest: velocity")
+        order = self.vanishing
+        if order > 1 and self.degree <= order:
+            last = {2: "acceleration", 3: "jerk"}[order]
+            problem = (
+                f"rest: {self.rest} asks for a continuous {last} that is zero at the ends: "
+                f"degree {self.degree} cannot give it"
+            )
+            lower = " or ".join(
+                f"rest: {word}" for word, level in _VANISHING.items() if level < min(order, self.degree)
+            )
+            raise refuse(problem, key=".degree", found=self.degree, allowed=f">= {order + 1}, or {lower}")
         return self
 
     @model_validator(mode="after")

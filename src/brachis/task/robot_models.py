@@ -5,8 +5,8 @@ Limits
 For ``torque``, ``velocity`` and ``position`` three cases differ: the key is absent, and the limit comes from the URDF;
 the key is null, and there is no limit; the key has a value. The models write the absent key as the word `FROM_URDF`,
 which a task file may also spell out. Thus absent and null stay distinguishable in comparisons and in saved tasks. A
-joint that a mapping leaves out keeps the limit of the URDF. A URDF has no ``acceleration``: absent means none. Friction
-is written likewise: absent, it is what the URDF's ``<dynamics>`` says.
+joint that a mapping leaves out keeps the limit of the URDF. A URDF has no ``acceleration``, ``jerk`` or
+``torque_rate``: absent means none. Friction is written likewise: absent, it is what the URDF's ``<dynamics>`` says.
 """
 
 from __future__ import annotations
@@ -134,6 +134,8 @@ class LimitScale(Model):
     acceleration: Positive = Field(default=1.0, description="Factor on all acceleration limits.")
     power: Positive = Field(default=1.0, description="Factor on all power limits, the total one too.")
     rms_torque: Positive = Field(default=1.0, description="Factor on all limits of root-mean-square torques.")
+    jerk: Positive = Field(default=1.0, description="Factor on all jerk limits.")
+    torque_rate: Positive = Field(default=1.0, description="Factor on all limits of torque rates.")
 
 
 @dataclass(frozen=True, init=False)
@@ -176,6 +178,10 @@ class LimitSpec:
             "joined by a line that falls ever more steeply; the last slope goes on. Absent or null: none."
         ),
     ] = None
+    jerk: Annotated[OwnLimit, Field(description="Largest jerk, rad/s^3 (m/s^3). Absent or null: none.")] = None
+    torque_rate: Annotated[
+        OwnLimit, Field(description="Largest rate of change of the torque, N m/s (force, N/s). Absent or null: none.")
+    ] = None
 
     __pydantic_config__ = Model.model_config
 
@@ -190,6 +196,8 @@ class LimitSpec:
         total_power: float | None = None,
         rms_torque: StatedLimit = None,
         torque_speed: StatedCurves = None,
+        jerk: StatedLimit = None,
+        torque_rate: StatedLimit = None,
     ) -> None:
         """Take limits from a program; they are checked when a robot is made with them, where its joints are known.
 
@@ -209,11 +217,14 @@ class LimitSpec:
             W.
         torque_speed : mapping of str to (p, 2) array or sequence of pairs, optional
             Points [speed, torque] by joint name.
+        jerk, torque_rate : float, sequence, array, mapping or None, optional
+            rad/s^3 or m/s^3; Nm/s or N/s. As `acceleration`. They need ``spline.degree`` >= 3 and acceleration at rest.
         """
         if not isinstance(scale, LimitScale):
             scale = LimitScale().model_copy(update={kind: plain(factor) for kind, factor in (scale or {}).items()})
-        stated = (torque, velocity, acceleration, position, scale, power, total_power, rms_torque, torque_speed)
-        for each, value in zip(fields(self), stated, strict=True):
+        stated = (torque, velocity, acceleration, position, scale)
+        further = (power, total_power, rms_torque, torque_speed, jerk, torque_rate)
+        for each, value in zip(fields(self), (*stated, *further), strict=True):
             object.__setattr__(self, each.name, plain(value, tuple))
 
 

@@ -141,6 +141,10 @@ class Trajectory:
         """Joint accelerations, as `position`; rad/s^2 or m/s^2."""
         return np.asarray(self.pieces(self._checked(t), nu=2))
 
+    def jerk(self, t: np.ndarray | float) -> np.ndarray:
+        """Joint jerks, as `position`; rad/s^3 or m/s^3. At a node the value behind it."""
+        return np.asarray(self.pieces(self._checked(t), nu=3))
+
     def torque(self, t: np.ndarray | float) -> np.ndarray:
         """Joint torques, as `position`; Nm or N."""
         t = self._checked(t)

@@ -50,9 +50,12 @@ def end_checks(
             checks.append(_worst_joint(f"{name} posture", miss, options.posture_tolerance, "rad, m", robot, time))
         speed, allowed = np.abs(trajectory.velocity(time)), options.rest_velocity_tolerance
         checks.append(_worst_joint(f"{name} velocity", speed, allowed, "rad/s, m/s", robot, time))
-        if task.spline.rest == "full":
+        if task.spline.vanishing > 1:
             bend, allowed = np.abs(trajectory.acceleration(time)), options.rest_acceleration_tolerance
             checks.append(_worst_joint(f"{name} acceleration", bend, allowed, "rad/s2, m/s2", robot, time))
+        if task.spline.vanishing > 2:  # noqa: PLR2004  (jerk)
+            jerk = np.abs(trajectory.jerk(time)) / (1.0 + np.abs(trajectory.jerk(trajectory.times)).max())
+            checks.append(_worst_joint(f"{name} jerk", jerk, options.rest_jerk_tolerance, "relative", robot, time))
     return checks
 
 

@@ -11,6 +11,8 @@ beginning with a = -gravity, and back again with the forces F = m a_com and the 
 payload is a body of its own beside those of the URDF. The torque is the moment, or force, along z, and
 
     armature qddot + viscous qdot + coulomb tanh(qdot / v_eps).
+
+Its rate is taken by differences along the motion, that of the last three terms by their derivatives.
 """
 
 from __future__ import annotations
@@ -24,6 +26,10 @@ from brachis.robot import Robot
 from brachis.task import Placement
 
 _Z = np.array([0.0, 0.0, 1.0])
+_STEP = 1e-3
+"""Of the differences, in rad or m."""
+_FAR = 300.0
+"""Velocities, in widths of the Coulomb friction, beyond which its slope is zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +70,32 @@ def torques(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) ->
     """Joint torques (K, n) from states (K, n), Nm or N; that of a free roll of the tool is zero."""
     f = robot.friction
     return _rigid(robot, q, qdot, qddot) + f.armature * qddot + f.viscous * qdot + f.coulomb * np.tanh(qdot / f.v_eps)
+
+
+def torque_rates(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, qdddot: np.ndarray) -> np.ndarray:
+    """Rates of the joint torques (K, n): differences along the motion, friction by its derivative; Nm/s or N/s.
+
+    Differences of fourth order, over a step in which no joint goes far, nor changes its speed or acceleration much.
+    """
+    rates = [np.abs(part).max(axis=1) ** (1.0 / order) for order, part in enumerate((qdot, qddot, qdddot), 1)]
+    step = _STEP / np.maximum(np.max(rates, axis=0), 1.0)[:, None]
+
+    def change(h: np.ndarray) -> np.ndarray:
+        ahead, behind = (
+            _rigid(robot, q + t * qdot + t**2 / 2.0 * qddot + t**3 / 6.0 * qdddot, *_on(t, qdot, qddot, qdddot))
+            for t in (h, -h)
+        )
+        return (ahead - behind) / (2.0 * h)
+
+    f = robot.friction
+    sliding = np.cosh(np.clip(qdot / f.v_eps, -_FAR, _FAR)) ** -2
+    friction = f.armature * qdddot + (f.viscous + f.coulomb / f.v_eps * sliding) * qddot
+    return (4.0 * change(step) - change(2.0 * step)) / 3.0 + friction
+
+
+def _on(t: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, qdddot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity and acceleration after times t, (K, 1), s, under a jerk that stays."""
+    return qdot + t * qddot + t**2 / 2.0 * qdddot, qddot + t * qdddot
 
 
 def _rigid(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:

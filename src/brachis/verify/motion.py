@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -12,6 +12,10 @@ from brachis.verify.mechanics import torques
 from brachis.verify.polynomials import values_of
 
 _SAME_PLACE = 1e-9
+_ROUNDING = 120.0 * np.finfo(float).eps
+"""Jerk of a piece of 1 s that comes of the rounding of positions of 1 rad at both ends."""
+_SHOWS = 1e-5
+"""Part of a joint's largest jerk."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +34,8 @@ class Pieces:
         Coefficients relative to `nodes`.
     velocity : (5, L, n) ndarray
     acceleration : (4, L, n) ndarray
+    jerk : (3, L, n) ndarray
+        Of pieces so short that the rounding of positions shows in their third derivative, the mean one.
     """
 
     times: np.ndarray
@@ -38,6 +44,7 @@ class Pieces:
     position: np.ndarray
     velocity: np.ndarray
     acceleration: np.ndarray
+    jerk: np.ndarray
 
     @classmethod
     def of(cls, trajectory: Trajectory) -> Pieces:
@@ -45,7 +52,11 @@ class Pieces:
         position, lengths = trajectory.pieces.c, np.diff(trajectory.times)
         velocity = 5.0 * np.diff(position, axis=0) / lengths[:, None]
         acceleration = 4.0 * np.diff(velocity, axis=0) / lengths[:, None]
-        return cls(trajectory.times, lengths, trajectory.q[:-1], position, velocity, acceleration)
+        jerk = 3.0 * np.diff(acceleration, axis=0) / lengths[:, None]
+        mean = (acceleration[-1] - acceleration[0]) / lengths[:, None]
+        rounding = _ROUNDING * np.abs(trajectory.q).max(axis=0) / lengths[:, None] ** 3
+        jerk = np.where(rounding > _SHOWS * np.abs(mean).max(axis=0), mean, jerk)
+        return cls(trajectory.times, lengths, trajectory.q[:-1], position, velocity, acceleration, jerk)
 
     def time(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the times of places, s."""
@@ -66,7 +77,7 @@ class States:
     piece : (K,) int ndarray
     u, t : (K,) ndarray
         Place in the piece; time, s.
-    q, qdot, qddot, tau : (K, n) ndarray
+    q, qdot, qddot, qdddot, tau : (K, n) ndarray
     """
 
     piece: np.ndarray
@@ -75,6 +86,7 @@ class States:
     q: np.ndarray
     qdot: np.ndarray
     qddot: np.ndarray
+    qdddot: np.ndarray
     tau: np.ndarray
 
     @classmethod
@@ -86,17 +98,16 @@ class States:
         piece, u = piece[~again], u[~again]
         q = pieces.nodes[piece] + values_of(pieces.position[:, piece], u)
         qdot, qddot = values_of(pieces.velocity[:, piece], u), values_of(pieces.acceleration[:, piece], u)
-        return cls(piece, u, pieces.time(piece, u), q, qdot, qddot, torques(robot, q, qdot, qddot))
+        qdddot = values_of(pieces.jerk[:, piece], u)
+        return cls(piece, u, pieces.time(piece, u), q, qdot, qddot, qdddot, torques(robot, q, qdot, qddot))
 
     def only(self, chosen: np.ndarray) -> States:
         """Return some of the states, in a new order."""
-        parts = (self.piece, self.u, self.t, self.q, self.qdot, self.qddot, self.tau)
-        return States(*(part[chosen] for part in parts))
+        return States(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     def merged(self, other: States) -> tuple[States, np.ndarray]:
         """Return these states and others, ascending, and where each one was among those put one after the other."""
-        mine = (self.piece, self.u, self.t, self.q, self.qdot, self.qddot, self.tau)
-        theirs = (other.piece, other.u, other.t, other.q, other.qdot, other.qddot, other.tau)
-        both = States(*(np.concatenate(parts) for parts in zip(mine, theirs, strict=True)))
+        names = [field.name for field in fields(self)]
+        both = States(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
         order = np.lexsort((both.u, both.piece))
         return both.only(order), order

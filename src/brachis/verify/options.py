@@ -25,6 +25,8 @@ class VerifyOptions:
         Largest joint velocity at the ends, rad/s or m/s.
     rest_acceleration_tolerance : float
         Largest joint acceleration at the ends where the task asks for full rest, rad/s^2 or m/s^2.
+    rest_jerk_tolerance : float
+        Largest joint jerk at the ends where the task asks for rest in jerk, as a fraction of one plus the largest one.
     jump_tolerance : float
         Largest jump where polynomial pieces join, as a fraction of one plus the quantity's largest value.
     spline_tolerance : float
@@ -38,5 +40,6 @@ class VerifyOptions:
     posture_tolerance: float = 1e-9
     rest_velocity_tolerance: float = 1e-8
     rest_acceleration_tolerance: float = 1e-6
+    rest_jerk_tolerance: float = 1e-4
     jump_tolerance: float = 1e-6
     spline_tolerance: float = 1e-8

@@ -8,7 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from brachis.custom_limits import LimitModel, custom_limits
-from brachis.verify.limits import drives, joint_rate, position, process_speed, tool_motion, tool_speed, torque
+from brachis.verify.limits import (
+    drives,
+    joint_rate,
+    position,
+    process_speed,
+    tool_motion,
+    tool_speed,
+    torque,
+    torque_rate,
+)
 from brachis.verify.limits.own import check_own
 from brachis.verify.limits.protocol import Given, LimitCheck, Worst
 from brachis.verify.options import VerifyOptions
@@ -28,6 +37,8 @@ TABLE: dict[str, LimitCheck] = {
     "total_power": drives.worst_total_power,
     "torque_speed": drives.worst_torque_at_speed,
     "rms_torque": drives.worst_rms_torque,
+    "jerk": joint_rate.worst_jerk,
+    "torque_rate": torque_rate.worst,
 }
 
 

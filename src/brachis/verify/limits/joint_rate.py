@@ -1,4 +1,4 @@
-"""v_min <= qdot <= v_max and |qddot| <= a_max, exactly: the saved motion is polynomial."""
+"""v_min <= qdot <= v_max, |qddot| <= a_max and |qdddot| <= j_max, exactly: the saved motion is polynomial."""
 
 from __future__ import annotations
 
@@ -18,6 +18,12 @@ def worst_acceleration(given: Given) -> Worst | None:
     """Find the largest acceleration ratio, anywhere."""
     limit = given.robot.limits.acceleration
     return _worst(given, given.pieces.acceleration, -limit, limit)
+
+
+def worst_jerk(given: Given) -> Worst | None:
+    """Find the largest jerk ratio, anywhere."""
+    limit = given.robot.limits.jerk
+    return _worst(given, given.pieces.jerk, -limit, limit)
 
 
 def _worst(given: Given, rates: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Worst | None:

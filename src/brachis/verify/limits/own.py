@@ -27,7 +27,7 @@ def check_own(model: LimitModel, given: Given) -> tuple[str, Worst]:
     def ratios(states: States) -> np.ndarray:
         if independent is None:
             s = given.s_at(states.t)
-            motion = SimpleNamespace(q=states.q, qdot=states.qdot, qddot=states.qddot, s=s)
+            motion = SimpleNamespace(q=states.q, qdot=states.qdot, qddot=states.qddot, qdddot=states.qdddot, s=s)
             return np.abs(limit.ratios(motion, states.t))
         found = np.abs(independent(given.robot, states.q, states.qdot, states.qddot, states.tau))
         if found.shape != (len(states.t), len(limit.labels)):

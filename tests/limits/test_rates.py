@@ -1,0 +1,171 @@
+"""Jerk and torque rate through all of it: refusals, plan, dense grid, verification, sensitivity, timeline."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.bottleneck import check_sensitivities, limit_ratios
+from brachis.errors import InputError
+from brachis.limits import Label, Limit, Partials
+from brachis.plots import plot_timeline
+from brachis.verify import verify_trajectory
+from brachis.verify.mechanics import torque_rates, torques
+
+ROOT = Path(__file__).parents[2]
+FIGURES = {"jerk": 12.0, "torque_rate": 25.0}  # rad/s^3 and Nm/s
+
+
+def task(*, spline=None, **limits):
+    found = brachis.load_task(ROOT / "examples/01_scara_line.yaml").to_dict()
+    found["path"] = [{"line": {"length": 1.0, "angle_deg": 45.0}}]
+    found["robot"]["limits"] |= limits
+    settings = found["spline"] | (spline or {})
+    return {**found, "spline": settings, "search": {"effort": "single", "least_motion": False}}
+
+
+@pytest.fixture(scope="module")
+def free():
+    return brachis.plan(None, task())
+
+
+@pytest.fixture(scope="module", params=FIGURES)
+def kind(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def result(kind):
+    return brachis.plan(None, task(**{kind: FIGURES[kind]}))
+
+
+def rates(trajectory, kind, count=20_000):
+    """Differences of accelerations or torques over the saved motion, per second."""
+    t = np.linspace(0.0, trajectory.t_end, count)
+    values = trajectory.acceleration(t) if kind == "jerk" else trajectory.torque(t)
+    return np.abs(np.diff(values, axis=0)) / np.diff(t)[:, None]
+
+
+def test_the_limit_holds_everywhere_and_is_used(kind, free, result):
+    assert rates(free.trajectory, kind).max() > 2.0 * FIGURES[kind], "without the limit it is exceeded"
+    assert result.verified
+    assert rates(result.trajectory, kind).max() == pytest.approx(FIGURES[kind], rel=5e-4)
+    assert rates(result.trajectory, kind).max() < FIGURES[kind] * 1.0002
+    assert result.t_end > 1.01 * free.t_end
+
+
+def test_verification_finds_what_is_too_fast(kind, result):
+    name = f"{kind.replace('_', ' ')} ratio"
+    check = {each.name: each for each in result.verification.checks}[name]
+    assert check.value == pytest.approx(1.0, abs=2e-4)
+    robot = result.trajectory.robot
+    tighter = replace(robot.limits, **{kind: getattr(robot.limits, kind) / 1.001})
+    verification = verify_trajectory(result.trajectory, robot=replace(robot, limits=tighter))
+    failed = [each for each in verification.checks if not each.passed]
+    assert [each.name for each in failed] == [name]
+    assert failed[0].value == pytest.approx(1.001 * check.value, rel=1e-6)
+    joint = result.trajectory.joint_names.index(failed[0].subject)
+    near = failed[0].time + np.array([-1e-6, 0.0, 1e-6])
+    values = result.trajectory.acceleration if kind == "jerk" else result.trajectory.torque
+    steps = np.abs(np.diff(values(near)[:, joint])) / 1e-6  # at a knot either side may be the worst
+    assert steps.max() == pytest.approx(FIGURES[kind], rel=1e-3)
+
+
+def test_verification_finds_a_rate_within_a_microsecond(kind, result):
+    """The rounding of positions hides the third derivative of so short a piece, not how its acceleration changes."""
+    trajectory, change = result.trajectory, np.array([0.1, 0.0, 0.0])
+    t = 0.4321 * trajectory.t_end + np.array([0.0, 1e-6])
+    place = int(np.searchsorted(trajectory.times, t[0]))
+    assert trajectory.times[place] > t[1]
+    at = trajectory.at(t)
+    qddot = at.qddot + np.array([[0.0], [1.0]]) * change
+    new = {"times": at.t, "q": at.q, "qdot": at.qdot, "qddot": qddot, "qddot_before": qddot}
+    arrays = {name: np.insert(getattr(trajectory, name), place, values, axis=0) for name, values in new.items()}
+    checks = {each.name: each for each in verify_trajectory(replace(trajectory, **arrays)).checks}
+    found = checks[f"{kind.replace('_', ' ')} ratio"]
+    inertia = 1.0 if kind == "jerk" else np.abs(trajectory.torque(t[0]) - _torque(trajectory, t[0], change)).max() / 0.1
+    assert found.value == pytest.approx(0.1 / 1e-6 * inertia / FIGURES[kind], rel=1e-2)
+    assert found.time == pytest.approx(t[0], abs=2e-6)
+
+
+def _torque(trajectory, t, change):
+    states = (np.atleast_2d(part(t)) for part in (trajectory.position, trajectory.velocity, trajectory.acceleration))
+    q, qdot, qddot = states
+    return torques(trajectory.robot, q, qdot, qddot + change)[0]
+
+
+@pytest.mark.parametrize(("step", "above"), [(0.01, 1e-4), (0.0005, 5e-6)])
+def test_prediction_is_what_solving_again_gives(kind, result, step, above):
+    """Within 1 % other limits take over, here and there; the linearised problem knows, and for small steps none do."""
+    found = check_sensitivities(result.attempt.refined, step=step)
+    large = found.larger(above)
+    assert {entry.sensitivity.label.kind for entry in large} >= {kind.replace("_", " ")}
+    assert all(entry.optimal for entry in large)
+    assert max(entry.linearised_deviation for entry in large) < 0.05
+    if step < 0.01:
+        assert found.worst_deviation(above) < 0.005
+
+
+def test_timeline_and_ratios_know_it(kind, result):
+    ratios = limit_ratios(result.trajectory)
+    column = [str(label) for label in ratios.labels].index(f"j2 {kind.replace('_', ' ')}")
+    assert ratios.labels[column].unit == {"jerk": "rad/s^3", "torque_rate": "Nm/s"}[kind]
+    assert np.abs(ratios.values).max() == pytest.approx(1.0, abs=2e-4)
+    # At inner knots of cubic splines the jerk jumps: both sides are there.
+    twice = ratios.t[1:][np.diff(ratios.t) == 0.0]
+    knots = np.unique(result.trajectory.knots)[1:-1] * result.t_end
+    np.testing.assert_allclose(twice, knots, atol=1e-12)
+    assert plot_timeline(result.trajectory).axes
+
+
+def test_the_limits_of_rates_are_for_splines_that_can_hold_them(kind):
+    figure = {kind: FIGURES[kind]}
+    words = f"the {kind.replace('_', ' ')} limit asks for a continuous acceleration"
+    with pytest.raises(InputError, match=rf"spline\.degree: {words}; found 2, .*; allowed: >= 3"):
+        brachis.plan(None, task(spline={"degree": 2, "rest": "velocity"}, **figure))
+    with pytest.raises(InputError, match=rf"spline\.rest: {words}; found velocity, .*; allowed: full or jerk"):
+        brachis.plan(None, task(spline={"rest": "velocity"}, **figure))
+
+
+def test_rates_of_the_verification_are_differences_of_its_torques(free):
+    trajectory, t, h = free.trajectory, np.linspace(0.1, 2.0, 9) + 0.0123, 1e-4
+    parts = [getattr(trajectory, name)(t) for name in ("position", "velocity", "acceleration", "jerk")]
+    friction = replace(trajectory.robot.friction, viscous=np.full(3, 2.0), coulomb=np.full(3, 1.5), v_eps=np.ones(3))
+    robot = replace(trajectory.robot, friction=friction)
+
+    def after(step):
+        q, qdot, qddot, qdddot = parts
+        moved = q + step * qdot + step**2 / 2 * qddot + step**3 / 6 * qdddot
+        return torques(robot, moved, qdot + step * qddot + step**2 / 2 * qdddot, qddot + step * qdddot)
+
+    expected = (after(h) - after(-h)) / (2.0 * h)
+    np.testing.assert_allclose(torque_rates(robot, *parts), expected, atol=1e-6 * np.abs(expected).max())
+
+
+class _Twist(Limit):
+    """A limit of the user's own that asks for the jerk: the sum of two joints' jerks."""
+
+    kind, order, time_scaling = "twist", 3, True
+    labels = (Label("arm", "twist", "rad/s^3"),)
+    lower, upper = -np.ones(1), np.ones(1)
+
+    def bind(self, _robot):
+        return self
+
+    def values(self, motion):
+        return motion.qdddot[:, 1:].sum(axis=1)[:, None] / 15.0
+
+    def partials(self, motion):
+        return Partials(qdddot=np.broadcast_to(np.array([[0.0, 1.0, 1.0]]) / 15.0, (len(motion.q), 1, 3)))
+
+
+def test_a_limit_of_the_users_own_may_ask_for_the_jerk(free):
+    t = np.linspace(0.0, 1.0, 5001)
+    assert np.abs(free.trajectory.jerk(t * free.t_end)[:, 1:].sum(axis=1)).max() > 20.0
+    result = brachis.plan(None, task(), limits=[_Twist()])
+    assert result.verified
+    assert np.abs(result.trajectory.jerk(t * result.t_end)[:, 1:].sum(axis=1)).max() <= 15.0 * 1.0002
