@@ -18,6 +18,7 @@ from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Boundary, FixedGrid, Grid, Phase, Program
 from brachis.path import Path, path_of
 from brachis.robot import ROLL_JOINT, Robot, TaskMap, bind
+from brachis.robot.task_map import JointSpace
 from brachis.task import Task
 
 _EXACT = 1e-12
@@ -81,7 +82,10 @@ class Problem:
 
 def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
     """Return the posture nearest to a given one, (n,), at the end of the path; the given one if it is there already."""
-    newton, place = Newton(task_map), path.sample(np.ones(1)).target
+    place = path.sample(np.ones(1)).target
+    if isinstance(task_map, JointSpace):
+        return np.asarray(place[0])
+    newton = Newton(task_map)
     miss = task_map.difference(place, task_map.values(posture[None]))
     if task_map.robot.n < task_map.m or np.abs(miss).max() < _EXACT:
         return posture
@@ -142,7 +146,7 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
     -------
     list of Decomposition
         With ``redundant_joints: auto`` the one with the largest branch margin at the start posture first, and closed
-        forms before polynomials; none where the robot has no closed form. At least one if the task names the joints.
+        forms before polynomials; none where the robot has no closed form or the path is one of joints. At least one if the task names the joints.
 
     Raises
     ------
@@ -155,6 +159,8 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
         There is no such joint or branch.
     """
     task, robot, task_map = problem.task, problem.robot, problem.task_map
+    if isinstance(task_map, JointSpace):
+        return []
     if task.redundant_joints != "auto":
         wanted = _with_roll(task_map, task.redundant_joints)
         return [_decomposition(problem, ik.find(robot, task_map, wanted, families=families))]

@@ -57,9 +57,13 @@ def _followed(phase: Phase, joint_path: np.ndarray) -> np.ndarray:
 
 def _timed(joint_path: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
     """Follow a joint path, (S, c), with a smooth motion from rest to rest: the places at `t_norm`, (K, c)."""
-    u = t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
-    grid = np.linspace(0.0, 1.0, len(joint_path))
+    u, grid = rest_to_rest(t_norm), np.linspace(0.0, 1.0, len(joint_path))
     return np.column_stack([np.interp(u, grid, column) for column in joint_path.T])
+
+
+def rest_to_rest(t_norm: np.ndarray) -> np.ndarray:
+    """Return how far along a joint path, from 0 to 1, a first guess is at normalised times."""
+    return t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
 
 
 def fitted(phase: Phase, duration: float, t_norm: np.ndarray, wanted: np.ndarray) -> np.ndarray:

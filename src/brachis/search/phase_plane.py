@@ -39,16 +39,24 @@ def least_time(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> float:
     float
         s; infinite where the joint path cannot be followed at any speed.
     """
+    times = least_times(limits, s, q)
+    return np.inf if times is None else float(times[-1])
+
+
+def least_times(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+    """Estimate when the stations are passed, (S,), s; see `least_time`. None where they cannot be."""
     step = s[1] - s[0]
     slope, offset, ceiling = _lines(limits, q, np.gradient(q, step, axis=0, edge_order=2), step)
     intervals = _controllable(slope, offset, ceiling, step)
     if intervals is None or intervals[0][0] > 0.0:
-        return np.inf
+        return None
     x = _fastest(slope, offset, *intervals, step)
+    if x.max() <= 0.0:
+        return None
     # Between stations nothing stops; a station where the grid says so is an artefact of its width.
     x[1:-1] = np.maximum(x[1:-1], _STANDING * np.median(x))
     speed = np.sqrt(x)
-    return float(np.sum(2.0 * step / (speed[1:] + speed[:-1]))) if x.max() > 0.0 else np.inf
+    return np.concatenate([[0.0], np.cumsum(2.0 * step / (speed[1:] + speed[:-1]))])
 
 
 def _lines(

@@ -1,5 +1,6 @@
 """What is asked: the task file as frozen models, its loader and its schema. No numerics."""
 
+from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.load import check_robot_settings, load_task
 from brachis.task.models import (
     Posture,
@@ -29,6 +30,7 @@ from brachis.task.segments import (
     ArcCenter,
     ArcSegment,
     ArcVia,
+    BSplineSegment,
     Circle,
     CircleSegment,
     CsvFile,
@@ -54,6 +56,8 @@ __all__ = [
     "ArcSegment",
     "ArcVia",
     "Attitude",
+    "BSplineCurve",
+    "BSplineSegment",
     "Circle",
     "CircleSegment",
     "CsvFile",
