@@ -146,7 +146,8 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
     -------
     list of Decomposition
         With ``redundant_joints: auto`` the one with the largest branch margin at the start posture first, and closed
-        forms before polynomials; none where the robot has no closed form or the path is one of joints. At least one if the task names the joints.
+        forms before polynomials; none where the robot has no closed form, or the path is one of joints. At least one
+        if the task names the joints.
 
     Raises
     ------

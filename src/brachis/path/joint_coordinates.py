@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from brachis.errors import PathError, UnknownNameError
 from brachis.path.row_coordinates import RowCoordinates
 from brachis.robot.task_map.rows import joints_of
-from brachis.task import BSplineSegment, LineSegment, SplineSegment
+from brachis.task import BSplineCurve, BSplineSegment, LineSegment, SplineSegment, SplineThrough
 
 if TYPE_CHECKING:
     from brachis.path.protocol import Array, Curve
@@ -31,7 +29,8 @@ class JointCoordinates(RowCoordinates):
             problem = "no kind of segment for a path of joints"
             allowed = "line: {to: ...}, line: {by: ...}, spline, bspline, csv"
             raise PathError(problem, found=segment.kind, allowed=allowed, where=f"path[{index}]")
-        names = None if isinstance(segment, LineSegment) else segment.shape.joints
+        shape = segment.shape
+        names = shape.joints if isinstance(shape, SplineThrough | BSplineCurve) else None
         if names is None:
             return super().curve(segment, index, start)
         own, where = joints_of(self.rows), f"path[{index}].{segment.kind}.joints"
@@ -42,7 +41,9 @@ class JointCoordinates(RowCoordinates):
             raise PathError("joints are missing", found=list(names), allowed=", ".join(own), where=where)
         order = [own.index(name) for name in names]
         other = JointCoordinates(tuple(self.rows[place] for place in order))
-        return Reordered(super(JointCoordinates, other).curve(segment, index, start[order]), np.argsort(order))
+        return Reordered(
+            super(JointCoordinates, other).curve(segment, index, start[order]), [names.index(joint) for joint in own]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +53,12 @@ class Reordered:
     Attributes
     ----------
     curve : Curve
-    order : (m,) int ndarray
+    columns : list of int
         Columns of the curve in the order wanted.
     """
 
     curve: Curve
-    order: Array
+    columns: list[int]
 
     @property
     def length(self) -> float:
@@ -71,4 +72,4 @@ class Reordered:
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
         """See `Curve`."""
-        return self.curve.derivatives(sigma, order)[:, :, self.order]
+        return self.curve.derivatives(sigma, order)[:, :, self.columns]

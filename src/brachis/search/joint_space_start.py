@@ -6,15 +6,15 @@ import numpy as np
 
 from brachis.attempt import Start
 from brachis.errors import PathError
+from brachis.feasibility import beyond_at_rest, in_figures
 from brachis.kinematics import JointSpaceMap
-from brachis.limits import Limit, Moments
+from brachis.limits import Limit
 from brachis.nlp.guess import rest_to_rest
 from brachis.problem import Problem
 from brachis.search.phase_plane import least_times
 
 FAMILY = "path of joints"
 _STATIONS = 401
-_SLACK = 1e-9
 
 
 def joint_space_start(problem: Problem) -> Start:
@@ -51,16 +51,17 @@ def joint_space_start(problem: Problem) -> Start:
 
 def _refuse_beyond(limit: Limit, s: np.ndarray, q: np.ndarray) -> None:
     """Refuse a path along which the arm at rest is beyond a limit."""
-    violation = limit.violation(limit.values(Moments.at_rest(q)))
-    beyond = violation - _SLACK * np.maximum(limit.violation_scale, 1.0)
-    if (beyond <= 0.0).all():
+    values, beyond = beyond_at_rest(limit, q)
+    station, column = (int(place) for place in np.unravel_index(np.argmax(beyond), beyond.shape))
+    if beyond[station, column] <= 0.0:
         return
-    column = int(np.argmax(beyond.max(axis=0)))
-    where = s[beyond[:, column] > 0.0]
-    label = limit.labels[column]
+    where, label = s[beyond[:, column] > 0.0], limit.labels[column]
+    found, allowed = in_figures(limit, column, float(values[station, column]))
     raise PathError(
-        f"the {label.kind} limit of {label.subject!r} {limit.refusal} along the path",
+        f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
         s_interval=(float(where[0]), float(where[-1])),
         where="path",
+        found=f"{found} {label.unit} at s = {s[station]:.3g}",
+        allowed=f"{allowed} {label.unit}",
         hint=f"Lead the path elsewhere{f', or raise {label.key}' if label.key else ''}",
     )

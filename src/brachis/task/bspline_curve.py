@@ -44,5 +44,5 @@ class BSplineCurve(Model):
             raise refuse("the B-spline is not clamped", key=".knots", found=list(knots), allowed=allowed)
         if most > self.degree - _SMOOTH or {*inner} & (ends[0] | ends[1]):
             problem = "a knot occurs so often that a derivative up to the third jumps"
-            raise refuse(problem, key=".knots", found=f"{most} times", allowed=f"{self.degree - _SMOOTH} times at most")
+            raise refuse(problem, key=".knots", found=most, allowed=f"{self.degree - _SMOOTH} times at most")
         return self

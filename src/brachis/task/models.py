@@ -208,8 +208,8 @@ class Task(Model):
     )
     task_space: TaskSpace = Field(
         description="What the path prescribes: rows out of x, y, z, yaw (yaw last, with two others); position (all "
-        "of x, y, z); pose; pose_free_roll, a pose that may roll about the tool frame's z axis; or joints: the path is one "
-        "of all joints, in the order of the chain (rad, m), and only its timing is planned."
+        "of x, y, z); pose; pose_free_roll, a pose that may roll about the tool frame's z axis; or joints: the path is "
+        "one of all joints, in the order of the chain (rad, m), and only its timing is planned."
     )
     path: Annotated[tuple[Segment, ...], Field(min_length=1)] = Field(description="Segments of the path, in order.")
     tool_limits: ToolLimits = Field(default_factory=ToolLimits, description="Limits on the motion of the tool.")
