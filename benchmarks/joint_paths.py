@@ -10,6 +10,7 @@ takes the very same path on a fine grid, on which limits hold at grid points alo
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import time
 from collections import Counter
 from pathlib import Path
@@ -22,9 +23,8 @@ import brachis
 from brachis.path import path_of
 from brachis.robot import bind
 
-URDF = Path(__file__).parents[1] / "robots/iiwa14/robot.urdf"
-GRID = 2000
-"""Intervals of toppra's grid."""
+ROOT = Path(__file__).parents[1]
+URDF = ROOT / "robots/iiwa14/robot.urdf"
 ACTIVE, HELD = 0.999, 0.9
 """Parts of a limit: from the first one on it is active; gravity alone takes at most the second one of torques."""
 
@@ -66,41 +66,6 @@ def _drawn(rng: np.random.Generator, intervals: int) -> dict[str, Any]:
     }
 
 
-def by_toppra(task: brachis.Task, grid: int = GRID) -> tuple[float, float]:
-    """Time a task's path with toppra; return the end time, s, and the processor time, s."""
-    import toppra  # noqa: PLC0415  (of the test extra)
-
-    robot, task_map = bind(brachis.Robot.from_urdf(URDF, limits=task.robot.limits), task.task_space)
-    path, limits, data = path_of(task_map, task), robot.limits, robot.model.createData()
-
-    class Geometry(toppra.interpolator.AbstractGeometricPath):  # type: ignore[misc]
-        dof, waypoints = robot.n, None
-        path_interval = np.array([0.0, 1.0])
-
-        def __call__(self, s: Any, order: int = 0) -> np.ndarray:
-            sample = path.sample(np.atleast_1d(s))
-            values = (sample.target, sample.xi, sample.xi_ds)[order]
-            return values if np.ndim(s) else values[0]
-
-    def torque(q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
-        return np.asarray(pin.rnea(robot.model, data, q, qdot, qddot))
-
-    both = np.array([-1.0, 1.0])
-    constraints = [
-        toppra.constraint.JointVelocityConstraint(limits.velocity[:, None] * both),
-        toppra.constraint.JointAccelerationConstraint(limits.acceleration[:, None] * both),
-        toppra.constraint.JointTorqueConstraint(torque, limits.torque[:, None] * both, np.zeros(robot.n)),
-    ]
-    began = time.process_time()
-    points = np.linspace(0.0, 1.0, grid + 1)
-    _, speed, _ = toppra.algorithm.TOPPRA(
-        constraints, Geometry(), gridpoints=points, solver_wrapper="seidel"
-    ).compute_parameterization(0.0, 0.0)
-    if speed is None:
-        return np.inf, time.process_time() - began
-    return float(np.sum(2.0 * np.diff(points) / (speed[1:] + speed[:-1]))), time.process_time() - began
-
-
 def main() -> None:
     """Print a line a case, then a summary."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -108,11 +73,16 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--intervals", type=int, default=150)
     given = parser.parse_args()
+    spec = importlib.util.spec_from_file_location("example", ROOT / "examples/11_from_toppra.py")
+    example = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(example)
     rows, active = [], Counter[str]()
     print("case   brachis t_E   toppra t_E   difference   brachis   toppra (processor time)")
     for seed in range(given.first, given.first + given.count):
         task = case(seed, given.intervals)
-        least, theirs = by_toppra(task)
+        robot, began = brachis.Robot.from_urdf(URDF, limits=task.robot.limits), time.process_time()
+        least = example.by_toppra(robot, task)
+        theirs = time.process_time() - began
         began = time.process_time()
         try:
             result = brachis.plan(None, task)
@@ -129,7 +99,7 @@ def main() -> None:
     print(
         f"{len(rows)} cases, {int(np.isinf(gaps).sum())} failed; difference {100.0 * gaps.min():.3f} to "
         f"{100.0 * gaps.max():.3f} %, median {100.0 * np.median(gaps):.3f} %; processor time, median: brachis "
-        f"{np.median(ours_all):.2f} s (refined and verified), toppra {np.median(theirs_all):.2f} s ({GRID} intervals)"
+        f"{np.median(ours_all):.2f} s (refined and verified), toppra {np.median(theirs_all):.2f} s (2000 intervals)"
     )
     print(", ".join(f"{name.removesuffix(' ratio')} limit active in {count}" for name, count in active.items()))
 

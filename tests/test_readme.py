@@ -47,7 +47,7 @@ SNIPPETS = [
 
 
 def test_there_are_snippets():
-    assert {page.name for page, _ in SNIPPETS} == {"README.md", "closed_forms.md"}
+    assert {page.name for page, _ in SNIPPETS} == {"README.md", "closed_forms.md", "from_toppra.md"}
 
 
 @pytest.mark.parametrize(("page", "number"), SNIPPETS, ids=lambda value: getattr(value, "name", str(value)))
@@ -163,6 +163,18 @@ def test_example_07():
         mirrored = results[360 - angle, "free start"].t_end
         assert results[angle, "free start"].t_end == pytest.approx(mirrored, rel=2e-3)
     check_table("examples/07_find_the_fastest.py", module.markdown_table(results))
+
+
+def test_example_11():
+    pytest.importorskip("toppra")
+    result, least = load(ROOT / "examples/11_from_toppra.py").main()
+    assert result.verified
+    assert result.verification.worst_ratio <= 1 + 1e-4
+    assert result.t_end == pytest.approx(least, rel=2e-3)
+    printed = re.findall(
+        r"^    (?:brachis|toppra): +([0-9.]+) s", (ROOT / "docs/from_toppra.md").read_text(), re.MULTILINE
+    )
+    assert [float(each) for each in printed] == pytest.approx([result.t_end, least], abs=5e-4)
 
 
 def test_published_figure_lies_between_16_and_17_intervals():

@@ -1,7 +1,8 @@
 """What a joint map is: curves y(t) in, joint motion and its exact derivatives out.
 
-Along a path y = (s, q_r), and the closed form gives the other joints (`closed_form`). Without a path y = q
-(`direct`). Everything that lays down, solves and refines a program takes any of them.
+Along a path y = (s, q_r), and the closed form gives the other joints (`closed_form`); along a path of all joints
+y = (s) (`joint_space`). Without a path y = q (`direct`). Everything that lays down, solves and refines a program takes
+any of them.
 """
 
 from __future__ import annotations
