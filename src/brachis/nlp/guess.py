@@ -86,10 +86,8 @@ def fitted(phase: Phase, duration: float, t_norm: np.ndarray, wanted: np.ndarray
     basis = basis_matrix(phase.knots, phase.degree, t_norm)
     parts = [np.array([duration])]
     for spline, values in zip(phase.splines, wanted.T, strict=True):
-        tied = np.zeros((len(spline.variable), spline.free))
-        kept = np.flatnonzero(spline.variable >= 0)
-        tied[kept, spline.variable[kept]] = 1.0
-        parts.append(np.linalg.lstsq(basis @ tied, values - basis @ spline.fixed, rcond=None)[0])
+        given = basis @ (spline.fixed + duration * spline.rate)
+        parts.append(np.linalg.lstsq(basis @ spline.matrix, values - given, rcond=None)[0])
     parts.append(phase.grid.lengths_of(phase.knots))
     return np.clip(np.concatenate(parts), phase.x_lower, phase.x_upper)
 

@@ -68,7 +68,8 @@ class Phase:
         self.grid, self.boundary = grid, boundary
         self.splines = boundary.splines(grid.knots, grid.degree)
         layout = Layout.of(grid, self.splines, self.limits, path=self.joint_map.path is not None)
-        self.slices, self._s, self._lengths, self._places = layout.slices, layout.s, layout.lengths, layout.places
+        self.slices, self._lengths, self._places = layout.slices, layout.lengths, layout.places
+        self._progress = layout.progress
         self.x_lower, self.x_upper = layout.x_lower, layout.x_upper
         self.lower, self.upper = layout.lower, layout.upper
         self.jacobian_rows, self.jacobian_columns = layout.jacobian_rows, layout.jacobian_columns
@@ -147,7 +148,7 @@ class Phase:
     def end_variables(self, point: int) -> np.ndarray:
         """Variables that are the curves' values at the start (`point` 0) or end (-1), (c,); -1 where fixed."""
         pairs = zip(self.splines, self.slices, strict=True)
-        found = ((spline.variable[point], part.start) for spline, part in pairs)
+        found = ((int(spline.variable[point, 0]), part.start) for spline, part in pairs)
         return np.array([first + own if own >= 0 else -1 for own, first in found], dtype=int)
 
     def motion(self, x: np.ndarray) -> Motion:
@@ -160,7 +161,7 @@ class Phase:
     def _control_points(self, x: np.ndarray) -> np.ndarray:
         """Control points (c, N + d)."""
         parts = zip(self.splines, self.slices, strict=True)
-        return np.array([spline.control_points(x[part]) for spline, part in parts])
+        return np.array([spline.control_points(x[part], x[0]) for spline, part in parts])
 
     def variables_from(self, motion: Motion) -> np.ndarray:
         """Point x nearest to given curves over the same knots, or over as many where these are free."""
@@ -189,7 +190,7 @@ class Phase:
         state = self.state(x)
         values = [limit.values(state).ravel() for limit in self.limits]
         totals = np.full(len(self.grid.total), x[self._lengths].sum())
-        return np.concatenate([*values, np.diff(x[self._s]), totals])
+        return np.concatenate([*values, self._progress.values(x), totals])
 
     def has(self, limit: Limit) -> bool:
         """Tell whether a limit is one of the phase's, the very object."""
@@ -233,9 +234,7 @@ class Phase:
         state = self.state(x)
         self.evaluations["jacobians"] += 1
         entries = [part.ravel() for part in self._chained([limit.partials(state) for limit in self.limits], x)]
-        steps = len(x[self._s][1:])
-        ones = np.ones(len(self.grid.lower))
-        return np.concatenate([*entries, np.full(steps, -1.0), np.ones(steps), ones])
+        return np.concatenate([*entries, self._progress.weight, np.ones(len(self.grid.lower))])
 
     def gradient(self, partials: Partials, x: np.ndarray) -> np.ndarray:
         """Gradient, (v,), of a sum over the collocation points; raises UnreachableError as `state` does.
@@ -254,11 +253,13 @@ class Phase:
     def _chained(self, functions: Sequence[Partials], x: np.ndarray) -> Iterator[np.ndarray]:
         """Differentiate each function of the joint motion by T, each curve's variables and h, (places, c) each."""
         state, exact = self.state(x), self._derivatives(x)
+        moving = timed(self._basis_of_rates(x), x[0])
         bases = [timed(basis, x[0]) for basis in self._bases(x)]
         slopes = np.hstack(timed(self.grid.slopes(x[self._lengths], self._control_points(x)), x[0]))
         for partials in functions:
             by = chain(partials, state, exact)
-            yield by_time(by, state) / -x[0]
+            drifts = (np.einsum("kcj,kj->kc", part, rate) for part, rate in zip(by, moving, strict=True))
+            yield sum(drifts, start=by_time(by, state) / -x[0])
             for j, (places, basis) in enumerate(zip(self._places, bases, strict=True)):
                 parts = (part[places.point, :, j] * values[:, None] for part, values in zip(by, basis, strict=True))
                 yield sum(parts, start=np.zeros(()))
@@ -270,6 +271,11 @@ class Phase:
         if self._exact is None or self._exact[0] is not state:
             self._exact = state, self.joint_map.derivatives(state)
         return self._exact[1]
+
+    def _basis_of_rates(self, x: np.ndarray) -> np.ndarray:
+        """What the curves and their derivatives gain with every second of the duration at fixed t_norm, (3, K, c)."""
+        rates = np.array([spline.rate for spline in self.splines])
+        return self.grid.basis(x[self._lengths]).curves(rates)
 
     def _bases(self, x: np.ndarray) -> list[np.ndarray]:
         """Basis functions of every curve's free variables, (3, z) each; computed anew where the grid's change."""
