@@ -11,6 +11,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from brachis.task import (
+    BoundarySettings,
     FrictionSettings,
     LimitScale,
     LimitSpec,
@@ -43,6 +44,7 @@ PARTS: dict[str, type] = {
     "robot.limits": dataclass(LimitSpec),
     "robot.limits.scale": LimitScale,
     "robot.friction": FrictionSettings,
+    "boundary": BoundarySettings,
     "tool_limits": ToolLimits,
     "spline": SplineSettings,
     "search": SearchSettings,

@@ -10,13 +10,13 @@ import numpy as np
 from brachis import ik
 from brachis.bspline import clamped_knots, spread
 from brachis.custom_limits import LimitModel
-from brachis.errors import DecompositionError, StartError, UnknownNameError
+from brachis.errors import DecompositionError, StartError, UnknownNameError, UnreachableError
 from brachis.feasibility import branch_of, check_end_branch, check_postures, check_regular, lacks_a_direction
-from brachis.kinematics import ClosedFormMap, JointMap, Newton
+from brachis.kinematics import ChartMap, ClosedFormMap, JointMap, Newton
 from brachis.limits import Limit, limits_of
 from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Boundary, FixedGrid, Grid, Phase, Program
-from brachis.path import Path, path_of
+from brachis.path import Path, check_closed, path_of, path_speed
 from brachis.robot import ROLL_JOINT, Robot, TaskMap, bind
 from brachis.robot.task_map import JointSpace
 from brachis.task import Task
@@ -37,8 +37,8 @@ class Problem:
     task_map : TaskMap
     path : Path
     start, end : (n,) ndarray or None
-        Postures, None where free. The end is the posture nearest to the given one that is on the path, which that one
-        may miss by what its digits leave out.
+        Postures, None where free; the same one where the motion is periodic. Otherwise the end is the posture nearest
+        to the given one that is on the path, which that one may miss by what its digits leave out.
     limits : tuple of Limit
     further : tuple of LimitModel
         Those of the limits that are not in the task, as the user gave them.
@@ -73,9 +73,12 @@ class Problem:
         start = None if task.start == "free" else robot.posture(task.start.joints, "start.joints")
         end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
         path = path_of(task_map, task)
+        if task.boundary.periodic:
+            check_closed(task_map, path)
+            end = start
         limits = limits_of(robot, task, further)
         check_postures(task_map, limits, start, end, path)
-        if end is not None:
+        if end is not None and not task.boundary.periodic:
             end = _on_path(task_map, end, path)
         return cls(task, robot, task_map, path, start, end, limits, tuple(further))
 
@@ -240,12 +243,38 @@ def program_of(problem: Problem, joint_map: JointMap, breaks: np.ndarray) -> Pro
 
 
 def phase_in(problem: Problem, joint_map: JointMap, grid: Grid) -> Phase:
-    """Write the motion along the path down as a phase, in the coordinates of a joint map, over a grid."""
+    """Write the motion along the path down as a phase, in the coordinates of a joint map, over a grid.
+
+    Raises
+    ------
+    UnreachableError
+        A periodic motion is asked for in coordinates that do not close with the path.
+    """
+    return Phase(joint_map, problem.limits, grid, _boundary(problem, joint_map))
+
+
+def _boundary(problem: Problem, joint_map: JointMap) -> Boundary:
+    """Write the task's boundary conditions in the coordinates of a joint map."""
+    task, given = problem.task, problem.task.boundary
     free = np.full(problem.robot.n, np.nan)
     start, end = (free if posture is None else posture for posture in (problem.start, problem.end))
-    rest = 2 if problem.task.spline.rest == "full" else 1
-    boundary = Boundary(joint_map.coordinates(0.0, start), joint_map.coordinates(1.0, end), rest)
-    return Phase(joint_map, problem.limits, grid, boundary)
+    values = joint_map.coordinates(0.0, start), joint_map.coordinates(1.0, end)
+    rest = 2 if task.spline.rest == "full" else 1
+    if not given.periodic:
+        first = _rates(problem, 0.0, given.start_speed, len(values[0]))
+        return Boundary(*values, rest, first, _rates(problem, 1.0, given.end_speed, len(values[1])))
+    if isinstance(joint_map, ChartMap) and not joint_map.rows.closes:
+        raise UnreachableError("the chart's measure of self-motion is another one at the path's end")
+    return Boundary(*values, rest, periodic=True)
+
+
+def _rates(problem: Problem, s: float, speed: float, count: int) -> np.ndarray | None:
+    """Rates of the curves at an end that is passed at a speed; None at rest."""
+    if not speed:
+        return None
+    rates = np.full(count, np.nan)
+    rates[0] = speed / path_speed(problem.task_map, problem.path, s)
+    return rates
 
 
 def breaks_of(task: Task) -> np.ndarray:

@@ -133,7 +133,7 @@ def test_boundary_splines(degree, extra, derivatives, start, end, seed):
     for wanted, time in ((start, 0.0), (end, 1.0)):
         if np.isfinite(wanted):
             assert float(curve(time)) == pytest.approx(wanted, abs=1e-12)
-    np.testing.assert_allclose(spline.free_from(points), free, atol=1e-12)
+    np.testing.assert_allclose(spline.free_from(points, 1.0), free, atol=1e-12)
     # Nothing more is tied than the boundary conditions ask for.
     still = min(derivatives, degree - 1)
     assert spline.free == len(points) - 2 * still - np.isfinite(start) - np.isfinite(end)

@@ -4,7 +4,8 @@
 
 A clamped spline begins like the straight line y0 + v t, with v given and the derivatives after the first zero up to the
 k-th one, where its first k + 1 control points are those of the line: y0 + v T xi_i, with xi the Greville abscissae. At
-rest, v = 0, these are equal. What derivatives have in common at a seam is linear in the control points too (see
+rest, v = 0, these are equal. The other control points fade from the line, v T xi_i (1 - xi_i)^2, plus what is free of
+them: this changes no motion, but lets a longer duration alone leave the curve smooth, which solvers need. What derivatives have in common at a seam is linear in the control points too (see
 `periodic`). Boundary conditions therefore need no rows in the NLP.
 """
 
@@ -72,12 +73,15 @@ class BoundarySpline:
         count = len(abscissae)
         group = np.arange(count)
         fixed, rate = np.zeros(count), np.zeros(count)
-        for condition, anchor in ((start, 0), (end, count - 1)):
-            tied = 1 if np.isnan(condition.rate) else 1 + condition.derivatives
-            own = slice(None, tied) if anchor == 0 else slice(count - tied, None)
+        first, last = (1 if np.isnan(each.rate) else 1 + each.derivatives for each in (start, end))
+        ends = slice(None, first), slice(count - last, None)
+        for condition, anchor, own, other in ((start, 0, *ends), (end, count - 1, *ends[::-1])):
             group[own] = anchor if np.isnan(condition.value) else -1
             fixed[own] = np.nan_to_num(condition.value)
-            rate[own] = np.nan_to_num(condition.rate) * (abscissae[own] - abscissae[anchor])
+            away = abscissae - abscissae[anchor]
+            fading = away * (1.0 - np.abs(away)) ** 2
+            fading[own], fading[other] = away[own], 0.0
+            rate += np.nan_to_num(condition.rate) * fading
         variable = np.full(count, -1)
         _, variable[group >= 0] = np.unique(group[group >= 0], return_inverse=True)
         return cls(knots, degree, variable[:, None], np.ones((count, 1)), fixed, rate)
@@ -105,11 +109,12 @@ class BoundarySpline:
         parts = np.where(self.variable >= 0, self.weight * free[self.variable], 0.0)
         return np.asarray(parts.sum(axis=1) + self.fixed + duration * self.rate)
 
-    def free_from(self, control_points: np.ndarray) -> np.ndarray:
-        """Free variables that come nearest to given control points: means over those that a variable is alone."""
+    def free_from(self, control_points: np.ndarray, duration: float) -> np.ndarray:
+        """Free variables that come nearest to given control points: means over those that are one variable each."""
+        own_part = control_points - self.fixed - duration * self.rate
         alone = ((self.variable >= 0).sum(axis=1) == 1) & (self.weight[:, 0] == 1.0) & (self.variable[:, 0] >= 0)
         own = self.variable[alone, 0]
-        return np.asarray(np.bincount(own, weights=control_points[alone]) / np.bincount(own))
+        return np.asarray(np.bincount(own, weights=own_part[alone]) / np.bincount(own))
 
 
 def greville(knots: np.ndarray, degree: int) -> np.ndarray:

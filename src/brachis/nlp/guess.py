@@ -47,23 +47,52 @@ def starting_point(program: Program, joint_paths: Sequence[np.ndarray]) -> np.nd
 
 
 def _smoothed(phase: Phase, joint_path: np.ndarray) -> np.ndarray:
-    return phase.variables_from(Motion(1.0, phase.knots, phase.degree, _timed(joint_path, phase.splines[0].greville).T))
+    timed = _timed(phase, joint_path, phase.splines[0].greville)
+    return phase.variables_from(Motion(_duration(phase), phase.knots, phase.degree, timed.T))
 
 
 def _followed(phase: Phase, joint_path: np.ndarray) -> np.ndarray:
     t_norm = np.linspace(0.0, 1.0, _FIT_DENSITY * len(phase.knots))
-    return fitted(phase, 1.0, t_norm, _timed(joint_path, t_norm))
+    return fitted(phase, _duration(phase), t_norm, _timed(phase, joint_path, t_norm))
 
 
-def _timed(joint_path: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
-    """Follow a joint path, (S, c), with a smooth motion from rest to rest: the places at `t_norm`, (K, c)."""
-    u, grid = rest_to_rest(t_norm), np.linspace(0.0, 1.0, len(joint_path))
-    return np.column_stack([np.interp(u, grid, column) for column in joint_path.T])
+def _rates(phase: Phase) -> tuple[float, float]:
+    """Rates of the first curve at both ends, 1/s."""
+    ends = phase.boundary.start_rates, phase.boundary.end_rates
+    first, last = (0.0 if rates is None else float(rates[0]) for rates in ends)
+    return first, last
 
 
-def rest_to_rest(t_norm: np.ndarray) -> np.ndarray:
-    """Return how far along a joint path, from 0 to 1, a first guess is at normalised times."""
-    return t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
+def _duration(phase: Phase) -> float:
+    """Duration of a first guess, s: that of a constant acceleration from one end's speed to the other's."""
+    total = sum(_rates(phase))
+    return 2.0 / total if total else 1.0
+
+
+def _closed(phase: Phase, joint_path: np.ndarray) -> np.ndarray:
+    """Let the joint path of a periodic motion end as far ahead of its start as it has to, by an even drift."""
+    if not phase.boundary.periodic:
+        return joint_path
+    ahead = np.nan_to_num(phase.boundary.end - phase.boundary.start)
+    part = np.linspace(0.0, 1.0, len(joint_path))[:, None]
+    return joint_path + part * (ahead - (joint_path[-1] - joint_path[0]))
+
+
+def _timed(phase: Phase, joint_path: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
+    """Follow a joint path, (S, c), smoothly: the places at `t_norm`, (K, c)."""
+    grid = np.linspace(0.0, 1.0, len(joint_path))
+    u = guessed_progress(t_norm, *_rates(phase))
+    return np.column_stack([np.interp(u, grid, column) for column in _closed(phase, joint_path).T])
+
+
+def guessed_progress(t_norm: np.ndarray, first: float, last: float) -> np.ndarray:
+    """Return how far along a joint path, from 0 to 1, a first guess is at normalised times.
+
+    From rest to rest it is smooth; between other speeds, in whatever unit, the acceleration is constant.
+    """
+    if first == last == 0.0:
+        return t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
+    return t_norm * (2.0 * first + (last - first) * t_norm) / (first + last)
 
 
 def fitted(phase: Phase, duration: float, t_norm: np.ndarray, wanted: np.ndarray) -> np.ndarray:

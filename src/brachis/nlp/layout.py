@@ -69,7 +69,7 @@ class Layout:
         x_lower = np.concatenate([np.full(ends[-1], -np.inf), grid.lower])
         x_upper = np.concatenate([np.full(ends[-1], np.inf), grid.upper])
         x_lower[0] = SHORTEST_TIME
-        if path:
+        if path and not splines[0].rate.any():
             x_lower[slices[0]], x_upper[slices[0]] = 0.0, 1.0
         progress = Progress.of(splines[0], slices[0].start) if path else Progress.none()
         lengths = slice(int(ends[-1]), len(x_lower))

@@ -165,7 +165,8 @@ class Phase:
 
     def variables_from(self, motion: Motion) -> np.ndarray:
         """Point x nearest to given curves over the same knots, or over as many where these are free."""
-        free = [spline.free_from(c) for spline, c in zip(self.splines, motion.control_points, strict=True)]
+        pairs = zip(self.splines, motion.control_points, strict=True)
+        free = [spline.free_from(points, motion.t_end) for spline, points in pairs]
         return np.concatenate([[motion.t_end], *free, self.grid.lengths_of(motion.knots)])
 
     def state(self, x: np.ndarray) -> JointState:
@@ -273,7 +274,7 @@ class Phase:
         return self._exact[1]
 
     def _basis_of_rates(self, x: np.ndarray) -> np.ndarray:
-        """What the curves and their derivatives gain with every second of the duration at fixed t_norm, (3, K, c)."""
+        """Differentiate the curves and their derivatives by the duration at fixed t_norm, (3, K, c)."""
         rates = np.array([spline.rate for spline in self.splines])
         return self.grid.basis(x[self._lengths]).curves(rates)
 

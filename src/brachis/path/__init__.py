@@ -1,6 +1,7 @@
 """The prescribed path and its derivatives by the path coordinate, up to the third."""
 
 from brachis.path.build import build_path
+from brachis.path.ends import check_closed, path_speed
 from brachis.path.from_curve import bspline_segment
 from brachis.path.origin import check_on_path, path_of
 from brachis.path.pose import PosePath
@@ -16,6 +17,8 @@ __all__ = [
     "SequencePath",
     "bspline_segment",
     "build_path",
+    "check_closed",
     "check_on_path",
     "path_of",
+    "path_speed",
 ]

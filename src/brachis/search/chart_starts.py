@@ -92,6 +92,8 @@ def _start_along(newton: Newton, joint_path: JointPath, origin: str) -> Start | 
             chart = chart_around(problem.task_map, problem.path, places, q)
         except UnreachableError:
             continue
+        if problem.task.boundary.periodic and not chart.rows.closes:
+            continue
         estimate = least_time(problem.limits, places, q)
         return Start(problem, chart, chart.curves(places, q), estimate, origin, CHART)
     return None

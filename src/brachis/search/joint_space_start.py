@@ -9,7 +9,8 @@ from brachis.errors import PathError
 from brachis.feasibility import beyond_at_rest, in_figures
 from brachis.kinematics import JointSpaceMap
 from brachis.limits import Limit
-from brachis.nlp.guess import rest_to_rest
+from brachis.nlp.guess import guessed_progress
+from brachis.path import path_speed
 from brachis.problem import Problem
 from brachis.search.phase_plane import least_times
 
@@ -39,11 +40,14 @@ def joint_space_start(problem: Problem) -> Start:
     for limit in problem.limits:
         if limit.static:
             _refuse_beyond(limit, s, q)
-    times = least_times(problem.limits, s, q)
+    boundary = problem.task.boundary
+    ends = (boundary.start_speed, 0.0), (boundary.end_speed, 1.0)
+    rates = [speed / path_speed(problem.task_map, problem.path, place) for speed, place in ends]
+    times = least_times(problem.limits, s, q, (rates[0], rates[1]))
     estimate, joint_path = np.inf, s
     if times is not None:
         estimate = float(times[-1])
-        when = np.interp(s, rest_to_rest(s), s)  # normalised times at which a first guess is at even places
+        when = np.interp(s, guessed_progress(s, *rates), s)  # normalised times at which a first guess is at even places
         joint_path = np.interp(when * estimate, times, s)
     joint_map = JointSpaceMap(problem.robot, problem.path)
     return Start(problem, joint_map, joint_path[:, None], estimate, FAMILY, FAMILY)

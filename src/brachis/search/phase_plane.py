@@ -43,14 +43,20 @@ def least_time(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> float:
     return np.inf if times is None else float(times[-1])
 
 
-def least_times(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> np.ndarray | None:
-    """Estimate when the stations are passed, (S,), s; see `least_time`. None where they cannot be."""
+def least_times(
+    limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, rates: tuple[float, float] = (0.0, 0.0)
+) -> np.ndarray | None:
+    """Estimate when the stations are passed, (S,), s; see `least_time`. None where they cannot be.
+
+    `rates` are ds/dt at both ends, 1/s.
+    """
     step = s[1] - s[0]
     slope, offset, ceiling = _lines(limits, q, np.gradient(q, step, axis=0, edge_order=2), step)
-    intervals = _controllable(slope, offset, ceiling, step)
-    if intervals is None or intervals[0][0] > 0.0:
+    first, last = (rate**2 for rate in rates)
+    intervals = _controllable(slope, offset, ceiling, step, last)
+    if intervals is None or not intervals[0][0] <= first <= intervals[1][0]:
         return None
-    x = _fastest(slope, offset, *intervals, step)
+    x = _fastest(slope, offset, *intervals, step, first)
     if x.max() <= 0.0:
         return None
     # Between stations nothing stops; a station where the grid says so is an artefact of its width.
@@ -82,11 +88,15 @@ def _lines(
 
 
 def _controllable(
-    slope: tuple[np.ndarray, np.ndarray], offset: tuple[np.ndarray, np.ndarray], ceiling: np.ndarray, step: float
+    slope: tuple[np.ndarray, np.ndarray],
+    offset: tuple[np.ndarray, np.ndarray],
+    ceiling: np.ndarray,
+    step: float,
+    last: float,
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Go backwards: the intervals of x, (S,), from which the end can be reached at rest; None where one is empty."""
+    """Go backwards: the intervals of x, (S,), from which the end can be reached with x = `last`; None where empty."""
     count = len(ceiling)
-    low, high = np.zeros(count), np.zeros(count)
+    low, high = np.full(count, last), np.full(count, last)
     for i in range(count - 2, -1, -1):
         # u >= (low' - x) / 2 step and u <= (high' - x) / 2 step join the lines.
         up = np.append(slope[0][i], -0.5 / step), np.append(offset[0][i], 0.5 * high[i + 1] / step)
@@ -109,9 +119,10 @@ def _fastest(
     low: np.ndarray,
     high: np.ndarray,
     step: float,
+    first: float,
 ) -> np.ndarray:
-    """Go forwards from rest: x, (S,), under the largest u."""
-    x = np.zeros(len(low))
+    """Go forwards from x = `first`: x, (S,), under the largest u."""
+    x = np.full(len(low), first)
     for i in range(len(low) - 1):
         largest = np.min(slope[0][i] * x[i] + offset[0][i], initial=np.inf)
         x[i + 1] = np.clip(x[i] + 2.0 * step * largest, low[i + 1], high[i + 1])

@@ -1,5 +1,6 @@
 """What is asked: the task file as frozen models, its loader and its schema. No numerics."""
 
+from brachis.task.boundary import BoundarySettings
 from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.load import check_robot_settings, load_task
 from brachis.task.models import (
@@ -58,6 +59,7 @@ __all__ = [
     "Attitude",
     "BSplineCurve",
     "BSplineSegment",
+    "BoundarySettings",
     "Circle",
     "CircleSegment",
     "CsvFile",

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, JsonValue, Tag, field_validator, model_validator
 
+from brachis.task.boundary import BoundarySettings
 from brachis.task.fields import Count, Flag, Model, Name, Number, Positive, Share, by_form, refuse
 from brachis.task.robot_models import JointValues, RobotSettings
 from brachis.task.segments import Segment
@@ -212,6 +213,9 @@ class Task(Model):
         "one of all joints, in the order of the chain (rad, m), and only its timing is planned."
     )
     path: Annotated[tuple[Segment, ...], Field(min_length=1)] = Field(description="Segments of the path, in order.")
+    boundary: BoundarySettings = Field(
+        default_factory=BoundarySettings, description="Speeds at both ends, or a motion that goes round for ever."
+    )
     tool_limits: ToolLimits = Field(default_factory=ToolLimits, description="Limits on the motion of the tool.")
     custom_limits: dict[Name, dict[str, JsonValue]] = Field(
         default={},
@@ -261,6 +265,16 @@ class Task(Model):
         if self.start == "free" and self.search.guesses == "numeric":
             problem = "numeric inverse kinematics needs a posture to begin with, and start is free"
             raise refuse(problem, key="search.guesses", found="numeric", allowed="lattice")
+        return self
+
+    @model_validator(mode="after")
+    def _ends_in_motion(self) -> Task:
+        if self.boundary.in_motion and self.spline.knots == "free":
+            problem = "ends in motion tie control points by the knots, which may not move then"
+            raise refuse(problem, key="spline.knots", found="free", allowed="uniform, or a boundary at rest")
+        if self.boundary.periodic and self.end != "free":
+            problem = "the end posture of a periodic motion is its start posture"
+            raise refuse(problem, key="end", found=self.end.model_dump(), allowed="free")
         return self
 
     @model_validator(mode="after")

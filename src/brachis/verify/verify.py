@@ -16,7 +16,7 @@ from brachis.errors import InputError
 from brachis.path import Path, path_of
 from brachis.robot import Robot, TaskMap, bind
 from brachis.trajectory import Trajectory
-from brachis.verify.checks import continuity_checks, end_checks, progress_checks, spline_checks
+from brachis.verify.checks import continuity_checks, end_checks, progress_checks, seam_checks, spline_checks
 from brachis.verify.limits import Given, limit_checks
 from brachis.verify.motion import Pieces, States
 from brachis.verify.options import VerifyOptions
@@ -81,6 +81,7 @@ def verify_trajectory(
         *end_checks(trajectory, robot, task_map, path, options),
         *spline_checks(trajectory, robot, states, options),
         *continuity_checks(trajectory, pieces, robot, options),
+        *seam_checks(trajectory, pieces, robot, options),
     ]
     worst = max((check.value for check in ratios), default=0.0)
     return Verification(tuple(checks), len(states.t), worst, path_check.value)
