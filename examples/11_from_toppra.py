@@ -48,7 +48,8 @@ def by_toppra(robot: brachis.Robot, task: brachis.Task, intervals: int = 2000) -
     ]
     grid = np.linspace(0.0, 1.0, intervals + 1)
     solver = toppra.algorithm.TOPPRA(constraints, Geometry(), gridpoints=grid, solver_wrapper="seidel")
-    _, speed, _ = solver.compute_parameterization(0.0, 0.0)
+    ends = np.array([task.boundary.start_speed, task.boundary.end_speed])
+    _, speed, _ = solver.compute_parameterization(*(ends / np.linalg.norm(path.sample([0.0, 1.0]).xi, axis=1)))
     return float(np.sum(2.0 * np.diff(grid) / (speed[1:] + speed[:-1])))
 
 

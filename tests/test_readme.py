@@ -165,6 +165,13 @@ def test_example_07():
     check_table("examples/07_find_the_fastest.py", module.markdown_table(results))
 
 
+def test_example_10():
+    module = load(ROOT / "examples/10_periodic_circle.py")
+    results = module.main()
+    assert all(result.verified for result in results.values())
+    assert results["periodic"].t_end < 0.85 * results["rest to rest"].t_end
+
+
 def test_example_11():
     pytest.importorskip("toppra")
     result, least = load(ROOT / "examples/11_from_toppra.py").main()

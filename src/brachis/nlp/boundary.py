@@ -5,8 +5,9 @@
 A clamped spline begins like the straight line y0 + v t, with v given and the derivatives after the first zero up to the
 k-th one, where its first k + 1 control points are those of the line: y0 + v T xi_i, with xi the Greville abscissae. At
 rest, v = 0, these are equal. The other control points fade from the line, v T xi_i (1 - xi_i)^2, plus what is free of
-them: this changes no motion, but lets a longer duration alone leave the curve smooth, which solvers need. What derivatives have in common at a seam is linear in the control points too (see
-`periodic`). Boundary conditions therefore need no rows in the NLP.
+them: this changes no motion, but lets a longer duration alone leave the curve smooth, which solvers need. What
+derivatives have in common at a seam is linear in the control points too (see `periodic`). Boundary conditions therefore
+need no rows in the NLP.
 """
 
 from __future__ import annotations
