@@ -69,7 +69,9 @@ def test_three_turns_in_mujoco_without_drift(circle):
         away[k] = np.abs(error).max()
         data.qfrc_applied[order] = tau + stiffness * error + damping * (v - data.qvel[order])
         mujoco.mj_step(model, data)
-    by_turn = [away[(t >= turn * trajectory.t_end) & (t < (turn + 1) * trajectory.t_end)].max() for turn in range(TURNS)]
+    by_turn = [
+        away[(t >= turn * trajectory.t_end) & (t < (turn + 1) * trajectory.t_end)].max() for turn in range(TURNS)
+    ]
     assert max(by_turn) < 1e-4
     assert by_turn[-1] < 1.1 * by_turn[1] + 1e-7, "it drifts"
 
@@ -119,7 +121,7 @@ def test_speeds_at_both_ends_with_redundancy(rest):
     speeds = {"start_speed": 0.2, "end_speed": 0.5}
     path = [{"line": {"length": 0.6, "angle_deg": 90}}]
     spline = {"intervals": 12, "rest": rest}
-    task = variant(path=path, boundary=speeds, spline=spline, redundant_joints=["j2"], search=QUICK)
+    task = variant(path=path, boundary=speeds, spline=spline, redundant_joints=["j1"], search=QUICK)
     result = brachis.plan(None, task)
     assert result.verified
     model, trajectory = result.trajectory.robot.model, result.trajectory
@@ -143,7 +145,7 @@ def test_path_of_joints_with_speeds_takes_as_long_as_in_toppra():
         "task_space": "joints",
         "path": [{"spline": {"through": waypoints[1:]}}],
         "boundary": {"start_speed": 0.8, "end_speed": 1.0},
-        "spline": {"intervals": 150, "rest": "velocity"},
+        "spline": {"intervals": 120, "rest": "velocity"},
         "search": {"least_motion": False},
     }
     result = brachis.plan(None, task)
