@@ -82,7 +82,7 @@ def test_closed_forms_close_too(circle):
     assert result.t_end == pytest.approx(circle.t_end, rel=0.02)
 
 
-def test_a_free_start_posture_is_the_end_posture(circle):
+def test_a_free_start_posture_is_the_end_posture():
     place = [3.0**0.5, 0.0]
     result = brachis.plan(None, variant(start="free", path_start=place, search=QUICK, spline={"intervals": 12}))
     assert result.verified
@@ -133,6 +133,21 @@ def test_speeds_at_both_ends_with_redundancy(rest):
     assert result.t_end < brachis.plan(None, {**task, "boundary": {}}).t_end
     faster = replace(trajectory, task=brachis.load_task({**task, "boundary": {**speeds, "end_speed": 0.501}}))
     assert failed(faster) == {"end speed"}
+
+
+def test_a_turn_on_the_spot_ends_at_an_angular_speed():
+    path, boundary = [{"line": {"by": [0.0, 0.0, 0.5]}}], {"end_speed": 0.3}
+    task = variant(task_space=["x", "y", "yaw"], path=path, boundary=boundary, search=QUICK, spline={"intervals": 12})
+    result = brachis.plan(None, task)
+    assert result.verified
+    assert result.trajectory.velocity(result.t_end).sum() == pytest.approx(0.3, abs=1e-9)
+
+
+def test_a_speed_that_no_limit_allows_is_told():
+    path, spline = [{"line": {"length": 0.6, "angle_deg": 90}}], {"intervals": 8}
+    task = variant(path=path, boundary={"end_speed": 20.0}, redundant_joints=["j1"], search=QUICK, spline=spline)
+    with pytest.raises(brachis.PlanningError, match=r"lower boundary.end_speed, which is 20 m/s"):
+        brachis.plan(None, task)
 
 
 def test_path_of_joints_with_speeds_takes_as_long_as_in_toppra():

@@ -107,6 +107,10 @@ def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
         tried.append(f"raise solver.max_iterations, which is {task.solver.max_iterations}")
     if "time limit" in statuses and task.solver.time_limit < few["time_limit"].default:
         tried.append(f"raise solver.time_limit, which is {task.solver.time_limit:g} s")
+    for key in ("start_speed", "end_speed"):
+        speed = getattr(task.boundary, key)
+        if speed:
+            tried.append(f"lower boundary.{key}, which is {speed:g} m/s")
     if not tried and task.search.effort != _MOST_EFFORT:
         tried.append(f"raise search.effort, which is {task.search.effort}")
     if not tried:

@@ -54,7 +54,7 @@ def end_checks(
         if boundary.periodic:
             continue
         if given_speed:
-            checks += _moving_end(name, trajectory, task_map, given_speed, time, options)
+            checks += _moving_end(name, trajectory, task_map, path, given_speed, time, options)
             continue
         speed, allowed = np.abs(trajectory.velocity(time)), options.rest_velocity_tolerance
         checks.append(_worst_joint(f"{name} velocity", speed, allowed, "rad/s, m/s", robot, time))
@@ -65,19 +65,26 @@ def end_checks(
 
 
 def _moving_end(
-    name: str, trajectory: Trajectory, task_map: TaskMap, wanted: float, time: float, options: VerifyOptions
+    name: str,
+    trajectory: Trajectory,
+    task_map: TaskMap,
+    path: Path,
+    wanted: float,
+    time: float,
+    options: VerifyOptions,
 ) -> list[Check]:
     """Check that an end is passed at the speed that the task asks for, which is constant there with full rest."""
     q, qdot = trajectory.position(time)[None], trajectory.velocity(time)
     position, angle = task_map.norms(task_map.jacobian(task_map.twists(q))[0] @ qdot)
-    off, allowed = abs(float(position or angle) - wanted), options.rest_velocity_tolerance * (1.0 + wanted)
-    unit = "m/s" if position else "rad/s, m/s"
+    moves = float(task_map.norms(path.sample(trajectory.path_spline([time])).xi)[0][0]) > _ROUNDING
+    off, allowed = abs(float(position if moves else angle) - wanted), options.rest_velocity_tolerance * (1.0 + wanted)
+    unit = "m/s" if moves else "rad/s"
     checks = [Check(f"{name} speed", off, allowed, unit, off <= allowed, time=time)]
     if trajectory.task.spline.rest == "full":
         rate, bend = (abs(float(trajectory.path_spline(time, nu=order))) for order in (1, 2))
         change, allowed = wanted * bend / rate if rate else np.inf, options.rest_acceleration_tolerance
         checks.append(
-            Check(f"{name} acceleration along the path", change, allowed, "m/s2", change <= allowed, time=time)
+            Check(f"{name} acceleration along the path", change, allowed, f"{unit}2", change <= allowed, time=time)
         )
     return checks
 
