@@ -14,7 +14,10 @@ import pytest
 
 import brachis
 from brachis.bottleneck import check_sensitivities, solved_again
+from brachis.robot import dynamics
+from brachis.task import LimitSpec
 from brachis.verify import verify_trajectory
+from support.chains import planar_robot
 
 ROOT = Path(__file__).parents[1]
 IIWA = ROOT / "robots/iiwa14/robot.urdf"
@@ -128,6 +131,22 @@ def test_paths_beyond_a_limit_at_rest_are_refused_with_their_place():
     weak = {"torque": {"joint_2": 40.0}}
     with pytest.raises(brachis.BrachisError, match=r"torque limit of 'joint_2' .* Nm at s = .*40 N"):
         brachis.plan(None, task([{"line": {"to": [0, 1.6, 0, 0, 0, 0, 0]}}], start={"joints": [0.0] * 7}, limits=weak))
+
+
+def test_momentum_carries_an_arm_through_postures_that_it_cannot_hold():
+    """A pendulum that needs 6.2 Nm to be held level, from its lowest to its highest position, which takes 12.4 J."""
+    task = {
+        "brachis": 1,
+        "start": {"joints": [-1.5]},
+        "task_space": "joints",
+        "path": [{"line": {"to": [1.5]}}],
+        "search": {"least_motion": False},
+    }
+    strong, weak = (planar_robot("R", "xz", limits=LimitSpec(torque=torque)) for torque in (5.5, 3.0))
+    assert np.abs(dynamics.torque(strong, *np.zeros((3, 1, 1)))).max() > 6.0
+    assert brachis.plan(strong, task).verified
+    with pytest.raises(brachis.BrachisError, match=r"torque limit of 'j1' cannot hold the arm against gravity"):
+        brachis.plan(weak, task)
 
 
 def test_an_end_beside_the_path_is_refused():

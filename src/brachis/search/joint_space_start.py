@@ -33,17 +33,18 @@ def joint_space_start(problem: Problem) -> Start:
     Raises
     ------
     PathError
-        A limit that holds at rest is exceeded along the path.
+        The path leaves the joint ranges, or no motion along it was found and the arm cannot hold a posture on it.
     """
     s = np.linspace(0.0, 1.0, _STATIONS)
     q = problem.path.sample(s).target
-    for limit in problem.limits:
-        if limit.static:
-            _refuse_beyond(limit, s, q)
     boundary = problem.task.boundary
     ends = (boundary.start_speed, 0.0), (boundary.end_speed, 1.0)
     rates = [speed / path_speed(problem.task_map, problem.path, place) for speed, place in ends]
     times = least_times(problem.limits, s, q, (rates[0], rates[1]))
+    for limit in problem.limits:
+        # In motion an arm may pass postures that it cannot hold.
+        if limit.static and (times is None or not limit.time_scaling):
+            _refuse_beyond(limit, s, q)
     estimate, joint_path = np.inf, s
     if times is not None:
         estimate = float(times[-1])
