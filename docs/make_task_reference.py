@@ -11,6 +11,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from brachis.task import (
+    BoundarySettings,
     FrictionSettings,
     InertiaMatrix,
     LimitScale,
@@ -28,6 +29,7 @@ from brachis.task import (
     Task,
     ToolLimits,
 )
+from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.orientation import Quaternion, RollPitchYaw, Rotation, RotationVector, Tangent, ToQuaternion
 from brachis.task.segments import (
     ArcCenter,
@@ -51,6 +53,7 @@ PARTS: dict[str, type] = {
     "robot.payload": Payload,
     "robot.payload.inertia": InertiaMatrix,
     "robot.tool_offset, robot.mounting": Placement,
+    "boundary": BoundarySettings,
     "tool_limits": ToolLimits,
     "tool_limits.speed": SpeedTable,
     "tool_limits.process_speed": ProcessSpeed,
@@ -64,6 +67,7 @@ SEGMENTS: dict[str, tuple[type[BaseModel], ...]] = {
     "arc": (ArcCenter, ArcVia),
     "circle": (Circle,),
     "spline": (SplineThrough,),
+    "bspline": (BSplineCurve,),
     "csv": (CsvFile,),
 }
 TABLE_HEAD = ("| key | default | meaning |", "|---|---|---|")
@@ -108,13 +112,17 @@ the task: a saved task does not need it any more. In Python: `brachis.read_limit
 PATH = """
 ## `path`
 
-A list of segments. Each is a mapping with one of the kinds below (`line`, `arc`, `circle`, `spline`, `csv`, `turn`)
-and, beside it, the keys of this table. A segment starts where its predecessor ends, the first one where the tool is at
-the start posture. The path must be smooth to the third derivative: segments that do not continue each other need a
-`blend`.
+A list of segments. Each is a mapping with one of the kinds below (`line`, `arc`, `circle`, `spline`, `bspline`, `csv`,
+`turn`) and, beside it, the keys of this table. A segment starts where its predecessor ends, the first one where the
+tool is at the start posture. The path must be smooth to the third derivative: segments that do not continue each other
+need a `blend`.
 
 Coordinates are those of the rows of the task space, m, and rad for yaw. In task spaces of poses (`pose`,
 `pose_free_roll`) they are x, y, z, and `orientation` says how the tool turns.
+
+With `task_space: joints` they are the positions of all joints, rad (m), in the order of the chain, and the segments
+are `line: {to: ...}`, `line: {by: ...}`, `spline`, `bspline` and `csv`; lengths along the path, those of blends too,
+are in rad (m). `docs/from_toppra.md` has an example.
 """
 TURN = """
 ### `turn: {...}`
@@ -180,7 +188,8 @@ CSV = """
 
 `csv: {file: poses.csv}` is a spline through the rows of a file. Its first line names the columns, in any order;
 lengths are in metres, angles in radians; lines that are empty or begin with `#` are skipped. In task spaces of rows the
-columns are the rows (`x,y`, `x,z,yaw`, ...). In task spaces of poses they are
+columns are the rows (`x,y`, `x,z,yaw`, ...), and for paths of joints the joints' names. In task spaces of poses they
+are
 
 - `x,y,z`: positions; the segment's `orientation` says how the tool turns;
 - `x,y,z,qw,qx,qy,qz`: positions and unit quaternions;

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +10,11 @@ import pytest
 
 import brachis
 from brachis.verify import verify_trajectory
+from support.mujoco_models import mujoco_model
 
 mujoco = pytest.importorskip("mujoco")
 
 ROOT = Path(__file__).parents[1]
-COMPILER = """
-  <mujoco>
-    <compiler discardvisual="true" fusestatic="false" inertiafromgeom="false" balanceinertia="false" strippath="false"/>
-  </mujoco>
-"""
 TX90L = {
     "brachis": 1,
     "start": {"joints": [0, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1]},
@@ -39,13 +34,7 @@ def motion(request):
     urdf = ROOT / f"robots/{request.param}/robot.urdf"
     trajectory = brachis.plan(urdf, TASKS[request.param]).trajectory
     assert verify_trajectory(trajectory).passed
-    text = urdf.read_text().replace("</robot>", COMPILER + "</robot>")
-    text = re.sub(r'ixx="0(\.0)?"', 'ixx="1e-12"', text)  # slender rods, which MuJoCo refuses, turn about z alone
-    model = mujoco.MjModel.from_xml_string(text)
-    model.opt.gravity[:] = trajectory.robot.model.gravity.linear
-    order = [model.joint(name).qposadr[0] for name in trajectory.joint_names]
-    assert sorted(order) == list(range(model.nq))
-    return trajectory, model, np.array(order)
+    return trajectory, *mujoco_model(trajectory.robot)
 
 
 def test_inverse_dynamics_agree(motion):

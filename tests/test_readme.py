@@ -49,7 +49,7 @@ SNIPPETS = [
 
 
 def test_there_are_snippets():
-    assert {page.name for page, _ in SNIPPETS} == {"README.md", "closed_forms.md"}
+    assert {page.name for page, _ in SNIPPETS} == {"README.md", "closed_forms.md", "from_toppra.md"}
 
 
 @pytest.mark.parametrize(("page", "number"), SNIPPETS, ids=lambda value: getattr(value, "name", str(value)))
@@ -183,6 +183,27 @@ def test_example_09():
     times = [result.t_end for result in results.values()]
     assert times == sorted(times)
     assert times[-1] > 1.5 * times[0]
+
+
+def test_example_10():
+    module = load(ROOT / "examples/10_periodic_circle.py")
+    results = module.main()
+    assert all(result.verified for result in results.values())
+    printed = re.search(r"10_periodic_circle.py`: ([0-9.]+) s a turn, and ([0-9.]+) s", README)
+    ours = [results[name].t_end for name in ("periodic", "rest to rest")]
+    assert [float(each) for each in printed.groups()] == pytest.approx(ours, abs=0.006)
+
+
+def test_example_11():
+    pytest.importorskip("toppra")
+    result, least = load(ROOT / "examples/11_from_toppra.py").main()
+    assert result.verified
+    assert result.verification.worst_ratio <= 1 + 1e-4
+    assert result.t_end == pytest.approx(least, rel=2e-3)
+    printed = re.findall(
+        r"^    (?:brachis|toppra): +([0-9.]+) s", (ROOT / "docs/from_toppra.md").read_text(), re.MULTILINE
+    )
+    assert [float(each) for each in printed] == pytest.approx([result.t_end, least], abs=5e-4)
 
 
 def test_published_figure_lies_between_16_and_17_intervals():

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from brachis.errors import BrachisError as BrachisError
     from brachis.errors import InputError as InputError
     from brachis.errors import PlanningError as PlanningError
+    from brachis.path import bspline_segment as bspline_segment
     from brachis.planner import plan as plan
     from brachis.planner import transcribe as transcribe
     from brachis.plausibility import PlausibilityWarning as PlausibilityWarning
@@ -48,6 +49,7 @@ _HOME = {
     "TaskMap": "brachis.robot",
     "Trajectory": "brachis.trajectory",
     "Verification": "brachis.verify",
+    "bspline_segment": "brachis.path",
     "load_task": "brachis.task",
     "plan": "brachis.planner",
     "read_limits": "brachis.task",
@@ -72,6 +74,7 @@ __all__ = [
     "Verification",
     "__version__",
     "bottleneck",
+    "bspline_segment",
     "compose",
     "load_task",
     "plan",

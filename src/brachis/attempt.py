@@ -9,13 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from brachis.kinematics import CHART, ChartMap, ClosedFormMap
+from brachis.kinematics import CHART, ChartMap, ClosedFormMap, JointSpaceMap
 from brachis.nlp import Program
 from brachis.problem import Problem
 from brachis.refine import Refined
 from brachis.solvers import SolverReport
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
+
+PathMap = ClosedFormMap | ChartMap | JointSpaceMap
+"""Joint maps along a path."""
 
 
 def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
@@ -30,7 +33,7 @@ class Start:
     Attributes
     ----------
     problem : Problem
-    joint_map : ClosedFormMap or ChartMap
+    joint_map : ClosedFormMap, ChartMap or JointSpaceMap
         Robot, path and coordinates put together, for a motion that begins at, or near, its start posture.
     joint_path : (S, 1 + r) ndarray
         Successive values of the map's curves: s and the redundant joints, or s and the chart's sigma.
@@ -39,7 +42,7 @@ class Start:
     origin : str
         Where it is from, in plain words, for example ``lattice 2``.
     family : str
-        Family of the closed form; ``chart`` where there is none.
+        Family of the closed form; ``chart`` or ``path of joints`` where there is none.
     solver : str
         The solver that plans from it; empty while none is chosen.
     timed : bool
@@ -47,7 +50,7 @@ class Start:
     """
 
     problem: Problem
-    joint_map: ClosedFormMap | ChartMap
+    joint_map: PathMap
     joint_path: np.ndarray
     estimate: float
     origin: str

@@ -69,18 +69,22 @@ def _check_range(robot: Robot, posture: np.ndarray, name: str) -> None:
             )
 
 
+def beyond_at_rest(limit: Limit, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values of a limit in postures (K, n) at rest, (K, c), and how far beyond it they are; negative inside."""
+    values = limit.values(Moments.at_rest(q))
+    return values, limit.violation(values) - _RANGE_SLACK * np.maximum(limit.violation_scale, 1.0)
+
+
 def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str) -> None:
     """Refuse a posture in which a limit is exceeded although the arm stands still."""
-    still = Moments.at_rest(posture[None])
     for limit in limits:
         if not limit.static:
             continue
-        values = limit.values(still)
-        beyond = limit.violation(values)[0] - _RANGE_SLACK * np.maximum(limit.violation_scale, 1.0)
+        (values,), (beyond,) = beyond_at_rest(limit, posture[None])
         worst = int(np.argmax(beyond))
         if beyond[worst] > 0.0:
             label = limit.labels[worst]
-            found, allowed = _in_figures(limit, worst, float(values[0, worst]))
+            found, allowed = in_figures(limit, worst, float(values[worst]))
             raise StartError(
                 f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
                 where=f"{name}.joints",
@@ -108,8 +112,8 @@ def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:
             raise InputError(asked, where="spline.rest", found=found, allowed="full or jerk")
 
 
-def _in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
-    """Write a value and its bounds in the unit of the value's label."""
+def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
+    """Write a value and its bounds in the unit of the value's label, which is left out."""
     bounds = [bound for bound in limit.bounds if bound.column == column]
     if not bounds:
         return f"{value:.4g}", f"{limit.lower[column]:.4g} to {limit.upper[column]:.4g}"

@@ -154,8 +154,8 @@ def path_hint(task_map: TaskMap, targets: np.ndarray) -> str | None:
 def place_hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str | None:
     """Say that a target, (c,), looks like mm where the tool's place, (c,), is about there in m."""
     axes = len(task_map.axes)
-    away = np.abs(place[:axes] - target[:axes] / _THOUSAND).max()
-    near = away <= _ROUNDED and np.abs(place[:axes] - target[:axes]).max() > _ROUNDED
+    away = np.abs(place[:axes] - target[:axes] / _THOUSAND).max(initial=0.0)
+    near = away <= _ROUNDED and np.abs(place[:axes] - target[:axes]).max(initial=0.0) > _ROUNDED
     return "The path looks like mm: divided by 1000 it is where the tool is" if near else None
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from brachis import ik
 from brachis.bspline import clamped_knots, spread
 from brachis.custom_limits import LimitModel
-from brachis.errors import DecompositionError, StartError, UnknownNameError
+from brachis.errors import DecompositionError, StartError, UnknownNameError, UnreachableError
 from brachis.feasibility import (
     branch_of,
     check_end_branch,
@@ -19,12 +19,13 @@ from brachis.feasibility import (
     check_smoothness,
     lacks_a_direction,
 )
-from brachis.kinematics import ClosedFormMap, JointMap, Newton
+from brachis.kinematics import ChartMap, ClosedFormMap, JointMap, Newton
 from brachis.limits import Limit, limits_of
 from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Boundary, FixedGrid, Grid, Phase, Program
-from brachis.path import Path, path_of
+from brachis.path import Path, check_closed, path_of, path_speed
 from brachis.robot import ROLL_JOINT, Robot, TaskMap, bind
+from brachis.robot.task_map import JointSpace
 from brachis.task import Task
 
 _EXACT = 1e-12
@@ -43,8 +44,8 @@ class Problem:
     task_map : TaskMap
     path : Path
     start, end : (n,) ndarray or None
-        Postures, None where free. The end is the posture nearest to the given one that is on the path, which that one
-        may miss by what its digits leave out.
+        Postures, None where free; the same one where the motion is periodic. Otherwise the end is the posture nearest
+        to the given one that is on the path, which that one may miss by what its digits leave out.
     limits : tuple of Limit
     further : tuple of LimitModel
         Those of the limits that are not in the task, as the user gave them.
@@ -80,17 +81,33 @@ class Problem:
         start = None if task.start == "free" else robot.posture(task.start.joints, "start.joints")
         end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
         path = path_of(task_map, task)
+        if task.boundary.periodic:
+            check_closed(task_map, path)
+            end = start
         limits = limits_of(robot, task, further)
         check_smoothness(limits, task.spline)
         check_postures(task_map, limits, start, end, path)
-        if end is not None:
+        if end is not None and not task.boundary.periodic:
             end = _on_path(task_map, end, path)
         return cls(task, robot, task_map, path, start, end, limits, tuple(further))
+
+    @property
+    def end_rates(self) -> tuple[float, float]:
+        """ds/dt at start and end, 1/s; zero at rest, and where a periodic motion has no ends."""
+        given = self.task.boundary
+        first, last = (
+            speed / path_speed(self.task_map, self.path, s) if speed else 0.0
+            for s, speed in ((0.0, given.start_speed), (1.0, given.end_speed))
+        )
+        return first, last
 
 
 def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
     """Return the posture nearest to a given one, (n,), at the end of the path; the given one if it is there already."""
-    newton, place = Newton(task_map), path.sample(np.ones(1)).target
+    place = path.sample(np.ones(1)).target
+    if isinstance(task_map, JointSpace):
+        return np.asarray(place[0])
+    newton = Newton(task_map)
     miss = task_map.difference(place, task_map.values(posture[None]))
     if task_map.robot.n < task_map.m or np.abs(miss).max() < _EXACT:
         return posture
@@ -151,7 +168,8 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
     -------
     list of Decomposition
         With ``redundant_joints: auto`` the one with the largest branch margin at the start posture first, and closed
-        forms before polynomials; none where the robot has no closed form. At least one if the task names the joints.
+        forms before polynomials; none where the robot has no closed form, or the path is one of joints. At least one
+        if the task names the joints.
 
     Raises
     ------
@@ -164,6 +182,8 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
         There is no such joint or branch.
     """
     task, robot, task_map = problem.task, problem.robot, problem.task_map
+    if isinstance(task_map, JointSpace):
+        return []
     if task.redundant_joints != "auto":
         wanted = _with_roll(task_map, task.redundant_joints)
         return [_decomposition(problem, ik.find(robot, task_map, wanted, families=families))]
@@ -242,12 +262,33 @@ def program_of(problem: Problem, joint_map: JointMap, breaks: np.ndarray) -> Pro
 
 
 def phase_in(problem: Problem, joint_map: JointMap, grid: Grid) -> Phase:
-    """Write the motion along the path down as a phase, in the coordinates of a joint map, over a grid."""
+    """Write the motion along the path down as a phase, in the coordinates of a joint map, over a grid.
+
+    Raises
+    ------
+    UnreachableError
+        A periodic motion is asked for in coordinates that do not close with the path.
+    """
+    return Phase(joint_map, problem.limits, grid, _boundary(problem, joint_map))
+
+
+def _boundary(problem: Problem, joint_map: JointMap) -> Boundary:
+    """Write the task's boundary conditions in the coordinates of a joint map."""
+    task, given = problem.task, problem.task.boundary
     free = np.full(problem.robot.n, np.nan)
     start, end = (free if posture is None else posture for posture in (problem.start, problem.end))
-    ends = joint_map.coordinates(0.0, start), joint_map.coordinates(1.0, end)
-    boundary = Boundary(*ends, problem.task.spline.vanishing)
-    return Phase(joint_map, problem.limits, grid, boundary)
+    values = joint_map.coordinates(0.0, start), joint_map.coordinates(1.0, end)
+    if not given.periodic:
+        first, last = (_rates(rate, len(values[0])) for rate in problem.end_rates)
+        return Boundary(*values, task.spline.vanishing, first, last)
+    if isinstance(joint_map, ChartMap) and not joint_map.rows.closes:
+        raise UnreachableError("the chart's measure of self-motion is another one at the path's end")
+    return Boundary(*values, task.spline.vanishing, periodic=True)
+
+
+def _rates(rate: float, count: int) -> np.ndarray | None:
+    """Rates of the curves at an end with a given ds/dt; None at rest."""
+    return np.append(rate, np.full(count - 1, np.nan)) if rate else None
 
 
 def breaks_of(task: Task) -> np.ndarray:

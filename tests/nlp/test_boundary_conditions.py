@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
 from brachis.bspline import clamped_uniform_knots
-from brachis.nlp.boundary import BoundarySpline
+from brachis.nlp.boundary import BoundarySpline, EndCondition
 from support.phases import CASES, phase_of, reachable_points
 
 
@@ -124,16 +124,17 @@ def test_monotone_control_points_make_progress_monotone():
 )
 def test_boundary_splines(degree, extra, derivatives, start, end, seed):
     knots = clamped_uniform_knots(degree, 4 + extra)
-    spline = BoundarySpline.resting(knots, degree, derivatives=min(derivatives, degree - 1), start=start, end=end)
+    ends = (EndCondition(value, 0.0, min(derivatives, degree - 1)) for value in (start, end))
+    spline = BoundarySpline.between(knots, degree, *ends)
     free = np.random.default_rng(seed).normal(size=spline.free)
-    points = spline.control_points(free)
+    points = spline.control_points(free, 1.0)
     curve = BSpline(knots, points, degree)
     for order in range(1, min(derivatives, degree - 1) + 1):
         np.testing.assert_allclose(curve(np.array([0.0, 1.0]), nu=order), 0.0, atol=1e-9 * np.abs(points).max() * 100)
     for wanted, time in ((start, 0.0), (end, 1.0)):
         if np.isfinite(wanted):
             assert float(curve(time)) == pytest.approx(wanted, abs=1e-12)
-    np.testing.assert_allclose(spline.free_from(points), free, atol=1e-12)
+    np.testing.assert_allclose(spline.free_from(points, 1.0), free, atol=1e-12)
     # Nothing more is tied than the boundary conditions ask for.
     still = min(derivatives, degree - 1)
     assert spline.free == len(points) - 2 * still - np.isfinite(start) - np.isfinite(end)

@@ -56,6 +56,7 @@ def plan(
     degree=3,
     rest="velocity",
     solver="auto",
+    boundary=None,
     **spline,
 ):
     task = {
@@ -67,6 +68,7 @@ def plan(
         "redundant_joints": list(redundant),
         "spline": {"degree": degree, "intervals": intervals, "rest": rest, **spline},
         "solver": {"name": solver},
+        "boundary": boundary or {},
     }
     return brachis.plan(urdf, task)
 
@@ -84,6 +86,24 @@ def test_one_slide(slides):
     result = plan(slides([X], [FORCE]), ["x"], [LENGTH])
     assert result.verified
     assert bang_bang(MASS) <= result.t_end < 1.01 * bang_bang(MASS)
+
+
+@pytest.mark.parametrize("rest", ["velocity", "full"])
+@pytest.mark.parametrize(("first", "last"), [(2.0, 0.0), (0.0, 3.0), (1.5, 4.0), (6.0, 6.0)])
+def test_slide_between_speeds(slides, first, last, rest):
+    """Full force forwards up to the speed v with 2 v^2 = 2 a L + v0^2 + v1^2, full force back from there."""
+    speeds, boundary = np.array([first, last]), {"start_speed": first, "end_speed": last}
+    result = plan(slides([X], [FORCE]), ["x"], [LENGTH], intervals=100, rest=rest, boundary=boundary)
+    assert result.verified
+    most = np.sqrt(FORCE / MASS * LENGTH + 0.5 * speeds @ speeds)
+    exact = (2.0 * most - speeds.sum()) * MASS / FORCE
+    # With full rest the force is zero at both ends, and rises and falls within an interval.
+    assert result.t_end == pytest.approx(exact, rel=1e-3 if rest == "velocity" else 1e-2)
+    assert result.t_end > exact * (1.0 - 1e-4)
+    ends = result.trajectory.velocity(np.array([0.0, result.t_end]))[:, 0]
+    np.testing.assert_allclose(ends, speeds, atol=1e-9)
+    force = np.abs(result.trajectory.torque(np.array([0.0, result.t_end]))).max()
+    assert force < 1e-6 if rest == "full" else force > 0.9 * FORCE
 
 
 @pytest.mark.parametrize(("axis", "mass"), [(0, 2.0 * MASS), (1, MASS)], ids=["lower slide", "upper slide"])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from brachis import limits
+from support.jacobians import dense, differences
 from support.phases import CASES, phase_of, reachable_points
 
 KINDS = [*limits.TABLE, "branch_margin"]
@@ -25,22 +26,6 @@ def blocks(phase) -> dict[str, slice]:
     if len(phase.grid.total):
         result["lengths"] = slice(result["progress"].stop, len(phase.lower))
     return result
-
-
-def dense(phase, x) -> np.ndarray:
-    matrix = np.zeros((len(phase.lower), phase.variables))
-    np.add.at(matrix, (phase.jacobian_rows, phase.jacobian_columns), phase.jacobian(x))
-    return matrix
-
-
-def differences(phase, x, h=1e-4) -> np.ndarray:
-    """Central differences of fourth order, column by column."""
-    columns = []
-    for unit in np.eye(len(x)):
-        near = phase.rows(x + h * unit) - phase.rows(x - h * unit)
-        far = phase.rows(x + 2.0 * h * unit) - phase.rows(x - 2.0 * h * unit)
-        columns.append((8.0 * near - far) / (12.0 * h))
-    return np.stack(columns, axis=1)
 
 
 UNIFORM = [(case, degree, "uniform") for case in CASES for degree in (3, 4, 5)]

@@ -14,11 +14,12 @@ from threadpoolctl import ThreadpoolController
 
 from brachis.deadline import Deadline
 from brachis.errors import PlanningError, UnreachableError
-from brachis.kinematics import ChartMap, ChartRows, JointMap, chart_around
+from brachis.kinematics import ChartMap, ChartRows, JointMap, JointSpaceMap, chart_around
 from brachis.nlp import Motion, Program
 from brachis.problem import Problem, decompositions_of, program_of
 from brachis.refine import Refined, RefinementOptions, refine
 from brachis.robot import ROLL_JOINT
+from brachis.robot.task_map import JOINTS
 from brachis.search.solving import MARGINS, solve_with
 from brachis.solvers import solver_named
 from brachis.trajectory import Trajectory
@@ -66,9 +67,13 @@ def solved_again(trajectory: Trajectory) -> Refined:
 
 def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
     """Lay the problem down over the saved knots; the motion is its point x."""
+    joint_map: JointMap
     if len(trajectory.chart_rows):
         problem = Problem.of(trajectory.robot, trajectory.task)
-        joint_map: JointMap = _chart(problem, trajectory)
+        joint_map = _chart(problem, trajectory)
+    elif trajectory.task.task_space == JOINTS:
+        problem = Problem.of(trajectory.robot, trajectory.task)
+        joint_map = JointSpaceMap(problem.robot, problem.path)
     else:
         names = tuple(name for name in trajectory.redundant_joints if name != ROLL_JOINT)
         task = trajectory.task.model_copy(update={"redundant_joints": names, "branch": trajectory.branch})

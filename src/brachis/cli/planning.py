@@ -79,11 +79,12 @@ def _show(result: Result, data: dict[str, Any]) -> None:
     """Print the plan for a person."""
     console = result_console()
     attempt, trajectory = result.attempt, result.trajectory
+    named = trajectory.branch not in {"", result.family}
     table = Table(show_header=False, title="plan", title_justify="left")
     rows = {
         "end time t_E": f"{result.t_end:.4f} s",
         "redundant joints": coordinates(trajectory.redundant_joints, trajectory.branch),
-        "branch": result.family if trajectory.branch == result.family else f"{trajectory.branch} ({result.family})",
+        "branch": f"{trajectory.branch} ({result.family})" if named else result.family,
         "start posture": _posture(data, "start_posture"),
         "end posture": _posture(data, "end_posture"),
         **data["in_use"],

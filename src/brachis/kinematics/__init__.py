@@ -7,6 +7,7 @@ from brachis.kinematics.closed_form import ClosedFormMap
 from brachis.kinematics.direct import DirectJointMap
 from brachis.kinematics.interpolation import Nodes, interpolate
 from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
+from brachis.kinematics.joint_space import JointSpaceMap
 from brachis.kinematics.newton import Newton, null_spaces, solved_each
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "DirectJointMap",
     "JointDerivatives",
     "JointMap",
+    "JointSpaceMap",
     "JointState",
     "Newton",
     "Nodes",

@@ -50,6 +50,11 @@ class ChartRows:
         """Number of rows."""
         return int(self.coefficients.shape[1])
 
+    @property
+    def closes(self) -> bool:
+        """Whether postures that are the same at both ends of the path have the same sigma there."""
+        return self.knots is None
+
     def arrays(self) -> tuple[np.ndarray, np.ndarray]:
         """Coefficients and knots as they are saved: no knots where the rows are constant."""
         return self.coefficients, np.empty(0) if self.knots is None else self.knots

@@ -11,8 +11,9 @@ d(D f)/dy = D(df/dy) and d(D f)/dydot = D(df/dydot) + df/dy, and so on; hence
 
 of which only the last is new; it is taken by differences along the motion.
 
-Along a path y = (s, q_r), and the closed form gives the other joints (`closed_form`). Without a path y = q
-(`direct`). Everything that lays down, solves and refines a program takes any of them.
+Along a path y = (s, q_r), and the closed form gives the other joints (`closed_form`); along a path of all joints
+y = (s) (`joint_space`). Without a path y = q (`direct`). Everything that lays down, solves and refines a program takes
+any of them.
 """
 
 from __future__ import annotations

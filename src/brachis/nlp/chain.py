@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from brachis.kinematics import JointState
@@ -37,11 +35,3 @@ def chain(partials: Partials, state: JointState) -> tuple[np.ndarray, ...]:
     by_ydot = by_ydot + 3.0 * partials.qdddot @ exact.qddot_y
     by_yddot = by_yddot + 3.0 * partials.qdddot @ exact.qdot_y
     return by_y, by_ydot, by_yddot, partials.qdddot @ state.gradient
-
-
-def by_time(by: Sequence[np.ndarray], state: JointState) -> np.ndarray:
-    """Add up what `chain` found to -t_E d/dt_E of the limit, (K, c): a longer time slows the curves down."""
-    derivatives = zip(by[1:], (state.ydot, state.yddot, state.ydddot), strict=False)
-    return np.asarray(
-        sum(order * np.einsum("kcj,kj->kc", part, own) for order, (part, own) in enumerate(derivatives, 1))
-    )

@@ -25,7 +25,9 @@ TimeLaw = Callable[[np.ndarray], np.ndarray]
 """Which part of a joint path is passed at normalised times."""
 
 
-def starting_point(program: Program, joint_paths: Sequence[np.ndarray], *, timed: bool = False) -> np.ndarray | None:
+def starting_point(
+    program: Program, joint_paths: Sequence[np.ndarray], duration: float | None = None
+) -> np.ndarray | None:
     """Fit splines to a joint path of every phase, and scale the time until the limits hold.
 
     Control points taken from the joint path itself smooth it; where that leaves the branch, least squares follow it
@@ -36,40 +38,65 @@ def starting_point(program: Program, joint_paths: Sequence[np.ndarray], *, timed
     program : Program
     joint_paths : sequence of (S, c) ndarray
         For each phase, successive values of its curves: along a path of s and the redundant joints.
-    timed : bool, optional
-        Whether they are those of a motion, at even times; otherwise they get a smooth one from rest to rest.
+    duration : float, optional
+        Of the motions whose values at even times these are, s; otherwise they get smooth ones from end to end.
 
     Returns
     -------
     (v,) ndarray or None
         None where the fit is out of reach at a collocation point.
     """
-    passed_at = _evenly if timed else _smooth_from_rest_to_rest
     pairs = list(zip(program.phases, joint_paths, strict=True))
     for fit in (_smoothed, _followed):
         with contextlib.suppress(UnreachableError):
-            return shortest_time(
-                program, np.concatenate([fit(phase, joint_path, passed_at) for phase, joint_path in pairs])
-            )
+            parts = [fit(phase, _closed(phase, joint_path), duration) for phase, joint_path in pairs]
+            return shortest_time(program, np.concatenate(parts))
     return None
 
 
-def _smoothed(phase: Phase, joint_path: np.ndarray, passed_at: TimeLaw) -> np.ndarray:
-    points = _values(joint_path, passed_at(phase.splines[0].greville))
-    return phase.variables_from(Motion(1.0, phase.knots, phase.degree, points.T))
+def _smoothed(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
+    points = _values(joint_path, _law(phase, duration)(phase.splines[0].greville))
+    return phase.variables_from(Motion(_first_duration(phase, duration), phase.knots, phase.degree, points.T))
 
 
-def _followed(phase: Phase, joint_path: np.ndarray, passed_at: TimeLaw) -> np.ndarray:
+def _followed(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
     t_norm = np.linspace(0.0, 1.0, _FIT_DENSITY * len(phase.knots))
-    return fitted(phase, 1.0, t_norm, _values(joint_path, passed_at(t_norm)))
+    return fitted(phase, _first_duration(phase, duration), t_norm, _values(joint_path, _law(phase, duration)(t_norm)))
 
 
-def _evenly(t_norm: np.ndarray) -> np.ndarray:
-    return t_norm
+def _rates(phase: Phase) -> tuple[float, float]:
+    """Rates of the first curve at both ends, 1/s."""
+    ends = phase.boundary.start_rates, phase.boundary.end_rates
+    first, last = (0.0 if rates is None else float(rates[0]) for rates in ends)
+    return first, last
 
 
-def _smooth_from_rest_to_rest(t_norm: np.ndarray) -> np.ndarray:
-    return t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
+def _first_duration(phase: Phase, duration: float | None) -> float:
+    """Duration with which ends in motion are fitted, s: as given, or that of a constant acceleration between them."""
+    total = sum(_rates(phase))
+    return (duration or 2.0 / total) if total else 1.0
+
+
+def _law(phase: Phase, duration: float | None) -> TimeLaw:
+    """Tell which part of a joint path is passed when: even parts of a motion's own, otherwise a smooth motion.
+
+    From rest to rest that is smooth; between other speeds the acceleration is constant.
+    """
+    first, last = _rates(phase)
+    if duration is not None:
+        return lambda t_norm: t_norm
+    if first == last == 0.0:
+        return lambda t_norm: t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
+    return lambda t_norm: t_norm * (2.0 * first + (last - first) * t_norm) / (first + last)
+
+
+def _closed(phase: Phase, joint_path: np.ndarray) -> np.ndarray:
+    """Let the joint path of a periodic motion end as far ahead of its start as it has to, by an even drift."""
+    if not phase.boundary.periodic:
+        return joint_path
+    ahead = np.nan_to_num(phase.boundary.end - phase.boundary.start)
+    part = np.linspace(0.0, 1.0, len(joint_path))[:, None]
+    return joint_path + part * (ahead - (joint_path[-1] - joint_path[0]))
 
 
 def _values(joint_path: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -98,30 +125,34 @@ def fitted(phase: Phase, duration: float, t_norm: np.ndarray, wanted: np.ndarray
     basis = basis_matrix(phase.knots, phase.degree, t_norm)
     parts = [np.array([duration])]
     for spline, values in zip(phase.splines, wanted.T, strict=True):
-        tied = np.zeros((len(spline.variable), spline.free))
-        kept = np.flatnonzero(spline.variable >= 0)
-        tied[kept, spline.variable[kept]] = 1.0
-        parts.append(np.linalg.lstsq(basis @ tied, values - basis @ spline.fixed, rcond=None)[0])
+        given = basis @ (spline.fixed + duration * spline.rate)
+        parts.append(np.linalg.lstsq(basis @ spline.matrix, values - given, rcond=None)[0])
     parts.append(phase.grid.lengths_of(phase.knots))
     return np.clip(np.concatenate(parts), phase.x_lower, phase.x_upper)
 
 
 def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
-    """Scale the time until velocity, acceleration and torque limits just hold, where any time does.
+    """Scale the time until velocity, acceleration and torque limits just hold, or are exceeded least where no time does.
 
-    Far above the least time no limit is active, and a solver that has seen no curvature creeps towards it.
+    Far above the least time no limit is active, and a solver that has seen no curvature creeps towards it. Where an arm
+    passes postures that it cannot hold, long times do not hold the limits either.
 
     Raises
     ------
     UnreachableError
         A collocation point is out of the branch's reach.
     """
+    best, least = x, np.inf
     while program.end_time(x) < _LONGEST_TIME:
         worst = worst_time_scaling_ratio(program, x)
+        if worst < least:
+            best, least = x, worst
         if worst <= 1.0:
             break
         # Without gravity and friction, torque falls with the square of the time.
         x = program.time_scaled(x, _STRETCH * min(np.sqrt(worst), 8.0))
+    else:
+        return best
     shorter = x
     while program.end_time(shorter) > _SHORTEST_TIME:
         shorter = program.time_scaled(shorter, _SHRINKAGE)

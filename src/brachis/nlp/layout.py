@@ -5,13 +5,12 @@ is a path, then of each joint that is chosen freely, in chain order. Boundary co
 points and have no rows. Where the knots are free, the interval lengths h in normalised time come last (see `grid`).
 
 Rows: for each limit, in the order of the list, its c values at collocation point 0, then at point 1, and so on, or
-their c means over time where it is held over the whole motion; along a path then the differences of successive control
-points of s, which are >= 0 so that ds/dt >= 0 holds at all times; where the knots are free, last the sum of h, which is
-1. All rows are dimensionless.
+their c means over time where it is held over the whole motion; along a path then differences of successive control
+points of s, which are >= 0 so that ds/dt >= 0 holds at all times (see `progress`); where the knots are free, last the
+sum of h, which is 1. All rows are dimensionless.
 
 Entries of the Jacobian: for each of `batches` those of all its limits by T, by the variables of each curve and by h,
-all points of a place together, or of means those by all variables; then -1 and 1 for each difference; last 1 for each
-of h.
+all points of a place together, or of means those by all variables; then those of the differences; last 1 for each of h.
 """
 
 from __future__ import annotations
@@ -25,6 +24,7 @@ import numpy as np
 from brachis.limits import Limit
 from brachis.nlp.boundary import BoundarySpline, SparsityPattern
 from brachis.nlp.grid import Grid
+from brachis.nlp.progress import Progress
 
 SHORTEST_TIME = 1e-4
 """Least duration, s."""
@@ -38,8 +38,8 @@ class Layout:
     ----------
     slices : tuple of slice
         Variables of each curve.
-    s : slice
-        Variables of s; none where there is no path.
+    progress : Progress
+        Differences of control points of s; none where there is no path.
     lengths : slice
         Variables h; none where the knots are fixed.
     places : tuple of SparsityPattern
@@ -52,7 +52,7 @@ class Layout:
     """
 
     slices: tuple[slice, ...]
-    s: slice
+    progress: Progress
     lengths: slice
     places: tuple[SparsityPattern, ...]
     x_lower: np.ndarray
@@ -70,14 +70,15 @@ class Layout:
         x_lower = np.concatenate([np.full(ends[-1], -np.inf), grid.lower])
         x_upper = np.concatenate([np.full(ends[-1], np.inf), grid.upper])
         x_lower[0] = SHORTEST_TIME
-        s = slices[0] if path else slice(1, 1)
-        x_lower[s], x_upper[s] = 0.0, 1.0
+        if path and not splines[0].rate.any():
+            x_lower[slices[0]], x_upper[slices[0]] = 0.0, 1.0
+        progress = Progress.of(splines[0], slices[0].start) if path else Progress.none()
         lengths = slice(int(ends[-1]), len(x_lower))
         basis = grid.basis(grid.lengths_of(grid.knots))
         places = tuple(SparsityPattern.of(basis.columns, spline) for spline in splines)
-        steps = np.arange(s.start, s.stop - 1)
-        pattern = _pattern(grid, limits, slices, steps, lengths, places)
-        return cls(slices, s, lengths, places, x_lower, x_upper, *_bounds(grid, limits, len(steps)), *pattern)
+        pattern = _pattern(grid, limits, slices, progress, lengths, places)
+        bounds = _bounds(grid, limits, len(progress.offset))
+        return cls(slices, progress, lengths, places, x_lower, x_upper, *bounds, *pattern)
 
 
 def height(limit: Limit, count: int) -> int:
@@ -103,11 +104,11 @@ def _pattern(
     grid: Grid,
     limits: Sequence[Limit],
     slices: Sequence[slice],
-    steps: np.ndarray,
+    progress: Progress,
     lengths: slice,
     places: Sequence[SparsityPattern],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns of the Jacobian's entries, (nnz,) each; `steps` are the variables of s but the last one."""
+    """Rows and columns of the Jacobian's entries, (nnz,) each."""
     count = len(grid.t_norm)
     patterns = [(np.arange(count), np.zeros(count, dtype=int))]
     patterns += [(place.point, place.variable + part.start) for place, part in zip(places, slices, strict=True)]
@@ -128,7 +129,7 @@ def _pattern(
             rows += [together[point].ravel() for point, _ in patterns]
             columns += [np.repeat(variable, together.shape[1]) for _, variable in patterns]
     first = int(ends[-1])
-    differences, of_h = first + np.arange(len(steps)), np.arange(lengths.start, lengths.stop)
-    rows += [differences, differences, np.full(len(of_h), first + len(steps))]
-    columns += [steps, steps + 1, of_h]
+    of_h = np.arange(lengths.start, lengths.stop)
+    rows += [first + progress.row, np.full(len(of_h), first + len(progress.offset))]
+    columns += [progress.variable, of_h]
     return np.concatenate(rows), np.concatenate(columns)

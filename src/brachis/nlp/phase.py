@@ -22,7 +22,7 @@ from brachis.kinematics import JointMap, JointState
 from brachis.limits import Limit, Partials, Role, branch_margin
 from brachis.limits.branch_margin import MARGIN
 from brachis.nlp.boundary import Boundary, LocalBasis
-from brachis.nlp.chain import by_time, chain
+from brachis.nlp.chain import chain
 from brachis.nlp.grid import FixedGrid, FreeGrid, Grid
 from brachis.nlp.layout import Layout, batches, height
 from brachis.nlp.motion import Motion, per_second
@@ -69,7 +69,8 @@ class Phase:
         self.grid, self.boundary = grid, boundary
         self.splines = boundary.splines(grid.knots, grid.degree)
         layout = Layout.of(grid, self.splines, self.limits, path=self.joint_map.path is not None)
-        self.slices, self._s, self._lengths, self._places = layout.slices, layout.s, layout.lengths, layout.places
+        self.slices, self._lengths, self._places = layout.slices, layout.lengths, layout.places
+        self._progress = layout.progress
         self.x_lower, self.x_upper = layout.x_lower, layout.x_upper
         self.lower, self.upper = layout.lower, layout.upper
         self.jacobian_rows, self.jacobian_columns = layout.jacobian_rows, layout.jacobian_columns
@@ -153,7 +154,7 @@ class Phase:
     def end_variables(self, point: int) -> np.ndarray:
         """Variables that are the curves' values at the start (`point` 0) or end (-1), (c,); -1 where fixed."""
         pairs = zip(self.splines, self.slices, strict=True)
-        found = ((spline.variable[point], part.start) for spline, part in pairs)
+        found = ((int(spline.variable[point, 0]), part.start) for spline, part in pairs)
         return np.array([first + own if own >= 0 else -1 for own, first in found], dtype=int)
 
     def motion(self, x: np.ndarray) -> Motion:
@@ -166,11 +167,12 @@ class Phase:
     def _control_points(self, x: np.ndarray) -> np.ndarray:
         """Control points (c, N + d)."""
         parts = zip(self.splines, self.slices, strict=True)
-        return np.array([spline.control_points(x[part]) for spline, part in parts])
+        return np.array([spline.control_points(x[part], x[0]) for spline, part in parts])
 
     def variables_from(self, motion: Motion) -> np.ndarray:
         """Point x nearest to given curves over the same knots, or over as many where these are free."""
-        free = [spline.free_from(c) for spline, c in zip(self.splines, motion.control_points, strict=True)]
+        pairs = zip(self.splines, motion.control_points, strict=True)
+        free = [spline.free_from(points, motion.t_end) for spline, points in pairs]
         return np.concatenate([[motion.t_end], *free, self.grid.lengths_of(motion.knots)])
 
     def state(self, x: np.ndarray) -> JointState:
@@ -193,7 +195,7 @@ class Phase:
         """Values of the rows, (c,); raises UnreachableError as `state` does."""
         values = [self._held(limit, x).ravel() for limit in self.limits]
         totals = np.full(len(self.grid.total), x[self._lengths].sum())
-        return np.concatenate([*values, np.diff(x[self._s]), totals])
+        return np.concatenate([*values, self._progress.values(x), totals])
 
     def _held(self, limit: Limit, x: np.ndarray) -> np.ndarray:
         """Values of a limit that are rows, (K, c), or (1, c) where their means are."""
@@ -248,9 +250,7 @@ class Phase:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `state` does."""
         self.evaluations["jacobians"] += 1
         entries = [part.ravel() for batch in batches(self.limits) for part in self._of_rows(batch, x)]
-        steps = len(x[self._s][1:])
-        ones = np.ones(len(self.grid.lower))
-        return np.concatenate([*entries, np.full(steps, -1.0), np.ones(steps), ones])
+        return np.concatenate([*entries, self._progress.weight, np.ones(len(self.grid.lower))])
 
     def gradient(self, partials: Partials, x: np.ndarray) -> np.ndarray:
         """Gradient, (v,), of a sum over the collocation points; raises UnreachableError as `state` does.
@@ -290,12 +290,20 @@ class Phase:
         padded = ((*parts, *[np.zeros_like(parts[0])] * (orders - len(parts))) for parts in each)
         by = [np.concatenate(parts, axis=1) for parts in zip(*padded, strict=True)]
         slopes = per_second(self.grid.slopes(x[self._lengths], self._control_points(x))[:orders], x[0])
-        yield by_time(by, state) / -x[0]
+        drifts = zip(by, self._drifts(x), strict=False)
+        yield np.asarray(sum(np.einsum("kcj,kj->kc", part, drift) for part, drift in drifts))
         for j, (places, basis) in enumerate(zip(self._places, self._bases(x), strict=True)):
             values = per_second(basis[:orders], x[0])
             parts = (part[places.point, :, j] * own[:, None] for part, own in zip(by, values, strict=True))
             yield sum(parts, start=np.zeros(()))
         yield (np.concatenate(by, axis=2)[self.grid.point] @ np.hstack(slopes)[:, :, None])[:, :, 0]
+
+    def _drifts(self, x: np.ndarray) -> list[np.ndarray]:
+        """Differentiate the curves and their time derivatives by T, (K, c) each: a longer time slows them down."""
+        state, rates = self.state(x), np.array([spline.rate for spline in self.splines])
+        moving = per_second(self.grid.basis(x[self._lengths]).curves(rates), x[0])
+        orders = enumerate(zip(moving, (state.y, state.ydot, state.yddot, state.ydddot), strict=True))
+        return [rate - order / x[0] * part for order, (rate, part) in orders]
 
     def _bases(self, x: np.ndarray) -> list[np.ndarray]:
         """Basis functions of every curve's free variables, (3, z) each; computed anew where the grid's change."""

@@ -1,6 +1,8 @@
 """The prescribed path and its derivatives by the path coordinate, up to the third."""
 
 from brachis.path.build import build_path
+from brachis.path.ends import check_closed, path_speed
+from brachis.path.from_curve import bspline_segment
 from brachis.path.origin import check_on_path, path_of
 from brachis.path.pose import PosePath
 from brachis.path.protocol import Array, Curve, Path, PathSample
@@ -13,7 +15,10 @@ __all__ = [
     "PathSample",
     "PosePath",
     "SequencePath",
+    "bspline_segment",
     "build_path",
+    "check_closed",
     "check_on_path",
     "path_of",
+    "path_speed",
 ]

@@ -56,13 +56,15 @@ def check_neighbours(first: Curve, second: Curve, size: float, join: Join, *, st
     if stands_still(first, join.positions) or stands_still(second, join.positions):
         problem = f"a blend needs motion of the position on both sides, and {still} on one"
         hint = f"Turn {turning} along a line"
-        raise PathError(problem, s_interval=at, found=f"{size:g} m", allowed="no blend here", where=where, hint=hint)
+        raise PathError(
+            problem, s_interval=at, found=f"{size:g} {join.unit}", allowed="no blend here", where=where, hint=hint
+        )
     longest = min(first.length, second.length) / 2
     if size > longest * (1 + _ROUNDING):
         problem = "the blend is longer than half of a neighbouring segment"
         # Rounded down, to whole nanometres, so that the blend that the message names is accepted.
-        allowed = f"at most {floor(longest * 1e9) / 1e9:.10g} m"
-        raise PathError(problem, s_interval=at, found=f"{size:g} m", allowed=allowed, where=where)
+        allowed = f"at most {floor(longest * 1e9) / 1e9:.10g} {join.unit}"
+        raise PathError(problem, s_interval=at, found=f"{size:g} {join.unit}", allowed=allowed, where=where)
 
 
 def ends(first: Curve, second: Curve, size: float, positions: int) -> tuple[Array, Array, float]:

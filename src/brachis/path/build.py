@@ -9,9 +9,10 @@ import numpy as np
 
 from brachis.errors import PathError
 from brachis.path.assembly import join_curves
+from brachis.path.joint_coordinates import JointCoordinates
 from brachis.path.pose_coordinates import PoseCoordinates
 from brachis.path.row_coordinates import RowCoordinates
-from brachis.robot.task_map.rows import POSE_ROWS
+from brachis.robot.task_map.rows import POSE_ROWS, joints_of
 
 if TYPE_CHECKING:
     from brachis.path.coordinates import Coordinates
@@ -29,7 +30,8 @@ def build_path(segments: Sequence[Segment], start: Sequence[float] | Array, task
     start : array_like, shape (m,) or (12,)
         Task coordinates at the start posture, m and rad; of a pose the position and the rotation matrix row by row.
     task_space_rows : sequence of str
-        Rows of the task space, out of x, y, z and yaw, where yaw comes last; or x, y, z, rx, ry, rz for poses.
+        Rows of the task space, out of x, y, z and yaw, where yaw comes last; x, y, z, rx, ry, rz for poses; or the rows
+        of all joints (`brachis.robot.task_map.rows.joint_rows`).
 
     Returns
     -------
@@ -52,7 +54,7 @@ def build_path(segments: Sequence[Segment], start: Sequence[float] | Array, task
     [[1.0, 1.0]]
     """
     rows = tuple(task_space_rows)
-    coordinates: Coordinates = PoseCoordinates() if rows == POSE_ROWS else RowCoordinates(rows)
+    coordinates = _coordinates(rows)
     point = coordinates.checked(np.array(start, dtype=float))
     if not segments:
         problem = "a path needs at least one segment"
@@ -62,3 +64,10 @@ def build_path(segments: Sequence[Segment], start: Sequence[float] | Array, task
         curves.append(coordinates.curve(segment, i, point))
         point = curves[-1].derivatives(np.array([curves[-1].length]), 0)[0, 0]
     return coordinates.path(join_curves(curves, [segment.blend for segment in segments], coordinates))
+
+
+def _coordinates(rows: tuple[str, ...]) -> Coordinates:
+    """Return what the coordinates of a task space with these rows are."""
+    if joints_of(rows):
+        return JointCoordinates(rows)
+    return PoseCoordinates() if rows == POSE_ROWS else RowCoordinates(rows)

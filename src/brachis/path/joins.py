@@ -9,7 +9,7 @@ import numpy as np
 
 from brachis.errors import PathError
 from brachis.path.site import place
-from brachis.robot.task_map.rows import position_rows
+from brachis.robot.task_map.rows import joints_of, position_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -60,7 +60,12 @@ class Join:
     @property
     def rounding(self) -> str:
         """What to set to round the corner."""
-        return f"{self.blend_key} (m) to round it"
+        return f"{self.blend_key} ({self.unit}) to round it"
+
+    @property
+    def unit(self) -> str:
+        """Unit of lengths along the path."""
+        return "rad, m" if joints_of(self.rows) else "m"
 
 
 @dataclass(frozen=True, eq=False)

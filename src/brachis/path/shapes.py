@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from brachis.errors import PathError
 from brachis.path.arc import arc_center, arc_via, circle
+from brachis.path.bspline import bspline_curve
 from brachis.path.line import line_by, line_heading, line_to
 from brachis.path.spline import spline_through
-from brachis.task import ArcCenter, ArcVia, Circle, CsvFile, LineBy, LineHeading, LineTo, SplineThrough
+from brachis.task import ArcCenter, ArcVia, BSplineCurve, Circle, CsvFile, LineBy, LineHeading, LineTo, SplineThrough
 
 if TYPE_CHECKING:
     from brachis.path.protocol import Curve
@@ -31,6 +32,7 @@ BUILDERS: Final[dict[type[Shape], Callable[[Any, Site], Curve]]] = {
     ArcVia: arc_via,
     Circle: circle,
     SplineThrough: spline_through,
+    BSplineCurve: bspline_curve,
     CsvFile: _unread,
 }
 """For every form of segment, the function that makes its curve."""

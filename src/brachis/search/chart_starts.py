@@ -6,12 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.attempt import Start
+from brachis.attempt import PathMap, Start
 from brachis.deadline import NEVER, Deadline
 from brachis.errors import PathError, UnreachableError
-from brachis.kinematics import CHART, ChartMap, ClosedFormMap, Newton, chart_around
+from brachis.kinematics import CHART, Newton, chart_around
 from brachis.problem import Decomposition, Problem
+from brachis.robot.task_map import JointSpace
 from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
+from brachis.search.joint_space_start import joint_space_start
 from brachis.search.lattice import LARGEST_STEP
 from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.phase_plane import least_time
@@ -90,6 +92,8 @@ def _start_along(newton: Newton, joint_path: JointPath, origin: str) -> Start | 
             chart = chart_around(problem.task_map, problem.path, places, q)
         except UnreachableError:
             continue
+        if problem.task.boundary.periodic and not chart.rows.closes:
+            continue
         estimate = least_time(problem.limits, places, q)
         return Start(problem, chart, chart.curves(places, q), estimate, origin, CHART)
     return None
@@ -110,7 +114,7 @@ def _followed(newton: Newton, joint_path: JointPath, places: np.ndarray, pieces:
     return q if follows else None
 
 
-def first_map(problem: Problem, decompositions: Sequence[Decomposition]) -> tuple[ClosedFormMap | ChartMap, str]:
+def first_map(problem: Problem, decompositions: Sequence[Decomposition]) -> tuple[PathMap, str]:
     """Return a joint map of the problem, of a closed form where there is one, and its family.
 
     It begins at the given start posture, or where that is free at that of the first joint path.
@@ -121,6 +125,9 @@ def first_map(problem: Problem, decompositions: Sequence[Decomposition]) -> tupl
         The lattice has no joint path.
     """
     level = SEARCH_LEVELS["fast"][0]
+    if isinstance(problem.task_map, JointSpace):
+        start = joint_space_start(problem)
+        return start.joint_map, start.family
     if decompositions and problem.start is not None:
         first = decompositions[0]
         return first.joint_map(problem.start, first.branches[0]), first.match.family

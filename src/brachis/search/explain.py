@@ -11,6 +11,7 @@ from brachis import ik
 from brachis.attempt import Attempt
 from brachis.errors import BrachisError, PathError, PlanningError
 from brachis.problem import Decomposition, Problem
+from brachis.robot.task_map import JointSpace
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.reach import reason_out_of_reach
 from brachis.task import SolverSettings, Task
@@ -107,6 +108,10 @@ def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
         tried.append(f"raise solver.max_iterations, which is {task.solver.max_iterations}")
     if "time limit" in statuses and task.solver.time_limit < few["time_limit"].default:
         tried.append(f"raise solver.time_limit, which is {task.solver.time_limit:g} s")
+    for key in ("start_speed", "end_speed"):
+        speed = getattr(task.boundary, key)
+        if speed:
+            tried.append(f"lower boundary.{key}, which is {speed:g} m/s")
     if not tried and task.search.effort != _MOST_EFFORT:
         tried.append(f"raise search.effort, which is {task.search.effort}")
     if not tried:
@@ -116,7 +121,7 @@ def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
 
 def _what_is_missing(problem: Problem) -> str:
     """Say which further choices of redundant joints EAIK might add where it is not installed."""
-    if problem.task.redundant_joints != "auto":
+    if problem.task.redundant_joints != "auto" or isinstance(problem.task_map, JointSpace):
         return ""
     missing = ik.missing_eaik(ik.find_all(problem.robot, problem.task_map))
     return f". {missing}" if missing else ""

@@ -50,10 +50,10 @@ def first_point(program: Program, start: Start) -> np.ndarray | None:
         curves, times = paced
         at = np.linspace(0.0, times[-1], 4 * _STATIONS)
         motion = np.column_stack([np.interp(at, times, column) for column in curves.T])
-        x = starting_point(program, [motion], timed=True)
+        x = starting_point(program, [motion], times[-1])
         if x is not None:
             return x
-    return starting_point(program, [start.joint_path], timed=start.timed)
+    return starting_point(program, [start.joint_path], start.estimate if start.timed else None)
 
 
 def _paced(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
@@ -62,5 +62,5 @@ def _paced(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     joint_path = start.joint_path
     curves = np.column_stack([s, *(np.interp(s, joint_path[:, 0], column) for column in joint_path.T[1:])])
     q = start.joint_map.postures(curves)
-    times = prescribed_times(start.problem.limits, s, q) if np.isfinite(q).all() else None
+    times = prescribed_times(start.problem.limits, s, q, start.problem.end_rates) if np.isfinite(q).all() else None
     return None if times is None else (curves, times)

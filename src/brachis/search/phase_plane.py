@@ -22,6 +22,7 @@ from brachis.limits import Limit
 
 _SLOWEST = 1e-9
 _STANDING = 1e-3
+_AT_REST = (0.0, 0.0)
 
 
 def least_time(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> float:
@@ -40,17 +41,29 @@ def least_time(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> float:
     float
         s; infinite where the joint path cannot be followed at any speed.
     """
-    times = _times(_lines(limits, s, q), s[1] - s[0])
+    times = least_times(limits, s, q)
     return np.inf if times is None else float(times[-1])
 
 
-def prescribed_times(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> np.ndarray | None:
-    """Find times along a joint path, (S,), s, where a limit asks for a least speed; None where none does or can.
+def least_times(
+    limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, rates: tuple[float, float] = _AT_REST
+) -> np.ndarray | None:
+    """Estimate when the stations are passed, (S,), s; see `least_time`. None where they cannot be.
 
-    A start that is too slow there is no good one. Parameters as for `least_time`.
+    `rates` are ds/dt at both ends, 1/s.
+    """
+    return _times(_lines(limits, s, q), s[1] - s[0], rates)
+
+
+def prescribed_times(
+    limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, rates: tuple[float, float] = _AT_REST
+) -> np.ndarray | None:
+    """Find times as `least_times` does where a limit asks for a least speed; None where none does or can.
+
+    A start that is too slow there is no good one.
     """
     lines = _lines(limits, s, q)
-    return _times(lines, s[1] - s[0]) if lines.floor.any() else None
+    return _times(lines, s[1] - s[0], rates) if lines.floor.any() else None
 
 
 @dataclass(frozen=True)
@@ -71,12 +84,13 @@ class _Lines:
     ceiling: np.ndarray
 
 
-def _times(lines: _Lines, step: float) -> np.ndarray | None:
+def _times(lines: _Lines, step: float, rates: tuple[float, float]) -> np.ndarray | None:
     """Find the times at the stations, (S,), s, under the largest u; None where the joint path cannot be followed."""
-    intervals = _controllable(lines, step)
-    if intervals is None or intervals[0][0] > 0.0:
+    first, last = (rate**2 for rate in rates)
+    intervals = _controllable(lines, step, last)
+    if intervals is None or not intervals[0][0] <= first <= intervals[1][0]:
         return None
-    x = _fastest(lines.slope, lines.offset, *intervals, step)
+    x = _fastest(lines.slope, lines.offset, *intervals, step, first)
     if not x.max() > 0.0:
         return None
     # Between stations nothing stops; a station where the grid says so is an artefact of its width.
@@ -109,11 +123,11 @@ def _lines(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> _Lines:
     return _Lines((-b / a, -b / a), (np.maximum(first, second), np.minimum(first, second)), floor, ceiling)
 
 
-def _controllable(lines: _Lines, step: float) -> tuple[np.ndarray, np.ndarray] | None:
-    """Go backwards: the intervals of x, (S,), from which the end can be reached at rest; None where one is empty."""
+def _controllable(lines: _Lines, step: float, last: float) -> tuple[np.ndarray, np.ndarray] | None:
+    """Go backwards: the intervals of x, (S,), from which the end can be reached with x = `last`; None where empty."""
     slope, offset = lines.slope, lines.offset
     count = len(lines.ceiling)
-    low, high = np.zeros(count), np.zeros(count)
+    low, high = np.full(count, last), np.full(count, last)
     for i in range(count - 2, -1, -1):
         # u >= (low' - x) / 2 step and u <= (high' - x) / 2 step join the lines.
         up = np.append(slope[0][i], -0.5 / step), np.append(offset[0][i], 0.5 * high[i + 1] / step)
@@ -136,9 +150,10 @@ def _fastest(
     low: np.ndarray,
     high: np.ndarray,
     step: float,
+    first: float,
 ) -> np.ndarray:
-    """Go forwards from rest: x, (S,), under the largest u."""
-    x = np.zeros(len(low))
+    """Go forwards from x = `first`: x, (S,), under the largest u."""
+    x = np.full(len(low), first)
     for i in range(len(low) - 1):
         largest = np.min(slope[0][i] * x[i] + offset[0][i], initial=np.inf)
         x[i + 1] = np.clip(x[i] + 2.0 * step * largest, low[i + 1], high[i + 1])

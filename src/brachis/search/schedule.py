@@ -2,7 +2,7 @@
 
 Where the task leaves the choice of redundant joints open, starts come from the lattice of all postures, and plans are
 made in charts; the closed forms of single choices are tried only while nothing is verified. A task that names its
-redundant joints or its branch gets these alone.
+redundant joints or its branch gets these alone. Along a path of joints there is one start, and no choice.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ from brachis.attempt import Start
 from brachis.deadline import Deadline
 from brachis.nlp.differential_ik import STRATEGIES
 from brachis.problem import Decomposition, Problem
+from brachis.robot.task_map import JointSpace
 from brachis.search.chart_starts import chart_starts
 from brachis.search.joint_path import DeadEnd
+from brachis.search.joint_space_start import joint_space_start
 from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.processes import each, processes
 from brachis.search.solving import Listener
@@ -73,11 +75,21 @@ def batches(
     curved = any(limit.where == "whole" for limit in problem.limits)
     solvers = [solver.name for solver in solver_named(problem.task.solver.name, curved=curved)]
     levels = SEARCH_LEVELS[problem.task.search.effort]
+    if isinstance(problem.task_map, JointSpace):
+        yield from _timings(problem, solvers)
+        return
     if charts_allowed(problem, decompositions):
         yield from _in_charts(problem, decompositions, solvers, deadline, listener, note)
         levels = tuple(dataclasses.replace(level, last_resort=True) for level in levels)
     if decompositions:
         yield from _in_closed_forms(decompositions, levels, solvers, deadline, listener, note)
+
+
+def _timings(problem: Problem, solvers: Sequence[str]) -> Iterator[Batch]:
+    """Yield batches for a path of joints: its timing alone is planned, solver after solver."""
+    start = joint_space_start(problem)
+    for solver in solvers:
+        yield Batch((start.with_solver(solver),), 1, last_resort=solver != solvers[0])
 
 
 def _in_closed_forms(

@@ -1,5 +1,7 @@
 """What is asked: the task file as frozen models, its loader and its schema. No numerics."""
 
+from brachis.task.boundary import BoundarySettings
+from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.limits_file import LimitsFile, read_limits
 from brachis.task.load import check_robot_settings, load_task
 from brachis.task.models import (
@@ -31,6 +33,7 @@ from brachis.task.segments import (
     ArcCenter,
     ArcSegment,
     ArcVia,
+    BSplineSegment,
     Circle,
     CircleSegment,
     CsvFile,
@@ -56,6 +59,9 @@ __all__ = [
     "ArcSegment",
     "ArcVia",
     "Attitude",
+    "BSplineCurve",
+    "BSplineSegment",
+    "BoundarySettings",
     "Circle",
     "CircleSegment",
     "CsvFile",

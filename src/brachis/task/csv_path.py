@@ -1,8 +1,9 @@
 """Waypoints from CSV files.
 
 The first line names the columns: the rows of the task space, or for poses ``x, y, z`` and, where the tool turns,
-``qw, qx, qy, qz`` (unit quaternion) or ``rx, ry, rz`` (rotation vector, rad), in any order. Lines that are empty or
-begin with ``#`` are skipped. The first row of numbers is where the segment starts.
+``qw, qx, qy, qz`` (unit quaternion) or ``rx, ry, rz`` (rotation vector, rad), in any order; for paths of joints the
+joints' names. Lines that are empty or begin with ``#`` are skipped. The first row of numbers is where the segment
+starts.
 """
 
 from __future__ import annotations
@@ -79,9 +80,10 @@ def expand_csv_files(task: Task, source: str, folder: Path) -> Task:
 
 def _spline(segment: CsvSegment, task: Task, where: str, folder: Path) -> SplineSegment:
     settings = segment.csv
-    rows = task.task_space
-    table = _read(settings, (rows,) if isinstance(rows, tuple) else _POSE_COLUMNS, f"{where}.csv.file", folder)
-    position = rows if isinstance(rows, tuple) else _POSITION
+    rows, of_joints = task.task_space, task.task_space == "joints"
+    choices = () if of_joints else (rows,) if isinstance(rows, tuple) else _POSE_COLUMNS
+    table = _read(settings, choices, f"{where}.csv.file", folder)
+    position = table.columns if of_joints else rows if isinstance(rows, tuple) else _POSITION
     turning = table.columns != position
     if turning and segment.orientation is not None:
         problem = "the CSV file's columns say already how the tool turns"
@@ -95,12 +97,13 @@ def _spline(segment: CsvSegment, task: Task, where: str, folder: Path) -> Spline
         relative=settings.relative,
         starts_at=points[0],
         starts_oriented=attitudes[0] if attitudes else None,
+        joints=table.columns if of_joints else None,
     )
     return SplineSegment(blend=segment.blend, orientation=segment.orientation, spline=spline)
 
 
 def _read(settings: CsvFile, choices: tuple[tuple[str, ...], ...], where: str, folder: Path) -> _Table:
-    """Read a file whose columns are one of `choices`, and put them in that order."""
+    """Read a file whose columns are one of `choices`, and put them in that order; any columns where there are none."""
     path = folder / settings.file
     text = read_text(path, where=where, folder=folder, found=settings.file).removeprefix("\ufeff")
     reader = csv.reader(text.split("\n"), skipinitialspace=True)
@@ -112,9 +115,9 @@ def _read(settings: CsvFile, choices: tuple[tuple[str, ...], ...], where: str, f
     lines = [(line, cells) for line, cells in lines if any(cells) and not cells[0].startswith("#")]
     if not lines:
         problem = "the file is empty"
-        raise TaskError(problem, allowed=_columns(choices), where=str(path))
+        raise TaskError(problem, allowed=_columns(choices) or "the names of the joints", where=str(path))
     header = lines[0][1]
-    columns = next((choice for choice in choices if sorted(choice) == sorted(header)), None)
+    columns = next((choice for choice in choices or (tuple(header),) if sorted(choice) == sorted(header)), None)
     if columns is None:
         problem = "wrong columns"
         hint = "The first line names the columns; commas separate them"

@@ -10,15 +10,16 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, JsonValue, Tag, field_validator, model_validator
 
+from brachis.task.boundary import BoundarySettings
 from brachis.task.fields import Count, Flag, Model, Name, Number, Positive, Share, by_form, refuse
 from brachis.task.robot_models import JointValues, RobotSettings
 from brachis.task.segments import Segment
 from brachis.task.tool_limits import ToolLimits
 
 Row = Literal["x", "y", "z", "yaw"]
-_Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll"]
+_Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll", "joints"]
 POSITION_ROWS: Final[tuple[Row, ...]] = ("x", "y", "z")
-_SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll"
+_SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll, joints"
 _VANISHING: Final = {"velocity": 1, "full": 2, "jerk": 3}
 
 
@@ -38,9 +39,9 @@ def _check_rows(rows: tuple[str, ...]) -> tuple[str, ...]:
 
 
 TaskSpace = Annotated[
-    Annotated[Literal["position", "pose", "pose_free_roll"], Tag("<word>")]
+    Annotated[Literal["position", "pose", "pose_free_roll", "joints"], Tag("<word>")]
     | Annotated[Annotated[tuple[Row, ...], Field(min_length=1), AfterValidator(_check_rows)], Tag("<list>")],
-    by_form(_SPACE_FORMS, "position", "pose", "pose_free_roll"),
+    by_form(_SPACE_FORMS, "position", "pose", "pose_free_roll", "joints"),
     AfterValidator(_expand_position),
 ]
 
@@ -223,9 +224,13 @@ class Task(Model):
     )
     task_space: TaskSpace = Field(
         description="What the path prescribes: rows out of x, y, z, yaw (yaw last, with two others); position (all "
-        "of x, y, z); pose; or pose_free_roll, a pose that may roll about the tool frame's z axis."
+        "of x, y, z); pose; pose_free_roll, a pose that may roll about the tool frame's z axis; or joints: the path is "
+        "one of all joints, in the order of the chain (rad, m), and only its timing is planned."
     )
     path: Annotated[tuple[Segment, ...], Field(min_length=1)] = Field(description="Segments of the path, in order.")
+    boundary: BoundarySettings = Field(
+        default_factory=BoundarySettings, description="Speeds at both ends, or a motion that goes round for ever."
+    )
     tool_limits: ToolLimits = Field(default_factory=ToolLimits, description="Limits on the motion of the tool.")
     custom_limits: dict[Name, dict[str, JsonValue]] = Field(
         default={},
@@ -270,10 +275,34 @@ class Task(Model):
             problem = "a free start posture leaves open where the path begins"
             pose = isinstance(self.task_space, str)
             rows = (*POSITION_ROWS, "qw", "qx", "qy", "qz") if pose else self.task_space
-            raise refuse(problem, key="path_start", absent=True, allowed=f"[{', '.join(rows)}]")
+            allowed = "the joints" if self.task_space == "joints" else f"[{', '.join(rows)}]"
+            raise refuse(problem, key="path_start", absent=True, allowed=allowed)
         if self.start == "free" and self.search.guesses == "numeric":
             problem = "numeric inverse kinematics needs a posture to begin with, and start is free"
             raise refuse(problem, key="search.guesses", found="numeric", allowed="lattice")
+        return self
+
+    @model_validator(mode="after")
+    def _ends_in_motion(self) -> Task:
+        if self.boundary.in_motion and self.spline.knots == "free":
+            problem = "ends in motion tie control points by the knots, which may not move then"
+            raise refuse(problem, key="spline.knots", found="free", allowed="uniform, or a boundary at rest")
+        if self.boundary.periodic and self.end != "free":
+            problem = "the end posture of a periodic motion is its start posture"
+            raise refuse(problem, key="end", found=self.end.model_dump(), allowed="free")
+        return self
+
+    @model_validator(mode="after")
+    def _a_path_of_joints_leaves_no_choice(self) -> Task:
+        if self.task_space == "joints":
+            for key, given, default in (
+                ("redundant_joints", self.redundant_joints, "auto"),
+                ("branch", self.branch, "auto"),
+                ("search.guesses", self.search.guesses, "lattice"),
+            ):
+                if given != default:
+                    problem = "a path of joints leaves no choice of postures"
+                    raise refuse(problem, key=key, found=given, allowed=f"{default}, with task_space: joints")
         return self
 
     def to_dict(self) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Tag, field_validator, model_validator
 
+from brachis.task.bspline_curve import BSplineCurve, JointOrder
 from brachis.task.fields import Flag, Model, Name, NonNegative, Number, Positive, Vector, by_key, refuse
 from brachis.task.orientation import Attitude, OrientationMode, Turning
 
@@ -108,6 +109,8 @@ class SplineThrough(Model):
         default=None, description="As `starts_at`, the orientation of the tool; beside `orientations`."
     )
 
+    joints: JointOrder = None
+
     @model_validator(mode="after")
     def _orientations_fit(self) -> SplineThrough:
         if self.orientations is None:
@@ -150,7 +153,7 @@ Arc = Annotated[
         {"ArcCenter": ("center", "angle_deg"), "ArcVia": ("via", "to")},
     ),
 ]
-Shape = LineTo | LineBy | LineHeading | ArcCenter | ArcVia | Circle | SplineThrough | CsvFile
+Shape = LineTo | LineBy | LineHeading | ArcCenter | ArcVia | Circle | SplineThrough | BSplineCurve | CsvFile
 
 
 class SegmentModel(Model):
@@ -214,6 +217,12 @@ class SplineSegment(MovingSegment):
         return self
 
 
+class BSplineSegment(MovingSegment):
+    """A curve that is given as a B-spline."""
+
+    bspline: BSplineCurve
+
+
 class TurnSegment(SegmentModel):
     """A turn of the tool on the spot, in task spaces of poses."""
 
@@ -231,6 +240,7 @@ Segment = Annotated[
     | Annotated[ArcSegment, Tag("<ArcSegment>")]
     | Annotated[CircleSegment, Tag("<CircleSegment>")]
     | Annotated[SplineSegment, Tag("<SplineSegment>")]
+    | Annotated[BSplineSegment, Tag("<BSplineSegment>")]
     | Annotated[TurnSegment, Tag("<TurnSegment>")]
     | Annotated[CsvSegment, Tag("<CsvSegment>")],
     by_key(
@@ -240,6 +250,7 @@ Segment = Annotated[
             "ArcSegment": ("arc",),
             "CircleSegment": ("circle",),
             "SplineSegment": ("spline",),
+            "BSplineSegment": ("bspline",),
             "TurnSegment": ("turn",),
             "CsvSegment": ("csv",),
         },

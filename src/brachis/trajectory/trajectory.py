@@ -177,7 +177,8 @@ class Trajectory:
         Raises
         ------
         InputError
-            `dt` is not positive, or so small that there would be more than ten million samples.
+            `dt` is not positive, or so small that there would be more than ten million samples; or a motion that does
+            not end at rest is to be held.
         UnknownNameError
             `last` is neither.
         """
@@ -189,6 +190,8 @@ class Trajectory:
             )
         whole = int(np.ceil(self.t_end / dt * (1.0 - 1e-12)))
         before = np.arange(whole) * dt
+        if last == "hold" and (self.task.boundary.periodic or self.task.boundary.end_speed):
+            raise InputError("a motion that does not end at rest cannot be held", where="last", allowed="exact")
         if last == "exact":
             return self.at(np.append(before, self.t_end))
         moving, rest = self.at(before), np.zeros((1, self.robot.n))

@@ -39,15 +39,23 @@ def end_checks(
     trajectory: Trajectory, robot: Robot, task_map: TaskMap, path: Path, options: VerifyOptions
 ) -> list[Check]:
     """Check that the motion begins and ends as the task says."""
-    task = trajectory.task
+    task, boundary = trajectory.task, trajectory.task.boundary
     checks = []
-    wanted = {"start": (0.0, task.start), "end": (trajectory.t_end, task.end)}
-    for name, (time, posture) in wanted.items():
+    wanted = {
+        "start": (0.0, task.start, boundary.start_speed),
+        "end": (trajectory.t_end, task.end, boundary.end_speed),
+    }
+    for name, (time, posture, given_speed) in wanted.items():
         if posture != "free":
             given = robot.posture(posture.joints, f"{name}.joints")
             place = path.sample(np.array([time / trajectory.t_end])).target
             miss = np.abs(trajectory.position(time) - _on_path(given, task_map, place))
             checks.append(_worst_joint(f"{name} posture", miss, options.posture_tolerance, "rad, m", robot, time))
+        if boundary.periodic:
+            continue
+        if given_speed:
+            checks += _moving_end(name, trajectory, task_map, path, given_speed, time, options)
+            continue
         speed, allowed = np.abs(trajectory.velocity(time)), options.rest_velocity_tolerance
         checks.append(_worst_joint(f"{name} velocity", speed, allowed, "rad/s, m/s", robot, time))
         if task.spline.vanishing > 1:
@@ -57,6 +65,41 @@ def end_checks(
             jerk = np.abs(trajectory.jerk(time)) / (1.0 + np.abs(trajectory.jerk(trajectory.times)).max())
             checks.append(_worst_joint(f"{name} jerk", jerk, options.rest_jerk_tolerance, "relative", robot, time))
     return checks
+
+
+def _moving_end(
+    name: str,
+    trajectory: Trajectory,
+    task_map: TaskMap,
+    path: Path,
+    wanted: float,
+    time: float,
+    options: VerifyOptions,
+) -> list[Check]:
+    """Check that an end is passed at the speed that the task asks for, which is constant there with full rest."""
+    q, qdot = trajectory.position(time)[None], trajectory.velocity(time)
+    position, angle = task_map.norms(task_map.jacobian(task_map.twists(q))[0] @ qdot)
+    moves = float(task_map.norms(path.sample(trajectory.path_spline([time])).xi)[0][0]) > _ROUNDING
+    off, allowed = abs(float(position if moves else angle) - wanted), options.rest_velocity_tolerance * (1.0 + wanted)
+    unit = "m/s" if moves else "rad/s"
+    checks = [Check(f"{name} speed", off, allowed, unit, off <= allowed, time=time)]
+    if trajectory.task.spline.vanishing > 1:
+        rate, bend = (abs(float(trajectory.path_spline(time, nu=order))) for order in (1, 2))
+        change, allowed = wanted * bend / rate if rate else np.inf, options.rest_acceleration_tolerance
+        checks.append(
+            Check(f"{name} acceleration along the path", change, allowed, f"{unit}2", change <= allowed, time=time)
+        )
+    return checks
+
+
+def seam_checks(trajectory: Trajectory, pieces: Pieces, robot: Robot, options: VerifyOptions) -> list[Check]:
+    """Check that a periodic motion goes on where it ends as it begins."""
+    if not trajectory.task.boundary.periodic:
+        return []
+    last = len(pieces.lengths) - 1
+    before = States.at(pieces, robot, np.array([last]), np.ones(1))
+    after = States.at(pieces, robot, np.array([0]), np.zeros(1))
+    return _jumps(before, after, " over the seam", trajectory.degree, options)
 
 
 def _on_path(given: np.ndarray, task_map: TaskMap, place: np.ndarray) -> np.ndarray:
@@ -86,8 +129,13 @@ def continuity_checks(trajectory: Trajectory, pieces: Pieces, robot: Robot, opti
     behind = np.arange(1, len(pieces.lengths))
     before = States.at(pieces, robot, behind - 1, np.ones(len(behind)))
     after = States.at(pieces, robot, behind, np.zeros(len(behind)))
+    return _jumps(before, after, " jump", trajectory.degree, options)
+
+
+def _jumps(before: States, after: States, what: str, degree: int, options: VerifyOptions) -> list[Check]:
+    """Compare the states on both sides of places."""
     names = {"position": "q", "velocity": "qdot", "acceleration": "qddot", "torque": "tau"}
-    if trajectory.degree < CONTINUOUS_TORQUE:  # the asked degree has them jump
+    if degree < CONTINUOUS_TORQUE:  # the asked degree has them jump
         del names["acceleration"], names["torque"]
     checks, allowed = [], options.jump_tolerance
     for name, part in names.items():
@@ -96,7 +144,7 @@ def continuity_checks(trajectory: Trajectory, pieces: Pieces, robot: Robot, opti
         jumps = np.abs(right - left).max(axis=1, initial=0.0) / scale
         value = float(jumps.max(initial=0.0))
         time = float(after.t[int(np.argmax(jumps))]) if len(jumps) else None
-        checks.append(Check(f"{name} jump", value, allowed, "relative", value <= allowed, time=time))
+        checks.append(Check(f"{name}{what}", value, allowed, "relative", value <= allowed, time=time))
     return checks
 
 

@@ -15,8 +15,9 @@ from brachis.custom_limits import LimitModel
 from brachis.errors import InputError
 from brachis.path import Path, path_of
 from brachis.robot import Robot, TaskMap, bind
+from brachis.robot.task_map import JointSpace
 from brachis.trajectory import Trajectory
-from brachis.verify.checks import continuity_checks, end_checks, progress_checks, spline_checks
+from brachis.verify.checks import continuity_checks, end_checks, progress_checks, seam_checks, spline_checks
 from brachis.verify.limits import Given, limit_checks
 from brachis.verify.mechanics import tool_placements
 from brachis.verify.motion import Pieces, States
@@ -82,6 +83,7 @@ def verify_trajectory(
         *end_checks(trajectory, robot, task_map, path, options),
         *spline_checks(trajectory, robot, states, options),
         *continuity_checks(trajectory, pieces, robot, options),
+        *seam_checks(trajectory, pieces, robot, options),
     ]
     worst = max((check.value for check in ratios), default=0.0)
     return Verification(tuple(checks), len(states.t), worst, path_check.value)
@@ -98,7 +100,8 @@ def _path_error(
     once = np.append(np.diff(states.t) > 0.0, True)  # not both sides of a node
     t, q = states.t[once], states.q[once]
     targets = path.sample(np.clip(trajectory.path_spline(t), 0.0, 1.0)).target
-    found = task_map.of_placements(*tool_placements(task_map.robot, q))
+    of_joints = isinstance(task_map, JointSpace)
+    found = q if of_joints else task_map.of_placements(*tool_placements(task_map.robot, q))
     errors = np.maximum(*task_map.norms(task_map.difference(found, targets)))
     worst = int(np.argmax(errors))
     tolerance = options.path_tolerance

@@ -8,6 +8,7 @@ import numpy as np
 
 from brachis.errors import InputError
 from brachis.robot.robot import Robot
+from brachis.robot.task_map.joint_space import JointSpace
 from brachis.robot.task_map.pose import Pose
 from brachis.robot.task_map.protocol import TaskMap
 from brachis.robot.task_map.rows import AXES, POSE_ROWS, ROWS, YAW, position_rows
@@ -15,7 +16,8 @@ from brachis.robot.task_map.rows_and_yaw import RowsAndYaw
 from brachis.robot.task_map.world_rows import WorldRows
 
 FREE_ROLL = "pose_free_roll"
-WORDS = ("position", "pose", FREE_ROLL)
+JOINTS = "joints"
+WORDS = ("position", "pose", FREE_ROLL, JOINTS)
 _IN_PLANE = 1.0 - 1e-9
 
 
@@ -58,8 +60,8 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
     return RowsAndYaw(robot, names, int(np.argmax(in_plane >= _IN_PLANE)))
 
 
-def _of_word(robot: Robot, word: str) -> Pose:
-    """Return the poses, after a check that the tool can roll where that is asked for."""
+def _of_word(robot: Robot, word: str) -> Pose | JointSpace:
+    """Return the joints or the poses, after a check that the tool can roll where that is asked for."""
     if word not in WORDS:
         raise InputError(
             "this task space does not exist",
@@ -67,6 +69,8 @@ def _of_word(robot: Robot, word: str) -> Pose:
             found=word,
             allowed=f"rows out of {', '.join(ROWS)}, or one of {', '.join(WORDS)}",
         )
+    if word == JOINTS:
+        return JointSpace(robot)
     if word == FREE_ROLL and not robot.rolls_freely:
         raise InputError(
             "the robot's tool does not roll freely",

@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from brachis.errors import InputError
 from brachis.robot.robot import Robot
-from brachis.robot.task_map.rows import AXES, position_rows
+from brachis.robot.task_map.rows import AXES
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class TaskMap(ABC):
     rows : tuple of str
         Names of the m rows, those of the position (m) first, then the angles (rad).
     axes : tuple of int
-        World axes (0, 1, 2) of the position rows.
+        World axes (0, 1, 2) of the position rows; none in a space of joints.
     """
 
     frame: ClassVar[pin.ReferenceFrame]
@@ -55,7 +55,7 @@ class TaskMap(ABC):
 
     def __post_init__(self) -> None:
         """Look the axes up, and make a workspace."""
-        object.__setattr__(self, "axes", tuple(AXES.index(row) for row in position_rows(self.rows)))
+        object.__setattr__(self, "axes", tuple(AXES.index(row) for row in self.rows if row in AXES))
         object.__setattr__(self, "_data", self.robot.model.createData())
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -1,0 +1,143 @@
+"""Segments of a path from curves of other libraries: SciPy's splines, or any function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from brachis.errors import InputError
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline, PPoly
+
+    from brachis.path.protocol import Array
+
+_SMOOTH = 3
+_LEAST_DEGREE, _DEGREE = 4, 5
+_SAME = 1e-7
+"""Jumps of a derivative, relative to its largest value, that are rounding."""
+_COARSEST, _FINEST = 8, 4096
+
+
+def bspline_segment(
+    curve: Callable[[Any], Any], interval: tuple[float, float] | None = None, *, tolerance: float = 1e-9
+) -> dict[str, Any]:
+    """Turn a curve into a segment of a task's path.
+
+    Parameters
+    ----------
+    curve : scipy BSpline, PPoly, CubicSpline, ... or callable
+        Piecewise polynomials of SciPy's are taken exactly. Of any other function ``curve(u)`` the values, (m,), are
+        asked for at single numbers u in the interval.
+    interval : (float, float), optional
+        Range of u; of SciPy's curves their own. Required for a function.
+    tolerance : float, optional
+        Largest distance of a function from the spline that stands for it, rad or m.
+
+    Returns
+    -------
+    dict
+        ``{"bspline": {...}}``, an entry of a task's ``path``.
+
+    Raises
+    ------
+    InputError
+        A derivative up to the third jumps, a function is not smooth enough for the tolerance, or the interval or the
+        values do not fit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> segment = bspline_segment(lambda u: [np.sin(u), u, 1.0], (0.0, 1.0))
+    >>> segment["bspline"]["degree"]
+    5
+    """
+    from scipy.interpolate import BSpline, PPoly  # noqa: PLC0415  (imports in 0.3 s)
+
+    if isinstance(curve, BSpline):
+        own = curve.t[curve.k : len(curve.t) - curve.k]
+        spline = _of_pieces(curve, own, curve.k, interval)
+    elif isinstance(curve, PPoly):
+        spline = _of_pieces(curve, curve.x, len(curve.c) - 1, interval)
+    elif interval is None:
+        raise InputError("the interval of a function is not known", where="interval", allowed="(first, last)")
+    else:
+        spline = _of_function(curve, _checked(interval), tolerance)
+    parts = {"degree": int(spline.k), "knots": spline.t.tolist(), "control_points": spline.c.tolist()}
+    return {"bspline": parts}
+
+
+def _checked(interval: tuple[float, float]) -> tuple[float, float]:
+    first, last = (float(end) for end in interval)
+    if not (np.isfinite([first, last]).all() and first < last):
+        raise InputError("is not an interval", where="interval", found=interval, allowed="(first, last), first < last")
+    return first, last
+
+
+def _of_pieces(pieces: BSpline | PPoly, breaks: Array, degree: int, interval: tuple[float, float] | None) -> BSpline:
+    """Write piecewise polynomials, C3, as a clamped B-spline over the same breaks."""
+    first, last = _checked(interval or (breaks[0], breaks[-1]))
+    inner = np.unique(breaks[(breaks > first) & (breaks < last)])
+    after = np.append(inner, last)  # so that there is a place where there are no breaks
+    before = np.nextafter(after, first)
+    for order in range(_SMOOTH + 1):
+        values = _rows(pieces(after, nu=order))
+        jumps = np.abs(values - _rows(pieces(before, nu=order))).max(axis=1)
+        if jumps.max() > _SAME * (1.0 + np.abs(values).max()):
+            place = float(after[int(np.argmax(jumps))])
+            raise InputError(
+                "the curve is not smooth enough: a path must be smooth to the third derivative",
+                where="curve",
+                found=f"a jump of {jumps.max():.3g} in derivative {order} at {place:.6g}",
+                allowed="three continuous derivatives",
+                hint="Interpolate with scipy.interpolate.make_interp_spline(x, y, k=5), or give the waypoints "
+                "themselves (spline: {through: ...})",
+            )
+    degree = max(degree, _LEAST_DEGREE)
+    return _interpolating(lambda u: _rows(pieces(u)), first, last, inner, degree, degree - _SMOOTH)
+
+
+def _of_function(curve: Callable[[Any], Any], interval: tuple[float, float], tolerance: float) -> BSpline:
+    """Fit a spline of degree 5 to a function, with ever more intervals, until it is met in between as well."""
+
+    def values(u: Array) -> Array:
+        points = np.array([np.asarray(curve(float(each)), dtype=float) for each in u])
+        if points.ndim != 2 or not np.isfinite(points).all():  # noqa: PLR2004
+            raise InputError("the function's values are no points", where="curve", allowed="m finite numbers each")
+        return points
+
+    count, miss = _COARSEST, np.inf
+    while count <= _FINEST:
+        breaks = np.linspace(*interval, count + 1)
+        spline = _interpolating(values, *interval, breaks[1:-1], _DEGREE, 1)
+        between = breaks[:-1] + np.diff(breaks) * 0.37
+        miss = float(np.abs(spline(between) - values(between)).max())
+        if miss <= tolerance:
+            return spline
+        count *= 2
+    raise InputError(
+        "the function is not smooth enough for a spline",
+        where="curve",
+        found=f"{miss:.3g} rad or m off with {_FINEST} intervals",
+        allowed=f"{tolerance:g}",
+        hint="A path must be smooth to the third derivative; raise the tolerance if the function is rounded",
+    )
+
+
+def _interpolating(
+    values: Callable[[Array], Array], first: float, last: float, inner: Array, degree: int, multiplicity: int
+) -> BSpline:
+    """Interpolate at the Greville abscissae, which is exact where the spline space has the function."""
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415
+
+    ends = np.ones(degree + 1)
+    knots = np.concatenate([first * ends, np.repeat(inner, multiplicity), last * ends])
+    sites = np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree).mean(axis=1).clip(first, last)
+    return make_interp_spline(sites, values(sites), k=degree, t=knots)
+
+
+def _rows(values: Array) -> Array:
+    """One row a point, also of curves of one coordinate."""
+    return np.asarray(values, dtype=float).reshape(len(values), -1)

@@ -1,0 +1,171 @@
+"""Ends in motion and periodic motions: conditions that hold for every x, and exact derivatives with them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import BSpline
+
+from brachis.bspline import clamped_knots
+from brachis.nlp.boundary import Boundary, BoundarySpline, EndCondition, periodic
+from support.jacobians import dense, differences
+from support.phases import phase_of, reachable_points
+
+BREAKS = np.array([0.0, 0.1, 0.25, 0.5, 0.6, 0.85, 0.95, 1.0])
+RATE = 0.6
+
+
+def with_boundary(case, degree, **conditions):
+    """A phase with every kind of limit and other conditions at its ends."""
+    phase = phase_of(case, degree=degree, rest="velocity")
+    own = phase.boundary
+    values = {"start": own.start, "end": own.end, "derivatives": own.derivatives, **conditions}
+    return phase.over(phase.grid, Boundary(**values))
+
+
+def moving(case, degree, derivatives):
+    rates = np.array([RATE, *[np.nan] * phase_of(case).joint_map.r])
+    return with_boundary(case, degree, start_rates=rates, end_rates=2.0 * rates, derivatives=derivatives)
+
+
+def going_round(case, degree):
+    return with_boundary(case, degree, periodic=True)
+
+
+def at_both_ends(phase, x, order):
+    motion = phase.motion(x)
+    curve = BSpline(motion.knots * motion.t_end, motion.control_points.T, motion.degree)
+    return curve(np.array([0.0, motion.t_end]), nu=order)
+
+
+PHASES = {
+    "moving, r0": lambda: moving("r0", 3, 1),
+    "moving, constant speed, r0": lambda: moving("r0", 4, 2),
+    "moving, constant speed, r2": lambda: moving("r2", 3, 2),
+    "periodic, r0": lambda: going_round("r0", 3),
+    "periodic, r1": lambda: going_round("r1", 4),
+    "periodic, r2": lambda: going_round("r2", 3),
+}
+
+
+@pytest.fixture(params=PHASES, scope="module")
+def phase(request):
+    return PHASES[request.param]()
+
+
+def test_jacobian_equals_differences(phase):
+    for x in reachable_points(phase, 2):
+        exact, expected = dense(phase, x), differences(phase, x)
+        count = len(phase._progress.offset)
+        kinds = {limit.kind: phase.rows_of(limit).ravel() for limit in phase.limits}
+        kinds["progress"] = np.arange(len(phase.lower) - count, len(phase.lower))
+        assert count >= 3
+        for kind, rows in kinds.items():
+            wrong = np.abs(exact[rows] - expected[rows]).max(axis=1)
+            if kind == "tool_speed":  # the direction of a tool that hardly moves turns within the difference's step
+                wrong = wrong[phase.rows(x)[rows] > 0.05]
+            error = wrong.max() / np.abs(expected[rows]).max()
+            assert error <= 1e-6, f"{kind}: relative error {error:.1e}"
+
+
+def test_pattern_has_no_place_twice(phase):
+    places = phase.jacobian_rows * phase.variables + phase.jacobian_columns
+    assert len(np.unique(places)) == len(places)
+
+
+def test_the_way_to_x_and_back(phase):
+    for x in reachable_points(phase, 2):
+        np.testing.assert_allclose(phase.variables_from(phase.motion(x)), x, atol=1e-13)
+
+
+@pytest.mark.parametrize("derivatives", [1, 2])
+@pytest.mark.parametrize("case", ["r0", "r1", "r2"])
+def test_rates_hold_whatever_the_duration(case, derivatives):
+    phase = moving(case, 4, derivatives)
+    for x in reachable_points(phase, 3, spread=0.3):
+        value, rate, second = (at_both_ends(phase, x, order)[:, 0] for order in range(3))
+        np.testing.assert_allclose(value, [0.0, 1.0], atol=1e-12)
+        np.testing.assert_allclose(rate, [RATE, 2.0 * RATE], rtol=1e-12)
+        assert (np.abs(second) < 1e-9).all() == (derivatives == 2)
+        others = np.abs(at_both_ends(phase, x, 1)[:, 1:])
+        assert (others > 1e-6).all(), "the redundant joints' velocities should be free"
+
+
+@pytest.mark.parametrize(("degree", "smooth"), [(2, 1), (3, 2), (4, 2)])
+@pytest.mark.parametrize("case", ["r0", "r1", "r2"])
+def test_derivatives_close_over_the_seam(case, degree, smooth):
+    phase = going_round(case, degree)
+    for x in reachable_points(phase, 3):
+        for order in range(degree + 1):
+            first, last = at_both_ends(phase, x, order)
+            ahead = np.eye(1 + phase.joint_map.r)[0] if order == 0 else 0.0
+            gap, size = np.abs(last - first - ahead), 1.0 + np.abs(first).max()
+            if order <= smooth:
+                assert gap.max() < 1e-10 * size
+            else:
+                assert gap.max() > 1e-6, "nothing more is tied"
+
+
+@pytest.mark.parametrize("phase", ["moving, constant speed, r2", "periodic, r2"], indirect=True)
+def test_monotone_rows_say_whether_progress_is_monotone(phase):
+    rng = np.random.default_rng(5)
+    monotone = []
+    for _ in range(200):
+        x = np.append(rng.uniform(0.05, 1.5), rng.normal(size=phase.variables - 1))
+        own = phase.slices[0]
+        x[own] = np.sort(rng.uniform(0.0, 1.0, own.stop - own.start)) + 0.02 * rng.normal(size=own.stop - own.start)
+        if phase.boundary.periodic and x[own].min() < 0.0:  # which bounds on x take care of
+            continue
+        monotone.append(phase._progress.values(x).min() >= 0.0)
+        assert monotone[-1] == (np.diff(phase.motion(x).control_points[0]).min() >= -1e-15)
+    assert 10 < sum(monotone) < len(monotone) - 10
+
+
+@settings(max_examples=50, deadline=None, derandomize=True)
+@given(
+    degree=st.integers(2, 6),
+    derivatives=st.integers(1, 2),
+    start=st.just(np.nan) | st.floats(-3.0, 3.0),
+    rate=st.just(np.nan) | st.floats(-3.0, 3.0),
+    duration=st.floats(0.1, 10.0),
+    seed=st.integers(0, 99),
+)
+def test_splines_between_rates(degree, derivatives, start, rate, duration, seed):
+    derivatives = min(derivatives, degree - 1)
+    knots = clamped_knots(degree, BREAKS)
+    condition = EndCondition(start, rate, derivatives)
+    spline = BoundarySpline.between(knots, degree, condition, EndCondition(np.nan, 0.0, 1))
+    points = spline.control_points(np.random.default_rng(seed).normal(size=spline.free), duration)
+    curve = BSpline(knots * duration, points, degree)
+    if not np.isnan(start):
+        assert float(curve(0.0)) == pytest.approx(start, abs=1e-12)
+    if not np.isnan(rate):
+        assert float(curve(0.0, nu=1)) == pytest.approx(rate, abs=1e-9 * np.abs(points).max() / duration)
+        if derivatives == 2:
+            assert float(curve(0.0, nu=2)) == pytest.approx(0.0, abs=1e-8 * np.abs(points).max() / duration**2)
+    given = (not np.isnan(start)) + (0 if np.isnan(rate) else derivatives)
+    assert spline.free == len(points) - 1 - given
+
+
+@settings(max_examples=50, deadline=None, derandomize=True)
+@given(
+    degree=st.integers(2, 6),
+    start=st.just(np.nan) | st.floats(-3.0, 3.0),
+    jump=st.floats(-3.0, 3.0),
+    seed=st.integers(0, 99),
+)
+def test_periodic_splines(degree, start, jump, seed):
+    spline = periodic(clamped_knots(degree, BREAKS), degree, start, jump)
+    free = np.random.default_rng(seed).normal(size=spline.free)
+    points = spline.control_points(free, 1.0)
+    np.testing.assert_allclose(spline.matrix @ free + spline.fixed, points, atol=1e-12 * np.abs(points).max())
+    curve = BSpline(spline.knots, points, degree)
+    for order in range(min(degree, 3)):
+        first, last = curve(np.array([0.0, 1.0]), nu=order)
+        assert last - first == pytest.approx(jump if order == 0 else 0.0, abs=1e-9 * (1.0 + np.abs(points).max()) * 400)
+    if not np.isnan(start):
+        assert float(curve(0.0)) == pytest.approx(start, abs=1e-12)
+    np.testing.assert_allclose(spline.free_from(points, 1.0), free, atol=1e-12)
+    assert spline.free == len(points) - min(degree, 3) - (not np.isnan(start))

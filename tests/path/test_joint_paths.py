@@ -1,0 +1,111 @@
+"""Paths of joints: what they may consist of, in which order the joints stand, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brachis.errors import BrachisError, PathError, TaskError
+from brachis.path import build_path
+from brachis.robot.task_map.rows import joint_rows
+from brachis.task import load_task
+
+ROWS = joint_rows(["a", "b", "x"])
+START = [0.1, 0.2, 0.3]
+CLAMPED = {"degree": 4, "knots": [0] * 5 + [1] * 5, "control_points": [START, *np.eye(3).tolist(), [1, 1, 1]]}
+
+
+def task(path, **more):
+    return load_task({"brachis": 1, "start": {"joints": START}, "task_space": "joints", "path": path, **more})
+
+
+def build(path, start=START):
+    return build_path(task(path).path, start, ROWS)
+
+
+def at(path, s):
+    return path.sample(np.atleast_1d(s)).target
+
+
+def test_lines_splines_and_blends():
+    path = build([{"line": {"by": [0.3, 0, 0]}, "blend": 0.1}, {"line": {"to": [0.4, 0.8, 0.3]}}])
+    np.testing.assert_allclose(at(path, [0.0, 1.0]), [START, [0.4, 0.8, 0.3]], atol=1e-15)
+    assert len(path.breaks) == 4
+    path = build([{"spline": {"through": [[0.5, 0.5, 0.5], [0.1, 0.9, 0.2]]}}])
+    chord = np.linalg.norm([0.4, 0.3, 0.2])
+    whole = chord + np.linalg.norm([0.4, 0.4, 0.3])
+    np.testing.assert_allclose(at(path, chord / whole), [[0.5, 0.5, 0.5]], atol=1e-12)
+
+
+def test_joints_may_stand_in_another_order(tmp_path):
+    plain = build([{"spline": {"through": [[0.5, 0.6, 0.7], [0.1, 0.9, 0.2]]}}])
+    named = build([{"spline": {"through": [[0.7, 0.5, 0.6], [0.2, 0.1, 0.9]], "joints": ["x", "a", "b"]}}])
+    s = np.linspace(0.0, 1.0, 7)
+    np.testing.assert_allclose(at(named, s), at(plain, s), atol=1e-14)
+    file = tmp_path / "path.csv"
+    file.write_text("x,a,b\n0.3,0.1,0.2\n0.7,0.5,0.6\n0.2,0.1,0.9\n")
+    np.testing.assert_allclose(at(build([{"csv": {"file": str(file)}}]), s), at(plain, s), atol=1e-14)
+
+
+def test_bsplines_are_taken_as_they_are():
+    path = build([{"bspline": CLAMPED}])
+    np.testing.assert_allclose(at(path, [0.0, 1.0]), [START, [1, 1, 1]], atol=1e-15)
+    moved = build([{"bspline": {**CLAMPED, "relative": True}}], [1.1, 0.2, 0.3])
+    np.testing.assert_allclose(at(moved, 1.0), [[2, 1, 1]], atol=1e-15)
+    with pytest.raises(PathError, match="starts elsewhere"):
+        build([{"bspline": CLAMPED}], [0.2, 0.2, 0.3])
+
+
+REFUSED = [
+    ({"circle": {"center": [0, 0, 0]}}, "no kind of segment for a path of joints"),
+    ({"turn": {"rotate": {"axis": [0, 0, 1], "angle_deg": 3}}}, "no kind of segment for a path of joints"),
+    ({"line": {"length": 1, "angle_deg": 3}}, "needs 2 position rows"),
+    ({"line": {"by": [1, 2]}}, r"found 2: .*joint a, joint b, joint x"),
+    ({"spline": {"through": [[1, 1, 1]], "joints": ["a", "b", "c"]}}, r"spline\.joints.*'c'.*a, b, x"),
+    ({"spline": {"through": [[1, 1]], "joints": ["a", "b"]}}, r"joints are missing"),
+    ({"line": {"by": [1, 2, 3]}, "orientation": "fixed"}, "for task spaces of poses"),
+    ({"bspline": {**CLAMPED, "control_points": [[0.1, 0.2]] * 5}}, r"control_points\[0\]: wrong number"),
+    ({"bspline": {**CLAMPED, "control_points": [START] * 5}}, "zero length"),
+]
+
+
+@pytest.mark.parametrize(("segment", "words"), REFUSED)
+def test_what_a_path_of_joints_cannot_be(segment, words):
+    with pytest.raises(BrachisError, match=words):
+        build([segment])
+
+
+def test_a_corner_is_refused_with_its_place():
+    with pytest.raises(PathError, match=r"a corner of 90 degrees.*path\[0\].*blend \(rad, m\)"):
+        build([{"line": {"by": [0.3, 0, 0]}}, {"line": {"by": [0, 0.3, 0]}}])
+
+
+@pytest.mark.parametrize(
+    ("parts", "words"),
+    [
+        ({"degree": 3}, "degree"),
+        ({"knots": [0] * 5 + [1] * 6}, "wrong number of knots; found 11; allowed: 10"),
+        ({"knots": [0, 0, 0, 0, 0.1, *[1] * 5]}, "not clamped"),
+        ({"knots": [1] * 5 + [0] * 5}, "not clamped"),
+        (
+            {"knots": [0] * 5 + [0.5, 0.5] + [1] * 5, "control_points": [START] * 7},
+            "up to the third jumps; found 2; allowed: 1 times",
+        ),
+    ],
+)
+def test_bsplines_that_are_none(parts, words):
+    with pytest.raises(TaskError, match=words):
+        task([{"bspline": {**CLAMPED, **parts}}])
+
+
+@pytest.mark.parametrize(
+    ("key", "more"),
+    [
+        ("redundant_joints", {"redundant_joints": ["a"]}),
+        ("branch", {"branch": "elbow up"}),
+        ("search.guesses", {"search": {"guesses": "numeric"}}),
+    ],
+)
+def test_there_is_nothing_to_choose(key, more):
+    with pytest.raises(TaskError, match=f"{key}: a path of joints leaves no choice"):
+        task([{"line": {"by": [1, 0, 0]}}], **more)

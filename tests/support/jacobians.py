@@ -1,0 +1,21 @@
+"""Jacobians of phases as matrices, exact and by differences."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def dense(phase, x) -> np.ndarray:
+    matrix = np.zeros((len(phase.lower), phase.variables))
+    np.add.at(matrix, (phase.jacobian_rows, phase.jacobian_columns), phase.jacobian(x))
+    return matrix
+
+
+def differences(phase, x, h=1e-4) -> np.ndarray:
+    """Central differences of fourth order, column by column."""
+    columns = []
+    for unit in np.eye(len(x)):
+        near = phase.rows(x + h * unit) - phase.rows(x - h * unit)
+        far = phase.rows(x + 2.0 * h * unit) - phase.rows(x - 2.0 * h * unit)
+        columns.append((8.0 * near - far) / (12.0 * h))
+    return np.stack(columns, axis=1)

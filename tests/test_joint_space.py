@@ -1,0 +1,177 @@
+"""Paths of joints from the task to the verified motion: beside toppra, under every limit, saved, tampered with."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.bottleneck import check_sensitivities, solved_again
+from brachis.robot import dynamics
+from brachis.task import LimitSpec
+from brachis.verify import verify_trajectory
+from support.chains import planar_robot
+
+ROOT = Path(__file__).parents[1]
+IIWA = ROOT / "robots/iiwa14/robot.urdf"
+SEEDS = (41, 54)
+"""Cases in which velocity, acceleration and torque limits are all active."""
+WAYPOINTS = np.random.default_rng(3).uniform(-1.0, 1.0, (4, 7))
+
+
+def task(path=None, *, limits=None, **more):
+    return {
+        "brachis": 1,
+        "robot": {"urdf": str(IIWA), "limits": {"acceleration": 10.0, **(limits or {})}},
+        "start": {"joints": WAYPOINTS[0]},
+        "task_space": "joints",
+        "path": path or [{"spline": {"through": WAYPOINTS[1:]}}],
+        "search": {"least_motion": False},
+        **more,
+    }
+
+
+@pytest.fixture(scope="module")
+def bench():
+    sys.path.insert(0, str(ROOT / "benchmarks"))
+    try:
+        yield importlib.import_module("joint_paths")
+    finally:
+        sys.path.remove(str(ROOT / "benchmarks"))
+
+
+@pytest.fixture(scope="module")
+def example():
+    spec = importlib.util.spec_from_file_location("from_toppra", ROOT / "examples/11_from_toppra.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def planned():
+    return brachis.plan(None, task())
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_end_time_is_that_of_toppra(bench, example, seed):
+    pytest.importorskip("toppra")
+    result = brachis.plan(None, bench.case(seed, intervals=150))
+    assert result.verified
+    least = example.by_toppra(result.trajectory.robot, result.task)
+    assert result.t_end == pytest.approx(least, rel=3e-3)
+
+
+def test_result_is_verified_and_follows_the_path(planned):
+    assert planned.verified
+    assert planned.verification.path_error <= 1e-9
+    assert planned.trajectory.redundant_joints == ()
+    assert planned.family == "path of joints"
+    np.testing.assert_allclose(planned.trajectory.position(0.0), WAYPOINTS[0], atol=1e-12)
+    np.testing.assert_allclose(planned.trajectory.position(planned.t_end), WAYPOINTS[-1], atol=1e-12)
+
+
+@pytest.mark.parametrize("limit", ["torque", "velocity", "acceleration", "tool speed"])
+def test_every_limit_is_violated_without_it_and_met_with_it(planned, limit):
+    """On the dense grid of the verification, which has formulas of its own."""
+    scale = {"torque": {"scale": {"torque": 0.2}}, "velocity": {"velocity": 0.6}, "acceleration": {"acceleration": 2.0}}
+    given = {"tool_limits": {"speed": 0.5}} if limit == "tool speed" else {"limits": scale[limit]}
+    held = brachis.plan(None, task(**given))
+    assert held.verified
+    assert held.t_end > 1.01 * planned.t_end
+    before = replace(planned.trajectory, task=held.trajectory.task, robot=held.trajectory.robot)
+    (found,) = [check for check in verify_trajectory(before).checks if check.name == f"{limit} ratio"]
+    assert found.value > 1.05
+    (found,) = [check for check in held.verification.checks if check.name == f"{limit} ratio"]
+    assert 0.99 < found.value <= 1.0001
+
+
+def test_saved_motion_is_verified_again_and_tampering_is_seen(planned, tmp_path):
+    planned.trajectory.save(tmp_path / "motion.npz")
+    loaded = brachis.Trajectory.load(tmp_path / "motion.npz")
+    assert verify_trajectory(loaded).passed
+    q = np.array(loaded.q)
+    q[len(q) // 2, 3] += 1e-6
+    failed = {check.name for check in verify_trajectory(replace(loaded, q=q)).checks if not check.passed}
+    assert "path error" in failed
+    other = np.array(loaded.control_points)
+    other[0, 8] += 1e-6
+    failed = {
+        check.name for check in verify_trajectory(replace(loaded, control_points=other)).checks if not check.passed
+    }
+    assert "path error" in failed
+
+
+def test_a_spline_of_scipys_is_the_path():
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415
+
+    curve = make_interp_spline(np.linspace(0.0, 3.0, 6), np.vstack([WAYPOINTS, WAYPOINTS[:2]]), k=5)
+    result = brachis.plan(None, task([brachis.bspline_segment(curve)]))
+    assert result.verified
+    u = 3.0 * result.trajectory.path_coordinate(1.0)
+    np.testing.assert_allclose(result.trajectory.position(1.0), curve(u), atol=1e-9)
+
+
+@pytest.mark.parametrize("spline", [{"intervals": "auto", "tolerance": 0.01}, {"intervals": 6, "knots": "free"}])
+def test_calmest_motion_auto_intervals_and_free_knots(spline):
+    result = brachis.plan(None, task(spline=spline, search={"least_motion": True}))
+    assert result.verified
+
+
+def test_paths_beyond_a_limit_at_rest_are_refused_with_their_place():
+    with pytest.raises(brachis.BrachisError, match=r"position limit of 'joint_2' .* found 3 rad at s = 1"):
+        brachis.plan(None, task([{"line": {"to": [0, 3.0, 0, 0, 0, 0, 0]}}]))
+    weak = {"torque": {"joint_2": 40.0}}
+    with pytest.raises(brachis.BrachisError, match=r"torque limit of 'joint_2' .* Nm at s = .*40 N"):
+        brachis.plan(None, task([{"line": {"to": [0, 1.6, 0, 0, 0, 0, 0]}}], start={"joints": [0.0] * 7}, limits=weak))
+
+
+def test_momentum_carries_an_arm_through_postures_that_it_cannot_hold():
+    """A pendulum that needs 6.2 Nm to be held level, from its lowest to its highest position, which takes 12.4 J."""
+    task = {
+        "brachis": 1,
+        "start": {"joints": [-1.5]},
+        "task_space": "joints",
+        "path": [{"line": {"to": [1.5]}}],
+        "search": {"least_motion": False},
+    }
+    strong, weak = (planar_robot("R", "xz", limits=LimitSpec(torque=torque)) for torque in (5.5, 3.0))
+    assert np.abs(dynamics.torque(strong, *np.zeros((3, 1, 1)))).max() > 6.0
+    assert brachis.plan(strong, task).verified
+    with pytest.raises(brachis.BrachisError, match=r"torque limit of 'j1' cannot hold the arm against gravity"):
+        brachis.plan(weak, task)
+
+
+def test_an_end_beside_the_path_is_refused():
+    with pytest.raises(brachis.BrachisError, match=r"end posture is off the path.*in joint joint_3"):
+        brachis.plan(None, task(end={"joints": WAYPOINTS[-1] + [0, 0, 1e-3, 0, 0, 0, 0]}))
+
+
+def test_sensitivities_are_those_of_solving_again(planned):
+    found = check_sensitivities(planned.attempt.refined)
+    assert found.larger()
+    assert found.worst_deviation() < 0.05
+
+
+def test_bottlenecks_of_the_saved_motion_are_those_of_the_plan(planned, tmp_path):
+    planned.trajectory.save(tmp_path / "motion.npz")
+    again = solved_again(brachis.Trajectory.load(tmp_path / "motion.npz"))
+    assert again.t_end == pytest.approx(planned.t_end, rel=1e-4)
+
+
+def test_program():
+    robot = brachis.Robot.from_urdf(IIWA)
+    program, family = brachis.transcribe(robot, brachis.load_task(task()))
+    assert family == "path of joints"
+    assert program.variables == 1 + 20 + 3 - 6
+
+
+def test_plain_data(planned):
+    json.dumps(planned.to_dict())
