@@ -23,11 +23,11 @@ from brachis.task import (
     ToolLimits,
 )
 from brachis.task.orientation import Quaternion, RollPitchYaw, Rotation, RotationVector, Tangent, ToQuaternion
+from brachis.task.point_data import BSplineCurve, FileUnits, FitTolerance, PointFile
 from brachis.task.segments import (
     ArcCenter,
     ArcVia,
     Circle,
-    CsvFile,
     LineBy,
     LineHeading,
     LineTo,
@@ -53,7 +53,10 @@ SEGMENTS: dict[str, tuple[type[BaseModel], ...]] = {
     "arc": (ArcCenter, ArcVia),
     "circle": (Circle,),
     "spline": (SplineThrough,),
-    "csv": (CsvFile,),
+    "csv": (PointFile,),
+    "csv.units": (FileUnits,),
+    "csv.tolerance": (FitTolerance,),
+    "bspline": (BSplineCurve,),
 }
 TABLE_HEAD = ("| key | default | meaning |", "|---|---|---|")
 INTRODUCTION = """# Task files

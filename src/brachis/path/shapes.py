@@ -7,9 +7,20 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from brachis.errors import PathError
 from brachis.path.arc import arc_center, arc_via, circle
+from brachis.path.bspline_curve import bspline_curve
 from brachis.path.line import line_by, line_heading, line_to
 from brachis.path.spline import spline_through
-from brachis.task import ArcCenter, ArcVia, Circle, CsvFile, LineBy, LineHeading, LineTo, SplineThrough
+from brachis.task import (
+    ArcCenter,
+    ArcVia,
+    BSplineCurve,
+    Circle,
+    LineBy,
+    LineHeading,
+    LineTo,
+    PointFile,
+    SplineThrough,
+)
 
 if TYPE_CHECKING:
     from brachis.path.protocol import Curve
@@ -17,10 +28,10 @@ if TYPE_CHECKING:
     from brachis.task import Shape
 
 
-def _unread(shape: CsvFile, site: Site) -> NoReturn:
-    problem = "the CSV file has not been read"
-    hint = "brachis.load_task reads it and makes a spline of it"
-    raise PathError(problem, found=shape.file, allowed="a spline", where=f"{site.key}.file", hint=hint)
+def _unread(shape: PointFile, site: Site) -> NoReturn:
+    problem = "the file has not been read"
+    hint = "brachis.load_task reads it and makes a curve of it"
+    raise PathError(problem, found=shape.file, allowed="a curve", where=f"{site.key}.file", hint=hint)
 
 
 BUILDERS: Final[dict[type[Shape], Callable[[Any, Site], Curve]]] = {
@@ -31,7 +42,8 @@ BUILDERS: Final[dict[type[Shape], Callable[[Any, Site], Curve]]] = {
     ArcVia: arc_via,
     Circle: circle,
     SplineThrough: spline_through,
-    CsvFile: _unread,
+    BSplineCurve: bspline_curve,
+    PointFile: _unread,
 }
 """For every form of segment, the function that makes its curve."""
 

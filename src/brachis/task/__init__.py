@@ -23,15 +23,16 @@ from brachis.task.orientation import (
     ToRotationVector,
     TurnTo,
 )
+from brachis.task.point_data import BSplineCurve, FileUnits, FitReport, FitTolerance, PointFile
 from brachis.task.robot_models import FROM_URDF, FrictionSettings, LimitScale, LimitSpec, RobotSettings
 from brachis.task.schema import json_schema
 from brachis.task.segments import (
     ArcCenter,
     ArcSegment,
     ArcVia,
+    BSplineSegment,
     Circle,
     CircleSegment,
-    CsvFile,
     CsvSegment,
     LineBy,
     LineHeading,
@@ -54,10 +55,14 @@ __all__ = [
     "ArcSegment",
     "ArcVia",
     "Attitude",
+    "BSplineCurve",
+    "BSplineSegment",
     "Circle",
     "CircleSegment",
-    "CsvFile",
     "CsvSegment",
+    "FileUnits",
+    "FitReport",
+    "FitTolerance",
     "FrictionSettings",
     "LimitScale",
     "LimitSpec",
@@ -66,6 +71,7 @@ __all__ = [
     "LineSegment",
     "LineTo",
     "MovingSegment",
+    "PointFile",
     "Posture",
     "Quaternion",
     "RefinementSettings",

@@ -15,6 +15,7 @@ from pydantic import Field, Tag, field_validator, model_validator
 
 from brachis.task.fields import Flag, Model, Name, NonNegative, Number, Positive, Vector, by_key, refuse
 from brachis.task.orientation import Attitude, OrientationMode, Turning
+from brachis.task.point_data import BSplineCurve, PointFile
 
 Yaw = Annotated[
     Literal["fixed", "tangent"],
@@ -24,6 +25,7 @@ Normal = Annotated[
     tuple[Number, Number, Number] | None,
     Field(description="Axis of rotation, for three position rows; right-hand rule. Any length but zero."),
 ]
+_POSE_COLUMNS = 7
 Centre = Annotated[Vector, Field(description="Centre, m: the position rows, without yaw.")]
 
 
@@ -121,19 +123,6 @@ class SplineThrough(Model):
         return self
 
 
-class CsvFile(Model):
-    """A smooth curve through waypoints from a file; `brachis.task.load_task` reads it and makes a spline of it."""
-
-    file: Name = Field(
-        description="CSV file, relative to the task file's folder; its first row is where the segment starts."
-    )
-    relative: Flag = Field(
-        default=False,
-        description="Whether the rows count from the first one, so that the path may start anywhere: displacements "
-        "along the world axes, rotations in the tool frame.",
-    )
-
-
 Line = Annotated[
     Annotated[LineTo, Tag("<LineTo>")]
     | Annotated[LineBy, Tag("<LineBy>")]
@@ -150,7 +139,7 @@ Arc = Annotated[
         {"ArcCenter": ("center", "angle_deg"), "ArcVia": ("via", "to")},
     ),
 ]
-Shape = LineTo | LineBy | LineHeading | ArcCenter | ArcVia | Circle | SplineThrough | CsvFile
+Shape = LineTo | LineBy | LineHeading | ArcCenter | ArcVia | Circle | SplineThrough | BSplineCurve | PointFile
 
 
 class SegmentModel(Model):
@@ -220,10 +209,23 @@ class TurnSegment(SegmentModel):
     turn: Turning
 
 
-class CsvSegment(MovingSegment):
-    """A smooth curve through waypoints from a file."""
+class BSplineSegment(MovingSegment):
+    """A B-spline curve."""
 
-    csv: CsvFile
+    bspline: BSplineCurve
+
+    @model_validator(mode="after")
+    def _one_word_on_orientation(self) -> BSplineSegment:
+        if self.orientation is not None and len(self.bspline.control_points[0]) == _POSE_COLUMNS:
+            problem = "the curve's quaternions say already how the tool turns"
+            raise refuse(problem, key=".orientation", allowed="orientation or control points with quaternions, not both")
+        return self
+
+
+class CsvSegment(MovingSegment):
+    """A smooth curve along points from a file."""
+
+    csv: PointFile
 
 
 Segment = Annotated[
@@ -231,6 +233,7 @@ Segment = Annotated[
     | Annotated[ArcSegment, Tag("<ArcSegment>")]
     | Annotated[CircleSegment, Tag("<CircleSegment>")]
     | Annotated[SplineSegment, Tag("<SplineSegment>")]
+    | Annotated[BSplineSegment, Tag("<BSplineSegment>")]
     | Annotated[TurnSegment, Tag("<TurnSegment>")]
     | Annotated[CsvSegment, Tag("<CsvSegment>")],
     by_key(
@@ -240,6 +243,7 @@ Segment = Annotated[
             "ArcSegment": ("arc",),
             "CircleSegment": ("circle",),
             "SplineSegment": ("spline",),
+            "BSplineSegment": ("bspline",),
             "TurnSegment": ("turn",),
             "CsvSegment": ("csv",),
         },

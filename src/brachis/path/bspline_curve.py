@@ -1,0 +1,92 @@
+"""B-spline curves that are given by knots and control points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brachis.errors import PathError
+from brachis.path.pose import POSITIONS, QuaternionPoseCurve
+from brachis.path.rotations import quaternions_of, rotation_of
+from brachis.path.spline import START_TOLERANCE, SplineCurve, starts_elsewhere
+
+if TYPE_CHECKING:
+    from brachis.path.protocol import Array
+    from brachis.path.site import Site
+    from brachis.task import BSplineCurve
+
+POSE_COLUMNS = 7
+"""Of control points with quaternions."""
+_SLOWEST, _FASTEST = 0.5, 2.0
+
+
+def bspline_curve(shape: BSplineCurve, site: Site) -> SplineCurve:
+    """Return the curve, moved to the segment's start: it keeps its form to the last digit of the start.
+
+    Raises
+    ------
+    PathError
+        Control points have the wrong number of coordinates, or the curve starts elsewhere than the segment.
+    """
+    first = site.coordinates(shape.control_points[0], "control_points[0]", site.rows)
+    points, off = np.array(shape.control_points), site.start - first
+    if not shape.relative:
+        _check_start(off[: len(site.positions)], off[len(site.positions) :], site)
+    return _checked(shape, points + off, site)
+
+
+def pose_bspline(shape: BSplineCurve, site: Site, rotation: Array) -> QuaternionPoseCurve:
+    """Return the curve of poses, moved and turned to the segment's start.
+
+    Parameters
+    ----------
+    shape : BSplineCurve
+        Control points with quaternions.
+    site : Site
+        Place of the segment, in three position rows.
+    rotation : ndarray, shape (3, 3)
+        Rotation matrix of the tool at the segment's start.
+
+    Raises
+    ------
+    PathError
+        The curve starts elsewhere than the segment.
+    """
+    points = np.array(shape.control_points)
+    first = points[0, POSITIONS:] / np.linalg.norm(points[0, POSITIONS:])
+    turn = _product(quaternions_of(rotation_of(rotation)), first * [1.0, -1.0, -1.0, -1.0])
+    off = site.start - points[0, :POSITIONS]
+    if not shape.relative:
+        _check_start(off, 2.0 * turn[1:], site)
+    points[:, :POSITIONS] += off
+    points[:, POSITIONS:] = _product(turn, points[:, POSITIONS:])
+    return QuaternionPoseCurve(_checked(shape, points, site))
+
+
+def _check_start(off: Array, turned: Array, site: Site) -> None:
+    for away, unit in ((off, "m"), (turned, "rad")):
+        distance = float(np.linalg.norm(away))
+        if distance > START_TOLERANCE:
+            raise starts_elsewhere(f"{site.key}.control_points[0]", f"{site.describe()}, {distance:.4g} {unit} off")
+
+
+def _checked(shape: BSplineCurve, points: Array, site: Site) -> SplineCurve:
+    """Return the curve from sigma = 0 on, after a check that sigma is about its arc length."""
+    from scipy.interpolate import BSpline  # noqa: PLC0415  (imports in half a second)
+
+    spline = BSpline(np.array(shape.knots) - shape.knots[0], points, shape.degree)
+    breaks = np.unique(spline.t)
+    speed = np.linalg.norm(spline(breaks, nu=1)[:, : len(site.positions)], axis=1)
+    if not _SLOWEST < np.median(speed) < _FASTEST:
+        problem = "the knots are not in metres along the curve"
+        found = f"a curve that moves by {np.median(speed):.3g} m per unit of its knots"
+        raise PathError(problem, found=found, allowed="about 1", where=f"{site.key}.knots")
+    return SplineCurve(spline, float(breaks[-1]), breaks)
+
+
+def _product(one: Array, other: Array) -> Array:
+    """Return the products, (..., 4), of quaternions (w, x, y, z)."""
+    w, v = one[..., :1], one[..., 1:]
+    scalar = w * other[..., :1] - np.sum(v * other[..., 1:], axis=-1, keepdims=True)
+    return np.concatenate([scalar, w * other[..., 1:] + other[..., :1] * v + np.cross(v, other[..., 1:])], axis=-1)

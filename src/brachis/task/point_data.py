@@ -1,0 +1,155 @@
+"""Points of a path from files, as the task file writes them, and the smooth curves that are fitted to them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field, Strict, WithJsonSchema, model_validator
+
+from brachis.cam.units import ANGLES, LENGTHS, SPEEDS, quantity
+from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, Positive, Vector, refuse
+
+_SMOOTH = 4
+
+
+def _quantity_of(units: dict[str, float], example: str) -> BeforeValidator:
+    """Read numbers with units; bare numbers are in SI units."""
+
+    def read(value: object) -> object:
+        if not isinstance(value, str):
+            return value
+        number = quantity(value, units)
+        if number is None:
+            raise refuse("no quantity", found=value, allowed=f"a number with a unit ({', '.join(units)}), as {example}")
+        return number
+
+    return BeforeValidator(read)
+
+
+_QUANTITY_SCHEMA = WithJsonSchema(
+    {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"type": "string", "pattern": "^[0-9.eE+-]+ *[a-z/]+$"}]}
+)
+Length = Annotated[
+    float, _quantity_of(LENGTHS, "0.05 mm"), Strict(), Field(ge=1e-7, le=1.0), _QUANTITY_SCHEMA
+]
+Angle = Annotated[float, _quantity_of(ANGLES, "0.1 deg"), Strict(), Field(ge=1e-7, le=0.5), _QUANTITY_SCHEMA]
+
+
+class FileUnits(Model):
+    """Units of the numbers in a file; a header such as ``x_mm`` states them too."""
+
+    length: Literal["m", "cm", "mm", "um", "in", "inch"] | None = Field(
+        default=None, description="Of positions. Null: as the header says, else m."
+    )
+    angle: Literal["rad", "mrad", "deg"] | None = Field(
+        default=None, description="Of yaw and rotation vectors. Null: as the header says, else rad."
+    )
+    speed: Literal["m/s", "mm/s", "m/min", "mm/min", "in/min", "inch/min"] | None = Field(
+        default=None, description="Of a column of feed rates. Null: as the header says, which then must."
+    )
+
+
+class FitTolerance(Model):
+    """How far points may be from the path; numbers with their unit (0.05 mm, 0.1 deg), or in m and rad."""
+
+    position: Length = Field(description="Largest distance of a point from the path.")
+    orientation: Angle = Field(
+        default=ANGLES["deg"] / 10.0,
+        description="Largest angle between a given orientation, or yaw, and the path's. 0.1 deg unless given.",
+    )
+    corner: Length | None = Field(
+        default=None, description="Largest distance of a point from the path where a corner is rounded. Null: `position`."
+    )
+
+
+class PointFile(Model):
+    """Points from a CSV file or from G-code; `brachis.task.load_task` reads it and makes a smooth curve of it."""
+
+    file: Name = Field(
+        description="CSV file, or G-code (.nc, .ngc, .gcode, .tap), relative to the task file's folder; its first row is "
+        "where the segment starts."
+    )
+    relative: Flag = Field(
+        default=False,
+        description="Whether the rows count from the first one, so that the path may start anywhere: displacements "
+        "along the world axes, rotations in the tool frame.",
+    )
+    units: FileUnits = Field(default_factory=FileUnits, description="Units of its numbers.")
+    tolerance: FitTolerance | None = Field(
+        default=None,
+        description="How far the rows may be from the path, which is then a fit with as few knots as that takes; for "
+        "many rows, and for such as scatter. Null: the path passes all of them.",
+    )
+    corner: Literal["blend", "refuse"] = Field(
+        default="blend",
+        description="With a tolerance, what becomes of corners: rounded within the tolerance, or refused and listed.",
+    )
+
+
+class FoundCorner(Model):
+    """A corner of the points."""
+
+    row: Count = Field(description="Line of the file, or index, of the nearest point.")
+    angle: Number = Field(description="Change of direction, rad.")
+    distance: Number = Field(description="Along the path from its first point, m.")
+    blend: NonNegative = Field(description="What its blend takes from either side, m.")
+
+
+class FitReport(Model):
+    """Where a curve comes from, and how near it is to the points; written by brachis."""
+
+    source: Name = Field(description="File, or what the points were given as.")
+    points: Count = Field(description="Number of points.")
+    length: NonNegative = Field(description="Length of the path, m.")
+    position_error: NonNegative = Field(description="Largest distance of a point from the path, m, beside corners.")
+    position_rms: NonNegative = Field(description="Root mean square of the distances, m.")
+    position_tolerance: Positive = Field(description="What was allowed, m.")
+    orientation_error: NonNegative = Field(description="Largest angle between given and fitted orientation, rad.")
+    orientation_tolerance: Positive = Field(description="What was allowed, rad.")
+    intervals: Count = Field(description="Number of knot intervals of all curves of these points.")
+    corners: tuple[FoundCorner, ...] = Field(default=(), description="Corners, in order.")
+    told: tuple[str, ...] = Field(default=(), description="What was found out about the data.")
+    profile: tuple[tuple[Number, Number, Number], ...] = Field(
+        default=(), description="Along the path, m: the largest distance, m, and angle, rad, of the points there."
+    )
+
+
+class BSplineCurve(Model):
+    """A B-spline curve, given by its knots and control points."""
+
+    degree: Annotated[Count, Field(ge=_SMOOTH, le=7)] = Field(default=5, description="Degree.")
+    knots: Vector = Field(
+        description="Knots, m along the curve, ascending, the first and the last one degree + 1 times. Inner ones leave "
+        "three continuous derivatives: degree 5 allows each twice."
+    )
+    control_points: Annotated[tuple[Vector, ...], Field(min_length=_SMOOTH + 1)] = Field(
+        description="Control points: all rows of the task space (m, yaw in rad); in task spaces of poses x, y, z, or "
+        "x, y, z, qw, qx, qy, qz, whose orientation is that of the quaternion divided by its length."
+    )
+    relative: Flag = Field(
+        default=False, description="Whether the curve is moved to the segment's start, wherever that is; as for csv."
+    )
+    speeds: tuple[tuple[tuple[Number, Positive], ...], ...] = Field(
+        default=(),
+        description="Tables of the speed of the tool that is prescribed along the curve: [m along it, m/s], linear in "
+        "between; where there is none, none is prescribed.",
+    )
+    fit: FitReport | None = Field(default=None, description="What the curve was fitted to; written by brachis.")
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> BSplineCurve:
+        count, degree, knots = len(self.control_points), self.degree, self.knots
+        if len(knots) != count + degree + 1:
+            problem = "wrong number of knots for these control points"
+            raise refuse(problem, key=".knots", found=len(knots), allowed=f"{count + degree + 1}")
+        if len({len(point) for point in self.control_points}) > 1:
+            raise refuse("control points differ in their number of coordinates", key=".control_points", allowed="one")
+        ascending = all(one <= other for one, other in pairwise(knots))
+        inner = knots[degree + 1 : -degree - 1]
+        clamped = len({*knots[: degree + 1]}) == len({*knots[-degree - 1 :]}) == 1
+        smooth = all(inner.count(knot) <= degree - 3 for knot in set(inner)) and not {knots[0], knots[-1]} & {*inner}
+        if not (ascending and clamped and smooth and knots[0] < knots[-1]):
+            allowed = f"ascending, the ends {degree + 1} times, inner ones at most {degree - 3} times"
+            raise refuse("the knots give no curve with three continuous derivatives", key=".knots", allowed=allowed)
+        return self
