@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from brachis.errors import TaskError
 from brachis.task.fitted import corners_refused, segments_along, spline_through
 from brachis.task.models import Task
-from brachis.task.orientation import Rotate, TurnTo
+from brachis.task.orientation import Quaternion, Rotate, TurnTo
 from brachis.task.point_data import PointFile
-from brachis.task.segments import CsvSegment, Segment
+from brachis.task.segments import BSplineSegment, CsvSegment, Segment, SplineSegment
 from brachis.task.text_file import read_text
 
 if TYPE_CHECKING:
@@ -42,7 +42,18 @@ def expand_csv_files(task: Task, source: str, folder: Path) -> Task:
     path: list[Segment] = []
     for i, segment in enumerate(task.path):
         path += _read(segment, task, f"{source}: path[{i}]", folder) if isinstance(segment, CsvSegment) else [segment]
-    return task.model_copy(update={"path": tuple(path)})
+    start = _start_of(path[0]) if task.path_start is None and task.start == "free" else task.path_start
+    return Task.model_validate(task.model_copy(update={"path": tuple(path), "path_start": start}))
+
+
+def _start_of(segment: Segment) -> tuple[float, ...] | None:
+    """Return the place where a path begins that says so itself."""
+    if isinstance(segment, SplineSegment) and not segment.spline.relative and segment.spline.starts_at:
+        oriented = segment.spline.starts_oriented
+        return (*segment.spline.starts_at, *(oriented.quaternion if isinstance(oriented, Quaternion) else ()))
+    if isinstance(segment, BSplineSegment) and not segment.bspline.relative:
+        return segment.bspline.control_points[0]
+    return None
 
 
 def _read(segment: CsvSegment, task: Task, where: str, folder: Path) -> list[Segment]:

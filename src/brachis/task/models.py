@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, JsonValue, Tag, field_validator, mod
 
 from brachis.task.fields import Count, Flag, Model, Name, Number, Positive, Share, by_form, refuse
 from brachis.task.robot_models import JointValues, RobotSettings
-from brachis.task.segments import Segment
+from brachis.task.segments import CsvSegment, Segment
 from brachis.task.tool_limits import ToolLimits
 
 Row = Literal["x", "y", "z", "yaw"]
@@ -199,7 +199,7 @@ class Task(Model):
         default=None,
         description="Where the path begins: all rows of the task space (m, yaw in rad); of a pose the position and a "
         "quaternion w, x, y, z. Null: where the start posture's tool is; otherwise a start posture whose tool is "
-        "elsewhere is refused. With start: free it must be given.",
+        "elsewhere is refused. With start: free it must be given, unless a file's first row says it.",
     )
     end: FreePosture = Field(
         default="free",
@@ -251,7 +251,9 @@ class Task(Model):
 
     @model_validator(mode="after")
     def _free_start_needs_a_place(self) -> Task:
-        if self.start == "free" and self.path_start is None:
+        first = self.path[0]
+        from_file = isinstance(first, CsvSegment) and not first.csv.relative
+        if self.start == "free" and self.path_start is None and not from_file:
             problem = "a free start posture leaves open where the path begins"
             pose = isinstance(self.task_space, str)
             rows = (*POSITION_ROWS, "qw", "qx", "qy", "qz") if pose else self.task_space
