@@ -81,7 +81,6 @@ def fit_curves(
     along = np.concatenate([start + stretch.sigma for start, stretch in zip(starts, stretches, strict=False)])
     distances = np.concatenate([stretch.distances for stretch in stretches])
     angles = np.concatenate([stretch.angles for stretch in stretches])
-    size = of_size(points)
     rough = (str(scatter),) if scatter.deviation else ()
     return curves, Report(
         source=points.source,
@@ -97,7 +96,8 @@ def fit_curves(
             CornerRemark(int(points.rows[corner.index]), corner.angle, float(start), blend)
             for corner, start, blend in zip(corners, starts[1:], blends, strict=False)
         ),
-        told=(*told, *repeated, *filled, *rough, *([size] if size else [])),
+        told=(*told, *repeated, *filled, *rough),
+        doubt=of_size(points),
         profile=profile_of(np.maximum.accumulate(along), distances, angles),
     )
 

@@ -52,6 +52,8 @@ class Report:
     corners : tuple of CornerRemark
     told : tuple of str
         What was found out about the data.
+    doubt : str or None
+        What of the data is hardly meant.
     profile : tuple of (float, float, float)
         Along the path, m: the largest distance, m, and angle, rad, of the points there.
     """
@@ -67,6 +69,7 @@ class Report:
     intervals: int
     corners: tuple[CornerRemark, ...]
     told: tuple[str, ...]
+    doubt: str | None
     profile: tuple[tuple[float, float, float], ...]
 
 

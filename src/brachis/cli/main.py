@@ -193,7 +193,9 @@ def plot(
 
 @app.command()
 def inspect(
-    urdf: Annotated[Path, typer.Argument(help="URDF file.", metavar="URDF")],
+    urdf: Annotated[
+        Path, typer.Argument(help="URDF file; or a task file, for the points that its path follows.", metavar="URDF")
+    ],
     task_space: Annotated[
         str | None,
         typer.Option(
@@ -211,8 +213,11 @@ def inspect(
 ) -> None:
     """List a robot's joints, and which choices of redundant joints have a closed form."""
     with interrupts.postponed():
-        from brachis.cli import inspection  # noqa: PLC0415
+        from brachis.cli import inspection, point_inspection  # noqa: PLC0415
 
+    if urdf.suffix in point_inspection.SUFFIXES:
+        point_inspection.inspect_points(urdf, as_json=json)
+        return
     inspection.inspect_command(
         urdf,
         task_space=task_space,

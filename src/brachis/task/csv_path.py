@@ -83,7 +83,12 @@ def _read(segment: CsvSegment, task: Task, where: str, folder: Path) -> list[Seg
             hint = "Give orientations in the file, or orientation: tangent"
             raise TaskError(problem, found=f"{len(curves) - 1} corners", where=f"{where}.orientation", hint=hint)
     made = segments_along(
-        curves, report, relative=settings.relative, orientation=segment.orientation, blend=segment.blend
+        curves,
+        report,
+        source=settings.file,
+        relative=settings.relative,
+        orientation=segment.orientation,
+        blend=segment.blend,
     )
     return [*made]
 

@@ -41,12 +41,16 @@ def segments_along(
     curves: tuple[FittedCurve, ...],
     report: Report,
     *,
+    source: str,
     relative: bool,
     orientation: OrientationMode = None,
     blend: float | None = None,
 ) -> list[BSplineSegment]:
-    """Return a segment for every curve, with blends between; the first one has the report, `blend` is the last one's."""
-    segments = []
+    """Return a segment for every curve, with blends between; the first one has the report, `blend` is the last one's.
+
+    The points come from `source`, as the user calls it.
+    """
+    segments, told = [], FitReport(**{**asdict(report), "source": source})
     for i, curve in enumerate(curves):
         shape = BSplineCurve(
             degree=curve.spline.k,
@@ -54,7 +58,7 @@ def segments_along(
             control_points=tuple(tuple(row) for row in curve.spline.c.tolist()),
             relative=relative or i > 0,
             speeds=curve.speeds,
-            fit=FitReport(**asdict(report)) if i == 0 else None,
+            fit=told if i == 0 else None,
         )
         size = blend if i == len(curves) - 1 else curve.blend
         segments.append(BSplineSegment(blend=size, orientation=orientation, bspline=shape))

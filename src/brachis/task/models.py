@@ -11,8 +11,9 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, Field, JsonValue, Tag, field_validator, model_validator
 
 from brachis.task.fields import Count, Flag, Model, Name, Number, Positive, Share, by_form, refuse
+from brachis.task.point_data import FitReport
 from brachis.task.robot_models import JointValues, RobotSettings
-from brachis.task.segments import CsvSegment, Segment
+from brachis.task.segments import BSplineSegment, CsvSegment, Segment
 from brachis.task.tool_limits import ToolLimits
 
 Row = Literal["x", "y", "z", "yaw"]
@@ -262,6 +263,12 @@ class Task(Model):
             problem = "numeric inverse kinematics needs a posture to begin with, and start is free"
             raise refuse(problem, key="search.guesses", found="numeric", allowed="lattice")
         return self
+
+    @property
+    def fits(self) -> tuple[FitReport, ...]:
+        """How near the path is to the points that it was fitted to, one for each file or array."""
+        curves = (segment.bspline.fit for segment in self.path if isinstance(segment, BSplineSegment))
+        return tuple(fit for fit in curves if fit is not None)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the task as plain mappings, lists, numbers and strings.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Literal
+from math import degrees
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, Strict, WithJsonSchema, model_validator
 
@@ -11,6 +12,7 @@ from brachis.cam.units import ANGLES, LENGTHS, SPEEDS, quantity
 from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, Positive, Vector, refuse
 
 _SMOOTH = 4
+_LISTED = 10
 
 
 def _quantity_of(units: dict[str, float], example: str) -> BeforeValidator:
@@ -110,9 +112,27 @@ class FitReport(Model):
     intervals: Count = Field(description="Number of knot intervals of all curves of these points.")
     corners: tuple[FoundCorner, ...] = Field(default=(), description="Corners, in order.")
     told: tuple[str, ...] = Field(default=(), description="What was found out about the data.")
+    doubt: str | None = Field(default=None, description="What of the data is hardly meant.")
     profile: tuple[tuple[Number, Number, Number], ...] = Field(
         default=(), description="Along the path, m: the largest distance, m, and angle, rad, of the points there."
     )
+
+
+    def __str__(self) -> str:
+        """Say it in one line, lengths in mm."""
+        off, rms, allowed = (1e3 * x for x in (self.position_error, self.position_rms, self.position_tolerance))
+        turned, turned_allowed = map(degrees, (self.orientation_error, self.orientation_tolerance))
+        text = f"{self.source}: {self.points} points along {1e3 * self.length:.5g} mm, {self.intervals} knot intervals; "
+        text += f"at most {off:.3g} mm off (allowed {allowed:.3g} mm), rms {rms:.3g} mm"
+        text += f"; orientation at most {turned:.2g} deg off (allowed {turned_allowed:.3g} deg)" if turned else ""
+        corners = [f"row {corner.row} ({degrees(corner.angle):.3g} deg)" for corner in self.corners[:_LISTED]]
+        corners += ["..."] if len(self.corners) > _LISTED else []
+        text += f"; {len(self.corners)} corners blended: {', '.join(corners)}" if corners else "; no corners"
+        return f"{text}; {'; '.join(self.told)}" if self.told else text
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON, without the profile."""
+        return self.model_dump(mode="json", exclude={"profile"})
 
 
 class BSplineCurve(Model):
