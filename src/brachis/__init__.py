@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from brachis.robot import task_map_of as task_map_of
     from brachis.task import LimitSpec as LimitSpec
     from brachis.task import Task as Task
+    from brachis.task import fit_path as fit_path
     from brachis.task import load_task as load_task
     from brachis.trajectory import Trajectory as Trajectory
     from brachis.verify import Verification as Verification
@@ -47,6 +48,7 @@ _HOME = {
     "TaskMap": "brachis.robot",
     "Trajectory": "brachis.trajectory",
     "Verification": "brachis.verify",
+    "fit_path": "brachis.task",
     "load_task": "brachis.task",
     "plan": "brachis.planner",
     "task_map_of": "brachis.robot",
@@ -71,6 +73,7 @@ __all__ = [
     "__version__",
     "bottleneck",
     "compose",
+    "fit_path",
     "load_task",
     "plan",
     "task_map_of",

@@ -80,7 +80,9 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
         return
     position = points.position
     before, here, after = position[:-2], position[1:-1], position[2:]
-    off = np.linalg.norm(here - (before + after) / 2.0, axis=1)
+    side = after - before
+    share = np.clip(np.sum((here - before) * side, axis=1) / np.maximum(np.sum(side**2, axis=1), SAME**2), 0.0, 1.0)
+    off = np.linalg.norm(here - before - share[:, None] * side, axis=1)
     chords = np.linalg.norm(np.diff(position, axis=0), axis=1)
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(chords, _AROUND, mode="reflect"), 2 * _AROUND + 2)
     usual = np.median(windows, axis=1)[: len(off)]
@@ -88,7 +90,7 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
     i = int(np.argmax(off / allowed))
     if off[i] > allowed[i]:
         problem = "the point is a spike, far off its neighbours"
-        away = f"{1e3 * off[i]:.4g} mm off the middle of its neighbours, which are {1e3 * usual[i]:.3g} mm apart"
+        away = f"{1e3 * off[i]:.4g} mm off the line between its neighbours; points are {1e3 * usual[i]:.3g} mm apart"
         found = f"{points.described(i + 1)}, {away}"
         hint = "Correct or remove the row"
         raise points.wrong(i + 1, problem, found=found, allowed=f"at most {1e3 * allowed[i]:.3g} mm", hint=hint)

@@ -27,6 +27,27 @@ def allowed_columns(rows: tuple[str, ...] | str) -> str:
     return " | ".join(",".join(choice) for choice in _choices(rows))
 
 
+def understood(
+    header: tuple[str, ...], where: str, rows: tuple[str, ...] | str
+) -> tuple[dict[str, tuple[int, str | None]], tuple[str, ...]]:
+    """Return index and unit of every column by its name, and the names that belong to positions and orientations.
+
+    Raises
+    ------
+    TaskError
+        Columns are missing or unknown.
+    """
+    headings = {name: (column, unit) for column, name, unit in map(_heading, range(len(header)), header)}
+    names = sorted(name for name in headings if name != _SPEED)
+    choice = next((one for one in _choices(rows) if sorted(one) == names), None)
+    if choice is None or len(headings) != len(header):
+        problem = "wrong columns"
+        hint = "The first line names the columns, separated by commas, semicolons, tabs or spaces; units may follow "
+        hint += "(x_mm); a column feed may stand beside them"
+        raise TaskError(problem, found=", ".join(header), allowed=allowed_columns(rows), where=where, hint=hint)
+    return headings, choice
+
+
 def points_of(table: Table, rows: tuple[str, ...] | str, units: Units, source: str) -> tuple[Points, tuple[str, ...]]:
     """Return the points of a table in SI units, and what was found out about the units.
 
@@ -46,14 +67,7 @@ def points_of(table: Table, rows: tuple[str, ...] | str, units: Units, source: s
         Columns are missing or unknown, units contradict each other, or a quaternion has no unit length.
     """
     where = f"{source}: line {table.header_line}"
-    headings = {name: (column, unit) for column, name, unit in map(_heading, range(len(table.header)), table.header)}
-    names = [name for name in headings if name != _SPEED]
-    choice = next((one for one in _choices(rows) if sorted(one) == sorted(names)), None)
-    if choice is None or len(headings) != len(table.header):
-        problem = "wrong columns"
-        hint = "The first line names the columns, separated by commas, semicolons, tabs or spaces; units may follow "
-        hint += "(x_mm); a column feed may stand beside them"
-        raise TaskError(problem, found=", ".join(table.header), allowed=allowed_columns(rows), where=where, hint=hint)
+    headings, choice = understood(table.header, where, rows)
     stated: dict[str, str] = {}
 
     def column(name: str, kind: str, factors: dict[str, float]) -> Array:

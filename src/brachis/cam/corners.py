@@ -23,6 +23,7 @@ _NOTHING = 1e-24
 _NOISY_POINTS = 4
 _OF_TOLERANCE = 2.0
 _GUARD = 0.3
+_OF_SPACING = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,7 @@ def _turning(position: Array, u: Array, width: float, least: int) -> tuple[Array
 
 
 def _directions(position: Array, u: Array, first: Indices, last: Indices) -> tuple[Array, Array]:
-    """Return unit vectors along the straight lines that fit points `first` to `last`, (n, p), and their doubts, (n,)."""
+    """Return unit vectors along the lines that fit points `first` to `last`, (n, p), and their doubts, (n,)."""
     moment = np.hstack([np.ones((len(u), 1)), u[:, None], u[:, None] ** 2, position, u[:, None] * position])
     sums = np.concatenate([np.zeros((1, moment.shape[1])), np.cumsum(moment, axis=0)])
     part = sums[last + 1] - sums[first]
@@ -130,7 +131,9 @@ def _located(points: Points, u: Array, i: int, angle: float, width: float, least
         side = np.flatnonzero((away > _GUARD * width) & (away < 2.0 * width))
         if len(side) <= least:
             side = np.clip(i + int(sign) * np.arange(1, 1 + max(least, 2)), 0, len(u) - 1)
-        along = np.polyfit(u[side], position[side], 1)[0] if np.ptp(u[side]) else sign * (position[side[0]] - position[i])
+        along = (
+            np.polyfit(u[side], position[side], 1)[0] if np.ptp(u[side]) else sign * (position[side[0]] - position[i])
+        )
         sides.append((position[side].mean(axis=0), along / np.linalg.norm(along)))
     (one, a), (other, b) = sides
     steps, *_ = np.linalg.lstsq(np.stack([a, -b], axis=1), other - one, rcond=None)
@@ -143,8 +146,11 @@ def _located(points: Points, u: Array, i: int, angle: float, width: float, least
 
 
 def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool:
-    """Tell whether the parabola through the three points on one side leads to a point, or the line through two."""
-    side = i + sign * np.arange(1, 4)
+    """Tell whether the cubic through the four points on one side leads to a point; of lower degree where there are fewer.
+
+    It may miss it by `off`, m, or by a small part of the spacing.
+    """
+    side = i + sign * np.arange(1, 5)
     side = side[(side >= 0) & (side < len(u))]
     if len(side) == 1:
         return True
@@ -152,4 +158,4 @@ def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool
     for k in side:
         others = side[side != k]
         foreseen += position[k] * np.prod((u[i] - u[others]) / (u[k] - u[others]))
-    return bool(np.linalg.norm(foreseen - position[i]) <= off)
+    return bool(np.linalg.norm(foreseen - position[i]) <= max(off, _OF_SPACING * abs(u[side[0]] - u[i])))

@@ -15,7 +15,8 @@ from brachis.cam.points import Array, Points, angles_between
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-_SIDES = 64
+_SIDES = 20_000
+_LEAST_SIDES = 64
 
 
 def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
@@ -30,7 +31,8 @@ def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
     from scipy.spatial import cKDTree  # noqa: PLC0415
 
     breaks = np.unique(spline.t)
-    sides = np.arange(_SIDES) / _SIDES
+    count = max(_LEAST_SIDES, _SIDES // (len(breaks) - 1))
+    sides = np.arange(count) / count
     sigma = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * sides).ravel(), breaks[-1])
     drawn = spline(sigma)
     dimension = points.position.shape[1]

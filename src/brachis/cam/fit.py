@@ -119,7 +119,9 @@ def _with_fewest_knots(points: Points, fit: Fit, tolerance: Tolerance) -> Fit:
         fit = trial
     while most - fewest > 1:
         count = (most + fewest) // 2
-        trial = fit_over(points, sigma, np.interp(np.linspace(0.0, 1.0, count + 1), np.linspace(0.0, 1.0, len(breaks)), breaks))
+        trial = fit_over(
+            points, sigma, np.interp(np.linspace(0.0, 1.0, count + 1), np.linspace(0.0, 1.0, len(breaks)), breaks)
+        )
         if trial.ratios(tolerance).max() <= 1.0:
             most, fit = count, trial
         else:

@@ -94,7 +94,9 @@ def _block(machine: _Machine, code: str, where: str, number: int) -> None:
     words = _WORD.findall(code)
     rest = _WORD.sub("", code).strip()
     if rest:
-        raise TaskError("not understood", found=repr(rest[:40]), allowed="G-code words, such as G1 X10 F600", where=where)
+        raise TaskError(
+            "not understood", found=repr(rest[:40]), allowed="G-code words, such as G1 X10 F600", where=where
+        )
     values: dict[str, float] = {}
     for letter, text in words:
         if letter == "G":
@@ -109,7 +111,9 @@ def _block(machine: _Machine, code: str, where: str, number: int) -> None:
     if "F" in values:
         machine.feed = values["F"] * machine.unit / 60.0
         if not machine.feed > 0.0:
-            raise TaskError("a feed rate must be positive", found=f"F{values['F']:g}", allowed="more than 0", where=where)
+            raise TaskError(
+                "a feed rate must be positive", found=f"F{values['F']:g}", allowed="more than 0", where=where
+            )
     if any(axis in values for axis in "XYZIJKR"):
         _move(machine, values, where, number)
 
@@ -199,9 +203,7 @@ def _arc(
     return places
 
 
-def _centre(
-    one: np.ndarray, other: np.ndarray, radius: float, *, clockwise: bool, where: str
-) -> np.ndarray:
+def _centre(one: np.ndarray, other: np.ndarray, radius: float, *, clockwise: bool, where: str) -> np.ndarray:
     """Return the centre, (2,), of an arc of given radius; a negative one is that of more than half a turn."""
     chord = other - one
     length = hypot(*chord)

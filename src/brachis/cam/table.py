@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
@@ -41,7 +41,7 @@ class Table:
     told: tuple[str, ...]
 
 
-def read_table(text: str, source: str, allowed: str) -> Table:
+def read_table(text: str, source: str, allowed: str, check: Callable[[tuple[str, ...], str], object]) -> Table:
     """Read a table whose first line names the columns; lines that are empty or begin with ``#`` are skipped.
 
     Parameters
@@ -52,6 +52,8 @@ def read_table(text: str, source: str, allowed: str) -> Table:
         The file, for messages.
     allowed : str
         The columns that it may have, for messages.
+    check : callable
+        Refuses a header that is not understood, given its file and line.
 
     Raises
     ------
@@ -73,6 +75,7 @@ def read_table(text: str, source: str, allowed: str) -> Table:
         lines = [lines[0], *((number, line.replace(",", ".")) for number, line in lines[1:])]
     told += [f"columns separated by {_DELIMITERS[delimiter]}"] * (delimiter != ",") + ["decimal commas"] * commas
     (_, header), *rows = _cells(lines, delimiter, source)
+    check(tuple(header), f"{source}: line {lines[0][0]}")
     numbers = np.array([number for number, _ in rows], dtype=int)
     return Table(tuple(header), lines[0][0], _numbers(rows, header, source), numbers, tuple(told))
 

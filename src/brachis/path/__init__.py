@@ -5,6 +5,7 @@ from brachis.path.origin import check_on_path, path_of
 from brachis.path.pose import PosePath
 from brachis.path.protocol import Array, Curve, Path, PathSample
 from brachis.path.sequence import SequencePath
+from brachis.path.speed_table import SpeedTable, speed_tables
 
 __all__ = [
     "Array",
@@ -13,7 +14,9 @@ __all__ = [
     "PathSample",
     "PosePath",
     "SequencePath",
+    "SpeedTable",
     "build_path",
     "check_on_path",
     "path_of",
+    "speed_tables",
 ]

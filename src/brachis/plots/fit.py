@@ -43,7 +43,7 @@ def plot_fit(trajectory: Trajectory) -> Figure:
 
 def _draw(ax: Axes, fit: FitReport) -> None:
     along, distances, angles = np.array(fit.profile).T
-    ax.plot(1e3 * along, 1e3 * distances, color=style.COLOURS[0], linewidth=0.6, label="position")
+    ax.plot(1e3 * along, 1e3 * distances, color=style.COLOURS[0], linewidth=0.6)
     ax.axhline(1e3 * fit.position_tolerance, color=style.COLOURS[0], linewidth=0.8, linestyle="--")
     for corner in fit.corners:
         ax.axvline(1e3 * corner.distance, color=style.GREY, linewidth=0.6, linestyle=":")
@@ -57,3 +57,5 @@ def _draw(ax: Axes, fit: FitReport) -> None:
         beside.axhline(np.rad2deg(fit.orientation_tolerance), color=style.COLOURS[1], linewidth=0.8, linestyle="--")
         beside.set_ylim(0.0, _ROOM * np.rad2deg(fit.orientation_tolerance))
         style.dress(beside, "", "angle (deg)")
+        beside.yaxis.label.set_color(style.COLOURS[1])
+        ax.yaxis.label.set_color(style.COLOURS[0])

@@ -1,5 +1,6 @@
 """What is asked: the task file as frozen models, its loader and its schema. No numerics."""
 
+from brachis.task.arrays import fit_path
 from brachis.task.load import check_robot_settings, load_task
 from brachis.task.models import (
     Posture,
@@ -97,6 +98,7 @@ __all__ = [
     "TurnSegment",
     "TurnTo",
     "check_robot_settings",
+    "fit_path",
     "json_schema",
     "load_task",
 ]

@@ -1,14 +1,14 @@
-"""Segments out of points and of the curves that were fitted to them."""
+"""Segments out of points: a spline through all of them, or smooth curves within a tolerance."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from math import degrees
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from brachis.errors import TaskError
-from brachis.task.orientation import OrientationMode, Quaternion
-from brachis.task.point_data import BSplineCurve, FitReport
+from brachis.task.orientation import OrientationMode, Quaternion, Rotate, TurnTo
+from brachis.task.point_data import BSplineCurve, FitReport, FitTolerance
 from brachis.task.segments import BSplineSegment, SplineSegment, SplineThrough
 
 if TYPE_CHECKING:
@@ -20,55 +20,113 @@ _QUATERNION = 4
 _LISTED = 10
 
 
-def spline_through(
-    points: Points, *, relative: bool, orientation: OrientationMode = None, blend: float | None = None
-) -> SplineSegment:
-    """Return the segment that passes through all points."""
+@dataclass(frozen=True)
+class Wanted:
+    """What is asked of a path along points; see the task file's ``csv``.
+
+    Attributes
+    ----------
+    source : str
+        What the user calls the points.
+    where : str
+        Where the task names them, for messages.
+    tolerance : FitTolerance or None
+    corner : {"blend", "refuse"}
+    relative : bool
+    orientation : optional
+        How the tool turns.
+    blend : float or None
+        The last segment's.
+    """
+
+    source: str
+    where: str
+    tolerance: FitTolerance | None
+    corner: Literal["blend", "refuse"]
+    relative: bool
+    orientation: OrientationMode
+    blend: float | None = None
+
+
+def segments_along(points: Points, wanted: Wanted, told: tuple[str, ...] = ()) -> list[SplineSegment | BSplineSegment]:
+    """Return the segments along points, whose first one is where they start.
+
+    Parameters
+    ----------
+    points : Points
+    wanted : Wanted
+    told : tuple of str, optional
+        What was found out when the points were read.
+
+    Raises
+    ------
+    TaskError
+        Points are wrong, or there is no smooth curve within the tolerance; the message names the row.
+    """
+    # Imported here: tasks without points need neither NumPy nor SciPy.
+    from brachis.cam.checks import refuse_repetitions  # noqa: PLC0415
+    from brachis.cam.curves import fit_curves, refuse_rough  # noqa: PLC0415
+    from brachis.cam.least_squares import Tolerance  # noqa: PLC0415
+
+    if points.turning.shape[1] == _QUATERNION and wanted.orientation is not None:
+        problem = "the points' orientations say already how the tool turns"
+        where = f"{wanted.where}.orientation"
+        raise TaskError(problem, found="orientations", allowed="no orientation", where=where)
+    if wanted.tolerance is None:
+        refuse_repetitions(points)
+        refuse_rough(points)
+        return [_spline_through(points, wanted)]
+    position, orientation, corner = (getattr(wanted.tolerance, name) for name in FitTolerance.model_fields)
+    curves, report = fit_curves(points, Tolerance(position, orientation, corner or position), told)
+    if len(curves) > 1:
+        _check_corners(report, wanted)
+    told_of = FitReport(**{**asdict(report), "source": wanted.source})
+    return [_segment(i, curve, len(curves), told_of, wanted) for i, curve in enumerate(curves)]
+
+
+def _spline_through(points: Points, wanted: Wanted) -> SplineSegment:
     poses = points.turning.shape[1] == _QUATERNION
     places = [tuple(row) for row in (points.position if poses else points.columns).tolist()]
-    turned = [Quaternion(quaternion=tuple(row)) for row in points.turning.tolist()] if poses else None
+    turned = [Quaternion(quaternion=(w, x, y, z)) for w, x, y, z in points.turning.tolist()] if poses else None
     spline = SplineThrough(
         through=tuple(places[1:]),
         orientations=tuple(turned[1:]) if turned else None,
-        relative=relative,
+        relative=wanted.relative,
         starts_at=places[0],
         starts_oriented=turned[0] if turned else None,
     )
-    return SplineSegment(blend=blend, orientation=orientation, spline=spline)
+    return SplineSegment(blend=wanted.blend, orientation=wanted.orientation, spline=spline)
 
 
-def segments_along(
-    curves: tuple[FittedCurve, ...],
-    report: Report,
-    *,
-    source: str,
-    relative: bool,
-    orientation: OrientationMode = None,
-    blend: float | None = None,
-) -> list[BSplineSegment]:
-    """Return a segment for every curve, with blends between; the first one has the report, `blend` is the last one's.
+def _segment(i: int, curve: FittedCurve, count: int, report: FitReport, wanted: Wanted) -> BSplineSegment:
+    """Return the segment of curve `i`; the first one has the report, all but the last one a blend of their own."""
+    shape = BSplineCurve(
+        degree=curve.spline.k,
+        knots=tuple(curve.spline.t.tolist()),
+        control_points=tuple(tuple(row) for row in curve.spline.c.tolist()),
+        relative=wanted.relative or i > 0,
+        speeds=curve.speeds,
+        fit=report if i == 0 else None,
+    )
+    blend = wanted.blend if i == count - 1 else curve.blend
+    return BSplineSegment(blend=blend, orientation=wanted.orientation, bspline=shape)
 
-    The points come from `source`, as the user calls it.
+
+def _check_corners(report: Report, wanted: Wanted) -> None:
+    """Refuse corners where they are not to be rounded, and turns that would have to go on over them.
+
+    Raises
+    ------
+    TaskError
+        It lists the corners.
     """
-    segments, told = [], FitReport(**{**asdict(report), "source": source})
-    for i, curve in enumerate(curves):
-        shape = BSplineCurve(
-            degree=curve.spline.k,
-            knots=tuple(curve.spline.t.tolist()),
-            control_points=tuple(tuple(row) for row in curve.spline.c.tolist()),
-            relative=relative or i > 0,
-            speeds=curve.speeds,
-            fit=told if i == 0 else None,
-        )
-        size = blend if i == len(curves) - 1 else curve.blend
-        segments.append(BSplineSegment(blend=size, orientation=orientation, bspline=shape))
-    return segments
-
-
-def corners_refused(report: Report, where: str) -> TaskError:
-    """Return the error that there are corners, which lists them."""
     found = [f"{degrees(corner.angle):.3g} deg at row {corner.row}" for corner in report.corners]
-    more = [f"{len(found) - _LISTED} more"] if len(found) > _LISTED else []
-    hint = "Set corner: blend to round them within the tolerance"
-    listed = ", ".join([*found[:_LISTED], *more])
-    return TaskError(f"the points have {len(found)} corners", found=listed, allowed="none", where=where, hint=hint)
+    listed = ", ".join([*found[:_LISTED], *([f"{len(found) - _LISTED} more"] if len(found) > _LISTED else [])])
+    if wanted.corner == "refuse":
+        hint = "Set corner: blend to round them within the tolerance"
+        where = f"{wanted.where}.corner"
+        raise TaskError(f"the points have {len(found)} corners", found=listed, allowed="none", where=where, hint=hint)
+    if isinstance(wanted.orientation, Rotate | TurnTo):
+        hint = "Give an orientation for every point, or orientation: tangent"
+        where = f"{wanted.where}.orientation"
+        raise TaskError("the tool cannot turn at a constant rate over corners", found=listed, where=where, hint=hint)

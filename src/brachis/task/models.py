@@ -253,8 +253,8 @@ class Task(Model):
     @model_validator(mode="after")
     def _free_start_needs_a_place(self) -> Task:
         first = self.path[0]
-        from_file = isinstance(first, CsvSegment) and not first.csv.relative
-        if self.start == "free" and self.path_start is None and not from_file:
+        unread = isinstance(first, CsvSegment) and not first.csv.relative
+        if self.start == "free" and self.path_start is None and not unread and first.begins is None:
             problem = "a free start posture leaves open where the path begins"
             pose = isinstance(self.task_space, str)
             rows = (*POSITION_ROWS, "qw", "qx", "qy", "qz") if pose else self.task_space

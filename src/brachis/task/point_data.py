@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, Strict, WithJsonSchema, model_validator
 
-from brachis.cam.units import ANGLES, LENGTHS, SPEEDS, quantity
+from brachis.cam.units import ANGLES, LENGTHS, quantity
 from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, Positive, Vector, refuse
 
 _SMOOTH = 4
@@ -32,9 +32,7 @@ def _quantity_of(units: dict[str, float], example: str) -> BeforeValidator:
 _QUANTITY_SCHEMA = WithJsonSchema(
     {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"type": "string", "pattern": "^[0-9.eE+-]+ *[a-z/]+$"}]}
 )
-Length = Annotated[
-    float, _quantity_of(LENGTHS, "0.05 mm"), Strict(), Field(ge=1e-7, le=1.0), _QUANTITY_SCHEMA
-]
+Length = Annotated[float, _quantity_of(LENGTHS, "0.05 mm"), Strict(), Field(ge=1e-7, le=1.0), _QUANTITY_SCHEMA]
 Angle = Annotated[float, _quantity_of(ANGLES, "0.1 deg"), Strict(), Field(ge=1e-7, le=0.5), _QUANTITY_SCHEMA]
 
 
@@ -61,7 +59,8 @@ class FitTolerance(Model):
         description="Largest angle between a given orientation, or yaw, and the path's. 0.1 deg unless given.",
     )
     corner: Length | None = Field(
-        default=None, description="Largest distance of a point from the path where a corner is rounded. Null: `position`."
+        default=None,
+        description="Largest distance of a point from the path where a corner is rounded. Null: `position`.",
     )
 
 
@@ -69,8 +68,8 @@ class PointFile(Model):
     """Points from a CSV file or from G-code; `brachis.task.load_task` reads it and makes a smooth curve of it."""
 
     file: Name = Field(
-        description="CSV file, or G-code (.nc, .ngc, .gcode, .tap), relative to the task file's folder; its first row is "
-        "where the segment starts."
+        description="CSV file, or G-code (.nc, .ngc, .gcode, .tap), relative to the task file's folder; its first row "
+        "is where the segment starts."
     )
     relative: Flag = Field(
         default=False,
@@ -117,12 +116,13 @@ class FitReport(Model):
         default=(), description="Along the path, m: the largest distance, m, and angle, rad, of the points there."
     )
 
-
     def __str__(self) -> str:
         """Say it in one line, lengths in mm."""
         off, rms, allowed = (1e3 * x for x in (self.position_error, self.position_rms, self.position_tolerance))
         turned, turned_allowed = map(degrees, (self.orientation_error, self.orientation_tolerance))
-        text = f"{self.source}: {self.points} points along {1e3 * self.length:.5g} mm, {self.intervals} knot intervals; "
+        text = (
+            f"{self.source}: {self.points} points along {1e3 * self.length:.5g} mm, {self.intervals} knot intervals; "
+        )
         text += f"at most {off:.3g} mm off (allowed {allowed:.3g} mm), rms {rms:.3g} mm"
         text += f"; orientation at most {turned:.2g} deg off (allowed {turned_allowed:.3g} deg)" if turned else ""
         corners = [f"row {corner.row} ({degrees(corner.angle):.3g} deg)" for corner in self.corners[:_LISTED]]
@@ -140,8 +140,8 @@ class BSplineCurve(Model):
 
     degree: Annotated[Count, Field(ge=_SMOOTH, le=7)] = Field(default=5, description="Degree.")
     knots: Vector = Field(
-        description="Knots, m along the curve, ascending, the first and the last one degree + 1 times. Inner ones leave "
-        "three continuous derivatives: degree 5 allows each twice."
+        description="Knots, m along the curve, ascending, the first and the last one degree + 1 times. Inner ones "
+        "leave three continuous derivatives: degree 5 allows each twice."
     )
     control_points: Annotated[tuple[Vector, ...], Field(min_length=_SMOOTH + 1)] = Field(
         description="Control points: all rows of the task space (m, yaw in rad); in task spaces of poses x, y, z, or "

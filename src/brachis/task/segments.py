@@ -13,8 +13,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Tag, field_validator, model_validator
 
-from brachis.task.fields import Flag, Model, Name, NonNegative, Number, Positive, Vector, by_key, refuse
-from brachis.task.orientation import Attitude, OrientationMode, Turning
+from brachis.task.fields import Flag, Model, NonNegative, Number, Positive, Vector, by_key, refuse
+from brachis.task.orientation import Attitude, OrientationMode, Quaternion, Turning
 from brachis.task.point_data import BSplineCurve, PointFile
 
 Yaw = Annotated[
@@ -151,6 +151,11 @@ class SegmentModel(Model):
     )
 
     @property
+    def begins(self) -> tuple[float, ...] | None:
+        """Where the segment says that it begins: the rows of the task space; of poses position and quaternion."""
+        return None
+
+    @property
     def kind(self) -> str:
         """The key that names the segment in the task file: ``line``, ``arc``, ``circle``, ``spline``, ..."""
         return next(name for name in type(self).model_fields if name not in {"blend", "orientation"})
@@ -195,6 +200,14 @@ class SplineSegment(MovingSegment):
 
     spline: SplineThrough
 
+    @property
+    def begins(self) -> tuple[float, ...] | None:
+        """See `SegmentModel.begins`."""
+        place, oriented = self.spline.starts_at, self.spline.starts_oriented
+        if self.spline.relative or place is None:
+            return None
+        return (*place, *oriented.quaternion) if isinstance(oriented, Quaternion) else place
+
     @model_validator(mode="after")
     def _one_word_on_orientation(self) -> SplineSegment:
         if self.orientation is not None and self.spline.orientations is not None:
@@ -214,11 +227,18 @@ class BSplineSegment(MovingSegment):
 
     bspline: BSplineCurve
 
+    @property
+    def begins(self) -> tuple[float, ...] | None:
+        """See `SegmentModel.begins`."""
+        return None if self.bspline.relative else self.bspline.control_points[0]
+
     @model_validator(mode="after")
     def _one_word_on_orientation(self) -> BSplineSegment:
         if self.orientation is not None and len(self.bspline.control_points[0]) == _POSE_COLUMNS:
             problem = "the curve's quaternions say already how the tool turns"
-            raise refuse(problem, key=".orientation", allowed="orientation or control points with quaternions, not both")
+            raise refuse(
+                problem, key=".orientation", allowed="orientation or control points with quaternions, not both"
+            )
         return self
 
 
