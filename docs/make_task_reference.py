@@ -54,10 +54,9 @@ SEGMENTS: dict[str, tuple[type[BaseModel], ...]] = {
     "circle": (Circle,),
     "spline": (SplineThrough,),
     "csv": (PointFile,),
-    "csv.units": (FileUnits,),
-    "csv.tolerance": (FitTolerance,),
     "bspline": (BSplineCurve,),
 }
+FILES: dict[str, type[BaseModel]] = {"units": FileUnits, "tolerance": FitTolerance}
 TABLE_HEAD = ("| key | default | meaning |", "|---|---|---|")
 INTRODUCTION = """# Task files
 
@@ -82,7 +81,8 @@ planner's least) are warned of on standard error and listed as `warnings` in the
 PATH = """
 ## `path`
 
-A list of segments. Each is a mapping with one of the kinds below (`line`, `arc`, `circle`, `spline`, `csv`, `turn`)
+A list of segments. Each is a mapping with one of the kinds below (`line`, `arc`, `circle`, `spline`, `bspline`, `csv`,
+`turn`)
 and, beside it, the keys of this table. A segment starts where its predecessor ends, the first one where the tool is at
 the start posture. The path must be smooth to the third derivative: segments that do not continue each other need a
 `blend`.
@@ -150,23 +150,57 @@ An orientation is written in one of three forms:
 |---|---|
 """
 CSV = """
-## CSV files
+## Files of points
 
-`csv: {file: poses.csv}` is a spline through the rows of a file. Its first line names the columns, in any order;
-lengths are in metres, angles in radians; lines that are empty or begin with `#` are skipped. In task spaces of rows the
-columns are the rows (`x,y`, `x,z,yaw`, ...). In task spaces of poses they are
+`csv: {file: poses.csv}` is a smooth curve along the rows of a file. Its first line names the columns, in any order;
+lines that are empty or begin with `#` are skipped. In task spaces of rows the columns are the rows (`x,y`, `x,z,yaw`,
+...). In task spaces of poses they are
 
 - `x,y,z`: positions; the segment's `orientation` says how the tool turns;
 - `x,y,z,qw,qx,qy,qz`: positions and unit quaternions;
-- `x,y,z,rx,ry,rz`: positions and rotation vectors, rad.
+- `x,y,z,rx,ry,rz`: positions and rotation vectors.
 
-The first row is where the segment starts. A segment that starts elsewhere, by more than 1e-4 m or rad, is refused;
-with `relative: true` the rows are moved so that the first one is at the segment's start: displacements keep their
-direction in the world, rotations are those in the tool frame. Where successive rows have the same position, the curve
-would have to stop, and the file is refused, unless the position stands still in the whole file.
+A column `feed` (or `f`, `speed`, `v`) may stand beside them: the speed of the tool on the way to each row. Columns are
+separated by commas, semicolons, tabs or spaces; with all but commas, decimal commas are understood. Units follow names
+(`x_mm`, `X [mm]`, `rx (deg)`, `feed_mm/min`) or are stated by `units`; lengths without a unit are in metres, angles in
+radians, and the unit of speeds must be stated. What was found out about the file is told.
 
-The file is read with the task, and becomes a `spline` with `through`, `orientations`, `starts_at` and
-`starts_oriented`: a saved task does not need it any more.
+The first row is where the segment starts, and where the path begins with `start: free` if the task has no `path_start`.
+A segment that starts elsewhere, by more than 1e-4 m or rad, is refused; with `relative: true` the rows are moved so
+that the first one is at the segment's start: displacements keep their direction in the world, rotations are those in
+the tool frame.
+
+**Without a tolerance** the path passes all rows. Where successive rows have the same position, the curve would have to
+stop, and the file is refused, unless the position stands still in the whole file. Rows that are rounded or scatter so
+much that the curvature of a curve through them is noise are refused with the reason: give a tolerance.
+
+**With a tolerance** the path is a quintic B-spline, C4, within the tolerance of all rows (up to 100,000 and more), with
+few knots, through the first and the last one. Repeated rows are left out and told; spikes and changes of unit are
+refused with their line. Ways five times longer than usual are taken as straight, as CAM means them. Corners are found
+and listed, and rounded by blends within `tolerance.corner`; the tighter, the slower a robot passes them. The distance
+of every row from the curve is measured by a formula that the fit does not use. `brachis inspect TASK` prints what was
+found, `brachis plan` too; `result.fits` and the JSON have it, `brachis plot --kind fit` draws the errors.
+
+```yaml
+start: free
+task_space: pose
+path:
+  - csv:
+      file: seam.csv
+      units: {length: mm, angle: deg}
+      tolerance: {position: 0.05 mm, orientation: 0.1 deg, corner: 0.5 mm}
+      corner: blend
+```
+
+G-code (`.nc`, `.ngc`, `.gcode`, `.tap`) is read likewise: G0 to G3 with I, J, K or R, G17 to G21, G90, G91, F.
+Millimetres are taken where it does not say. What has no say in where the tool goes is skipped and told; cycles, cutter
+compensation and rotary axes are refused.
+
+Feed rates are kept with the path (`brachis.path.speed_tables`); they do not limit the tool's speed by themselves.
+
+The file is read with the task, and becomes a `spline` or one `bspline` for every stretch between corners: a saved task
+does not need it any more. Arrays take the same way: `brachis.fit_path(points, tolerance=...)` returns the segments of a
+path along positions, 4x4 matrices, SE3 or positions with quaternions, the first one included.
 """
 
 
@@ -209,6 +243,8 @@ def page() -> str:
     profile = ToQuaternion.model_fields["profile"]
     parts += ["\n### `to: {...}`\n", "One of the three forms of an orientation, and\n", *TABLE_HEAD]
     parts += [_row("profile", profile), "\n### `tangent: {...}`\n", *rows(Tangent), CSV.rstrip()]
+    for key, model in FILES.items():
+        parts += [f"\n### `csv.{key}`\n", *rows(model)]
     return "\n".join(parts) + "\n"
 
 

@@ -45,7 +45,9 @@ def test_few_knots_are_taken():
     assert fit_curves(points(line), tolerance(0.01 * MM))[1].intervals == 1
     scattered = line + np.random.default_rng(1).normal(size=line.shape) * 0.02 * MM
     assert fit_curves(points(scattered), tolerance(0.15 * MM))[1].intervals == 1
-    looser, tighter = (fit_curves(points(wave(3_000)), tolerance(allowed * MM))[1].intervals for allowed in (0.5, 0.005))
+    looser, tighter = (
+        fit_curves(points(wave(3_000)), tolerance(allowed * MM))[1].intervals for allowed in (0.5, 0.005)
+    )
     assert looser < tighter <= 30
 
 
@@ -114,7 +116,9 @@ def test_long_straight_ways_are_straight():
 
 
 def test_scatter_that_is_wider_than_the_tolerance_is_said():
-    with pytest.raises(TaskError, match=r"row \d+: no smooth curve .*scatter by 0.05\d* mm .*tolerance of 0.3 mm or more"):
+    with pytest.raises(
+        TaskError, match=r"row \d+: no smooth curve .*scatter by 0.05\d* mm .*tolerance of 0.3 mm or more"
+    ):
         fit_curves(points(wave(2_000, 0.05 * MM)), tolerance(0.02 * MM))
 
 

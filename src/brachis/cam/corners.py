@@ -146,7 +146,7 @@ def _located(points: Points, u: Array, i: int, angle: float, width: float, least
 
 
 def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool:
-    """Tell whether the cubic through the four points on one side leads to a point; of lower degree where there are fewer.
+    """Tell whether the cubic through four points on one side, or what fewer points there give, leads to a point.
 
     It may miss it by `off`, m, or by a small part of the spacing.
     """

@@ -68,7 +68,8 @@ def fit_curves(
     refuse_spikes(points, scatter, tolerance.position)
     points, filled = with_gaps_filled(points)
     corners = find_corners(points, scatter, tolerance.corner)
-    stretches = fit_between(points, corners, tolerance, scatter)
+    doubt = of_size(points)
+    stretches = fit_between(points, corners, tolerance, scatter, doubt)
     blends = [
         blend_between(first, second, corner, tolerance)
         for first, second, corner in zip(stretches, stretches[1:], corners, strict=False)
@@ -97,7 +98,7 @@ def fit_curves(
             for corner, start, blend in zip(corners, starts[1:], blends, strict=False)
         ),
         told=(*told, *repeated, *filled, *rough),
-        doubt=of_size(points),
+        doubt=doubt,
         profile=profile_of(np.maximum.accumulate(along), distances, angles),
     )
 

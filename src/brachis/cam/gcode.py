@@ -40,6 +40,7 @@ class _Machine:
     motion: str | None = None
     plane: tuple[int, int, int] = _PLANES["17"]
     unit: float = 1e-3
+    unit_stated: bool = False
     absolute: bool = True
     feed: float = float("nan")
     at: list[float | None] = field(default_factory=lambda: [None, None, None])
@@ -86,7 +87,8 @@ def read_gcode(text: str, rows: tuple[str, ...] | str, source: str) -> tuple[Poi
         source,
     )
     told = (f"skipped {', '.join(sorted(machine.skipped))}",) if machine.skipped else ()
-    return points, ("G-code", *told)
+    unit = () if machine.unit_stated else ("millimetres, as neither G20 nor G21 says otherwise",)
+    return points, ("G-code", *unit, *told)
 
 
 def _block(machine: _Machine, code: str, where: str, number: int) -> None:
@@ -129,7 +131,7 @@ def _mode(machine: _Machine, code: str, where: str) -> None:
     elif code in _PLANES:
         machine.plane = _PLANES[code]
     elif code in _UNITS:
-        machine.unit = _UNITS[code]
+        machine.unit, machine.unit_stated = _UNITS[code], True
     elif code in {"90", "91"}:
         machine.absolute = code == "90"
     elif code in _IGNORED:

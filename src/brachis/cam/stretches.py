@@ -52,8 +52,12 @@ class Stretch:
         return self.fit.sigma[self.given]
 
 
-def fit_between(points: Points, corners: tuple[Corner, ...], tolerance: Tolerance, scatter: Scatter) -> list[Stretch]:
+def fit_between(
+    points: Points, corners: tuple[Corner, ...], tolerance: Tolerance, scatter: Scatter, doubt: str | None = None
+) -> list[Stretch]:
     """Cut points at their corners and fit a curve to each stretch.
+
+    What of the points is hardly meant, `doubt`, is the hint where that cannot be done.
 
     Raises
     ------
@@ -72,7 +76,7 @@ def fit_between(points: Points, corners: tuple[Corner, ...], tolerance: Toleranc
                 position[row] = corner.place
         whole = replace(whole, position=position)
         chosen = slice(len(before), len(before) + len(given))
-        fit = _fitted(whole, tolerance, scatter)
+        fit = _fitted(whole, tolerance, scatter, doubt)
         stretches.append(Stretch(whole, chosen, fit, *deviations(whole.only(chosen), fit.spline)))
     return stretches
 
@@ -106,7 +110,7 @@ def blend_between(first: Stretch, second: Stretch, corner: Corner, tolerance: To
     return blend_size(corner.angle, left, shortest)
 
 
-def _fitted(points: Points, tolerance: Tolerance, scatter: Scatter) -> Fit:
+def _fitted(points: Points, tolerance: Tolerance, scatter: Scatter, doubt: str | None) -> Fit:
     """Fit one curve.
 
     Raises
@@ -127,4 +131,4 @@ def _fitted(points: Points, tolerance: Tolerance, scatter: Scatter) -> Fit:
         hint = f"The data are {scatter}"
         hint += f"; give a tolerance of {1e3 * wanted:.2g} mm or more" if wanted > tolerance.position else ""
     problem = f"no smooth curve is within the tolerance of {what}"
-    raise points.wrong(i, problem, found=f"{found} at {points.described(i)}", allowed=allowed, hint=hint)
+    raise points.wrong(i, problem, found=f"{found} at {points.described(i)}", allowed=allowed, hint=doubt or hint)

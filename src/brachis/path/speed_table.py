@@ -60,14 +60,14 @@ def speed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, .
         return ()
     tables: list[tuple[Array, Array]] = []
     goes_on = False
-    for begin, piece in zip(sequence.breaks, sequence.pieces, strict=False):
+    for begin, end, piece in zip(sequence.breaks, sequence.breaks[1:], sequence.pieces, strict=False):
         if piece.segment is None:
             continue
         segment = segments[piece.segment]
         for sigma, speed in map(np.transpose, segment.bspline.speeds if isinstance(segment, BSplineSegment) else ()):
             at = np.unique(np.clip(sigma, piece.first, piece.last))
             if len(at) > 1:
-                s = begin + (at - piece.first) / sequence.total
+                s = np.interp(at, [piece.first, piece.last], [begin, end])
                 at_start = goes_on and sigma[0] <= piece.first
                 before = tables.pop() if at_start and tables else (np.empty(0), np.empty(0))
                 values = np.interp(at, sigma, speed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from math import degrees
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from brachis.errors import TaskError
 from brachis.task.orientation import OrientationMode, Quaternion, Rotate, TurnTo
@@ -100,10 +100,11 @@ def _spline_through(points: Points, wanted: Wanted) -> SplineSegment:
 
 def _segment(i: int, curve: FittedCurve, count: int, report: FitReport, wanted: Wanted) -> BSplineSegment:
     """Return the segment of curve `i`; the first one has the report, all but the last one a blend of their own."""
+    control_points: Any = curve.spline.c.tolist()  # SciPy's stubs take it for a vector
     shape = BSplineCurve(
         degree=curve.spline.k,
         knots=tuple(curve.spline.t.tolist()),
-        control_points=tuple(tuple(row) for row in curve.spline.c.tolist()),
+        control_points=tuple(map(tuple, control_points)),
         relative=wanted.relative or i > 0,
         speeds=curve.speeds,
         fit=report if i == 0 else None,

@@ -19,7 +19,6 @@ from brachis.task.yaml_reader import read_yaml
 
 _LARGEST_TASK = 1_000_000
 """Bytes of YAML, which take some 20 s to read."""
-_POSE_NUMBERS = 7
 
 
 def load_task(source: str | os.PathLike[str] | Mapping[str, object] | Task) -> Task:
@@ -116,9 +115,7 @@ def _with_start(task: Task, source: str) -> Task:
     """
     if task.start != "free" or task.path_start is not None:
         return task
-    begins = task.path[0].begins
-    fits = begins is not None and (not isinstance(task.task_space, str) or len(begins) == _POSE_NUMBERS)
     try:
-        return Task.model_validate(task.model_copy(update={"path_start": begins if fits else None}))
+        return Task.model_validate(task.model_copy(update={"path_start": task.begins}))
     except ValidationError as error:
         raise task_error(error, source, Task) from None

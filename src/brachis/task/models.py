@@ -21,6 +21,7 @@ _Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll"]
 POSITION_ROWS: Final[tuple[Row, ...]] = ("x", "y", "z")
 _SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll"
 _FULL_REST_DEGREE = 3
+_POSE_NUMBERS = 7
 
 
 def _expand_position(space: _Space) -> _Space:
@@ -254,7 +255,7 @@ class Task(Model):
     def _free_start_needs_a_place(self) -> Task:
         first = self.path[0]
         unread = isinstance(first, CsvSegment) and not first.csv.relative
-        if self.start == "free" and self.path_start is None and not unread and first.begins is None:
+        if self.start == "free" and self.path_start is None and not unread and self.begins is None:
             problem = "a free start posture leaves open where the path begins"
             pose = isinstance(self.task_space, str)
             rows = (*POSITION_ROWS, "qw", "qx", "qy", "qz") if pose else self.task_space
@@ -263,6 +264,12 @@ class Task(Model):
             problem = "numeric inverse kinematics needs a posture to begin with, and start is free"
             raise refuse(problem, key="search.guesses", found="numeric", allowed="lattice")
         return self
+
+    @property
+    def begins(self) -> tuple[float, ...] | None:
+        """Where the first segment says that the path begins, as `path_start`; None where it leaves that open."""
+        place, poses = self.path[0].begins, isinstance(self.task_space, str)
+        return None if place is None or (poses and len(place) != _POSE_NUMBERS) else place
 
     @property
     def fits(self) -> tuple[FitReport, ...]:

@@ -6,7 +6,7 @@ from itertools import pairwise
 from math import degrees
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, Strict, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Field, Strict, WithJsonSchema, field_validator, model_validator
 
 from brachis.cam.units import ANGLES, LENGTHS, quantity
 from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, Positive, Vector, refuse
@@ -86,6 +86,16 @@ class PointFile(Model):
         default="blend",
         description="With a tolerance, what becomes of corners: rounded within the tolerance, or refused and listed.",
     )
+
+    @field_validator("corner", mode="before")
+    @classmethod
+    def _no_stops(cls, corner: object) -> object:
+        if corner == "stop":
+            problem = "a path cannot stop at a corner: it is one motion from rest to rest"
+            raise refuse(
+                problem, found=corner, allowed="blend or refuse; or two tasks, one to the corner and one from it"
+            )
+        return corner
 
 
 class FoundCorner(Model):
