@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from brachis.cam.checks import of_size, refuse_spikes, without_repetitions
-from brachis.cam.curves import refuse_rough
+from brachis.cam.curves import fit_curves, interpolated
+from brachis.cam.least_squares import Tolerance
+from brachis.cam.points import with_like_signs
 from brachis.cam.scatter import decimals_of, scatter_of
 from brachis.errors import TaskError
 from support.seams import bent, points, wave
@@ -15,7 +18,7 @@ MM = 1e-3
 
 
 def spikes(position):
-    refuse_spikes(points(position), scatter_of(position), 0.05 * MM)
+    refuse_spikes(points(position), scatter_of(points(position)), 0.05 * MM)
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.02])
@@ -70,19 +73,19 @@ def test_a_turn_on_the_spot_is_refused():
 @pytest.mark.parametrize("scatter", [0.001, 0.02])
 @pytest.mark.parametrize("count", [200, 5_000])
 def test_scatter_is_estimated(scatter, count):
-    found = scatter_of(wave(count, scatter * MM)).deviation
+    found = scatter_of(points(wave(count, scatter * MM))).deviation
     assert 0.6 * scatter * MM < found < 1.3 * scatter * MM
 
 
 @pytest.mark.parametrize("position", [wave(200), bent(60)[0], wave(12, 1.0), wave(3_000)[:, :1]])
 def test_smooth_and_few_points_do_not_scatter(position):
-    assert scatter_of(position).deviation < 1e-12
+    assert scatter_of(points(position)).deviation < 1e-12
 
 
 def test_unevenly_spaced_smooth_points_do_not_scatter():
     t = np.sort(np.random.default_rng(3).uniform(0.0, 1.0, 500))
     curve = np.column_stack([np.cos(3.0 * t), np.sin(3.0 * t)])
-    assert scatter_of(curve).deviation < 1e-6
+    assert scatter_of(points(curve)).deviation < 1e-6
 
 
 def test_rounding_is_told_from_scatter():
@@ -90,11 +93,22 @@ def test_rounding_is_told_from_scatter():
     assert decimals_of(rounded) == 6
     assert decimals_of(wave(100)) is None
     with pytest.raises(TaskError) as caught:
-        refuse_rough(points(rounded))
+        interpolated(points(rounded))
     message = str(caught.value)
     for text in ("too rough", "its curvature would be noise", "rounded to 1e-06 m at 0.", "tolerance: {position:"):
         assert text in message
-    refuse_rough(points(np.round(wave(2_000), 12)))
-    refuse_rough(points(wave(2_000)))
+    interpolated(points(np.round(wave(2_000), 12)))
+    interpolated(points(wave(2_000)))
     with pytest.raises(TaskError, match=r"scatter by 0.02\d* mm \(standard deviation\) at 0.5\d* mm spacing"):
-        refuse_rough(points(wave(2_000, 0.02 * MM)))
+        interpolated(points(wave(2_000, 0.02 * MM)))
+
+
+def test_orientations_that_scatter_are_told_from_smooth_ones():
+    position, t = wave(1_000), np.linspace(0.0, 1.0, 1_000)
+    noise = np.random.default_rng(6).normal(size=(1_000, 3)) * 1e-3
+    turns = Rotation.from_rotvec(np.column_stack([np.sin(t), t, 3.0 * t]))
+    for turned, least, most in ((turns, 0.0, 1e-12), (turns * Rotation.from_rotvec(noise), 0.8e-3, 1.2e-3)):
+        given = points(position, with_like_signs(np.roll(turned.as_quat(), 1, axis=1)))
+        assert least <= scatter_of(given).turning <= most
+    with pytest.raises(TaskError, match=r"tolerance of orientation; .*orientations that scatter by 0.05\d* deg"):
+        fit_curves(given, Tolerance(0.05 * MM, 1e-3, 0.05 * MM))

@@ -39,7 +39,7 @@ def test_inspect_says_what_was_found(seam):
 
 
 def test_inspect_of_a_path_without_points(task, write):
-    assert "no part of the path is fitted to points" in RUNNER.invoke(app, ["inspect", str(write(task))]).stdout
+    assert "no part of the path comes from points" in RUNNER.invoke(app, ["inspect", str(write(task))]).stdout
 
 
 def test_plan_reports_and_draws_the_fit(seam, tmp_path):

@@ -84,6 +84,9 @@ def test_positions_alone_leave_the_orientation_to_the_segment() -> None:
     made = load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": "pose", "path": [segment, line]})
     through = tuple(map(tuple, POINTS[1:].tolist()))
     spline = SplineThrough(through=through, starts_at=tuple(POINTS[0].tolist()))
+    (report,) = made.fits
+    spline = spline.model_copy(update={"fit": report})
+    assert (report.source, report.points, report.profile) == ("poses.csv", 4, ())
     assert made.path[0] == SplineSegment(spline=spline, orientation="tangent", blend=0.01)
     path_of(made, POINTS[0], TURNS[0])
 

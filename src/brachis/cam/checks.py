@@ -15,6 +15,7 @@ _FEWEST = 10
 _OF_SPACING = 4.0
 _OF_SCATTER = 15.0
 _AROUND = 4
+_OF_USUAL = 20.0
 _FACTOR = (900.0, 1100.0)
 _LARGEST = 100.0
 """Paths of robots are shorter, m."""
@@ -111,7 +112,9 @@ def _refuse_factors(points: Points) -> None:
     sizes = np.linalg.norm(points.position, axis=1)
     ratios = sizes[1:] / np.maximum(sizes[:-1], SAME)
     growth = np.maximum(ratios, 1.0 / np.maximum(ratios, SAME))
-    for i in np.flatnonzero((growth > _FACTOR[0]) & (growth < _FACTOR[1])).tolist():
+    steps = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
+    far = steps > _OF_USUAL * np.median(steps)
+    for i in np.flatnonzero(far & (growth > _FACTOR[0]) & (growth < _FACTOR[1])).tolist():
         one, other = points.position[i], points.position[i + 1]
         small, large = (one, other) if ratios[i] > 1.0 else (other, one)
         if np.linalg.norm(large / 1e3 - small) < 0.1 * np.linalg.norm(small):

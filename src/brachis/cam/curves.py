@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.cam.checks import of_size, refuse_spikes, without_repetitions
+from brachis.cam.checks import of_size, refuse_repetitions, refuse_spikes, without_repetitions
 from brachis.cam.corners import find_corners
 from brachis.cam.gaps import with_gaps_filled
 from brachis.cam.least_squares import Tolerance
@@ -64,7 +64,7 @@ def fit_curves(
     """
     count = len(points)
     points, repeated = without_repetitions(points)
-    scatter = scatter_of(points.position)
+    scatter = scatter_of(points)
     refuse_spikes(points, scatter, tolerance.position)
     points, filled = with_gaps_filled(points)
     corners = find_corners(points, scatter, tolerance.corner)
@@ -103,14 +103,23 @@ def fit_curves(
     )
 
 
-def refuse_rough(points: Points) -> None:
-    """Refuse points whose rounding or scatter would give a curve through all of them its curvature.
+def interpolated(points: Points, told: tuple[str, ...] = ()) -> Report:
+    """Return what is said of a curve through all points, after a check that its curvature is not that of their scatter.
+
+    Parameters
+    ----------
+    points : Points
+    told : tuple of str, optional
+        What was found out before.
 
     Raises
     ------
     TaskError
+        So are repetitions and spikes.
     """
-    scatter = scatter_of(points.position)
+    refuse_repetitions(points)
+    scatter = scatter_of(points)
+    refuse_spikes(points, scatter, 0.0)
     length = float(np.linalg.norm(np.diff(points.position, axis=0), axis=1).sum())
     if scatter.curvature * length > _ROUGH:
         problem = "the points are too rough for a curve through all of them: its curvature would be noise"
@@ -118,3 +127,18 @@ def refuse_rough(points: Points) -> None:
         found = f"{scatter}, which make a curvature of {scatter.curvature:.2g} 1/m by themselves"
         allowed = f"less than {_ROUGH / length:.2g} 1/m"
         raise TaskError(problem, found=found, allowed=allowed, where=points.source, hint=hint)
+    return Report(
+        source=points.source,
+        points=len(points),
+        length=length,
+        position_error=0.0,
+        position_rms=0.0,
+        position_tolerance=0.0,
+        orientation_error=0.0,
+        orientation_tolerance=0.0,
+        intervals=len(points) - 1,
+        corners=(),
+        told=told,
+        doubt=of_size(points),
+        profile=(),
+    )

@@ -1,8 +1,8 @@
 """A smooth curve within a tolerance of points, with few knots.
 
 The curve is a quintic B-spline, C4, through the first and the last point; of all with the same knots it has the least
-sum of squared distances. Knots are added where the tolerance is exceeded and then removed where it is not needed:
-no knot of the result can be taken away alone without a point leaving the tolerance, but those that were tried together.
+sum of squared distances. Intervals in which the tolerance is exceeded are halved; then knots that are not needed are
+taken away, and fewer ones spread in the same proportion are tried.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def fit_points(points: Points, tolerance: Tolerance, scatter: Scatter) -> Fit:
         return _polynomial(points, sigma)
     every = -(-len(points) // _SAMPLE)
     chosen = np.unique(np.append(np.arange(0, len(points), every), len(points) - 1))
-    noisy, dimension = scatter.deviation > 0.0, points.position.shape[1]
+    noisy, dimension = scatter.noisy(tolerance), points.position.shape[1]
     rough = _with_knots_added(points.only(chosen), sigma[chosen], sigma[[0, -1]], tolerance, noisy=noisy)
     if rough is None:
         return _interpolated(points, sigma)

@@ -6,14 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.cam.points import Array
+from brachis.cam.least_squares import Tolerance
+from brachis.cam.points import QUATERNION, Array, Points
 
 _FEWEST = 20
 _WHITE = -0.25
 """Correlation of neighbouring residuals below which they are noise: -0.8 for white noise, 1 for a smooth curve."""
 _NEIGHBOURS = (-2, -1, 1, 2)
-_MEDIANS = {2: 0.6745, 3: 1.1774}
-"""Median distance from a line of normally distributed points, by the dimension of space, in standard deviations."""
+_ON_A_LINE, _IN_A_PLANE, _IN_SPACE = 0.6745, 1.1774, 1.5382
+"""Median distance from zero of normally distributed points, by their dimension, in standard deviations."""
+_MEDIANS = {2: _ON_A_LINE, 3: _IN_A_PLANE}
+"""The same from a path, by the dimension of space."""
+_COUNTS = 0.1
+_NOTHING = 1e-300
+_CLOSEST = 1e-12
 _CLIP = 5.0
 _MOST_DECIMALS = 12
 _SECOND_DIFFERENCE = 6.0**0.5
@@ -28,6 +34,8 @@ class Scatter:
     ----------
     deviation : float
         Standard deviation across the path, m; 0 where the points look smooth, or are too few to tell.
+    turning : float
+        Standard deviation of each component of their orientations, rad; of yaw; 0 as above.
     spacing : float
         Median distance of successive points, m.
     decimals : int or None
@@ -35,8 +43,13 @@ class Scatter:
     """
 
     deviation: float
+    turning: float
     spacing: float
     decimals: int | None
+
+    def noisy(self, tolerance: Tolerance) -> bool:
+        """Tell whether a curve through all points would follow scatter that counts beside a tolerance."""
+        return self.deviation > 0.0 or self.turning > _COUNTS * tolerance.orientation
 
     @property
     def curvature(self) -> float:
@@ -51,27 +64,45 @@ class Scatter:
             return f"positions rounded to {rounding:g} m {spacing}"
         return f"positions that scatter by {1e3 * self.deviation:.3g} mm (standard deviation) {spacing}"
 
+    def of_turning(self) -> str:
+        """Say what the scatter of orientations looks like."""
+        return f"orientations that scatter by {np.rad2deg(self.turning):.2g} deg (standard deviation)"
 
-def scatter_of(position: Array) -> Scatter:
-    """Estimate the scatter of positions, (n, p), m.
+
+def scatter_of(points: Points) -> Scatter:
+    """Estimate the scatter of points.
 
     Each point is compared with the cubic through its two neighbours on either side, over chord lengths; of the
-    difference counts what is across the path. Noise makes successive differences alternate, curvature does not.
+    difference of positions counts what is across the path. Noise makes successive differences alternate, curvature
+    does not.
     """
+    position, turning = points.position, points.turning
     chords = np.linalg.norm(np.diff(position, axis=0), axis=1)
     spacing = float(np.median(chords)) if len(chords) else 0.0
-    count, dimension = position.shape
-    if count < _FEWEST or dimension not in _MEDIANS:
-        return Scatter(0.0, spacing, None)
-    across = _residuals(position, chords)
-    sizes = np.linalg.norm(across, axis=1)
+    if len(points) < _FEWEST or position.shape[1] not in _MEDIANS or not spacing:
+        return Scatter(0.0, 0.0, spacing, None)
+    along = position[4:] - position[:-4]
+    along /= np.maximum(np.linalg.norm(along, axis=1), _NOTHING)[:, None]
+    away = _residuals(position, chords)
+    across = away - np.sum(away * along, axis=1)[:, None] * along
+    deviation = _deviation(across, _MEDIANS[position.shape[1]])
+    of_turning = 0.0
+    if turning.shape[1]:
+        # Half the angle for quaternions, whose scatter has three dimensions; the angle itself for yaw.
+        whole, median = (2.0, _IN_SPACE) if turning.shape[1] == QUATERNION else (1.0, _ON_A_LINE)
+        of_turning = whole * _deviation(_residuals(turning, chords), median)
+    return Scatter(deviation, of_turning, spacing, decimals_of(position))
+
+
+def _deviation(residuals: Array, median_of_one: float) -> float:
+    """Return the standard deviation of residuals, (n, c), if they look like noise; zero where they do not."""
+    sizes = np.linalg.norm(residuals, axis=1)
     median = float(np.median(sizes))
     if median == 0.0:
-        return Scatter(0.0, spacing, None)
-    clipped = across * np.minimum(1.0, _CLIP * median / np.maximum(sizes, 1e-300))[:, None]
+        return 0.0
+    clipped = residuals * np.minimum(1.0, _CLIP * median / np.maximum(sizes, _NOTHING))[:, None]
     correlation = float(np.sum(clipped[1:] * clipped[:-1]) / np.sum(clipped**2))
-    deviation = median / _MEDIANS[dimension] if correlation < _WHITE else 0.0
-    return Scatter(deviation, spacing, decimals_of(position))
+    return median / median_of_one if correlation < _WHITE else 0.0
 
 
 def decimals_of(position: Array) -> int | None:
@@ -83,19 +114,16 @@ def decimals_of(position: Array) -> int | None:
     return None
 
 
-def _residuals(position: Array, chords: Array) -> Array:
-    """Return the differences across the path, (n - 4, p), scaled to the deviation of the points."""
-    count = len(position)
-    u = np.concatenate([[0.0], np.cumsum(np.maximum(chords, 1e-12 * chords.max(initial=1e-300)))])
+def _residuals(values: Array, chords: Array) -> Array:
+    """Return the differences of values, (n, c), from local cubics, (n - 4, c), scaled to the scatter of one value."""
+    count = len(values)
+    u = np.concatenate([[0.0], np.cumsum(np.maximum(chords, _CLOSEST * chords.max()))])
     inner = np.arange(2, count - 2)
     offsets = np.stack([u[inner + k] - u[inner] for k in _NEIGHBOURS])
     weights = np.ones_like(offsets)
-    for i in range(4):
-        for j in range(4):
+    for i in range(len(_NEIGHBOURS)):
+        for j in range(len(_NEIGHBOURS)):
             if i != j:
                 weights[i] *= offsets[j] / (offsets[j] - offsets[i])
-    foreseen = sum(weights[i][:, None] * position[inner + k] for i, k in enumerate(_NEIGHBOURS))
-    away = (position[inner] - foreseen) / np.sqrt(1.0 + np.sum(weights**2, axis=0))[:, None]
-    along = position[inner + 2] - position[inner - 2]
-    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
-    return np.asarray(away - np.sum(away * along, axis=1)[:, None] * along)
+    foreseen = sum(weights[i][:, None] * values[inner + k] for i, k in enumerate(_NEIGHBOURS))
+    return np.asarray((values[inner] - foreseen) / np.sqrt(1.0 + np.sum(weights**2, axis=0))[:, None])

@@ -122,13 +122,15 @@ def _fitted(points: Points, tolerance: Tolerance, scatter: Scatter, doubt: str |
     i = int(np.argmax(ratios))
     if ratios[i] <= 1.0 + _ROUNDING:
         return fit
-    what, found, allowed = "position", f"{1e3 * fit.position_errors[i]:.3g} mm", f"{1e3 * tolerance.position:.3g} mm"
-    if fit.position_errors[i] <= tolerance.position:
+    of_turning, hint = bool(fit.position_errors[i] <= tolerance.position), "Is the row as it should be?"
+    if of_turning:
         angles = np.rad2deg([fit.turning_errors[i], tolerance.orientation])
-        what, found, allowed = "orientation", f"{angles[0]:.3g} deg", f"{angles[1]:.3g} deg"
-    hint, wanted = "Is the row as it should be?", _OF_SCATTER * scatter.deviation
-    if scatter.deviation:
-        hint = f"The data are {scatter}"
-        hint += f"; give a tolerance of {1e3 * wanted:.2g} mm or more" if wanted > tolerance.position else ""
-    problem = f"no smooth curve is within the tolerance of {what}"
+        found, allowed = (f"{angle:.3g} deg" for angle in angles)
+        hint = f"The data are {scatter.of_turning()}" if scatter.turning else hint
+    else:
+        found, allowed = (f"{1e3 * value:.3g} mm" for value in (fit.position_errors[i], tolerance.position))
+        wanted = _OF_SCATTER * scatter.deviation
+        more = f"; give a tolerance of {1e3 * wanted:.2g} mm or more" if wanted > tolerance.position else ""
+        hint = f"The data are {scatter}{more}" if scatter.deviation else hint
+    problem = f"no smooth curve is within the tolerance of {'orientation' if of_turning else 'position'}"
     raise points.wrong(i, problem, found=f"{found} at {points.described(i)}", allowed=allowed, hint=doubt or hint)

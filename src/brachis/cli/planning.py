@@ -72,7 +72,7 @@ def _write(result: Result, data: dict[str, object], out: Path) -> Written:
         overview: lambda path: save_figure(plot_overview(result.trajectory), path),
         candidates: lambda path: save_figure(plot_candidates(result.candidates), path),
     }
-    if result.fits:
+    if any(told.profile for told in result.fits):
         figures[fit] = lambda path: save_figure(plot_fit(result.trajectory), path)
     return write_files(out, results, figures, stale=(*_FILES[not result.verified], fit))
 

@@ -22,7 +22,7 @@ def inspect_points(task: Path, *, as_json: bool) -> None:
         return
     console = result_console()
     if not fits:
-        console.print(f"{task}: no part of the path is fitted to points")
+        console.print(f"{task}: no part of the path comes from points")
     for fit in fits:
         console.print(_table(fit))
         if fit.corners:
@@ -33,6 +33,8 @@ def _table(fit: FitReport) -> Table:
     table = Table(show_header=False, title=fit.source, title_justify="left")
     table.add_row("points", f"{fit.points} along {1e3 * fit.length:.6g} mm")
     table.add_row("knot intervals", str(fit.intervals))
+    if not fit.profile:
+        table.add_row("path", "passes all points")
     allowed = f"(allowed {1e3 * fit.position_tolerance:.4g} mm), rms {1e3 * fit.position_rms:.3g} mm"
     table.add_row("position error", f"at most {1e3 * fit.position_error:.4g} mm {allowed}")
     allowed = f"(allowed {degrees(fit.orientation_tolerance):.4g} deg)"

@@ -32,7 +32,7 @@ def plot_fit(trajectory: Trajectory) -> Figure:
         One column wide, one part for each file or array that the path was fitted to; dotted lines are corners. A path
         that was not fitted gives a figure that says so.
     """
-    fits = trajectory.task.fits
+    fits = [fit for fit in trajectory.task.fits if fit.profile]
     figure = style.new_figure(style.COLUMN_WIDTH, _HEIGHT * max(len(fits), 1))
     if not fits:
         figure.text(0.5, 0.5, "the path was not fitted to points", ha="center", va="center", fontsize=style.LABEL_SIZE)

@@ -64,8 +64,7 @@ def segments_along(points: Points, wanted: Wanted, told: tuple[str, ...] = ()) -
         Points are wrong, or there is no smooth curve within the tolerance; the message names the row.
     """
     # Imported here: tasks without points need neither NumPy nor SciPy.
-    from brachis.cam.checks import refuse_repetitions  # noqa: PLC0415
-    from brachis.cam.curves import fit_curves, refuse_rough  # noqa: PLC0415
+    from brachis.cam.curves import fit_curves, interpolated  # noqa: PLC0415
     from brachis.cam.least_squares import Tolerance  # noqa: PLC0415
 
     if points.turning.shape[1] == _QUATERNION and wanted.orientation is not None:
@@ -73,18 +72,20 @@ def segments_along(points: Points, wanted: Wanted, told: tuple[str, ...] = ()) -
         where = f"{wanted.where}.orientation"
         raise TaskError(problem, found="orientations", allowed="no orientation", where=where)
     if wanted.tolerance is None:
-        refuse_repetitions(points)
-        refuse_rough(points)
-        return [_spline_through(points, wanted)]
+        return [_spline_through(points, _named(interpolated(points, told), wanted), wanted)]
     position, orientation, corner = (getattr(wanted.tolerance, name) for name in FitTolerance.model_fields)
     curves, report = fit_curves(points, Tolerance(position, orientation, corner or position), told)
     if len(curves) > 1:
         _check_corners(report, wanted)
-    told_of = FitReport(**{**asdict(report), "source": wanted.source})
-    return [_segment(i, curve, len(curves), told_of, wanted) for i, curve in enumerate(curves)]
+    named = _named(report, wanted)
+    return [_segment(i, curve, len(curves), named, wanted) for i, curve in enumerate(curves)]
 
 
-def _spline_through(points: Points, wanted: Wanted) -> SplineSegment:
+def _named(report: Report, wanted: Wanted) -> FitReport:
+    return FitReport(**{**asdict(report), "source": wanted.source})
+
+
+def _spline_through(points: Points, report: FitReport, wanted: Wanted) -> SplineSegment:
     poses = points.turning.shape[1] == _QUATERNION
     places = [tuple(row) for row in (points.position if poses else points.columns).tolist()]
     turned = [Quaternion(quaternion=(w, x, y, z)) for w, x, y, z in points.turning.tolist()] if poses else None
@@ -94,6 +95,7 @@ def _spline_through(points: Points, wanted: Wanted) -> SplineSegment:
         relative=wanted.relative,
         starts_at=places[0],
         starts_oriented=turned[0] if turned else None,
+        fit=report,
     )
     return SplineSegment(blend=wanted.blend, orientation=wanted.orientation, spline=spline)
 

@@ -11,9 +11,9 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, Field, JsonValue, Tag, field_validator, model_validator
 
 from brachis.task.fields import Count, Flag, Model, Name, Number, Positive, Share, by_form, refuse
-from brachis.task.point_data import FitReport
+from brachis.task.point_data import BSplineCurve, FitReport
 from brachis.task.robot_models import JointValues, RobotSettings
-from brachis.task.segments import BSplineSegment, CsvSegment, Segment
+from brachis.task.segments import CsvSegment, Segment, SplineThrough
 from brachis.task.tool_limits import ToolLimits
 
 Row = Literal["x", "y", "z", "yaw"]
@@ -273,8 +273,9 @@ class Task(Model):
 
     @property
     def fits(self) -> tuple[FitReport, ...]:
-        """How near the path is to the points that it was fitted to, one for each file or array."""
-        curves = (segment.bspline.fit for segment in self.path if isinstance(segment, BSplineSegment))
+        """Where the path comes from points, one for each file or array: what they were, and how near it is to them."""
+        shapes = (getattr(segment, segment.kind) for segment in self.path)
+        curves = (shape.fit for shape in shapes if isinstance(shape, SplineThrough | BSplineCurve))
         return tuple(fit for fit in curves if fit is not None)
 
     def to_dict(self) -> dict[str, Any]:

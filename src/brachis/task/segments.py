@@ -15,7 +15,7 @@ from pydantic import Field, Tag, field_validator, model_validator
 
 from brachis.task.fields import Flag, Model, NonNegative, Number, Positive, Vector, by_key, refuse
 from brachis.task.orientation import Attitude, OrientationMode, Quaternion, Turning
-from brachis.task.point_data import BSplineCurve, PointFile
+from brachis.task.point_data import BSplineCurve, FitReport, PointFile
 
 Yaw = Annotated[
     Literal["fixed", "tangent"],
@@ -109,6 +109,7 @@ class SplineThrough(Model):
     starts_oriented: Attitude | None = Field(
         default=None, description="As `starts_at`, the orientation of the tool; beside `orientations`."
     )
+    fit: FitReport | None = Field(default=None, description="Where the waypoints come from; written by brachis.")
 
     @model_validator(mode="after")
     def _orientations_fit(self) -> SplineThrough:
