@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +15,7 @@ from brachis.cam.points import Points
 from brachis.cam.report import CornerRemark, Report, profile_of
 from brachis.cam.scatter import scatter_of
 from brachis.cam.speeds import Run, speed_runs
-from brachis.cam.stretches import blend_between, fit_between
+from brachis.cam.stretches import Stretch, blend_between, fit_between
 from brachis.errors import TaskError
 
 if TYPE_CHECKING:
@@ -78,14 +78,25 @@ def fit_curves(
         FittedCurve(stretch.fit.spline, blend, speed_runs(stretch.fit.sigma, stretch.points.speed))
         for stretch, blend in zip(stretches, [*blends, None], strict=True)
     )
+    report = _report(stretches, tolerance, points=count, source=points.source, doubt=doubt)
+    found = zip(corners, np.cumsum([stretch.length for stretch in stretches]), blends, strict=False)
+    told = (*told, *repeated, *filled, *((str(scatter),) if scatter.deviation else ()))
+    remarks = tuple(
+        CornerRemark(int(points.rows[corner.index]), corner.angle, float(distance), blend)
+        for corner, distance, blend in found
+    )
+    return curves, replace(report, corners=remarks, told=told)
+
+
+def _report(stretches: list[Stretch], tolerance: Tolerance, *, points: int, source: str, doubt: str | None) -> Report:
+    """Report on all stretches, but for their corners and what was told."""
     starts = np.cumsum([0.0, *(stretch.length for stretch in stretches)])
     along = np.concatenate([start + stretch.sigma for start, stretch in zip(starts, stretches, strict=False)])
     distances = np.concatenate([stretch.distances for stretch in stretches])
     angles = np.concatenate([stretch.angles for stretch in stretches])
-    rough = (str(scatter),) if scatter.deviation else ()
-    return curves, Report(
-        source=points.source,
-        points=count,
+    return Report(
+        source=source,
+        points=points,
         length=float(starts[-1]),
         position_error=float(distances.max()),
         position_rms=float(np.sqrt(np.mean(distances**2))),
@@ -93,11 +104,6 @@ def fit_curves(
         orientation_error=float(angles.max()),
         orientation_tolerance=tolerance.orientation,
         intervals=sum(len(stretch.fit.breaks) - 1 for stretch in stretches),
-        corners=tuple(
-            CornerRemark(int(points.rows[corner.index]), corner.angle, float(start), blend)
-            for corner, start, blend in zip(corners, starts[1:], blends, strict=False)
-        ),
-        told=(*told, *repeated, *filled, *rough),
         doubt=doubt,
         profile=profile_of(np.maximum.accumulate(along), distances, angles),
     )
@@ -127,18 +133,4 @@ def interpolated(points: Points, told: tuple[str, ...] = ()) -> Report:
         found = f"{scatter}, which make a curvature of {scatter.curvature:.2g} 1/m by themselves"
         allowed = f"less than {_ROUGH / length:.2g} 1/m"
         raise TaskError(problem, found=found, allowed=allowed, where=points.source, hint=hint)
-    return Report(
-        source=points.source,
-        points=len(points),
-        length=length,
-        position_error=0.0,
-        position_rms=0.0,
-        position_tolerance=0.0,
-        orientation_error=0.0,
-        orientation_tolerance=0.0,
-        intervals=len(points) - 1,
-        corners=(),
-        told=told,
-        doubt=of_size(points),
-        profile=(),
-    )
+    return Report(points.source, len(points), length, intervals=len(points) - 1, told=told, doubt=of_size(points))

@@ -35,7 +35,7 @@ class CornerRemark:
 
 @dataclass(frozen=True)
 class Report:
-    """Where a path comes from, and how near it is to the points.
+    """Where a path comes from, and how near it is to the points; as it stands for a path through all of them.
 
     Attributes
     ----------
@@ -61,16 +61,16 @@ class Report:
     source: str
     points: int
     length: float
-    position_error: float
-    position_rms: float
-    position_tolerance: float
-    orientation_error: float
-    orientation_tolerance: float
-    intervals: int
-    corners: tuple[CornerRemark, ...]
-    told: tuple[str, ...]
-    doubt: str | None
-    profile: tuple[tuple[float, float, float], ...]
+    position_error: float = 0.0
+    position_rms: float = 0.0
+    position_tolerance: float = 0.0
+    orientation_error: float = 0.0
+    orientation_tolerance: float = 0.0
+    intervals: int = 0
+    corners: tuple[CornerRemark, ...] = ()
+    told: tuple[str, ...] = ()
+    doubt: str | None = None
+    profile: tuple[tuple[float, float, float], ...] = ()
 
 
 def profile_of(along: Array, distances: Array, angles: Array) -> tuple[tuple[float, float, float], ...]:
