@@ -87,8 +87,8 @@ def plan(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for result.npz, result.json, overview.png and candidates.png; of a motion that fails the "
-            "verification the names begin with unverified."
+            help="Folder for result.npz, result.json, overview.png and candidates.png (and fit.png, where the path was "
+            "fitted to points); of a motion that fails the verification the names begin with unverified."
         ),
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
