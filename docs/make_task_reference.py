@@ -22,8 +22,9 @@ from brachis.task import (
     Task,
     ToolLimits,
 )
+from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.orientation import Quaternion, RollPitchYaw, Rotation, RotationVector, Tangent, ToQuaternion
-from brachis.task.point_data import BSplineCurve, FileUnits, FitTolerance, PointFile
+from brachis.task.point_data import FileUnits, FitTolerance, PointFile
 from brachis.task.segments import (
     ArcCenter,
     ArcVia,
@@ -196,7 +197,7 @@ G-code (`.nc`, `.ngc`, `.gcode`, `.tap`) is read likewise: G0 to G3 with I, J, K
 Millimetres are taken where it does not say. What has no say in where the tool goes is skipped and told; cycles, cutter
 compensation and rotary axes are refused.
 
-Feed rates are kept with the path (`brachis.path.speed_tables`); they do not limit the tool's speed by themselves.
+Feed rates are kept with the path (`brachis.path.feed_tables`); they do not limit the tool's speed by themselves.
 
 The file is read with the task, and becomes a `spline` or one `bspline` for every stretch between corners: a saved task
 does not need it any more. Arrays take the same way: `brachis.fit_path(points, tolerance=...)` returns the segments of a

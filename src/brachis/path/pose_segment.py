@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import PathError
-from brachis.path.bspline_curve import POSE_COLUMNS, pose_bspline
+from brachis.path.bspline import POSE_COLUMNS, pose_bspline
 from brachis.path.line import LineCurve
 from brachis.path.orientation import orientation_along
 from brachis.path.pose import POSITIONS, PoseCurve, rotations

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from brachis.errors import PathError
 from brachis.path.arc import arc_center, arc_via, circle
-from brachis.path.bspline_curve import bspline_curve
+from brachis.path.bspline import bspline_curve
 from brachis.path.line import line_by, line_heading, line_to
 from brachis.path.spline import spline_through
 from brachis.task import (

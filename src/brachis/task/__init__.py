@@ -1,6 +1,7 @@
 """What is asked: the task file as frozen models, its loader and its schema. No numerics."""
 
 from brachis.task.arrays import fit_path
+from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.load import check_robot_settings, load_task
 from brachis.task.models import (
     Posture,
@@ -24,7 +25,7 @@ from brachis.task.orientation import (
     ToRotationVector,
     TurnTo,
 )
-from brachis.task.point_data import BSplineCurve, FileUnits, FitReport, FitTolerance, PointFile
+from brachis.task.point_data import FileUnits, FitReport, FitTolerance, PointFile
 from brachis.task.robot_models import FROM_URDF, FrictionSettings, LimitScale, LimitSpec, RobotSettings
 from brachis.task.schema import json_schema
 from brachis.task.segments import (

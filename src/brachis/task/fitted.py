@@ -7,8 +7,9 @@ from math import degrees
 from typing import TYPE_CHECKING, Any, Literal
 
 from brachis.errors import TaskError
+from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.orientation import OrientationMode, Quaternion, Rotate, TurnTo
-from brachis.task.point_data import BSplineCurve, FitReport, FitTolerance
+from brachis.task.point_data import FitReport, FitTolerance
 from brachis.task.segments import BSplineSegment, SplineSegment, SplineThrough
 
 if TYPE_CHECKING:

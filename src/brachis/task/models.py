@@ -10,8 +10,9 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, JsonValue, Tag, field_validator, model_validator
 
+from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.fields import Count, Flag, Model, Name, Number, Positive, Share, by_form, refuse
-from brachis.task.point_data import BSplineCurve, FitReport
+from brachis.task.point_data import FitReport
 from brachis.task.robot_models import JointValues, RobotSettings
 from brachis.task.segments import CsvSegment, Segment, SplineThrough
 from brachis.task.tool_limits import ToolLimits

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from math import degrees
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, Strict, WithJsonSchema, field_validator, model_validator
+from pydantic import BeforeValidator, Field, Strict, WithJsonSchema, field_validator
 
 from brachis.cam.units import ANGLES, LENGTHS, quantity
-from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, Positive, Vector, refuse
+from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, refuse
 
-_SMOOTH = 4
 _LISTED = 10
 
 
@@ -143,43 +141,3 @@ class FitReport(Model):
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON, without the profile."""
         return self.model_dump(mode="json", exclude={"profile"})
-
-
-class BSplineCurve(Model):
-    """A B-spline curve, given by its knots and control points."""
-
-    degree: Annotated[Count, Field(ge=_SMOOTH, le=7)] = Field(default=5, description="Degree.")
-    knots: Vector = Field(
-        description="Knots, m along the curve, ascending, the first and the last one degree + 1 times. Inner ones "
-        "leave three continuous derivatives: degree 5 allows each twice."
-    )
-    control_points: Annotated[tuple[Vector, ...], Field(min_length=_SMOOTH + 1)] = Field(
-        description="Control points: all rows of the task space (m, yaw in rad); in task spaces of poses x, y, z, or "
-        "x, y, z, qw, qx, qy, qz, whose orientation is that of the quaternion divided by its length."
-    )
-    relative: Flag = Field(
-        default=False, description="Whether the curve is moved to the segment's start, wherever that is; as for csv."
-    )
-    speeds: tuple[tuple[tuple[Number, Positive], ...], ...] = Field(
-        default=(),
-        description="Tables of the speed of the tool that is prescribed along the curve: [m along it, m/s], linear in "
-        "between; where there is none, none is prescribed.",
-    )
-    fit: FitReport | None = Field(default=None, description="What the curve was fitted to; written by brachis.")
-
-    @model_validator(mode="after")
-    def _fits_together(self) -> BSplineCurve:
-        count, degree, knots = len(self.control_points), self.degree, self.knots
-        if len(knots) != count + degree + 1:
-            problem = "wrong number of knots for these control points"
-            raise refuse(problem, key=".knots", found=len(knots), allowed=f"{count + degree + 1}")
-        if len({len(point) for point in self.control_points}) > 1:
-            raise refuse("control points differ in their number of coordinates", key=".control_points", allowed="one")
-        ascending = all(one <= other for one, other in pairwise(knots))
-        inner = knots[degree + 1 : -degree - 1]
-        clamped = len({*knots[: degree + 1]}) == len({*knots[-degree - 1 :]}) == 1
-        smooth = all(inner.count(knot) <= degree - 3 for knot in set(inner)) and not {knots[0], knots[-1]} & {*inner}
-        if not (ascending and clamped and smooth and knots[0] < knots[-1]):
-            allowed = f"ascending, the ends {degree + 1} times, inner ones at most {degree - 3} times"
-            raise refuse("the knots give no curve with three continuous derivatives", key=".knots", allowed=allowed)
-        return self

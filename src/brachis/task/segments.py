@@ -13,9 +13,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Tag, field_validator, model_validator
 
+from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.fields import Flag, Model, NonNegative, Number, Positive, Vector, by_key, refuse
 from brachis.task.orientation import Attitude, OrientationMode, Quaternion, Turning
-from brachis.task.point_data import BSplineCurve, FitReport, PointFile
+from brachis.task.point_data import FitReport, PointFile
 
 Yaw = Annotated[
     Literal["fixed", "tangent"],

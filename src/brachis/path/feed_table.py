@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class SpeedTable:
+class FeedTable:
     """Speed of the tool over the path coordinate, linear in between; outside the table none is prescribed.
 
     Attributes
@@ -43,7 +43,7 @@ class SpeedTable:
         return np.asarray(np.interp(s, self.s, self.speed, left=np.inf, right=np.inf))
 
 
-def speed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ...]:
+def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[FeedTable, ...]:
     """Return the tables of a task's segments on the path that was built of them, in order.
 
     Where one segment's table ends with it and the next one's begins with that, they are one, over the blend between.
@@ -75,4 +75,4 @@ def speed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, .
             goes_on = bool(sigma[-1] >= piece.last)
         if not isinstance(segment, BSplineSegment) or not segment.bspline.speeds:
             goes_on = False
-    return tuple(SpeedTable(s, speed) for s, speed in tables)
+    return tuple(FeedTable(s, speed) for s, speed in tables)

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.errors import PathError
 from brachis.path.pose import POSITIONS, QuaternionPoseCurve
 from brachis.path.rotations import quaternions_of, rotation_of
 from brachis.path.spline import START_TOLERANCE, SplineCurve, starts_elsewhere
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
 
 POSE_COLUMNS = 7
 """Of control points with quaternions."""
-_SLOWEST, _FASTEST = 0.5, 2.0
 
 
 def bspline_curve(shape: BSplineCurve, site: Site) -> SplineCurve:
@@ -33,7 +31,7 @@ def bspline_curve(shape: BSplineCurve, site: Site) -> SplineCurve:
     points, off = np.array(shape.control_points), site.start - first
     if not shape.relative:
         _check_start(off[: len(site.positions)], off[len(site.positions) :], site)
-    return _checked(shape, points + off, site)
+    return _curve(shape, points + off)
 
 
 def pose_bspline(shape: BSplineCurve, site: Site, rotation: Array) -> QuaternionPoseCurve:
@@ -61,7 +59,7 @@ def pose_bspline(shape: BSplineCurve, site: Site, rotation: Array) -> Quaternion
         _check_start(off, 2.0 * turn[1:], site)
     points[:, :POSITIONS] += off
     points[:, POSITIONS:] = _product(turn, points[:, POSITIONS:])
-    return QuaternionPoseCurve(_checked(shape, points, site))
+    return QuaternionPoseCurve(_curve(shape, points))
 
 
 def _check_start(off: Array, turned: Array, site: Site) -> None:
@@ -71,17 +69,12 @@ def _check_start(off: Array, turned: Array, site: Site) -> None:
             raise starts_elsewhere(f"{site.key}.control_points[0]", f"{site.describe()}, {distance:.4g} {unit} off")
 
 
-def _checked(shape: BSplineCurve, points: Array, site: Site) -> SplineCurve:
-    """Return the curve from sigma = 0 on, after a check that sigma is about its arc length."""
+def _curve(shape: BSplineCurve, points: Array) -> SplineCurve:
+    """Return the curve of control points, (n, m), from sigma = 0 on."""
     from scipy.interpolate import BSpline  # noqa: PLC0415  (imports in half a second)
 
     spline = BSpline(np.array(shape.knots) - shape.knots[0], points, shape.degree)
     breaks = np.unique(spline.t)
-    speed = np.linalg.norm(spline(breaks, nu=1)[:, : len(site.positions)], axis=1)
-    if not _SLOWEST < np.median(speed) < _FASTEST:
-        problem = "the knots are not in metres along the curve"
-        found = f"a curve that moves by {np.median(speed):.3g} m per unit of its knots"
-        raise PathError(problem, found=found, allowed="about 1", where=f"{site.key}.knots")
     return SplineCurve(spline, float(breaks[-1]), breaks)
 
 
