@@ -31,11 +31,11 @@ from brachis.task import (
 )
 from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.orientation import Quaternion, RollPitchYaw, Rotation, RotationVector, Tangent, ToQuaternion
+from brachis.task.point_data import FileUnits, FitTolerance, PointFile
 from brachis.task.segments import (
     ArcCenter,
     ArcVia,
     Circle,
-    CsvFile,
     LineBy,
     LineHeading,
     LineTo,
@@ -68,8 +68,9 @@ SEGMENTS: dict[str, tuple[type[BaseModel], ...]] = {
     "circle": (Circle,),
     "spline": (SplineThrough,),
     "bspline": (BSplineCurve,),
-    "csv": (CsvFile,),
+    "csv": (PointFile,),
 }
+FILES: dict[str, type[BaseModel]] = {"units": FileUnits, "tolerance": FitTolerance}
 TABLE_HEAD = ("| key | default | meaning |", "|---|---|---|")
 INTRODUCTION = """# Task files
 
@@ -184,24 +185,59 @@ An orientation is written in one of three forms:
 |---|---|
 """
 CSV = """
-## CSV files
+## Files of points
 
-`csv: {file: poses.csv}` is a spline through the rows of a file. Its first line names the columns, in any order;
-lengths are in metres, angles in radians; lines that are empty or begin with `#` are skipped. In task spaces of rows the
-columns are the rows (`x,y`, `x,z,yaw`, ...), and for paths of joints the joints' names. In task spaces of poses they
+`csv: {file: poses.csv}` is a smooth curve along the rows of a file. Its first line names the columns, in any order;
+lines that are empty or begin with `#` are skipped. In task spaces of rows the columns are the rows (`x,y`, `x,z,yaw`,
+...), and for paths of joints the joints' names (rad, m; without `units` and `tolerance`). In task spaces of poses they
 are
 
 - `x,y,z`: positions; the segment's `orientation` says how the tool turns;
 - `x,y,z,qw,qx,qy,qz`: positions and unit quaternions;
-- `x,y,z,rx,ry,rz`: positions and rotation vectors, rad.
+- `x,y,z,rx,ry,rz`: positions and rotation vectors.
 
-The first row is where the segment starts. A segment that starts elsewhere, by more than 1e-4 m or rad, is refused;
-with `relative: true` the rows are moved so that the first one is at the segment's start: displacements keep their
-direction in the world, rotations are those in the tool frame. Where successive rows have the same position, the curve
-would have to stop, and the file is refused, unless the position stands still in the whole file.
+A column `feed` (or `f`, `speed`, `v`) may stand beside them: the speed of the tool on the way to each row. Columns are
+separated by commas, semicolons, tabs or spaces; with all but commas, decimal commas are understood. Units follow names
+(`x_mm`, `X [mm]`, `rx (deg)`, `feed_mm/min`) or are stated by `units`; lengths without a unit are in metres, angles in
+radians, and the unit of speeds must be stated. What was found out about the file is told.
 
-The file is read with the task, and becomes a `spline` with `through`, `orientations`, `starts_at` and
-`starts_oriented`: a saved task does not need it any more.
+The first row is where the segment starts, and where the path begins with `start: free` if the task has no `path_start`.
+A segment that starts elsewhere, by more than 1e-4 m or rad, is refused; with `relative: true` the rows are moved so
+that the first one is at the segment's start: displacements keep their direction in the world, rotations are those in
+the tool frame.
+
+**Without a tolerance** the path passes all rows. Where successive rows have the same position, the curve would have to
+stop, and the file is refused, unless the position stands still in the whole file. Rows that are rounded or scatter so
+much that the curvature of a curve through them is noise are refused with the reason: give a tolerance.
+
+**With a tolerance** the path is a quintic B-spline, C4, within the tolerance of all rows (up to 100,000 and more), with
+few knots, through the first and the last one. Repeated rows are left out and told; spikes and changes of unit are
+refused with their line. Ways five times longer than usual are taken as straight, as CAM means them. Corners are found
+and listed, and rounded by blends within `tolerance.corner`; the tighter, the slower a robot passes them. The distance
+of every row from the curve is measured by a formula that the fit does not use. `brachis inspect TASK` prints what was
+found, `brachis plan` too; `result.fits` and the JSON have it, `brachis plot --kind fit` draws the errors.
+
+```yaml
+start: free
+task_space: pose
+path:
+  - csv:
+      file: seam.csv
+      units: {length: mm, angle: deg}
+      tolerance: {position: 0.05 mm, orientation: 0.1 deg, corner: 0.5 mm}
+      corner: blend
+```
+
+G-code (`.nc`, `.ngc`, `.gcode`, `.tap`) is read likewise: G0 to G3 with I, J, K or R, G17 to G21, G90, G91, F.
+Millimetres are taken where it does not say. What has no say in where the tool goes is skipped and told; cycles, cutter
+compensation and rotary axes are refused.
+
+Feed rates are largest speeds of the tool, from the first to the last row that has one and linear between them; they
+stand beside those of `tool_limits`.
+
+The file is read with the task, and becomes a `spline` or one `bspline` for every stretch between corners: a saved task
+does not need it any more. Arrays take the same way: `brachis.fit_path(points, tolerance=...)` returns the segments of a
+path along positions, 4x4 matrices, SE3 or positions with quaternions, the first one included.
 """
 
 
@@ -244,6 +280,8 @@ def page() -> str:
     profile = ToQuaternion.model_fields["profile"]
     parts += ["\n### `to: {...}`\n", "One of the three forms of an orientation, and\n", *TABLE_HEAD]
     parts += [_row("profile", profile), "\n### `tangent: {...}`\n", *rows(Tangent), CSV.rstrip()]
+    for key, model in FILES.items():
+        parts += [f"\n### `csv.{key}`\n", *rows(model)]
     return "\n".join(parts) + "\n"
 
 

@@ -28,6 +28,7 @@ ORDER = (
     "arrays",
     "deadline",
     "interrupts",
+    "cam",
     "task",
     "robot",
     "custom_limits",

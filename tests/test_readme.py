@@ -177,6 +177,17 @@ def test_example_07():
     check_table("examples/07_find_the_fastest.py", module.markdown_table(results))
 
 
+def test_example_08(tmp_path):
+    figure = tmp_path / "fit.png"
+    result = load(ROOT / "examples/08_cam_seam.py").main(str(figure))
+    (fit,) = result.fits
+    assert result.verified
+    assert fit.points == 20_000
+    assert fit.position_error <= fit.position_tolerance == pytest.approx(0.15e-3)
+    assert len(fit.corners) == 1
+    assert figure.stat().st_size > 1000
+
+
 def test_example_09():
     results = load(ROOT / "examples/09_payload_friction_jerk.py").main()
     assert all(result.verified for result in results.values())

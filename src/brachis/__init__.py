@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from brachis.robot import task_map_of as task_map_of
     from brachis.task import LimitSpec as LimitSpec
     from brachis.task import Task as Task
+    from brachis.task import fit_path as fit_path
     from brachis.task import load_task as load_task
     from brachis.task import read_limits as read_limits
     from brachis.trajectory import Trajectory as Trajectory
@@ -50,6 +51,7 @@ _HOME = {
     "Trajectory": "brachis.trajectory",
     "Verification": "brachis.verify",
     "bspline_segment": "brachis.path",
+    "fit_path": "brachis.task",
     "load_task": "brachis.task",
     "plan": "brachis.planner",
     "read_limits": "brachis.task",
@@ -76,6 +78,7 @@ __all__ = [
     "bottleneck",
     "bspline_segment",
     "compose",
+    "fit_path",
     "load_task",
     "plan",
     "read_limits",

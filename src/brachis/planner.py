@@ -126,7 +126,8 @@ def _plan(
     robot = robot_for(robot, task.robot)
     task = task.model_copy(update={"robot": robot.settings})
     loaded, deadline = time.perf_counter(), Deadline.after(task.search.time_limit)
-    remarks = plausibility.tell(plausibility.of_robot(robot), strict=strict, stacklevel=4)
+    remarks = plausibility.of_robot(robot) + plausibility.of_points(task)
+    remarks = plausibility.tell(remarks, strict=strict, stacklevel=4)
     problem = Problem.of(robot, task, limits)
     places = plausibility.of_places(problem.task_map, problem.start, problem.end, task.path_start)
     remarks += plausibility.tell(places, strict=strict, stacklevel=4)
@@ -141,7 +142,7 @@ def _plan(
     end_time = plausibility.of_end_time(best.t_end, SHORTEST_TIME)
     remarks += plausibility.tell(end_time, strict=strict, stacklevel=4)
     return Result(
-        task=task,
+        task=problem.task,
         trajectory=best.trajectory if least is None else least.trajectory,
         verification=best.verification if least is None else least.verification,
         family=best.start.family,

@@ -12,6 +12,7 @@ import numpy as np
 from brachis.errors import PlausibilityError
 from brachis.robot import Robot, TaskMap
 from brachis.robot.task_map.rows import YAW
+from brachis.task import Task
 
 _TURN = 2.0 * math.pi
 _FASTEST = {"rad": 60.0, "m": 50.0}
@@ -120,6 +121,15 @@ def of_places(
         found = f"{path_start[-1]:.6g} rad"
         remarks.append(Remark("path_start", "yaw looks like degrees", found, "within one turn"))
     return tuple(remarks)
+
+
+def of_points(task: Task) -> tuple[Remark, ...]:
+    """Look at the points that a task's path was fitted to."""
+    return tuple(
+        Remark(f"path: {fit.source}", fit.doubt, f"{fit.length:.4g} m", "a path within the robot's reach")
+        for fit in task.fits
+        if fit.doubt
+    )
 
 
 def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:

@@ -23,7 +23,7 @@ from brachis.kinematics import ChartMap, ClosedFormMap, JointMap, Newton
 from brachis.limits import Limit, limits_of
 from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Boundary, FixedGrid, Grid, Phase, Program
-from brachis.path import Path, check_closed, path_of, path_speed
+from brachis.path import Path, check_closed, path_of, path_speed, with_feed_rates
 from brachis.robot import ROLL_JOINT, Robot, TaskMap, bind
 from brachis.robot.task_map import JointSpace
 from brachis.task import Task
@@ -81,6 +81,7 @@ class Problem:
         start = None if task.start == "free" else robot.posture(task.start.joints, "start.joints")
         end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
         path = path_of(task_map, task)
+        task = with_feed_rates(task, path)
         if task.boundary.periodic:
             check_closed(task_map, path)
             end = start

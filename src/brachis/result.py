@@ -10,7 +10,7 @@ from brachis.least_motion import LeastMotion
 from brachis.plausibility import Remark
 from brachis.robot import in_use
 from brachis.solvers import SolverReport
-from brachis.task import Task
+from brachis.task import FitReport, Task
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
 
@@ -66,6 +66,11 @@ class Result:
         return self.verification.passed
 
     @property
+    def fits(self) -> tuple[FitReport, ...]:
+        """How near the path is to the points that it was fitted to, one for each file or array."""
+        return self.task.fits
+
+    @property
     def report(self) -> SolverReport:
         """Report of the solve that gave the trajectory."""
         return self.attempt.reports[-1]
@@ -90,6 +95,7 @@ class Result:
             "collocation_points": last.collocation_points,
             "time_scaled": last.time_scaled,
             "least_motion": None if self.least_motion is None else self.least_motion.to_dict(),
+            "fits": [fit.to_dict() for fit in self.fits],
             "candidates": [candidate.to_dict() for candidate in self.candidates],
             "interrupted": self.interrupted,
             "undone": list(self.undone),

@@ -11,18 +11,25 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from support.poses import pose_path
+from support.seams import wave
 
 PAGE = Path(__file__).parents[2] / "docs" / "task_files.md"
 EXAMPLES = re.findall(r"^```yaml\n(.*?)^```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
 
 
 def test_there_are_examples() -> None:
-    assert len(EXAMPLES) == 2
+    assert len(EXAMPLES) == 3
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
-def test_examples_are_paths(example: str) -> None:
+def test_examples_are_paths(example: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     content = yaml.safe_load(example)
+    start = np.zeros(3)
+    if "csv" in content["path"][0]:
+        degrees = np.linspace(0.0, 20.0, 200)[:, None] * [0.0, 0.0, 1.0]
+        rows, start = np.hstack([1e3 * wave(200), degrees]), wave(200)[0]
+        np.savetxt("seam.csv", rows, header="x,y,z,rx,ry,rz", delimiter=",", comments="")
     assert content["task_space"] == "pose"
-    path = pose_path(content["path"], np.zeros(3), Rotation.identity())
+    path = pose_path(content["path"], start, Rotation.identity())
     assert np.abs(path.sample([0.0, 0.5, 1.0]).xi[:, 3:]).max() > 0.1

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from brachis.errors import PathError
 from brachis.path import build_path
 from brachis.robot.task_map.rows import POSE_ROWS
-from brachis.task import CsvFile, CsvSegment, LineBy, LineSegment
+from brachis.task import CsvSegment, LineBy, LineSegment, PointFile
 from support.poses import pose, pose_path
 
 RIGHT: dict[str, Any] = {"line": {"by": [1, 0, 0]}}
@@ -176,5 +176,5 @@ def test_the_start_must_be_a_pose() -> None:
 @pytest.mark.parametrize("rows", [POSE_ROWS, ("x", "y", "z")])
 def test_a_csv_file_is_read_before(rows: tuple[str, ...]) -> None:
     start = pose(np.zeros(3), Rotation.identity())[: 12 if rows == POSE_ROWS else 3]
-    with pytest.raises(PathError, match=r"path\[0\].csv.file: the CSV file has not been read; found a.csv"):
-        build_path([CsvSegment(csv=CsvFile(file="a.csv"))], start, rows)
+    with pytest.raises(PathError, match=r"path\[0\].csv.file: the file has not been read; found a.csv"):
+        build_path([CsvSegment(csv=PointFile(file="a.csv"))], start, rows)

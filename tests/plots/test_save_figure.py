@@ -62,7 +62,7 @@ def test_all_text_is_readable_and_inside_the_figure(name, fixture, request):
     figure = PLOTS[name](request.getfixturevalue(fixture))
     figure.draw_without_rendering()
     texts = [text for text in figure.findobj(mpl.text.Text) if text.get_visible() and text.get_text().strip()]
-    assert len(texts) > 5
+    assert len(texts) > 5 or name == "fit", "a path that was not fitted has a figure that says so"
     assert min(text.get_fontsize() for text in texts) >= 6.0
     page = figure.bbox.padded(2.0)
     ticks = {

@@ -15,13 +15,14 @@ from rich.table import Table
 from brachis import ik
 from brachis.cli.joint_table import NONE, joint_rows
 from brachis.cli.output import print_json, result_console
+from brachis.cli.point_inspection import print_points
 from brachis.errors import InputError
 from brachis.plausibility import of_robot
 from brachis.robot import Robot, bind, in_use
 from brachis.robot.from_task import robot_from_settings
 from brachis.robot.task_map.rows import AXES, POSE_ROWS, YAW
 from brachis.robot.urdf import last_common_link, read_file
-from brachis.task import LimitSpec, load_task
+from brachis.task import LimitSpec, Task, load_task
 
 _TASK_FILES = (".yaml", ".yml")
 _PARALLEL = 1e-9
@@ -49,11 +50,13 @@ def inspect_command(
     remarks: list[str] = []
     if source.suffix in _TASK_FILES:
         given = {"--tool-frame": tool_frame, "--base-frame": base_frame, "--lock": lock}
-        robot, space = _of_task(source, [option for option, value in given.items() if value])
+        task = _task_of(source, [option for option, value in given.items() if value])
+        robot = robot_from_settings(task.robot)
     else:
-        robot, space = _of_urdf(source, tool_frame or _tool(source, remarks), base_frame, lock), None
-    space = _space(task_space) if task_space else space or _natural_space(robot, remarks)
-    robot, rows = bind(robot, space)
+        task = None
+        robot = _of_urdf(source, tool_frame or _tool(source, remarks), base_frame, lock)
+    asked: str | Sequence[str] | None = None if task is None else task.task_space
+    robot, rows = bind(robot, _space(task_space) if task_space else asked or _natural_space(robot, remarks))
     remarks += [f"warning: {remark}" for remark in of_robot(robot)]
     joints, acting = joint_rows(robot), in_use(robot)
     candidates = ik.find_all(robot, rows)
@@ -73,6 +76,7 @@ def inspect_command(
                 "in_use": acting,
                 "joints": joints,
                 "decompositions": decompositions,
+                "fits": [fit.to_dict() for fit in task.fits] if task else [],
             }
         )
         return
@@ -84,6 +88,8 @@ def inspect_command(
     console.print(_table("joints", [{key: row[key] for key in shown} for row in joints]))
     for name, text in acting.items():
         console.print(f"{name}: {text}")
+    if task:
+        print_points(console, task)
     r = robot.n - rows.m
     console.print(f"task space [{', '.join(rows.rows)}]: degree of redundancy {r}")
     if r < 0:
@@ -92,13 +98,12 @@ def inspect_command(
     _print_decompositions(console, decompositions)
 
 
-def _of_task(path: Path, options: Sequence[str]) -> tuple[Robot, str | Sequence[str]]:
-    """Make the robot of a task file; its task space besides."""
+def _task_of(path: Path, options: Sequence[str]) -> Task:
+    """Read a task file, beside which no options are given."""
     if options:
         hint = "Leave the option away, or inspect the URDF"
         raise InputError("is for URDFs; a task says it itself", where=options[0], hint=hint)
-    task = load_task(path)
-    return robot_from_settings(task.robot), task.task_space
+    return load_task(path)
 
 
 def _of_urdf(path: Path, tool_frame: str, base_frame: str | None, lock: list[str]) -> Robot:

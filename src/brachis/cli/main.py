@@ -87,8 +87,8 @@ def plan(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for result.npz, result.json, overview.png and candidates.png; of a motion that fails the "
-            "verification the names begin with unverified."
+            help="Folder for result.npz, result.json, overview.png and candidates.png (and fit.png, where the path was "
+            "fitted to points); of a motion that fails the verification the names begin with unverified."
         ),
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
@@ -196,7 +196,8 @@ def inspect(
     source: Annotated[
         Path,
         typer.Argument(
-            help="URDF file, or a task file (.yaml): the robot as the task has it, with the limits and masses in use.",
+            help="URDF file, or a task file (.yaml): the robot as the task has it, with the limits and masses in use, "
+            "and the points that its path follows.",
             metavar="URDF|TASK",
         ),
     ],

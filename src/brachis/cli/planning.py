@@ -27,10 +27,10 @@ from brachis.result import Result
 from brachis.search.record import SAME_MOTION
 
 _FILES = {
-    True: ("result.npz", "result.json", "overview.png", "candidates.png"),
-    False: ("unverified.npz", "unverified.json", "unverified.png", "unverified_candidates.png"),
+    True: ("result.npz", "result.json", "overview.png", "candidates.png", "fit.png"),
+    False: ("unverified.npz", "unverified.json", "unverified.png", "unverified_candidates.png", "unverified_fit.png"),
 }
-"""Names of the trajectory, the figures of merit, the drawings of motion and search, by whether it was verified."""
+"""Names of the trajectory, the figures of merit, the drawings of motion, search and fit, by whether it was verified."""
 _MANY = 40
 """Candidates that are listed on the screen."""
 
@@ -61,9 +61,9 @@ def _write(result: Result, data: dict[str, object], out: Path) -> Written:
 
     Files of an earlier plan with the other names are removed: they would be another motion's.
     """
-    from brachis.plots import plot_candidates, plot_overview, save_figure  # noqa: PLC0415  (matplotlib takes 0.7 s)
+    from brachis.plots import plot_candidates, plot_fit, plot_overview, save_figure  # noqa: PLC0415  (matplotlib takes 0.7 s)
 
-    trajectory, figures_of_merit, overview, candidates = _FILES[result.verified]
+    trajectory, figures_of_merit, overview, candidates, fit = _FILES[result.verified]
     results: dict[str, Writer] = {
         trajectory: result.trajectory.save,
         figures_of_merit: lambda path: write_text(json_text(data), path),
@@ -72,7 +72,9 @@ def _write(result: Result, data: dict[str, object], out: Path) -> Written:
         overview: lambda path: save_figure(plot_overview(result.trajectory), path),
         candidates: lambda path: save_figure(plot_candidates(result.candidates), path),
     }
-    return write_files(out, results, figures, stale=_FILES[not result.verified])
+    if any(told.profile for told in result.fits):
+        figures[fit] = lambda path: save_figure(plot_fit(result.trajectory), path)
+    return write_files(out, results, figures, stale=(*_FILES[not result.verified], fit))
 
 
 def _show(result: Result, data: dict[str, Any]) -> None:
@@ -103,6 +105,8 @@ def _show(result: Result, data: dict[str, Any]) -> None:
     for name, value in rows.items():
         table.add_row(name, value)
     console.print(table)
+    for fit in result.fits:
+        console.print(f"path from {fit}")
     if len(result.candidates) > 1:
         console.print(_candidates_table(result))
     console.print(verification_table(result.verification))

@@ -29,6 +29,7 @@ from brachis.ik.prismatic import prismatic
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError
 from brachis.ik.spherical_wrist import spherical_wrist
 from brachis.robot import Robot, TaskMap
+from brachis.robot.task_map import JointSpace
 
 BUILTIN: tuple[Family, ...] = (prismatic, planar, positioning, spherical_wrist, parallel_axes, eaik, polynomial)
 
@@ -137,9 +138,9 @@ def find(robot: Robot, task_map: TaskMap, redundant_joints: Sequence[str], *, fa
 
 
 def find_all(robot: Robot, task_map: TaskMap, *, families: Sequence[Family] = ()) -> list[Candidate]:
-    """Try every choice of redundant joints; see `find`."""
+    """Try every choice of redundant joints; see `find`. Paths of joints need no closed form."""
     r = robot.n - task_map.m
-    if r < 0:
+    if r < 0 or isinstance(task_map, JointSpace):
         return []
     ideals = _ideals(robot, task_map)
     return [_try(robot, task_map, names, families, ideals) for names in itertools.combinations(robot.joint_names, r)]

@@ -10,6 +10,8 @@ _RAMP = 5e-3
 """Length of a ramp in s: Newton's steps need a slope."""
 _SHARE = 0.4
 """Part of the way to the next place that a ramp takes at most."""
+_BEYOND = 20.0
+"""Times the speed at its end, up to which a table that ends there goes on rising within a ramp."""
 
 
 class SpeedTable:
@@ -21,16 +23,20 @@ class SpeedTable:
         Ascending; a place that occurs twice is a step.
     speed : (P,) sequence of float
         m/s.
+    whole : bool, optional
+        Whether the first and the last speed hold beyond their places too; otherwise nothing does there.
 
     Attributes
     ----------
     places : (p,) ndarray
         Path coordinates between which the speed is linear, each once.
     speeds : (p,) ndarray
-        m/s, nowhere above the given ones.
+        m/s; between the given places nowhere above the given ones.
+    largest : float
+        Of the given ones, m/s.
     """
 
-    def __init__(self, s: Sequence[float], speed: Sequence[float]) -> None:
+    def __init__(self, s: Sequence[float], speed: Sequence[float], *, whole: bool = True) -> None:
         places, speeds = np.array(s, dtype=float), np.array(speed, dtype=float)
         given, steps = places.copy(), np.flatnonzero(np.diff(places) == 0.0)
         for first in steps.tolist():
@@ -45,7 +51,12 @@ class SpeedTable:
             places[moved] += onwards * length
             speeds[moved] += share * (speed[beyond] - speed[moved])
         kept = _bends(places, speeds)
-        self.places, self.speeds = places[kept], speeds[kept]
+        self.places, self.speeds, self._whole = places[kept], speeds[kept], whole
+        self.largest = float(self.speeds.max())
+        if not whole:
+            first, last = self.places[[0, -1]]
+            self.places = np.concatenate([[first - _RAMP], self.places, [last + _RAMP]])
+            self.speeds = np.concatenate([self.speeds[:1] * _BEYOND, self.speeds, self.speeds[-1:] * _BEYOND])
 
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Largest speeds, (K,), m/s, at path coordinates s, (K,), and their derivatives by s; none off the path."""
@@ -53,7 +64,9 @@ class SpeedTable:
             return np.full(len(s), self.speeds[0]), np.zeros(len(s))
         slopes = np.concatenate([[0.0], np.diff(self.speeds) / np.diff(self.places), [0.0]])
         piece = np.searchsorted(self.places, s, side="right")
-        return np.where(np.isnan(s), np.inf, np.interp(s, self.places, self.speeds)), slopes[piece]
+        beyond = (s < self.places[0]) | (s > self.places[-1])
+        nowhere = np.isnan(s) | (beyond & (not self._whole))
+        return np.where(nowhere, np.inf, np.interp(s, self.places, self.speeds)), slopes[piece]
 
 
 def _bends(places: np.ndarray, speeds: np.ndarray) -> np.ndarray:

@@ -132,7 +132,7 @@ def fitted(phase: Phase, duration: float, t_norm: np.ndarray, wanted: np.ndarray
 
 
 def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
-    """Scale the time until velocity, acceleration and torque limits just hold, or are exceeded least where no time does.
+    """Scale the time until velocity, acceleration and torque limits just hold, or are exceeded least if they cannot.
 
     Far above the least time no limit is active, and a solver that has seen no curvature creeps towards it. Where an arm
     passes postures that it cannot hold, long times do not hold the limits either.

@@ -2,6 +2,7 @@
 
 from brachis.path.build import build_path
 from brachis.path.ends import check_closed, path_speed
+from brachis.path.feed_table import with_feed_rates
 from brachis.path.from_curve import bspline_segment
 from brachis.path.origin import check_on_path, path_of
 from brachis.path.pose import PosePath
@@ -21,4 +22,5 @@ __all__ = [
     "check_on_path",
     "path_of",
     "path_speed",
+    "with_feed_rates",
 ]

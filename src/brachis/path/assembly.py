@@ -42,13 +42,13 @@ def join_curves(curves: Sequence[Curve], blends: Sequence[float | None], coordin
     for join, curve, following, size in zip(joins, curves, curves[1:], blends, strict=False):
         if size is None:
             corners.append(coordinates.corner(join, curve, following))
-            pieces.append(Piece(curve, taken, curve.length))
+            pieces.append(Piece(curve, taken, curve.length, join.index))
             taken = 0.0
         else:
             rounded = coordinates.blend(curve, following, size, join)
-            pieces += [Piece(curve, taken, curve.length - size), Piece(rounded, 0.0, rounded.length)]
+            pieces += [Piece(curve, taken, curve.length - size, join.index), Piece(rounded, 0.0, rounded.length)]
             taken = size
-    pieces.append(Piece(curves[-1], taken, curves[-1].length))
+    pieces.append(Piece(curves[-1], taken, curves[-1].length, len(curves) - 1))
     refuse_corners([corner for corner in corners if corner is not None])
     # Two blends that meet in the middle of a segment leave nothing of it, but rounding.
     kept = tuple(piece for piece in pieces if piece.length > _NOTHING * piece.curve.length)

@@ -1,4 +1,4 @@
-"""Curves that are given as B-splines."""
+"""B-spline curves that are given by knots and control points."""
 
 from __future__ import annotations
 
@@ -7,36 +7,83 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import PathError
-from brachis.path.site import Site, place
-from brachis.path.spline import SplineCurve, starts_elsewhere
+from brachis.path.pose import POSITIONS, QuaternionPoseCurve
+from brachis.path.rotations import quaternions_of, rotation_of
+from brachis.path.spline import START_TOLERANCE, SplineCurve, starts_elsewhere
 
 if TYPE_CHECKING:
+    from brachis.path.protocol import Array
+    from brachis.path.site import Site
     from brachis.task import BSplineCurve
 
-_STARTS_AT = 1e-6
-"""How far the start may be from the curve's own, m and rad: the digits that a posture is written with."""
+POSE_COLUMNS = 7
+"""Of control points with quaternions."""
 
 
 def bspline_curve(shape: BSplineCurve, site: Site) -> SplineCurve:
-    """Return the curve of control points, moved so that it begins where the segment starts.
+    """Return the curve, moved to the segment's start: it keeps its form to the last digit of the start.
 
     Raises
     ------
     PathError
-        A control point has the wrong number of coordinates, or the curve begins elsewhere.
+        Control points are all the same or have the wrong number of coordinates, or the curve starts elsewhere than the
+        segment.
     """
-    # Imported here: it takes half a second, which tasks without a spline need not wait for.
-    from scipy.interpolate import BSpline  # noqa: PLC0415
-
-    points = np.array(
-        [site.coordinates(point, f"control_points[{i}]", site.rows) for i, point in enumerate(shape.control_points)]
-    )
-    off = site.start - points[0]
-    if not shape.relative and np.abs(off).max() > _STARTS_AT:
-        own = place(site.rows, points[0])
-        raise starts_elsewhere(f"{site.key}.control_points[0]", f"{site.describe()}, not {own}", _STARTS_AT)
-    knots = np.array(shape.knots) - shape.knots[0]
-    curve = SplineCurve(BSpline(knots, points + off, shape.degree), float(knots[-1]), np.unique(knots))
+    first = site.coordinates(shape.control_points[0], "control_points[0]", site.rows)
+    points, off = np.array(shape.control_points), site.start - first
+    if not shape.relative:
+        _check_start(off[: len(site.positions)], off[len(site.positions) :], site)
     if not np.ptp(points, axis=0).any():
         raise PathError("the segment has zero length", allowed="control points that differ", where=site.key)
-    return curve
+    return _curve(shape, points + off)
+
+
+def pose_bspline(shape: BSplineCurve, site: Site, rotation: Array) -> QuaternionPoseCurve:
+    """Return the curve of poses, moved and turned to the segment's start.
+
+    Parameters
+    ----------
+    shape : BSplineCurve
+        Control points with quaternions.
+    site : Site
+        Place of the segment, in three position rows.
+    rotation : ndarray, shape (3, 3)
+        Rotation matrix of the tool at the segment's start.
+
+    Raises
+    ------
+    PathError
+        The curve starts elsewhere than the segment.
+    """
+    points = np.array(shape.control_points)
+    first = points[0, POSITIONS:] / np.linalg.norm(points[0, POSITIONS:])
+    turn = _product(quaternions_of(rotation_of(rotation)), first * [1.0, -1.0, -1.0, -1.0])
+    off = site.start - points[0, :POSITIONS]
+    if not shape.relative:
+        _check_start(off, 2.0 * turn[1:], site)
+    points[:, :POSITIONS] += off
+    points[:, POSITIONS:] = _product(turn, points[:, POSITIONS:])
+    return QuaternionPoseCurve(_curve(shape, points))
+
+
+def _check_start(off: Array, turned: Array, site: Site) -> None:
+    for away, unit in ((off, "m"), (turned, "rad")):
+        distance = float(np.linalg.norm(away))
+        if distance > START_TOLERANCE:
+            raise starts_elsewhere(f"{site.key}.control_points[0]", f"{site.describe()}, {distance:.4g} {unit} off")
+
+
+def _curve(shape: BSplineCurve, points: Array) -> SplineCurve:
+    """Return the curve of control points, (n, m), from sigma = 0 on."""
+    from scipy.interpolate import BSpline  # noqa: PLC0415  (imports in half a second)
+
+    spline = BSpline(np.array(shape.knots) - shape.knots[0], points, shape.degree)
+    breaks = np.unique(spline.t)
+    return SplineCurve(spline, float(breaks[-1]), breaks)
+
+
+def _product(one: Array, other: Array) -> Array:
+    """Return the products, (..., 4), of quaternions (w, x, y, z)."""
+    w, v = one[..., :1], one[..., 1:]
+    scalar = w * other[..., :1] - np.sum(v * other[..., 1:], axis=-1, keepdims=True)
+    return np.concatenate([scalar, w * other[..., 1:] + other[..., :1] * v + np.cross(v, other[..., 1:])], axis=-1)

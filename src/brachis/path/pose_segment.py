@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import PathError
+from brachis.path.bspline import POSE_COLUMNS, pose_bspline
 from brachis.path.line import LineCurve
 from brachis.path.orientation import orientation_along
 from brachis.path.pose import POSITIONS, PoseCurve, rotations
@@ -15,7 +16,7 @@ from brachis.path.shapes import curve_of
 from brachis.path.site import ZERO_LENGTH, Site
 from brachis.path.turns import turn_of
 from brachis.robot.task_map.rows import AXES
-from brachis.task import SplineThrough, TurnSegment
+from brachis.task import BSplineCurve, SplineThrough, TurnSegment
 
 if TYPE_CHECKING:
     from brachis.path.protocol import Array, Curve
@@ -54,5 +55,7 @@ def pose_curve(segment: Segment, index: int, start: Array) -> Curve:
     shape = segment.shape
     if isinstance(shape, SplineThrough) and shape.orientations is not None:
         return pose_spline(shape, shape.orientations, site, rotation)
+    if isinstance(shape, BSplineCurve) and len(shape.control_points[0]) == POSE_COLUMNS:
+        return pose_bspline(shape, site, rotation)
     curve = curve_of(shape, site)
     return PoseCurve(curve, orientation_along(segment.orientation, curve, rotation, f"path[{index}].orientation"))

@@ -19,11 +19,12 @@ _QUADRATURE_POINTS = 16
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """The part of a curve between sigma = `first` and sigma = `last`."""
+    """The part of a curve between sigma = `first` and sigma = `last`; of which segment, or None for a blend."""
 
     curve: Curve
     first: float
     last: float
+    segment: int | None = None
 
     @property
     def length(self) -> float:

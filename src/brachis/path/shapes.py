@@ -10,7 +10,17 @@ from brachis.path.arc import arc_center, arc_via, circle
 from brachis.path.bspline import bspline_curve
 from brachis.path.line import line_by, line_heading, line_to
 from brachis.path.spline import spline_through
-from brachis.task import ArcCenter, ArcVia, BSplineCurve, Circle, CsvFile, LineBy, LineHeading, LineTo, SplineThrough
+from brachis.task import (
+    ArcCenter,
+    ArcVia,
+    BSplineCurve,
+    Circle,
+    LineBy,
+    LineHeading,
+    LineTo,
+    PointFile,
+    SplineThrough,
+)
 
 if TYPE_CHECKING:
     from brachis.path.protocol import Curve
@@ -18,10 +28,10 @@ if TYPE_CHECKING:
     from brachis.task import Shape
 
 
-def _unread(shape: CsvFile, site: Site) -> NoReturn:
-    problem = "the CSV file has not been read"
-    hint = "brachis.load_task reads it and makes a spline of it"
-    raise PathError(problem, found=shape.file, allowed="a spline", where=f"{site.key}.file", hint=hint)
+def _unread(shape: PointFile, site: Site) -> NoReturn:
+    problem = "the file has not been read"
+    hint = "brachis.load_task reads it and makes a curve of it"
+    raise PathError(problem, found=shape.file, allowed="a curve", where=f"{site.key}.file", hint=hint)
 
 
 BUILDERS: Final[dict[type[Shape], Callable[[Any, Site], Curve]]] = {
@@ -33,7 +43,7 @@ BUILDERS: Final[dict[type[Shape], Callable[[Any, Site], Curve]]] = {
     Circle: circle,
     SplineThrough: spline_through,
     BSplineCurve: bspline_curve,
-    CsvFile: _unread,
+    PointFile: _unread,
 }
 """For every form of segment, the function that makes its curve."""
 

@@ -84,13 +84,13 @@ def waypoints_of(shape: SplineThrough, site: Site) -> Array:
     return np.stack([site.start, *points])
 
 
-def starts_elsewhere(where: str, found: str, allowed: float = START_TOLERANCE) -> PathError:
+def starts_elsewhere(where: str, found: str) -> PathError:
     """Return the error that a segment does not start where its waypoints expect."""
     problem = "the segment starts elsewhere than its waypoints expect"
     return PathError(
         problem,
         found=found,
-        allowed=f"at most {allowed:g} m and rad off",
+        allowed=f"at most {START_TOLERANCE:g} m and rad off",
         where=where,
         hint="Set relative: true to count from the segment's start, or begin the path there",
     )

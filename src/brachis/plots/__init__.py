@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from brachis.plots.candidates import plot_candidates
 from brachis.plots.comparison import plot_comparison
+from brachis.plots.fit import plot_fit
 from brachis.plots.limits import plot_limits
 from brachis.plots.motion import plot_motion
 from brachis.plots.overview import plot_overview
@@ -30,6 +31,7 @@ PLOTS: dict[str, Callable[[Trajectory], Figure]] = {
     "overview": plot_overview,
     "timeline": plot_timeline,
     "limits": plot_limits,
+    "fit": plot_fit,
 }
 """Plots of one trajectory by name; `plot_comparison` compares many, `plot_candidates` draws a search."""
 
@@ -39,6 +41,7 @@ __all__ = [
     "check_suffix",
     "plot_candidates",
     "plot_comparison",
+    "plot_fit",
     "plot_limits",
     "plot_motion",
     "plot_overview",

@@ -11,7 +11,6 @@ from brachis import ik
 from brachis.attempt import Attempt
 from brachis.errors import BrachisError, PathError, PlanningError
 from brachis.problem import Decomposition, Problem
-from brachis.robot.task_map import JointSpace
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.reach import reason_out_of_reach
 from brachis.task import SolverSettings, Task
@@ -121,7 +120,7 @@ def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
 
 def _what_is_missing(problem: Problem) -> str:
     """Say which further choices of redundant joints EAIK might add where it is not installed."""
-    if problem.task.redundant_joints != "auto" or isinstance(problem.task_map, JointSpace):
+    if problem.task.redundant_joints != "auto":
         return ""
     missing = ik.missing_eaik(ik.find_all(problem.robot, problem.task_map))
     return f". {missing}" if missing else ""

@@ -1,5 +1,6 @@
 """What is asked: the task file as frozen models, its loader and its schema. No numerics."""
 
+from brachis.task.arrays import fit_path
 from brachis.task.boundary import BoundarySettings
 from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.limits_file import LimitsFile, read_limits
@@ -27,6 +28,7 @@ from brachis.task.orientation import (
     ToRotationVector,
     TurnTo,
 )
+from brachis.task.point_data import FileUnits, FitReport, FitTolerance, PointFile
 from brachis.task.robot_models import FROM_URDF, FrictionSettings, LimitScale, LimitSpec, RobotSettings
 from brachis.task.schema import json_schema
 from brachis.task.segments import (
@@ -36,7 +38,6 @@ from brachis.task.segments import (
     BSplineSegment,
     Circle,
     CircleSegment,
-    CsvFile,
     CsvSegment,
     LineBy,
     LineHeading,
@@ -64,8 +65,10 @@ __all__ = [
     "BoundarySettings",
     "Circle",
     "CircleSegment",
-    "CsvFile",
     "CsvSegment",
+    "FileUnits",
+    "FitReport",
+    "FitTolerance",
     "FrictionSettings",
     "InertiaMatrix",
     "LimitScale",
@@ -78,6 +81,7 @@ __all__ = [
     "MovingSegment",
     "Payload",
     "Placement",
+    "PointFile",
     "Posture",
     "ProcessSpeed",
     "Quaternion",
@@ -105,6 +109,7 @@ __all__ = [
     "TurnSegment",
     "TurnTo",
     "check_robot_settings",
+    "fit_path",
     "json_schema",
     "load_task",
     "read_limits",

@@ -1,4 +1,4 @@
-"""Curves that a task file gives as B-splines."""
+"""Curves that a task gives as B-splines; fits to points become such curves."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from brachis.task.fields import Count, Flag, Model, Name, Number, Vector, refuse
+from brachis.task.fields import Count, Flag, Model, Name, Number, Positive, Vector, refuse
+from brachis.task.point_data import FitReport
 
 JointOrder = Annotated[
     tuple[Name, ...] | None,
@@ -19,20 +20,31 @@ _SMOOTH = 3
 class BSplineCurve(Model):
     """A clamped B-spline, three times continuously differentiable; `brachis.bspline_segment` makes one of a curve."""
 
-    degree: Count = Field(ge=4, le=15, description="Degree.")
-    knots: Annotated[tuple[Number, ...], Field(min_length=2)] = Field(
-        description="Knots, ascending: the first and the last one degree + 1 times, others up to degree - 3 times."
+    degree: Annotated[Count, Field(ge=_SMOOTH + 1, le=15)] = Field(default=5, description="Degree.")
+    knots: Vector = Field(
+        description="Knots, ascending: the first and the last one degree + 1 times, others up to degree - 3 times; "
+        "in m along the curve, where blends and speeds are to be so."
     )
-    control_points: Annotated[tuple[Vector, ...], Field(min_length=2)] = Field(
-        description="Control points: all rows of the task space each (m, yaw in rad); the first one is the segment's "
-        "start."
+    control_points: Annotated[tuple[Vector, ...], Field(min_length=_SMOOTH + 2)] = Field(
+        description="Control points: all rows of the task space (m, yaw in rad); in task spaces of poses x, y, z, or "
+        "x, y, z, qw, qx, qy, qz, whose orientation is that of the quaternion divided by its length."
     )
-    relative: Flag = Field(default=False, description="Whether the curve is moved to the segment's start.")
+    relative: Flag = Field(
+        default=False, description="Whether the curve is moved to the segment's start, wherever that is; as for csv."
+    )
     joints: JointOrder = None
+    speeds: tuple[tuple[tuple[Number, Positive], ...], ...] = Field(
+        default=(),
+        description="Tables of the speed of the tool that is prescribed along the curve: [m along it, m/s], linear in "
+        "between; where there is none, none is prescribed.",
+    )
+    fit: FitReport | None = Field(default=None, description="What the curve was fitted to; written by brachis.")
 
     @model_validator(mode="after")
     def _knots_fit(self) -> BSplineCurve:
         knots, outer = self.knots, self.degree + 1
+        if len({len(point) for point in self.control_points}) > 1:
+            raise refuse("control points differ in their number of coordinates", key=".control_points", allowed="one")
         if len(knots) != len(self.control_points) + outer:
             allowed = f"{len(self.control_points) + outer}: control points + degree + 1"
             raise refuse("wrong number of knots", key=".knots", found=len(knots), allowed=allowed)

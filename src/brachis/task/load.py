@@ -99,9 +99,25 @@ def _task_from(content: object, source: str, folder: Path) -> Task:
     except RecursionError:
         problem = "the task contains itself (a YAML alias inside its own anchor)"
         raise TaskError(problem, where=source) from None
-    task = expand_csv_files(task, source, folder)
+    task = _with_start(expand_csv_files(task, source, folder), source)
     if task.robot.urdf is None:
         return task
     # Not Path.resolve: a linked folder keeps its name, beside which the URDF's meshes may be.
     urdf = os.path.abspath(folder / task.robot.urdf)  # noqa: PTH100
     return task.model_copy(update={"robot": task.robot.model_copy(update={"urdf": urdf})})
+
+
+def _with_start(task: Task, source: str) -> Task:
+    """Fill in where the path begins, if its first segment says so and the task does not.
+
+    Raises
+    ------
+    TaskError
+        Neither does, and the start posture is free.
+    """
+    if task.start != "free" or task.path_start is not None:
+        return task
+    try:
+        return Task.model_validate(task.model_copy(update={"path_start": task.begins}))
+    except ValidationError as error:
+        raise task_error(error, source, Task) from None

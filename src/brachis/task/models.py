@@ -11,9 +11,11 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, Field, JsonValue, Tag, field_validator, model_validator
 
 from brachis.task.boundary import BoundarySettings
+from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.fields import Count, Flag, Model, Name, Number, Positive, Share, by_form, refuse
+from brachis.task.point_data import FitReport
 from brachis.task.robot_models import JointValues, RobotSettings
-from brachis.task.segments import Segment
+from brachis.task.segments import CsvSegment, Segment, SplineThrough
 from brachis.task.tool_limits import ToolLimits
 
 Row = Literal["x", "y", "z", "yaw"]
@@ -21,6 +23,7 @@ _Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll", "joints
 POSITION_ROWS: Final[tuple[Row, ...]] = ("x", "y", "z")
 _SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll, joints"
 _VANISHING: Final = {"velocity": 1, "full": 2, "jerk": 3}
+_POSE_NUMBERS = 7
 
 
 def _expand_position(space: _Space) -> _Space:
@@ -215,7 +218,7 @@ class Task(Model):
         default=None,
         description="Where the path begins: all rows of the task space (m, yaw in rad); of a pose the position and a "
         "quaternion w, x, y, z. Null: where the start posture's tool is; otherwise a start posture whose tool is "
-        "elsewhere is refused. With start: free it must be given.",
+        "elsewhere is refused. With start: free it must be given, unless a file's first row says it.",
     )
     end: FreePosture = Field(
         default="free",
@@ -271,7 +274,9 @@ class Task(Model):
 
     @model_validator(mode="after")
     def _free_start_needs_a_place(self) -> Task:
-        if self.start == "free" and self.path_start is None:
+        first = self.path[0]
+        unread = isinstance(first, CsvSegment) and not first.csv.relative
+        if self.start == "free" and self.path_start is None and not unread and self.begins is None:
             problem = "a free start posture leaves open where the path begins"
             pose = isinstance(self.task_space, str)
             rows = (*POSITION_ROWS, "qw", "qx", "qy", "qz") if pose else self.task_space
@@ -304,6 +309,19 @@ class Task(Model):
                     problem = "a path of joints leaves no choice of postures"
                     raise refuse(problem, key=key, found=given, allowed=f"{default}, with task_space: joints")
         return self
+
+    @property
+    def begins(self) -> tuple[float, ...] | None:
+        """Where the first segment says that the path begins, as `path_start`; None where it leaves that open."""
+        place, poses = self.path[0].begins, isinstance(self.task_space, str) and self.task_space != "joints"
+        return None if place is None or (poses and len(place) != _POSE_NUMBERS) else place
+
+    @property
+    def fits(self) -> tuple[FitReport, ...]:
+        """Where the path comes from points, one for each file or array: what they were, and how near it is to them."""
+        shapes = (getattr(segment, segment.kind) for segment in self.path)
+        curves = (shape.fit for shape in shapes if isinstance(shape, SplineThrough | BSplineCurve))
+        return tuple(fit for fit in curves if fit is not None)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the task as plain mappings, lists, numbers and strings.

@@ -14,8 +14,9 @@ from typing import Annotated, Literal
 from pydantic import Field, Tag, field_validator, model_validator
 
 from brachis.task.bspline_curve import BSplineCurve, JointOrder
-from brachis.task.fields import Flag, Model, Name, NonNegative, Number, Positive, Vector, by_key, refuse
-from brachis.task.orientation import Attitude, OrientationMode, Turning
+from brachis.task.fields import Flag, Model, NonNegative, Number, Positive, Vector, by_key, refuse
+from brachis.task.orientation import Attitude, OrientationMode, Quaternion, Turning
+from brachis.task.point_data import FitReport, PointFile
 
 Yaw = Annotated[
     Literal["fixed", "tangent"],
@@ -25,6 +26,7 @@ Normal = Annotated[
     tuple[Number, Number, Number] | None,
     Field(description="Axis of rotation, for three position rows; right-hand rule. Any length but zero."),
 ]
+_POSE_COLUMNS = 7
 Centre = Annotated[Vector, Field(description="Centre, m: the position rows, without yaw.")]
 
 
@@ -108,7 +110,7 @@ class SplineThrough(Model):
     starts_oriented: Attitude | None = Field(
         default=None, description="As `starts_at`, the orientation of the tool; beside `orientations`."
     )
-
+    fit: FitReport | None = Field(default=None, description="Where the waypoints come from; written by brachis.")
     joints: JointOrder = None
 
     @model_validator(mode="after")
@@ -122,19 +124,6 @@ class SplineThrough(Model):
             allowed = f"{len(self.through)}, as there are waypoints in through"
             raise refuse(problem, key=".orientations", found=len(self.orientations), allowed=allowed)
         return self
-
-
-class CsvFile(Model):
-    """A smooth curve through waypoints from a file; `brachis.task.load_task` reads it and makes a spline of it."""
-
-    file: Name = Field(
-        description="CSV file, relative to the task file's folder; its first row is where the segment starts."
-    )
-    relative: Flag = Field(
-        default=False,
-        description="Whether the rows count from the first one, so that the path may start anywhere: displacements "
-        "along the world axes, rotations in the tool frame.",
-    )
 
 
 Line = Annotated[
@@ -153,7 +142,7 @@ Arc = Annotated[
         {"ArcCenter": ("center", "angle_deg"), "ArcVia": ("via", "to")},
     ),
 ]
-Shape = LineTo | LineBy | LineHeading | ArcCenter | ArcVia | Circle | SplineThrough | BSplineCurve | CsvFile
+Shape = LineTo | LineBy | LineHeading | ArcCenter | ArcVia | Circle | SplineThrough | BSplineCurve | PointFile
 
 
 class SegmentModel(Model):
@@ -163,6 +152,11 @@ class SegmentModel(Model):
         default=None,
         description="Rounds the corner at the END of this segment: metres taken from it and from the next one.",
     )
+
+    @property
+    def begins(self) -> tuple[float, ...] | None:
+        """Where the segment says that it begins: the rows of the task space; of poses position and quaternion."""
+        return None
 
     @property
     def kind(self) -> str:
@@ -209,6 +203,14 @@ class SplineSegment(MovingSegment):
 
     spline: SplineThrough
 
+    @property
+    def begins(self) -> tuple[float, ...] | None:
+        """See `SegmentModel.begins`."""
+        place, oriented = self.spline.starts_at, self.spline.starts_oriented
+        if self.spline.relative or place is None:
+            return None
+        return (*place, *oriented.quaternion) if isinstance(oriented, Quaternion) else place
+
     @model_validator(mode="after")
     def _one_word_on_orientation(self) -> SplineSegment:
         if self.orientation is not None and self.spline.orientations is not None:
@@ -217,22 +219,36 @@ class SplineSegment(MovingSegment):
         return self
 
 
-class BSplineSegment(MovingSegment):
-    """A curve that is given as a B-spline."""
-
-    bspline: BSplineCurve
-
-
 class TurnSegment(SegmentModel):
     """A turn of the tool on the spot, in task spaces of poses."""
 
     turn: Turning
 
 
-class CsvSegment(MovingSegment):
-    """A smooth curve through waypoints from a file."""
+class BSplineSegment(MovingSegment):
+    """A B-spline curve."""
 
-    csv: CsvFile
+    bspline: BSplineCurve
+
+    @property
+    def begins(self) -> tuple[float, ...] | None:
+        """See `SegmentModel.begins`."""
+        return None if self.bspline.relative else self.bspline.control_points[0]
+
+    @model_validator(mode="after")
+    def _one_word_on_orientation(self) -> BSplineSegment:
+        if self.orientation is not None and len(self.bspline.control_points[0]) == _POSE_COLUMNS:
+            problem = "the curve's quaternions say already how the tool turns"
+            raise refuse(
+                problem, key=".orientation", allowed="orientation or control points with quaternions, not both"
+            )
+        return self
+
+
+class CsvSegment(MovingSegment):
+    """A smooth curve along points from a file."""
+
+    csv: PointFile
 
 
 Segment = Annotated[

@@ -86,6 +86,11 @@ class ToolLimits(Model):
         description="Largest speed, m/s, for the whole path; or a table over the path, {s: [...], speed: [...]}. "
         "Null: none.",
     )
+    feed: tuple[SpeedTable, ...] = Field(
+        default=(),
+        description="Tables of largest speeds over parts of the path, and none beyond their first and last places; "
+        "written by brachis from the feed rates of the path's points.",
+    )
     acceleration: Speed | None = Field(default=None, description="Largest acceleration, m/s^2. Null: none.")
     angular_speed: Speed | None = Field(
         default=None,

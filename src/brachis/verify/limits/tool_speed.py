@@ -13,29 +13,36 @@ from brachis.verify.motion import States
 
 
 def worst(given: Given) -> Worst | None:
-    """Find the largest ratio of the tool's speed, at the states and between them; at the places of a table too."""
-    limit, robot = given.trajectory.task.tool_limits.speed, given.robot
-    if limit is None:
+    """Find the largest ratio of the tool's speed, at the states and between them; at the places of tables too."""
+    limits, robot = given.trajectory.task.tool_limits, given.robot
+    stated, feed = limits.speed, limits.feed
+    if stated is None and not feed:
         return None
-    if not isinstance(limit, SpeedTable):
-        figure = limit
-        return worst_between(given, lambda states: speeds(robot, states) / figure, ("tool",))
-    places, figures = np.array(limit.s), np.array(limit.speed)
-    steps = np.flatnonzero(np.diff(places) == 0.0)
+    tables = [*([stated] if isinstance(stated, SpeedTable) else []), *feed]
 
     def ratios(states: States) -> np.ndarray:
         s = given.s_at(states.t)
-        # `interp` takes one side of a step; the bound is the lower of both sides.
-        allowed = np.interp(s, places, figures)
-        for step in steps.tolist():
-            at_step = np.abs(s - places[step]) <= _SAME_PLACE
-            allowed = np.where(at_step, np.minimum(allowed, figures[step : step + 2].min()), allowed)
+        allowed = np.full(len(s), stated if isinstance(stated, float) else np.inf)
+        for table in tables:
+            within = (s >= table.s[0] - _SAME_PLACE) & (s <= table.s[-1] + _SAME_PLACE)
+            allowed = np.minimum(allowed, np.where(within | (table is stated), _allowed(table, s), np.inf))
         return speeds(robot, states) / allowed[:, None]
 
-    return worst_between(given.looking_at(np.unique(places)), ratios, ("tool",))
+    places = np.unique([place for table in tables for place in table.s])
+    return worst_between(given.looking_at(places) if tables else given, ratios, ("tool",))
 
 
 _SAME_PLACE = 1e-12
+
+
+def _allowed(table: SpeedTable, s: np.ndarray) -> np.ndarray:
+    """Largest speeds, (K,), at path coordinates s, (K,); of both sides of a step the lower one."""
+    places, figures = np.array(table.s), np.array(table.speed)
+    allowed = np.interp(s, places, figures)  # which takes one side of a step
+    for step in np.flatnonzero(np.diff(places) == 0.0).tolist():
+        at_step = np.abs(s - places[step]) <= _SAME_PLACE
+        allowed = np.where(at_step, np.minimum(allowed, figures[step : step + 2].min()), allowed)
+    return np.asarray(allowed)
 
 
 def speeds(robot: Robot, states: States) -> np.ndarray:

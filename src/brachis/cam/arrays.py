@@ -1,0 +1,105 @@
+"""Points from arrays and transforms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from brachis.cam.points import QUATERNION, Array, Points, with_like_signs
+from brachis.cam.units import ANGLES, LENGTHS, SPEEDS, Units
+from brachis.errors import TaskError
+
+_ROTATION = 1e-4
+_MOST_ROWS = 3
+_HOMOGENEOUS = (4, 4)
+_MATRIX = (3, 3)
+
+
+def points_from(points: Any, orientations: Any, speed: Any, units: Units, source: str) -> Points:  # noqa: ANN401
+    """Return points from what a program has.
+
+    Parameters
+    ----------
+    points : array_like, (n, p) or (n, 4, 4), or sequence of transforms
+        Positions; or homogeneous matrices, or objects that have one.
+    orientations : array_like, (n, 4), (n, 3, 3) or (n,), or object with quaternions; or None
+        Quaternions w, x, y, z; rotation matrices; SciPy's rotations; yaw.
+    speed : array_like, (n,), or None
+    units : Units
+        Of the numbers; m, rad and m/s where not stated.
+    source : str
+        What messages call the points.
+
+    Raises
+    ------
+    TaskError
+        Arrays of other shapes, or with numbers that are not finite, or that are no rotations; the row is named.
+    """
+    values = _array(_matrices(points), source, source)
+    if values.ndim == 3 and values.shape[1:] == _HOMOGENEOUS and orientations is None:  # noqa: PLR2004
+        values, orientations = values[:, :3, 3], values[:, :3, :3]
+    if values.ndim != 2 or not 1 <= values.shape[1] <= _MOST_ROWS or len(values) < 2:  # noqa: PLR2004
+        allowed = "(n, 1 to 3) positions, or (n, 4, 4) matrices, of 2 rows or more"
+        raise TaskError("points of the wrong shape", found=values.shape, allowed=allowed, where=source)
+    turning = np.empty((len(values), 0)) if orientations is None else _turning(orientations, units, source)
+    speeds = None
+    if speed is not None:
+        speeds = np.asarray(speed, dtype=float) * SPEEDS[units.speed or "m/s"]
+        bad = np.flatnonzero(np.atleast_1d(speeds <= 0.0))
+        if bad.size:
+            where = f"{source}: row {bad[0]}"
+            raise TaskError("a speed must be positive", found=f"{speeds.flat[bad[0]]:g} m/s", where=where)
+    for name, one in (("orientations", turning), ("speed", speeds)):
+        if one is not None and len(np.atleast_1d(one)) != len(values):
+            raise TaskError(f"as many {name} as points are needed", found=len(np.atleast_1d(one)), allowed=len(values))
+    return Points(values * LENGTHS[units.length or "m"], turning, speeds, np.arange(len(values)), source, "row")
+
+
+def _matrices(points: Any) -> Any:  # noqa: ANN401
+    """Return the homogeneous matrices of transforms; anything else as it is."""
+    if not isinstance(points, np.ndarray) and callable(getattr(points, "as_matrix", None)):
+        return points.as_matrix()
+    if isinstance(points, list | tuple) and points:
+        if hasattr(points[0], "homogeneous"):
+            return [one.homogeneous for one in points]
+        if callable(getattr(points[0], "as_matrix", None)):
+            return [one.as_matrix() for one in points]
+    return points
+
+
+def _turning(orientations: Any, units: Units, source: str) -> Array:  # noqa: ANN401
+    """Return quaternions, (n, 4), or yaw, (n, 1)."""
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415  (imports in 0.2 s)
+
+    where = f"{source}: orientations"
+    if isinstance(orientations, Rotation):
+        return with_like_signs(np.roll(orientations.as_quat(), 1, axis=-1))
+    values = _array(orientations, where, source)
+    if values.ndim == 1:
+        return values[:, None] * ANGLES[units.angle or "rad"]
+    if values.shape[1:] == _MATRIX:
+        off = np.abs(values @ np.swapaxes(values, 1, 2) - np.eye(3)).max(axis=(1, 2))
+        _refuse_first((off > _ROTATION) | (np.linalg.det(values) < 0.0), "no rotation matrix", values, source)
+        return with_like_signs(np.roll(Rotation.from_matrix(values).as_quat(), 1, axis=1))
+    if values.shape[1:] != (QUATERNION,):
+        allowed = "(n, 4) quaternions w, x, y, z; (n, 3, 3) matrices; (n,) yaw"
+        raise TaskError("orientations of the wrong shape", found=values.shape, allowed=allowed, where=where)
+    off = np.abs(np.linalg.norm(values, axis=1) - 1.0)
+    _refuse_first(off > 100.0 * _ROTATION, "the quaternion's length is not 1", values, source)
+    return with_like_signs(values)
+
+
+def _array(values: Any, where: str, source: str) -> Array:  # noqa: ANN401
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise TaskError("not an array of numbers", found=str(error), where=where) from None
+    _refuse_first(~np.isfinite(array.reshape(len(array), -1) if array.ndim else array), "not finite", array, source)
+    return array
+
+
+def _refuse_first(bad: np.ndarray, problem: str, values: Array, source: str) -> None:
+    rows = np.flatnonzero(bad.any(axis=1) if bad.ndim > 1 else bad)
+    if rows.size:
+        raise TaskError(problem, found=values[rows[0]].tolist(), where=f"{source}: row {rows[0]}")

@@ -1,0 +1,143 @@
+"""Points of a path from files, as the task file writes them, and the smooth curves that are fitted to them."""
+
+from __future__ import annotations
+
+from math import degrees
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, Strict, WithJsonSchema, field_validator
+
+from brachis.cam.units import ANGLES, LENGTHS, quantity
+from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, refuse
+
+_LISTED = 10
+
+
+def _quantity_of(units: dict[str, float], example: str) -> BeforeValidator:
+    """Read numbers with units; bare numbers are in SI units."""
+
+    def read(value: object) -> object:
+        if not isinstance(value, str):
+            return value
+        number = quantity(value, units)
+        if number is None:
+            raise refuse("no quantity", found=value, allowed=f"a number with a unit ({', '.join(units)}), as {example}")
+        return number
+
+    return BeforeValidator(read)
+
+
+_QUANTITY_SCHEMA = WithJsonSchema(
+    {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"type": "string", "pattern": "^[0-9.eE+-]+ *[a-z/]+$"}]}
+)
+Length = Annotated[float, _quantity_of(LENGTHS, "0.05 mm"), Strict(), Field(ge=1e-7, le=1.0), _QUANTITY_SCHEMA]
+Angle = Annotated[float, _quantity_of(ANGLES, "0.1 deg"), Strict(), Field(ge=1e-7, le=0.5), _QUANTITY_SCHEMA]
+
+
+class FileUnits(Model):
+    """Units of the numbers in a file; a header such as ``x_mm`` states them too."""
+
+    length: Literal["m", "cm", "mm", "um", "in", "inch"] | None = Field(
+        default=None, description="Of positions. Null: as the header says, else m."
+    )
+    angle: Literal["rad", "mrad", "deg"] | None = Field(
+        default=None, description="Of yaw and rotation vectors. Null: as the header says, else rad."
+    )
+    speed: Literal["m/s", "mm/s", "m/min", "mm/min", "in/min", "inch/min"] | None = Field(
+        default=None, description="Of a column of feed rates. Null: as the header says, which then must."
+    )
+
+
+class FitTolerance(Model):
+    """How far points may be from the path; numbers with their unit (0.05 mm, 0.1 deg), or in m and rad."""
+
+    position: Length = Field(description="Largest distance of a point from the path.")
+    orientation: Angle = Field(
+        default=ANGLES["deg"] / 10.0,
+        description="Largest angle between a given orientation, or yaw, and the path's. 0.1 deg unless given.",
+    )
+    corner: Length | None = Field(
+        default=None,
+        description="Largest distance of a point from the path where a corner is rounded. Null: `position`.",
+    )
+
+
+class PointFile(Model):
+    """Points from a CSV file or from G-code; `brachis.task.load_task` reads it and makes a smooth curve of it."""
+
+    file: Name = Field(
+        description="CSV file, or G-code (.nc, .ngc, .gcode, .tap), relative to the task file's folder; its first row "
+        "is where the segment starts."
+    )
+    relative: Flag = Field(
+        default=False,
+        description="Whether the rows count from the first one, so that the path may start anywhere: displacements "
+        "along the world axes, rotations in the tool frame.",
+    )
+    units: FileUnits = Field(default_factory=FileUnits, description="Units of its numbers.")
+    tolerance: FitTolerance | None = Field(
+        default=None,
+        description="How far the rows may be from the path, which is then a fit with as few knots as that takes; for "
+        "many rows, and for such as scatter. Null: the path passes all of them.",
+    )
+    corner: Literal["blend", "refuse"] = Field(
+        default="blend",
+        description="With a tolerance, what becomes of corners: rounded within the tolerance, or refused and listed.",
+    )
+
+    @field_validator("corner", mode="before")
+    @classmethod
+    def _no_stops(cls, corner: object) -> object:
+        if corner == "stop":
+            problem = "a path cannot stop at a corner: it is one motion from rest to rest"
+            raise refuse(
+                problem, found=corner, allowed="blend or refuse; or two tasks, one to the corner and one from it"
+            )
+        return corner
+
+
+class FoundCorner(Model):
+    """A corner of the points."""
+
+    row: Count = Field(description="Line of the file, or index, of the nearest point.")
+    angle: Number = Field(description="Change of direction, rad.")
+    distance: Number = Field(description="Along the path from its first point, m.")
+    blend: NonNegative = Field(description="What its blend takes from either side, m.")
+
+
+class FitReport(Model):
+    """Where a curve comes from, and how near it is to the points; written by brachis."""
+
+    source: Name = Field(description="File, or what the points were given as.")
+    points: Count = Field(description="Number of points.")
+    length: NonNegative = Field(description="Length of the path, m.")
+    position_error: NonNegative = Field(description="Largest distance of a point from the path, m, beside corners.")
+    position_rms: NonNegative = Field(description="Root mean square of the distances, m.")
+    position_tolerance: NonNegative = Field(description="What was allowed, m; 0 where all points are passed.")
+    orientation_error: NonNegative = Field(description="Largest angle between given and fitted orientation, rad.")
+    orientation_tolerance: NonNegative = Field(description="What was allowed, rad.")
+    intervals: Count = Field(description="Number of knot intervals of all curves of these points.")
+    corners: tuple[FoundCorner, ...] = Field(default=(), description="Corners, in order.")
+    told: tuple[str, ...] = Field(default=(), description="What was found out about the data.")
+    doubt: str | None = Field(default=None, description="What of the data is hardly meant.")
+    profile: tuple[tuple[Number, Number, Number], ...] = Field(
+        default=(), description="Along the path, m: the largest distance, m, and angle, rad, of the points there."
+    )
+
+    def __str__(self) -> str:
+        """Say it in one line, lengths in mm."""
+        off, rms, allowed = (1e3 * x for x in (self.position_error, self.position_rms, self.position_tolerance))
+        turned, turned_allowed = map(degrees, (self.orientation_error, self.orientation_tolerance))
+        text = (
+            f"{self.source}: {self.points} points along {1e3 * self.length:.5g} mm, {self.intervals} knot intervals; "
+        )
+        text += f"at most {off:.3g} mm off (allowed {allowed:.3g} mm), rms {rms:.3g} mm"
+        text += f"; orientation at most {turned:.2g} deg off (allowed {turned_allowed:.3g} deg)" if turned else ""
+        corners = [f"row {corner.row} ({degrees(corner.angle):.3g} deg)" for corner in self.corners[:_LISTED]]
+        corners += ["..."] if len(self.corners) > _LISTED else []
+        text += f"; {len(self.corners)} corners blended: {', '.join(corners)}" if corners else "; no corners"
+        return f"{text}; {'; '.join(self.told)}" if self.told else text
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON, without the profile."""
+        return self.model_dump(mode="json", exclude={"profile"})

@@ -1,0 +1,97 @@
+"""G-code becomes the points of its lines and arcs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brachis.cam.curves import fit_curves
+from brachis.cam.gcode import read_gcode
+from brachis.cam.least_squares import Tolerance
+from brachis.errors import TaskError
+
+
+def points_of(text, rows="position"):
+    return read_gcode(text, rows if rows != "position" else ("x", "y", "z"), "a.nc")
+
+
+PROGRAM = """%
+(a slot)
+G21 G17 G90 G54
+N10 G0 X100 Y0 Z50
+N20 G1 Z10 F600
+N30 X200. ; along
+N40 G3 X250 Y50 I0 J50 F1200
+N50 G2 X300 Y100 R50
+M30
+%
+"""
+
+
+def test_lines_and_arcs():
+    points, told = points_of(PROGRAM)
+    assert told == ("G-code", "skipped G54, M30")
+    np.testing.assert_allclose(points.position[0], [0.1, 0.0, 0.05])
+    for line, end in ((5, [0.1, 0.0, 0.01]), (6, [0.2, 0.0, 0.01]), (7, [0.25, 0.05, 0.01]), (8, [0.3, 0.1, 0.01])):
+        np.testing.assert_allclose(points.position[points.rows == line][-1], end, atol=1e-12)
+    for line, centre in ((7, [0.2, 0.05]), (8, [0.3, 0.05])):
+        on_arc = points.position[points.rows == line]
+        np.testing.assert_allclose(np.linalg.norm(on_arc[:, :2] - centre, axis=1), 0.05, atol=1e-12)
+        chord = np.linalg.norm(np.diff(on_arc, axis=0), axis=1).max()
+        assert chord**2 / (8.0 * 0.05) < 1.1e-6
+    assert np.isnan(points.speed[0])
+    np.testing.assert_allclose(np.unique(points.speed[1:]), [0.01, 0.02])
+
+
+def test_units_planes_and_increments():
+    points, _ = points_of("G20 G91 G0 X1 Y0 Z0\nG18\nG1 X1 F60\nG2 X0 Z2 K1\n")
+    np.testing.assert_allclose(points.position[-1], [0.0508, 0.0, 0.0508], atol=1e-12)
+    np.testing.assert_allclose(points.speed[-1], 0.0254)
+    half = points.position[points.rows == 4]
+    np.testing.assert_allclose(np.hypot(half[:, 0] - 0.0508, half[:, 2] - 0.0254), 0.0254, atol=1e-12)
+
+
+@pytest.mark.parametrize(("motion", "side"), [("G2", 1.0), ("G3", -1.0)])
+def test_whole_circles_and_long_arcs(motion, side):
+    """In the plane G17, clockwise as seen from above: G2 goes from the left over the top."""
+    circle, _ = points_of(f"G0 X0 Y0 Z0\n{motion} X0 Y0 I10 J0 F100\n")
+    assert np.ptp(circle.position[:, 0]) == pytest.approx(0.02, rel=1e-3)
+    assert side * circle.position[len(circle) // 4, 1] == pytest.approx(0.01, rel=1e-3)
+    short, _ = points_of(f"G0 X0 Y0 Z0\n{motion} X10 Y0 R10 F100\n")
+    long, _ = points_of(f"G0 X0 Y0 Z0\n{motion} X10 Y0 R-10 F100\n")
+    heights = [np.abs(points.position[:, 1]).max() for points in (short, long)]
+    np.testing.assert_allclose(heights, [0.01 - np.sqrt(75.0) / 1e3, 0.01 + np.sqrt(75.0) / 1e3], rtol=1e-3)
+    assert side * short.position[len(short) // 2, 1] > 0.0
+    assert side * long.position[len(long) // 2, 1] > 0.0
+
+
+def test_a_program_is_fitted_with_its_corners():
+    points, _ = points_of(PROGRAM)
+    curves, report = fit_curves(points, Tolerance(0.02e-3, 1e-3, 0.1e-3))
+    assert [corner.row for corner in report.corners] == [5]
+    assert report.position_error <= 0.02e-3
+    assert curves[1].speeds[0][0] == (0.0, 0.01)
+    assert curves[1].speeds[0][-1][1] == pytest.approx(0.02)
+
+
+MISTAKES = [
+    ("G0 X1 Y1 Z1\nG81 X2", r"line 2: this code is not read; found G81"),
+    ("G0 X1 Y1 Z1\nG1 X2 A5 F10", r"line 2: axes other than X, Y, Z are not read; found A5"),
+    ("X1 Y1 Z1", r"line 1: a move before G0"),
+    ("G0 X1 Y1 Z1\nG2 X5 Y1 I1 J1 F10", r"line 2: the arc is none; found radius 1.41421 mm at its start"),
+    ("G0 X1 Y1 Z1\nG2 X5 Y1 R1 F10", r"line 2: the arc is none; found R 1 mm for ends 4 mm apart"),
+    ("G0 X1 Y1 Z1\nG1 X#1 F10", r"line 2: not understood; found 'X#1'"),
+    ("G0 X1 Y1 Z1\nG1 X2 F0", r"line 2: a feed rate must be positive; found F0"),
+    ("G0 X1 Y1", r"a.nc: no motion; found 0 places"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), MISTAKES)
+def test_mistakes_are_named(text, message):
+    with pytest.raises(TaskError, match=message):
+        points_of(text)
+
+
+def test_positions_alone_are_given():
+    with pytest.raises(TaskError, match=r"G-code gives positions alone; found x, y, yaw"):
+        points_of(PROGRAM, ("x", "y", "yaw"))

@@ -1,0 +1,63 @@
+"""What the command line says of points that a path follows."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from brachis.cli.main import app
+from brachis.errors import PlausibilityError, TaskError
+from brachis.planner import plan
+from brachis.task import load_task
+
+RUNNER = CliRunner()
+
+
+@pytest.fixture
+def seam(task, write, tmp_path):
+    """A task along points that scatter by 0.02 mm, in mm with decimal commas."""
+    y = np.linspace(0.0, 600.0, 1_500)
+    x = 1732.0508 + 20.0 * np.sin(y / 100.0)
+    scatter = np.random.default_rng(5).normal(size=(2, 1_500)) * 0.02
+    rows = (f"{a:.4f};{b:.4f}".replace(".", ",") for a, b in zip(x + scatter[0], y + scatter[1], strict=True))
+    (tmp_path / "seam.csv").write_text("\n".join(["x_mm;y_mm", *rows]))
+    task["path"] = [{"csv": {"file": "seam.csv", "tolerance": {"position": "0.12 mm"}}}]
+    return write({**task, "start": "free", "redundant_joints": ["j1"], "search": {"effort": "single"}})
+
+
+def test_inspect_says_what_was_found(seam):
+    done = RUNNER.invoke(app, ["inspect", str(seam)])
+    assert done.exit_code == 0
+    for text in ("seam.csv", "1500 along", "decimal commas", "semicolons", "length in mm", "scatter by", "0.12 mm"):
+        assert text in done.stdout
+    (fit,) = json.loads(RUNNER.invoke(app, ["inspect", str(seam), "--json"]).stdout)["fits"]
+    assert fit["position_error"] <= 0.12e-3
+    assert fit["corners"] == []
+
+
+def test_inspect_of_a_path_without_points(task, write):
+    assert "no part of the path comes from points" in RUNNER.invoke(app, ["inspect", str(write(task))]).stdout
+
+
+def test_plan_reports_and_draws_the_fit(seam, tmp_path):
+    done = RUNNER.invoke(app, ["plan", str(seam), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.stdout
+    assert "path from seam.csv: 1500 points" in " ".join(done.stdout.split())
+    (fit,) = json.loads((tmp_path / "out/result.json").read_text())["fits"]
+    assert 0.0 < fit["position_rms"] < fit["position_error"] <= 0.12e-3
+    assert (tmp_path / "out/fit.png").stat().st_size > 1000
+    arguments = ["plot", str(tmp_path / "out/result.npz"), "--kind", "fit", "--out", str(tmp_path / "again.svg")]
+    assert RUNNER.invoke(app, arguments).exit_code == 0
+
+
+def test_points_in_other_units_are_warned_of(seam, tmp_path):
+    rows = (tmp_path / "seam.csv").read_text().replace("x_mm;y_mm", "x;y")
+    (tmp_path / "seam.csv").write_text(rows)
+    with pytest.raises(TaskError, match=r"mm for m\? Set units: {length: mm}"):
+        load_task(seam)
+    seam.write_text(seam.read_text().replace("0.12 mm", "0.12 m"))
+    with pytest.raises(PlausibilityError, match=r"mm for m\? Set units: {length: mm}"):
+        plan(None, seam, strict=True)

@@ -1,0 +1,191 @@
+"""Curves given by knots and control points, as fits make them: moved to their start, joined, with speeds along them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy.spatial.transform import Rotation
+
+from brachis.errors import PathError, TaskError
+from brachis.path import build_path
+from brachis.path.feed_table import feed_tables
+from brachis.robot.task_map.rows import POSE_ROWS
+from brachis.task import BSplineCurve, Task, fit_path, load_task
+from support.poses import pose
+from support.seams import bent, brute_distances, wave
+
+MM = 1e-3
+S = np.linspace(0.0, 1.0, 2_001)
+
+
+def test_the_path_is_within_the_tolerance_of_all_points_blends_included() -> None:
+    position, _ = bent(900, 0.01 * MM)
+    segments = fit_path(position, tolerance={"position": "0.1 mm", "corner": "0.5 mm"})
+    path = build_path(segments, position[0], ["x", "y", "z"])
+    assert len(segments) == 3
+    assert len(path.breaks) == 6
+    distances = brute_distances(position, path.sample(np.linspace(0.0, 1.0, 20_001)).target)
+    assert distances.max() <= 0.5 * MM
+    away = np.array([corner.row for corner in segments[0].bspline.fit.corners])
+    beside = np.abs(np.arange(len(position))[:, None] - away).min(axis=1) > 10
+    assert distances[beside].max() <= 0.1 * MM
+    assert distances[~beside].max() > 0.2 * MM
+
+
+@pytest.mark.parametrize("rows", [["x", "y", "z"], ["x", "y"]])
+def test_derivatives_are_those_of_the_path(rows: list[str]) -> None:
+    position = wave(500)[:, : len(rows)]
+    path = build_path(fit_path(position, tolerance={"position": 1e-5}), position[0], rows)
+    step = 1e-5
+    sample, before, after = (path.sample(S[1:-1] + off) for off in (0.0, -step, step))
+    for name, of in (("target", "xi"), ("xi", "xi_ds"), ("xi_ds", "xi_dds")):
+        slope = (getattr(after, name) - getattr(before, name)) / (2.0 * step)
+        scale = np.abs(getattr(sample, of)).max()
+        np.testing.assert_allclose(getattr(sample, of), slope, atol=1e-6 * scale)
+
+
+def poses(count: int = 300) -> tuple[np.ndarray, Rotation]:
+    t = np.linspace(0.0, 1.0, count)
+    return wave(count), Rotation.from_rotvec(np.column_stack([0.4 * t, np.sin(t), 3.0 - 0.0 * t]))
+
+
+def matrices(position: np.ndarray, turns: Rotation) -> np.ndarray:
+    result = np.tile(np.eye(4), (len(position), 1, 1))
+    result[:, :3, :3], result[:, :3, 3] = turns.as_matrix(), position
+    return result
+
+
+def test_all_forms_of_poses_give_the_same_path() -> None:
+    import pinocchio as pin  # noqa: PLC0415
+
+    position, turns = poses()
+    allowed = {"position": "0.02 mm", "orientation": "0.05 deg"}
+    homogeneous = matrices(position, turns)
+    quaternions = np.roll(turns.as_quat(), 1, axis=1)
+    quaternions[1::2] *= -1.0
+    forms: list[dict[str, Any]] = [
+        {"points": homogeneous},
+        {"points": [pin.SE3(one) for one in homogeneous]},
+        {"points": position, "orientations": quaternions},
+        {"points": position, "orientations": turns.as_matrix()},
+        {"points": position.tolist(), "orientations": turns},
+    ]
+    start = pose(position[0], turns[0])
+    targets = []
+    for form in forms:
+        path = build_path(fit_path(form.pop("points"), tolerance=allowed, **form), start, POSE_ROWS)
+        targets.append(path.sample(S).target)
+        np.testing.assert_allclose(targets[-1], targets[0], atol=1e-9)
+    np.testing.assert_allclose(targets[0][[0, -1]], [pose(position[i], turns[i]) for i in (0, -1)], atol=1e-9)
+
+
+def test_a_relative_curve_is_moved_and_turned() -> None:
+    position, turns = poses()
+    segments = fit_path(matrices(position, turns), tolerance={"position": "0.02 mm"}, relative=True)
+    recorded = build_path(segments, pose(position[0], turns[0]), POSE_ROWS).sample(S).target
+    start, turn = np.array([3.0, 2.0, 1.0]), Rotation.from_rotvec([1.0, -0.4, 0.2])
+    moved = build_path(segments, pose(start, turn), POSE_ROWS).sample(S).target
+    np.testing.assert_allclose(moved[:, :3], recorded[:, :3] - position[0] + start, atol=1e-9)
+    change = (turn * turns[0].inv()).as_matrix()
+    np.testing.assert_allclose(moved[:, 3:].reshape(-1, 3, 3), change @ recorded[:, 3:].reshape(-1, 3, 3), atol=1e-9)
+
+
+def test_a_start_elsewhere_is_refused() -> None:
+    position, turns = poses()
+    segments = fit_path(matrices(position, turns), tolerance={"position": "0.02 mm"})
+    with pytest.raises(PathError, match=r"control_points\[0\]: .*, 0.02 m off; allowed: at most 0.0001 m"):
+        build_path(segments, pose(position[0] + [0.0, 0.02, 0.0], turns[0]), POSE_ROWS)
+    with pytest.raises(PathError, match=r"control_points\[0\]: .*, 0.01 rad off"):
+        build_path(segments, pose(position[0], Rotation.from_rotvec([0.0, 0.01, 0.0]) * turns[0]), POSE_ROWS)
+
+
+def test_speeds_follow_the_path_over_its_blends() -> None:
+    position, _ = bent(900)
+    speed = np.where(np.arange(900) < 450, 0.1, 0.2)
+    segments = fit_path(position, tolerance={"position": "0.05 mm", "corner": "1 mm"}, speed=speed)
+    path = build_path(segments, position[0], ["x", "y", "z"])
+    (table,) = feed_tables(segments, path)
+    assert (table.s[0], table.s[-1]) == pytest.approx((0.0, 1.0))
+    assert np.all(np.diff(table.s) > 0.0)
+    middle = path.sample(S).target
+    nearest = np.array([np.argmin(np.linalg.norm(position - place, axis=1)) for place in middle])
+    clear = np.abs(nearest - 450) > 2
+    np.testing.assert_allclose(np.interp(S, table.s, table.speed)[clear], speed[nearest[clear]])
+
+
+def test_stretches_without_speed_have_no_table() -> None:
+    position = wave(100)
+    speed = np.full(100, 0.1)
+    speed[40:60] = np.nan
+    segments = fit_path(position, tolerance={"position": "0.05 mm"}, speed=speed)
+    path = build_path(segments, position[0], ["x", "y", "z"])
+    first, second = feed_tables(segments, path)
+    assert first.s[-1] == pytest.approx(39 / 99, abs=0.01)
+    assert second.s[0] == pytest.approx(59 / 99, abs=0.01)
+    assert feed_tables(fit_path(position), build_path(fit_path(position), position[0], ["x", "y", "z"])) == ()
+
+
+def test_the_first_point_is_where_a_free_start_begins() -> None:
+    position, turns = poses()
+    base = {"brachis": 1, "start": "free", "task_space": "pose"}
+    for allowed in (None, {"position": "0.02 mm"}):
+        made = load_task({**base, "path": fit_path(matrices(position, turns), tolerance=allowed)})
+        assert made.path_start is not None
+        np.testing.assert_allclose(made.path_start[:3], position[0])
+    with pytest.raises(TaskError, match="path_start"):
+        load_task({**base, "path": fit_path(position, tolerance={"position": "0.02 mm"})})
+    with pytest.raises(TaskError, match="path_start"):
+        load_task({**base, "path": fit_path(position, relative=True)})
+
+
+def test_a_fitted_task_survives_being_saved() -> None:
+    position, turns = poses()
+    segments = fit_path(matrices(position, turns), tolerance={"position": "0.02 mm"}, speed=np.full(300, 0.1))
+    made = load_task({"brachis": 1, "start": "free", "task_space": "pose", "path": segments})
+    assert load_task(made.to_dict()) == made
+    assert isinstance(made, Task)
+    assert made.fits[0].points == 300
+
+
+WRONG: list[tuple[dict[str, Any], str]] = [
+    ({"points": np.zeros((5, 4, 3))}, r"points of the wrong shape; found \(5, 4, 3\)"),
+    ({"points": [[0.0, np.nan], [1.0, 1.0]]}, r"points: row 0: not finite"),
+    ({"points": ["a"]}, r"not an array of numbers"),
+    ({"points": wave(5), "orientations": np.zeros((5, 4))}, r"row 0: the quaternion's length is not 1"),
+    ({"points": wave(5), "orientations": np.ones((5, 3, 3))}, r"row 0: no rotation matrix"),
+    ({"points": wave(5), "orientations": np.ones((5, 2))}, r"orientations of the wrong shape"),
+    (
+        {"points": wave(5), "orientations": np.ones(4)},
+        r"as many orientations as points are needed; found 4; allowed: 5",
+    ),
+    ({"points": wave(5), "speed": np.zeros(5)}, r"row 0: a speed must be positive"),
+    (
+        {"points": wave(5), "tolerance": {"position": "5 kg"}},
+        r"tolerance: position: no quantity; found '5 kg'.*0.05 mm",
+    ),
+    ({"points": wave(5), "tolerance": {"positions": 1.0}}, r"tolerance"),
+    ({"points": wave(5), "units": {"length": "furlong"}}, r"units: length"),
+    (
+        {"points": bent(300)[0], "tolerance": {"position": "0.1 mm"}, "corner": "refuse"},
+        r"2 corners; found 8\d.* deg at row",
+    ),
+]
+
+
+@pytest.mark.parametrize(("given", "message"), WRONG)
+def test_wrong_arrays_are_named(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(TaskError, match=message):
+        fit_path(**given)
+
+
+def test_knots_that_are_not_smooth_are_refused() -> None:
+    points = [[float(i), 0.0] for i in range(6)]
+    ends = [0.0] * 6, [5.0] * 6
+    BSplineCurve(knots=tuple(ends[0] + ends[1]), control_points=tuple(map(tuple, points)))
+    with pytest.raises(ValidationError, match="not clamped"):
+        BSplineCurve(knots=(0.0,) * 5 + (0.1,) + (5.0,) * 6, control_points=tuple(map(tuple, points)))
+    with pytest.raises(ValidationError, match="wrong number of knots"):
+        BSplineCurve(knots=(0.0, 1.0), control_points=tuple(map(tuple, points)))
