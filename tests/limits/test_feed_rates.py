@@ -58,7 +58,7 @@ def test_speeds_are_held_where_they_are_prescribed_and_nowhere_else(robot, rates
     first, second = held.task.tool_limits.feed
     for table, figure in ((first, SLOW), (second, FAST)):
         inside = (sample.s >= table.s[0]) & (sample.s <= table.s[-1])
-        assert speed[inside].max() == pytest.approx(figure, rel=2e-3)
+        assert 0.98 * figure < speed[inside].max() < (1.0 + 1e-4) * figure
     between = (sample.s > first.s[-1]) & (sample.s < second.s[0])
     assert speed[between].max() > 1.1 * FAST
     # The plan without feed rates is no motion for the task with them.

@@ -123,6 +123,8 @@ def test_the_published_limits_of_the_panda_are_those_of_its_urdf():
     for name in ("position_lower", "position_upper", "velocity", "torque"):
         np.testing.assert_allclose(getattr(published, name), getattr(stated, name), rtol=1e-12)
     np.testing.assert_array_equal(published.acceleration, [15, 7.5, 10, 12.5, 15, 20, 20])
+    np.testing.assert_array_equal(published.jerk, [7500, 3750, 5000, 6250, 7500, 10000, 10000])
+    np.testing.assert_array_equal(published.torque_rate, 1000.0)
 
 
 def test_a_file_states_torque_curves_and_the_power_of_all_joints_too(loaded):

@@ -13,6 +13,8 @@ from brachis.trajectory import Trajectory
 from brachis.verify.motion import Pieces, States
 
 _BISECTIONS = 60
+_SAME_PLACE = 1e-9
+"""Of a piece."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,9 @@ class Given:
     def looking_at(self, s: np.ndarray) -> Given:
         """Return the same, with the states at further path coordinates, (P,)."""
         added = States.at(self.pieces, self.robot, *self.pieces.place(self.times_of(s)))
-        return replace(self, states=self.states.merged(added)[0])
+        both = self.states.merged(added)[0]
+        apart = (np.diff(both.piece) > 0) | (np.diff(both.u) > _SAME_PLACE)
+        return replace(self, states=both.only(np.append(True, apart)))
 
     def between(self, begin: float, end: float) -> Given:
         """Return the same, with no states but those from one path coordinate to another, both included."""
