@@ -10,7 +10,7 @@ from scipy.interpolate import BSpline
 
 from brachis.bspline import clamped_knots
 from brachis.nlp.boundary import Boundary, BoundarySpline, EndCondition, periodic
-from support.jacobians import dense, differences
+from support.jacobians import dense, differences, told
 from support.phases import phase_of, reachable_points
 
 BREAKS = np.array([0.0, 0.1, 0.25, 0.5, 0.6, 0.85, 0.95, 1.0])
@@ -19,7 +19,7 @@ RATE = 0.6
 
 def with_boundary(case, degree, **conditions):
     """A phase with every kind of limit and other conditions at its ends."""
-    phase = phase_of(case, degree=degree, rest="velocity")
+    phase = phase_of(case, degree=degree, rest="velocity" if degree == 2 else "full")
     own = phase.boundary
     values = {"start": own.start, "end": own.end, "derivatives": own.derivatives, **conditions}
     return phase.over(phase.grid, Boundary(**values))
@@ -57,15 +57,13 @@ def phase(request):
 
 def test_jacobian_equals_differences(phase):
     for x in reachable_points(phase, 2):
-        exact, expected = dense(phase, x), differences(phase, x)
+        exact, expected = dense(phase, x), differences(phase, x, 2e-5)  # process speeds set in within 1e-3 of s
         count = len(phase._progress.offset)
-        kinds = {limit.kind: phase.rows_of(limit).ravel() for limit in phase.limits}
+        kinds = {limit.kind: phase.rows_of(limit).ravel()[told(phase, limit, x)] for limit in phase.limits}
         kinds["progress"] = np.arange(len(phase.lower) - count, len(phase.lower))
         assert count >= 3
         for kind, rows in kinds.items():
             wrong = np.abs(exact[rows] - expected[rows]).max(axis=1)
-            if kind == "tool_speed":  # the direction of a tool that hardly moves turns within the difference's step
-                wrong = wrong[phase.rows(x)[rows] > 0.05]
             error = wrong.max() / np.abs(expected[rows]).max()
             assert error <= 1e-6, f"{kind}: relative error {error:.1e}"
 
@@ -93,7 +91,7 @@ def test_rates_hold_whatever_the_duration(case, derivatives):
         assert (others > 1e-6).all(), "the redundant joints' velocities should be free"
 
 
-@pytest.mark.parametrize(("degree", "smooth"), [(2, 1), (3, 2), (4, 2)])
+@pytest.mark.parametrize(("degree", "smooth"), [(2, 1), (3, 2), (4, 3), (5, 3)])
 @pytest.mark.parametrize("case", ["r0", "r1", "r2"])
 def test_derivatives_close_over_the_seam(case, degree, smooth):
     phase = going_round(case, degree)
@@ -103,7 +101,7 @@ def test_derivatives_close_over_the_seam(case, degree, smooth):
             ahead = np.eye(1 + phase.joint_map.r)[0] if order == 0 else 0.0
             gap, size = np.abs(last - first - ahead), 1.0 + np.abs(first).max()
             if order <= smooth:
-                assert gap.max() < 1e-10 * size
+                assert gap.max() < 1e-9 * size
             else:
                 assert gap.max() > 1e-6, "nothing more is tied"
 
@@ -162,10 +160,10 @@ def test_periodic_splines(degree, start, jump, seed):
     points = spline.control_points(free, 1.0)
     np.testing.assert_allclose(spline.matrix @ free + spline.fixed, points, atol=1e-12 * np.abs(points).max())
     curve = BSpline(spline.knots, points, degree)
-    for order in range(min(degree, 3)):
+    for order in range(min(degree, 4)):
         first, last = curve(np.array([0.0, 1.0]), nu=order)
         assert last - first == pytest.approx(jump if order == 0 else 0.0, abs=1e-9 * (1.0 + np.abs(points).max()) * 400)
     if not np.isnan(start):
         assert float(curve(0.0)) == pytest.approx(start, abs=1e-12)
     np.testing.assert_allclose(spline.free_from(points, 1.0), free, atol=1e-12)
-    assert spline.free == len(points) - min(degree, 3) - (not np.isnan(start))
+    assert spline.free == len(points) - min(degree, 4) - (not np.isnan(start))

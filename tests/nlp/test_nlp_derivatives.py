@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from brachis import limits
-from support.jacobians import dense, differences
+from support.jacobians import dense, differences, told
 from support.phases import CASES, phase_of, reachable_points
 
 KINDS = [*limits.TABLE, "branch_margin"]
 UNTIMED = ("position", "branch_margin")
-SIZES = ("tool_speed", "tool_acceleration", "tool_angular_speed")
-PROCESS = ("process_speed", "least_process_speed")
 
 
 def blocks(phase) -> dict[str, slice]:
@@ -37,17 +35,6 @@ def phase(request):
     case, degree, knots = request.param
     fixed = phase_of(case, degree=degree, rest="velocity" if degree == 2 else "full")
     return fixed if knots == "uniform" else fixed.with_free_knots(0.1)
-
-
-def told(phase, limit, x) -> np.ndarray:
-    """Rows whose differences tell: the direction of a tool that hardly moves turns within a step, and kinks bend."""
-    state, kind = phase.state(x), limit.kind
-    near = np.abs(state.s[:, None] - limit.breaks).min(axis=1, initial=np.inf) > 1e-3
-    if kind in SIZES:
-        near &= limit.values(state)[:, 0] > 0.05
-    if kind in PROCESS:
-        near &= phase.limits[KINDS.index("tool_speed")].values(state)[:, 0] > 0.05
-    return np.repeat(near, len(limit.lower)) if limit.where == "points" else np.ones(len(limit.lower), dtype=bool)
 
 
 def test_jacobian_equals_differences(phase):
