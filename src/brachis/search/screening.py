@@ -35,7 +35,8 @@ _PROGRESS, _PATIENCE = 5e-3, 3
 _SAME_TIME, _SAME_PATH = 0.02, 0.15
 """Starts are the same where their end times differ by less than this fraction, and no joint by more, rad or m."""
 _SAME_LEAST, _OFTEN = 1.003, 4
-"""The least end time was met often enough where so many quick solves, or as many as are kept, end within this factor."""
+"""No further start is looked at where so many quick solves, or as many as are kept, end within this factor of the
+least end time."""
 _ALIKE = 2
 """So many of these, or half of those kept, are kept."""
 _SLOWER = 1.03
