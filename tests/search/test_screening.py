@@ -88,3 +88,25 @@ def test_those_for_which_there_was_no_time_come_after_the_others(starts, monkeyp
     first, *others = screening.screened(starts, MOST, NEVER, quiet)
     assert first.origin == starts[0].origin
     assert others == [], "what was not solved is slower for all that is known"
+
+
+def test_starts_say_whose_closed_form_they_begin_with(starts):
+    names = {decomposition.name for decomposition in decompositions_of(starts[0].problem)}
+    for start in starts:
+        number, _, seed = start.origin.partition(", from ")
+        assert number.startswith("lattice ")
+        assert seed in names
+
+
+def test_no_further_start_is_looked_at_where_the_least_end_time_is_met_again(starts, monkeypatch):
+    looked_at = []
+
+    def quickly(start, _deadline, _listener):
+        looked_at.append(start)
+        return dataclasses.replace(start, estimate=[1.5, 1.0, np.inf, 1.001, 1.002, 1.0][len(looked_at) - 1])
+
+    monkeypatch.setattr(screening, "_quickly", quickly)
+    monkeypatch.setattr(screening, "_same", lambda *_starts: False)
+    kept = screening.screened(starts, MOST, NEVER, quiet)
+    assert len(looked_at) == 6
+    assert [start.estimate for start in kept] == [1.0, 1.0]

@@ -22,7 +22,7 @@ def beginnings(
     cells_per_turn: int,
     count: int,
     rng: np.random.Generator,
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray]:
     """Find postures all over the self-motion manifold at the path's beginning, ranges left out of account.
 
     Parameters
@@ -40,14 +40,17 @@ def beginnings(
 
     Returns
     -------
-    (K, n) ndarray
+    q : (K, n) ndarray
         rad or m.
+    seeds : (K,) int ndarray
+        Which of the decompositions gave it; -1 where chance did.
     """
     target = problem.path.sample(np.zeros(1)).target
     if not decompositions:
         drawn = _drawn(problem, count, rng)
         q = newton.nearest(np.repeat(target, count, axis=0), drawn)
-        return q[np.isfinite(q).all(axis=1)]
+        q = q[np.isfinite(q).all(axis=1)]
+        return q, np.full(len(q), -1)
     found = []
     for decomposition in decompositions:
         cells = Cells.of(decomposition, cells_per_turn, None)
@@ -57,7 +60,7 @@ def beginnings(
         q[..., list(decomposition.redundant)] = q_r[:, None, None]
         q[..., complement(problem.robot.n, decomposition.redundant)] = answers
         found.append(q[np.isfinite(q).all(axis=3)])
-    return np.concatenate(found)
+    return np.concatenate(found), np.repeat(np.arange(len(found)), [len(q) for q in found])
 
 
 def _drawn(problem: Problem, count: int, rng: np.random.Generator) -> np.ndarray:

@@ -70,7 +70,7 @@ def chart_starts(
         return found
     newton = Newton(problem.task_map)
     starts = (
-        None if number > 1 and deadline.passed else _start_along(newton, joint_path, f"lattice {number}")
+        None if number > 1 and deadline.passed else _start_along(newton, joint_path, _origin(number, joint_path))
         for number, joint_path in enumerate(found, 1)
     )
     ranked = sorted((start for start in starts if start is not None), key=lambda start: start.estimate)
@@ -78,6 +78,10 @@ def chart_starts(
         return DeadEnd(0.0, {NO_CHART: len(found)})
     hopeful = [start for start in ranked if start.estimate <= _HOPELESS * ranked[0].estimate or start is ranked[0]]
     return screened(hopeful, level.in_charts, deadline, listener) if hopeful else []
+
+
+def _origin(number: int, joint_path: JointPath) -> str:
+    return f"lattice {number}" + (f", from {joint_path.seed}" if joint_path.seed else "")
 
 
 def _start_along(newton: Newton, joint_path: JointPath, origin: str) -> Start | None:

@@ -36,6 +36,8 @@ class JointPath:
         In the measure of the lattice, s^2.
     branch : int
         Index into the closed form's branches; 0 where the joint path keeps to none.
+    seed : str
+        Whose closed form gave the posture at which it begins, or ``random``; empty where that is given.
     """
 
     problem: Problem
@@ -43,6 +45,7 @@ class JointPath:
     q: np.ndarray
     length: float
     branch: int = 0
+    seed: str = ""
 
 
 @dataclass(frozen=True)

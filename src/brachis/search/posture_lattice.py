@@ -11,6 +11,7 @@ are sampled, and a layer keeps a bounded number of nodes.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import fields
 
@@ -73,6 +74,7 @@ class PostureLattice(Lattice):
         self._size = cell_sizes(revolute, cells_per_turn)
         self._newton = Newton(problem.task_map)
         self._modulo = revolute & ~self._telling
+        self._begun: tuple[np.ndarray, np.ndarray] | None = None
 
     def _at_end(self, last: Layer) -> np.ndarray:
         """See `Lattice`."""
@@ -84,6 +86,9 @@ class PostureLattice(Lattice):
 
         Of several redundant joints the nodes are samples, among which there are no such minima.
         """
+        return [dataclasses.replace(each, seed=self._begun_by(each.q[0])) for each in self._distinct(found, ends, most)]
+
+    def _distinct(self, found: list[JointPath], ends: Layer, most: int) -> list[JointPath]:
         if self._r > 1:
             return distinct(found, most)
         first, second = self._near(ends.q, ends.q, _AROUND * float(self._size.max()))
@@ -102,7 +107,8 @@ class PostureLattice(Lattice):
         if self._origin is not None:
             return _layer(self._origin[None].astype(float), np.zeros(1, dtype=int))
         count = _STARTS * self._nodes
-        q = beginnings(self.problem, self._decompositions, self._newton, self._cells_per_turn, count, rng)
+        self._begun = beginnings(self.problem, self._decompositions, self._newton, self._cells_per_turn, count, rng)
+        q, _ = self._begun
         if not len(q):
             return {NO_ANSWER: 1}
         _, kept = np.unique(self._key(q, self._size), axis=0, return_index=True)
@@ -113,6 +119,14 @@ class PostureLattice(Lattice):
         q = q[within.all(axis=1)]
         held, refused = self._held(q)
         return _layer(*self._told_apart(q[held])) if held.any() else refused
+
+    def _begun_by(self, q: np.ndarray) -> str:
+        """Tell whose closed form gave a posture, (n,), of the first layer; empty where it was given."""
+        if self._begun is None:
+            return ""
+        postures, seeds = self._begun
+        nearest = int(np.abs(self._step(q, postures)).max(axis=1).argmin())
+        return "random" if seeds[nearest] < 0 else self._decompositions[seeds[nearest]].name
 
     def _told_apart(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return starts, (K, n), and labels, (K,): joint paths of different labels do not displace each other.

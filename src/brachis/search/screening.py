@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from contextlib import closing
 
 import numpy as np
 
@@ -33,6 +34,11 @@ _PROGRESS, _PATIENCE = 5e-3, 3
 """A quick solve ends where so many feasible iterates differ by no more than this fraction."""
 _SAME_TIME, _SAME_PATH = 0.02, 0.15
 """Starts are the same where their end times differ by less than this fraction, and no joint by more, rad or m."""
+_SAME_LEAST, _OFTEN = 1.003, 4
+"""No further start is looked at where so many quick solves, or as many as are kept, end within this factor of the
+least end time."""
+_ALIKE = 2
+"""So many of these, or half of those kept, are kept."""
 _SLOWER = 1.03
 """Starts that are slower than the fastest one by this factor are left out."""
 
@@ -58,13 +64,25 @@ def screened(starts: Sequence[Start], most: int, deadline: Deadline, listener: L
         return list(starts)
     jobs = processes(starts[0].problem.task.search.jobs)
     listener(f"solving quickly from {len(starts)} joint paths")
-    looked_at = list(each(_quickly, starts, deadline, jobs=jobs, listener=listener))
+    looked_at: list[Start] = []
+    with closing(each(_quickly, starts, deadline, jobs=jobs, listener=listener)) as solved:
+        for start in solved:
+            looked_at.append(start)
+            if _met_again(looked_at, max(_OFTEN, most)):
+                break
     kept: list[Start] = []
     for start in sorted(looked_at, key=lambda start: start.estimate):
-        slow = bool(kept) and start.estimate > _SLOWER * kept[0].estimate
-        if len(kept) < most and not slow and not any(_same(start, other) for other in kept):
+        ratio = start.estimate / kept[0].estimate if kept else 1.0
+        alike = ratio <= _SAME_LEAST and len(kept) >= max(_ALIKE, most // 2)
+        if len(kept) < most and not alike and not ratio > _SLOWER and not any(_same(start, other) for other in kept):
             kept.append(start)
     return kept
+
+
+def _met_again(looked_at: Sequence[Start], often: int) -> bool:
+    """Tell whether so many quick solves ended at the least end time that others are unlikely to end below it."""
+    times = np.array([start.estimate for start in looked_at if np.isfinite(start.estimate)])
+    return bool(np.sum(times <= _SAME_LEAST * times.min(initial=np.inf)) >= often)
 
 
 def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
