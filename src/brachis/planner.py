@@ -236,7 +236,7 @@ def _in_words(status: SolveStatus) -> str:
 def _solver(start: Start, deadline: Deadline, listener: Listener) -> Solve:
     """Make a function that solves with the start's solver."""
     (solver,) = solver_named(start.solver)
-    return solve_with(solver, start.problem.task.solver, start.joint_map.r, deadline, listener)
+    return solve_with(solver, start.problem.task.solver, start.joint_map, deadline, listener)
 
 
 def transcribe(

@@ -112,7 +112,7 @@ def _answers(program: Program, x: np.ndarray, trajectory: Trajectory) -> Iterato
     for backend in solver_named(task.solver.name, curved=curved):
         if deadline.passed:
             return
-        solve = solve_with(backend, task.solver, program.phases[0].joint_map.r, deadline, lambda _text: None)
+        solve = solve_with(backend, task.solver, program.phases[0].joint_map, deadline, lambda _text: None)
         try:
             refined = refine(program, solve(program, x), solve, options)
         except (ImportError, UnreachableError):

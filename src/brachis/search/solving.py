@@ -9,6 +9,7 @@ import numpy as np
 
 from brachis.deadline import Deadline
 from brachis.errors import UnreachableError
+from brachis.kinematics import ChartMap, JointMap
 from brachis.limits.branch_margin import MARGIN
 from brachis.nlp import Program
 from brachis.nlp.guess import shortest_time
@@ -26,7 +27,9 @@ HELD_BACK = 1e-4
 _EASY = 2
 """Order of the limits with which solves from afar are easy; see `eased`."""
 _ON_ITS_WAY = 1e-3
-_PATIENCE = 100
+_STAGNATION = 1e-5, 10
+"""Progress and patience in charts; see `SolverOptions`."""
+_ITERATIONS = 100
 """Iterations for each redundant joint that ``auto`` grants a solver on one guess, unless the task says otherwise."""
 WORTH_IT = 2e-4
 """A smaller branch margin that shortens the motion by less than this fraction is not worth its sharper turns."""
@@ -117,7 +120,7 @@ def eased(program: Program, x: np.ndarray, solve: Solve, margin: float) -> tuple
 
 
 def solve_with(
-    solver: Solver, settings: SolverSettings, redundancy: int, deadline: Deadline, listener: Listener
+    solver: Solver, settings: SolverSettings, joint_map: JointMap, deadline: Deadline, listener: Listener
 ) -> Solve:
     """Make a function that runs one backend under the task's bounds.
 
@@ -125,8 +128,9 @@ def solve_with(
     ----------
     solver : Solver
     settings : SolverSettings
-    redundancy : int
-        Degree of redundancy r.
+    joint_map : JointMap
+        Of what is solved. In a chart, where wandering among equally fast motions is common and no branch boundary slows
+        a solve down on its way, fewer iterates without gain are waited for.
     deadline : Deadline
     listener : callable
 
@@ -134,15 +138,17 @@ def solve_with(
     -------
     callable
     """
-    patience = settings.max_iterations
-    if settings.name == "auto" and patience == SolverSettings.model_fields["max_iterations"].default:
-        patience = _PATIENCE * max(redundancy, 1)
+    most = settings.max_iterations
+    if settings.name == "auto" and most == SolverSettings.model_fields["max_iterations"].default:
+        most = _ITERATIONS * max(joint_map.r, 1)
+    stagnation = _STAGNATION if isinstance(joint_map, ChartMap) else ()
 
     def progress(iteration: int, objective: float) -> None:
         listener(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s")
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
         remaining = deadline.within(settings.time_limit).for_a_solve
-        return solver.solve(program, x, SolverOptions(settings.tolerance, patience, remaining), progress)
+        options = SolverOptions(settings.tolerance, most, remaining, *stagnation)
+        return solver.solve(program, x, options, progress)
 
     return solve

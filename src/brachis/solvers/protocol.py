@@ -79,8 +79,8 @@ class SolverOptions:
     tolerance: float = 1e-6
     max_iterations: int = 300
     time_limit: float = 20.0
-    progress: float = 1e-5
-    patience: int = 10
+    progress: float = 1e-6
+    patience: int = 15
 
 
 @dataclass(frozen=True)
