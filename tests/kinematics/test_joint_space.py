@@ -27,28 +27,39 @@ def along():
 @pytest.fixture(scope="module")
 def states():
     rng = np.random.default_rng(1)
-    return rng.uniform(0.05, 0.95, (6, 1)), rng.normal(size=(6, 1)), rng.normal(size=(6, 1))
+    return rng.uniform(0.05, 0.95, (6, 1)), *(rng.normal(size=(6, 1)) for _ in range(3))
 
 
 def test_the_motion_is_that_of_the_path(along, states):
-    y, ydot, yddot = states
-    state = along.state(y, ydot, yddot)
+    y, ydot, yddot, ydddot = states
+    state = along.state(*states)
 
     def moved(t):
-        return along.postures(y + t * ydot + 0.5 * t**2 * yddot)
+        return along.postures(y + t * ydot + t**2 * yddot / 2.0 + t**3 * ydddot / 6.0)
+
+    def accelerated(t):
+        return along.state(
+            y + t * ydot + t**2 * yddot / 2.0 + t**3 * ydddot / 6.0,
+            ydot + t * yddot + t**2 * ydddot / 2.0,
+            yddot + t * ydddot,
+            ydddot,
+        ).qddot
 
     np.testing.assert_array_equal(state.q, along.postures(y))
     np.testing.assert_allclose(state.qdot, (moved(H) - moved(-H)) / (2.0 * H), atol=1e-8)
     np.testing.assert_allclose(state.qddot, (moved(1e-3) - 2.0 * moved(0) + moved(-1e-3)) / 1e-6, atol=1e-4)
+    jerk = (accelerated(H) - accelerated(-H)) / (2.0 * H)
+    np.testing.assert_allclose(state.qdddot, jerk, atol=1e-5 * np.abs(jerk).max())
 
 
 def test_derivatives_equal_differences(along, states):
-    y, ydot, yddot = states
-    exact = along.derivatives(along.state(y, ydot, yddot))
+    y, ydot, yddot, ydddot = states
+    exact = along.derivatives(along.state(*states))
 
     def difference(part, *, of_y, of_ydot):
         ahead, behind = (
-            getattr(along.state(y + sign * H * of_y, ydot + sign * H * of_ydot, yddot), part) for sign in (1.0, -1.0)
+            getattr(along.state(y + sign * H * of_y, ydot + sign * H * of_ydot, yddot, ydddot), part)
+            for sign in (1.0, -1.0)
         )
         return (ahead - behind) / (2.0 * H)
 
