@@ -97,9 +97,9 @@ class FullSpace:
         """End time, s."""
         return self.program.objective(x)
 
-    def gradient(self) -> np.ndarray:
+    def gradient(self, x: np.ndarray) -> np.ndarray:
         """Gradient of the end time."""
-        return self.program.gradient()
+        return self.program.gradient(x)
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Rows of the program, then the path's equations."""

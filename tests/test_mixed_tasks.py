@@ -79,3 +79,5 @@ def test_derivatives_of_the_plain_transcription(bench, robot, number, folder):
     entries = program.jacobian(x) * step[program.jacobian_columns]
     exact = np.bincount(program.jacobian_rows, weights=entries, minlength=len(program.lower))
     assert np.abs(slope - exact).max() < 1e-6 * np.abs(exact).max()
+    ahead, behind = (program.objective(x + sign * 1e-6 * step) for sign in (1.0, -1.0))
+    assert program.gradient(x) @ step == pytest.approx((ahead - behind) / 2e-6, rel=1e-6)
