@@ -174,4 +174,6 @@ def test_program():
 
 
 def test_plain_data(planned):
-    json.dumps(planned.to_dict())
+    data = json.loads(json.dumps(planned.to_dict()))
+    assert data["t_end"] == planned.t_end
+    assert data["verified"] is True

@@ -30,9 +30,13 @@ def test_a_spike_is_named(scatter):
         spikes(position)
 
 
-def test_corners_are_no_spikes():
-    spikes(bent(300)[0])
-    spikes(bent(10_000, 0.05 * MM)[0])
+@pytest.mark.parametrize(("count", "scatter"), [(300, 0.0), (10_000, 0.05 * MM)])
+def test_corners_are_no_spikes_and_spikes_beside_them_are(count, scatter):
+    position = bent(count, scatter)[0]
+    spikes(position)
+    position[count // 5] += [0.0, 0.0, 50.0 * MM]
+    with pytest.raises(TaskError, match=f"row {count // 5}: the point is a spike"):
+        spikes(position)
 
 
 def test_a_factor_of_a_thousand_is_named():

@@ -38,7 +38,7 @@ _SAME_LEAST, _OFTEN = 1.003, 4
 """No further start is looked at where so many quick solves, or as many as are kept, end within this factor of the
 least end time."""
 _ALIKE = 2
-"""So many of these, or half of those kept, are kept."""
+"""So many of these equally fast starts are kept at most, or half of what a level plans if that is more."""
 _SLOWER = 1.03
 """Starts that are slower than the fastest one by this factor are left out."""
 
