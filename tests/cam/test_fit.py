@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
+from brachis.cam import stretches
 from brachis.cam.curves import fit_curves
+from brachis.cam.deviations import deviations
+from brachis.cam.fit import fit_points
 from brachis.cam.least_squares import Tolerance
 from brachis.errors import TaskError
 from support.seams import bent, brute_distances, points, wave
@@ -126,3 +132,38 @@ def test_what_there_is_too_little_room_for_is_said():
     position, _ = bent(2_000, 0.05 * MM)
     with pytest.raises(TaskError, match=r"row \d+: the corner of .* cannot be rounded .*larger tolerance.corner"):
         fit_curves(points(position), tolerance(0.3 * MM, corner=0.1 * MM))
+
+
+def rounds(count, n=2_000):
+    """A circle of 0.2 m that is gone round several times, with a yaw that goes on over all rounds."""
+    t = np.linspace(0.0, count, n)
+    circle = 0.2 * np.column_stack([np.cos(2.0 * np.pi * t), np.sin(2.0 * np.pi * t)])
+    return circle, np.linspace(0.0, np.pi / 2.0, n)[:, None]
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 20])
+def test_every_round_is_compared_with_its_own(count):
+    position, yaw = rounds(count, 4_000)
+    _, report = fit_curves(points(position, yaw), tolerance(0.1 * MM, np.deg2rad(1.0)))
+    assert report.orientation_error < np.deg2rad(0.1)
+    assert report.position_error <= 0.1 * MM
+
+
+def test_a_round_that_is_left_out_is_seen():
+    position, yaw = rounds(1)
+    ((curve,), _) = fit_curves(points(position, yaw), tolerance(0.1 * MM, np.deg2rad(1.0)))
+    twice, turned = rounds(2, 4_000)
+    distances, _ = deviations(points(twice, turned), curve.spline)
+    assert distances.max() > 0.1
+
+
+def test_a_curve_that_does_not_pass_its_points_is_refused(monkeypatch):
+    position = wave(500)[:, :2]
+    monkeypatch.setattr(stretches, "fit_points", lambda given, *rest: shifted(fit_points(given, *rest)))
+    with pytest.raises(TaskError, match=r"does not pass the points within the tolerance.* mm off"):
+        fit_curves(points(position), tolerance(0.05 * MM))
+
+
+def shifted(fit):
+    """The same fit with a curve a millimetre away, which its own errors do not show."""
+    return dataclasses.replace(fit, spline=BSpline(fit.spline.t, fit.spline.c + MM, fit.spline.k))

@@ -82,7 +82,9 @@ MISTAKES = [
     ("G0 X1 Y1 Z1\nG2 X5 Y1 R1 F10", r"line 2: the arc is none; found R 1 mm for ends 4 mm apart"),
     ("G0 X1 Y1 Z1\nG1 X#1 F10", r"line 2: not understood; found 'X#1'"),
     ("G0 X1 Y1 Z1\nG1 X2 F0", r"line 2: a feed rate must be positive; found F0"),
-    ("G0 X1 Y1", r"a.nc: no motion; found 0 places"),
+    ("G0 X1 Y1", r"a.nc: no motion; found 0 places.*Z is never stated"),
+    ("G0 X1 Y1 Z1\nM98 P1000", r"line 2: subprograms are not read; found M98"),
+    ("G54 G0 X1 Y1 Z1\nG1 X2 F10\nG55\nG1 X3", r"line 3: the work offset changes within the program"),
 ]
 
 
@@ -95,3 +97,13 @@ def test_mistakes_are_named(text, message):
 def test_positions_alone_are_given():
     with pytest.raises(TaskError, match=r"G-code gives positions alone; found x, y, yaw"):
         points_of(PROGRAM, ("x", "y", "yaw"))
+
+
+def test_nothing_after_the_end_is_a_move():
+    points, _ = points_of("G0 X1 Y1 Z1\nG1 X10 F600\nM30\nG1 X900 Y900\n")
+    np.testing.assert_allclose(points.position[-1], [0.01, 0.001, 0.001])
+
+
+def test_a_plane_needs_no_third_axis():
+    points, _ = points_of("G0 X0 Y0\nG1 X10 F600\nG1 Y10\n", ("x", "y"))
+    np.testing.assert_allclose(points.position[-1], [0.01, 0.01])

@@ -26,6 +26,7 @@ def points_from(points: Any, orientations: Any, speed: Any, units: Units, source
     orientations : array_like, (n, 4), (n, 3, 3) or (n,), or object with quaternions; or None
         Quaternions w, x, y, z; rotation matrices; SciPy's rotations; yaw.
     speed : array_like, (n,), or None
+        NaN where none is prescribed.
     units : Units
         Of the numbers; m, rad and m/s where not stated.
     source : str
@@ -45,11 +46,12 @@ def points_from(points: Any, orientations: Any, speed: Any, units: Units, source
     turning = np.empty((len(values), 0)) if orientations is None else _turning(orientations, units, source)
     speeds = None
     if speed is not None:
-        speeds = np.asarray(speed, dtype=float) * SPEEDS[units.speed or "m/s"]
-        bad = np.flatnonzero(np.atleast_1d(speeds <= 0.0))
-        if bad.size:
-            where = f"{source}: row {bad[0]}"
-            raise TaskError("a speed must be positive", found=f"{speeds.flat[bad[0]]:g} m/s", where=where)
+        where = f"{source}: speed"
+        speeds = _numbers(speed, where) * SPEEDS[units.speed or "m/s"]
+        if speeds.ndim != 1:
+            raise TaskError("speeds of the wrong shape", found=speeds.shape, allowed="(n,)", where=where)
+        problem = "a speed must be positive and finite, or NaN where there is none"
+        _refuse_first((speeds <= 0.0) | np.isinf(speeds), problem, speeds, source)
     for name, one in (("orientations", turning), ("speed", speeds)):
         if one is not None and len(np.atleast_1d(one)) != len(values):
             raise TaskError(f"as many {name} as points are needed", found=len(np.atleast_1d(one)), allowed=len(values))
@@ -91,12 +93,18 @@ def _turning(orientations: Any, units: Units, source: str) -> Array:  # noqa: AN
 
 
 def _array(values: Any, where: str, source: str) -> Array:  # noqa: ANN401
-    try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise TaskError("not an array of numbers", found=str(error), where=where) from None
+    array = _numbers(values, where)
+    if not array.size:
+        raise TaskError("an array without numbers", found=array.shape, allowed="2 rows or more", where=where)
     _refuse_first(~np.isfinite(array.reshape(len(array), -1) if array.ndim else array), "not finite", array, source)
     return array
+
+
+def _numbers(values: Any, where: str) -> Array:  # noqa: ANN401
+    try:
+        return np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise TaskError("not an array of numbers", found=str(error), where=where) from None
 
 
 def _refuse_first(bad: np.ndarray, problem: str, values: Array, source: str) -> None:

@@ -68,7 +68,7 @@ def points_of(table: Table, rows: tuple[str, ...] | str, units: Units, source: s
     """
     where = f"{source}: line {table.header_line}"
     headings, choice = understood(table.header, where, rows)
-    stated: dict[str, str] = {}
+    stated: dict[str, dict[str, None]] = {}
 
     def column(name: str, kind: str, factors: dict[str, float]) -> Array:
         index, unit = headings[name]
@@ -85,7 +85,7 @@ def points_of(table: Table, rows: tuple[str, ...] | str, units: Units, source: s
         turning = np.column_stack(angles) if angles else np.empty((len(lengths), 0))
     points = Points(lengths, _turning(turning, others, table, source), speed, table.lines, source)
     _check_speeds(points)
-    return points, tuple(f"{kind} in {unit}, as the header says" for kind, unit in stated.items())
+    return points, tuple(f"{kind} in {' and '.join(units)}, as the header says" for kind, units in stated.items())
 
 
 def _choices(rows: tuple[str, ...] | str) -> tuple[tuple[str, ...], ...]:
@@ -105,7 +105,13 @@ def _heading(index: int, text: str) -> tuple[int, str, str | None]:
 
 
 def _unit(
-    name: str, unit: str | None, kind: str, factors: dict[str, float], units: Units, stated: dict[str, str], where: str
+    name: str,
+    unit: str | None,
+    kind: str,
+    factors: dict[str, float],
+    units: Units,
+    stated: dict[str, dict[str, None]],
+    where: str,
 ) -> str:
     """Return the unit of a column: the heading's, else the task's, else m or rad."""
     asked, found = getattr(units, kind), f"{unit} for {name}"
@@ -114,7 +120,7 @@ def _unit(
             raise TaskError(f"unknown unit of {kind}", found=found, allowed=", ".join(factors), where=where)
         if asked is not None and factors[asked] != factors[unit]:
             raise TaskError("the header contradicts the task's units", found=found, allowed=asked, where=where)
-        stated[kind] = unit
+        stated.setdefault(kind, {})[unit] = None
         return unit
     if asked is None and getattr(_DEFAULTS, kind) is None:
         hint = "Write feed_mm/min in the header, or units: {speed: mm/min} in the task"

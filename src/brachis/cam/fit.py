@@ -47,7 +47,7 @@ def fit_points(points: Points, tolerance: Tolerance, scatter: Scatter) -> Fit:
     every = -(-len(points) // _SAMPLE)
     chosen = np.unique(np.append(np.arange(0, len(points), every), len(points) - 1))
     noisy, dimension = scatter.noisy(tolerance), points.position.shape[1]
-    rough = _with_knots_added(points.only(chosen), sigma[chosen], sigma[[0, -1]], tolerance, noisy=noisy)
+    rough = _with_knots_added(points.only(chosen), sigma[chosen], _first_breaks(points, sigma), tolerance, noisy=noisy)
     if rough is None:
         return _interpolated(points, sigma)
     places, breaks = over_arc_length(rough, dimension)
@@ -56,6 +56,13 @@ def fit_points(points: Points, tolerance: Tolerance, scatter: Scatter) -> Fit:
     if fit is not None and fit.ratios(tolerance).max() <= 1.0:
         return _with_fewest_knots(points, _with_knots_removed(points, fit, tolerance), tolerance)
     return _interpolated(points, sigma) if fit is None or (not noisy and len(points) <= _INTERPOLATED) else fit
+
+
+def _first_breaks(points: Points, sigma: Array) -> Array:
+    """Return the knots to begin with: as many intervals as the path is longer than what it extends over."""
+    extent = float(np.linalg.norm(np.ptp(points.position, axis=0)))
+    count = max(1, min(int(sigma[-1] / extent), len(points) // _NOISY_POINTS))
+    return np.linspace(0.0, float(sigma[-1]), count + 1)
 
 
 def _with_knots_added(points: Points, sigma: Array, breaks: Array, tolerance: Tolerance, *, noisy: bool) -> Fit | None:

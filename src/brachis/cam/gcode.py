@@ -1,8 +1,8 @@
 """G-code: rapid and straight moves, arcs, feed rates (G0, G1, G2, G3, F), in any plane, absolute or incremental.
 
 Moves become points on them: lines are straight between their ends, arcs are met within a micrometre. What does not say
-where the tool goes (spindle, coolant, work offsets) is skipped and told; what would (cycles, cutter compensation,
-rotary axes) is refused.
+where the tool goes (spindle, coolant, one work offset) is skipped and told; what would (cycles, cutter compensation,
+rotary axes, subprograms, a change of the work offset) is refused. M2 and M30 end the program.
 """
 
 from __future__ import annotations
@@ -25,7 +25,10 @@ _MOTIONS: Final = {"0", "1", "2", "3"}
 _PLANES: Final = {"17": (0, 1, 2), "18": (2, 0, 1), "19": (1, 2, 0)}
 """Of an arc, the axes of its plane, then the one along its normal."""
 _UNITS: Final = {"20": 0.0254, "21": 1e-3}
-_IGNORED: Final = {"40", "49", "54", "55", "56", "57", "58", "59", "61", "64", "80", "91.1", "94"}
+_IGNORED: Final = {"40", "49", "61", "64", "80", "91.1", "94"}
+_OFFSETS: Final = {"54", "55", "56", "57", "58", "59"}
+_ENDS: Final = {"2", "30"}
+_CALLS: Final = {"97", "98", "99"}
 _SAGITTA = 1e-6
 _PIECES = 4
 _PIECE = 1e-3
@@ -41,6 +44,8 @@ class _Machine:
     plane: tuple[int, int, int] = _PLANES["17"]
     unit: float = 1e-3
     unit_stated: bool = False
+    offset: str = "54"
+    ended: bool = False
     absolute: bool = True
     feed: float = float("nan")
     at: list[float | None] = field(default_factory=lambda: [None, None, None])
@@ -67,16 +72,22 @@ def read_gcode(text: str, rows: tuple[str, ...] | str, source: str) -> tuple[Poi
     TaskError
         The program has words that are not understood, or an arc is none; the message names the line.
     """
-    machine = _Machine()
+    names = POSITION if isinstance(rows, str) else rows
+    if not set(names) <= set(POSITION):
+        raise TaskError("G-code gives positions alone", found=", ".join(names), allowed="x, y, z", where=source)
+    machine = _Machine(at=[None if name in names else 0.0 for name in POSITION])
     for number, line in enumerate(text.removeprefix("\ufeff").split("\n"), 1):
         code = _COMMENT.sub("", line.upper()).strip()
         if code:
             _block(machine, code, f"{source}: line {number}", number)
-    names = POSITION if isinstance(rows, str) else rows
-    if not set(names) <= set(POSITION):
-        raise TaskError("G-code gives positions alone", found=", ".join(names), allowed="x, y, z", where=source)
+        if machine.ended:
+            break
     if len(machine.points) < 2:  # noqa: PLR2004
-        raise TaskError("no motion", found=f"{len(machine.points)} places", allowed="2 or more", where=source)
+        never = [name.upper() for name, place in zip(POSITION, machine.at, strict=True) if place is None]
+        hint = f"{', '.join(never)} is never stated" if never else None
+        raise TaskError(
+            "no motion", found=f"{len(machine.points)} places", allowed="2 or more", where=source, hint=hint
+        )
     chosen = [POSITION.index(name) for name in names]
     speed = np.array(machine.speeds)
     points = Points(
@@ -108,14 +119,12 @@ def _block(machine: _Machine, code: str, where: str, number: int) -> None:
         elif letter in "ABCUVW":
             problem = "axes other than X, Y, Z are not read"
             raise TaskError(problem, found=letter + text, allowed="X, Y, Z, I, J, K, R, F", where=where)
+        elif letter == "M":
+            _miscellaneous(machine, _plain(text), where)
         elif letter != "N":
-            machine.skipped.add(letter + _plain(text) if letter == "M" else letter)
+            machine.skipped.add(letter)
     if "F" in values:
-        machine.feed = values["F"] * machine.unit / 60.0
-        if not machine.feed > 0.0:
-            raise TaskError(
-                "a feed rate must be positive", found=f"F{values['F']:g}", allowed="more than 0", where=where
-            )
+        _feed(machine, values["F"], where)
     if any(axis in values for axis in "XYZIJKR"):
         _move(machine, values, where, number)
 
@@ -123,6 +132,20 @@ def _block(machine: _Machine, code: str, where: str, number: int) -> None:
 def _plain(text: str) -> str:
     """Write a code without needless zeros."""
     return f"{float(text):g}"
+
+
+def _feed(machine: _Machine, value: float, where: str) -> None:
+    machine.feed = value * machine.unit / 60.0
+    if not machine.feed > 0.0:
+        raise TaskError("a feed rate must be positive", found=f"F{value:g}", allowed="more than 0", where=where)
+
+
+def _miscellaneous(machine: _Machine, code: str, where: str) -> None:
+    if code in _CALLS:
+        problem = "subprograms are not read"
+        raise TaskError(problem, found=f"M{code}", allowed="a program without calls", where=where)
+    machine.ended = code in _ENDS
+    machine.skipped.add(f"M{code}")
 
 
 def _mode(machine: _Machine, code: str, where: str) -> None:
@@ -134,6 +157,12 @@ def _mode(machine: _Machine, code: str, where: str) -> None:
         machine.unit, machine.unit_stated = _UNITS[code], True
     elif code in {"90", "91"}:
         machine.absolute = code == "90"
+    elif code in _OFFSETS:
+        if machine.points and machine.offset != code:
+            problem = "the work offset changes within the program: where the tool goes is not known"
+            raise TaskError(problem, found=f"G{code}", allowed="one work offset", where=where)
+        machine.offset = code
+        machine.skipped.add(f"G{code}")
     elif code in _IGNORED:
         machine.skipped.add(f"G{code}")
     else:

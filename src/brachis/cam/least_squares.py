@@ -16,6 +16,8 @@ DEGREE = 5
 """Of all fitted curves: C4 at their knots."""
 _END_WEIGHT = 1e3
 _STEPS = 2
+_FARTHEST = 0.02
+"""How far a point may be from where it was taken to be, as a part of the length."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,8 @@ def fit_over(points: Points, sigma: Array, breaks: Array) -> Fit:
     knots = clamped(breaks / length)
     inside = np.clip(sigma[order] / length, 0.0, 1.0)
     spline = make_lsq_spline(inside, columns[order] - origin, knots, k=DEGREE, w=weights[order])
+    if not np.isfinite(spline.c).all():
+        raise ValueError("the knots are too dense for the points")
     control_points = spline.c + origin
     control_points[[0, -1]] = columns[[0, -1]]
     return measured(points, BSpline(knots * length, control_points, DEGREE), breaks, sigma)
@@ -118,11 +122,14 @@ def measured(points: Points, spline: BSpline, breaks: Array, sigma: Array) -> Fi
     dimension = points.position.shape[1]
     position = type(spline)(spline.t, spline.c[:, :dimension], spline.k)
     slope, sigma = position.derivative(), sigma.copy()
+    # Of a path that winds, a first rough curve is near points of other windings, too: these are not for the taking.
+    far = _FARTHEST * (breaks[-1] - breaks[0])
+    low, high = np.maximum(sigma - far, breaks[0]), np.minimum(sigma + far, breaks[-1])
     for _ in range(_STEPS):
         tangent = slope(sigma)
         along = np.sum((points.position - position(sigma)) * tangent, axis=1)
         sigma += along / np.maximum(np.sum(tangent**2, axis=1), 1e-12)
-        np.clip(sigma, breaks[0], breaks[-1], out=sigma)
+        np.clip(sigma, low, high, out=sigma)
         sigma[[0, -1]] = breaks[[0, -1]]
     values = spline(sigma)
     distances = np.linalg.norm(values[:, :dimension] - points.position, axis=1)

@@ -16,6 +16,8 @@ from brachis.cam.scatter import Scatter
 
 _OF_SCATTER = 6.0
 _ROUNDING = 1e-6
+_DRAWN, _TINY = 1e-3, 1e-8
+"""By how much a distance may be overestimated, as a part of the tolerance and in m or rad."""
 _SHARPEST = np.deg2rad(150.0)
 _LEAST_SHARE = 0.05
 
@@ -77,8 +79,31 @@ def fit_between(
         whole = replace(whole, position=position)
         chosen = slice(len(before), len(before) + len(given))
         fit = _fitted(whole, tolerance, scatter, doubt)
-        stretches.append(Stretch(whole, chosen, fit, *deviations(whole.only(chosen), fit.spline)))
+        distances, angles = _checked(whole, fit, tolerance)
+        stretches.append(Stretch(whole, chosen, fit, distances[chosen], angles[chosen]))
     return stretches
+
+
+def _checked(points: Points, fit: Fit, tolerance: Tolerance) -> tuple[Array, Array]:
+    """Return distances and angles of points from their fit, by another formula than the fit's.
+
+    Raises
+    ------
+    TaskError
+        A point is farther away than the tolerance allows.
+    """
+    distances, angles = deviations(points, fit.spline)
+    for found, allowed, per, unit in (
+        (distances, tolerance.position, 1e-3, "mm"),
+        (angles, tolerance.orientation, np.pi / 180.0, "deg"),
+    ):
+        i = int(np.argmax(found))
+        if found[i] > allowed * (1.0 + _DRAWN) + _TINY:
+            problem = "the fitted curve does not pass the points within the tolerance"
+            hint = "Raise the tolerance, or cut the path into several"
+            away = f"{points.described(i)}, {found[i] / per:.4g} {unit} off"
+            raise points.wrong(i, problem, found=away, allowed=f"{allowed / per:.4g} {unit}", hint=hint)
+    return distances, angles
 
 
 def blend_between(first: Stretch, second: Stretch, corner: Corner, tolerance: Tolerance) -> float:

@@ -17,6 +17,8 @@ from brachis.problem import breaks_of
 from brachis.search.phase_plane import prescribed_times
 
 _STATIONS = 401
+_STEADY = 1e-6
+"""Changes of the speed below this part of it are rounding."""
 _SPREAD = 0.4
 """Part of the knots that is spread evenly over the time; the others are over the change of speed."""
 
@@ -29,7 +31,9 @@ def first_breaks(start: Start) -> np.ndarray:
     _, times = paced
     t_norm = np.linspace(0.0, 1.0, _STATIONS)
     speed = np.gradient(np.interp(t_norm, times / times[-1], np.linspace(0.0, 1.0, len(times))), t_norm)
-    change = np.append(0.0, np.cumsum(np.abs(np.diff(speed, prepend=0.0))[1:]))
+    change = np.append(0.0, np.cumsum(np.abs(np.diff(speed))))
+    if change[-1] <= _STEADY * np.abs(speed).max():
+        return breaks
     return np.asarray(np.interp(breaks, _SPREAD * t_norm + (1.0 - _SPREAD) * change / change[-1], t_norm))
 
 

@@ -73,6 +73,12 @@ def segments_along(points: Points, wanted: Wanted, told: tuple[str, ...] = ()) -
         where = f"{wanted.where}.orientation"
         raise TaskError(problem, found="orientations", allowed="no orientation", where=where)
     if wanted.tolerance is None:
+        if points.speed is not None:
+            problem = "feed rates are read along a fitted path alone"
+            hint = "Give a tolerance, or leave the feed rates out"
+            raise TaskError(
+                problem, found="feed rates", allowed="a tolerance beside them", where=wanted.where, hint=hint
+            )
         return [_spline_through(points, _named(interpolated(points, told), wanted), wanted)]
     position, orientation, corner = (getattr(wanted.tolerance, name) for name in FitTolerance.model_fields)
     curves, report = fit_curves(points, Tolerance(position, orientation, corner or position), told)

@@ -60,7 +60,8 @@ class Given:
         """Return the same, with no states but those from one path coordinate to another, both included."""
         more = self.looking_at(np.array([begin, end]))
         first, last = self.times_of(np.array([begin, end]))
-        inside = (more.states.t >= first) & (more.states.t <= last)
+        slack = _SAME_PLACE * self.trajectory.t_end
+        inside = (more.states.t >= first - slack) & (more.states.t <= last + slack)
         return replace(more, states=more.states.only(inside))
 
 

@@ -1,0 +1,41 @@
+"""Points from arrays: what is wrong with them is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.cam.arrays import points_from
+from brachis.cam.units import Units
+from brachis.errors import TaskError
+
+POINTS = np.linspace([0.0, 0.0, 0.0], [0.1, 0.2, 0.3], 20)
+WRONG = [
+    (np.full(20, np.inf), r"row 0: a speed must be positive and finite"),
+    (np.full(20, -0.1), r"row 0: a speed must be positive and finite"),
+    (np.ones((20, 3)), r"speeds of the wrong shape; found \(20, 3\)"),
+    (["a"] * 20, r"not an array of numbers"),
+    (np.ones(19), r"as many speed as points are needed"),
+]
+
+
+@pytest.mark.parametrize(("speed", "message"), WRONG)
+def test_wrong_speeds_are_named(speed, message):
+    with pytest.raises(TaskError, match=message):
+        points_from(POINTS, None, speed, Units(), "points")
+
+
+def test_no_speed_may_be_prescribed_in_places():
+    speed = np.where(np.arange(20) < 5, np.nan, 0.1)
+    np.testing.assert_array_equal(points_from(POINTS, None, speed, Units(), "points").speed, speed)
+
+
+def test_empty_arrays_are_refused():
+    with pytest.raises(TaskError, match="an array without numbers"):
+        points_from(np.empty((0, 3)), None, None, Units(), "points")
+
+
+def test_feed_rates_without_a_tolerance_are_refused_not_lost():
+    with pytest.raises(TaskError, match="feed rates are read along a fitted path alone"):
+        brachis.fit_path(POINTS, speed=np.full(20, 0.01))
