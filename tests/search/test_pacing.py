@@ -1,0 +1,40 @@
+"""Knots where a motion with a least speed changes its speed, and evenly where it does not."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from brachis.search import pacing
+from brachis.task import load_task
+
+TASK = {
+    "brachis": 1,
+    "task_space": ["x", "y"],
+    "start": {"joints": [0.0, 0.0]},
+    "path": [{"line": {"by": [0.5, 0.0]}}],
+    "spline": {"intervals": 20},
+}
+
+
+def breaks(times: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> np.ndarray:
+    start = SimpleNamespace(problem=SimpleNamespace(task=load_task(TASK)))
+    monkeypatch.setattr(pacing, "_paced", lambda _start: (np.zeros((len(times), 1)), times))
+    return pacing.first_breaks(start)
+
+
+def test_a_constant_speed_has_even_knots(monkeypatch):
+    found = breaks(np.linspace(0.0, 4.0, 401), monkeypatch)
+    np.testing.assert_allclose(np.diff(found), 0.05, rtol=1e-12)
+
+
+def test_knots_are_closer_where_the_speed_changes(monkeypatch):
+    s = np.linspace(0.0, 1.0, 401)
+    found = breaks(np.where(s < 0.5, s, 0.5 + 4.0 * (s - 0.5)), monkeypatch)
+    lengths, place = np.diff(found), 0.2  # at s = 0.5 in normalised time
+    near = np.abs(0.5 * (found[1:] + found[:-1]) - place) < 0.02
+    assert lengths[near].max() < 0.3 * lengths[~near].min()
+    assert found[0] == 0.0
+    assert found[-1] == 1.0
