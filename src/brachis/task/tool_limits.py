@@ -68,7 +68,7 @@ class ProcessSpeed(Model):
         AfterValidator(_between),
     ] = Field(
         description="[begin, end], path coordinates between which it is held; outside, as fast as the limits allow. "
-        "The motion begins and ends at rest, so that both lie within the path."
+        "Both lie strictly within the path, also where the motion does not begin or end at rest."
     )
     tolerance: Annotated[Share, Field(ge=_LEAST_TOLERANCE, le=0.5)] = Field(
         default=0.01, description="Largest deviation either way, as a share of the speed: 1 %, or 0.01."
