@@ -103,7 +103,7 @@ def test_missing_solver_is_said_and_the_next_one_taken(monkeypatch):
     monkeypatch.setitem(sys.modules, "unopy", None)
     result = brachis.plan(robot(), task())
     assert result.verified
-    assert result.report.solver == "ipopt"
+    assert result.solver_report.solver == "ipopt"
     assert any("uno: not installed" in candidate.status for candidate in result.candidates)
 
 

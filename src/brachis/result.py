@@ -71,7 +71,7 @@ class Result:
         return self.task.fits
 
     @property
-    def report(self) -> SolverReport:
+    def solver_report(self) -> SolverReport:
         """Report of the solve that gave the trajectory."""
         return self.attempt.reports[-1]
 
@@ -87,9 +87,9 @@ class Result:
             "position_units": list(self.trajectory.robot.position_units),
             "family": self.family,
             "in_use": in_use(self.trajectory.robot),
-            "status": self.report.status.name.lower(),
-            "advice": self.report.status.value,
-            "solver": self.report.solver,
+            "status": self.solver_report.status.name.lower(),
+            "advice": self.solver_report.status.value,
+            "solver": self.solver_report.solver,
             "iterations": sum(report.iterations for report in last.reports),
             "refinement_rounds": last.refinement_rounds,
             "collocation_points": last.collocation_points,

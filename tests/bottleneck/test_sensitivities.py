@@ -27,7 +27,7 @@ def found_of(result):
 def test_time_falls_with_the_root_of_the_force(slide, rest, degree):
     # t = 2 sqrt(m L / F) times a factor of the spline alone: d t / d ln F = -t / 2 exactly.
     result = slide(rest=rest, degree=degree)
-    found, answer = found_of(result), result.report.objective
+    found, answer = found_of(result), result.solver_report.objective
     assert found.of("j1", "torque").change(1.0) == pytest.approx(-0.5 * answer, rel=1e-5)
     assert found.of("j1", "torque").derivative == pytest.approx(-0.5 * answer / FORCE, rel=1e-5)
     assert [entry.change(1.0) for entry in found.limits if str(entry.label) != "j1 torque"] == [0.0] * 7
@@ -44,14 +44,14 @@ def test_trapezoid(slide):
     assert force == pytest.approx(-ramp, rel=0.1)
     assert speed == pytest.approx(ramp - LENGTH / limit, rel=0.1)
     # The same motion k times as fast needs k times the velocity and k^2 times the force.
-    assert 2.0 * force + speed == pytest.approx(-result.report.objective, rel=1e-4)
+    assert 2.0 * force + speed == pytest.approx(-result.solver_report.objective, rel=1e-4)
     assert found.of("j1", "velocity").label.unit == "m/s"
 
 
 def test_acceleration_limit(slide):
     result = slide(robot={"limits": {"acceleration": 6.0, "torque": None}})
     found = found_of(result)
-    assert found.of("j1", "acceleration").change(1.0) == pytest.approx(-0.5 * result.report.objective, rel=1e-5)
+    assert found.of("j1", "acceleration").change(1.0) == pytest.approx(-0.5 * result.solver_report.objective, rel=1e-5)
     assert found.of("j1", "acceleration").label.unit == "m/s^2"
 
 
@@ -139,10 +139,10 @@ def test_least_squares_agree_with_the_solver(scara, joint):
 
 def test_a_solver_without_multipliers(slide):
     result = slide(intervals=10, solver="slsqp")
-    assert not result.report.multipliers.any()
+    assert not result.solver_report.multipliers.any()
     found = found_of(result)
     assert found.source == "least squares"
-    assert found.of("j1", "torque").change(1.0) == pytest.approx(-0.5 * result.report.objective, rel=1e-3)
+    assert found.of("j1", "torque").change(1.0) == pytest.approx(-0.5 * result.solver_report.objective, rel=1e-3)
 
 
 def test_an_answer_that_is_no_optimum_is_told(scara):

@@ -270,5 +270,5 @@ def test_every_solver_finds_the_optimum(slides, solver):
     urdf = slides([X, Y], [FORCE, FORCE])
     result = plan(urdf, ["x", "y"], [LENGTH, 0.0], intervals=10, solver=solver)
     assert result.verified
-    assert result.report.solver == solver
+    assert result.solver_report.solver == solver
     assert result.t_end == pytest.approx(bang_bang(2.0 * MASS) / np.sqrt(1.0 - 4.0 / 300.0), rel=5e-4)

@@ -90,7 +90,7 @@ def _show(result: Result, data: dict[str, Any]) -> None:
         "start posture": _posture(data, "start_posture"),
         "end posture": _posture(data, "end_posture"),
         **data["in_use"],
-        "solver": f"{result.report.solver}, {result.report.status.value}",
+        "solver": f"{result.solver_report.solver}, {result.solver_report.status.value}",
         "iterations": f"{sum(r.iterations for r in attempt.reports)} in {len(attempt.reports)} solves (refined to "
         f"{attempt.collocation_points} collocation points)",
         "wall time": f"{1e3 * result.timing['total']:.0f} ms",

@@ -4,9 +4,14 @@ The first guess follows its joint path smoothly from rest to rest, and its time 
 such scaling meets a least speed over a part of the path. Where there is one, the joint path is therefore followed in
 the times of the phase plane, and knots are closer together where that motion changes its speed: a part of the path at
 a constant speed may be long, and the way to it short.
+
+Between ends in motion the first guess lies half-way between a constant acceleration and the phase plane. The former
+alone may need no force at all, where no limit's change with the end time tells a solver where to go.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -14,7 +19,7 @@ from brachis.attempt import Start
 from brachis.nlp import Program
 from brachis.nlp.guess import starting_point
 from brachis.problem import breaks_of
-from brachis.search.phase_plane import prescribed_times
+from brachis.search.phase_plane import least_times, prescribed_times
 
 _STATIONS = 401
 _STEADY = 1e-6
@@ -49,9 +54,10 @@ def first_point(program: Program, start: Start) -> np.ndarray | None:
     -------
     (v,) ndarray or None
     """
-    paced = _paced(start)
-    if paced is not None:
-        curves, times = paced
+    for followed in (_paced(start), _between_speeds(start)):
+        if followed is None:
+            continue
+        curves, times = followed
         at = np.linspace(0.0, times[-1], 4 * _STATIONS)
         motion = np.column_stack([np.interp(at, times, column) for column in curves.T])
         x = starting_point(program, [motion], times[-1])
@@ -62,9 +68,29 @@ def first_point(program: Program, start: Start) -> np.ndarray | None:
 
 def _paced(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     """Curves along the joint path, (S, c), and their times, (S,), s; None where no limit asks for a least speed."""
+    return _timed(start, prescribed_times)
+
+
+def _between_speeds(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
+    """Curves and times likewise where an end is in motion and the joint path is not a motion's yet; else None."""
+    first, last = start.problem.end_rates
+    fastest = None if start.timed or first == last == 0.0 else _timed(start, least_times)
+    if fastest is None:
+        return None
+    curves, times = fastest
+    s = np.linspace(0.0, 1.0, _STATIONS)
+    with np.errstate(invalid="ignore"):  # 0 / 0 where the motion starts from rest
+        even = np.nan_to_num(2.0 * s / (first + np.sqrt(first**2 + (last**2 - first**2) * s)))
+    return curves, 0.5 * (times + even)
+
+
+def _timed(start: Start, find_times: Callable[..., np.ndarray | None]) -> tuple[np.ndarray, np.ndarray] | None:
+    """Curves along the joint path at even stations, (S, c), and when the phase plane passes them, (S,), s."""
     s = np.linspace(0.0, 1.0, _STATIONS)
     joint_path = start.joint_path
     curves = np.column_stack([s, *(np.interp(s, joint_path[:, 0], column) for column in joint_path.T[1:])])
     q = start.joint_map.postures(curves)
-    times = prescribed_times(start.problem.limits, s, q, start.problem.end_rates) if np.isfinite(q).all() else None
-    return None if times is None else (curves, times)
+    if not np.isfinite(q).all():
+        return None
+    times = find_times(start.problem.limits, s, q, start.problem.end_rates)
+    return None if times is None or not np.isfinite(times[-1]) else (curves, times)
