@@ -96,7 +96,7 @@ def test_no_limit_costs_less_than_nothing(scara, joint):
     found = found_of(scara(joint))
     assert all(entry.change(1.0) <= 0.0 for entry in found.limits)
     # Torque limits and nothing else: were all torques f times as large, the time would fall with the root of f.
-    expected = -0.5 * scara(joint).report.objective
+    expected = -0.5 * scara(joint).solver_report.objective
     assert sum(entry.change(1.0) for entry in found.limits) == pytest.approx(expected, rel=2e-3)
 
 
