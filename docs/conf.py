@@ -1,0 +1,53 @@
+"""Sphinx: the documentation site. ``python3 tasks.py docs`` builds it, with warnings as errors, and checks its links."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+import brachis
+
+ROOT = Path(__file__).parents[1]
+STARTUP = """\
+import os
+os.chdir({clone!r})
+get_ipython().run_line_magic("config", "InlineBackend.figure_formats = ['retina']")
+"""
+
+project = "brachis"
+author = project_copyright = "The brachis authors"
+version = release = brachis.__version__
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.mathjax", "numpydoc", "myst_nb", "sphinx_design"]
+nitpicky = True
+templates_path: list[str] = []
+
+myst_enable_extensions = ["colon_fence", "dollarmath"]
+myst_heading_anchors = 3
+nb_execution_mode = "force"
+nb_execution_show_tb = True
+nb_execution_timeout = 600
+nb_merge_streams = True
+
+autodoc_typehints = "none"  # the sections of numpydoc have them, with shapes and units
+autodoc_default_options = {"exclude-members": "model_config"}
+default_role = "py:obj"
+numpydoc_show_class_members = False
+
+html_theme = "furo"
+html_title = "brachis"
+html_static_path: list[str] = []
+
+
+def _isolated_clone(folder: Path) -> None:
+    """Have cells run in a folder that looks like the repository and may be written to, whatever the reader's profile."""
+    for name in ("robots", "examples"):
+        (folder / name).symlink_to(ROOT / name)
+    startup = folder / ".ipython/profile_default/startup"
+    startup.mkdir(parents=True)
+    (startup / "clone.py").write_text(STARTUP.format(clone=str(folder)))
+    os.environ["IPYTHONDIR"] = str(folder / ".ipython")
+
+
+_CLONE = tempfile.TemporaryDirectory(prefix="brachis-docs-")  # until Sphinx ends
+_isolated_clone(Path(_CLONE.name))
