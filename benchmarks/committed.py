@@ -1,4 +1,4 @@
-"""Results that are kept in the repository: ``--save`` of a benchmark writes one, docs/make_pages.py makes tables of them."""
+"""Results that are kept: ``--save`` of a benchmark writes them, docs/make_pages.py makes tables of them."""
 
 from __future__ import annotations
 
@@ -43,11 +43,12 @@ def write(
     name: str, command: str, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], about: str
 ) -> None:
     """Write one file of results."""
+    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
     content = {
         "title": title,
         "command": command,
         "version": brachis.__version__,
-        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}",
+        "machine": machine,
         "about": about,
         "columns": list(columns),
         "rows": [list(row) for row in rows],

@@ -47,7 +47,7 @@ def make_task():
     return make
 
 
-def pytest_benchmark_update_json(benchmarks, output_json):
+def pytest_benchmark_update_json(output_json):
     """Keep a table of what is saved (``--benchmark-save`` or ``--benchmark-json``) in benchmarks/results."""
     sys.path.insert(0, str(ROOT / "benchmarks"))
     committed = importlib.import_module("committed")

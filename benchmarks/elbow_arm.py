@@ -18,9 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from committed import save
-
 import brachis
+from committed import save
 
 PUBLISHED_S = 2.74
 LENGTH_M, MASSES_KG = 0.75, (6.6, 4.2)

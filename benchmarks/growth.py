@@ -9,12 +9,11 @@ import math
 import time
 from pathlib import Path
 
-from committed import save
-
 from brachis import LimitSpec, Robot, load_task, transcribe
 from brachis.nlp.differential_ik import differential_ik_paths
 from brachis.nlp.guess import starting_point
 from brachis.solvers import SolverOptions, solver_named
+from committed import save
 
 ROOT = Path(__file__).parents[1]
 INTERVALS = (10, 20, 50, 100, 200)
@@ -55,8 +54,14 @@ def main() -> None:
             sizes = (intervals, program.variables, len(program.lower))
             counted = (report.iterations, counts["states"] - before)
             table.append(
-                (*map(str, sizes), name, f"{report.objective:.4f} s", *map(str, counted), f"{1e3 * took:.0f} ms")
-                + (report.status.name.lower(),)
+                (
+                    *map(str, sizes),
+                    name,
+                    f"{report.objective:.4f} s",
+                    *map(str, counted),
+                    f"{1e3 * took:.0f} ms",
+                    report.status.name.lower(),
+                )
             )
             print(f"| {' | '.join(table[-1])} |", flush=True)
     about = "The paper's arm at 90 degrees, redundant joint j1; one solve without refinement."

@@ -19,11 +19,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from committed import save
-
 import brachis
 from brachis.path import path_of
 from brachis.robot import bind
+from committed import save
 
 ROOT = Path(__file__).parents[1]
 URDF = ROOT / "robots/iiwa14/robot.urdf"

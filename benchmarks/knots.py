@@ -7,9 +7,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from committed import save
-
 from brachis import LimitSpec, Robot, plan
+from committed import save
 
 ROOT = Path(__file__).parents[1]
 JOINTS = ("j1", "j2", "j3")

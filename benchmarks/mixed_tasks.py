@@ -32,6 +32,7 @@ from brachis import plan
 from brachis.errors import BrachisError
 from brachis.plausibility import PlausibilityWarning
 from brachis.task import load_task
+from committed import save
 from mixed_robots import ROBOTS, ROOT
 
 SOON = 3.0

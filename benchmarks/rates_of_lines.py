@@ -12,9 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from committed import save
-
 import brachis
+from committed import save
 
 ROOT = Path(__file__).parents[1]
 JERK, TORQUE_RATE = 12.0, 20.0

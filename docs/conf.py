@@ -1,8 +1,9 @@
-"""Sphinx: the documentation site. ``python3 tasks.py docs`` builds it, with warnings as errors, and checks its links."""
+"""Sphinx: the documentation site. ``python3 tasks.py docs`` builds it with warnings as errors."""
 
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 from pathlib import Path
 
@@ -18,7 +19,8 @@ get_ipython().run_line_magic("config", "InlineBackend.figure_formats = ['retina'
 project = "brachis"
 author = project_copyright = "The brachis authors"
 version = release = brachis.__version__
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.mathjax", "numpydoc", "myst_nb", "sphinx_design"]
+sys.path.insert(0, str(ROOT / "docs"))
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.mathjax", "numpydoc", "myst_nb", "sphinx_design", "docstring_links"]
 nitpicky = True
 templates_path: list[str] = []
 
@@ -31,7 +33,7 @@ nb_merge_streams = True
 
 autodoc_typehints = "none"  # the sections of numpydoc have them, with shapes and units
 autodoc_default_options = {"exclude-members": "model_config"}
-default_role = "py:obj"
+default_role = "py:obj"  # docstring_links.py says what becomes of it
 numpydoc_show_class_members = False
 
 html_theme = "furo"
@@ -40,7 +42,7 @@ html_static_path: list[str] = []
 
 
 def _isolated_clone(folder: Path) -> None:
-    """Have cells run in a folder that looks like the repository and may be written to, whatever the reader's profile."""
+    """Have cells run in a folder that looks like the repository and may be written to."""
     for name in ("robots", "examples"):
         (folder / name).symlink_to(ROOT / name)
     startup = folder / ".ipython/profile_default/startup"

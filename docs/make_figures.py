@@ -67,7 +67,7 @@ def planned(name: str) -> brachis.Result:
 
 
 def scara_line() -> Planned:
-    """The paper's line."""
+    """Draw the paper's line."""
     result = planned("01_scara_line")
     save(plot_overview(result.trajectory), "scara_line")
     animate(result.trajectory, FIGURES / "scara_line.gif")
@@ -75,7 +75,7 @@ def scara_line() -> Planned:
 
 
 def scara_table() -> Planned:
-    """The paper's table."""
+    """Draw the paper's table."""
     results = load("examples/02_scara_table.py").plan_all()
     save(
         plot_comparison([(float(angle), joint, each.t_end) for (angle, joint), each in results.items()]), "scara_table"
@@ -84,7 +84,7 @@ def scara_table() -> Planned:
 
 
 def tx90l_rail() -> Planned:
-    """The industrial arm on its rail."""
+    """Draw the industrial arm on its rail."""
     result = brachis.plan(None, ROOT / RAIL_LINE)
     save(plot_timeline(result.trajectory), "timeline")
     save(plot_overview(result.trajectory), "tx90l_rail")
@@ -93,49 +93,49 @@ def tx90l_rail() -> Planned:
 
 
 def ur10_weld() -> Planned:
-    """A welding seam."""
+    """Draw a welding seam."""
     result = planned("04_ur10_rail_weld")
     save(plot_overview(result.trajectory), "ur10_weld")
     return {"rail": result}
 
 
 def panda_circle() -> Planned:
-    """Four redundant joints of a seven-joint arm."""
+    """Draw one of four motions of a seven-joint arm."""
     results = load("examples/05_panda_circle.py").main()
     save(plot_postures(results["panda_joint7"].trajectory), "panda_circle")
     return results
 
 
 def free_roll() -> Planned:
-    """Three ways to turn a tool."""
+    """Draw the fastest of three ways to turn a tool."""
     results = load("examples/06_free_roll.py").main()
     save(plot_overview(results["free roll"].trajectory), "free_roll")
     return results
 
 
 def fastest() -> Planned:
-    """All candidates of a search."""
+    """Draw all candidates of a search."""
     result = planned("07_find_the_fastest")
     save(plot_candidates(result.candidates), "candidates")
     return {"auto": result}
 
 
 def cam_seam() -> Planned:
-    """Points as CAM gives them."""
+    """Draw how near a path is to points as CAM gives them."""
     result = load("examples/08_cam_seam.py").main()
     save(plot_fit(result.trajectory), "cam_seam")
     return {"seam": result}
 
 
 def payload() -> Planned:
-    """More and more of what a task says."""
+    """Draw the motion with all that a task may say of a robot."""
     results = load("examples/09_payload_friction_jerk.py").main()
     save(plot_limits(list(results.values())[-1].trajectory), "payload")
     return results
 
 
 def periodic() -> Planned:
-    """A circle that is gone round for ever."""
+    """Draw a circle that is gone round for ever."""
     results = load("examples/10_periodic_circle.py").main()
     save(plot_overview(results["periodic"].trajectory), "periodic_circle")
     animate(results["periodic"].trajectory, FIGURES / "periodic_circle.gif")
@@ -143,14 +143,14 @@ def periodic() -> Planned:
 
 
 def joint_path() -> Planned:
-    """The timing of a path of joints."""
+    """Draw the limits along a path of joints."""
     result = planned("11_from_toppra")
     save(plot_limits(result.trajectory), "joint_path")
     return {"brachis": result}
 
 
 def crane() -> Planned:
-    """A plug-in's closed form."""
+    """Draw the motion with a plug-in's closed form."""
     family = load("examples/ik_plugin/src/brachis_polar/__init__.py").polar
     result = brachis.plan(None, ROOT / "examples/ik_plugin/crane.yaml", families=[family])
     save(plot_postures(result.trajectory), "crane")
@@ -158,7 +158,7 @@ def crane() -> Planned:
 
 
 def coupled() -> Planned:
-    """A plug-in's limit; the task names an installed one, here it is given as an object."""
+    """Draw the motion with a plug-in's limit, which is given as an object here."""
     limit = load("examples/limit_plugin/src/brachis_coupled/__init__.py").CoupledRange
     task = yaml.safe_load((ROOT / "examples/limit_plugin/coupled.yaml").read_text())
     task["robot"]["urdf"] = str(ROOT / "robots/scara3/robot.urdf")
