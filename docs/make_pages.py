@@ -40,6 +40,13 @@ BENCHMARKS_HEAD = """\
 
 Each table is made from a file in `benchmarks/results`, which the script named above it writes with `--save`. Times are
 processor times on the machine that the file names, unless a table says otherwise; they do not compare between machines.
+
+## How long a plan takes
+
+```{include} ../README.md
+:start-after: <!-- timings -->
+:end-before: <!-- end of timings -->
+```
 """
 
 
