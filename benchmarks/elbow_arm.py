@@ -19,7 +19,6 @@ from pathlib import Path
 import numpy as np
 
 import brachis
-from committed import save
 
 PUBLISHED_S = 2.74
 LENGTH_M, MASSES_KG = 0.75, (6.6, 4.2)
@@ -79,15 +78,11 @@ def main() -> None:
     """Print one line for every number of intervals."""
     free = planned(intervals=40, torque_rate=None)
     print(f"N =  40, torques alone: {free.t_end:.3f} s")
-    rows = [("40, torques alone", f"{free.t_end:.3f} s", "")]
     for intervals in (20, 40, 80):
         result = planned(intervals=intervals)
         state = "verified" if result.verified else "not verified"
         print(f"N = {intervals:3d}: {result.t_end:.3f} s, {state}, on branch {result.attempt.branch} ", end="")
         print(f"in {result.timing['total']:.1f} s (published: {PUBLISHED_S} s)")
-        rows.append((str(intervals), f"{result.t_end:.3f} s", state))
-    about = f"A published motion of {PUBLISHED_S} s; the script's first lines say what was assumed about the arm."
-    save("An elbow arm of the literature", ("knot intervals", "end time", "verification"), rows, about)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ The planar 3R of the paper, 90 degrees, redundant joint j1, one solve without re
 from __future__ import annotations
 
 import math
-import time
+import os
 from pathlib import Path
 
 from brachis import LimitSpec, Robot, load_task, transcribe
@@ -48,9 +48,9 @@ def main() -> None:
             x = first_point(program)
             counts = program.phases[0].evaluations
             before = counts["states"]
-            began = time.process_time()
+            began = sum(os.times()[:4])
             report = solver_named(name)[0].solve(program, x, SolverOptions(time_limit=120.0), None)
-            took = time.process_time() - began
+            took = sum(os.times()[:4]) - began  # of other processes too: large programs are solved in one
             sizes = (intervals, program.variables, len(program.lower))
             counted = (report.iterations, counts["states"] - before)
             table.append(
