@@ -3,9 +3,10 @@
 Usage: python benchmarks/jerk_paths.py [--count 20] [--first 0] [--intervals 100] [--stations 1601]
 
 The paths, and the limits on velocity, acceleration and torque, are those of `joint_paths`; the jerk of every joint is
-limited as well, and the acceleration is zero at both ends. brachis plans cubic splines s(t), refined and verified. copp-py
-takes the very same path with its derivatives at even stations, and its convex programs, each about the last one's
-answer, are solved until the end time settles. What comes out is looked at between its stations, by the same limits.
+limited as well, and the acceleration is zero at both ends. brachis plans cubic splines s(t), refined and verified.
+copp-py takes the very same path with its derivatives at even stations, and its convex programs, each about the last
+one's answer, are solved until the end time settles. What comes out is looked at between its stations, by the same
+limits.
 """
 
 from __future__ import annotations
