@@ -163,7 +163,7 @@ def coupled() -> Planned:
     task = yaml.safe_load((ROOT / "examples/limit_plugin/coupled.yaml").read_text())
     task["robot"]["urdf"] = str(ROOT / "robots/scara3/robot.urdf")
     (settings,) = task.pop("custom_limits").values()
-    result = brachis.plan(None, task, limits=[limit(**settings)])
+    result = brachis.plan(None, task, own_limits=[limit(**settings)])
     save(plot_torques(result.trajectory), "coupled")
     return {"coupled": result}
 
