@@ -30,6 +30,7 @@ def cell(robot: Robot, joint: str, spline: dict[str, Any]) -> str:
         "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
         "redundant_joints": [joint],
         "spline": spline,
+        "search": {"time_limit": 600.0},  # no busy machine ends a mesh early
     }
     began = time.process_time()
     result = plan(robot, task)

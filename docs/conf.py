@@ -38,7 +38,8 @@ numpydoc_show_class_members = False
 
 html_theme = "furo"
 html_title = "brachis"
-html_static_path: list[str] = []
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 
 
 def _isolated_clone(folder: Path) -> None:
