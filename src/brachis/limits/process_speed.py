@@ -112,6 +112,7 @@ class LeastProcessSpeed(_ProcessSpeedLimit):
     """Nor do process speeds fall short by more."""
 
     kind = "least_process_speed"
+    least_speed = True
     _side = -1.0
 
     def __init__(self, robot: Robot, parts: Sequence[ProcessSpeed]) -> None:
