@@ -54,6 +54,16 @@ class Result(Summary):
         What was left undone, in plain words.
     warnings : tuple of Remark
         What of robot, task and motion is hardly meant.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> result.verified, result.sample(dt=0.004).q.shape
+    (True, (638, 3))
+    >>> figure = result.plot("torques")
+    >>> print(type(result.bottleneck()).__name__)
+    BottleneckReport
     """
 
     task: Task
