@@ -24,7 +24,7 @@ from brachis.search.phase_plane import least_times, prescribed_times
 _STATIONS = 401
 _STEADY = 1e-6
 """Changes of the speed below this part of it are rounding."""
-_SPREAD = 0.4
+_SPREAD = 0.2
 """Part of the knots that is spread evenly over the time; the others are over the change of speed."""
 
 
