@@ -35,7 +35,7 @@ class Result(Summary):
     Attributes
     ----------
     task : Task
-        All that was asked, with the robot's settings and all defaults; ``plan(None, result.task)`` repeats the plan.
+        All that was asked, with the robot's settings and all defaults; ``plan(result.task)`` repeats the plan.
     trajectory : Trajectory
     verification : Verification
     family : str
