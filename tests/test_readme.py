@@ -80,7 +80,7 @@ def test_task_commands_exist():
 def test_task_file_of_the_readme_is_planned(clone):
     (task,) = blocks(ROOT / "README.md", "yaml")
     (clone / "task.yaml").write_text(task)
-    result = brachis.plan(None, clone / "task.yaml")
+    result = brachis.plan(clone / "task.yaml")
     assert result.verified
     # The corner of 90 degrees is rounded: the path is shorter than its two legs.
     assert 0.9 < brachis.transcribe(result.trajectory.robot, result.task)[0].phases[0].joint_map.path.length < 1.0
@@ -138,7 +138,7 @@ def test_example_03():
 
 
 def test_example_04():
-    result = brachis.plan(None, ROOT / "examples/04_ur10_rail_weld.yaml")
+    result = brachis.plan(ROOT / "examples/04_ur10_rail_weld.yaml")
     assert result.verified
     turned = result.trajectory.robot.tool_placements(result.trajectory.q[[0, -1]])[1]
     angle = np.arccos((np.trace(turned[0].T @ turned[1]) - 1.0) / 2.0)
