@@ -112,7 +112,7 @@ def main() -> None:
         least, worst = by_copp(robot, path_of(task_map, task), given.stations)
         theirs, began = time.process_time() - began, time.process_time()
         try:
-            result = brachis.plan(None, task)
+            result = brachis.plan(task)
             t_end = result.t_end if result.verified else np.inf
         except brachis.BrachisError as error:
             print(error)

@@ -26,7 +26,7 @@ def planned(angle_deg: float, **limits: float) -> tuple[brachis.Result, float]:
     task["path"], task["redundant_joints"] = [{"line": {"length": 1.0, "angle_deg": angle_deg}}], "auto"
     task["robot"]["limits"] |= limits
     began = time.process_time()
-    return brachis.plan(None, task), time.process_time() - began
+    return brachis.plan(task), time.process_time() - began
 
 
 def understated(result: brachis.Result) -> np.ndarray:

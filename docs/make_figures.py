@@ -63,7 +63,7 @@ def save(figure: Figure, name: str) -> None:
 
 def planned(name: str) -> brachis.Result:
     """Plan an example's task file."""
-    return brachis.plan(None, ROOT / f"examples/{name}.yaml")
+    return brachis.plan(ROOT / f"examples/{name}.yaml")
 
 
 def scara_line() -> Planned:
@@ -85,7 +85,7 @@ def scara_table() -> Planned:
 
 def tx90l_rail() -> Planned:
     """Draw the industrial arm on its rail."""
-    result = brachis.plan(None, ROOT / RAIL_LINE)
+    result = brachis.plan(ROOT / RAIL_LINE)
     save(plot_timeline(result.trajectory), "timeline")
     save(plot_overview(result.trajectory), "tx90l_rail")
     animate(result.trajectory, FIGURES / "tx90l_rail.gif", slower=10.0)
@@ -152,7 +152,7 @@ def joint_path() -> Planned:
 def crane() -> Planned:
     """Draw the motion with a plug-in's closed form."""
     family = load("examples/ik_plugin/src/brachis_polar/__init__.py").polar
-    result = brachis.plan(None, ROOT / "examples/ik_plugin/crane.yaml", families=[family])
+    result = brachis.plan(ROOT / "examples/ik_plugin/crane.yaml", families=[family])
     save(plot_postures(result.trajectory), "crane")
     return {"crane": result}
 
@@ -163,7 +163,7 @@ def coupled() -> Planned:
     task = yaml.safe_load((ROOT / "examples/limit_plugin/coupled.yaml").read_text())
     task["robot"]["urdf"] = str(ROOT / "robots/scara3/robot.urdf")
     (settings,) = task.pop("custom_limits").values()
-    result = brachis.plan(None, task, own_limits=[limit(**settings)])
+    result = brachis.plan(task, own_limits=[limit(**settings)])
     save(plot_torques(result.trajectory), "coupled")
     return {"coupled": result}
 

@@ -53,12 +53,12 @@ def self_motion() -> Figure:
 
 def trajectory_of(**changes: Any) -> brachis.Result:  # noqa: ANN401
     """Plan the paper's line with some keys of the task changed."""
-    return brachis.plan(None, {**brachis.load_task(LINE).to_dict(), **changes})
+    return brachis.plan({**brachis.load_task(LINE).to_dict(), **changes})
 
 
 def control_points() -> Figure:
     """Draw the splines of a plan over their control points and knots."""
-    trajectory = brachis.plan(None, LINE).trajectory
+    trajectory = brachis.plan(LINE).trajectory
     figure = style.new_figure(style.PAGE_WIDTH, 62.0)
     splines = ((trajectory.path_spline, "$s$"), (trajectory.redundant_spline, "$q_3$ (rad)"))
     for ax, (spline, label) in zip(figure.subplots(1, 2), splines, strict=True):
