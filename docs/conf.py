@@ -10,12 +10,6 @@ from pathlib import Path
 import brachis
 
 ROOT = Path(__file__).parents[1]
-STARTUP = """\
-import os
-os.chdir({clone!r})
-get_ipython().run_line_magic("config", "InlineBackend.figure_formats = ['retina']")
-"""
-
 project = "brachis"
 author = project_copyright = "The brachis authors"
 version = release = brachis.__version__
@@ -48,7 +42,7 @@ def _isolated_clone(folder: Path) -> None:
         (folder / name).symlink_to(ROOT / name)
     startup = folder / ".ipython/profile_default/startup"
     startup.mkdir(parents=True)
-    (startup / "clone.py").write_text(STARTUP.format(clone=str(folder)))
+    (startup / "clone.py").write_text(f"import os\nos.chdir({str(folder)!r})\n")
     os.environ["IPYTHONDIR"] = str(folder / ".ipython")
 
 

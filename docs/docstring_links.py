@@ -6,6 +6,7 @@ A name that the source does not know either is dead, and Sphinx warns of it.
 from __future__ import annotations
 
 import ast
+import re
 from functools import cache
 from pathlib import Path
 
@@ -48,7 +49,15 @@ def resolve(app: Sphinx, env: BuildEnvironment, node: pending_xref, contnode: no
     return contnode if last in names_in_source() else None
 
 
+def without_sections(_app: Sphinx, what: str, _name: str, _obj: object, _options: object, lines: list[str]) -> None:
+    """Make headings of a module's docstring plain ones: numpydoc leaves those of modules, which would be sections."""
+    if what == "module":
+        text = re.sub(r"^(\w+)\n-+$", r".. rubric:: \1", "\n".join(lines), flags=re.MULTILINE)
+        lines[:] = text.split("\n")
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Be an extension."""
+    app.connect("autodoc-process-docstring", without_sections)
     app.connect("missing-reference", resolve)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
