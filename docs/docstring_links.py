@@ -52,7 +52,7 @@ def resolve(app: Sphinx, env: BuildEnvironment, node: pending_xref, contnode: no
 def without_sections(_app: Sphinx, what: str, _name: str, _obj: object, _options: object, lines: list[str]) -> None:
     """Make headings of a module's docstring plain ones: numpydoc leaves those of modules, which would be sections."""
     if what == "module":
-        text = re.sub(r"^(\w+)\n-+$", r".. rubric:: \1", "\n".join(lines), flags=re.MULTILINE)
+        text = re.sub(r"^(\w+)\n-+$", r".. rubric:: \1\n", "\n".join(lines), flags=re.MULTILINE)
         lines[:] = text.split("\n")
 
 
