@@ -63,7 +63,7 @@ def _drawn(rng: np.random.Generator, intervals: int) -> dict[str, Any]:
         "task_space": "joints",
         "path": [{"spline": {"through": waypoints[1:].tolist()}}],
         "spline": {"intervals": intervals, "rest": "velocity"},
-        "search": {"least_motion": False},
+        "search": {"least_motion": False, "time_limit": 600.0},  # no busy machine ends a search early
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-import time
+import os
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +32,9 @@ def cell(robot: Robot, joint: str, spline: dict[str, Any]) -> str:
         "spline": spline,
         "search": {"time_limit": 600.0},  # no busy machine ends a mesh early
     }
-    began = time.process_time()
+    began = sum(os.times()[:4])
     result = plan(robot, task)
-    elapsed = time.process_time() - began
+    elapsed = sum(os.times()[:4]) - began  # of other processes too: large programs are solved in one
     intervals = len(set(result.trajectory.knots.tolist())) - 1
     note = "" if result.verified else ", not verified"
     return f"{result.t_end:.4f} s ({intervals}; {elapsed:.1f} s{note})"
