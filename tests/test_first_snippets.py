@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import runpy
 import warnings
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,17 @@ import pytest
 
 import brachis
 from brachis.errors import LimitError, TaskError, UnknownNameError
-from brachis.task import task_with
+from brachis.task import (
+    BoundarySettings,
+    LimitKeywords,
+    LimitSpec,
+    RobotSettings,
+    SearchSettings,
+    SplineSettings,
+    Task,
+    TaskKeywords,
+    task_with,
+)
 
 ROOT = Path(__file__).parents[1]
 Q0 = [0.5236, -2.0944, 2.0944]
@@ -181,3 +192,17 @@ def test_a_bar_tells_of_many_plans(capsys):
         (outcome,) = brachis.plan_many([{"brachis": 1}], progress=True)
     assert isinstance(outcome, TaskError)
     assert "100%" in capsys.readouterr().err
+
+
+def test_every_key_of_a_task_is_a_keyword():
+    sections = {
+        "robot": RobotSettings,
+        "boundary": BoundarySettings,
+        "spline": SplineSettings,
+        "search": SearchSettings,
+    }
+    keys = {key for model in (Task, *sections.values()) for key in model.model_fields}
+    left = {"brachis", "urdf", "limits_file", "tolerance", "shortest_interval", "guesses", "jobs"}
+    assert keys - set(TaskKeywords.__annotations__) == left, "in whole sections alone"
+    assert set(TaskKeywords.__annotations__) <= keys
+    assert set(LimitKeywords.__annotations__) == {each.name for each in fields(LimitSpec)}
