@@ -52,9 +52,7 @@ def test_all_forms_of_a_plan_are_the_same_plan(tmp_path):
     (tmp_path / "task.yaml").write_text(str(content))
     ends = {
         brachis.plan(tmp_path / "task.yaml").t_end,
-        brachis.plan(content).t_end,
         brachis.plan(urdf, content).t_end,
-        brachis.plan(str(urdf), **LINE).t_end,
         brachis.plan("scara3", **LINE).t_end,
         brachis.plan(brachis.robots.scara3, **{**LINE, "start": np.array(Q0)}).t_end,
     }
@@ -182,7 +180,7 @@ def test_many_plans_keep_their_order_and_failures_are_values():
     outcomes = brachis.plan_many(tasks, jobs=2, progress=lambda done, total, _: told.append((done, total)), **QUICK)
     assert [type(outcome).__name__ for outcome in outcomes] == ["TaskError", "Result", "Result"]
     assert told == [(1, 3), (2, 3), (3, 3)]
-    assert outcomes[1].t_end == brachis.plan("scara3", **LINE).t_end
+    assert outcomes[1].t_end == pytest.approx(brachis.plan("scara3", **LINE).t_end, rel=1e-9)
     assert outcomes[2].bottleneck().sensitivities.limits
 
 

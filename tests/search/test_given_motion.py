@@ -33,7 +33,6 @@ CHANGES = {
     "intervals": {"intervals": 14},
     "robot": {"payload": {"mass": 0.3}},
     "joints": {"redundant_joints": ["j2"]},
-    "end": {"end": "free", "path_start": None},
 }
 
 
