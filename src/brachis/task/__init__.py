@@ -3,6 +3,7 @@
 from brachis.task.arrays import fit_path
 from brachis.task.boundary import BoundarySettings
 from brachis.task.bspline_curve import BSplineCurve
+from brachis.task.keys import read_assignment, set_key, with_keys
 from brachis.task.limits_file import LimitsFile, read_limits
 from brachis.task.load import check_robot_settings, load_task
 from brachis.task.models import (
@@ -112,5 +113,8 @@ __all__ = [
     "fit_path",
     "json_schema",
     "load_task",
+    "read_assignment",
     "read_limits",
+    "set_key",
+    "with_keys",
 ]
