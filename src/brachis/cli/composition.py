@@ -70,7 +70,10 @@ def compose(
     meshes: Annotated[bool, typer.Option(help="Keep the arm's meshes, or drop them.")] = True,
     json: Json = False,
 ) -> None:
-    """Mount an arm on a linear axis and write the URDF of both. No figure of the axis is guessed."""
+    """Mount an arm on a linear axis, as a new URDF.
+
+    No figure of the axis is guessed.
+    """
     from brachis.compose import Rail, on_rail  # noqa: PLC0415  (loads Pinocchio, which no help needs)
 
     rail = Rail(

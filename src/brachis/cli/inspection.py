@@ -10,19 +10,20 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from rich.console import Console
-from rich.table import Table
 
 from brachis import ik
 from brachis.cli.joint_table import NONE, joint_rows
 from brachis.cli.output import print_json, result_console
 from brachis.cli.point_inspection import print_points
+from brachis.cli.settings import changed_task
+from brachis.cli.tables import print_table
 from brachis.errors import InputError
 from brachis.plausibility import of_robot
 from brachis.robot import Robot, bind, in_use
 from brachis.robot.from_task import robot_from_settings
 from brachis.robot.task_map.rows import AXES, POSE_ROWS, YAW
 from brachis.robot.urdf import last_common_link, read_file
-from brachis.task import LimitSpec, Task, load_task
+from brachis.task import LimitSpec, Task
 
 _TASK_FILES = (".yaml", ".yml")
 _PARALLEL = 1e-9
@@ -38,6 +39,7 @@ _OTHER_TASKS = (
 
 def inspect_command(
     source: Path,
+    changes: Sequence[str],
     *,
     task_space: str | None,
     tool_frame: str | None,
@@ -50,7 +52,7 @@ def inspect_command(
     remarks: list[str] = []
     if source.suffix in _TASK_FILES:
         given = {"--tool-frame": tool_frame, "--base-frame": base_frame, "--lock": lock}
-        task = _task_of(source, [option for option, value in given.items() if value])
+        task = _task_of(source, changes, [option for option, value in given.items() if value])
         robot = robot_from_settings(task.robot)
     else:
         task = None
@@ -85,7 +87,7 @@ def inspect_command(
     for remark in remarks:
         console.print(remark)
     shown = [key for key in joints[0] if any(row[key] != NONE for row in joints)]
-    console.print(_table("joints", [{key: row[key] for key in shown} for row in joints]))
+    print_table(console, "joints", shown, [[row[key] for key in shown] for row in joints])
     for name, text in acting.items():
         console.print(f"{name}: {text}")
     if task:
@@ -98,12 +100,12 @@ def inspect_command(
     _print_decompositions(console, decompositions)
 
 
-def _task_of(path: Path, options: Sequence[str]) -> Task:
+def _task_of(path: Path, changes: Sequence[str], options: Sequence[str]) -> Task:
     """Read a task file, beside which no options are given."""
     if options:
         hint = "Leave the option away, or inspect the URDF"
         raise InputError("is for URDFs; a task says it itself", where=options[0], hint=hint)
-    return load_task(path)
+    return changed_task(path, changes)
 
 
 def _of_urdf(path: Path, tool_frame: str, base_frame: str | None, lock: list[str]) -> Robot:
@@ -211,7 +213,9 @@ def _print_decompositions(console: Console, rows: list[dict[str, Any]]) -> None:
         *(["remark"] if any(r["remark"] for r in solved) else []),
     ]
     if solved:
-        console.print(_table("choices of redundant joints", [{name: row[name] for name in columns} for row in solved]))
+        print_table(
+            console, "choices of redundant joints", columns, [[row[name] for name in columns] for row in solved]
+        )
     for labels in dict.fromkeys(row["labels"] for row in solved):
         choices = "; ".join(row["redundant joints"] for row in solved if row["labels"] == labels)
         console.print(f"branches with {choices} redundant: {labels}")
@@ -234,12 +238,3 @@ def _tool_pose(robot: Robot, text: str) -> str:
     x, y, z, qx, qy, qz, qw = pin.SE3ToXYZQUAT(placement)
     position = ", ".join(f"{value:.9g}" for value in (x, y, z))
     return f"tool at [{position}] m, quaternion w, x, y, z [{', '.join(f'{value:.9g}' for value in (qw, qx, qy, qz))}]"
-
-
-def _table(title: str, rows: list[dict[str, Any]]) -> Table:
-    table = Table(title=title, title_justify="left")
-    for column in rows[0] if rows else ():
-        table.add_column(column, overflow="fold")
-    for row in rows:
-        table.add_row(*(str(value) for value in row.values()))
-    return table
