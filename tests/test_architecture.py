@@ -59,6 +59,7 @@ ORDER = (
     "export",
     "result",
     "planner",
+    "starter",
     "cli",
 )
 VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "limits", "bspline", "nlp", "solvers", "refine", "mesh"}

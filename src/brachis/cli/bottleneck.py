@@ -20,7 +20,7 @@ from brachis.cli.output import (
     result_console,
     shown_warnings,
 )
-from brachis.cli.settings import changed_task
+from brachis.cli.settings import changed_task, urdf_of
 from brachis.errors import InputError
 from brachis.result import Result
 from brachis.task import Task
@@ -85,7 +85,7 @@ def bottleneck_command(
 
 
 def _planned(task: Task, urdf: Path | None, listener: Callable[[str], None], *, strict: bool) -> _Motion:
-    result = planner.plan(urdf, task, listener=listener, strict=strict)
+    result = planner.plan(urdf and urdf_of(urdf), task, listener=listener, strict=strict)
     return _Motion(result, result.trajectory, result.verified, result.to_dict(), result.interrupted, result.undone)
 
 

@@ -15,18 +15,18 @@ from brachis import ik
 from brachis.cli.joint_table import NONE, joint_rows
 from brachis.cli.output import print_json, result_console
 from brachis.cli.point_inspection import print_points
-from brachis.cli.settings import changed_task
+from brachis.cli.settings import changed_task, urdf_of
 from brachis.cli.tables import print_table
 from brachis.errors import InputError
 from brachis.plausibility import of_robot
 from brachis.robot import Robot, bind, in_use
 from brachis.robot.from_task import robot_from_settings
-from brachis.robot.task_map.rows import AXES, POSE_ROWS, YAW
+from brachis.robot.task_map.rows import AXES, YAW
 from brachis.robot.urdf import last_common_link, read_file
+from brachis.starter import natural_space
 from brachis.task import LimitSpec, Task
 
 _TASK_FILES = (".yaml", ".yml")
-_PARALLEL = 1e-9
 _LISTED = 12
 _OTHER_TASKS = (
     "a whole pose is prescribed",
@@ -55,10 +55,10 @@ def inspect_command(
         task = _task_of(source, changes, [option for option, value in given.items() if value])
         robot = robot_from_settings(task.robot)
     else:
-        task = None
+        task, source = None, urdf_of(source)
         robot = _of_urdf(source, tool_frame or _tool(source, remarks), base_frame, lock)
     asked: str | Sequence[str] | None = None if task is None else task.task_space
-    robot, rows = bind(robot, _space(task_space) if task_space else asked or _natural_space(robot, remarks))
+    robot, rows = bind(robot, _space(task_space) if task_space else asked or _natural(robot, remarks))
     remarks += [f"warning: {remark}" for remark in of_robot(robot)]
     joints, acting = joint_rows(robot), in_use(robot)
     candidates = ik.find_all(robot, rows)
@@ -142,14 +142,9 @@ def _space(text: str) -> str | list[str]:
     return rows[0] if len(rows) == 1 and rows[0] not in (*AXES, YAW) else rows
 
 
-def _natural_space(robot: Robot, remarks: list[str]) -> str | list[str]:
-    """Choose what the robot can prescribe at most: a pose, three rows, or those of the plane in which it moves."""
-    geometry = ik.ChainGeometry.of(robot)
-    along = np.abs(np.where(geometry.revolute[:, None], 1.0 - np.abs(geometry.axes), np.abs(geometry.axes)))
-    normals = np.flatnonzero(np.all(along < _PARALLEL, axis=0))
-    space: str | list[str] = "pose" if robot.n >= len(POSE_ROWS) else list(AXES[: robot.n])
-    if len(normals):
-        space = [row for i, row in enumerate(AXES) if i != normals[0]][: robot.n]
+def _natural(robot: Robot, remarks: list[str]) -> str | list[str]:
+    """Choose what the robot can prescribe at most, and say so."""
+    space = natural_space(robot)
     remarks.append(
         f"task space: {space if isinstance(space, str) else ','.join(space)}; --task-space names another one"
     )

@@ -45,6 +45,34 @@ Changes = Annotated[
 ]
 
 
+@app.command(name="robots")
+def list_robots(json: Json = False) -> None:
+    """List the robots that come with brachis."""
+    with interrupts.postponed():
+        from brachis.cli import starting  # noqa: PLC0415  (each command imports what it needs)
+
+    starting.robots_command(as_json=json)
+
+
+@app.command()
+def new(
+    urdf: Annotated[Path, typer.Argument(help="URDF file, or the name of a robot that comes along.", metavar="URDF")],
+    out: Annotated[Path, typer.Option(help="Task file to write, a new one.")] = Path("task.yaml"),
+    tool_frame: Annotated[str | None, typer.Option(help="Link at the chain's end.")] = None,
+    base_frame: Annotated[str | None, typer.Option(help="Link at the chain's beginning.")] = None,
+    json: Json = False,
+) -> None:
+    """Write a first task for a robot, with comments.
+
+    It has a posture away from limits and singularities and a short line that can be reached from it, and it has been
+    planned and verified.
+    """
+    with interrupts.postponed():
+        from brachis.cli import starting  # noqa: PLC0415
+
+    starting.new_command(urdf, out, tool_frame=tool_frame, base_frame=base_frame, as_json=json)
+
+
 @app.command()
 def plan(
     task: TaskFile,
@@ -62,7 +90,7 @@ def plan(
 ) -> None:
     """Plan a task, verify the motion, and show what came out."""
     with interrupts.postponed():
-        from brachis.cli import planning  # noqa: PLC0415  (each command imports what it needs)
+        from brachis.cli import planning  # noqa: PLC0415
 
     raise typer.Exit(planning.plan_command(task, changes or [], urdf=urdf, out=out, strict=strict, as_json=json))
 
@@ -165,8 +193,8 @@ def inspect(
     source: Annotated[
         Path,
         typer.Argument(
-            help="URDF file, or a task file (.yaml): the robot as the task has it, with the limits and masses in use, "
-            "and the points that its path follows.",
+            help="URDF file or name of a robot; or a task file (.yaml): its robot with the limits and masses in use, and "
+            "the points that its path follows.",
             metavar="URDF|TASK",
         ),
     ],

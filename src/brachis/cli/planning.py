@@ -23,7 +23,7 @@ from brachis.cli.output import (
     result_console,
     shown_warnings,
 )
-from brachis.cli.settings import changed_task
+from brachis.cli.settings import changed_task, urdf_of
 from brachis.cli.tables import Column, print_table
 from brachis.errors import InputError
 from brachis.result import Result
@@ -45,7 +45,7 @@ def plan_command(
     if out is not None:
         make_folder(out, (*_FILES[True], *_FILES[False]), (task, urdf))
     with shown_warnings(), progress() as listener:
-        result = planner.plan(urdf, changed_task(task, changes), listener=listener, strict=strict)
+        result = planner.plan(urdf and urdf_of(urdf), changed_task(task, changes), listener=listener, strict=strict)
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
     failures: tuple[InputError, ...] = ()
     if out is not None:

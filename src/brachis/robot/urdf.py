@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -122,34 +122,42 @@ def read_chain(
 def last_common_link(text: str, where: str) -> tuple[str, tuple[str, ...]]:
     """Return the last link before a URDF's longest moving chains part, and the links at their ends.
 
-    For an arm with a gripper that is the link to which the fingers are attached; for a single chain its end.
+    For an arm with a gripper that is the link to which the fingers are attached; for a single chain its end. Of several
+    limbs, which share less than half of their joints, it is the first one in the file that counts.
 
     Raises
     ------
     UrdfError
-        The text is broken, or the chains part before a joint moves.
+        The text is broken, or no joint moves anything.
     """
     tree, urdf = parse_urdf(text, where)
     parents = {joint.child: joint for joint in urdf.robot.joints}
     inner = {joint.parent for joint in urdf.robot.joints}
     leaves = tuple(name for name in tree.links if name not in inner)
     chains = {leaf: _joints_between(tree.root, leaf, parents, where) for leaf in leaves}
-    counts = {leaf: sum(joint.type in MOVING_TYPES for joint in chain) for leaf, chain in chains.items()}
+    counts = {leaf: _moving(chain) for leaf, chain in chains.items()}
+    if not any(counts.values()):
+        raise UrdfError("no joint moves", where=where, found=f"chains to {', '.join(leaves)}")
     # Frames half way up the arm are no tools: the chains of most joints count.
-    moving = {leaf: chain for leaf, chain in chains.items() if counts[leaf] == max(counts.values())}
+    longest = {leaf: chain for leaf, chain in chains.items() if counts[leaf] == max(counts.values())}
+    first = next(iter(longest.values()))
+    limb = {leaf: chain for leaf, chain in longest.items() if 2 * _moving(_shared(first, chain)) >= _moving(first)}
+    return _shared(*limb.values())[-1].child, tuple(limb)
+
+
+def _moving(chain: Sequence[Any]) -> int:
+    """Count the joints that move."""
+    return sum(joint.type in MOVING_TYPES for joint in chain)
+
+
+def _shared(*chains: Sequence[Any]) -> list[Any]:
+    """Joints with which chains from the same root begin, before they part."""
     shared = []
-    for step in zip(*moving.values(), strict=False):
+    for step in zip(*chains, strict=False):
         if len({joint.child for joint in step}) > 1:
             break
         shared.append(step[0])
-    if not any(joint.type in MOVING_TYPES for joint in shared):
-        raise UrdfError(
-            "the tool frame is not clear: no joint moves all chains",
-            where=where,
-            found=f"chains to {', '.join(moving) or 'nowhere'}",
-            hint="Name the link at the end of one of them as tool frame",
-        )
-    return shared[-1].child, tuple(moving)
+    return shared
 
 
 def read_file(path: Path) -> str:
