@@ -18,6 +18,7 @@ from brachis.cli.point_inspection import print_points
 from brachis.cli.settings import changed_task, urdf_of
 from brachis.cli.tables import print_table
 from brachis.errors import InputError
+from brachis.kinds import Kind, kind_of
 from brachis.plausibility import of_robot
 from brachis.robot import Robot, bind, in_use
 from brachis.robot.from_task import robot_from_settings
@@ -50,7 +51,7 @@ def inspect_command(
 ) -> None:
     """Print a robot's joints and its decompositions."""
     remarks: list[str] = []
-    if source.suffix in _TASK_FILES:
+    if source.suffix in _TASK_FILES or kind_of(source) is Kind.TASK:
         given = {"--tool-frame": tool_frame, "--base-frame": base_frame, "--lock": lock}
         task = _task_of(source, changes, [option for option, value in given.items() if value])
         robot = robot_from_settings(task.robot)

@@ -193,8 +193,8 @@ def inspect(
     source: Annotated[
         Path,
         typer.Argument(
-            help="URDF file or name of a robot; or a task file (.yaml): its robot with the limits and masses in use, and "
-            "the points that its path follows.",
+            help="URDF file or name of a robot; or a task file: its robot with the limits and masses in use, and the "
+            "points that its path follows.",
             metavar="URDF|TASK",
         ),
     ],

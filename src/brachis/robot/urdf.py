@@ -14,6 +14,7 @@ from lxml import etree
 
 from brachis import files
 from brachis.errors import UnknownNameError, UrdfError
+from brachis.kinds import Kind, check_kind
 from brachis.robot.limits import FARTHEST, UrdfLimit
 from brachis.robot.urdf_bodies import StatedChain, stated_chain
 from brachis.robot.urdf_checks import MOVING_TYPES, check_inertias, check_joints
@@ -166,8 +167,9 @@ def read_file(path: Path) -> str:
     Raises
     ------
     UrdfError
-        The file is missing, not text, or no regular file of a size that a URDF may have.
+        The file is missing, not text, another file of brachis, or no regular file of a size that a URDF may have.
     """
+    check_kind(path, Kind.URDF, UrdfError)
     try:
         return files.read_file(path).decode()
     except FileNotFoundError as error:

@@ -55,7 +55,8 @@ class Choice:
 def choices(task_map: TaskMap) -> Iterator[Choice]:
     """Find first motions one by one, the most promising first.
 
-    There are none where the robot cannot move its tool in all directions of the task space. The same robot gets the same answer: what is drawn at random has a fixed seed.
+    There are none where the robot cannot move its tool in all directions of the task space. The same robot gets the
+    same answer: what is drawn at random has a fixed seed.
     """
     robot = task_map.robot
     postures = _drawn(robot)

@@ -9,6 +9,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from brachis.errors import TaskError
+from brachis.kinds import Kind, check_kind
 from brachis.task.csv_path import expand_csv_files
 from brachis.task.fields import plain
 from brachis.task.keys import with_keys
@@ -71,6 +72,7 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
         problem = "a task is loaded from a file or a mapping"
         raise TaskError(problem, found=type(source).__name__, allowed="a file name, a mapping, or a Task")
     path = Path(source)
+    check_kind(path, Kind.TASK, TaskError)
     hint = "Long lists of waypoints belong in a CSV file"
     text = read_text(path, where=str(path), folder=Path.cwd(), largest=_LARGEST_TASK, hint=hint)
     task = _task_from(read_yaml(text, str(path)), str(path), path.absolute().parent, changes or {})
