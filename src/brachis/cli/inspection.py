@@ -23,7 +23,7 @@ from brachis.plausibility import of_robot
 from brachis.robot import Robot, bind, in_use
 from brachis.robot.from_task import robot_from_settings
 from brachis.robot.task_map.rows import AXES, YAW
-from brachis.robot.urdf import last_common_link, read_file
+from brachis.robot.urdf import first_limb, read_file
 from brachis.starter import natural_space
 from brachis.task import LimitSpec, Task
 
@@ -57,7 +57,8 @@ def inspect_command(
         robot = robot_from_settings(task.robot)
     else:
         task, source = None, urdf_of(source)
-        robot = _of_urdf(source, tool_frame or _tool(source, remarks), base_frame, lock)
+        base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
+        robot = _of_urdf(source, tool_frame, base_frame, lock)
     asked: str | Sequence[str] | None = None if task is None else task.task_space
     robot, rows = bind(robot, _space(task_space) if task_space else asked or _natural(robot, remarks))
     remarks += [f"warning: {remark}" for remark in of_robot(robot)]
@@ -126,15 +127,19 @@ def _of_urdf(path: Path, tool_frame: str, base_frame: str | None, lock: list[str
     return replace(robot, limits=robot.limits.with_magnitudes(acceleration=np.full(robot.n, np.inf), **stated))
 
 
-def _tool(urdf: Path, remarks: list[str]) -> str:
-    """Take the last link before the URDF's chains part, and say so where they do."""
-    link, leaves = last_common_link(read_file(urdf), str(urdf))
-    if len(leaves) > 1:
+def _frames(urdf: Path, base: str | None, tool: str | None, remarks: list[str]) -> tuple[str | None, str]:
+    """Take the first limb of the URDF where base and tool frame are not given, and say so where there is a choice."""
+    if tool is not None:
+        return base, tool
+    limb = first_limb(read_file(urdf), str(urdf))
+    if limb.base and base is None:
+        remarks.append(f"base frame: {limb.base}, from which several limbs part; --base-frame names another one")
+    if len(limb.leaves) > 1:
         remarks.append(
-            f"tool frame: {link}, the last link before the chains to {', '.join(leaves)} part; "
+            f"tool frame: {limb.tool}, the last link before the chains to {', '.join(limb.leaves)} part; "
             "--tool-frame names another one"
         )
-    return link
+    return base or limb.base, limb.tool
 
 
 def _space(text: str) -> str | list[str]:

@@ -120,11 +120,29 @@ def read_chain(
     return UrdfChain(names, limits, locked, tool, base, _plain_xml(urdf), stated_chain(tree, names, locked, tool))
 
 
-def last_common_link(text: str, where: str) -> tuple[str, tuple[str, ...]]:
-    """Return the last link before a URDF's longest moving chains part, and the links at their ends.
+@dataclass(frozen=True)
+class Limb:
+    """What of a robot is taken where nothing is said.
 
-    For an arm with a gripper that is the link to which the fingers are attached; for a single chain its end. Of several
-    limbs, which share less than half of their joints, it is the first one in the file that counts.
+    Attributes
+    ----------
+    base : str or None
+        The link from which several limbs part; None where there is one, which begins at the URDF's root.
+    tool : str
+        The last link before the limb itself parts, into fingers for example; of a single chain its end.
+    leaves : tuple of str
+        Links at the limb's ends.
+    """
+
+    base: str | None
+    tool: str
+    leaves: tuple[str, ...]
+
+
+def first_limb(text: str, where: str) -> Limb:
+    """Find the chain of most joints in a URDF: an arm without its fingers, and without the trunk that it shares.
+
+    Limbs share less than half of their joints. Of several the first one in the file is taken.
 
     Raises
     ------
@@ -136,14 +154,16 @@ def last_common_link(text: str, where: str) -> tuple[str, tuple[str, ...]]:
     inner = {joint.parent for joint in urdf.robot.joints}
     leaves = tuple(name for name in tree.links if name not in inner)
     chains = {leaf: _joints_between(tree.root, leaf, parents, where) for leaf in leaves}
-    counts = {leaf: _moving(chain) for leaf, chain in chains.items()}
-    if not any(counts.values()):
+    most = max(_moving(chain) for chain in chains.values())
+    if not most:
         raise UrdfError("no joint moves", where=where, found=f"chains to {', '.join(leaves)}")
     # Frames half way up the arm are no tools: the chains of most joints count.
-    longest = {leaf: chain for leaf, chain in chains.items() if counts[leaf] == max(counts.values())}
+    longest = {leaf: chain for leaf, chain in chains.items() if _moving(chain) == most}
     first = next(iter(longest.values()))
-    limb = {leaf: chain for leaf, chain in longest.items() if 2 * _moving(_shared(first, chain)) >= _moving(first)}
-    return _shared(*limb.values())[-1].child, tuple(limb)
+    limb = {leaf: chain for leaf, chain in longest.items() if 2 * _moving(_shared(first, chain)) >= most}
+    trunk = _shared(*longest.values())
+    base = trunk[-1].child if len(limb) < len(longest) and trunk else None
+    return Limb(base, _shared(*limb.values())[-1].child, tuple(limb))
 
 
 def _moving(chain: Sequence[Any]) -> int:

@@ -11,7 +11,7 @@ from brachis import planner
 from brachis.errors import PlanningError
 from brachis.result import Result
 from brachis.robot import Robot, bind
-from brachis.robot.urdf import last_common_link, read_chain, read_file
+from brachis.robot.urdf import first_limb, read_chain, read_file
 from brachis.starter.choice import choices
 from brachis.starter.missing import placeholders
 from brachis.starter.space import spaces
@@ -57,7 +57,7 @@ def starter_task(
     folder : path, optional
         Where the task file will be; the URDF's path in it is relative to it where that is near.
     tool_frame, base_frame : str, optional
-        As in a task. By default the last link before the URDF's chains part, and its root.
+        As in a task. By default the ends of the chain of most joints; see `first_limb`.
     listener : callable, optional
         Is told what is done.
 
@@ -80,10 +80,13 @@ def starter_task(
     tell = listener or (lambda _text: None)
     path = Path(urdf)
     text = read_file(path)
-    tool = tool_frame or last_common_link(text, str(path))[0]
-    chain = read_chain(text, str(path), tool_frame=tool, base_frame=base_frame, locked_joints={})
+    base, tool = base_frame, tool_frame
+    if tool is None:
+        limb = first_limb(text, str(path))
+        base, tool = base or limb.base, limb.tool
+    chain = read_chain(text, str(path), tool_frame=tool, base_frame=base, locked_joints={})
     limits = placeholders(chain.joint_names, chain.limits)
-    robot = Robot.from_urdf(path, tool_frame=tool, base_frame=base_frame, limits=limits)
+    robot = Robot.from_urdf(path, tool_frame=tool, base_frame=base, limits=limits)
     for space in spaces(robot):
         tell(f"looking for a first motion that prescribes {space if isinstance(space, str) else ', '.join(space)}")
         bound, task_map = bind(robot, space)

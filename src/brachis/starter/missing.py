@@ -16,8 +16,8 @@ _RANGE = (-1.5, 1.5)
 def placeholders(names: Sequence[str], stated: Sequence[UrdfLimit]) -> LimitSpec:
     """Return limits for the joints of which a URDF states no usable ones; what it states stays.
 
-    Limits of zero, and a range from zero to zero, are what exporters write where there is none. Without a torque a joint
-    gets a limit of acceleration, since its time would go to zero otherwise.
+    Limits of zero, and a range from zero to zero, are what exporters write where there is none. Without a torque a
+    joint gets a limit of acceleration, since its time would go to zero otherwise.
     """
     by_name = dict(zip(names, stated, strict=True))
     weak = [name for name, limit in by_name.items() if not limit.effort]
