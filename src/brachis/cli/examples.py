@@ -19,9 +19,9 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "new": ("brachis new scara3", "brachis new iiwa14 --out iiwa.yaml"),
     "plan": (
         "brachis plan task.yaml --out out",
-        "brachis plan task.yaml --set spline.intervals=10 --set 'redundant_joints=[j1]'",
+        "brachis plan task.yaml --set search.effort=single --set 'path.0.line.by=[0, 0.4]'",
     ),
-    "bottleneck": ("brachis bottleneck out/result.npz", "brachis bottleneck task.yaml --set search.effort=single"),
+    "bottleneck": ("brachis bottleneck task.yaml --set search.effort=single",),
     "verify": ("brachis verify out/result.npz",),
     "export": ("brachis export out/result.npz --csv out/motion.csv --dt 0.004",),
     "plot": ("brachis plot out/result.npz --kind torques --out out/torques.svg",),

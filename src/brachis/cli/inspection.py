@@ -12,11 +12,11 @@ import pinocchio as pin
 from rich.console import Console
 
 from brachis import ik
-from brachis.cli.joint_table import NONE, joint_rows
+from brachis.cli.joint_table import NONE, WORDS, joint_rows
 from brachis.cli.output import print_json, result_console
 from brachis.cli.point_inspection import print_points
 from brachis.cli.settings import changed_task, urdf_of
-from brachis.cli.tables import print_table
+from brachis.cli.tables import Column, print_table
 from brachis.errors import InputError
 from brachis.kinds import Kind, kind_of
 from brachis.plausibility import of_robot
@@ -89,7 +89,8 @@ def inspect_command(
     for remark in remarks:
         console.print(remark)
     shown = [key for key in joints[0] if any(row[key] != NONE for row in joints)]
-    print_table(console, "joints", shown, [[row[key] for key in shown] for row in joints])
+    columns = [Column(key, number=key not in WORDS) for key in shown]
+    print_table(console, "joints", columns, [[row[key] for key in shown] for row in joints])
     for name, text in acting.items():
         console.print(f"{name}: {text}")
     if task:

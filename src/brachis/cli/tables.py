@@ -66,10 +66,10 @@ def print_table(
     parts = [list(range(len(named)))] if lined else _parts(least, console.width)
     for number, part in enumerate(parts, start=1):
         free = console.width - _around(len(part), lined=lined)
-        widths = _widths([least[i] for i in part], [most[i] for i in part], free)
+        widths = _widths([named[i] for i in part], [least[i] for i in part], [most[i] for i in part], free)
         told = f"{title} ({number} of {len(parts)})" if len(parts) > 1 else title
         look = box.HEAVY_HEAD if lined else None
-        table = Table(title=told, title_justify="left", show_header=header, box=look, padding=(0, 1))
+        table = Table(title=told, title_justify="left", show_header=header, box=look, padding=(0, 1), pad_edge=lined)
         for i, width in zip(part, widths, strict=True):
             table.add_column(
                 named[i].name, justify="right" if named[i].number else "left", overflow="fold", width=width
@@ -105,9 +105,15 @@ def _parts(least: Sequence[int], width: int) -> list[list[int]]:
     return parts
 
 
-def _widths(least: Sequence[int], most: Sequence[int], free: int) -> list[int]:
-    """Give every column what it needs, and while there is room widen those that wish for more, the narrowest first."""
+def _widths(columns: Sequence[Column], least: Sequence[int], most: Sequence[int], free: int) -> list[int]:
+    """Give every column what it needs, and while there is room widen those that wish for more, the narrowest first.
+
+    Where there is no room for what they need, the widest column of text is narrowed.
+    """
     widths = list(least)
+    texts = [i for i, column in enumerate(columns) if not column.number]
+    while sum(widths) > free and max(widths[i] for i in texts) > 1:
+        widths[max(texts, key=lambda i: widths[i])] -= 1
     while sum(widths) < free and any(width < wish for width, wish in zip(widths, most, strict=True)):
         wishing = [i for i, width in enumerate(widths) if width < most[i]]
         widths[min(wishing, key=lambda i: widths[i])] += 1

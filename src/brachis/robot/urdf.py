@@ -157,13 +157,18 @@ def first_limb(text: str, where: str) -> Limb:
     most = max(_moving(chain) for chain in chains.values())
     if not most:
         raise UrdfError("no joint moves", where=where, found=f"chains to {', '.join(leaves)}")
-    # Frames half way up the arm are no tools: the chains of most joints count.
-    longest = {leaf: chain for leaf, chain in chains.items() if _moving(chain) == most}
-    first = next(iter(longest.values()))
-    limb = {leaf: chain for leaf, chain in longest.items() if 2 * _moving(_shared(first, chain)) >= most}
-    trunk = _shared(*longest.values())
-    base = trunk[-1].child if len(limb) < len(longest) and trunk else None
+    longest = [chain for chain in chains.values() if _moving(chain) == most]
+    first = longest[0]
+    limb = {leaf: chain for leaf, chain in chains.items() if _is_of(first, chain)}
+    trunk = _shared(*longest)
+    base = trunk[-1].child if trunk and 2 * _moving(trunk) < most else None
     return Limb(base, _shared(*limb.values())[-1].child, tuple(limb))
+
+
+def _is_of(limb: Sequence[Any], chain: Sequence[Any]) -> bool:
+    """Tell whether a chain parts from a limb in its upper half, and moves there; frames half way up are no fingers."""
+    shared, joints = _moving(_shared(limb, chain)), _moving(limb)
+    return 2 * shared >= joints and (_moving(chain) > shared or shared == joints)
 
 
 def _moving(chain: Sequence[Any]) -> int:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from brachis import planner
+from brachis.deadline import Deadline
 from brachis.errors import PlanningError
 from brachis.result import Result
 from brachis.robot import Robot, bind
@@ -21,6 +22,8 @@ from brachis.task.yaml_reader import read_yaml
 
 _SOON = {"search.effort": "single", "search.time_limit": 20.0, "spline.intervals": 10, "search.least_motion": False}
 """Keys of the plan by which a task is tried."""
+_LONGEST = 90.0
+"""Time after which no further space is tried, s."""
 
 
 @dataclass(frozen=True)
@@ -87,10 +90,11 @@ def starter_task(
     chain = read_chain(text, str(path), tool_frame=tool, base_frame=base, locked_joints={})
     limits = placeholders(chain.joint_names, chain.limits)
     robot = Robot.from_urdf(path, tool_frame=tool, base_frame=base, limits=limits)
+    deadline = Deadline.after(_LONGEST)
     for space in spaces(robot):
         tell(f"looking for a first motion that prescribes {space if isinstance(space, str) else ', '.join(space)}")
         bound, task_map = bind(robot, space)
-        for choice in choices(task_map):
+        for choice in () if deadline.passed else choices(task_map):
             written = task_text(bound, space, choice, limits, Path(folder))
             result = _tried(written, path, tell)
             if result is not None and result.verified:
