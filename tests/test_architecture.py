@@ -29,6 +29,7 @@ ORDER = (
     "arrays",
     "deadline",
     "interrupts",
+    "summary",
     "cam",
     "task",
     "robot",
@@ -60,6 +61,7 @@ ORDER = (
     "export",
     "result",
     "planner",
+    "many",
     "starter",
     "cli",
 )

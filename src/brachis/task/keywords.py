@@ -11,7 +11,7 @@ from brachis.task.fields import Model, plain
 from brachis.task.load import Source, load_task
 from brachis.task.models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings, Task
 from brachis.task.mounting_models import Payload, Placement
-from brachis.task.robot_models import Array, LimitSpec, RobotSettings
+from brachis.task.robot_models import Array, LimitKeywords, LimitSpec, RobotSettings
 from brachis.task.segments import SegmentModel
 from brachis.task.tool_limits import ToolLimits
 
@@ -42,7 +42,7 @@ class TaskKeywords(TypedDict, total=False):
     gravity: Array | Sequence[float]
     locked_joints: Mapping[str, float]
     payload: Payload | Settings | None
-    limits: LimitSpec | Settings
+    limits: LimitSpec | LimitKeywords | Settings
     speed_override: float | str
     friction: Settings
     # boundary
@@ -57,7 +57,6 @@ class TaskKeywords(TypedDict, total=False):
     points_per_interval: int
     # search
     effort: Literal["single", "fast", "thorough", "exhaustive"]
-    jobs: int
     time_limit: float
     seed: int
     least_motion: bool
@@ -100,6 +99,7 @@ def task_with(source: Source | None = None, /, **keywords: Unpack[TaskKeywords])
     Examples
     --------
     >>> import brachis
+    >>> from brachis.task import task_with
     >>> task = task_with(
     ...     path=brachis.Line(by=[0.0, 0.5]), start=[0.5, -2.1, 2.1], task_space=["x", "y"], intervals=12
     ... )
@@ -120,9 +120,7 @@ def task_with(source: Source | None = None, /, **keywords: Unpack[TaskKeywords])
 
 
 def _in_full(key: str, value: object) -> object:
-    """Write a posture or a path as a task file does."""
-    if key == "path" and isinstance(value, SegmentModel):
-        return (value,)
+    """Write a posture as a task file does."""
     if key not in {"start", "end"} or isinstance(value, str | Model):
         return value
     return value if isinstance(value, Mapping) and set(value) == {"joints"} else {"joints": plain(value)}
