@@ -16,7 +16,8 @@ from brachis import LimitSpec
 from brachis.errors import BrachisError, PathError, PlausibilityError, StartError, UrdfError
 from brachis.plausibility import of_end_time, of_robot
 from brachis.robot import Robot
-from brachis.robot.urdf import first_limb, read_file
+from brachis.robot.limb import first_limb
+from brachis.robot.urdf import read_file
 from support.chains import Joint, chain_urdf
 
 ROOT = Path(__file__).parents[1]

@@ -22,8 +22,9 @@ from brachis.kinds import Kind, kind_of
 from brachis.plausibility import of_robot
 from brachis.robot import Robot, bind, in_use
 from brachis.robot.from_task import robot_from_settings
+from brachis.robot.limb import first_limb
 from brachis.robot.task_map.rows import AXES, YAW
-from brachis.robot.urdf import first_limb, read_file
+from brachis.robot.urdf import read_file
 from brachis.starter import natural_space
 from brachis.task import LimitSpec, Task
 

@@ -12,7 +12,8 @@ from brachis.deadline import Deadline
 from brachis.errors import PlanningError
 from brachis.result import Result
 from brachis.robot import Robot, bind
-from brachis.robot.urdf import first_limb, read_chain, read_file
+from brachis.robot.limb import first_limb
+from brachis.robot.urdf import read_chain, read_file
 from brachis.starter.choice import choices
 from brachis.starter.missing import placeholders
 from brachis.starter.space import spaces
