@@ -16,7 +16,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "brachis plan task.yaml --out out  # plan, verify, draw",
     ),
     "robots": ("brachis robots", "brachis robots --json"),
-    "new": ("brachis new scara3", "brachis new iiwa14 --out iiwa.yaml"),
+    "new": ("brachis new scara3", "brachis new gantry2 --out gantry.yaml"),
     "plan": (
         "brachis plan task.yaml --out out",
         "brachis plan task.yaml --set search.effort=single --set 'path.0.line.by=[0, 0.4]'",
