@@ -6,7 +6,7 @@ import math
 
 from brachis.bottleneck.check import CheckedSensitivity, SensitivityCheck
 from brachis.bottleneck.reference import MEANING, Reference
-from brachis.bottleneck.saturation import THRESHOLD, Saturation
+from brachis.bottleneck.saturation import RIPPLE, THRESHOLD, Saturation
 from brachis.bottleneck.sensitivities import BranchBoundary, Sensitivities, Sensitivity
 
 _FRACTION = 0.1
@@ -120,7 +120,10 @@ def _active(found: tuple[Saturation, ...]) -> list[str]:
             lines.append(f"{entry.label.subject} is at its {entry.label.kind} limit for {share}, {times}")
     if not lines:
         lines = ["nothing stays at a limit"]
-    return [*lines, f"(at its limit: at {100.0 * THRESHOLD:g} % of it or beyond)"]
+    return [
+        *lines,
+        f"(at its limit: at {100.0 * THRESHOLD:g} % of it or beyond, with ripple down to {100.0 * RIPPLE:g} %)",
+    ]
 
 
 def _reference(reference: Reference, t_end: float) -> str:
