@@ -14,8 +14,8 @@ from brachis.trajectory import Trajectory
 
 THRESHOLD = 0.99
 """A limit is active from where the motion is at this part of it ..."""
-RIPPLE = 0.97
-"""... until it falls below this one: splines ripple on a limit by a few per cent between their knots."""
+RIPPLE = 0.95
+"""... until it falls below this one: splines ripple on a limit between their knots."""
 
 
 @dataclass(frozen=True)
@@ -114,9 +114,7 @@ def saturations_of(
 
 
 def _stretches(t: np.ndarray, values: np.ndarray, threshold: float, ripple: float) -> list[tuple[float, float]]:
-    """Stretches of time on which values, linear between the times (K,), are at the threshold, or dip from it no lower
-    than the ripple in between.
-    """
+    """Stretches of time on which values, linear between the times (K,), keep to the threshold but for ripple."""
     above = np.concatenate([[False], values >= threshold, [False]])
     edges = np.flatnonzero(np.diff(above.astype(int))).reshape(-1, 2)
     if len(edges) == 0:

@@ -41,8 +41,8 @@ def plot_timeline(trajectory: Trajectory, limits: Sequence[Limit] | None = None)
     -------
     Figure
         Two columns wide; a row for each value of a limit of which the motion ever uses more than half. The
-        deeper the blue the nearer to the limit; orange where the limit is active, from 99 % of it on, ripple down to 97 %
-        included. The faint ticks are the knots of the splines.
+        deeper the blue the nearer to the limit; orange where the limit is active, from 99 % of it on, ripple down to
+        95 % included. The faint ticks are the knots of the splines.
 
     Examples
     --------
