@@ -31,6 +31,8 @@ ORDER = (
     "cam",
     "task",
     "robot",
+    "robots",
+    "examples",
     "custom_limits",
     "compose",
     "plausibility",
@@ -52,11 +54,11 @@ ORDER = (
     "completion",
     "search",
     "least_motion",
-    "result",
-    "planner",
     "bottleneck",
     "plots",
     "export",
+    "result",
+    "planner",
     "cli",
 )
 VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "limits", "bspline", "nlp", "solvers", "refine", "mesh"}

@@ -166,6 +166,6 @@ class _Twist(Limit):
 def test_a_limit_of_the_users_own_may_ask_for_the_jerk(free):
     t = np.linspace(0.0, 1.0, 5001)
     assert np.abs(free.trajectory.jerk(t * free.t_end)[:, 1:].sum(axis=1)).max() > 20.0
-    result = brachis.plan(None, task(), limits=[_Twist()])
+    result = brachis.plan(None, task(), own_limits=[_Twist()])
     assert result.verified
     assert np.abs(result.trajectory.jerk(t * result.t_end)[:, 1:].sum(axis=1)).max() <= 15.0 * 1.0002

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from brachis.bottleneck.check import SensitivityCheck, check_sensitivities
 from brachis.bottleneck.reference import Reference, find_reference
@@ -13,8 +13,10 @@ from brachis.bottleneck.sensitivities import Sensitivities, sensitivities
 from brachis.bottleneck.words import in_words
 from brachis.errors import InputError
 from brachis.limits import Role
-from brachis.result import Result
 from brachis.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from brachis.result import Result
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ def limits_of(robot: Robot, task: Task, further: Sequence[LimitModel] = ()) -> t
     """
     built = tuple(limit for build in TABLE.values() if (limit := build(robot, task)) is not None)
     named = bound_limits(custom_limits(task), robot, built, "custom_limits")
-    return (*built, *named, *bound_limits(further, robot, (*built, *named), "limits"))
+    return (*built, *named, *bound_limits(further, robot, (*built, *named), "own_limits"))
 
 
 __all__ = [

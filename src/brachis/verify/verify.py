@@ -31,7 +31,7 @@ def verify_trajectory(
     options: VerifyOptions | None = None,
     *,
     robot: Robot | None = None,
-    limits: Sequence[LimitModel] = (),
+    own_limits: Sequence[LimitModel] = (),
 ) -> Verification:
     """Check path, limits, progress, start and end, splines, and continuity of a trajectory.
 
@@ -42,7 +42,7 @@ def verify_trajectory(
     robot : Robot, optional
         Check against this robot and not the saved one, for example a newer URDF; its joints must have the same names
         in the same order.
-    limits : sequence of LimitModel, optional
+    own_limits : sequence of LimitModel, optional
         Limits of the user's own with which the trajectory was planned, beside those that its task names.
 
     Returns
@@ -75,7 +75,7 @@ def verify_trajectory(
     places = (np.concatenate(part) for part in zip(*parts, strict=True))
     states = States.at(pieces, robot, *places)
     path_check = _path_error(trajectory, path, task_map, states, options)
-    ratios = limit_checks(Given(robot, trajectory, pieces, states), limits, options)
+    ratios = limit_checks(Given(robot, trajectory, pieces, states), own_limits, options)
     checks = [
         path_check,
         *ratios,
