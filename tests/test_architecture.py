@@ -28,6 +28,7 @@ ORDER = (
     "arrays",
     "deadline",
     "interrupts",
+    "summary",
     "cam",
     "task",
     "robot",
@@ -59,6 +60,7 @@ ORDER = (
     "export",
     "result",
     "planner",
+    "many",
     "cli",
 )
 VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "limits", "bspline", "nlp", "solvers", "refine", "mesh"}

@@ -141,9 +141,10 @@ def plan(
 
 def _read(first: Given, task: Source | None, keywords: TaskKeywords) -> tuple[Robot, Task]:
     """Return the robot, and the task with all that the robot was made with."""
+    # What is no robot is a task.
     alone = task is None and first is not None and not is_robot(first)
     given, source = (None, first) if alone else (first, task)
-    asked = task_with(source, **keywords)  # type: ignore[arg-type]  (what is no robot is a task)
+    asked = task_with(source, **keywords)  # type: ignore[arg-type]
     robot = robot_for(located(given), asked.robot)  # type: ignore[arg-type]
     return robot, asked.model_copy(update={"robot": robot.settings})
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 from brachis.bottleneck.check import SensitivityCheck, check_sensitivities
@@ -13,13 +14,14 @@ from brachis.bottleneck.sensitivities import Sensitivities, sensitivities
 from brachis.bottleneck.words import in_words
 from brachis.errors import InputError
 from brachis.limits import Role
+from brachis.summary import LINES
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from brachis.result import Result
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BottleneckReport:
     """What holds a motion back.
 
@@ -49,6 +51,15 @@ class BottleneckReport:
     def __str__(self) -> str:
         """Say all in plain words."""
         return "\n".join(in_words(**vars(self)))
+
+    def __repr__(self) -> str:
+        """Say what there is room for on a screen."""
+        lines = str(self).split("\n")
+        return "\n".join([*lines[:LINES], "..."] if len(lines) > LINES else lines)
+
+    def _repr_html_(self) -> str:
+        """Say all in plain words in a notebook."""
+        return f"<pre>{escape(str(self))}</pre>"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""

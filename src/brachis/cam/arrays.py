@@ -42,7 +42,7 @@ def points_from(points: Any, orientations: Any, speed: Any, units: Units, source
     values = _array(_matrices(points), source, source)
     if values.ndim == 3 and values.shape[1:] == _HOMOGENEOUS and orientations is None:  # noqa: PLR2004
         values, orientations = values[:, :3, 3], values[:, :3, :3]
-    if values.ndim != 2 or not 1 <= values.shape[1] <= _MOST_ROWS or len(values) < least:
+    if values.ndim != 2 or not 1 <= values.shape[1] <= _MOST_ROWS or len(values) < least:  # noqa: PLR2004
         allowed = f"(n, 1 to 3) positions, or (n, 4, 4) matrices, of {least} rows or more"
         raise TaskError("points of the wrong shape", found=values.shape, allowed=allowed, where=source)
     turning = np.empty((len(values), 0)) if orientations is None else _turning(orientations, units, source)

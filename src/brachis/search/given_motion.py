@@ -101,13 +101,14 @@ def _on_path(problem: Problem, s: np.ndarray, q: np.ndarray) -> np.ndarray:
     ------
     UnreachableError
     """
-    ends = [given if given is not None else own for given, own in zip((problem.start, problem.end), q[[0, -1]])]
+    given = problem.start, problem.end
+    ends = [own if one is None else one for one, own in zip(given, q[[0, -1]], strict=True)]
     q = q + np.outer(1.0 - s, ends[0] - q[0]) + np.outer(s, ends[1] - q[-1])
     if problem.robot.n >= problem.task_map.m:
         q = Newton(problem.task_map).nearest(problem.path.sample(s).target, q)
-    for place, given in ((0, problem.start), (-1, problem.end)):
-        if given is not None:
-            q[place] = given
+    for place, posture in zip((0, -1), given, strict=True):
+        if posture is not None:
+            q[place] = posture
     if not (np.isfinite(q).all() and np.abs(np.diff(q, axis=0)).max() <= LARGEST_STEP):
         raise UnreachableError("its postures cannot be brought onto the path")
     return q

@@ -30,7 +30,7 @@ from brachis.task.orientation import (
     TurnTo,
 )
 from brachis.task.point_data import FileUnits, FitReport, FitTolerance, PointFile
-from brachis.task.robot_models import FROM_URDF, FrictionSettings, LimitScale, LimitSpec, RobotSettings
+from brachis.task.robot_models import FROM_URDF, FrictionSettings, LimitKeywords, LimitScale, LimitSpec, RobotSettings
 from brachis.task.schema import json_schema
 from brachis.task.segments import (
     ArcCenter,
@@ -76,6 +76,7 @@ __all__ = [
     "Helix",
     "HelixSegment",
     "InertiaMatrix",
+    "LimitKeywords",
     "LimitScale",
     "LimitSpec",
     "LimitsFile",

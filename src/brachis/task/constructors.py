@@ -194,9 +194,7 @@ def Helix(  # noqa: N802
     >>> brachis.Helix([0.5, 0.0, 0.3], pitch=0.02, turns=3)
     Helix(center=(0.5, 0.0, 0.3), turns=3.0, pitch=0.02, normal=(0.0, 0.0, 1.0))
     """
-    return _segment(
-        HelixSegment, "helix", blend, orientation, center=center, pitch=pitch, normal=normal, turns=turns
-    )
+    return _segment(HelixSegment, "helix", blend, orientation, center=center, pitch=pitch, normal=normal, turns=turns)
 
 
 def Spline(  # noqa: N802
@@ -237,7 +235,7 @@ def Spline(  # noqa: N802
     500
     """
     if orientations is None and _are_positions(through):
-        points = [_vector(point) for point in plain(through)]  # type: ignore[attr-defined]  (it is a list)
+        points = [_vector(point) for point in through]  # type: ignore[union-attr]
         return _segment(SplineSegment, "spline", blend, orientation, through=points, relative=relative)
     poses = _poses(through, "Spline.through", orientations)
     shape = {"through": [place for place, _ in poses], "orientations": [turn for _, turn in poses]}
@@ -267,13 +265,9 @@ def _vector(value: object) -> object:
     return [value] if isinstance(value, int | float) else value
 
 
-def _segment(
-    model: type[_S], kind: str, blend: float | None, orientation: Orientation, **shape: object
-) -> _S:
+def _segment(model: type[_S], kind: str, blend: float | None, orientation: Orientation, **shape: object) -> _S:
     """Validate what is given of a segment."""
-    given = {
-        key: _vector(value) if key in {"to", "by"} else value for key, value in shape.items() if value is not None
-    }
+    given = {key: _vector(value) if key in {"to", "by"} else value for key, value in shape.items() if value is not None}
     content = {kind: given, "blend": blend, "orientation": orientation}
     try:
         return model.model_validate(plain({key: value for key, value in content.items() if value is not None}))

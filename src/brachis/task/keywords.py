@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict, Unpack
 
 from brachis.errors import UnknownNameError
-from brachis.task.load import Source, load_task
-from brachis.task.models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings, Task
 from brachis.task.boundary import BoundarySettings
 from brachis.task.fields import Model, plain
+from brachis.task.load import Source, load_task
+from brachis.task.models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings, Task
 from brachis.task.mounting_models import Payload, Placement
-from brachis.task.robot_models import Array, LimitSpec, RobotSettings
+from brachis.task.robot_models import Array, LimitKeywords, LimitSpec, RobotSettings
 from brachis.task.segments import SegmentModel
 from brachis.task.tool_limits import ToolLimits
 
@@ -42,7 +42,7 @@ class TaskKeywords(TypedDict, total=False):
     gravity: Array | Sequence[float]
     locked_joints: Mapping[str, float]
     payload: Payload | Settings | None
-    limits: LimitSpec | Settings
+    limits: LimitSpec | LimitKeywords | Settings
     speed_override: float | str
     friction: Settings
     # boundary
@@ -57,7 +57,6 @@ class TaskKeywords(TypedDict, total=False):
     points_per_interval: int
     # search
     effort: Literal["single", "fast", "thorough", "exhaustive"]
-    jobs: int
     time_limit: float
     seed: int
     least_motion: bool

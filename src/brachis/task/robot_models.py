@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Annotated, Any, Final, Literal, Protocol
+from typing import Annotated, Any, Final, Literal, Protocol, TypedDict
 
 from pydantic import AfterValidator, Field, Tag
 
@@ -124,6 +124,22 @@ _StatedPair = Array | Sequence[float | None] | None
 StatedLimit = float | Array | Sequence[float | _StatedPair] | Mapping[str, float | _StatedPair] | str | None
 StatedCurves = Mapping[str, Array | Sequence[_StatedPair] | None] | None
 StatedRange = Array | Sequence[_StatedPair] | Mapping[str, _StatedPair] | str | None
+
+
+class LimitKeywords(TypedDict, total=False):
+    """Arguments of `LimitSpec`."""
+
+    torque: StatedLimit
+    velocity: StatedLimit
+    acceleration: StatedLimit
+    position: StatedRange
+    scale: Mapping[str, float] | LimitScale | None
+    power: StatedLimit
+    total_power: float | None
+    rms_torque: StatedLimit
+    torque_speed: StatedCurves
+    jerk: StatedLimit
+    torque_rate: StatedLimit
 
 
 class LimitScale(Model):

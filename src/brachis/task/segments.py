@@ -175,6 +175,13 @@ class SegmentModel(Model):
         """Join this segment to the end of a path."""
         return (*other, self) if isinstance(other, tuple) else NotImplemented
 
+    def __repr__(self) -> str:
+        """Show it as a program makes it."""
+        shape = getattr(self, self.kind)
+        rest = [(name, value) for name, value in self.__repr_args__() if name != self.kind]
+        given = ", ".join(f"{name}={value!r}" for name, value in (*shape.__repr_args__(), *rest))
+        return f"{type(self).__name__.removesuffix('Segment')}({given})"
+
     @property
     def begins(self) -> tuple[float, ...] | None:
         """Where the segment says that it begins: the rows of the task space; of poses position and quaternion."""

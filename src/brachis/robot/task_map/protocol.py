@@ -13,6 +13,7 @@ import pinocchio as pin
 from brachis.errors import InputError
 from brachis.robot.robot import Robot
 from brachis.robot.task_map.rows import AXES
+from brachis.summary import Summary
 
 
 @dataclass(frozen=True)
@@ -32,8 +33,8 @@ class TaskDerivatives:
     acceleration_qdot: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
-class TaskMap(ABC):
+@dataclass(frozen=True, eq=False, repr=False)
+class TaskMap(Summary, ABC):
     """Map from the joint positions of a robot to the c task coordinates of its tool, whose velocity has m rows.
 
     Attributes
