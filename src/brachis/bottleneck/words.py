@@ -30,7 +30,7 @@ def in_words(
     lines = [
         *_costs(sensitivities, t_end),
         *([] if check is None else _checked(check)),
-        *_active(saturations),
+        *active_in_words(saturations),
     ]
     if reference is not None:
         lines.append(_reference(reference, t_end))
@@ -110,7 +110,7 @@ def _taken_back(entry: CheckedSensitivity) -> str:
     return f"; other limits take over within the step, which leaves {1e3 * entry.linearised:+.4f} ms"
 
 
-def _active(found: tuple[Saturation, ...]) -> list[str]:
+def active_in_words(found: tuple[Saturation, ...]) -> list[str]:
     """Sentences on the limits that are active for some time."""
     lines = []
     for entry in found:

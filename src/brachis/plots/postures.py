@@ -55,7 +55,7 @@ def plot_postures(trajectory: Trajectory) -> Figure:
 def add_posture_axes(figure: Figure | SubFigure, trajectory: Trajectory, place: SubplotSpec | None = None) -> Axes:
     """Add axes that suit the robot: in its plane, or in space."""
     where = () if place is None else (place,)
-    if _plane(trajectory) is not None:
+    if plane_of(trajectory) is not None:
         return figure.add_subplot(*where)
     axes: Axes = figure.add_subplot(*where, projection="3d", computed_zorder=False)
     return axes
@@ -63,7 +63,7 @@ def add_posture_axes(figure: Figure | SubFigure, trajectory: Trajectory, place: 
 
 def draw_postures(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
     """Draw tool path and postures into the axes that `add_posture_axes` made."""
-    plane = _plane(trajectory)
+    plane = plane_of(trajectory)
     view = list(plane or (0, 1, 2))
     robot = trajectory.robot
     tool = skeleton(robot, samples.q).tool[:, view]
@@ -100,7 +100,8 @@ def legend_postures(ax: Axes, trajectory: Trajectory, width: float) -> None:
     style.legend_above(ax, width, handles, labels)
 
 
-def _plane(trajectory: Trajectory) -> tuple[int, int] | None:
+def plane_of(trajectory: Trajectory) -> tuple[int, int] | None:
+    """World axes of the plane in which a motion is drawn; None where it is drawn in space."""
     task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
     return drawing_plane(trajectory.robot, trajectory.q[0], task_map.axes)
 

@@ -28,6 +28,8 @@ class Quantity:
     values : (K, j) ndarray
     lower, upper : (j,) ndarray
         Limits; infinite where there is none.
+    around_zero : bool
+        Whether the limits lie around zero, so that ratios to them say how near they are.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Quantity:
     values: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
+    around_zero: bool
 
     @property
     def ratios(self) -> np.ndarray:
@@ -59,12 +62,13 @@ class _Kind:
     symbols: tuple[str, str]
     units: tuple[str, str]
     samples: str
+    around_zero: bool = True
 
 
 KINDS = {
-    "position": _Kind(("position",) * 2, ("q",) * 2, ("rad", "m"), "q"),
+    "position": _Kind(("position",) * 2, ("q",) * 2, ("rad", "m"), "q", around_zero=False),
     "velocity": _Kind(("velocity",) * 2, (r"\dot{q}",) * 2, ("rad/s", "m/s"), "qdot"),
-    "acceleration": _Kind(("acceleration",) * 2, (r"\ddot{q}",) * 2, ("rad/s$^2$", "m/s$^2$"), "qddot"),
+    "acceleration": _Kind(("acceleration",) * 2, (r"\ddot{q}",) * 2, ("rad/s²", "m/s²"), "qddot"),
     "torque": _Kind(("torque", "force"), (r"\tau", "F"), ("Nm", "N"), "tau"),
 }
 """Kinds of joint quantities by the name that their limits have."""
@@ -90,7 +94,9 @@ def quantities(trajectory: Trajectory, samples: Samples, kind: str) -> tuple[Qua
     lower, upper = limits_of_joints(robot, kind)
     values = getattr(samples, words.samples)
     return tuple(
-        Quantity(name, symbol, unit, samples.t, joints, values[:, joints], lower[joints], upper[joints])
+        Quantity(
+            name, symbol, unit, samples.t, joints, values[:, joints], lower[joints], upper[joints], words.around_zero
+        )
         for name, symbol, unit, joints in zip(
             words.names,
             words.symbols,
