@@ -58,6 +58,7 @@ ORDER = (
     "bottleneck",
     "plots",
     "export",
+    "report",
     "result",
     "planner",
     "many",

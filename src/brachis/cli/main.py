@@ -1,4 +1,4 @@
-"""The command line: ``brachis plan | bottleneck | verify | export | plot | inspect | compose | schema``.
+"""The command line: ``brachis plan | bottleneck | verify | export | plot | report | inspect | compose | schema``.
 
 Exit codes: 0 planned and verified, 1 no verified plan, 2 wrong input, 3 planned and verified, but not all figures could
 be written, 130 interrupted. Results go to standard output, everything else to standard error. With ``--json`` standard
@@ -189,6 +189,21 @@ def plot(
         from brachis.cli import results  # noqa: PLC0415
 
     results.plot_command(result, out=out, kind=kind)
+
+
+@app.command()
+def report(
+    result: ResultFile,
+    out: Annotated[
+        Path | None, typer.Option(help="HTML file to write; default: beside the result, as result.html.")
+    ] = None,
+    title: Annotated[str | None, typer.Option(help="Title of the page; default: the result's name.")] = None,
+) -> None:
+    """Write a saved motion as one HTML page, from which a person decides whether to run it."""
+    with interrupts.postponed():
+        from brachis.cli import report as command  # noqa: PLC0415
+
+    raise typer.Exit(command.report_command(result, out=out, title=title))
 
 
 @app.command()

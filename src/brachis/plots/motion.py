@@ -42,7 +42,7 @@ def plot_motion(trajectory: Trajectory) -> Figure:
     heights = [*(_JOINT_MM * height_of(part) for part in found), _PROGRESS_MM, _PROGRESS_MM]
     figure = style.new_figure(style.COLUMN_WIDTH, sum(heights) + _FRAME_MM)
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
-    panels = [figure.add_subplot(cell) for cell in grid]
+    panels = [figure.add_subplot(grid[row]) for row in range(len(heights))]
     for ax, part in zip(panels, found, strict=False):
         draw_quantity(ax, trajectory, part)
     draw_progress(panels[-2], trajectory, samples)

@@ -50,8 +50,9 @@ def plot_overview(trajectory: Trajectory) -> Figure:
     draw_postures(postures, trajectory, samples)
     legend_postures(postures, trajectory, 0.5 * style.PAGE_WIDTH - 10.0)
     torques = shown_torques(trajectory, samples)
-    cells = grid[0, 1].subgridspec(len(torques), 1) if len(torques) > 1 else [grid[0, 1]]
-    draw_torques([figure.add_subplot(cell) for cell in cells], trajectory, torques)
+    cells = grid[0, 1].subgridspec(len(torques), 1)
+    places = [cells[row] for row in range(len(torques))] if len(torques) > 1 else [grid[0, 1]]
+    draw_torques([figure.add_subplot(place) for place in places], trajectory, torques)
     joints = []
     for column, (draw, found) in enumerate(rows.items()):
         panels = [figure.add_subplot(grid[row + 1, column]) for row in range(len(found) + 1)]

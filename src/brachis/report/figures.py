@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +26,6 @@ _SHOWN = 0.5
 """Limits that the motion never comes this near to have no row."""
 _MOST = 1.1
 """Ratio at the upper end of the colours."""
-_TOOL = "tool speed"
 
 
 def encoded(values: np.ndarray) -> dict[str, Any]:
@@ -40,19 +41,21 @@ def motion_figure(motion: ReportedMotion) -> Figure:
     Joints in rad and joints in m have panels of their own; a joint is hidden in all panels at once.
     """
     trajectory, samples = motion.trajectory, motion.samples
-    parts = [part for kind in KINDS for part in quantities(trajectory, samples, kind)]
-    heights = [_PANEL_PX if len(part.joints) > _FEW_JOINTS else _SMALL_PX for part in parts] + [_SMALL_PX]
-    data, named = [], set()
+    panels = [[part] for kind in KINDS for part in quantities(trajectory, samples, kind)]
+    panels += [parts] if (parts := _over_their_limits(quantities(trajectory, samples, "torque"))) else []
+    heights = [_PANEL_PX if len(parts[0].joints) > _FEW_JOINTS else _SMALL_PX for parts in panels] + [_SMALL_PX]
+    data, named, last = [], set(), len(heights)
     layout = _layout(trajectory.t_end, sum(heights) + _FRAME_PX)
-    for row, (part, domain) in enumerate(zip(parts, _domains(heights), strict=False), start=1):
-        layout[_axis("yaxis", row)] = _value_axis(f"{part.name} ({part.unit})", domain, _view(part))
-        for column, joint in enumerate(part.joints.tolist()):
-            name = trajectory.joint_names[joint]
-            data += _joint_traces(part, column, name, row, shown=name not in named)
-            named.add(name)
-    last = len(heights)
-    layout[_axis("yaxis", last)] = _value_axis(f"{_TOOL} (m/s)", _domains(heights)[-1], None)
-    look = {"line": {"color": style.COLOURS[-1], "width": 1.6}, "name": _TOOL, "showlegend": False}
+    for row, (parts, domain) in enumerate(zip(panels, _domains(heights), strict=False), start=1):
+        title = f"{parts[0].name} ({parts[0].unit})"
+        layout[_axis("yaxis", row)] = _value_axis(title, domain, _view(parts))
+        for part in parts:
+            for column, joint in enumerate(part.joints.tolist()):
+                name = trajectory.joint_names[joint]
+                data += _joint_traces(part, column, name, row, shown=name not in named)
+                named.add(name)
+    layout[_axis("yaxis", last)] = _value_axis("tool speed (m/s)", _domains(heights)[-1], None)
+    look = {"line": {"color": style.COLOURS[-1], "width": 1.6}, "name": "tool", "showlegend": False}
     hover = {"hovertemplate": "%{y:.4g} m/s<extra>tool</extra>"}
     data.append({**_curve(samples.t, samples.tool_speed, last), **look, **hover})
     layout["xaxis"] |= {"anchor": f"y{last}", "title": {"text": "t (s)"}}
@@ -60,12 +63,23 @@ def motion_figure(motion: ReportedMotion) -> Figure:
     return {"data": data, "layout": layout}
 
 
+def _over_their_limits(parts: Sequence[Quantity]) -> list[Quantity]:
+    """Give torques and forces as parts of their limits: those of a wrist are small beside those of a shoulder."""
+    found = [part.limited() for part in parts]
+    names = " and ".join(part.name for part in found if part is not None)
+    ones = ((part, np.ones(len(part.joints))) for part in found if part is not None)
+    return [
+        replace(part, name=names, unit="part of the limit", values=part.ratios, lower=-one, upper=one)
+        for part, one in ones
+    ]
+
+
 def _joint_traces(part: Quantity, column: int, name: str, row: int, *, shown: bool) -> list[dict[str, Any]]:
     """Draw one joint's curve, and its limits as thin straight lines."""
     joint = style.joint_style(int(part.joints[column]))
     values, levels = part.values[:, column], (part.lower[column], part.upper[column])
-    line = {"color": joint["color"], "width": 1.8, "dash": _dash(joint["linestyle"])}
-    group = {"name": name, "legendgroup": name, "legend": "legend"}
+    line = {"color": joint["color"], "width": 1.8, "dash": _dash(joint["linestyle"]), "simplify": False}
+    group = {"name": name, "legendgroup": name, "legendrank": int(part.joints[column])}
     hover, share = f"%{{y:.4g}} {part.unit}", {}
     if part.around_zero and np.isfinite(levels).all():
         share = {"customdata": encoded(100.0 * np.abs(part.ratios[:, column]))}
@@ -143,11 +157,11 @@ def _value_axis(title: str, domain: tuple[float, float], view: tuple[float, floa
     return axis if view is None else {**axis, "range": view}
 
 
-def _view(part: Quantity) -> tuple[float, float]:
+def _view(parts: Sequence[Quantity]) -> tuple[float, float]:
     """Range of values in view: the motion, and the limits that it comes near."""
-    low, high = float(part.values.min()), float(part.values.max())
+    low, high = min(float(part.values.min()) for part in parts), max(float(part.values.max()) for part in parts)
     reach = _REACH * max(high - low, 1e-9)
-    levels = np.concatenate([part.lower, part.upper])
+    levels = np.concatenate([level for part in parts for level in (part.lower, part.upper)])
     near = levels[(levels > low - reach) & (levels < high + reach)]
     low, high = min([low, *near.tolist()]), max([high, *near.tolist()])
     room = 0.06 * max(high - low, 1e-9)

@@ -42,11 +42,24 @@ function flat(point) { // across and up, m from the middle
 }
 function fit() { // pixels per metre, for the view at the beginning
   let across = 0.1, up = 0.1;
-  for (let k = 0; k < bones.length; k += 3) {
-    const [x, y] = flat([bones[k], bones[k + 1], bones[k + 2]]);
+  const include = (point) => {
+    const [x, y] = flat(point);
     [across, up] = [Math.max(across, Math.abs(x)), Math.max(up, Math.abs(y))];
-  }
+  };
+  for (let k = 0; k < bones.length; k += 3) include([bones[k], bones[k + 1], bones[k + 2]]);
+  [from[0], to[0]].forEach((x) => [from[1], to[1]].forEach((y) => include(onGround(0, x, y))));
   return { across, up };
+}
+const axesInView = scene.plane ?? [0, 1], ground = [...middle];
+if (!scene.plane) ground[2] = Math.min(0, low[2]);
+const wide = Math.max(...axesInView.map((axis) => high[axis] - low[axis]), 0.1);
+const step = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10].find((value) => wide / value < 9) ?? 20;
+const from = axesInView.map((axis) => Math.floor(low[axis] / step) * step);
+const to = axesInView.map((axis) => Math.ceil(high[axis] / step) * step);
+function onGround(i, value, other) {
+  const point = [...ground];
+  [point[axesInView[i]], point[axesInView[1 - i]]] = [value, other];
+  return point;
 }
 const extent = fit();
 function screen(point) {
@@ -68,20 +81,10 @@ function colourOf(part) {
   return `rgb(${STOPS[k].map((value, i) => value + (place - k) * (STOPS[k + 1][i] - value)).join(",")})`;
 }
 function drawGround() {
-  const axes = scene.plane ?? [0, 1], ground = [...middle], names = "xyz", base = posture(0)[0];
-  if (!scene.plane) ground[2] = Math.min(0, low[2]);
-  const wide = Math.max(...axes.map((axis) => high[axis] - low[axis]), 0.1);
-  const step = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10].find((value) => wide / value < 9) ?? 20;
-  const from = axes.map((axis) => Math.floor(low[axis] / step) * step);
-  const to = axes.map((axis) => Math.ceil(high[axis] / step) * step);
-  axes.forEach((axis, i) => {
+  const names = "xyz", base = posture(0)[0];
+  [0, 1].forEach((i) => {
     for (let value = from[i]; value <= to[i] + step / 2; value += step) {
-      const line = [from[1 - i], to[1 - i]].map((other) => {
-        const point = [...ground];
-        [point[axis], point[axes[1 - i]]] = [value, other];
-        return point;
-      });
-      stroke(line, styled("--line"), 1);
+      stroke([onGround(i, value, from[1 - i]), onGround(i, value, to[1 - i])], styled("--line"), 1);
     }
   });
   pen.font = "12px sans-serif";
@@ -168,7 +171,7 @@ function fillTable() {
     const cell = table.tBodies[0].rows[joint].cells[column + 1], ratio = each.ratios?.[k];
     const share = ratio === undefined ? "" : ` (${(100 * ratio).toFixed(0)} %)`;
     cell.textContent = `${each.values[k].toFixed(3)} ${each.unit}${share}`;
-    cell.className = ratio > 1.0005 ? "beyond" : ratio >= 0.99 ? "at" : ratio >= 0.9 ? "near" : "";
+    cell.className = ["beyond", "at", "near"].find((level) => ratio >= scene.levels[level]) ?? "";
   }));
 }
 

@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from brachis.bottleneck import THRESHOLD
 from brachis.plots.postures import plane_of
 from brachis.plots.quantities import KINDS, quantities
 from brachis.plots.skeleton import skeleton
 from brachis.report.figures import encoded
 from brachis.report.motion import ReportedMotion
+from brachis.report.tables import NEAR
 
 _FRAMES = 240
 
@@ -23,7 +25,7 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
     dict
         ``t``, ``s``, ``speed`` (of the tool) at K times; ``bones``, (K, p, 3), m; ``plane``, the two world axes that a
         planar robot moves in, or None; ``joints``, with ``name``, ``redundant`` and, for every quantity, the values
-        with their unit and parts of their limits.
+        with their unit and parts of their limits; ``levels``, the parts of a limit from which on values are marked.
     """
     trajectory = motion.trajectory
     samples = trajectory.at(np.linspace(0.0, trajectory.t_end, _FRAMES))
@@ -48,4 +50,5 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
         "plane": plane_of(trajectory),
         "joints": joints,
         "kinds": list(KINDS),
+        "levels": {"near": NEAR, "at": THRESHOLD, "beyond": 1.0 + trajectory.task.refinement.tolerance},
     }

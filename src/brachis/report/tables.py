@@ -16,7 +16,7 @@ from brachis.report.motion import ReportedMotion
 from brachis.verify import Check
 
 _LIBRARIES = ("pin", "numpy", "scipy", "plotly")
-_NEAR = 0.5
+NEAR = 0.9
 """Values that use more of a limit are marked as near it; 1 is the limit itself."""
 _SMALL = 1e-9
 
@@ -143,7 +143,7 @@ def _peak(values: np.ndarray, lower: float, upper: float, unit: str, tolerance: 
 
 def _level(share: float, tolerance: float) -> str:
     """Grade how near a value is to its limit."""
-    edges = (("beyond", 1.0 + tolerance), ("at", THRESHOLD), ("near", _NEAR))
+    edges = (("beyond", 1.0 + tolerance), ("at", THRESHOLD), ("near", NEAR))
     return next((level for level, edge in edges if share >= edge), "")
 
 

@@ -164,7 +164,7 @@ def _template() -> Any:  # noqa: ANN401  (a Jinja2 template)
 
 @cache
 def _plotly() -> str:
-    """Plotly's program, packed: 1.5 of 4.8 MB."""
+    """Pack Plotly's program: 1.5 of 4.8 MB."""
     try:
         from plotly.offline import get_plotlyjs  # noqa: PLC0415  (an extra)
     except ImportError:
