@@ -16,7 +16,7 @@ def saved(folder, torque=None):
     trajectory = brachis.plan(None, quick).trajectory
     if torque is not None:
         settings = trajectory.task.robot
-        limits = settings.limits.model_copy(update={"torque": torque})
+        limits = dataclasses.replace(settings.limits, torque=torque)
         robot = settings.model_copy(update={"limits": limits})
         trajectory = dataclasses.replace(trajectory, task=trajectory.task.model_copy(update={"robot": robot}))
     trajectory.save(folder / "motion.npz")

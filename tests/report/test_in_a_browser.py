@@ -53,7 +53,7 @@ def test_it_plays_to_the_end_and_stops(opened, planar_page, planar):
     page, said, _ = opened(planar_page)
     page.evaluate(MOVE, 0.97)
     page.click("#play")
-    page.wait_for_function("document.getElementById('play').textContent === 'Play'", timeout=60_000)
+    page.get_by_role("button", name="Play", exact=True).wait_for(timeout=60_000)
     assert page.evaluate("Number(document.getElementById('time').value)") == pytest.approx(planar.t_end, rel=1e-4)
     assert said == []
 
@@ -65,6 +65,7 @@ def test_figures_are_there_in_dark_and_an_arm_in_space_turns(opened, weaker_page
     assert page.locator("#motion_figure .scatterlayer .trace").count() > 4 * 7
     assert page.evaluate("getComputedStyle(document.querySelector('header')).backgroundColor") == "rgb(195, 20, 47)"
     before = pixels(page)
+    page.locator("#robot").scroll_into_view_if_needed()
     box = page.locator("#robot").bounding_box()
     page.mouse.move(box["x"] + 100, box["y"] + 100)
     page.mouse.down()

@@ -55,7 +55,7 @@ def test_curves_are_the_motion(rail):
     for trace in data["data"]:
         title = axes["yaxis" if trace["yaxis"] == "y1" else trace["yaxis"].replace("y", "yaxis")]["title"]["text"]
         kind, _, unit = title.partition(" (")
-        if trace.get("meta") == "limit" or kind not in functions or unit == "part of the limit)":
+        if trace.get("meta") == "limit" or kind not in functions or unit == "of the limit)":
             continue
         joint = trajectory.joint_names.index(trace["name"])
         assert ("rad" in unit or "Nm" in unit) == (trace["name"] != "rail"), "joints in rad and in m are apart"

@@ -66,10 +66,10 @@ def motion_figure(motion: ReportedMotion) -> Figure:
 def _over_their_limits(parts: Sequence[Quantity]) -> list[Quantity]:
     """Give torques and forces as parts of their limits: those of a wrist are small beside those of a shoulder."""
     found = [part.limited() for part in parts]
-    names = " and ".join(part.name for part in found if part is not None)
+    names = ", ".join(part.name for part in found if part is not None)
     ones = ((part, np.ones(len(part.joints))) for part in found if part is not None)
     return [
-        replace(part, name=names, unit="part of the limit", values=part.ratios, lower=-one, upper=one)
+        replace(part, name=names, unit="of the limit", values=part.ratios, lower=-one, upper=one)
         for part, one in ones
     ]
 
