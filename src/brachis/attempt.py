@@ -105,6 +105,13 @@ class Attempt(Summary):
         Of the trajectory.
     undone : str
         What the time, or a solve that failed, left undone, in words; empty where nothing.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> result.candidates[0].status
+    'verified'
     """
 
     redundant_joints: tuple[str, ...]

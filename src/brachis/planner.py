@@ -126,8 +126,8 @@ def plan(
     >>> import brachis
     >>> result = brachis.plan("examples/01_scara_line.yaml", redundant_joints=["j1"], effort="single")
     >>> result.verified, round(result.t_end, 2)
-    (True, 2.48)
-    >>> again = brachis.plan("examples/01_scara_line.yaml", limits={"torque": 12}, start_from=result)
+    (True, 2.26)
+    >>> again = brachis.plan(result.task, limits={"torque": 12}, start_from=result)
     >>> again.t_end < result.t_end
     True
     """
@@ -332,7 +332,7 @@ def transcribe(
     >>> import brachis
     >>> program, family = brachis.transcribe(brachis.examples.scara_line, redundant_joints=["j1"])
     >>> program.variables, family
-    (43, 'planar')
+    (36, 'planar')
     """
     robot, asked = _read(robot_or_task, task, keywords)
     problem = Problem.of(robot, asked, own_limits)

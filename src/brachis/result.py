@@ -36,7 +36,7 @@ class Result(Summary):
     Attributes
     ----------
     task : Task
-        All that was asked, with the robot's settings and all defaults; ``plan(None, result.task)`` repeats the plan.
+        All that was asked, with the robot's settings and all defaults; ``plan(result.task)`` repeats the plan.
     trajectory : Trajectory
     verification : Verification
     family : str
@@ -55,6 +55,16 @@ class Result(Summary):
         What was left undone, in plain words.
     warnings : tuple of Remark
         What of robot, task and motion is hardly meant.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> result.verified, result.sample(dt=0.004).q.shape
+    (True, (638, 3))
+    >>> figure = result.plot("torques")
+    >>> print(type(result.bottleneck()).__name__)
+    BottleneckReport
     """
 
     task: Task

@@ -13,7 +13,7 @@ def saved(folder, torque=None):
     """Save a motion of the example, on drives with other limits than it was planned for."""
     task = brachis.load_task(ROOT / "examples/01_scara_line.yaml").to_dict()
     quick = {**task, "spline": {**task["spline"], "intervals": 6}, "search": {"effort": "single"}}
-    trajectory = brachis.plan(None, quick).trajectory
+    trajectory = brachis.plan(quick).trajectory
     if torque is not None:
         settings = trajectory.task.robot
         limits = dataclasses.replace(settings.limits, torque=torque)

@@ -20,7 +20,7 @@ QUICK = {"search": {"effort": "single", "least_motion": False}, "spline": {"inte
 
 def quick(example):
     task = brachis.load_task(example).to_dict()
-    return brachis.plan(None, {**task, **{key: {**task[key], **value} for key, value in QUICK.items()}})
+    return brachis.plan({**task, **{key: {**task[key], **value} for key, value in QUICK.items()}})
 
 
 @pytest.fixture(scope="session")

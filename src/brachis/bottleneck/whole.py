@@ -39,6 +39,13 @@ class BottleneckReport:
         The best value known, where asked for and found.
     reference_sought : bool
         True where it was asked for.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> print(str(result.bottleneck()).splitlines()[0])
+    10 % more torque at j1 (1 Nm) saves 3.4 % (87 ms)
     """
 
     t_end: float
@@ -99,8 +106,10 @@ def report(motion: Result | Trajectory, *, check: bool = False, reference: bool 
     Examples
     --------
     >>> import brachis
-    >>> print(brachis.bottleneck.report(brachis.plan(None, "examples/01_scara_line.yaml")))  # doctest: +SKIP
-    >>> print(brachis.bottleneck.report(brachis.Trajectory.load("out/result.npz")))  # doctest: +SKIP
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> found = brachis.bottleneck.report(result.trajectory)  # as of a loaded one
+    >>> [sensitivity.label.subject for sensitivity in found.sensitivities.limits][0]
+    'j1'
     """
     if isinstance(motion, Trajectory):
         trajectory, refined = motion, solved_again(motion)

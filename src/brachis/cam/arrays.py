@@ -65,7 +65,7 @@ def _matrices(points: Any) -> Any:  # noqa: ANN401
     if not isinstance(points, np.ndarray) and callable(getattr(points, "as_matrix", None)):
         return points.as_matrix()
     if isinstance(points, list | tuple) and points:
-        if hasattr(points[0], "homogeneous"):
+        if all(hasattr(one, "homogeneous") for one in points):
             return [one.homogeneous for one in points]
         if callable(getattr(points[0], "as_matrix", None)):
             return [one.as_matrix() for one in points]

@@ -4,6 +4,12 @@ A limit is a function of q, qdot, qddot and s, some of qdddot too. A new kind is
 field in `robot.limits` as well), its file here with a line in `TABLE`, and a file in `verify.limits` with a line in the
 table there. Nothing else asks which kind a limit is. Joint ranges are known elsewhere too: postures and turns are
 chosen within them.
+
+Examples
+--------
+>>> import brachis
+>>> "torque" in brachis.limits.TABLE
+True
 """
 
 from __future__ import annotations

@@ -62,6 +62,13 @@ class Robot(Summary):
         Text of that file.
     rolls_freely : bool
         Whether the last joint is the virtual one by which the tool rolls freely; see `bind`.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> robot = brachis.Robot.from_urdf("robots/scara3/robot.urdf", tool_frame="tool", gravity=[0, 0, 0])
+    >>> robot.tool_placement([0.0, 0.0, 0.0]).translation.round(6).tolist()
+    [3.0, 0.0, 0.0]
     """
 
     model: pin.Model

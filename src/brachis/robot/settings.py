@@ -29,18 +29,20 @@ def kept_settings(
     by_name: dict[str, Any] = {
         each.name: _by_name(getattr(limits, each.name), names, each.default) for each in fields(limits)
     }
-    return check_robot_settings(
-        {
-            "urdf": str(Path(path).absolute()),
-            "tool_frame": tool_frame,
-            "base_frame": base_frame,
-            "gravity": gravity,
-            "locked_joints": dict(locked_joints or {}),
-            "limits": replace(limits, **by_name),
-            "friction": dict(friction or {}),
-            **{name: getattr(added, name) for name in ("payload", "tool_offset", "mounting", "speed_override")},
-        }
-    )
+    content = {
+        "urdf": str(Path(path).absolute()),
+        "tool_frame": tool_frame,
+        "base_frame": base_frame,
+        "gravity": gravity,
+        "locked_joints": dict(locked_joints or {}),
+        "limits": replace(limits, **by_name),
+        "friction": dict(friction or {}),
+        **{name: getattr(added, name) for name in ("payload", "tool_offset", "mounting", "speed_override")},
+    }
+    made, default = check_robot_settings(content), RobotSettings()
+    # What is as by default counts as left out where the settings meet those of another robot or task.
+    stated = {key: value for key, value in content.items() if getattr(made, key) != getattr(default, key)}
+    return check_robot_settings(stated)
 
 
 def _by_name(value: object, names: Sequence[str], absent: object) -> object:

@@ -119,7 +119,7 @@ def Arc(  # noqa: N802
     --------
     >>> import brachis
     >>> brachis.Arc(center=[0.5, 0.0], angle_deg=90)
-    Arc(center=(0.5, 0.0), angle_deg=90.0)
+    Arc(center=[0.5, 0], angle_deg=90)
     """
     shape = {"center": center, "angle_deg": angle_deg, "normal": normal, "via": via, "to": to, "yaw": yaw}
     return _segment(ArcSegment, "arc", blend, orientation, **shape)
@@ -154,7 +154,7 @@ def Circle(  # noqa: N802
     --------
     >>> import brachis
     >>> brachis.Circle([0.5, 0.0], turns=2)
-    Circle(center=(0.5, 0.0), turns=2.0)
+    Circle(center=[0.5, 0], turns=2)
     """
     return _segment(CircleSegment, "circle", blend, orientation, center=center, turns=turns, normal=normal, yaw=yaw)
 
@@ -192,7 +192,7 @@ def Helix(  # noqa: N802
     --------
     >>> import brachis
     >>> brachis.Helix([0.5, 0.0, 0.3], pitch=0.02, turns=3)
-    Helix(center=(0.5, 0.0, 0.3), turns=3.0, pitch=0.02, normal=(0.0, 0.0, 1.0))
+    Helix(center=[0.5, 0, 0.3], turns=3, pitch=0.02, normal=[0, 0, 1])
     """
     return _segment(HelixSegment, "helix", blend, orientation, center=center, pitch=pitch, normal=normal, turns=turns)
 

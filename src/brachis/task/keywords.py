@@ -99,6 +99,7 @@ def task_with(source: Source | None = None, /, **keywords: Unpack[TaskKeywords])
     Examples
     --------
     >>> import brachis
+    >>> from brachis.task import task_with
     >>> task = task_with(
     ...     path=brachis.Line(by=[0.0, 0.5]), start=[0.5, -2.1, 2.1], task_space=["x", "y"], intervals=12
     ... )
@@ -119,9 +120,7 @@ def task_with(source: Source | None = None, /, **keywords: Unpack[TaskKeywords])
 
 
 def _in_full(key: str, value: object) -> object:
-    """Write a posture or a path as a task file does."""
-    if key == "path" and isinstance(value, SegmentModel):
-        return (value,)
+    """Write a posture as a task file does."""
     if key not in {"start", "end"} or isinstance(value, str | Model):
         return value
     return value if isinstance(value, Mapping) and set(value) == {"joints"} else {"joints": plain(value)}

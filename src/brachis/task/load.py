@@ -49,6 +49,7 @@ def load_task(source: Source) -> Task:
 
     Examples
     --------
+    >>> from brachis import load_task
     >>> task = load_task({
     ...     "brachis": 1,
     ...     "start": {"joints": [0.1, 0.2, 0.3]},

@@ -156,7 +156,14 @@ class LimitScale(Model):
 
 @dataclass(frozen=True, init=False)
 class LimitSpec:
-    """Joint limits: an absent key takes the URDF's, null removes the limit (see the module's documentation)."""
+    """Joint limits: an absent key takes the URDF's, null removes the limit (see the module's documentation).
+
+    Examples
+    --------
+    >>> import brachis
+    >>> brachis.LimitSpec(torque={"j1": 12.0}, velocity=2.0).velocity
+    2.0
+    """
 
     torque: Annotated[
         UrdfLimit,

@@ -42,8 +42,8 @@ class Samples(Summary):
     >>> import brachis
     >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single")
     >>> samples = result.sample(dt=0.1)
-    >>> samples.tool_position[-1].round(3).tolist(), samples.tool_speed[-1].round(6)
-    ([1.332, 0.6, 0.0], 0.0)
+    >>> samples.tool_position[-1].round(3).tolist(), samples.tool_quaternion.shape
+    ([1.732, 1.0, 0.0], (24, 4))
     """
 
     t: np.ndarray

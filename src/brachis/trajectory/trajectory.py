@@ -66,6 +66,14 @@ class Trajectory(Summary):
         closed form took its place.
     chart_knots : ndarray
         Knots of its splines; none where the rows are constant (B = 1).
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> trajectory = result.trajectory
+    >>> trajectory.position(0.1).shape, trajectory.torque([0.1, 0.2]).shape
+    ((3,), (2, 3))
     """
 
     task: Task

@@ -65,6 +65,13 @@ class Verification(Summary):
         Largest ratio of any quantity to its limit.
     path_error : float
         Largest distance from the path: m for position rows, rad for yaw, whichever is larger.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> [check.name for check in result.verification.checks][:2]
+    ['path error', 'torque ratio']
     """
 
     checks: tuple[Check, ...]

@@ -55,6 +55,13 @@ def verify_trajectory(
     InputError
         `robot` has other joints than the trajectory; or the trajectory's task does not fit the robot: its postures
         (`InputError`, `StartError`), task space (`InputError`) or path (`PathError`).
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> brachis.verify_trajectory(result.trajectory).passed
+    True
     """
     options = options or VerifyOptions()
     robot, task_map = bind(trajectory.robot if robot is None else robot, trajectory.task.task_space)

@@ -44,6 +44,13 @@ class TaskMap(Summary, ABC):
         Names of the m rows, those of the position (m) first, then the angles (rad).
     axes : tuple of int
         World axes (0, 1, 2) of the position rows; none in a space of joints.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> task_map = brachis.task_map_of(brachis.robots.scara3, ["x", "y"])
+    >>> task_map.m, task_map.rows
+    (2, ('x', 'y'))
     """
 
     frame: ClassVar[pin.ReferenceFrame]
