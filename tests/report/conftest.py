@@ -39,8 +39,13 @@ def planar_page(planar):
 
 
 @pytest.fixture(scope="session")
+def rail_page(rail):
+    return make_report(rail)
+
+
+@pytest.fixture(scope="session")
 def weaker(rail):
-    """The motion on drives that are weaker by a tenth, and a joint with a name that looks like HTML."""
+    """The motion on drives that are weaker by a tenth."""
     trajectory = rail.trajectory
     weak = trajectory.robot.limits.with_magnitudes(torque=0.9 * trajectory.robot.limits.torque)
     return dataclasses.replace(trajectory, robot=dataclasses.replace(trajectory.robot, limits=weak))

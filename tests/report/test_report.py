@@ -41,8 +41,8 @@ def test_everything_is_in_the_file(planar_page):
     assert len(without_plotly) < 700_000
 
 
-def test_curves_are_the_motion(rail):
-    data = data_of(make_report(rail))["motion"]
+def test_curves_are_the_motion(rail, rail_page):
+    data = data_of(rail_page)["motion"]
     trajectory, axes = rail.trajectory, data["layout"]
     functions = {
         "position": trajectory.position,
@@ -80,8 +80,8 @@ def test_limits_of_every_joint_are_drawn(weaker_page, weaker):
             assert np.float32(level) in levels[name]
 
 
-def test_the_animation_is_the_motion(rail):
-    scene = data_of(make_report(rail))["scene"]
+def test_the_animation_is_the_motion(rail, rail_page):
+    scene = data_of(rail_page)["scene"]
     t, bones = floats(scene["t"]), floats(scene["bones"])
     assert t[0] == 0.0
     assert t[-1] == pytest.approx(rail.t_end)
@@ -127,8 +127,8 @@ def test_text_is_no_markup(weaker_page):
     assert "&lt;script&gt;weaker" in weaker_page.html
 
 
-def test_every_joint_is_told_with_its_posture_and_how_near_it_comes_to_its_limits(rail):
-    page = make_report(rail).html
+def test_every_joint_is_told_with_its_posture_and_how_near_it_comes_to_its_limits(rail, rail_page):
+    page = rail_page.html
     rows = re.findall(r"<tr><th>([\w ]+?)( \*)?</th><td>(-?[\d.]+) (rad|m)</td><td>(-?[\d.]+) (?:rad|m)</td>", page)
     assert [row[0] for row in rows] == list(rail.trajectory.joint_names)
     assert [row[0] for row in rows if row[1]] == ["rail"]
@@ -151,25 +151,22 @@ def test_a_saved_motion_is_verified_again_and_told_as_the_plan(planar, planar_pa
     assert len(saves) >= 2, "the bottlenecks of a saved motion are found again"
 
 
-def test_remarks_and_what_was_left_undone_are_said(planar):
+def test_a_result_writes_its_report_with_remarks_and_what_was_left_undone(planar, tmp_path):
     remark = Remark("robot.limits.velocity", "looks like degrees", "120 rad/s", "1 to 60 rad/s")
     result = dataclasses.replace(planar, warnings=(remark,), undone=("the knots",), interrupted=True)
-    aside = re.search(r"<aside>.*?</aside>", make_report(result).html, re.DOTALL)[0]
+    page = result.report(tmp_path / "motion.html")
+    assert (tmp_path / "motion.html").read_text(encoding="utf-8") == page.html
+    aside = re.search(r"<aside>.*?</aside>", page.html, re.DOTALL)[0]
     assert "robot.limits.velocity: looks like degrees (found 120 rad/s; usual: 1 to 60 rad/s)" in aside
     assert "the knots" in aside
     assert "ended early" in aside
+    assert len(repr(page)) < 80
+    assert page._repr_html_().startswith("<iframe")
 
 
 def test_the_task_and_the_versions_are_in_it(planar_page):
     assert "angle_deg: 90" in planar_page.html
     assert f"brachis {brachis.__version__}" in planar_page.html
-
-
-def test_a_result_writes_its_report(planar, tmp_path):
-    page = planar.report(tmp_path / "motion.html")
-    assert (tmp_path / "motion.html").read_text(encoding="utf-8") == page.html
-    assert len(repr(page)) < 80
-    assert page._repr_html_().startswith("<iframe")
 
 
 @pytest.mark.parametrize(("module", "name"), [("jinja2", "Jinja2"), ("plotly.offline", "Plotly")])

@@ -69,8 +69,7 @@ def _over_their_limits(parts: Sequence[Quantity]) -> list[Quantity]:
     names = ", ".join(part.name for part in found if part is not None)
     ones = ((part, np.ones(len(part.joints))) for part in found if part is not None)
     return [
-        replace(part, name=names, unit="of the limit", values=part.ratios, lower=-one, upper=one)
-        for part, one in ones
+        replace(part, name=names, unit="of the limit", values=part.ratios, lower=-one, upper=one) for part, one in ones
     ]
 
 
