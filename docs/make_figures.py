@@ -21,7 +21,7 @@ def main() -> None:
     table = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(table)
     rows = [(float(angle), joint, result.t_end) for (angle, joint), result in table.plan_all().items()]
-    save_figure(plot_comparison(rows), FIGURES / "scara_table.png")
+    save_figure(plot_comparison(rows, "direction of the path", "\N{DEGREE SIGN}"), FIGURES / "scara_table.png")
     found = brachis.plan(ROOT / "examples/07_find_the_fastest.yaml")
     save_figure(plot_candidates(found.candidates), FIGURES / "candidates.png")
     rail = brachis.plan(ROOT / "examples/03_tx90l_rail_line.yaml")

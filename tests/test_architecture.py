@@ -59,6 +59,7 @@ ORDER = (
     "bottleneck",
     "plots",
     "export",
+    "report",
     "result",
     "planner",
     "many",

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from brachis import ik as ik
     from brachis import limits as limits
     from brachis import plots as plots
+    from brachis import report as report
     from brachis import robots as robots
     from brachis.attempt import Attempt as Attempt
     from brachis.bottleneck import BottleneckReport as BottleneckReport
@@ -66,7 +67,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_MODULES = ("bottleneck", "compose", "errors", "examples", "export", "ik", "limits", "plots", "robots")
+_MODULES = ("bottleneck", "compose", "errors", "examples", "export", "ik", "limits", "plots", "report", "robots")
 _HOME = {
     "Arc": "task.constructors",
     "Attempt": "attempt",

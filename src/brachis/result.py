@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from brachis import bottleneck, plots
+from brachis import bottleneck, plots, report
 from brachis.attempt import Attempt
 from brachis.errors import UnknownNameError
 from brachis.least_motion import LeastMotion
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from brachis.bottleneck import BottleneckReport
+    from brachis.report import Report
 
 CANDIDATES = "candidates"
 
@@ -113,6 +114,24 @@ class Result(Summary):
         if kind not in plots.PLOTS:
             raise UnknownNameError("plot", kind, (*plots.PLOTS, CANDIDATES), where="kind")
         return plots.PLOTS[kind](self.trajectory)
+
+    def report(self, path: str | os.PathLike[str] | None = None) -> Report:
+        """Make a page from which a person decides whether to run the motion; see `brachis.report.make_report`.
+
+        Parameters
+        ----------
+        path : path, optional
+            HTML file to write.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written; or Jinja2 or Plotly is not installed (`NotInstalledError`).
+        """
+        page = report.make_report(self)
+        if path is not None:
+            page.save(path)
+        return page
 
     def bottleneck(self, *, check: bool = False, reference: bool = False) -> BottleneckReport:
         """Find out what holds the motion back; see `brachis.bottleneck.report`."""

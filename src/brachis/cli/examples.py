@@ -25,6 +25,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "verify": ("brachis verify out/result.npz",),
     "export": ("brachis export out/result.npz --csv out/motion.csv --dt 0.004",),
     "plot": ("brachis plot out/result.npz --kind torques --out out/torques.svg",),
+    "report": ("brachis report out/result.npz", "brachis report out/result.npz --title 'cell 3' --out out/cell3.html"),
     "inspect": ("brachis inspect task.yaml", "brachis inspect tx90l_rail --task-space pose"),
     "compose": ("brachis compose iiwa14 --range -2 2 --velocity 2 --force 1500 --mass 50 --out cell.urdf",),
     "schema": ("brachis schema --out task.schema.json",),

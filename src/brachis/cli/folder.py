@@ -19,6 +19,7 @@ Writer = Callable[[Path], object]
 
 BEGINNINGS = {
     ".csv": (b"t,q_",),
+    ".html": (b"<!doctype html>\n<!-- brachis report -->",),
     ".json": (b'{\n  "t_end"', b'{\n  "$schema"'),
     ".npz": (b"PK",),
     ".pdf": (b"%PDF",),

@@ -189,6 +189,21 @@ def plot(
 
 
 @app.command()
+def report(
+    result: ResultFile,
+    out: Annotated[
+        Path | None, typer.Option(help="HTML file to write; default: beside the result, as result.html.")
+    ] = None,
+    title: Annotated[str | None, typer.Option(help="Title of the page; default: the result's name.")] = None,
+) -> None:
+    """Write a saved motion as one HTML page, from which a person decides whether to run it."""
+    with interrupts.postponed():
+        from brachis.cli import report as command  # noqa: PLC0415
+
+    raise typer.Exit(command.report_command(result, out=out, title=title))
+
+
+@app.command()
 def inspect(
     source: Annotated[
         Path,

@@ -294,6 +294,11 @@ class Robot(Summary):
         return tuple("m" if "P" in joint.shortname() else "rad" for joint in list(self.model.joints)[1:])
 
     @property
+    def torque_units(self) -> tuple[str, ...]:
+        """Unit of every joint's torque, ``Nm``, or of its force, ``N``."""
+        return tuple("Nm" if unit == "rad" else "N" for unit in self.position_units)
+
+    @property
     def revolute(self) -> np.ndarray:
         """Which joints turn, (n,) bool; the others slide."""
         return np.array([unit == "rad" for unit in self.position_units])
