@@ -46,6 +46,7 @@ ORDER = (
     "feasibility",
     "trajectory",
     "verify",
+    "recording",
     "problem",
     "attempt",
     "extract",
@@ -57,6 +58,7 @@ ORDER = (
     "bottleneck",
     "plots",
     "export",
+    "comparison",
     "cli",
 )
 VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "limits", "bspline", "nlp", "solvers", "refine", "mesh"}

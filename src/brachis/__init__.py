@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from brachis import compose as compose
     from brachis.attempt import Attempt as Attempt
     from brachis.bottleneck import BottleneckReport as BottleneckReport
+    from brachis.comparison import Comparison as Comparison
+    from brachis.comparison import compare as compare
     from brachis.errors import BrachisError as BrachisError
     from brachis.errors import InputError as InputError
     from brachis.errors import PlanningError as PlanningError
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from brachis.planner import plan as plan
     from brachis.planner import transcribe as transcribe
     from brachis.plausibility import PlausibilityWarning as PlausibilityWarning
+    from brachis.recording import import_motion as import_motion
     from brachis.result import Result as Result
     from brachis.robot import Robot as Robot
     from brachis.robot import TaskMap as TaskMap
@@ -40,6 +43,7 @@ _HOME = {
     "BottleneckReport": "brachis.bottleneck",
     "BrachisError": "brachis.errors",
     "Attempt": "brachis.attempt",
+    "Comparison": "brachis.comparison",
     "InputError": "brachis.errors",
     "LimitSpec": "brachis.task",
     "PlanningError": "brachis.errors",
@@ -51,7 +55,9 @@ _HOME = {
     "Trajectory": "brachis.trajectory",
     "Verification": "brachis.verify",
     "bspline_segment": "brachis.path",
+    "compare": "brachis.comparison",
     "fit_path": "brachis.task",
+    "import_motion": "brachis.recording",
     "load_task": "brachis.task",
     "plan": "brachis.planner",
     "read_limits": "brachis.task",
@@ -64,6 +70,7 @@ __all__ = [
     "Attempt",
     "BottleneckReport",
     "BrachisError",
+    "Comparison",
     "InputError",
     "LimitSpec",
     "PlanningError",
@@ -77,8 +84,10 @@ __all__ = [
     "__version__",
     "bottleneck",
     "bspline_segment",
+    "compare",
     "compose",
     "fit_path",
+    "import_motion",
     "load_task",
     "plan",
     "read_limits",

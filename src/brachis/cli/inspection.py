@@ -20,12 +20,11 @@ from brachis.errors import InputError
 from brachis.plausibility import of_robot
 from brachis.robot import Robot, bind, in_use
 from brachis.robot.from_task import robot_from_settings
-from brachis.robot.task_map.rows import AXES, POSE_ROWS, YAW
+from brachis.robot.task_map.rows import AXES, YAW
 from brachis.robot.urdf import last_common_link, read_file
 from brachis.task import LimitSpec, Task, load_task
 
 _TASK_FILES = (".yaml", ".yml")
-_PARALLEL = 1e-9
 _LISTED = 12
 _OTHER_TASKS = (
     "a whole pose is prescribed",
@@ -141,13 +140,8 @@ def _space(text: str) -> str | list[str]:
 
 
 def _natural_space(robot: Robot, remarks: list[str]) -> str | list[str]:
-    """Choose what the robot can prescribe at most: a pose, three rows, or those of the plane in which it moves."""
-    geometry = ik.ChainGeometry.of(robot)
-    along = np.abs(np.where(geometry.revolute[:, None], 1.0 - np.abs(geometry.axes), np.abs(geometry.axes)))
-    normals = np.flatnonzero(np.all(along < _PARALLEL, axis=0))
-    space: str | list[str] = "pose" if robot.n >= len(POSE_ROWS) else list(AXES[: robot.n])
-    if len(normals):
-        space = [row for i, row in enumerate(AXES) if i != normals[0]][: robot.n]
+    """Choose what the robot can prescribe at most, and say so."""
+    space = ik.natural_space(robot)
     remarks.append(
         f"task space: {space if isinstance(space, str) else ','.join(space)}; --task-space names another one"
     )

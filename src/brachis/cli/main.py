@@ -1,4 +1,4 @@
-"""The command line: ``brachis plan | bottleneck | verify | export | plot | inspect | compose | schema``.
+"""The command line: ``brachis plan | bottleneck | verify | export | import | compare | plot | ...``.
 
 Exit codes: 0 planned and verified, 1 no verified plan, 2 wrong input, 3 planned and verified, but not all figures could
 be written, 130 interrupted. Results go to standard output, everything else to standard error. With ``--json`` standard
@@ -19,6 +19,7 @@ from typer.core import TyperGroup
 from brachis import interrupts
 from brachis.cli.composition import VectorCommand, compose
 from brachis.cli.output import Json, StandardOutput, open_streams, print_failure
+from brachis.cli.today import compare, import_
 from brachis.errors import BrachisError
 from brachis.interrupts import INTERRUPTED
 
@@ -253,6 +254,8 @@ def inspect(
 
 
 app.command(cls=VectorCommand)(compose)
+app.command("import")(import_)
+app.command()(compare)
 
 
 @app.command()

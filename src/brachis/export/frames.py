@@ -43,7 +43,7 @@ def frames(trajectory: Trajectory, times: np.ndarray) -> Iterator[tuple[Figure, 
 
     figure = style.new_figure(1.2 * style.COLUMN_WIDTH, style.COLUMN_WIDTH)
     figure.set_dpi(DPI)
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     ax: Any = add_posture_axes(figure, trajectory)
     draw_postures(ax, trajectory, dense_samples(trajectory))
     task_map = task_map_of(trajectory.robot, trajectory.task.task_space)

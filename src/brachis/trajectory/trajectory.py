@@ -15,6 +15,7 @@ from brachis.errors import InputError, UnknownNameError
 from brachis.robot import Robot, dynamics
 from brachis.task import Task
 from brachis.trajectory.pieces import relative_coefficients
+from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
 from brachis.trajectory.samples import Samples
 
@@ -61,6 +62,8 @@ class Trajectory:
         closed form took its place.
     chart_knots : ndarray
         Knots of its splines; none where the rows are constant (B = 1).
+    recovered : Recovered or None
+        Where the motion comes from, if it was not planned; its path is then known to a tolerance.
     """
 
     task: Task
@@ -78,6 +81,7 @@ class Trajectory:
     control_points: np.ndarray
     chart_rows: np.ndarray
     chart_knots: np.ndarray
+    recovered: Recovered | None = None
 
     def __post_init__(self) -> None:
         """Take copies of the arrays that nobody can write to."""
@@ -217,6 +221,7 @@ class Trajectory:
             "branch": self.branch,
             "degree": self.degree,
             "joint_names": list(self.joint_names),
+            "recovered": None if self.recovered is None else self.recovered.to_dict(),
         }
         write_result(path, meta, {name: getattr(self, name) for name in ARRAYS})
 
@@ -237,6 +242,7 @@ class Trajectory:
             redundant_joints=content.redundant_joints,
             branch=content.branch,
             degree=content.degree,
+            recovered=content.recovered,
             **content.arrays,
         )
 
