@@ -146,7 +146,8 @@ def _timed(robot: brachis.Robot, q: np.ndarray) -> Any:
         toppra.constraint.JointTorqueConstraint(*torque, discretization_scheme=between),
     ]
     grid = np.linspace(0.0, 1.0, GRID + 1)
-    solver = toppra.algorithm.TOPPRA(constraints, Geometry(), gridpoints=grid, solver_wrapper="seidel")
+    wrapper = {"solver_wrapper": "seidel", "parametrizer": "ParametrizeConstAccel"}
+    solver = toppra.algorithm.TOPPRA(constraints, Geometry(), gridpoints=grid, **wrapper)
     return solver.compute_trajectory(0.0, 0.0)
 
 

@@ -66,14 +66,17 @@ def test_compare(run, recorded, tmp_path):
     ("options", "told"),
     [
         (("--angle", "grad"), "unknown unit of angle; found grad; allowed: rad, mrad, deg"),
-        (("--task-space", "x,z,y,yaw"), "task_space"),
-        (("--tolerance", "0.1"), "FitTolerance"),
+        (("--task-space", "x,z,y,yaw"), "yaw"),
+        (("--tolerance", "0.1"), "no tolerance of a path; found 0.1; allowed: 2e-07 to 0.001"),
+        (("--tolerance", "0"), "no tolerance of a path; found 0.0"),
+        (("--noise", "-1"), "noise"),
+        ((), "Degrees? Ask for units of the angle"),
     ],
 )
 def test_wrong_options(run, recorded, tmp_path, options, told):
     file, cell, _ = recorded
-    outcome = run("import", file, "--robot", cell, *options, "--out", tmp_path / "today.npz")
+    degrees = () if not options or "--angle" in options else ("--angle", "deg")
+    outcome = run("import", file, "--robot", cell, *degrees, *options, "--out", tmp_path / "today.npz")
     assert outcome.code == 2, outcome.err
-    if told != "FitTolerance":
-        assert told in outcome.err
+    assert told in outcome.err
     assert not (tmp_path / "today.npz").exists()

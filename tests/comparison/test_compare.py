@@ -90,18 +90,17 @@ def test_the_figure_shows_both(found):
     assert max(ratio.lines[1].get_ydata()) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_the_end_posture_may_be_kept(found, task):
+def test_the_end_posture_may_be_kept(found):
     kept = compare(found.today, keep_end=True)
     np.testing.assert_allclose(kept.result.trajectory.q[-1], found.today.q[-1], atol=1e-6)
     assert kept.saved <= found.saved + 1e-3
-    del task
 
 
 def test_where_the_first_plan_is_slower_others_are_made(found, monkeypatch):
     """The motion of a plan cannot be beaten with the same intervals: finer ones come next, then its own joint path."""
     wanted = []
 
-    def plan(robot, task, **_):
+    def plan(_robot, task, **_):
         wanted.append((task.spline.intervals, task.task_space))
         raise brachis.PlanningError("none") if len(wanted) < 3 else Planned
 

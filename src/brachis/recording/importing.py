@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from brachis import ik
-from brachis.errors import PathError
+from brachis.errors import InputError, PathError
 from brachis.recording.columns import Units
 from brachis.recording.nodes import Nodes, nodes_of
 from brachis.recording.path_coordinate import DEGREE, coordinate_spline
@@ -19,7 +19,7 @@ from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.combine import robot_for
 from brachis.robot.task_map import JOINTS
 from brachis.task import Segment, Task, load_task
-from brachis.trajectory import Recovered, Trajectory
+from brachis.trajectory import Recovered, Trajectory, check_tolerance
 
 TOLERANCE = 1e-6
 """Of a recovered path, m and rad."""
@@ -83,7 +83,10 @@ def import_motion(
     >>> today = brachis.import_motion("today.csv", "robot.urdf", units={"angle": "deg"})  # doctest: +SKIP
     >>> brachis.verify_trajectory(today).passed  # doctest: +SKIP
     """
-    settings = _settings(task)
+    if noise is not None and not 0.0 < noise < np.inf:
+        raise InputError("is no standard deviation", where="noise", found=noise, allowed="> 0 rad or m")
+    check_tolerance(float(tolerance))
+    settings = None if task is None else load_task(task)
     made = robot_for(robot, settings.robot) if settings else robot_for(robot, load_task(_BLANK).robot)
     space = task_space or (settings.task_space if settings else ik.natural_space(made))
     recording = read_recording(path, made, Units(**dict(units or {})))
@@ -107,10 +110,6 @@ _BLANK: dict[str, Any] = {
     "path": [{"line": {"by": [1.0]}}],
 }
 """A task that only stands for the defaults of all settings."""
-
-
-def _settings(task: str | os.PathLike[str] | Mapping[str, object] | Task | None) -> Task | None:
-    return None if task is None else load_task(task)
 
 
 def _with_roll(nodes: Nodes, n: int) -> Nodes:

@@ -8,8 +8,20 @@ from typing import Any
 
 from brachis.errors import InputError
 
-LARGEST = 1e-3
-"""Of tolerances, m and rad."""
+SMALLEST, LARGEST = 2e-7, 1e-3
+"""Tolerances, m and rad."""
+
+
+def check_tolerance(tolerance: float) -> None:
+    """Refuse what is too wide to say anything about a path, m and rad, or narrower than paths are fitted.
+
+    Raises
+    ------
+    InputError
+    """
+    if not SMALLEST <= tolerance <= LARGEST:
+        allowed = f"{SMALLEST:g} to {LARGEST:g} m and rad"
+        raise InputError("is no tolerance of a path", where="tolerance", found=tolerance, allowed=allowed)
 
 
 @dataclass(frozen=True)
@@ -37,9 +49,7 @@ class Recovered:
         ------
         InputError
         """
-        if not 0.0 < self.tolerance <= LARGEST:
-            allowed = f"> 0, at most {LARGEST:g} m and rad"
-            raise InputError("is no tolerance of a path", where="tolerance", found=self.tolerance, allowed=allowed)
+        check_tolerance(self.tolerance)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
