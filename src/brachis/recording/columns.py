@@ -22,7 +22,8 @@ _STATED = re.compile(rf"^(.+?)\s*(?:[\[(]\s*([a-z/]+)\s*[\])]|_((?:{_UNITS})(?:/
 _DIGITS = 12
 _LISTED = 8
 
-Kind = Literal["time", "position", "velocity"]
+Kind = Literal["t", "q", "qdot"]
+_WORDS: Final = {"t": "time", "q": "position", "qdot": "velocity"}
 
 
 @dataclass(frozen=True)
@@ -74,10 +75,10 @@ def understood(header: Sequence[str], joints: Sequence[str], where: str) -> dict
     TaskError
         Time or a joint's position is missing or stands there twice, or only some joints have velocities.
     """
-    known: dict[str, tuple[Kind, str]] = dict.fromkeys(_TIME, ("time", ""))
+    known: dict[str, tuple[Kind, str]] = dict.fromkeys(_TIME, ("t", ""))
     for joint in joints:
-        known |= {form.format(joint.lower()): ("velocity", joint) for form in _VELOCITY}
-        known |= {form.format(joint.lower()): ("position", joint) for form in _POSITION}
+        known |= {form.format(joint.lower()): ("qdot", joint) for form in _VELOCITY}
+        known |= {form.format(joint.lower()): ("q", joint) for form in _POSITION}
     found: dict[int, _Column] = {}
     for i, text in enumerate(header):
         name, unit = text.strip().lower(), None
@@ -87,12 +88,12 @@ def understood(header: Sequence[str], joints: Sequence[str], where: str) -> dict
         if name in known:
             found[i] = _Column(*known[name], unit)
     listed = [(column.kind, column.joint) for column in found.values()]
-    wanted: list[tuple[Kind, str]] = [("time", ""), *(("position", joint) for joint in joints)]
-    if any(kind == "velocity" for kind, _ in listed):
-        wanted += [("velocity", joint) for joint in joints]
+    wanted: list[tuple[Kind, str]] = [("t", ""), *(("q", joint) for joint in joints)]
+    if any(kind == "qdot" for kind, _ in listed):
+        wanted += [("qdot", joint) for joint in joints]
     for kind, joint in wanted:
         if listed.count((kind, joint)) != 1:
-            what = f"the {kind} of {joint!r}" if joint else "the time"
+            what = f"the {_WORDS[kind]} of {joint!r}" if joint else "the time"
             problem = f"{what} {'is missing' if (kind, joint) not in listed else 'stands there twice'}"
             names = ", ".join(header[:_LISTED]) + (", ..." if len(header) > _LISTED else "")
             raise TaskError(problem, found=names, allowed=allowed_columns(joints), where=where)
@@ -127,7 +128,7 @@ def in_si(
     table : Table
     columns : dict
         Of `understood`.
-    kind : {"time", "position", "velocity"}
+    kind : {"t", "q", "qdot"}
     joint : str
     base : {"s", "rad", "m"}
         SI unit of the joint's position, or of time.
@@ -143,7 +144,7 @@ def in_si(
     """
     i = next(i for i, column in columns.items() if (column.kind, column.joint) == (kind, joint))
     factors, asked = {"s": (TIMES, units.time), "rad": (ANGLES, units.angle), "m": (LENGTHS, units.length)}[base]
-    per = "/s" if kind == "velocity" else ""
+    per = "/s" if kind == "qdot" else ""
     stated, values = columns[i].unit, table.values[:, i]
     unit = (asked or base) if stated is None else stated.removesuffix(per)
     if unit not in factors or (stated is not None and not stated.endswith(per)):

@@ -114,8 +114,9 @@ _BLANK: dict[str, Any] = {
 
 def _with_roll(nodes: Nodes, n: int) -> Nodes:
     """Add the virtual joint of a freely rolling tool, which stands still."""
-    parts = (np.hstack([part, np.zeros((len(part), n - part.shape[1]))]) for part in (nodes.q, nodes.qdot, nodes.qddot))
-    return Nodes(nodes.t, *parts, nodes.told)
+    still = np.zeros((len(nodes.t), n - nodes.q.shape[1]))
+    q, qdot, qddot = (np.hstack([part, still]) for part in (nodes.q, nodes.qdot, nodes.qddot))
+    return Nodes(nodes.t, q, qdot, qddot, nodes.told)
 
 
 def _densely(nodes: Nodes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -151,13 +152,10 @@ def _task_of(
     resting, calm = nodes.at_rest
     jacobian = task_map.jacobian(task_map.twists(nodes.q[[0, -1]]))
     speeds = task_map.norms(np.einsum("kmn,kn->km", jacobian, nodes.qdot[[0, -1]]))[0].tolist()
-    given = {} if settings is None else settings.to_dict()
-    content = {
-        **{
-            key: given[key]
-            for key in ("tool_limits", "custom_limits", "search", "solver", "refinement")
-            if key in given
-        },
+    given: dict[str, Any] = {} if settings is None else settings.to_dict()
+    kept = ("tool_limits", "custom_limits", "search", "solver", "refinement")
+    content: dict[str, Any] = {
+        **{key: given[key] for key in kept if key in given},
         "brachis": 1,
         "robot": robot.settings.model_dump(),
         "start": {"joints": nodes.q[0].tolist()},

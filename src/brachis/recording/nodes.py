@@ -12,6 +12,7 @@ their place, as near to them as their rounding lets it be.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -117,11 +118,13 @@ def _differentiated(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, ...]
 
 def _smoothed(t: np.ndarray, q: np.ndarray, deviation: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return a smoothing spline and two derivatives at the times."""
-    from scipy.interpolate import splev, splprep  # noqa: PLC0415  (imports in 0.3 s)
+    from scipy.interpolate import BSpline, splprep  # noqa: PLC0415  (imports in 0.3 s)
 
-    parts = []
+    found = []
     for columns in np.array_split(q, -(-q.shape[1] // _MOST_COLUMNS), axis=1):
-        spline, _ = splprep(list(columns.T), u=t, k=5, s=columns.size * deviation**2)
-        parts.append([np.column_stack(splev(t, spline, der=order)) for order in range(3)])
-    position, velocity, acceleration = (np.hstack(part) for part in zip(*parts, strict=True))
+        fit: Any = splprep(list(columns.T), u=t, k=5, s=columns.size * deviation**2)
+        knots, control_points, degree = fit[0]
+        spline = BSpline(knots, np.column_stack(control_points), degree)
+        found.append(np.stack([spline(t, nu=order) for order in range(3)]))
+    position, velocity, acceleration = np.concatenate(found, axis=2)
     return position, velocity, acceleration

@@ -78,12 +78,12 @@ def read_recording(path: str | os.PathLike[str], robot: Robot, units: Units) -> 
     table = read_table(text, str(source), allowed, lambda header, where: understood(header, joints, where))
     where = f"{source}: line {table.header_line}"
     columns = understood(table.header, joints, where)
-    time = in_si(table, columns, "time", "", "s", units, where)
+    time = in_si(table, columns, "t", "", "s", units, where)
     bases = tuple(zip(joints, robot.position_units, strict=True))
-    parts = [in_si(table, columns, "position", name, unit, units, where) for name, unit in bases]
+    parts = [in_si(table, columns, "q", name, unit, units, where) for name, unit in bases]
     t, q, qdot = time.values, np.column_stack([part.values for part in parts]), None
-    if any(column.kind == "velocity" for column in columns.values()):
-        rates = (in_si(table, columns, "velocity", name, unit, units, where) for name, unit in bases)
+    if any(column.kind == "qdot" for column in columns.values()):
+        rates = (in_si(table, columns, "qdot", name, unit, units, where) for name, unit in bases)
         qdot = np.column_stack([part.values for part in rates])
     _check_times(t, table, source)
     _check_angles(q, robot, units, source)
