@@ -1,11 +1,12 @@
 """Seeded motions as they run today: pseudo-inverse joint paths, timed by toppra, beside plans along the same path.
 
-Usage: python benchmarks/today.py [--count 10] [--first 0] [--dt 0.002]
+Usage: python benchmarks/today.py [--count 10] [--first 0] [--dt 0.002] [--write FILE]
 
 Even seeds are planar arms of three joints, odd ones the KUKA iiwa 14. The tool goes along a line or an arc, carried by
 the pseudo-inverse of the Jacobian from a drawn posture; a quintic spline through its joint positions is timed by toppra
 within limits of velocity, acceleration and torque, and written as a CSV file of time and joint positions.
-`brachis.compare` sees that file and the URDF alone.
+`brachis.compare` sees that file, the URDF and the limits alone. With --write the first motion is written, within its
+URDF's limits: examples/12_today.csv is that of --first 4 --dt 0.004.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ class Today:
         """Write time and joint positions."""
         t = np.append(np.arange(0.0, self.motion.duration, dt), self.motion.duration)
         header = ",".join(["t", *self.robot.joint_names[: self.motion.dof]])
-        np.savetxt(path, np.column_stack([t, self.motion(t)]), delimiter=",", header=header, comments="", fmt="%.17g")
+        np.savetxt(path, np.column_stack([t, self.motion(t)]), delimiter=",", header=header, comments="", fmt="%.12g")
 
     def largest_ratio(self) -> float:
         """Return the largest ratio to a limit of velocity, acceleration or torque, from the motion itself."""
@@ -68,10 +69,12 @@ class Today:
         return float(np.max(self.task_map.norms(self.task_map.difference(places, path.sample(s).target))[0]))
 
 
-def case(seed: int) -> Today:
+def case(seed: int, *, limits: bool = True) -> Today:
     """Return the motion with this number: the first drawn one that stays clear of ranges and singularities."""
     rng = np.random.default_rng(seed)
     content = _planar(rng) if seed % 2 == 0 else _spatial(rng)
+    if not limits:
+        del content["robot"]["limits"]
     task = brachis.load_task({**content, "start": {"joints": [0.0] * 3}, "path": [{"line": {"by": [1.0, 0.0]}}]})
     robot, task_map = bind(robot_from_settings(task.robot), task.task_space)
     while True:
@@ -142,9 +145,10 @@ def _timed(robot: brachis.Robot, q: np.ndarray) -> Any:
     torque = (inverse_dynamics, limits.torque[:, None] * both, np.zeros(n))
     constraints = [
         toppra.constraint.JointVelocityConstraint(limits.velocity[:, None] * both),
-        toppra.constraint.JointAccelerationConstraint(limits.acceleration[:, None] * both, between),
         toppra.constraint.JointTorqueConstraint(*torque, discretization_scheme=between),
     ]
+    if np.isfinite(limits.acceleration).all():
+        constraints.append(toppra.constraint.JointAccelerationConstraint(limits.acceleration[:, None] * both, between))
     grid = np.linspace(0.0, 1.0, GRID + 1)
     wrapper = {"solver_wrapper": "seidel", "parametrizer": "ParametrizeConstAccel"}
     solver = toppra.algorithm.TOPPRA(constraints, Geometry(), gridpoints=grid, **wrapper)
@@ -157,7 +161,11 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=10)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--dt", type=float, default=0.002)
+    parser.add_argument("--write", type=Path)
     given = parser.parse_args()
+    if given.write:
+        case(given.first, limits=False).write(given.write, given.dt)
+        return
     rows = []
     print("                                                                largest ratio of today's")
     print("seed  robot      today    planned     saved   path off        itself   found   planned  compared in")

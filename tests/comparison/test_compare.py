@@ -87,6 +87,10 @@ def test_the_figure_shows_both(found):
         ends = sorted(line.get_xdata()[-1] for line in ax.lines[:2])
         assert ends == pytest.approx([found.result.t_end, found.today.t_end])
     assert progress.get_title() == found.verdict
+    t, speeds = speed.lines[1].get_data()
+    trajectory = found.result.trajectory
+    places = trajectory.robot.tool_placements(trajectory.position(t))[0]
+    assert np.trapezoid(speeds, t) == pytest.approx(np.linalg.norm(np.diff(places, axis=0), axis=1).sum(), rel=1e-3)
     assert max(ratio.lines[1].get_ydata()) == pytest.approx(1.0, abs=1e-3)
 
 
