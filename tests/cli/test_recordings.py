@@ -14,7 +14,7 @@ def recorded(task, tmp_path):
     """A slow motion as a file in degrees, and a task file with the robot and its settings."""
     task |= {"spline": {"intervals": 6}, "search": {"effort": "single", "least_motion": False}}
     slow = {**task, "robot": {**task["robot"], "limits": {"torque": 5.0, "velocity": None}}}
-    trajectory = brachis.plan(None, slow).trajectory
+    trajectory = brachis.plan(slow).trajectory
     samples = trajectory.sample(0.01)
     table = np.column_stack([samples.t, np.rad2deg(samples.q)])
     np.savetxt(tmp_path / "today.csv", table, delimiter=",", header="t,j1,j2,j3", comments="", fmt="%.17g")

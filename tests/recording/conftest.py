@@ -25,7 +25,7 @@ def motion():
         "search": {"effort": "single", "least_motion": False},
         "spline": {"intervals": 10},
     }
-    return plan(None, content).trajectory
+    return plan(content).trajectory
 
 
 @pytest.fixture(scope="package")

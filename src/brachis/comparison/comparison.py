@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from brachis.result import Result
+from brachis.summary import Summary
 from brachis.trajectory import Trajectory
 from brachis.verify import Check, Verification
 
@@ -31,8 +32,8 @@ class Use:
     planned_at: str
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Summary):
     """A motion of today and the one planned in its place.
 
     Attributes
@@ -43,6 +44,17 @@ class Comparison:
         Of today's motion.
     result : Result
         Of the plan along the same path, within the same limits.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     brachis.export.write(result.trajectory, f"{folder}/today.csv", dt=0.004)
+    ...     found = brachis.compare(f"{folder}/today.csv", task=result.task)
+    >>> [use.limit for use in found.uses], isinstance(found, brachis.Comparison)
+    (['torque'], True)
     """
 
     today: Trajectory
@@ -91,6 +103,13 @@ class Comparison:
             f"by {100.0 * (check.value - 1.0):.2g} % at {check.time or 0.0:.4f} s, as far as its rows tell"
             for check in self.exceeded
         )
+
+    def summary(self) -> dict[str, object]:
+        """Return what is shown."""
+        uses = (
+            f"{use.limit} {100.0 * use.today:.1f} % today, {100.0 * use.planned:.1f} % planned" for use in self.uses
+        )
+        return {"verdict": self.verdict, "limits used": "; ".join(uses), "remarks": "; ".join(self.remarks) or "none"}
 
     def __str__(self) -> str:
         """Say all in plain words."""

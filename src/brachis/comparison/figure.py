@@ -10,7 +10,6 @@ from brachis.bottleneck import limit_ratios
 from brachis.comparison.comparison import Comparison
 from brachis.plots import style
 from brachis.plots.curves import dense_samples
-from brachis.robot import task_map_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,11 +33,9 @@ def plot_today(comparison: Comparison) -> Figure:
     for (name, motion), colour, line in zip(motions.items(), style.COLOURS[1::-1], ("--", "-"), strict=True):
         look = {"color": colour, "linestyle": line, "linewidth": style.LINE_WIDTH}
         samples, ratios = dense_samples(motion), limit_ratios(motion)
-        tool = task_map_of(motion.robot, "position")
-        velocity = np.einsum("kmn,kn->km", tool.jacobian(tool.twists(samples.q)), samples.qdot)
         label = f"{name}: {motion.t_end:.4f} s"
         panels[0].plot(samples.t, samples.s, label=label, **look)
-        panels[1].plot(samples.t, np.linalg.norm(velocity, axis=1), **look)
+        panels[1].plot(samples.t, samples.tool_speed, **look)
         panels[2].plot(ratios.t, np.abs(ratios.values).max(axis=1, initial=0.0), **look)
     panels[2].axhline(1.0, color=style.GREY, linewidth=0.8)
     for ax, ylabel in zip(panels, ("$s$", "tool speed (m/s)", "largest ratio to a limit"), strict=True):

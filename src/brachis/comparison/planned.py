@@ -62,8 +62,14 @@ def compare(
 
     Examples
     --------
+    >>> import tempfile
     >>> import brachis
-    >>> print(brachis.compare("today.csv", "robot.urdf"))  # doctest: +SKIP
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     brachis.export.write(result.trajectory, f"{folder}/today.csv", dt=0.004)
+    ...     found = brachis.compare(f"{folder}/today.csv", task=result.task)
+    >>> found.result.verified, found.saved > -1e-3
+    (True, True)
     """
     if not isinstance(today, Trajectory):
         today = import_motion(

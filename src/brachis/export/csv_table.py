@@ -31,7 +31,7 @@ def export_csv(
     --------
     >>> from brachis import plan
     >>> from brachis.export import export_csv
-    >>> trajectory = plan(None, "examples/01_scara_line.yaml").trajectory
+    >>> trajectory = plan("examples/01_scara_line.yaml").trajectory
     >>> export_csv(trajectory, "motion.csv", dt=0.004)  # doctest: +SKIP
     """
     names, values = zip(*rows_of(trajectory, dt, last, joints).columns(), strict=True)

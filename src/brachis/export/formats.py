@@ -139,7 +139,7 @@ def write(
     --------
     >>> import brachis
     >>> from brachis import export
-    >>> trajectory = brachis.plan(None, "examples/01_scara_line.yaml").trajectory
+    >>> trajectory = brachis.plan("examples/01_scara_line.yaml").trajectory
     >>> export.write(trajectory, "motion.parquet", dt=0.004)  # doctest: +SKIP
     """
     chosen = format_of(path, form)

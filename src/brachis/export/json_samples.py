@@ -7,9 +7,10 @@ import os
 from collections.abc import Sequence
 from typing import Any, Final
 
-from brachis.export.rows import PREFIXES, rows_of
+from brachis.export.rows import rows_of
 from brachis.files import atomic_write
 from brachis.trajectory import Trajectory
+from brachis.trajectory.samples import COLUMNS
 
 SCHEMA_ID: Final = "urn:brachis:joint-trajectory:1"
 
@@ -68,7 +69,7 @@ def export_json(
         "position_units": rows.units,
         "t_end": trajectory.t_end,
         "dt": dt,
-        "samples": {name: getattr(rows, name).tolist() for name in ("t", "s", *PREFIXES.values())},
+        "samples": {name: getattr(rows, name).tolist() for name in ("t", "s", *COLUMNS.values())},
     }
     lines = (f"  {json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in content.items())
     with atomic_write(path) as stream:

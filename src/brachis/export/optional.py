@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from types import ModuleType
 
-from brachis.errors import InputError
+from brachis.errors import NotInstalledError
 
 
 def needed(name: str, what: str) -> ModuleType:
@@ -20,14 +20,9 @@ def needed(name: str, what: str) -> ModuleType:
 
     Raises
     ------
-    InputError
-        It is not installed.
+    NotInstalledError
     """
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        raise InputError(
-            f"{what} needs a library that is not installed",
-            found=str(error),
-            hint='Install it with: pip install "brachis[export]"',
-        ) from error
+        raise NotInstalledError(what, name.split(".", maxsplit=1)[0], "export") from error

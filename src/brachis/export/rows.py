@@ -10,9 +10,7 @@ import numpy as np
 from brachis.errors import UnknownNameError
 from brachis.robot import ROLL_JOINT
 from brachis.trajectory import Trajectory
-
-PREFIXES = {"q": "q", "qd": "qdot", "qdd": "qddot", "tau": "tau"}
-"""Prefixes of a table's columns, and the quantities behind them."""
+from brachis.trajectory.samples import COLUMNS
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +41,7 @@ class JointRows:
     def columns(self) -> Iterator[tuple[str, np.ndarray]]:
         """Yield names and values, (K,), of a table: ``t``, then ``q_``, ``qd_``, ``qdd_``, ``tau_`` of every joint."""
         yield "t", self.t
-        for prefix, quantity in PREFIXES.items():
+        for prefix, quantity in COLUMNS.items():
             yield from zip((f"{prefix}_{joint}" for joint in self.joints), getattr(self, quantity).T, strict=True)
 
 
@@ -74,6 +72,6 @@ def rows_of(trajectory: Trajectory, dt: float, last: str, joints: Sequence[str] 
         raise UnknownNameError("joint", unknown[0], names, where="joints")
     index = [names.index(name) for name in chosen]
     samples = trajectory.sample(dt, last=last)
-    parts = (getattr(samples, quantity)[:, index] for quantity in PREFIXES.values())
+    parts = (getattr(samples, quantity)[:, index] for quantity in COLUMNS.values())
     units = tuple(trajectory.robot.position_units[each] for each in index)
     return JointRows(chosen, units, samples.t, samples.s, *parts)

@@ -79,9 +79,14 @@ def import_motion(
 
     Examples
     --------
+    >>> import tempfile
     >>> import brachis
-    >>> today = brachis.import_motion("today.csv", "robot.urdf", units={"angle": "deg"})  # doctest: +SKIP
-    >>> brachis.verify_trajectory(today).passed  # doctest: +SKIP
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     brachis.export.write(result.trajectory, f"{folder}/today.csv", dt=0.004)
+    ...     today = brachis.import_motion(f"{folder}/today.csv", brachis.robots.scara3, task_space=["x", "y"])
+    >>> today.recovered.tolerance, round(today.t_end - result.t_end, 9)
+    (1e-06, 0.0)
     """
     if noise is not None and not 0.0 < noise < np.inf:
         raise InputError("is no standard deviation", where="noise", found=noise, allowed="> 0 rad or m")

@@ -3,8 +3,9 @@
 from brachis.task.arrays import fit_path
 from brachis.task.boundary import BoundarySettings
 from brachis.task.bspline_curve import BSplineCurve
+from brachis.task.keywords import TaskKeywords, task_with
 from brachis.task.limits_file import LimitsFile, read_limits
-from brachis.task.load import check_robot_settings, load_task
+from brachis.task.load import Source, check_robot_settings, load_task
 from brachis.task.models import (
     Posture,
     RefinementSettings,
@@ -29,7 +30,7 @@ from brachis.task.orientation import (
     TurnTo,
 )
 from brachis.task.point_data import FileUnits, FitReport, FitTolerance, PointFile
-from brachis.task.robot_models import FROM_URDF, FrictionSettings, LimitScale, LimitSpec, RobotSettings
+from brachis.task.robot_models import FROM_URDF, FrictionSettings, LimitKeywords, LimitScale, LimitSpec, RobotSettings
 from brachis.task.schema import json_schema
 from brachis.task.segments import (
     ArcCenter,
@@ -39,6 +40,8 @@ from brachis.task.segments import (
     Circle,
     CircleSegment,
     CsvSegment,
+    Helix,
+    HelixSegment,
     LineBy,
     LineHeading,
     LineSegment,
@@ -70,7 +73,10 @@ __all__ = [
     "FitReport",
     "FitTolerance",
     "FrictionSettings",
+    "Helix",
+    "HelixSegment",
     "InertiaMatrix",
+    "LimitKeywords",
     "LimitScale",
     "LimitSpec",
     "LimitsFile",
@@ -96,12 +102,14 @@ __all__ = [
     "SegmentModel",
     "Shape",
     "SolverSettings",
+    "Source",
     "SpeedTable",
     "SplineSegment",
     "SplineSettings",
     "SplineThrough",
     "Tangent",
     "Task",
+    "TaskKeywords",
     "ToQuaternion",
     "ToRollPitchYaw",
     "ToRotationVector",
@@ -113,4 +121,5 @@ __all__ = [
     "json_schema",
     "load_task",
     "read_limits",
+    "task_with",
 ]
