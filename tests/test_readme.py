@@ -49,7 +49,7 @@ SNIPPETS = [
 
 
 def test_there_are_snippets():
-    assert {page.name for page, _ in SNIPPETS} == {"README.md", "closed_forms.md", "from_toppra.md", "today.md"}
+    assert {page.name for page, _ in SNIPPETS} == {"README.md", "closed_forms.md", "from_toppra.md"}
 
 
 @pytest.mark.parametrize(("page", "number"), SNIPPETS, ids=lambda value: getattr(value, "name", str(value)))

@@ -156,8 +156,8 @@ def test_urscript(ur10, tmp_path):
 
 
 def test_gif(line_trajectory, written):
-    path = written(".gif", dt=0.6)
-    times = frame_times(line_trajectory, 0.6)
+    path = written(".gif", dt=1.2)
+    times = frame_times(line_trajectory, 1.2)
     assert times[-1] == line_trajectory.t_end
     durations, pictures = [], []
     with Image.open(path) as film:
@@ -165,7 +165,7 @@ def test_gif(line_trajectory, written):
             film.seek(k)
             durations.append(film.info["duration"])
             pictures.append(np.asarray(film.convert("RGB"), dtype=int))
-    assert durations == [600, 600, 600, 600, 600, 1000]
+    assert durations == [1200, 1200, 1200, 1000]
     assert len(pictures) == len(times)
     for (figure, _), t, picture in zip(frames(line_trajectory, times), times, pictures, strict=True):
         (ax,) = figure.axes

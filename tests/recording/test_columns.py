@@ -6,7 +6,8 @@ import pytest
 from brachis.errors import InputError, TaskError
 from brachis.recording import Units, read_recording
 from brachis.robot import Robot
-from recording.conftest import ROOT, SCARA
+
+from .conftest import ROOT, SCARA
 
 ROBOT = Robot.from_urdf(SCARA)
 NAMES = ("j1", "j2", "j3")

@@ -14,7 +14,8 @@ from brachis.recording.recording import Recording
 from brachis.robot import Robot
 from brachis.trajectory import Recovered, Trajectory
 from brachis.verify import verify_trajectory
-from recording.conftest import ROOT
+
+from .conftest import ROOT
 
 
 def test_the_motion_comes_back(imported, motion):
