@@ -96,6 +96,17 @@ def test_few_digits_are_smoothed(motion, table, write):
     np.testing.assert_allclose(found.acceleration(middle), motion.acceleration(middle + later), atol=0.2)
 
 
+def test_measured_positions_are_smoothed(motion, write):
+    samples, noise = motion.sample(0.002), 1e-5
+    q = samples.q + noise * np.random.default_rng(0).standard_normal(samples.q.shape)
+    path = write("t,j1,j2,j3", samples.t, q)
+    found = verify_trajectory(import_motion(path, task=motion.task, tolerance=1e-4, noise=noise))
+    assert found.path_error < 1e-4
+    assert found.worst_ratio == pytest.approx(1.0, abs=0.05)
+    with pytest.raises(PathError, match="say their noise, or raise the tolerance"):
+        import_motion(path, task=motion.task)
+
+
 def test_accelerations_that_jump_do_not_overshoot():
     """Bang-bang: a spline through the rows would exceed the acceleration by a fifth of the jump."""
     t = np.append(np.arange(0.0, 2.0, 0.01), 2.0)

@@ -5,8 +5,8 @@ it those are taken through which the polynomial bends least (essentially non-osc
 B. Engquist, S. Osher, S. R. Chakravarthy, Journal of Computational Physics 71, 1987): where accelerations jump, as they
 do in time-optimal motions, a spline through all rows would overshoot by a fifth of the jump and ring on both sides.
 
-Positions that are rounded to few digits have no second derivatives of their own: a smoothing spline of degree 5 takes
-their place, as near to them as their rounding lets it be.
+Positions that are rounded to few digits have no second derivatives of their own: a spline of degree 5 with few knots
+takes their place, as near to them as their rounding lets it be.
 """
 
 from __future__ import annotations
@@ -25,8 +25,12 @@ _CENTRED = 0.25
 """Factor on the bend around a row, which is taken unless others bend much less."""
 _AT_REST = (1e-3, 1e-2)
 """Of the largest velocity and acceleration: what is less at an end is rest."""
-_MOST_COLUMNS = 10
-"""Of FITPACK's curves."""
+_DEGREE, _FEWEST_INTERVALS, _MORE, _ROWS = 5, 4, 1.2, 3.0
+"""Of smoothing splines: the first number of intervals, the factor to the next one, and the fewest rows in each."""
+_SLOW = 0.02
+"""Of the largest speed: an end that is slower is taken to be at rest."""
+_NEAR = 1.05
+"""Standard deviations that a smoothing spline may be off, where noise alone is off by one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +121,34 @@ def _differentiated(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, ...]
 
 
 def _smoothed(t: np.ndarray, q: np.ndarray, deviation: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a smoothing spline and two derivatives at the times."""
-    from scipy.interpolate import BSpline, splprep  # noqa: PLC0415  (imports in 0.3 s)
+    """Return a least-squares spline and two derivatives at the times: that of the fewest intervals that will do.
 
-    found = []
-    for columns in np.array_split(q, -(-q.shape[1] // _MOST_COLUMNS), axis=1):
-        fit: Any = splprep(list(columns.T), u=t, k=5, s=columns.size * deviation**2)
-        knots, control_points, degree = fit[0]
-        spline = BSpline(knots, np.column_stack(control_points), degree)
-        found.append(np.stack([spline(t, nu=order) for order in range(3)]))
-    position, velocity, acceleration = np.concatenate(found, axis=2)
-    return position, velocity, acceleration
+    An end at which the spline is slow is one at rest: both control points there are the same.
+    """
+    from scipy.interpolate import BSpline  # noqa: PLC0415  (imports in 0.3 s)
+    from scipy.sparse.linalg import spsolve  # noqa: PLC0415
+
+    outer, count, resting = np.ones(_DEGREE), float(_FEWEST_INTERVALS), np.zeros(2, dtype=bool)
+    while True:
+        breaks = np.interp(np.linspace(0.0, 1.0, int(count) + 1), np.linspace(0.0, 1.0, len(t)), t)
+        knots = np.concatenate([t[0] * outer, breaks, t[-1] * outer])
+        rows = BSpline.design_matrix(t, knots, _DEGREE) @ _tied(len(knots) - _DEGREE - 1, resting)
+        spline = BSpline(knots, _tied(len(knots) - _DEGREE - 1, resting) @ spsolve(rows.T @ rows, rows.T @ q), _DEGREE)
+        off = np.sqrt(np.mean((spline(t) - q) ** 2, axis=0)).max()
+        found = tuple(np.asarray(spline(t, nu=order)) for order in range(3))
+        speed = np.abs(found[1]).max(axis=1)
+        slow = speed[[0, -1]] < _SLOW * speed.max()
+        done = off <= _NEAR * deviation or _MORE * count > len(t) / _ROWS
+        if done and (slow <= resting).all():
+            return found  # type: ignore[return-value]
+        resting, count = (slow, count) if done else (resting, _MORE * count)
+
+
+def _tied(count: int, resting: np.ndarray) -> Any:  # noqa: ANN401  (SciPy's sparse arrays)
+    """Return the matrix, (count, free), from free control points to all; at an end at rest the first two are one."""
+    from scipy.sparse import csr_array  # noqa: PLC0415
+
+    columns = np.arange(count)
+    columns[1:] -= int(resting[0])
+    columns[-1] -= int(resting[1])
+    return csr_array((np.ones(count), (np.arange(count), columns)), shape=(count, int(columns[-1]) + 1))

@@ -79,8 +79,8 @@ def path_followed(task_map: TaskMap, q: np.ndarray, qdot: np.ndarray, t: np.ndar
             found=str(error),
             allowed=f"{tolerance:g} m and rad",
             where="path",
-            hint="Where the tool stops and turns off, divide the file there; where positions are rough, raise the "
-            "tolerance",
+            hint="Where the tool stops and turns off, divide the file there; where positions are measured, say their "
+            "noise, or raise the tolerance",
         ) from error
     path = build_path(segments, values[0], task_map.rows)
     s = _nearest(task_map, path, values, length / length[-1])
