@@ -25,6 +25,7 @@ SOURCE = Path(__file__).parents[1] / "src/brachis"
 ORDER = (
     "errors",
     "files",
+    "kinds",
     "arrays",
     "deadline",
     "interrupts",
@@ -63,6 +64,7 @@ ORDER = (
     "planner",
     "many",
     "comparison",
+    "starter",
     "cli",
 )
 VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "limits", "bspline", "nlp", "solvers", "refine", "mesh"}

@@ -56,7 +56,7 @@ def import_(
     noise: Noise = None,
     json: Json = False,
 ) -> None:
-    """Make a result of a motion that runs today, for verify, plot, bottleneck and export."""
+    """Make a result of a motion that runs today."""
     with interrupts.postponed():
         from brachis.cli import recordings  # noqa: PLC0415
 
@@ -81,7 +81,7 @@ def compare(
     noise: Noise = None,
     json: Json = False,
 ) -> None:
-    """Plan the path of a motion that runs today within the same limits, and show both."""
+    """Show a motion of today beside a plan along its path."""
     with interrupts.postponed():
         from brachis.cli import recordings  # noqa: PLC0415
 
