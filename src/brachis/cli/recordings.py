@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.table import Table
-
 from brachis import comparison
 from brachis.cli.folder import Writer, Written, make_folder, write_files, write_one, write_text
 from brachis.cli.output import (
@@ -15,12 +13,13 @@ from brachis.cli.output import (
     json_text,
     print_error,
     print_json,
+    print_verification,
     print_what_was_left,
     progress,
     result_console,
     shown_warnings,
-    verification_table,
 )
+from brachis.cli.tables import Column, print_table
 from brachis.recording import import_motion
 from brachis.verify import VerifyOptions, verify_trajectory
 
@@ -90,7 +89,7 @@ def import_command(recorded: Recorded, *, out: Path, as_json: bool) -> None:
     console.print(f"end time t_E: {trajectory.t_end:.4f} s")
     for line in trajectory.recovered.told:
         console.print(line)
-    console.print(verification_table(verification))
+    print_verification(console, verification)
     console.print(f"wrote {out}")
 
 
@@ -133,20 +132,20 @@ def _show(found: comparison.Comparison, files: tuple[str, ...]) -> None:
     console = result_console()
     assert found.today.recovered is not None  # noqa: S101
     console.print(found.verdict)
-    table = Table()
-    table.add_column("")
-    for column in ("today", "planned"):
-        table.add_column(column, justify="right")
-    table.add_row("end time t_E", f"{found.today.t_end:.4f} s", f"{found.result.t_end:.4f} s")
-    for use in found.uses:
-        table.add_row(
-            f"{use.limit}, used",
-            f"{100 * use.today:.2f} % {use.today_at}",
-            f"{100 * use.planned:.2f} % {use.planned_at}",
-        )
     exceeded = f"{len(found.exceeded)} exceeded" if found.exceeded else "kept"
-    table.add_row("limits", exceeded, "kept and verified" if found.result.verified else "NOT verified")
-    console.print(table)
+    rows = [
+        ("end time t_E", f"{found.today.t_end:.4f} s", f"{found.result.t_end:.4f} s"),
+        *(
+            (
+                f"{use.limit}, used",
+                f"{100 * use.today:.2f} % {use.today_at}",
+                f"{100 * use.planned:.2f} % {use.planned_at}",
+            )
+            for use in found.uses
+        ),
+        ("limits", exceeded, "kept and verified" if found.result.verified else "NOT verified"),
+    ]
+    print_table(console, "", ("", Column("today", number=True), Column("planned", number=True)), rows)
     for line in (*found.remarks, *found.today.recovered.told):
         console.print(line)
     for name in files:
