@@ -6,6 +6,7 @@ import importlib.util
 from pathlib import Path
 
 import brachis
+from brachis.comparison import plot_today
 from brachis.plots import plot_candidates, plot_comparison, plot_overview, plot_timeline, save_figure
 
 ROOT = Path(__file__).parents[1]
@@ -26,6 +27,8 @@ def main() -> None:
     save_figure(plot_candidates(found.candidates), FIGURES / "candidates.png")
     rail = brachis.plan(ROOT / "examples/03_tx90l_rail_line.yaml")
     save_figure(plot_timeline(rail.trajectory), FIGURES / "timeline.png")
+    today = brachis.compare(ROOT / "examples/12_today.csv", ROOT / "robots/scara3/robot.urdf")
+    save_figure(plot_today(today), FIGURES / "today.png")
 
 
 if __name__ == "__main__":

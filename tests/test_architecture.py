@@ -50,6 +50,7 @@ ORDER = (
     "feasibility",
     "trajectory",
     "verify",
+    "recording",
     "problem",
     "attempt",
     "extract",
@@ -63,6 +64,7 @@ ORDER = (
     "result",
     "planner",
     "many",
+    "comparison",
     "starter",
     "cli",
 )

@@ -215,6 +215,16 @@ def test_example_11():
     assert [float(each) for each in printed] == pytest.approx([result.t_end, least], abs=5e-4)
 
 
+def test_example_12(tmp_path):
+    found = load(ROOT / "examples/12_today.py").main(tmp_path / "today.png")
+    assert found.result.verified
+    page = (ROOT / "docs/today.md").read_text()
+    printed = re.search(r"# ([0-9.]+) % faster: ([0-9.]+) s instead of ([0-9.]+) s", page).groups()
+    ours = [100 * found.saved, found.result.t_end, found.today.t_end]
+    assert [float(each) for each in printed] == pytest.approx(ours, abs=0.1)
+    assert (tmp_path / "today.png").stat().st_size > 1000
+
+
 def test_published_figure_lies_between_16_and_17_intervals():
     benchmark = load(ROOT / "benchmarks/published_figure.py")
     assert benchmark.end_time(17) < benchmark.PUBLISHED_S < benchmark.end_time(16)

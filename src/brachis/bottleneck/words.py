@@ -20,7 +20,7 @@ _MOMENT = 5e-4
 def in_words(
     *,
     t_end: float,
-    sensitivities: Sensitivities,
+    sensitivities: Sensitivities | None,
     saturations: tuple[Saturation, ...],
     check: SensitivityCheck | None,
     reference: Reference | None,
@@ -28,7 +28,8 @@ def in_words(
 ) -> list[str]:
     """Say what a report found, a line each; see `BottleneckReport` for its parts."""
     lines = [
-        *_costs(sensitivities, t_end),
+        *(["the motion was not planned: what a limit costs is not known"] if sensitivities is None else []),
+        *([] if sensitivities is None else _costs(sensitivities, t_end)),
         *([] if check is None else _checked(check)),
         *active_in_words(saturations),
     ]

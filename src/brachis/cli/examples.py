@@ -23,11 +23,16 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "bottleneck": ("brachis bottleneck task.yaml --set search.effort=single",),
     "verify": ("brachis verify out/result.npz",),
-    "export": ("brachis export out/result.npz --csv out/motion.csv --dt 0.004",),
+    "export": (
+        "brachis export out/result.npz --out out/motion.csv --dt 0.004",
+        "brachis export out/result.npz --out out/motion.gif --dt 0.1",
+    ),
+    "import": ("brachis import out/motion.csv --robot task.yaml --out out/today.npz",),
+    "compare": ("brachis compare out/motion.csv --robot task.yaml",),
     "plot": ("brachis plot out/result.npz --kind torques --out out/torques.svg",),
     "report": ("brachis report out/result.npz", "brachis report out/result.npz --title 'cell 3' --out out/cell3.html"),
     "inspect": ("brachis inspect task.yaml", "brachis inspect tx90l_rail --task-space pose"),
     "compose": ("brachis compose iiwa14 --range -2 2 --velocity 2 --force 1500 --mass 50 --out cell.urdf",),
-    "schema": ("brachis schema --out task.schema.json",),
+    "schema": ("brachis schema --out task.schema.json", "brachis schema --of trajectory"),
 }
 """By command; those of the whole program under no name."""

@@ -20,6 +20,7 @@ from brachis import interrupts
 from brachis.cli.app import app
 from brachis.cli.composition import VectorCommand, compose
 from brachis.cli.output import Json, StandardOutput, open_streams, print_failure, print_usage_error
+from brachis.cli.today import compare, import_
 from brachis.cli.verbosity import Verbosity, chosen
 from brachis.errors import BrachisError
 
@@ -156,21 +157,42 @@ def verify(
 @app.command()
 def export(
     result: ResultFile,
-    csv: Annotated[Path, typer.Option(help="CSV file to write: t, then q_, qd_, qdd_, tau_ of every joint; SI units.")],
-    dt: Annotated[float, typer.Option(help="Period of the controller, s.")] = 0.001,
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="File to write; its suffix says the format: .csv and .parquet (t, then q_, qd_, qdd_, tau_ of every "
+            "joint; SI units), .json, .yaml and .mcap (ROS 2's JointTrajectory), .script (URScript), .gif and .mp4."
+        ),
+    ],
+    form: Annotated[
+        str | None,
+        typer.Option("--format", help="Format, by name: csv, parquet, json, ros2, mcap, urscript, gif or mp4."),
+    ] = None,
+    dt: Annotated[
+        float | None,
+        typer.Option(
+            help="Period, s. Default: 0.001; 0.01 for ROS 2, 0.002 for URScript, 0.04 for animations.",
+            show_default=False,
+        ),
+    ] = None,
     last: Annotated[
-        str,
+        str | None,
         typer.Option(
             help="Where the rows end: exact, at the end time, which need not be a multiple of the period; or hold, at "
-            "the first multiple of it that is not before the end time, with the end posture held at rest."
+            "the first multiple of it that is not before the end time, with the end posture held at rest. Default: "
+            "exact; hold for URScript.",
+            show_default=False,
         ),
-    ] = "exact",
+    ] = None,
+    joints: Annotated[
+        str | None, typer.Option(help="Joints to write, in this order: j1,j2,... Default: all.", show_default=False)
+    ] = None,
 ) -> None:
-    """Sample a saved motion at a controller's rate."""
+    """Sample a saved motion for a controller, or animate it."""
     with interrupts.postponed():
         from brachis.cli import results  # noqa: PLC0415
 
-    results.export_command(result, csv, form="csv", dt=dt, last=last)
+    results.export_command(result, out, form=form, dt=dt, last=last, joints=joints)
 
 
 @app.command()
@@ -249,17 +271,20 @@ def inspect(
 
 
 app.command(cls=VectorCommand)(compose)
+app.command("import")(import_)
+app.command()(compare)
 
 
 @app.command()
 def schema(
     out: Annotated[Path | None, typer.Option(help="File to write instead of standard output.")] = None,
+    of: Annotated[str, typer.Option(help="Of what: task files, or trajectory (exported as JSON).")] = "task",
 ) -> None:
-    """Print the JSON schema of task files."""
+    """Print the JSON schema of tasks, or of exported JSON."""
     with interrupts.postponed():
         from brachis.cli import results  # noqa: PLC0415
 
-    results.schema_command(out)
+    results.schema_command(out, of)
 
 
 def main() -> None:

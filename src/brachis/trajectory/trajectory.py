@@ -18,6 +18,7 @@ from brachis.robot import Robot, dynamics
 from brachis.summary import Summary
 from brachis.task import Task
 from brachis.trajectory.pieces import relative_coefficients
+from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
 from brachis.trajectory.samples import Samples
 from brachis.trajectory.tool import tool_motion
@@ -66,6 +67,8 @@ class Trajectory(Summary):
         closed form took its place.
     chart_knots : ndarray
         Knots of its splines; none where the rows are constant (B = 1).
+    recovered : Recovered or None
+        Where the motion comes from, if it was not planned; its path is then known to a tolerance.
 
     Examples
     --------
@@ -91,6 +94,7 @@ class Trajectory(Summary):
     control_points: np.ndarray
     chart_rows: np.ndarray
     chart_knots: np.ndarray
+    recovered: Recovered | None = None
 
     def __post_init__(self) -> None:
         """Take copies of the arrays that nobody can write to."""
@@ -242,6 +246,7 @@ class Trajectory(Summary):
             "branch": self.branch or "none",
             "start posture": self.robot.in_words(self.q[0]),
             "end posture": self.robot.in_words(self.q[-1]),
+            **({"recovered from": self.recovered.source} if self.recovered else {}),
             "splines": f"degree {self.degree}, {len(self.knots) - 2 * self.degree - 1} intervals",
         }
 
@@ -262,6 +267,7 @@ class Trajectory(Summary):
             "branch": self.branch,
             "degree": self.degree,
             "joint_names": list(self.joint_names),
+            "recovered": None if self.recovered is None else self.recovered.to_dict(),
         }
         write_result(path, meta, {name: getattr(self, name) for name in ARRAYS})
 
@@ -282,6 +288,7 @@ class Trajectory(Summary):
             redundant_joints=content.redundant_joints,
             branch=content.branch,
             degree=content.degree,
+            recovered=content.recovered,
             **content.arrays,
         )
 
