@@ -57,6 +57,7 @@ ORDER = (
     "bottleneck",
     "plots",
     "export",
+    "view",
     "cli",
 )
 VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "limits", "bspline", "nlp", "solvers", "refine", "mesh"}

@@ -212,6 +212,21 @@ class ResultFileError(InputError):
     """A saved result is missing, broken, or of another schema version."""
 
 
+class NotInstalledError(InputError):
+    """A library of an extra is not installed.
+
+    Attributes
+    ----------
+    library, extra : str
+        The library, and the extra of brachis that brings it.
+    """
+
+    def __init__(self, user: str, library: str, extra: str) -> None:
+        self.library = library
+        self.extra = extra
+        super().__init__(f"{user} needs {library}, which is not installed", hint=f'pip install "brachis[{extra}]"')
+
+
 class UnreachableError(BrachisError):
     """A trial point of the optimiser has a collocation point outside the branch; solvers back off from it."""
 

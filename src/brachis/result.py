@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from brachis.attempt import Attempt
 from brachis.least_motion import LeastMotion
@@ -13,6 +13,9 @@ from brachis.solvers import SolverReport
 from brachis.task import FitReport, Task
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
+
+if TYPE_CHECKING:
+    from brachis.view import Viewer
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,11 @@ class Result:
     def solver_report(self) -> SolverReport:
         """Report of the solve that gave the trajectory."""
         return self.attempt.reports[-1]
+
+    def view(self, *, host: str = "127.0.0.1", port: int | None = None, block: bool | None = None) -> Viewer:
+        """Show the motion and the list of candidates in the browser; as `Trajectory.view`."""
+        candidates = [candidate.to_dict() for candidate in self.candidates]
+        return self.trajectory.view(candidates, verified=self.verified, host=host, port=port, block=block)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures of the plan as plain data for JSON."""

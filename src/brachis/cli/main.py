@@ -1,4 +1,4 @@
-"""The command line: ``brachis plan | bottleneck | verify | export | plot | inspect | compose | schema``.
+"""The command line: ``brachis plan | bottleneck | verify | export | plot | view | inspect | compose | schema``.
 
 Exit codes: 0 planned and verified, 1 no verified plan, 2 wrong input, 3 planned and verified, but not all figures could
 be written, 130 interrupted. Results go to standard output, everything else to standard error. With ``--json`` standard
@@ -56,6 +56,15 @@ TaskFile = Annotated[Path, typer.Argument(help="Task file (YAML).", metavar="TAS
 ResultFile = Annotated[
     Path, typer.Argument(help="Result file (npz) written by 'brachis plan --out'.", metavar="RESULT")
 ]
+Host = Annotated[
+    str, typer.Option(help="Address that the viewer listens on; 0.0.0.0 lets other machines look.", metavar="ADDRESS")
+]
+Port = Annotated[
+    int | None, typer.Option(help="Port of the viewer; 0 for any free one. Default: the first free one from 8080 on.")
+]
+Browser = Annotated[
+    bool, typer.Option("--browser/--no-browser", help="Open the browser, where there is a screen and a terminal.")
+]
 Strict = Annotated[
     bool,
     typer.Option("--strict", help="Refuse figures that are hardly meant, such as degrees for rad, instead of warning."),
@@ -92,6 +101,7 @@ def plan(
         ),
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
+    view: Annotated[bool, typer.Option("--view", help="Show the motion in the browser, until Ctrl-C.")] = False,
     strict: Strict = False,
     json: Json = False,
 ) -> None:
@@ -99,7 +109,7 @@ def plan(
     with interrupts.postponed():
         from brachis.cli import planning  # noqa: PLC0415  (each command imports what it needs)
 
-    raise typer.Exit(planning.plan_command(task, urdf=urdf, out=out, strict=strict, as_json=json))
+    raise typer.Exit(planning.plan_command(task, urdf=urdf, out=out, view=view, strict=strict, as_json=json))
 
 
 @app.command()
@@ -189,6 +199,23 @@ def plot(
         from brachis.cli import results  # noqa: PLC0415
 
     results.plot_command(result, out=out, kind=kind)
+
+
+@app.command()
+def view(
+    result: Annotated[
+        Path,
+        typer.Argument(help="Result file (npz) written by 'brachis plan --out', or the folder.", metavar="RESULT"),
+    ],
+    host: Host = "127.0.0.1",
+    port: Port = None,
+    browser: Browser = True,
+) -> None:
+    """Show a saved motion in the browser, until Ctrl-C: robot, path, ghost postures, and plots that follow a slider."""
+    with interrupts.postponed():
+        from brachis.cli import viewing  # noqa: PLC0415
+
+    viewing.view_command(result, host=host, port=port, browser=browser)
 
 
 @app.command()

@@ -22,9 +22,11 @@ from brachis.cli.output import (
     shown_warnings,
     verification_table,
 )
+from brachis.cli.viewing import show
 from brachis.errors import InputError
 from brachis.result import Result
 from brachis.search.record import SAME_MOTION
+from brachis.view import require_viser
 
 _FILES = {
     True: ("result.npz", "result.json", "overview.png", "candidates.png", "fit.png"),
@@ -35,8 +37,10 @@ _MANY = 40
 """Candidates that are listed on the screen."""
 
 
-def plan_command(task: Path, *, urdf: Path | None, out: Path | None, strict: bool, as_json: bool) -> int:
+def plan_command(task: Path, *, urdf: Path | None, out: Path | None, view: bool, strict: bool, as_json: bool) -> int:
     """Plan, show, write; returns the exit code."""
+    if view:
+        require_viser()
     if out is not None:
         make_folder(out, (*_FILES[True], *_FILES[False]), (task, urdf))
     with shown_warnings(), progress() as listener:
@@ -53,6 +57,8 @@ def plan_command(task: Path, *, urdf: Path | None, out: Path | None, strict: boo
     print_what_was_left(result.undone, interrupted=result.interrupted)
     if not result.verified:
         print_error("the motion found did not pass the verification; it is marked unverified")
+    if view:
+        show(result.trajectory, data["candidates"], verified=result.verified)
     return exit_code(result.verified, failures)
 
 
