@@ -105,12 +105,12 @@ def _skeleton(trajectory: Trajectory, radius: float) -> dict[int, list[trimesh.T
         placement, axis = model.jointPlacements[joint + 1], _axis(model.joints[joint + 1])
         drawn[joint] += _rod(begins[joint], placement.translation, radius, _BONE)
         if robot.position_units[joint] == "m":
-            ends = np.array([placement.act(axis * reach) for reach in _range(trajectory, joint)])
-            drawn[joint] += _rod(*ends, 0.5 * radius, _AXIS)
+            low, high = (placement.act(axis * reach) for reach in _range(trajectory, joint))
+            drawn[joint] += _rod(low, high, 0.5 * radius, _AXIS)
             drawn[joint + 1] += _block(3.0 * radius, _JOINT)
         else:
-            ends = np.array([-2.0, 2.0])[:, None] * radius * axis
-            drawn[joint + 1] += _rod(*ends, 1.7 * radius, _JOINT)
+            half = 2.0 * radius * axis
+            drawn[joint + 1] += _rod(-half, half, 1.7 * radius, _JOINT)
     drawn[tool.parentJoint] += _rod(begins[-1], tool.placement.translation, radius, _BONE)
     return {joint: meshes for joint, meshes in drawn.items() if meshes}
 

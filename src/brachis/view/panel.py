@@ -80,33 +80,35 @@ class Panel:
 
     def follow(self) -> None:
         """Let the slider and the button follow the playback."""
-        self._slider.value = self._playback.time
+        self._slider.value = round(self._playback.time, self._digits)
         self._button.label = "Pause" if self._playback.playing else "Play"
 
     def _add_controls(self) -> None:
         """Add slider, button and speed."""
         t_end = self._playback.t_end
         step = float(10.0 ** np.floor(np.log10(t_end / _SLIDER_STEPS)))
-        self._slider = self._gui.add_slider("time (s)", min=0.0, max=t_end, step=step, initial_value=0.0)
+        self._digits = max(0, round(-np.log10(step)))
+        ends = ((0.0, "0"), (t_end, f"{t_end:.4g}"))
+        self._slider = self._gui.add_slider("time (s)", 0.0, t_end, step, initial_value=0.0, marks=ends)
+        self._slider.on_update(self._drag)
         self._button = self._gui.add_button("Pause")
-        names = {f"{rate:g} x real time": rate for rate in RATES}
-        current = next(name for name, rate in names.items() if rate == self._playback.rate)
-        speed = self._gui.add_dropdown("speed", tuple(names), initial_value=current)
+        self._button.on_click(self._toggle)
+        self._rates = {f"{rate:g} x real time": rate for rate in RATES}
+        current = next(name for name, rate in self._rates.items() if rate == self._playback.rate)
+        self._gui.add_dropdown("speed", tuple(self._rates), initial_value=current).on_update(self._set_rate)
 
-        @self._slider.on_update
-        def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
-            if event.client is not None:  # else the slider follows the playback
-                self._playback.go_to(event.target.value)
-                self._show()
-
-        @self._button.on_click
-        def _(_event: object) -> None:
-            self._playback.toggle()
+    def _drag(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
+        """Show what the user chose with the slider, and stay there."""
+        if event.client is not None:  # else the slider follows the playback
+            self._playback.go_to(event.target.value)
             self._show()
 
-        @speed.on_update
-        def _(_event: object) -> None:
-            self._playback.rate = names[speed.value]
+    def _toggle(self, _event: object) -> None:
+        self._playback.toggle()
+        self._show()
+
+    def _set_rate(self, event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
+        self._playback.rate = self._rates[event.target.value]
 
     def _add_switches(self, scene: Scene) -> None:
         """Add a box to tick for every layer of the scene."""

@@ -13,7 +13,6 @@ from brachis.view.motion import Motion
 from brachis.view.placements import Placements, placements
 
 if TYPE_CHECKING:
-    import trimesh
     import viser
 
     Layer = list[viser.SceneNodeHandle]
@@ -22,6 +21,10 @@ LAYERS = ("robot", "skeleton", "ghost postures", "path", "tool trace", "tool fra
 """What can be shown and hidden."""
 _GHOST_FIRST, _GHOST_LAST = np.array([190.0, 214.0, 235.0]), np.array([25.0, 75.0, 125.0])
 _GHOST_OPACITY = 0.13
+_SHADES = 32
+"""Colours of the trace."""
+_FINE = 2000
+"""Faces of a mesh that is drawn as its convex hull where it is a ghost."""
 _PATH = (30, 30, 30)
 _START, _END = (0, 158, 115), (213, 94, 0)
 _FIELD_OF_VIEW = 0.75
@@ -97,7 +100,8 @@ class Scene:
         for joint, meshes in bodies.items():
             if _still(ghosts, joint):
                 continue
-            whole: trimesh.Trimesh = trimesh.util.concatenate([trimesh.Trimesh(m.vertices, m.faces) for m in meshes])
+            coarse = [mesh.convex_hull if len(mesh.faces) > _FINE else mesh for mesh in meshes]
+            whole = trimesh.util.concatenate([trimesh.Trimesh(mesh.vertices, mesh.faces) for mesh in coarse])
             handle = self._api.add_batched_meshes_simple(
                 f"/ghosts/{joint}",
                 whole.vertices,
@@ -114,23 +118,24 @@ class Scene:
     def _draw_path(self) -> None:
         """Draw the prescribed path with its ends."""
         points, layer = self._motion.path, self.layers["path"]
-        layer.append(self._lines("/path", points, np.array(_PATH, dtype=np.uint8), 2.0))
+        layer.append(
+            self._api.add_line_segments("/path", _segments(points), _PATH, thickness=2.5, thickness_units="screen")
+        )
         for name, point, colour in (("end", points[-1], _END), ("start", points[0], _START)):
             ball = self._api.add_icosphere(f"/path/{name}", 0.009 * self._size, color=colour, position=point)
             layer.append(ball)
 
     def _draw_trace(self) -> None:
         """Draw the way of the tool, coloured by its speed."""
-        speed = self._motion.frames.tool_speed
-        colours = speed_colours(speed / max(float(speed.max()), 1e-9))
-        self.layers["tool trace"].append(self._lines("/trace", self._motion.frames.tool, colours, 7.0))
-
-    def _lines(self, name: str, points: np.ndarray, colours: np.ndarray, width: float) -> viser.LineSegmentsHandle:
-        """Draw a polyline (K, 3) in one colour or with one for each point, `width` pixels wide."""
-        segments = np.stack([points[:-1], points[1:]], axis=1)
-        shades = np.broadcast_to(colours, points.shape)
-        pairs = np.stack([shades[:-1], shades[1:]], axis=1)
-        return self._api.add_line_segments(name, segments, pairs, thickness=width, thickness_units="screen")
+        speed, segments = self._motion.frames.tool_speed, _segments(self._motion.frames.tool)
+        parts = 0.5 * (speed[:-1] + speed[1:]) / max(float(speed.max()), 1e-9)
+        shades = np.round(parts * (_SHADES - 1)).astype(int)
+        colours = speed_colours(np.linspace(0.0, 1.0, _SHADES))
+        for shade in np.unique(shades).tolist():  # viser shows colours of single points lighter than they are
+            lines = self._api.add_line_segments(
+                f"/trace/{shade}", segments[shades == shade], colours[shade], thickness=7.0, thickness_units="screen"
+            )
+            self.layers["tool trace"].append(lines)
 
     def _draw_ground(self) -> float:
         """Draw a grid below everything; returns the size of its cells, m."""
@@ -172,6 +177,11 @@ class Scene:
         else:
             direction = np.array({(0, 1): (0.0, -0.45, 1.0), (0, 2): (0.0, -1.0, 0.3), (1, 2): (1.0, 0.0, 0.3)}[plane])
         return np.asarray(direction / np.linalg.norm(direction))
+
+
+def _segments(points: np.ndarray) -> np.ndarray:
+    """Straight pieces (K - 1, 2, 3) between points (K, 3)."""
+    return np.stack([points[:-1], points[1:]], axis=1)
 
 
 def speed_colours(parts: np.ndarray) -> np.ndarray:

@@ -42,7 +42,7 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
     require_viser()
     import viser  # noqa: PLC0415
 
-    class Server(viser.ViserServer):
+    class Server(viser.ViserServer):  # type: ignore[misc]  # not read by mypy
         """A server whose motions stay on this machine: viser's own can be told by a page to send them elsewhere."""
 
         def request_share_url(self, verbose: bool = True) -> None:  # noqa: FBT001, FBT002  (viser's signature)
