@@ -38,10 +38,10 @@ class Panel:
         Called when the user has chosen another instant.
     candidates : sequence of mapping
         What the search looked at, as `Attempt.to_dict` gives it.
-    verified : bool or None
-        None where it is not known.
     notes : sequence of str
         What else the user should know.
+    verified : bool or None
+        None where it is not known.
     """
 
     def __init__(
@@ -52,12 +52,13 @@ class Panel:
         playback: Playback,
         show: Callable[[], None],
         candidates: Sequence[Mapping[str, Any]],
-        verified: bool | None,  # noqa: FBT001  (a fact, not a flag)
         notes: Sequence[str],
+        *,
+        verified: bool | None,
     ) -> None:
         self._gui, self._motion, self._playback, self._show = server.gui, motion, playback, show
         self._gui.configure_theme(show_logo=False, show_share_button=False)
-        self._gui.add_html(tables.summary(motion.trajectory, verified, notes))
+        self._gui.add_html(tables.summary(motion.trajectory, notes, verified=verified))
         self._add_controls()
         stops = [f"rgb({red},{green},{blue})" for red, green, blue in speed_colours(np.linspace(0.0, 1.0, _STOPS))]
         self._gui.add_html(tables.speed_legend(stops, float(motion.frames.tool_speed.max())))

@@ -43,18 +43,22 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
     import viser  # noqa: PLC0415
 
     class Server(viser.ViserServer):  # type: ignore[misc]  # not read by mypy
-        """A server whose motions stay on this machine: viser's own can be told by a page to send them elsewhere."""
+        """A server that is silent, and whose scene stays here: viser's own can be told by a page to publish it."""
 
         def request_share_url(self, verbose: bool = True) -> None:  # noqa: FBT001, FBT002  (viser's signature)
             """Refuse to give the scene a public address."""
 
+        def stop(self) -> None:
+            """Stop without a word."""
+            with _quiet():
+                super().stop()
+
     chosen = _free_port(host) if port is None else port
     _check(host, chosen)
-    with quiet():
+    with _quiet():
         server = Server(host=host, port=chosen, label="brachis", verbose=False)
     if chosen not in (0, server.get_port()):  # somebody took it in between
-        with quiet():
-            server.stop()
+        server.stop()
         raise _in_use(host, chosen)
     return server
 
@@ -76,7 +80,7 @@ def is_local(host: str) -> bool:
     return all(ipaddress.ip_address(address).is_loopback for address in addresses)
 
 
-def quiet() -> contextlib.redirect_stdout[io.StringIO]:
+def _quiet() -> contextlib.redirect_stdout[io.StringIO]:
     """Keep viser's own messages from standard output, which is for results."""
     return contextlib.redirect_stdout(io.StringIO())
 

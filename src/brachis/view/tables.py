@@ -78,7 +78,7 @@ def speed_legend(stops: Sequence[str], fastest: float) -> str:
     )
 
 
-def summary(trajectory: Trajectory, verified: bool | None, notes: Sequence[str]) -> str:  # noqa: FBT001  (what is told)
+def summary(trajectory: Trajectory, notes: Sequence[str], *, verified: bool | None) -> str:
     """End time, what is known of the verification, and what else the user should know."""
     told = {None: "", True: ", verified", False: ', <b style="color:#D00000">NOT verified</b>'}[verified]
     text = f'<div style="margin:0.3em 0.8em;font-size:0.9em"><b>t_E = {trajectory.t_end:.4f} s</b>{told}</div>'

@@ -17,7 +17,7 @@ from brachis.view.motion import Motion
 from brachis.view.panel import Panel
 from brachis.view.playback import Playback, first_rate
 from brachis.view.scene import Scene
-from brachis.view.server import LOOPBACK, is_local, quiet, start_server
+from brachis.view.server import LOOPBACK, is_local, start_server
 
 _FRAME = 1.0 / 30.0
 """Period of the robot's pictures, s."""
@@ -68,9 +68,9 @@ class Viewer:
     ) -> None:
         self._server = start_server(host, port)
         try:
-            self._fill(trajectory, candidates, verified)
+            self._fill(trajectory, candidates, verified=verified)
         except BaseException:
-            self._close()
+            self._server.stop()
             raise
         shown = {"0.0.0.0": LOOPBACK, "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)  # noqa: S104
         self.local = is_local(host)
@@ -79,14 +79,16 @@ class Viewer:
         self._thread = threading.Thread(target=self._run, name="brachis viewer", daemon=True)
         self._thread.start()
 
-    def _fill(self, trajectory: Trajectory, candidates: Sequence[Mapping[str, Any]], verified: bool | None) -> None:  # noqa: FBT001
+    def _fill(self, trajectory: Trajectory, candidates: Sequence[Mapping[str, Any]], *, verified: bool | None) -> None:
         motion, bodies = Motion.of(trajectory), bodies_of(trajectory)
         boundary = trajectory.task.boundary
         self.playback = Playback(trajectory.t_end, first_rate(trajectory.t_end), loops=boundary.periodic)
         self._trajectory, self._lock = trajectory, threading.RLock()
         self._scene = Scene(self._server, motion, bodies)
         notes = [f"not shown: {reason}" for reason in bodies.unread]
-        self._panel = Panel(self._server, motion, self._scene, self.playback, self.show, candidates, verified, notes)
+        self._panel = Panel(
+            self._server, motion, self._scene, self.playback, self.show, candidates, notes, verified=verified
+        )
         self.show()
 
     def show(self) -> None:
@@ -109,7 +111,7 @@ class Viewer:
         """Stop the server; the page says that it has lost its connection."""
         self._stopped.set()
         self._thread.join()
-        self._close()
+        self._server.stop()
 
     def __enter__(self) -> Self:
         """Return the viewer, which is stopped at the end of the block."""
@@ -129,10 +131,6 @@ class Viewer:
         """Show the viewer within a notebook."""
         url = html.escape(self.url, quote=True)
         return f'<iframe src="{url}" width="100%" height="640" style="border:0"></iframe><a href="{url}">{url}</a>'
-
-    def _close(self) -> None:
-        with quiet():
-            self._server.stop()
 
     def _run(self) -> None:
         """Play the motion as long as somebody looks."""
