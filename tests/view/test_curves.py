@@ -61,4 +61,6 @@ def test_every_robot_has_curves(urdf, motion_of):
     assert len(found) >= 4
     for curves in found:
         assert np.isfinite(curves.values).all()
+        assert (curves.t[0], curves.t[-1]) == (0.0, motion.t_end)
+        assert (np.diff(curves.t) > 0.0).all()
         assert curves.values.shape == (len(curves.t), len(curves.names))

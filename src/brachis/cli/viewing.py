@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from brachis import interrupts
 from brachis.cli.output import print_error, result_console
 from brachis.errors import ResultFileError
 from brachis.trajectory import Trajectory
@@ -42,12 +43,12 @@ def show(
     browser: bool = True,
 ) -> None:
     """Show a motion until Ctrl-C; open the browser where there is a screen, and it is wanted."""
-    with Viewer(trajectory, candidates, verified=verified, host=host, port=port) as viewer:
-        result_console().print(f"look at {viewer.url}")
-        sys.stdout.flush()
-        print_error("Ctrl-C stops the viewer")
+    with Viewer(trajectory, candidates, verified=verified, host=host, port=port) as viewer, interrupts.expected():
         if not viewer.local:
             print_error(f"warning: whoever reaches {host} can look, and move the slider; leave --host out to be alone")
+        print_error("Ctrl-C stops the viewer")
+        result_console().print(f"look at {viewer.url}")
+        sys.stdout.flush()
         if browser and sys.stdout.isatty() and _has_screen():
             webbrowser.open(viewer.url)
         viewer.wait()

@@ -31,17 +31,15 @@ class Chart:
     gui : viser.GuiApi
         Where it is added.
     curves : Curves
-    t_end : float
-        End of the time axis, s.
     """
 
-    def __init__(self, gui: viser.GuiApi, curves: Curves, t_end: float) -> None:
+    def __init__(self, gui: viser.GuiApi, curves: Curves) -> None:
         self._curves = curves
         gui.add_html(_heading(curves))
         self._handle = gui.add_uplot(
             self._data(0.0),
             self._series(),
-            scales={"x": {"time": False, "range": (0.0, t_end)}, "y": {"range": (curves.low, curves.high)}},
+            scales={"x": {"time": False}, "y": {"range": (curves.low, curves.high)}},
             axes=(
                 {"font": _FONT, "size": 28, "label": "time (s)", "labelSize": 16, "labelFont": _FONT},
                 {"font": _FONT, "size": 40},

@@ -26,7 +26,7 @@ class Curves:
     styles : tuple of int
         Number of each one's colour.
     t : (K,) ndarray
-        s.
+        From 0 to the end of the motion, s.
     values : (K, c) ndarray
     bounds : tuple of float
         Levels of the limits.
@@ -112,12 +112,11 @@ def _largest_ratios(trajectory: Trajectory) -> Curves:
     kinds = tuple(dict.fromkeys(label.kind for label in ratios.labels))
     parts = np.abs(ratios.values)
     edges = np.unique(np.searchsorted(ratios.t, np.linspace(0.0, trajectory.t_end, _BINS), side="left"))
-    edges = edges[edges < len(ratios.t)]
+    edges = edges[ratios.t[edges] < trajectory.t_end]
     values = np.empty((len(edges), len(kinds)))
     for column, kind in enumerate(kinds):
         largest = parts[:, [label.kind == kind for label in ratios.labels]].max(axis=1)
         values[:, column] = np.maximum.reduceat(largest, edges)
     top = _TOP * max(1.0, float(values.max(initial=0.0)))
-    return Curves(
-        "largest of every kind / limit", kinds, tuple(range(len(kinds))), ratios.t[edges], values, (1.0,), 0.0, top
-    )
+    t, values = np.append(ratios.t[edges], trajectory.t_end), np.vstack([values, values[-1:]])
+    return Curves("largest of every kind / limit", kinds, tuple(range(len(kinds))), t, values, (1.0,), 0.0, top)

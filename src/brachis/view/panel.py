@@ -123,10 +123,7 @@ class Panel:
         """Add a panel with the plots and the list of candidates."""
         motion, panel = self._motion, self._gui.add_panel()
         with panel.add_tab("limits"):
-            charts = [
-                Chart(self._gui, curves, motion.trajectory.t_end)
-                for curves in all_curves(motion.trajectory, motion.samples)
-            ]
+            charts = [Chart(self._gui, curves) for curves in all_curves(motion.trajectory, motion.samples)]
         with panel.add_tab(f"candidates ({len(candidates)})" if candidates else "candidates"):
             self._gui.add_html(tables.candidates_table(candidates))
         panel.dock_left()

@@ -47,6 +47,8 @@ class Scene:
 
     def __init__(self, server: viser.ViserServer, motion: Motion, bodies: Bodies) -> None:
         self._api, self._motion, self._bodies = server.scene, motion, bodies
+        self._api.configure_environment_map(None)  # a plain light shows pale robots on the white page better
+        self._api.add_light_hemisphere("/light", sky_color=(255, 255, 255), ground_color=(120, 120, 130), intensity=2.0)
         self._robot = motion.trajectory.robot
         self._size = float(np.linalg.norm(bodies.moving_upper - bodies.moving_lower))
         self.layers: dict[str, Layer] = {name: [] for name in LAYERS}

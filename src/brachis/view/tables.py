@@ -45,7 +45,7 @@ def state_table(trajectory: Trajectory, now: Samples, tool: np.ndarray, speed: f
                 f"{now.tau[0, joint]:.2f} {force}",
             )
         )
-    return head + _table(("joint", "position", "speed", "torque or force"), rows)
+    return head + _table(("joint", "position", "speed", "torque, force"), rows)
 
 
 def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:

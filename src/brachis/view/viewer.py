@@ -99,13 +99,10 @@ class Viewer:
 
     def wait(self) -> None:
         """Wait until Ctrl-C, then stop."""
-        try:
+        with interrupts.expected():
             while not self._stopped.wait(0.5):
                 interrupts.check()
-        except KeyboardInterrupt:
-            interrupts.forget()
-        finally:
-            self.stop()
+        self.stop()
 
     def stop(self) -> None:
         """Stop the server; the page says that it has lost its connection."""
