@@ -90,6 +90,8 @@ def test_the_slider_moves_the_robot(browser, rail_result, tmp_path):
         page.wait_for_function("() => document.body.innerText.includes('s = 1.0000')")
         page.wait_for_timeout(1000)
         last = picture(page, "viewer_end", folder)
+        page.locator(".mantine-Notification-closeButton").first.click()  # "software rendering detected"
+        slider.blur()
         viewer.playback.go_to(0.4 * viewer.playback.t_end)
         viewer.show()
         page.wait_for_timeout(1000)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from brachis.robot import Robot
+from brachis.search.record import SAME_MOTION
 from brachis.view import Viewer
 from brachis.view.placements import placements
 from brachis.view.scene import LAYERS
@@ -107,6 +108,9 @@ def test_tables_have_units_and_escape_names(bare_robot, motion_of):
     assert "inf" not in listed
     assert "result.json" in candidates_table([])
     assert "40 more" in candidates_table([known] * 100)
+    again = candidates_table([known, {**known, "origin": "twice", "status": SAME_MOTION}])
+    assert "twice" not in again
+    assert "1 more" in again
 
 
 def test_the_panel_says_whether_the_motion_is_verified(line_result):

@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from brachis.trajectory import Trajectory
 from brachis.view.placements import Placements, placements
-from brachis.view.visuals import link_shapes, painted
+from brachis.view.visuals import coloured, link_shapes
 
 if TYPE_CHECKING:
     import trimesh
@@ -134,18 +134,10 @@ def _rod(begin: np.ndarray, end: np.ndarray, radius: float, colour: tuple[int, .
 
     if np.linalg.norm(end - begin) < 1e-9:  # noqa: PLR2004
         return []
-    return [_coloured(trimesh.creation.cylinder(radius, segment=[begin, end], sections=24), colour)]
+    return [coloured(trimesh.creation.cylinder(radius, segment=[begin, end], sections=24), colour)]
 
 
 def _block(size: float, colour: tuple[int, ...]) -> list[trimesh.Trimesh]:
     import trimesh  # noqa: PLC0415
 
-    return [_coloured(trimesh.creation.box((size, size, size)), colour)]
-
-
-def _coloured(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trimesh:
-    import trimesh  # noqa: PLC0415
-
-    sharp = trimesh.graph.smooth_shade(mesh, angle=0.6)
-    sharp.visual = trimesh.visual.TextureVisuals(material=painted(colour))
-    return sharp
+    return [coloured(trimesh.creation.box((size, size, size)), colour)]

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from brachis.attempt import coordinates
+from brachis.search.record import SAME_MOTION
 from brachis.trajectory import Samples, Trajectory
 
 _MANY = 60
@@ -40,32 +42,36 @@ def state_table(trajectory: Trajectory, now: Samples, tool: np.ndarray, speed: f
         rows.append(
             (
                 name,
-                f"{now.q[0, joint]:.3f} {unit}",
-                f"{now.qdot[0, joint]:.3f} {unit}/s",
-                f"{now.tau[0, joint]:.2f} {force}",
+                f"{_rounded(now.q[0, joint], 3)} {unit}",
+                f"{_rounded(now.qdot[0, joint], 3)} {unit}/s",
+                f"{_rounded(now.tau[0, joint], 2)} {force}",
             )
         )
     return head + _table(("joint", "position", "speed", "torque, force"), rows)
 
 
 def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
-    """List what the search looked at, as `Attempt.to_dict` gives it, the fastest verified one first."""
+    """List what the search looked at, as `Attempt.to_dict` gives it, the fastest verified one first.
+
+    The same motion is listed once.
+    """
     if not candidates:
         return _paragraph("The candidates of the search are not known: they are in result.json beside result.npz.")
     rows = [
         (
-            ", ".join(candidate.get("redundant_joints", ())) or "chart",
+            coordinates(candidate.get("redundant_joints", ()), str(candidate.get("branch", ""))),
             str(candidate.get("branch", "")),
             str(candidate.get("origin", "")),
             _seconds(candidate.get("coarse")),
             _seconds(candidate.get("t_end")),
             str(candidate.get("status", "")),
         )
-        for candidate in candidates[:_MANY]
+        for candidate in candidates
+        if candidate.get("status") != SAME_MOTION
     ]
-    left = len(candidates) - len(rows)
-    note = _paragraph(f"{left} more are in the JSON") if left else ""
-    return _table(("joints", "branch", "origin", "coarse", "t_end", "status"), rows) + note
+    left = len(candidates) - len(rows[:_MANY])
+    note = _paragraph(f"{left} more, slower or the same motion again") if left else ""
+    return _table(("joints", "branch", "origin", "coarse", "t_end", "status"), rows[:_MANY]) + note
 
 
 def speed_legend(stops: Sequence[str], fastest: float) -> str:
@@ -83,6 +89,11 @@ def summary(trajectory: Trajectory, notes: Sequence[str], *, verified: bool | No
     told = {None: "", True: ", verified", False: ', <b style="color:#D00000">NOT verified</b>'}[verified]
     text = f'<div style="margin:0.3em 0.8em;font-size:0.9em"><b>t_E = {trajectory.t_end:.4f} s</b>{told}</div>'
     return text + (_paragraph(*notes) if notes else "")
+
+
+def _rounded(value: float, digits: int) -> str:
+    """Write a number without a minus sign before zero."""
+    return f"{round(float(value), digits) + 0.0:.{digits}f}"
 
 
 def _seconds(value: object) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import io
 import os
 from collections.abc import Iterator
@@ -115,30 +114,28 @@ def _meshes(name: str, visual: Element, materials: list[Element]) -> Iterator[tr
         placement, geometry = read.scene.graph.get(node)
         mesh = read.scene.geometry[geometry]
         if isinstance(mesh, trimesh.Trimesh):
-            yield _shaded(trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual), placement)
+            yield _placed(trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual), placement)
 
 
 def _copied(element: Element) -> Element:
     return etree.fromstring(etree.tostring(element))
 
 
-def _shaded(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:  # noqa: ANN401  (a matrix)
-    """Place a mesh, keep its sharp edges, and give it one material that is no metal."""
-    import trimesh  # noqa: PLC0415
-
+def _placed(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:  # noqa: ANN401  (a matrix)
+    """Place a mesh, and see to its colour where it has no picture on it."""
     look = getattr(mesh.visual, "material", mesh.visual)  # a material, or colours of the faces
     if getattr(look, "baseColorTexture", None) is None and getattr(look, "image", None) is None:
-        colour = tuple(map(int, look.main_color)) if mesh.visual.defined else _STEEL
-        if len(mesh.faces) <= _PRIMITIVE:
-            mesh = trimesh.graph.smooth_shade(mesh, angle=_SHARP)
-        mesh.visual = trimesh.visual.TextureVisuals(material=painted(colour))
+        mesh = coloured(mesh, tuple(map(int, look.main_color)) if mesh.visual.defined else _STEEL)
     mesh.apply_transform(placement)
     return mesh
 
 
-@functools.cache
-def painted(colour: tuple[int, ...]) -> Any:  # noqa: ANN401  (trimesh's material)
-    """Material of a colour, RGBA from 0 to 255."""
+def coloured(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trimesh:
+    """Give a mesh one material that is no metal, RGBA from 0 to 255, and sharp edges unless it has too many faces."""
     import trimesh  # noqa: PLC0415
 
-    return trimesh.visual.material.PBRMaterial(baseColorFactor=colour, metallicFactor=0.1, roughnessFactor=0.65)
+    if len(mesh.faces) <= _PRIMITIVE:
+        mesh = trimesh.graph.smooth_shade(mesh, angle=_SHARP)
+    material = trimesh.visual.material.PBRMaterial(baseColorFactor=colour, metallicFactor=0.1, roughnessFactor=0.65)
+    mesh.visual = trimesh.visual.TextureVisuals(material=material)
+    return mesh
