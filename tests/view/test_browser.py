@@ -40,6 +40,18 @@ DRAWN = """() => {
 """The scene fades in once its light is loaded."""
 
 
+LINES = """() => {
+    const middle = (element) => { const box = element.getBoundingClientRect(); return (box.left + box.right) / 2; };
+    const lines = [...document.querySelectorAll('[data-part]')], areas = [...document.querySelectorAll('.u-over')];
+    return lines.map((line, i) => {
+        const area = areas[i].getBoundingClientRect(), box = line.getBoundingClientRect();
+        const wanted = area.left + Number(line.dataset.part) * area.width;
+        return [middle(line) - wanted, box.top - area.top, box.bottom - area.bottom];
+    });
+}"""
+"""How far the lines are from where they should be over their plots, pixels."""
+
+
 @pytest.fixture(scope="module")
 def browser():
     with playwright.sync_playwright() as driver:
@@ -96,7 +108,7 @@ def test_the_slider_moves_the_robot(browser, rail_result, tmp_path):
         viewer.show()
         page.wait_for_timeout(1000)
         picture(page, "viewer", folder)
-        text = page.inner_text("body")
+        text, apart = page.inner_text("body"), page.evaluate(LINES)
         page.close()
     assert viewer.playback.time == pytest.approx(0.4 * rail_result.t_end)
     assert len(np.unique(first.reshape(-1, 3), axis=0)) > 500  # there is something to see
@@ -104,5 +116,7 @@ def test_the_slider_moves_the_robot(browser, rail_result, tmp_path):
     assert changed(first, last) > 2000
     for part in ("verified", "torque / limit", "tool speed (m/s)", "rail", "joint_6", "candidates"):
         assert part in text
+    assert len(apart) >= 4
+    assert np.abs(apart).max() < 2.0
     assert faults == []
     assert [url for url in foreign if not url.startswith((viewer.url, "data:", "blob:"))] == []

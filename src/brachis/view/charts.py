@@ -16,7 +16,12 @@ if TYPE_CHECKING:
     from viser import uplot
 
 _HEIGHT = 165
-"""Pixels."""
+_LEFT, _RIGHT, _ABOVE, _BELOW = 40, 12, 6, 44
+"""Of a plot, and what is around its curves; pixels."""
+_LABEL = 16
+"""Of the height below, for the label."""
+_EDGE, _EDGES, _GAP = 9.5, 18.5, 12
+"""What viser leaves to the left of a plot (less half the line), on both sides and below, pixels; a test measures it."""
 _FONT = "11px sans-serif"
 _DASHES: dict[str, tuple[float, ...]] = {"-": (), "--": (6.0, 4.0), ":": (2.0, 3.0)}
 _NOW = "#D00000"
@@ -36,26 +41,27 @@ class Chart:
     def __init__(self, gui: viser.GuiApi, curves: Curves) -> None:
         self._curves = curves
         gui.add_html(_heading(curves))
-        self._handle = gui.add_uplot(
-            self._data(0.0),
+        gui.add_uplot(
+            self._data(),
             self._series(),
             scales={"x": {"time": False}, "y": {"range": (curves.low, curves.high)}},
             axes=(
-                {"font": _FONT, "size": 28, "label": "time (s)", "labelSize": 16, "labelFont": _FONT},
-                {"font": _FONT, "size": 40},
+                {"font": _FONT, "size": _BELOW - _LABEL, "label": "time (s)", "labelSize": _LABEL, "labelFont": _FONT},
+                {"font": _FONT, "size": _LEFT},
             ),
             legend={"show": False},
             cursor={"drag": {"x": False, "y": False, "setScale": False}},
             height=_HEIGHT,
-            padding=(6, 12, 0, 0),
+            padding=(_ABOVE, _RIGHT, 0, 0),
         )
+        self._line = gui.add_html(_line(0.0))
 
     def mark(self, t: float) -> None:
         """Draw the line at time `t`, s."""
-        self._handle.data = self._data(t)
+        self._line.content = _line(t / float(self._curves.t[-1]))
 
     def _series(self) -> tuple[uplot.Series, ...]:
-        """Time, limits, curves, and the line at the instant shown."""
+        """Time, limits and curves."""
         lines: list[uplot.Series] = [{"label": "time (s)"}]
         hidden: uplot.Series_Points = {"show": False}
         lines += [
@@ -65,18 +71,22 @@ class Chart:
         for name, style in zip(self._curves.names, self._curves.styles, strict=True):
             colour, dash = look(style)
             lines.append({"label": name, "stroke": colour, "width": 1.6, "dash": dash, "points": hidden})
-        return (*lines, {"label": "now", "stroke": _NOW, "width": 1.4, "points": hidden})
+        return tuple(lines)
 
-    def _data(self, now: float) -> tuple[np.ndarray, ...]:
-        """Columns of the plot; the line at `now` is a spike of the last one, which else stays below the axis."""
-        curves = self._curves
-        place = int(np.searchsorted(curves.t, now))
-        t = np.insert(curves.t, place, (now, now, now))
-        columns = [np.full_like(t, bound) for bound in curves.bounds]
-        columns += [np.insert(part, place, 3 * (np.interp(now, curves.t, part),)) for part in curves.values.T]
-        spike = np.full_like(t, curves.low - (curves.high - curves.low))
-        spike[place + 1] = curves.high + (curves.high - curves.low)
-        return (t, *columns, spike)
+    def _data(self) -> tuple[np.ndarray, ...]:
+        """Columns of the plot."""
+        t, values = self._curves.t, self._curves.values
+        return (t, *(np.full_like(t, bound) for bound in self._curves.bounds), *values.T)
+
+
+def _line(part: float) -> str:
+    """Line over the plot above it, at a part of its width; a plot that is given new data ever so often would blink."""
+    left = f"calc({_EDGE + _LEFT}px + {part:.5f} * (100% - {_EDGES + _LEFT + _RIGHT}px))"
+    style = f"position:absolute;z-index:5;width:1.5px;background:{_NOW};left:{left};bottom:{_BELOW + _GAP}px"
+    return (
+        '<div style="position:relative;height:0;pointer-events:none">'
+        f'<div data-part="{part:.5f}" style="{style};height:{_HEIGHT - _ABOVE - _BELOW}px"></div></div>'
+    )
 
 
 def look(style: int) -> tuple[str, tuple[float, ...]]:
