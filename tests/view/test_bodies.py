@@ -22,15 +22,13 @@ def placed(bodies, found):
 def test_placements_are_those_of_the_model(motion_of):
     robot = Robot.from_urdf(ROBOTS[-1], mounting={"xyz": [0.1, 0.2, 0.3], "rpy_deg": [10, 20, 30]})
     motion = motion_of(robot)
-    t, step = np.linspace(0.2, 0.9, 5), 1e-5
-    found = placements(robot, motion.position(t), motion.velocity(t))
+    t = np.linspace(0.2, 0.9, 5)
+    found = placements(robot, motion.position(t))
     tool, rotations = robot.tool_placements(motion.position(t))
     np.testing.assert_allclose(found.tool, tool, atol=1e-12)
     w, x, y, z = found.quaternions[0, -1]
     np.testing.assert_allclose(1.0 - 2.0 * (y * y + z * z), rotations[0, 0, 0], atol=1e-12)
     np.testing.assert_allclose(2.0 * (x * y + w * z), rotations[0, 1, 0], atol=1e-12)
-    ahead, behind = (placements(robot, motion.position(t + sign * step)).tool for sign in (1.0, -1.0))
-    np.testing.assert_allclose(found.tool_speed, np.linalg.norm(ahead - behind, axis=1) / (2.0 * step), rtol=1e-6)
 
 
 def test_a_rail_is_part_of_what_stands_still_and_the_arm_is_not(motion_of):

@@ -2,6 +2,12 @@
 
 Every function returns a Matplotlib figure of its own, made without pyplot and without touching Matplotlib's settings.
 Matplotlib is imported when the first figure is made.
+
+Examples
+--------
+>>> import brachis
+>>> sorted(brachis.plots.PLOTS)[:3]
+['fit', 'limits', 'motion']
 """
 
 from __future__ import annotations
@@ -14,6 +20,7 @@ from brachis.plots.comparison import plot_comparison
 from brachis.plots.fit import plot_fit
 from brachis.plots.limits import plot_limits
 from brachis.plots.motion import plot_motion
+from brachis.plots.notebook import as_html
 from brachis.plots.overview import plot_overview
 from brachis.plots.postures import plot_postures
 from brachis.plots.save import SUFFIXES, check_suffix, save_figure
@@ -38,6 +45,7 @@ PLOTS: dict[str, Callable[[Trajectory], Figure]] = {
 __all__ = [
     "PLOTS",
     "SUFFIXES",
+    "as_html",
     "check_suffix",
     "plot_candidates",
     "plot_comparison",

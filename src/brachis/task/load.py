@@ -9,8 +9,10 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from brachis.errors import TaskError
+from brachis.kinds import Kind, check_kind
 from brachis.task.csv_path import expand_csv_files
 from brachis.task.fields import plain
+from brachis.task.keys import with_keys
 from brachis.task.limits_file import with_limits_of_file
 from brachis.task.messages import show, task_error
 from brachis.task.models import Task
@@ -18,18 +20,23 @@ from brachis.task.robot_models import RobotSettings
 from brachis.task.text_file import read_text
 from brachis.task.yaml_reader import read_yaml
 
+Source = str | os.PathLike[str] | Mapping[str, object] | Task
+"""What a task is made of: its file, or its content."""
 _LARGEST_TASK = 1_000_000
 """Bytes of YAML, which take some 20 s to read."""
 
 
-def load_task(source: str | os.PathLike[str] | Mapping[str, object] | Task) -> Task:
+def load_task(source: Source, *, changes: Mapping[str, object] | None = None) -> Task:
     """Return the task that a file or a mapping describes.
 
     Parameters
     ----------
     source : path-like, mapping or Task
         A YAML file; or what such a file would contain, as a mapping (NumPy arrays are accepted as lists); or a task,
-        which is returned as it is.
+        which is returned as it is unless keys are to be changed.
+    changes : mapping of str to object, optional
+        Values by dotted keys, such as ``{"spline.intervals": 40, "path.0.line.length": 0.5}``: they take the place of
+        what `source` says.
 
     Returns
     -------
@@ -47,6 +54,7 @@ def load_task(source: str | os.PathLike[str] | Mapping[str, object] | Task) -> T
 
     Examples
     --------
+    >>> from brachis import load_task
     >>> task = load_task({
     ...     "brachis": 1,
     ...     "start": {"joints": [0.1, 0.2, 0.3]},
@@ -58,16 +66,17 @@ def load_task(source: str | os.PathLike[str] | Mapping[str, object] | Task) -> T
     3
     """
     if isinstance(source, Task):
-        return source
+        return load_task(source.to_dict(), changes=changes) if changes else source
     if isinstance(source, Mapping):
-        return _task_from(source, "task", Path.cwd())
+        return _task_from(source, "task", Path.cwd(), changes or {})
     if not isinstance(source, str | os.PathLike):
         problem = "a task is loaded from a file or a mapping"
         raise TaskError(problem, found=type(source).__name__, allowed="a file name, a mapping, or a Task")
     path = Path(source)
+    check_kind(path, Kind.TASK, TaskError)
     hint = "Long lists of waypoints belong in a CSV file"
     text = read_text(path, where=str(path), folder=Path.cwd(), largest=_LARGEST_TASK, hint=hint)
-    task = _task_from(read_yaml(text, str(path)), str(path), path.absolute().parent)
+    task = _task_from(read_yaml(text, str(path)), str(path), path.absolute().parent, changes or {})
     if task.robot.urdf is None:
         problem = "this key is required in a task file, and missing"
         raise TaskError(problem, where=f"{path}: robot.urdf", hint="Give the URDF's path, relative to the task file")
@@ -88,10 +97,13 @@ def check_robot_settings(content: Mapping[str, object]) -> RobotSettings:
         raise task_error(error, "robot", RobotSettings) from None
 
 
-def _task_from(content: object, source: str, folder: Path) -> Task:
+def _task_from(content: object, source: str, folder: Path, changes: Mapping[str, object]) -> Task:
     if not isinstance(content, Mapping):
         problem = "a task is a mapping"
         raise TaskError(problem, found=show(content), allowed=", ".join(Task.model_fields), where=source)
+    if changes:
+        content = with_keys(content, changes)
+        source = f"{source} with {', '.join(changes)} set"
     try:
         task = Task.model_validate(plain(with_limits_of_file(content, source, folder)))
     except ValidationError as error:

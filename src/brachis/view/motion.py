@@ -42,7 +42,7 @@ class Motion:
     def of(cls, trajectory: Trajectory) -> Motion:
         """Evaluate a trajectory."""
         samples = trajectory.at(np.linspace(0.0, trajectory.t_end, _INSTANTS))
-        frames = placements(trajectory.robot, samples.q, samples.qdot)
+        frames = placements(trajectory.robot, samples.q)
         ghosts = placements(trajectory.robot, trajectory.position(np.linspace(0.0, trajectory.t_end, _GHOSTS)))
         return cls(trajectory, samples, frames, _path(trajectory, samples.s, frames.tool), ghosts)
 

@@ -11,7 +11,6 @@ from brachis.view import tables
 from brachis.view.charts import Chart
 from brachis.view.curves import all_curves
 from brachis.view.motion import Motion
-from brachis.view.placements import placements
 from brachis.view.playback import RATES, Playback
 from brachis.view.scene import Scene, speed_colours
 
@@ -61,7 +60,7 @@ class Panel:
         self._gui.add_html(tables.summary(motion.trajectory, notes, verified=verified))
         self._add_controls()
         stops = [f"rgb({red},{green},{blue})" for red, green, blue in speed_colours(np.linspace(0.0, 1.0, _STOPS))]
-        self._gui.add_html(tables.speed_legend(stops, float(motion.frames.tool_speed.max())))
+        self._gui.add_html(tables.speed_legend(stops, float(motion.samples.tool_speed.max())))
         self._state = self._gui.add_html("")
         self._add_switches(scene)
         self._charts = self._add_plots(candidates)
@@ -72,10 +71,7 @@ class Panel:
         t = self._playback.time
         self.follow()
         now = self._motion.trajectory.at(np.array([t]))
-        frames = placements(self._motion.trajectory.robot, now.q, now.qdot)
-        self._state.content = tables.state_table(
-            self._motion.trajectory, now, frames.tool[0], float(frames.tool_speed[0])
-        )
+        self._state.content = tables.state_table(self._motion.trajectory, now)
         for chart in self._charts:
             chart.mark(t)
 

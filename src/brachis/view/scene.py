@@ -129,7 +129,7 @@ class Scene:
 
     def _draw_trace(self) -> None:
         """Draw the way of the tool, coloured by its speed."""
-        speed, segments = self._motion.frames.tool_speed, _segments(self._motion.frames.tool)
+        speed, segments = self._motion.samples.tool_speed, _segments(self._motion.frames.tool)
         parts = 0.5 * (speed[:-1] + speed[1:]) / max(float(speed.max()), 1e-9)
         shades = np.round(parts * (_SHADES - 1)).astype(int)
         colours = speed_colours(np.linspace(0.0, 1.0, _SHADES))

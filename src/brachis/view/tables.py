@@ -7,8 +7,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from brachis.attempt import coordinates
 from brachis.search.record import SAME_MOTION
 from brachis.trajectory import Samples, Trajectory
@@ -18,7 +16,7 @@ _MANY = 60
 _CELL = "padding:0 0.4em;white-space:nowrap"
 
 
-def state_table(trajectory: Trajectory, now: Samples, tool: np.ndarray, speed: float) -> str:
+def state_table(trajectory: Trajectory, now: Samples) -> str:
     """Time, path coordinate, tool, and every joint's position, speed and torque at one instant, with units.
 
     Parameters
@@ -26,15 +24,11 @@ def state_table(trajectory: Trajectory, now: Samples, tool: np.ndarray, speed: f
     trajectory : Trajectory
     now : Samples
         At one time.
-    tool : (3,) ndarray
-        Position of the tool, m.
-    speed : float
-        Of the tool, m/s.
     """
-    place = ", ".join(f"{value:.4f}" for value in tool)
+    place = ", ".join(f"{value:.4f}" for value in now.tool_position[0])
     head = _paragraph(
         f"t = {now.t[0]:.4f} s of {trajectory.t_end:.4f} s, s = {now.s[0]:.4f}",
-        f"tool at {place} m, {speed:.3f} m/s",
+        f"tool at {place} m, {now.tool_speed[0]:.3f} m/s",
     )
     rows = []
     for joint, (name, unit) in enumerate(zip(trajectory.joint_names, trajectory.robot.position_units, strict=True)):

@@ -1,0 +1,69 @@
+"""Dotted keys."""
+
+from __future__ import annotations
+
+import pytest
+
+from brachis.errors import TaskError
+from brachis.task import load_task, read_assignment, set_key, with_keys
+
+TASK = {
+    "brachis": 1,
+    "start": {"joints": [0.1, 0.2, 0.3]},
+    "task_space": ["x", "y"],
+    "path": [{"line": {"by": [1.0, 0.0]}}, {"line": {"by": [0.0, 1.0]}}],
+}
+
+
+@pytest.mark.parametrize("key", ["path.1.line.by", "path[1].line.by"])
+def test_lists_are_indexed(key):
+    changed = with_keys(TASK, {key: [2.0, 2.0]})
+    assert changed["path"] == [{"line": {"by": [1.0, 0.0]}}, {"line": {"by": [2.0, 2.0]}}]
+    assert TASK["path"][1] == {"line": {"by": [0.0, 1.0]}}
+
+
+def test_absent_and_null_mappings_are_made():
+    task = {"robot": {"limits": None}}
+    set_key(task, "robot.limits.torque", 5)
+    set_key(task, "spline.degree", 4)
+    assert task == {"robot": {"limits": {"torque": 5}}, "spline": {"degree": 4}}
+
+
+@pytest.mark.parametrize(
+    ("key", "expected"),
+    [
+        ("path.2.line", ["path is a list of 2", "path.0 to path.1"]),
+        ("path.last", ["path.last", "path.0 to path.1"]),
+        ("brachis.version", ["brachis has no keys", "found 1", "Set brachis itself"]),
+        ("spline..degree", ["spline..degree", "joined by dots"]),
+        ("", ["joined by dots"]),
+    ],
+)
+def test_ways_that_lead_nowhere(key, expected):
+    with pytest.raises(TaskError) as caught:
+        with_keys(TASK, {key: 1})
+    assert all(part in str(caught.value) for part in expected)
+
+
+def test_unknown_keys_are_named_with_their_alternatives():
+    with pytest.raises(TaskError, match=r"spline.intervls: unknown key.*allowed: .*Did you mean 'intervals'"):
+        load_task(with_keys(TASK, {"spline.intervls": 40}))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("spline.intervals=40", ("spline.intervals", 40)),
+        ("robot.limits.velocity = null", ("robot.limits.velocity", None)),
+        ("tool_limits={speed: 1e-1}", ("tool_limits", {"speed": 0.1})),
+        ("a=b=c", ("a", "b=c")),
+    ],
+)
+def test_values_are_yaml(text, expected):
+    assert read_assignment(text) == expected
+
+
+@pytest.mark.parametrize("text", ["spline.intervals", "start.joints=[1, 2"])
+def test_what_is_no_assignment(text):
+    with pytest.raises(TaskError, match=r"key=value|value of start.joints: line 1.*not valid YAML"):
+        read_assignment(text)
