@@ -25,7 +25,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "verify": ("brachis verify out/result.npz",),
     "export": ("brachis export out/result.npz --csv out/motion.csv --dt 0.004",),
     "plot": ("brachis plot out/result.npz --kind torques --out out/torques.svg",),
-    "view": ("brachis view out", "brachis view out/result.npz --port 8090 --no-browser"),
+    "view": ("brachis view out", "brachis view out/result.npz --port 0 --no-browser"),
     "inspect": ("brachis inspect task.yaml", "brachis inspect tx90l_rail --task-space pose"),
     "compose": ("brachis compose iiwa14 --range -2 2 --velocity 2 --force 1500 --mass 50 --out cell.urdf",),
     "schema": ("brachis schema --out task.schema.json",),

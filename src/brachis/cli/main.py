@@ -210,7 +210,10 @@ def view(
     port: Port = None,
     browser: Browser = True,
 ) -> None:
-    """Show a saved motion in the browser, until Ctrl-C: robot, path, ghost postures, and plots that follow a slider."""
+    """Show a saved motion in the browser.
+
+    Robot, path, tool trace and ghost postures, with plots over the limits that follow a slider. Ctrl-C ends it.
+    """
     with interrupts.postponed():
         from brachis.cli import viewing  # noqa: PLC0415
 
