@@ -61,6 +61,7 @@ ORDER = (
     "plots",
     "export",
     "report",
+    "view",
     "result",
     "planner",
     "many",

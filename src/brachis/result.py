@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from brachis.bottleneck import BottleneckReport
     from brachis.report import Report
+    from brachis.view import Viewer
 
 CANDIDATES = "candidates"
 
@@ -178,6 +179,11 @@ class Result(Summary):
     def solver_report(self) -> SolverReport:
         """Report of the solve that gave the trajectory."""
         return self.attempt.reports[-1]
+
+    def view(self, *, host: str = "127.0.0.1", port: int | None = None, block: bool | None = None) -> Viewer:
+        """Show the motion and the list of candidates in the browser; as `Trajectory.view`."""
+        candidates = [candidate.to_dict() for candidate in self.candidates]
+        return self.trajectory.view(candidates, verified=self.verified, host=host, port=port, block=block)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures of the plan as plain data for JSON."""

@@ -31,6 +31,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "compare": ("brachis compare out/motion.csv --robot task.yaml",),
     "plot": ("brachis plot out/result.npz --kind torques --out out/torques.svg",),
     "report": ("brachis report out/result.npz", "brachis report out/result.npz --title 'cell 3' --out out/cell3.html"),
+    "view": ("brachis view out", "brachis view out/result.npz --port 0 --no-browser"),
     "inspect": ("brachis inspect task.yaml", "brachis inspect tx90l_rail --task-space pose"),
     "compose": ("brachis compose iiwa14 --range -2 2 --velocity 2 --force 1500 --mass 50 --out cell.urdf",),
     "schema": ("brachis schema --out task.schema.json", "brachis schema --of trajectory"),

@@ -31,6 +31,15 @@ TaskFile = Annotated[Path, typer.Argument(help="Task file (YAML).", metavar="TAS
 ResultFile = Annotated[
     Path, typer.Argument(help="Result file (npz) written by 'brachis plan --out'.", metavar="RESULT")
 ]
+Host = Annotated[
+    str, typer.Option(help="Address that the viewer listens on; 0.0.0.0 lets other machines look.", metavar="ADDRESS")
+]
+Port = Annotated[
+    int | None, typer.Option(help="Port of the viewer; 0 for any free one. Default: the first free one from 8080 on.")
+]
+Browser = Annotated[
+    bool, typer.Option("--browser/--no-browser", help="Open the browser, where there is a screen and a terminal.")
+]
 Strict = Annotated[
     bool,
     typer.Option("--strict", help="Refuse figures that are hardly meant, such as degrees for rad, instead of warning."),
@@ -86,6 +95,7 @@ def plan(
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
     changes: Changes = None,
+    view: Annotated[bool, typer.Option("--view", help="Show the motion in the browser, until Ctrl-C.")] = False,
     strict: Strict = False,
     json: Json = False,
 ) -> None:
@@ -93,7 +103,9 @@ def plan(
     with interrupts.postponed():
         from brachis.cli import planning  # noqa: PLC0415
 
-    raise typer.Exit(planning.plan_command(task, changes or [], urdf=urdf, out=out, strict=strict, as_json=json))
+    raise typer.Exit(
+        planning.plan_command(task, changes or [], urdf=urdf, out=out, view=view, strict=strict, as_json=json)
+    )
 
 
 @app.command()
@@ -223,6 +235,26 @@ def report(
         from brachis.cli import report as command  # noqa: PLC0415
 
     raise typer.Exit(command.report_command(result, out=out, title=title))
+
+
+@app.command()
+def view(
+    result: Annotated[
+        Path,
+        typer.Argument(help="Result file (npz) written by 'brachis plan --out', or the folder.", metavar="RESULT"),
+    ],
+    host: Host = "127.0.0.1",
+    port: Port = None,
+    browser: Browser = True,
+) -> None:
+    """Show a saved motion in the browser.
+
+    Robot, path, tool trace and ghost postures, with plots over the limits that follow a slider. Ctrl-C ends it.
+    """
+    with interrupts.postponed():
+        from brachis.cli import viewing  # noqa: PLC0415
+
+    viewing.view_command(result, host=host, port=port, browser=browser)
 
 
 @app.command()

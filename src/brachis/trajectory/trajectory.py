@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +27,8 @@ from brachis.trajectory.tool import tool_motion
 if TYPE_CHECKING:
     import pandas as pd
     from scipy.interpolate import BPoly, BSpline
+
+    from brachis.view import Viewer
 
 CONTINUOUS_TORQUE = 3
 """Least B-spline degree that gives continuous acceleration, and so torque."""
@@ -249,6 +252,47 @@ class Trajectory(Summary):
             **({"recovered from": self.recovered.source} if self.recovered else {}),
             "splines": f"degree {self.degree}, {len(self.knots) - 2 * self.degree - 1} intervals",
         }
+
+    def view(
+        self,
+        candidates: Sequence[Mapping[str, Any]] = (),
+        *,
+        verified: bool | None = None,
+        host: str = "127.0.0.1",
+        port: int | None = None,
+        block: bool | None = None,
+    ) -> Viewer:
+        """Show the motion in the browser: robot, path, ghost postures, and plots that follow a slider.
+
+        Needs the extra ``view``.
+
+        Parameters
+        ----------
+        candidates : sequence of mapping, optional
+            What the search looked at, as `Result.to_dict` lists it.
+        verified : bool, optional
+            Whether the motion passed the verification, where that is known.
+        host : str, optional
+            Address that the viewer listens on; by default nobody but this machine reaches it.
+        port : int, optional
+            0 takes any free port; the first free one from 8080 on if left out.
+        block : bool, optional
+            Whether to wait until Ctrl-C. If left out, a script waits, an interactive session or a notebook does not.
+
+        Returns
+        -------
+        brachis.view.Viewer
+            With its ``url``; ``stop()`` ends it.
+
+        Raises
+        ------
+        InputError
+            Host or port cannot be listened on.
+        NotInstalledError
+            viser is not installed.
+        """
+        viewer = importlib.import_module("brachis.view")  # a later stage, which knows trajectories
+        return viewer.open_viewer(self, candidates, verified=verified, host=host, port=port, block=block)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file with all that is needed to load and verify the trajectory.
