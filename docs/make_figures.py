@@ -22,6 +22,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import brachis
+from brachis.comparison import plot_today
 from brachis.plots import (
     plot_candidates,
     plot_comparison,
@@ -77,9 +78,8 @@ def scara_line() -> Planned:
 def scara_table() -> Planned:
     """Draw the paper's table."""
     results = load("examples/02_scara_table.py").plan_all()
-    save(
-        plot_comparison([(float(angle), joint, each.t_end) for (angle, joint), each in results.items()]), "scara_table"
-    )
+    rows = [(float(angle), joint, each.t_end) for (angle, joint), each in results.items()]
+    save(plot_comparison(rows, "direction of the path", "\N{DEGREE SIGN}"), "scara_table")
     return {f"{angle} deg, {joint}": each for (angle, joint), each in results.items() if angle == 90}  # noqa: PLR2004
 
 
@@ -149,6 +149,13 @@ def joint_path() -> Planned:
     return {"brachis": result}
 
 
+def today() -> Planned:
+    """Draw a motion that runs today beside the one that is planned along its path."""
+    found = load("examples/12_today.py").main()
+    save(plot_today(found), "today")
+    return {"planned": found.result}
+
+
 def crane() -> Planned:
     """Draw the motion with a plug-in's closed form."""
     family = load("examples/ik_plugin/src/brachis_polar/__init__.py").polar
@@ -180,6 +187,7 @@ EXAMPLES: dict[str, Callable[[], Planned]] = {
     "09": payload,
     "10": periodic,
     "11": joint_path,
+    "12": today,
     "ik_plugin": crane,
     "limit_plugin": coupled,
 }

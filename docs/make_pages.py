@@ -22,6 +22,7 @@ PICTURES = {
     "09": "payload.png",
     "10": "periodic_circle.gif",
     "11": "joint_path.png",
+    "12": "today.png",
     "ik_plugin": "crane.png",
     "limit_plugin": "coupled.png",
 }

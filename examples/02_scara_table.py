@@ -67,7 +67,7 @@ def main() -> None:
         from brachis.plots import plot_comparison, save_figure  # noqa: PLC0415  (only when a figure is wanted)
 
         rows = [(float(angle), joint, result.t_end) for (angle, joint), result in results.items()]
-        save_figure(plot_comparison(rows), sys.argv[1])
+        save_figure(plot_comparison(rows, "direction of the path", "\N{DEGREE SIGN}"), sys.argv[1])
         print(f"wrote {sys.argv[1]}")
     if verified < len(results):
         sys.exit(1)

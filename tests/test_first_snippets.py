@@ -13,6 +13,7 @@ import pytest
 
 import brachis
 from brachis.errors import LimitError, TaskError, UnknownNameError
+from brachis.robot import bind
 from brachis.task import (
     BoundarySettings,
     LimitKeywords,
@@ -147,6 +148,14 @@ def test_a_robot_with_other_limits_keeps_the_rest():
         robot.with_limits(torque={"joint1": 3.0})
     with pytest.raises(LimitError, match="positive"):
         robot.with_limits(torque=-3.0)
+
+
+def test_a_robot_whose_tool_rolls_may_have_other_limits():
+    robot, _ = bind(brachis.robots.iiwa14, "pose_free_roll")
+    changed = robot.with_limits(velocity=1.0)
+    assert changed.rolls_freely
+    assert changed.limits.velocity.tolist() == [1.0] * 7 + [np.inf]
+    assert not robot.with_payload(1.0).rolls_freely
 
 
 def test_a_payload_is_carried():

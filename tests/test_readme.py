@@ -6,6 +6,7 @@ import importlib.util
 import os
 import re
 import shlex
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -62,10 +63,23 @@ def test_commands_run(clone):
     assert len(lines) >= 6
     environment = {**os.environ, "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
     for line in lines:
+        if "view" in line:
+            look(shlex.split(line), clone, environment)
+            continue
         done = subprocess.run(shlex.split(line), cwd=clone, env=environment, capture_output=True, text=True)  # noqa: PLW1510
         assert done.returncode == 0, f"{line}: {done.stderr}"
     assert (clone / "out/motion.csv").stat().st_size > 1000
     assert (clone / "out/torques.pdf").read_bytes().startswith(b"%PDF")
+
+
+def look(command: list[str], folder: Path, environment: dict[str, str]) -> None:
+    """Start a viewer, and stop it once it says where to look."""
+    if importlib.util.find_spec("viser") is None:
+        return
+    with subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True) as viewer:
+        assert any("look at http://127.0.0.1:" in line for line in viewer.stdout)
+        viewer.send_signal(signal.SIGINT)
+    assert viewer.returncode == 0
 
 
 def test_task_commands_exist():
@@ -213,6 +227,16 @@ def test_example_11():
         r"^    (?:brachis|toppra): +([0-9.]+) s", (ROOT / "docs/from_toppra.md").read_text(), re.MULTILINE
     )
     assert [float(each) for each in printed] == pytest.approx([result.t_end, least], abs=5e-4)
+
+
+def test_example_12(tmp_path):
+    found = load(ROOT / "examples/12_today.py").main(tmp_path / "today.png")
+    assert found.result.verified
+    page = (ROOT / "docs/today.md").read_text()
+    printed = re.search(r"# ([0-9.]+) % faster: ([0-9.]+) s instead of ([0-9.]+) s", page).groups()
+    ours = [100 * found.saved, found.result.t_end, found.today.t_end]
+    assert [float(each) for each in printed] == pytest.approx(ours, abs=0.1)
+    assert (tmp_path / "today.png").stat().st_size > 1000
 
 
 def test_published_figure_lies_between_16_and_17_intervals():

@@ -70,7 +70,7 @@ def test_notebooks_show_a_figure_beside_a_table_and_figures_as_pictures(result):
         (np.arange(3), "[0, 1, 2]"),
         (list(range(100)), "100 items"),
         ({"a": 1}, "a: 1"),
-        ("x" * 500 + "\n", "x" * 70 + "... (501 characters)"),
+        ("x" * 500 + "\n", "x" * 84 + "... (501 characters)"),
     ],
 )
 def test_values_are_shortened(value, text):

@@ -12,6 +12,7 @@ A path             Line, Arc, Circle, Helix, Spline, joined by +; fit_path, bspl
 A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (those that come along)
 A task             Task, load_task; examples (task files that come along)
 What comes out     Result, Trajectory, Samples, Attempt, Verification, BottleneckReport
+What runs today    import_motion, from a CSV file; compare it with a plan along its path: Comparison
 To look at it      Result.plot, plots, Result.bottleneck, bottleneck, verify_trajectory, export
 What goes wrong    errors; BrachisError, InputError, PlanningError, PlausibilityWarning
 To extend it       ik (closed forms), limits, compose (arms on rails), TaskMap, task_map_of
@@ -34,9 +35,12 @@ if TYPE_CHECKING:
     from brachis import ik as ik
     from brachis import limits as limits
     from brachis import plots as plots
+    from brachis import report as report
     from brachis import robots as robots
     from brachis.attempt import Attempt as Attempt
     from brachis.bottleneck import BottleneckReport as BottleneckReport
+    from brachis.comparison import Comparison as Comparison
+    from brachis.comparison import compare as compare
     from brachis.errors import BrachisError as BrachisError
     from brachis.errors import InputError as InputError
     from brachis.errors import PlanningError as PlanningError
@@ -45,6 +49,7 @@ if TYPE_CHECKING:
     from brachis.planner import plan as plan
     from brachis.planner import transcribe as transcribe
     from brachis.plausibility import PlausibilityWarning as PlausibilityWarning
+    from brachis.recording import import_motion as import_motion
     from brachis.result import Result as Result
     from brachis.robot import Robot as Robot
     from brachis.robot import TaskMap as TaskMap
@@ -66,13 +71,14 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_MODULES = ("bottleneck", "compose", "errors", "examples", "export", "ik", "limits", "plots", "robots")
+_MODULES = ("bottleneck", "compose", "errors", "examples", "export", "ik", "limits", "plots", "report", "robots")
 _HOME = {
     "Arc": "task.constructors",
     "Attempt": "attempt",
     "BottleneckReport": "bottleneck",
     "BrachisError": "errors",
     "Circle": "task.constructors",
+    "Comparison": "comparison",
     "Helix": "task.constructors",
     "InputError": "errors",
     "LimitSpec": "task",
@@ -88,7 +94,9 @@ _HOME = {
     "Trajectory": "trajectory",
     "Verification": "verify",
     "bspline_segment": "path",
+    "compare": "comparison",
     "fit_path": "task",
+    "import_motion": "recording",
     "load_task": "task",
     "plan": "planner",
     "plan_many": "many",

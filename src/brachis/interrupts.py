@@ -100,6 +100,15 @@ def heard() -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def expected() -> Iterator[None]:
+    """Let a press end this block, which is how it is meant to end, and nothing else."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        forget()
+
+
+@contextlib.contextmanager
 def postponed() -> Iterator[None]:
     """Let a press wait for the end of this block, which raises KeyboardInterrupt then.
 

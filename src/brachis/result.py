@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from brachis import bottleneck, plots
+from brachis import bottleneck, plots, report
 from brachis.attempt import Attempt
 from brachis.errors import UnknownNameError
 from brachis.least_motion import LeastMotion
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from brachis.bottleneck import BottleneckReport
+    from brachis.report import Report
+    from brachis.view import Viewer
 
 CANDIDATES = "candidates"
 
@@ -114,6 +116,24 @@ class Result(Summary):
             raise UnknownNameError("plot", kind, (*plots.PLOTS, CANDIDATES), where="kind")
         return plots.PLOTS[kind](self.trajectory)
 
+    def report(self, path: str | os.PathLike[str] | None = None) -> Report:
+        """Make a page from which a person decides whether to run the motion; see `brachis.report.make_report`.
+
+        Parameters
+        ----------
+        path : path, optional
+            HTML file to write.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written; or Jinja2 or Plotly is not installed (`NotInstalledError`).
+        """
+        page = report.make_report(self)
+        if path is not None:
+            page.save(path)
+        return page
+
     def bottleneck(self, *, check: bool = False, reference: bool = False) -> BottleneckReport:
         """Find out what holds the motion back; see `brachis.bottleneck.report`."""
         return bottleneck.report(self, check=check, reference=reference)
@@ -159,6 +179,11 @@ class Result(Summary):
     def solver_report(self) -> SolverReport:
         """Report of the solve that gave the trajectory."""
         return self.attempt.reports[-1]
+
+    def view(self, *, host: str = "127.0.0.1", port: int | None = None, block: bool | None = None) -> Viewer:
+        """Show the motion and the list of candidates in the browser; as `Trajectory.view`."""
+        candidates = [candidate.to_dict() for candidate in self.candidates]
+        return self.trajectory.view(candidates, verified=self.verified, host=host, port=port, block=block)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures of the plan as plain data for JSON."""

@@ -8,7 +8,7 @@ from html import escape
 from typing import Any
 
 COLUMNS, LINES = 100, 22
-_ROOM = 90
+_ROOM = 104
 """Characters of one value."""
 _ITEMS = 8
 

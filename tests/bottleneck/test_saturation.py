@@ -43,7 +43,7 @@ def of(found, joint, kind):
 
 def test_full_force_for_a_part_of_the_time(made):
     trajectory = made([0.0, 0.3 * T, T], [LIMIT, 0.0, 0.0], [LIMIT, LIMIT, 0.0])
-    entry = of(saturations(trajectory), "j1", "torque")
+    entry = of(saturations(trajectory), "j1", "force")
     assert entry.share == pytest.approx(0.3, abs=1e-12)
     (stretch,) = entry.active
     assert (stretch.begin, stretch.end, stretch.side) == (0.0, pytest.approx(0.3 * T), "upper")
@@ -52,7 +52,7 @@ def test_full_force_for_a_part_of_the_time(made):
 
 def test_both_directions_count(made):
     turn = [0.0, 0.25 * T, 0.75 * T, T]
-    entry = of(saturations(made(turn, [0.0, LIMIT, -LIMIT, 0.0], [0.0, 0.0, LIMIT, -LIMIT])), "j1", "torque")
+    entry = of(saturations(made(turn, [0.0, LIMIT, -LIMIT, 0.0], [0.0, 0.0, LIMIT, -LIMIT])), "j1", "force")
     assert entry.share == pytest.approx(0.75, abs=1e-12)
     assert [stretch.side for stretch in entry.active] == ["upper", "lower"]
     assert entry.active[1].begin == entry.active[0].end == pytest.approx(0.75 * T)
@@ -60,17 +60,41 @@ def test_both_directions_count(made):
 
 def test_the_threshold_is_met_between_grid_points(made):
     ramp = made([0.0, T], [0.0, LIMIT], [0.0, LIMIT])
-    assert of(saturations(ramp), "j1", "torque").share == pytest.approx(1e-3, rel=1e-6)
-    half = of(saturations(ramp, threshold=0.4321), "j1", "torque")
+    assert of(saturations(ramp), "j1", "force").share == pytest.approx(1e-2, rel=1e-6)
+    half = of(saturations(ramp, threshold=0.4321), "j1", "force")
     assert half.share == pytest.approx(1.0 - 0.4321, rel=1e-9)
     assert half.active[0].begin == pytest.approx(0.4321 * T)
 
 
 def test_below_the_threshold_nothing_is_active(made):
-    trajectory = made([0.0, T], [0.998 * LIMIT] * 2, [0.998 * LIMIT] * 2)
-    entry = of(saturations(trajectory), "j1", "torque")
+    trajectory = made([0.0, T], [0.989 * LIMIT] * 2, [0.989 * LIMIT] * 2)
+    entry = of(saturations(trajectory), "j1", "force")
     assert (entry.active, entry.share) == ((), 0.0)
-    assert entry.peak == pytest.approx(0.998)
+    assert entry.peak == pytest.approx(0.989)
+
+
+def rippling(made, lowest):
+    """A force at its limit with one dip in the middle of the motion."""
+    times, forces = [0.0, 0.4 * T, 0.5 * T, 0.6 * T, T], np.array([1.0, 1.0, lowest, 1.0, 1.0]) * LIMIT
+    return of(saturations(made(times, forces, forces)), "j1", "force")
+
+
+def test_ripple_interrupts_no_stretch(made):
+    entry = rippling(made, 0.955)
+    assert [(stretch.begin, stretch.end) for stretch in entry.active] == [(0.0, T)]
+    assert entry.share == 1.0
+
+
+def test_a_deeper_dip_does(made):
+    entry = rippling(made, 0.9)
+    assert len(entry.active) == 2
+    below = 2.0 * 0.1 * 0.9  # each flank is 0.1 of the time long and below the threshold for nine tenths of it
+    assert entry.share == pytest.approx(1.0 - below)
+
+
+def test_a_motion_near_its_limit_that_never_reaches_it_does_not_count(made):
+    times, forces = [0.0, 0.5 * T, T], np.array([0.96, 0.985, 0.96]) * LIMIT
+    assert of(saturations(made(times, forces, forces)), "j1", "force").active == ()
 
 
 def test_positions_are_measured_by_their_distance_from_an_end(made):
@@ -91,8 +115,8 @@ def test_unlimited_joints_are_left_out(made):
     limits = trajectory.robot.limits.with_magnitudes(torque=np.array([FORCE, np.inf]))
     trajectory = dataclasses.replace(trajectory, robot=dataclasses.replace(trajectory.robot, limits=limits))
     names = [str(label) for label in limit_ratios(trajectory).labels]
-    assert "j1 torque" in names
-    assert "j2 torque" not in names
+    assert "j1 force" in names
+    assert "j2 force" not in names
     assert not [name for name in names if name.endswith("acceleration")]
 
 

@@ -28,9 +28,9 @@ def test_time_falls_with_the_root_of_the_force(slide, rest, degree):
     # t = 2 sqrt(m L / F) times a factor of the spline alone: d t / d ln F = -t / 2 exactly.
     result = slide(rest=rest, degree=degree)
     found, answer = found_of(result), result.solver_report.objective
-    assert found.of("j1", "torque").change(1.0) == pytest.approx(-0.5 * answer, rel=1e-5)
-    assert found.of("j1", "torque").derivative == pytest.approx(-0.5 * answer / FORCE, rel=1e-5)
-    assert [entry.change(1.0) for entry in found.limits if str(entry.label) != "j1 torque"] == [0.0] * 7
+    assert found.of("j1", "force").change(1.0) == pytest.approx(-0.5 * answer, rel=1e-5)
+    assert found.of("j1", "force").derivative == pytest.approx(-0.5 * answer / FORCE, rel=1e-5)
+    assert [entry.change(1.0) for entry in found.limits if str(entry.label) != "j1 force"] == [0.0] * 7
     assert found.limits[0].label.subject == "j1"
     assert found.reliable
 
@@ -40,7 +40,7 @@ def test_trapezoid(slide):
     result = slide(intervals=40, robot={"limits": {"velocity": limit}})
     found = found_of(result)
     ramp = limit * CARRIED / FORCE  # t = L / v + v m / F, but for the corners that a spline rounds
-    force, speed = found.of("j1", "torque").change(1.0), found.of("j1", "velocity").change(1.0)
+    force, speed = found.of("j1", "force").change(1.0), found.of("j1", "velocity").change(1.0)
     assert force == pytest.approx(-ramp, rel=0.1)
     assert speed == pytest.approx(ramp - LENGTH / limit, rel=0.1)
     # The same motion k times as fast needs k times the velocity and k^2 times the force.
@@ -66,8 +66,8 @@ def test_lifting_against_gravity(slide):
         return np.sqrt(2.0 * LENGTH * (up + down) / (up * down))
 
     exact = (best(force + 1e-4) - best(force - 1e-4)) / 2e-4
-    assert found.of("j2", "torque").derivative == pytest.approx(exact, rel=0.02)
-    assert found.of("j2", "torque").label.unit == "N"
+    assert found.of("j2", "force").derivative == pytest.approx(exact, rel=0.02)
+    assert found.of("j2", "force").label.unit == "N"
 
 
 def held(slide, half):
@@ -142,7 +142,7 @@ def test_a_solver_without_multipliers(slide):
     assert not result.solver_report.multipliers.any()
     found = found_of(result)
     assert found.source == "least squares"
-    assert found.of("j1", "torque").change(1.0) == pytest.approx(-0.5 * result.solver_report.objective, rel=1e-3)
+    assert found.of("j1", "force").change(1.0) == pytest.approx(-0.5 * result.solver_report.objective, rel=1e-3)
 
 
 def test_an_answer_that_is_no_optimum_is_told(scara):

@@ -35,6 +35,7 @@ def test_help_of_every_command_has_an_example(command, option, run):
 
 def test_examples_work_in_this_order(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("brachis.view.Viewer.wait", lambda _viewer: None)  # for Ctrl-C
     (tmp_path / "out").mkdir()
     assert set(EXAMPLES) == {"", *COMMANDS}
     assert {line.split("  #")[0].strip() for line in EXAMPLES[""]} <= {*EXAMPLES["new"], *EXAMPLES["plan"]}

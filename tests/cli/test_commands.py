@@ -268,7 +268,7 @@ def test_verify_against_a_weaker_robot_fails(run, task, write, tmp_path):
 def test_export(run, planned, tmp_path):
     data, out = planned
     table = tmp_path / "motion.csv"
-    assert run("export", out / "result.npz", "--csv", table, "--dt", 0.01).code == 0
+    assert run("export", out / "result.npz", "--out", table, "--dt", 0.01).code == 0
     with table.open() as stream:
         rows = list(csv.reader(stream))
     names = ["j1", "j2", "j3"]
@@ -295,7 +295,7 @@ def test_plot_of_unknown_kind(run, planned, tmp_path):
 def test_the_saved_motion_is_not_written_over(run, planned):
     saved = planned[1] / "result.npz"
     before = saved.read_bytes()
-    outcome = run("export", saved, "--csv", saved)
+    outcome = run("export", saved, "--out", saved)
     assert outcome.code == 2
     assert "would be written over an input" in outcome.err
     assert run("plot", saved, "--out", saved).code == 2

@@ -53,7 +53,7 @@ def test_plot(kind, run, files, tmp_path):
 
 
 def test_export_verify_inspect(run, files, tmp_path):
-    outcome = run("export", files / "result.npz", "--csv", tmp_path / "motion.csv", "--dt", 0.01)
+    outcome = run("export", files / "result.npz", "--out", tmp_path / "motion.csv", "--dt", 0.01)
     assert outcome.code == 0, outcome.err
     with (tmp_path / "motion.csv").open() as stream:
         rows = list(csv.reader(stream))

@@ -46,9 +46,9 @@ def contents(folder):
 
 
 OVER = {
-    "the task": ("export", "result.npz", "--csv", "task.yaml"),
-    "the waypoints": ("export", "result.npz", "--csv", "points.csv"),
-    "the motion": ("export", "result.npz", "--csv", "result.npz"),
+    "the task": ("export", "result.npz", "--out", "task.yaml"),
+    "the waypoints": ("export", "result.npz", "--out", "points.csv"),
+    "the motion": ("export", "result.npz", "--out", "result.npz"),
     "a figure over the task": ("plot", "result.npz", "--out", "task.yaml"),
     "a figure that is none": ("plot", "result.npz", "--out", "notes.png"),
     "the schema over the task": ("schema", "--out", "task.yaml"),
@@ -82,7 +82,7 @@ def test_a_link_to_an_input_is_that_input(run, saved, tmp_path):
     (tmp_path / "new.csv").symlink_to(saved / "points.csv")
     (tmp_path / "new.urdf").symlink_to(saved / "robot.urdf")
     before = contents(saved)
-    assert run("export", saved / "result.npz", "--csv", tmp_path / "new.csv").code == 2
+    assert run("export", saved / "result.npz", "--out", tmp_path / "new.csv").code == 2
     assert run("compose", saved / "robot.urdf", *RAIL, "--out", tmp_path / "new.urdf").code == 2
     assert contents(saved) == before
 
@@ -91,8 +91,8 @@ def test_older_files_of_the_same_kind_are_written_over(run, saved, tmp_path):
     (tmp_path / "empty.csv").touch()  # as mktemp makes it
     for _ in range(2):
         for command in (
-            ("export", saved / "result.npz", "--csv", tmp_path / "motion.csv", "--dt", 0.1),
-            ("export", saved / "result.npz", "--csv", tmp_path / "empty.csv", "--dt", 0.1),
+            ("export", saved / "result.npz", "--out", tmp_path / "motion.csv", "--dt", 0.1),
+            ("export", saved / "result.npz", "--out", tmp_path / "empty.csv", "--dt", 0.1),
             ("plot", saved / "result.npz", "--kind", "torques", "--out", tmp_path / "figure.svg"),
             ("plot", saved / "result.npz", "--kind", "torques", "--out", tmp_path / "figure.pdf"),
             ("schema", "--out", tmp_path / "schema.json"),
@@ -136,7 +136,7 @@ def test_the_last_row(end, run, saved, tmp_path):
     table = tmp_path / "motion.csv"
     trajectory = brachis.Trajectory.load(saved / "result.npz")
     dt = trajectory.t_end / 7.5
-    assert run("export", saved / "result.npz", "--csv", table, "--dt", dt, "--last", end).code == 0
+    assert run("export", saved / "result.npz", "--out", table, "--dt", dt, "--last", end).code == 0
     with table.open() as stream:
         rows = [[float(cell) for cell in row] for row in list(csv.reader(stream))[1:]]
     assert len(rows) == 9
@@ -144,13 +144,13 @@ def test_the_last_row(end, run, saved, tmp_path):
     np.testing.assert_array_equal(rows[-1][1:4], trajectory.position(trajectory.t_end))
     if end == "hold":
         np.testing.assert_array_equal(rows[-1][4:], np.zeros(9))  # no gravity: nothing holds the posture
-    outcome = run("export", saved / "result.npz", "--csv", table, "--last", "held")
+    outcome = run("export", saved / "result.npz", "--out", table, "--last", "held")
     assert outcome.code == 2
     assert "Did you mean 'hold'?" in outcome.err
 
 
 def test_a_period_longer_than_the_motion_is_warned_of(run, saved, tmp_path):
-    outcome = run("export", saved / "result.npz", "--csv", tmp_path / "motion.csv", "--dt", 4)
+    outcome = run("export", saved / "result.npz", "--out", tmp_path / "motion.csv", "--dt", 4)
     assert outcome.code == 0
     assert "the period of 4 s is longer than the motion, which takes" in outcome.err
     assert len((tmp_path / "motion.csv").read_text().splitlines()) == 3

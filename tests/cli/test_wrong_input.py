@@ -127,7 +127,7 @@ def test_missing_task_file(run, tmp_path):
     assert "nothing.yaml" in outcome.err
 
 
-@pytest.mark.parametrize("command", [("verify",), ("export", "--csv", "x.csv"), ("plot", "--out", "x.png")])
+@pytest.mark.parametrize("command", [("verify",), ("export", "--out", "x.csv"), ("plot", "--out", "x.png")])
 def test_result_that_is_none(command, run, tmp_path):
     broken = tmp_path / "result.npz"
     broken.write_bytes(b"PK no archive")

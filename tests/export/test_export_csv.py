@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brachis.errors import InputError
-from brachis.export import FORMATS, export_csv
+from brachis.export import export_csv
 
 HEADER = "t,q_j1,q_j2,q_j3,qd_j1,qd_j2,qd_j3,qdd_j1,qdd_j2,qdd_j3,tau_j1,tau_j2,tau_j3"
 DT = 0.004
@@ -94,14 +94,3 @@ def test_a_file_that_cannot_be_written_whole_leaves_the_old_one_and_nothing_else
     assert done.stdout == f"{path}: cannot be written; found File too large\n"
     assert path.read_text() == "old"
     assert sorted(tmp_path.iterdir()) == [path, saved]
-
-
-@pytest.mark.parametrize("suffix", sorted(FORMATS))
-def test_every_format_writes_its_file(line_trajectory, tmp_path, suffix):
-    path = tmp_path / f"motion.{suffix}"
-    FORMATS[suffix](line_trajectory, path, 0.1)
-    assert path.stat().st_size > 0
-
-
-def test_csv_is_a_format():
-    assert FORMATS["csv"] is export_csv

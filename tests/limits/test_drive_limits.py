@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import brachis
+from brachis.limits import limits_of
 from brachis.verify import verify_trajectory
 from support.chains import INERTIAL, Joint, chain_urdf
 
@@ -85,7 +86,7 @@ def test_rms_force_makes_a_parabola_of_the_speed(slide):
     assert ratio(result, "rms torque") == pytest.approx(1.0, abs=1e-5)
     check = brachis.bottleneck.report(result, check=True).check
     (entry,) = check.larger()
-    assert str(entry.sensitivity.label) == "j1 rms torque"
+    assert str(entry.sensitivity.label) == "j1 rms force"
     assert entry.deviation < 0.05
 
 
@@ -205,3 +206,20 @@ def test_an_arm_keeps_the_rms_torques_of_its_motors(arm):
     unaware = dataclasses.replace(free.trajectory, task=result.task)
     verification = verify_trajectory(unaware, robot=result.trajectory.robot)
     assert [each.name for each in verification.checks if not each.passed] == ["rms torque ratio"]
+
+
+def test_what_is_a_torque_of_revolute_joints_is_a_force_of_prismatic_ones():
+    limits = brachis.LimitSpec(
+        torque=9.0, rms_torque=8.0, torque_rate=7.0, torque_speed={"j1": [[0, 9], [1, 8], [2, 5]]}
+    )
+    for kind, unit, word in (("revolute", "Nm", "torque"), ("prismatic", "N", "force")):
+        limit = {"lower": -1.0, "upper": 1.0, "velocity": 5.0, "effort": 9.0}
+        joint = Joint(kind, axis=(0.0, 0.0, 1.0), limit=limit, inertial=INERTIAL.format(mass=1.0))
+        robot = brachis.Robot.from_urdf("one.urdf", urdf_text=chain_urdf([joint]), limits=limits)
+        task = brachis.load_task(
+            {"brachis": 1, "start": {"joints": [0.0]}, "task_space": ["x"], "path": [{"line": {"by": [0.1]}}]}
+        )
+        labels = {label for found in limits_of(robot, task) for label in found.labels if label.unit.startswith("N")}
+        assert {label.kind for label in labels} == {word, f"rms {word}", f"{word} rate", f"{word} at speed"}
+        assert {label.unit for label in labels} == {unit, f"{unit}/s"}
+        assert {label.key.split(".")[2] for label in labels} == {"torque", "rms_torque", "torque_rate", "torque_speed"}

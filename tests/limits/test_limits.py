@@ -174,7 +174,7 @@ def test_pairs_of_limits_are_the_bounds_of_what_is_limited(kind):
     figures = {(str(limit.labels[bound.column]), bound.end): bound.figure for bound in limit.bounds}
     first = {"torque": ("j1 torque", -20.0, 60.0), "velocity": ("j2 velocity", -1.0, 4.0)}[kind]
     assert (figures[first[0], "lower"], figures[first[0], "upper"]) == first[1:]
-    assert figures["j3 torque" if kind == "torque" else "j3 velocity", None] > 0.0
+    assert figures["j3 force" if kind == "torque" else "j3 velocity", None] > 0.0
     column = [str(label) for label in limit.labels].index(first[0])
     quantity = same.values(STATES)[:, column] * same.bounds[column].figure
     middle, half = 0.5 * (first[1] + first[2]), 0.5 * (first[2] - first[1])

@@ -20,7 +20,8 @@ def heights(ax):
 
 def test_bars_are_the_end_times():
     rows = paper_rows()
-    (ax,) = plot_comparison(rows).axes
+    (ax,) = plot_comparison(rows, "direction", "°").axes
+    assert ax.get_xlabel() == "direction"
     assert heights(ax) == {joint: [t for _, name, t in rows if name == joint] for joint in JOINTS}
     assert [tick.get_text() for tick in ax.get_xticklabels()] == [f"{a}°" for a in range(0, 360, 45)]
     assert ax.get_ylim()[0] == 0.0
@@ -30,7 +31,25 @@ def test_bars_are_the_end_times():
 def test_angles_are_sorted_and_joints_keep_their_order():
     (ax,) = plot_comparison([(90.0, "b", 3.0), (-45.0, "a", 1.0), (90.0, "a", 2.0), (-45.0, "b", 4.0)]).axes
     assert list(heights(ax).items()) == [("b", [4.0, 3.0]), ("a", [1.0, 2.0])]
-    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["-45°", "90°"]
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["-45", "90"]
+
+
+def test_any_cases_are_compared_in_their_order():
+    rows = [("seam", "rail, j1", 2.0), ("hem", "j1", 1.0), ("seam", "j1", 3.0), ("a circle", "rail, j1", 4.0)]
+    (ax,) = plot_comparison(rows, "path").axes
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["seam", "hem", "a circle"]
+    assert ax.get_xlabel() == "path"
+    assert heights(ax) == {"rail, j1": [2.0, 4.0], "j1": [3.0, 1.0]}
+
+
+def test_numbers_have_their_unit():
+    (ax,) = plot_comparison([(5.0, "stiff", 3.0), (2.5, "stiff", 2.0)], "payload", " kg").axes
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["2.5 kg", "5 kg"]
+
+
+def test_bars_differ_without_colours():
+    (ax,) = plot_comparison(paper_rows()).axes
+    assert len({container[0].get_hatch() for container in ax.containers}) == len(JOINTS)
 
 
 def test_every_value_is_written_above_its_bar_and_the_shortest_is_bold():
@@ -70,7 +89,7 @@ def test_value_labels_are_legible(step):
 
 
 def test_many_angles_go_to_more_panels_in_order():
-    figure = plot_comparison(paper_rows(10))
+    figure = plot_comparison(paper_rows(10), unit="°")
     assert len(figure.axes) > 1
     labels = [tick.get_text() for ax in figure.axes for tick in ax.get_xticklabels()]
     assert labels == [f"{a}°" for a in range(0, 360, 10)]
@@ -80,7 +99,7 @@ def test_many_angles_go_to_more_panels_in_order():
     ("rows", "message", "where"),
     [
         ([], "nothing to compare", "rows"),
-        ([(0.0, "j1", 2.0), (math.inf, "j1", 2.0)], "is not an angle", "rows[1]"),
+        ([(0.0, "j1", 2.0), (math.inf, "j1", 2.0)], "is not a case", "rows[1]"),
         ([(0.0, "j1", 0.0)], "is not an end time", "rows[0]"),
         ([(0.0, "j1", -1.0)], "is not an end time", "rows[0]"),
         ([(0.0, "j1", math.inf)], "is not an end time", "rows[0]"),

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from brachis.plots import plot_motion, plot_overview
+from brachis.plots.style import limit_dashes
 
 INF = float("inf")
 
@@ -11,7 +12,11 @@ def labelled(ax):
 
 
 def levels(ax):
-    return sorted(line.get_ydata()[0] for line in ax.get_lines() if line.get_linestyle() == "--")
+    return sorted(line.get_ydata()[0] for line in drawn_limits(ax))
+
+
+def drawn_limits(ax):
+    return [line for line in ax.get_lines() if line.get_gid() == "limit"]
 
 
 def test_panels_show_the_trajectory(line_trajectory):
@@ -44,7 +49,15 @@ def test_units_of_revolute_and_of_mixed_chains(line_trajectory, spatial_trajecto
     labels = [ax.get_ylabel() for ax in plot_motion(line_trajectory).axes]
     assert labels == ["$q$ (rad)", r"$\dot{q}$ (rad/s)", "$s$", r"$\dot{s}$ (1/s)"]
     labels = [ax.get_ylabel() for ax in plot_motion(spatial_trajectory).axes]
-    assert labels[:2] == ["$q$ (rad, m)", r"$\dot{q}$ (rad/s, m/s)"]
+    assert labels[:4] == ["$q$ (rad)", "$q$ (m)", r"$\dot{q}$ (rad/s)", r"$\dot{q}$ (m/s)"]
+
+
+def test_joints_in_rad_and_in_m_have_axes_of_their_own(spatial_trajectory):
+    turning, sliding = plot_motion(spatial_trajectory).axes[:2]
+    assert list(labelled(turning)) == list(spatial_trajectory.joint_names[1:])
+    assert list(labelled(sliding)) == ["rail"]
+    t, q = labelled(sliding)["rail"].get_data()
+    assert np.array_equal(q, spatial_trajectory.position(t)[:, 0])
 
 
 def test_limits_are_drawn_where_the_joint_comes_near(line_trajectory, with_limits):
@@ -53,7 +66,7 @@ def test_limits_are_drawn_where_the_joint_comes_near(line_trajectory, with_limit
     velocity = np.full(3, INF)
     velocity[fastest] = 1.05 * peak[fastest]
     ax = plot_motion(with_limits(line_trajectory, velocity=velocity)).axes[1]
-    (limit,) = [line for line in ax.get_lines() if line.get_linestyle() == "--"]
+    (limit,) = drawn_limits(ax)
     assert abs(limit.get_ydata()[0]) == velocity[fastest]
     assert limit.get_color() == labelled(ax)[line_trajectory.joint_names[fastest]].get_color()
     assert ax.get_ylim()[0] < limit.get_ydata()[0] < ax.get_ylim()[1]
@@ -66,13 +79,36 @@ def test_far_and_infinite_limits_do_not_squeeze_the_data(line_trajectory, with_l
     assert far.get_ylim() == free.get_ylim()
 
 
-def test_a_limit_that_all_joints_share_is_one_grey_line(line_trajectory, with_limits):
+def test_every_joint_has_its_own_limits_also_where_they_are_the_same(line_trajectory, with_limits):
     limit = 1.02 * np.abs(line_trajectory.qdot).max()
-    ax = plot_motion(with_limits(line_trajectory, velocity=np.full(3, limit))).axes[1]
-    dashed = [line for line in ax.get_lines() if line.get_linestyle() == "--"]
-    assert len(dashed) in {1, 2}
-    assert {line.get_color() for line in dashed} == {"#666666"}
-    assert {abs(line.get_ydata()[0]) for line in dashed} == {limit}
+    open_below = {"velocity_lower": np.full(3, -INF), "velocity_upper": np.full(3, limit)}
+    ax = plot_motion(with_limits(line_trajectory, **open_below)).axes[1]
+    curves = labelled(ax)
+    near = {
+        name for name, line in curves.items() if limit < line.get_ydata().max() + 0.3 * np.ptp(ax.dataLim.intervaly)
+    }
+    drawn = drawn_limits(ax)
+    assert {line.get_color() for line in drawn} == {curves[name].get_color() for name in near}
+    assert levels(ax) == [limit] * len(near)
+
+
+def test_joints_that_share_a_level_share_its_dashes():
+    dashes = [limit_dashes(place, 3) for place in range(3)]
+    inked = [{(offset_of - offset + step) % 18 for step in range(4) for offset_of in [0.0]} for offset, _ in dashes]
+    assert all(sum(pattern) == 18.0 for _, pattern in dashes)
+    assert not inked[0] & inked[1]
+    assert not inked[1] & inked[2]
+    assert not inked[0] & inked[2]
+
+
+def test_limits_that_differ_in_both_directions_are_both_drawn(line_trajectory, with_limits):
+    lower = line_trajectory.qdot.min(axis=0) - np.array([0.01, 0.02, 0.03])
+    upper = line_trajectory.qdot.max(axis=0) + np.array([0.04, 0.05, 0.06])
+    ax = plot_motion(with_limits(line_trajectory, velocity_lower=lower, velocity_upper=upper)).axes[1]
+    assert levels(ax) == sorted([*lower, *upper])
+    for joint, name in enumerate(line_trajectory.joint_names):
+        own = [line.get_ydata()[0] for line in drawn_limits(ax) if line.get_color() == labelled(ax)[name].get_color()]
+        assert sorted(own) == [lower[joint], upper[joint]]
 
 
 def test_position_ranges_are_drawn(line_trajectory, with_limits):

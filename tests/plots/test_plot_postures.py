@@ -1,7 +1,9 @@
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
+from mpl_toolkits.mplot3d import proj3d
 
 from brachis.plots import plot_postures
 from brachis.plots.skeleton import drawing_plane, skeleton
@@ -77,6 +79,23 @@ def test_a_spatial_chain_is_drawn_in_space_with_equal_scales(spatial_trajectory)
     spans = np.ptp([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()], axis=1)
     ratios = np.array(ax._box_aspect) / spans
     np.testing.assert_allclose(ratios, ratios[0])
+
+
+def test_postures_in_space_fill_their_frame_and_nothing_is_cut_off(spatial_trajectory):
+    figure = plot_postures(spatial_trajectory)
+    figure.draw_without_rendering()
+    ax = figure.axes[0]
+    frame, box = ax.get_window_extent(), ax.get_tightbbox()
+    corners = np.array(list(itertools.product(ax.get_xlim(), ax.get_ylim(), ax.get_zlim()))).T
+    across, up, _ = proj3d.proj_transform(*corners, ax.get_proj())
+    places = ax.transData.transform(np.column_stack([across, up]))
+    filled = np.ptp(places, axis=0) / (frame.width, frame.height)
+    assert filled.max() > 0.77
+    assert filled.min() > 0.55
+    assert box.x0 >= 0.0
+    assert box.y0 >= 0.0
+    assert box.x1 <= figure.bbox.x1
+    assert box.y1 <= figure.bbox.y1
 
 
 def test_a_prismatic_joint_is_drawn_from_its_rest_to_where_it_is(spatial_trajectory):

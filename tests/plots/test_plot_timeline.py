@@ -51,6 +51,10 @@ def test_active_stretches_are_marked_where_they_are(line_trajectory):
     assert entry.active
     drawn = spans(ax)[rows(ax).index("j1 torque")]
     np.testing.assert_allclose(sorted(drawn), [(stretch.begin, stretch.end) for stretch in entry.active])
+    marked = sum(end - begin for begin, end in drawn) / line_trajectory.t_end
+    assert marked == pytest.approx(entry.share), "the report's text says what the plot shows"
+    assert 0.5 < entry.share < 0.7
+    assert len(entry.active) < 7
 
 
 def test_time_axis(line_trajectory):

@@ -11,7 +11,7 @@ def lines(ax):
 
 
 def levels(ax):
-    return sorted(line.get_ydata()[0] for line in ax.get_lines() if line.get_linestyle() == "--")
+    return sorted(line.get_ydata()[0] for line in ax.get_lines() if line.get_gid() == "limit")
 
 
 def test_lines_are_the_torques_over_their_limits(line_trajectory, with_limits):
@@ -76,9 +76,28 @@ def test_without_any_torque_limit_the_torques_themselves_are_drawn(line_trajecto
     assert ax.get_ylabel() == r"$\tau$ (Nm)"
 
 
-def test_torque_units_of_mixed_chains(spatial_trajectory, with_limits):
-    ax = plot_torques(with_limits(spatial_trajectory, torque=np.full(7, INF))).axes[0]
-    assert ax.get_ylabel() == r"$\tau$ (Nm, N)"
+def test_torques_and_forces_without_limits_have_axes_of_their_own(spatial_trajectory, with_limits):
+    turning, sliding = plot_torques(with_limits(spatial_trajectory, torque=np.full(7, INF))).axes
+    assert (turning.get_ylabel(), sliding.get_ylabel()) == (r"$\tau$ (Nm)", "$F$ (N)")
+    assert list(lines(sliding)) == ["rail"]
+    assert list(lines(turning)) == list(spatial_trajectory.joint_names[1:])
+
+
+def test_what_pushes_a_prismatic_joint_is_a_force(spatial_trajectory, with_limits):
+    (ax,) = plot_torques(spatial_trajectory).axes
+    assert ax.get_ylabel() == r"$\tau / \tau_\mathrm{max}$, $F / F_\mathrm{max}$"
+    only_rail = with_limits(spatial_trajectory, torque=np.array([50.0, *[INF] * 6]))
+    (ax,) = plot_torques(only_rail).axes
+    assert ax.get_ylabel() == r"$F / F_\mathrm{max}$"
+    assert list(lines(ax)) == ["rail"]
+
+
+def test_torques_are_measured_by_the_limit_of_their_direction(line_trajectory, with_limits):
+    lower, upper = np.array([-20.0, -5.0, -10.0]), np.array([10.0, 20.0, 5.0])
+    trajectory = with_limits(line_trajectory, torque_lower=lower, torque_upper=upper)
+    t, ratio = lines(plot_torques(trajectory).axes[0])["j1"].get_data()
+    tau = trajectory.torque(t)[:, 0]
+    np.testing.assert_allclose(ratio, np.where(tau > 0.0, tau / 10.0, tau / 20.0))
 
 
 @pytest.mark.parametrize("name", ["line_trajectory", "spatial_trajectory"])

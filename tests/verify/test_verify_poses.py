@@ -9,7 +9,7 @@ import pytest
 
 import brachis
 from brachis import Trajectory, verify_trajectory
-from brachis.export import FORMATS
+from brachis.export import export_csv
 from support.spatial import START, rail_arm
 
 
@@ -61,7 +61,7 @@ def test_saved_motions_come_back(motion, tmp_path):
     again = Trajectory.load(tmp_path / "motion.npz")
     assert again.joint_names == motion.joint_names
     assert verify_trajectory(again).passed
-    FORMATS["csv"](again, tmp_path / "motion.csv", 0.01)
+    export_csv(again, tmp_path / "motion.csv", 0.01)
     assert "q_j7" in (tmp_path / "motion.csv").read_text().splitlines()[0]
 
 

@@ -11,12 +11,13 @@ Examples
 from brachis.bottleneck.check import CheckedSensitivity, SensitivityCheck, check_sensitivities
 from brachis.bottleneck.ratios import LimitRatios, limit_ratios
 from brachis.bottleneck.reference import Reference, find_reference
-from brachis.bottleneck.saturation import THRESHOLD, Saturation, Stretch, saturations
+from brachis.bottleneck.saturation import RIPPLE, THRESHOLD, Saturation, Stretch, saturations
 from brachis.bottleneck.saved import solved_again
 from brachis.bottleneck.sensitivities import BranchBoundary, Sensitivities, Sensitivity, sensitivities
 from brachis.bottleneck.whole import BottleneckReport, report
 
 __all__ = [
+    "RIPPLE",
     "THRESHOLD",
     "BottleneckReport",
     "BranchBoundary",

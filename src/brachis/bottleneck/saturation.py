@@ -13,13 +13,15 @@ from brachis.limits import Label, Limit
 from brachis.summary import Summary
 from brachis.trajectory import Trajectory
 
-THRESHOLD = 0.999
-"""A limit is active where the motion is at this part of it or beyond."""
+THRESHOLD = 0.99
+"""A limit is active from where the motion is at this part of it ..."""
+RIPPLE = 0.95
+"""... until it falls below this one: splines ripple on a limit between their knots."""
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stretch of time.
+    """A stretch of time on which a limit is active, ripple included.
 
     Attributes
     ----------
@@ -43,7 +45,7 @@ class Saturation(Summary):
     label : Label
         What is limited.
     share : float
-        Part of the time, 0 to 1.
+        Part of the time, 0 to 1, that the stretches together take.
     peak : float
         Largest ratio to the limit.
     active : tuple of Stretch
@@ -67,7 +69,11 @@ class Saturation(Summary):
 
 
 def saturations(
-    trajectory: Trajectory, limits: Sequence[Limit] | None = None, *, threshold: float = THRESHOLD
+    trajectory: Trajectory,
+    limits: Sequence[Limit] | None = None,
+    *,
+    threshold: float = THRESHOLD,
+    ripple: float = RIPPLE,
 ) -> tuple[Saturation, ...]:
     """Find when every limit is active.
 
@@ -79,23 +85,27 @@ def saturations(
         Those of the trajectory's task if left out.
     threshold : float, optional
         Part of the limit from which on it counts as active.
+    ripple : float, optional
+        Part of the limit above which dips below the threshold count as ripple, which interrupts no stretch.
 
     Returns
     -------
     tuple of Saturation
         Of all limits, those active longest first.
     """
-    return saturations_of(limit_ratios(trajectory, limits), threshold=threshold)
+    return saturations_of(limit_ratios(trajectory, limits), threshold=threshold, ripple=ripple)
 
 
-def saturations_of(ratios: LimitRatios, *, threshold: float = THRESHOLD) -> tuple[Saturation, ...]:
+def saturations_of(
+    ratios: LimitRatios, *, threshold: float = THRESHOLD, ripple: float = RIPPLE
+) -> tuple[Saturation, ...]:
     """As `saturations`, from ratios already computed."""
     found = []
     for label, column in zip(ratios.labels, ratios.values.T, strict=True):
         active = [
             Stretch(begin, end, side)
             for side, sign in (("lower", -1.0), ("upper", 1.0))
-            for begin, end in _stretches(ratios.t, sign * column, threshold)
+            for begin, end in _stretches(ratios.t, sign * column, threshold, ripple)
         ]
         active.sort(key=lambda stretch: stretch.begin)
         duration = sum(stretch.end - stretch.begin for stretch in active)
@@ -104,16 +114,22 @@ def saturations_of(ratios: LimitRatios, *, threshold: float = THRESHOLD) -> tupl
     return tuple(sorted(found, key=lambda entry: (-entry.share, -entry.peak)))
 
 
-def _stretches(t: np.ndarray, values: np.ndarray, threshold: float) -> list[tuple[float, float]]:
-    """Stretches of time on which values, linear between the times (K,), are at the threshold or above."""
-    above = values >= threshold
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], above, [False]]).astype(int)))
-    found: list[tuple[float, float]] = []
-    for first, after in edges.reshape(-1, 2).tolist():
-        begin = _crossing(t, values, first - 1, threshold) if first else float(t[0])
-        end = _crossing(t, values, after - 1, threshold) if after < len(t) else float(t[-1])
-        found.append((begin, end))
-    return found
+def _stretches(t: np.ndarray, values: np.ndarray, threshold: float, ripple: float) -> list[tuple[float, float]]:
+    """Stretches of time on which values, linear between the times (K,), keep to the threshold but for ripple."""
+    above = np.concatenate([[False], values >= threshold, [False]])
+    edges = np.flatnonzero(np.diff(above.astype(int))).reshape(-1, 2)
+    if len(edges) == 0:
+        return []
+    dips = np.array([values[end:begin].min() for end, begin in zip(edges[:-1, 1], edges[1:, 0], strict=True)])
+    apart = dips < ripple
+    firsts, afters = edges[np.append(True, apart), 0], edges[np.append(apart, True), 1]
+    return [
+        (
+            _crossing(t, values, first - 1, threshold) if first else float(t[0]),
+            _crossing(t, values, after - 1, threshold) if after < len(t) else float(t[-1]),
+        )
+        for first, after in zip(firsts.tolist(), afters.tolist(), strict=True)
+    ]
 
 
 def _crossing(t: np.ndarray, values: np.ndarray, before: int, threshold: float) -> float:

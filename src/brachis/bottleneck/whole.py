@@ -29,8 +29,8 @@ class BottleneckReport:
     ----------
     t_end : float
         Of the motion, s.
-    sensitivities : Sensitivities
-        What every limit costs.
+    sensitivities : Sensitivities or None
+        What every limit costs; None of a motion that was not planned, and is no optimum whose multipliers tell.
     saturations : tuple of Saturation
         When every limit is active, those active longest first.
     check : SensitivityCheck or None
@@ -49,7 +49,7 @@ class BottleneckReport:
     """
 
     t_end: float
-    sensitivities: Sensitivities
+    sensitivities: Sensitivities | None
     saturations: tuple[Saturation, ...]
     check: SensitivityCheck | None = None
     reference: Reference | None = None
@@ -72,7 +72,7 @@ class BottleneckReport:
         """Return the figures as plain data for JSON."""
         return {
             "t_end_s": self.t_end,
-            "sensitivities": self.sensitivities.to_dict(),
+            "sensitivities": None if self.sensitivities is None else self.sensitivities.to_dict(),
             "active_from_ratio": THRESHOLD,
             "saturations": [entry.to_dict() for entry in self.saturations],
             "check": None if self.check is None else self.check.to_dict(),
@@ -111,6 +111,12 @@ def report(motion: Result | Trajectory, *, check: bool = False, reference: bool 
     >>> [sensitivity.label.subject for sensitivity in found.sensitivities.limits][0]
     'j1'
     """
+    if isinstance(motion, Trajectory) and motion.recovered is not None:
+        if check or reference:
+            hint = "brachis compare plans the same path; ask for the bottlenecks of that plan"
+            problem = "the motion was not planned: nothing of it can be solved again"
+            raise InputError(problem, where=motion.recovered.source, hint=hint)
+        return BottleneckReport(motion.t_end, None, saturations(motion))
     if isinstance(motion, Trajectory):
         trajectory, refined = motion, solved_again(motion)
     elif motion.attempt.refined is None:

@@ -6,7 +6,7 @@ import math
 
 from brachis.bottleneck.check import CheckedSensitivity, SensitivityCheck
 from brachis.bottleneck.reference import MEANING, Reference
-from brachis.bottleneck.saturation import THRESHOLD, Saturation
+from brachis.bottleneck.saturation import RIPPLE, THRESHOLD, Saturation
 from brachis.bottleneck.sensitivities import BranchBoundary, Sensitivities, Sensitivity
 
 _FRACTION = 0.1
@@ -20,7 +20,7 @@ _MOMENT = 5e-4
 def in_words(
     *,
     t_end: float,
-    sensitivities: Sensitivities,
+    sensitivities: Sensitivities | None,
     saturations: tuple[Saturation, ...],
     check: SensitivityCheck | None,
     reference: Reference | None,
@@ -28,9 +28,10 @@ def in_words(
 ) -> list[str]:
     """Say what a report found, a line each; see `BottleneckReport` for its parts."""
     lines = [
-        *_costs(sensitivities, t_end),
+        *(["the motion was not planned: what a limit costs is not known"] if sensitivities is None else []),
+        *([] if sensitivities is None else _costs(sensitivities, t_end)),
         *([] if check is None else _checked(check)),
-        *_active(saturations),
+        *active_in_words(saturations),
     ]
     if reference is not None:
         lines.append(_reference(reference, t_end))
@@ -110,7 +111,7 @@ def _taken_back(entry: CheckedSensitivity) -> str:
     return f"; other limits take over within the step, which leaves {1e3 * entry.linearised:+.4f} ms"
 
 
-def _active(found: tuple[Saturation, ...]) -> list[str]:
+def active_in_words(found: tuple[Saturation, ...]) -> list[str]:
     """Sentences on the limits that are active for some time."""
     lines = []
     for entry in found:
@@ -120,7 +121,10 @@ def _active(found: tuple[Saturation, ...]) -> list[str]:
             lines.append(f"{entry.label.subject} is at its {entry.label.kind} limit for {share}, {times}")
     if not lines:
         lines = ["nothing stays at a limit"]
-    return [*lines, f"(at its limit: at {100.0 * THRESHOLD:g} % of it or beyond)"]
+    return [
+        *lines,
+        f"(at its limit: at {100.0 * THRESHOLD:g} % of it or beyond, with ripple down to {100.0 * RIPPLE:g} %)",
+    ]
 
 
 def _reference(reference: Reference, t_end: float) -> str:

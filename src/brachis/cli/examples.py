@@ -16,17 +16,24 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "brachis plan task.yaml --out out  # plan, verify, draw",
     ),
     "robots": ("brachis robots", "brachis robots --json"),
-    "new": ("brachis new scara3", "brachis new iiwa14 --out iiwa.yaml"),
+    "new": ("brachis new scara3", "brachis new gantry2 --out gantry.yaml"),
     "plan": (
         "brachis plan task.yaml --out out",
         "brachis plan task.yaml --set search.effort=single --set 'path.0.line.by=[0, 0.4]'",
     ),
     "bottleneck": ("brachis bottleneck task.yaml --set search.effort=single",),
     "verify": ("brachis verify out/result.npz",),
-    "export": ("brachis export out/result.npz --csv out/motion.csv --dt 0.004",),
+    "export": (
+        "brachis export out/result.npz --out out/motion.csv --dt 0.004",
+        "brachis export out/result.npz --out out/motion.gif --dt 0.1",
+    ),
+    "import": ("brachis import out/motion.csv --robot task.yaml --out out/today.npz",),
+    "compare": ("brachis compare out/motion.csv --robot task.yaml",),
     "plot": ("brachis plot out/result.npz --kind torques --out out/torques.svg",),
+    "report": ("brachis report out/result.npz", "brachis report out/result.npz --title 'cell 3' --out out/cell3.html"),
+    "view": ("brachis view out", "brachis view out/result.npz --port 0 --no-browser"),
     "inspect": ("brachis inspect task.yaml", "brachis inspect tx90l_rail --task-space pose"),
     "compose": ("brachis compose iiwa14 --range -2 2 --velocity 2 --force 1500 --mass 50 --out cell.urdf",),
-    "schema": ("brachis schema --out task.schema.json",),
+    "schema": ("brachis schema --out task.schema.json", "brachis schema --of trajectory"),
 }
 """By command; those of the whole program under no name."""

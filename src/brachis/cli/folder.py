@@ -19,12 +19,19 @@ Writer = Callable[[Path], object]
 
 BEGINNINGS = {
     ".csv": (b"t,q_",),
+    ".html": (b"<!doctype html>\n<!-- brachis report -->",),
+    ".gif": (b"GIF8",),
     ".json": (b'{\n  "t_end"', b'{\n  "$schema"'),
+    ".mcap": (b"\x89MCAP0",),
+    ".mp4": (b"\0\0\0\x1cftyp", b"\0\0\0\x20ftyp"),
     ".npz": (b"PK",),
+    ".parquet": (b"PAR1",),
     ".pdf": (b"%PDF",),
     ".png": (b"\x89PNG",),
+    ".script": (b"def brachis_motion():",),
     ".svg": (b"<?xml", b"<svg"),
     ".urdf": (b"<?xml", b"<robot"),
+    ".yaml": (b"# trajectory_msgs/msg/JointTrajectory",),
 }
 """How files of our own begin, by suffix; what begins otherwise is somebody else's and is not written over."""
 

@@ -25,7 +25,6 @@ from brachis.robot.from_task import robot_from_settings
 from brachis.robot.limb import first_limb
 from brachis.robot.task_map.rows import AXES, YAW
 from brachis.robot.urdf import read_file
-from brachis.starter import natural_space
 from brachis.task import LimitSpec, Task
 
 _TASK_FILES = (".yaml", ".yml")
@@ -152,7 +151,7 @@ def _space(text: str) -> str | list[str]:
 
 def _natural(robot: Robot, remarks: list[str]) -> str | list[str]:
     """Choose what the robot can prescribe at most, and say so."""
-    space = natural_space(robot)
+    space = ik.natural_space(robot)
     remarks.append(
         f"task space: {space if isinstance(space, str) else ','.join(space)}; --task-space names another one"
     )

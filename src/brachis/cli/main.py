@@ -20,6 +20,7 @@ from brachis import interrupts
 from brachis.cli.app import app
 from brachis.cli.composition import VectorCommand, compose
 from brachis.cli.output import Json, StandardOutput, open_streams, print_failure, print_usage_error
+from brachis.cli.today import compare, import_
 from brachis.cli.verbosity import Verbosity, chosen
 from brachis.errors import BrachisError
 
@@ -29,6 +30,15 @@ _UsageError = cast("type[Exception]", typer.BadParameter.__bases__[0])
 TaskFile = Annotated[Path, typer.Argument(help="Task file (YAML).", metavar="TASK")]
 ResultFile = Annotated[
     Path, typer.Argument(help="Result file (npz) written by 'brachis plan --out'.", metavar="RESULT")
+]
+Host = Annotated[
+    str, typer.Option(help="Address that the viewer listens on; 0.0.0.0 lets other machines look.", metavar="ADDRESS")
+]
+Port = Annotated[
+    int | None, typer.Option(help="Port of the viewer; 0 for any free one. Default: the first free one from 8080 on.")
+]
+Browser = Annotated[
+    bool, typer.Option("--browser/--no-browser", help="Open the browser, where there is a screen and a terminal.")
 ]
 Strict = Annotated[
     bool,
@@ -85,6 +95,7 @@ def plan(
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
     changes: Changes = None,
+    view: Annotated[bool, typer.Option("--view", help="Show the motion in the browser, until Ctrl-C.")] = False,
     strict: Strict = False,
     json: Json = False,
 ) -> None:
@@ -92,7 +103,9 @@ def plan(
     with interrupts.postponed():
         from brachis.cli import planning  # noqa: PLC0415
 
-    raise typer.Exit(planning.plan_command(task, changes or [], urdf=urdf, out=out, strict=strict, as_json=json))
+    raise typer.Exit(
+        planning.plan_command(task, changes or [], urdf=urdf, out=out, view=view, strict=strict, as_json=json)
+    )
 
 
 @app.command()
@@ -156,21 +169,42 @@ def verify(
 @app.command()
 def export(
     result: ResultFile,
-    csv: Annotated[Path, typer.Option(help="CSV file to write: t, then q_, qd_, qdd_, tau_ of every joint; SI units.")],
-    dt: Annotated[float, typer.Option(help="Period of the controller, s.")] = 0.001,
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="File to write; its suffix says the format: .csv and .parquet (t, then q_, qd_, qdd_, tau_ of every "
+            "joint; SI units), .json, .yaml and .mcap (ROS 2's JointTrajectory), .script (URScript), .gif and .mp4."
+        ),
+    ],
+    form: Annotated[
+        str | None,
+        typer.Option("--format", help="Format, by name: csv, parquet, json, ros2, mcap, urscript, gif or mp4."),
+    ] = None,
+    dt: Annotated[
+        float | None,
+        typer.Option(
+            help="Period, s. Default: 0.001; 0.01 for ROS 2, 0.002 for URScript, 0.04 for animations.",
+            show_default=False,
+        ),
+    ] = None,
     last: Annotated[
-        str,
+        str | None,
         typer.Option(
             help="Where the rows end: exact, at the end time, which need not be a multiple of the period; or hold, at "
-            "the first multiple of it that is not before the end time, with the end posture held at rest."
+            "the first multiple of it that is not before the end time, with the end posture held at rest. Default: "
+            "exact; hold for URScript.",
+            show_default=False,
         ),
-    ] = "exact",
+    ] = None,
+    joints: Annotated[
+        str | None, typer.Option(help="Joints to write, in this order: j1,j2,... Default: all.", show_default=False)
+    ] = None,
 ) -> None:
-    """Sample a saved motion at a controller's rate."""
+    """Sample a saved motion for a controller, or animate it."""
     with interrupts.postponed():
         from brachis.cli import results  # noqa: PLC0415
 
-    results.export_command(result, csv, form="csv", dt=dt, last=last)
+    results.export_command(result, out, form=form, dt=dt, last=last, joints=joints)
 
 
 @app.command()
@@ -186,6 +220,41 @@ def plot(
         from brachis.cli import results  # noqa: PLC0415
 
     results.plot_command(result, out=out, kind=kind)
+
+
+@app.command()
+def report(
+    result: ResultFile,
+    out: Annotated[
+        Path | None, typer.Option(help="HTML file to write; default: beside the result, as result.html.")
+    ] = None,
+    title: Annotated[str | None, typer.Option(help="Title of the page; default: the result's name.")] = None,
+) -> None:
+    """Write a saved motion as one HTML page, from which a person decides whether to run it."""
+    with interrupts.postponed():
+        from brachis.cli import report as command  # noqa: PLC0415
+
+    raise typer.Exit(command.report_command(result, out=out, title=title))
+
+
+@app.command()
+def view(
+    result: Annotated[
+        Path,
+        typer.Argument(help="Result file (npz) written by 'brachis plan --out', or the folder.", metavar="RESULT"),
+    ],
+    host: Host = "127.0.0.1",
+    port: Port = None,
+    browser: Browser = True,
+) -> None:
+    """Show a saved motion in the browser.
+
+    Robot, path, tool trace and ghost postures, with plots over the limits that follow a slider. Ctrl-C ends it.
+    """
+    with interrupts.postponed():
+        from brachis.cli import viewing  # noqa: PLC0415
+
+    viewing.view_command(result, host=host, port=port, browser=browser)
 
 
 @app.command()
@@ -234,17 +303,20 @@ def inspect(
 
 
 app.command(cls=VectorCommand)(compose)
+app.command("import")(import_)
+app.command()(compare)
 
 
 @app.command()
 def schema(
     out: Annotated[Path | None, typer.Option(help="File to write instead of standard output.")] = None,
+    of: Annotated[str, typer.Option(help="Of what: task files, or trajectory (exported as JSON).")] = "task",
 ) -> None:
-    """Print the JSON schema of task files."""
+    """Print the JSON schema of tasks, or of exported JSON."""
     with interrupts.postponed():
         from brachis.cli import results  # noqa: PLC0415
 
-    results.schema_command(out)
+    results.schema_command(out, of)
 
 
 def main() -> None:

@@ -25,9 +25,11 @@ from brachis.cli.output import (
 )
 from brachis.cli.settings import changed_task, urdf_of
 from brachis.cli.tables import Column, print_table
+from brachis.cli.viewing import show
 from brachis.errors import InputError
 from brachis.result import Result
 from brachis.search.record import SAME_MOTION
+from brachis.view import require_viser
 
 _FILES = {
     True: ("result.npz", "result.json", "overview.png", "candidates.png", "fit.png"),
@@ -39,9 +41,11 @@ _MANY = 40
 
 
 def plan_command(
-    task: Path, changes: Sequence[str], *, urdf: Path | None, out: Path | None, strict: bool, as_json: bool
+    task: Path, changes: Sequence[str], *, urdf: Path | None, out: Path | None, view: bool, strict: bool, as_json: bool
 ) -> int:
     """Plan, show, write; returns the exit code."""
+    if view:
+        require_viser()
     if out is not None:
         make_folder(out, (*_FILES[True], *_FILES[False]), (task, urdf))
     with shown_warnings(), progress() as listener:
@@ -58,6 +62,8 @@ def plan_command(
     print_what_was_left(result.undone, interrupted=result.interrupted)
     if not result.verified:
         print_error("the motion found did not pass the verification; it is marked unverified")
+    if view:
+        show(result.trajectory, data["candidates"], verified=result.verified)
     return exit_code(result.verified, failures)
 
 

@@ -27,16 +27,23 @@ def verify_command(result: Path, *, urdf: Path | None, as_json: bool) -> int:
     return 0 if verification.passed else 1
 
 
-def export_command(result: Path, out: Path, *, form: str, dt: float, last: str) -> None:
+def export_command(
+    result: Path, out: Path, *, form: str | None, dt: float | None, last: str | None, joints: str | None
+) -> None:
     """Write a saved motion in one of the formats of `brachis.export.FORMATS`."""
-    from brachis.export import FORMATS  # noqa: PLC0415
+    from brachis import export  # noqa: PLC0415
 
-    trajectory = Trajectory.load(result)
+    chosen, trajectory = export.format_of(out, form), Trajectory.load(result)
+    names = None if joints is None else [name.strip() for name in joints.split(",")]
     write_one(
-        out, lambda path: FORMATS[form](trajectory, path, dt, last=last), (f".{form}",), _sources(result, trajectory)
+        out,
+        lambda path: export.write(trajectory, path, form=form, dt=dt, last=last, joints=names),
+        (chosen.suffix,),
+        _sources(result, trajectory),
     )
-    if dt > trajectory.t_end:
-        print_error(f"the period of {dt:g} s is longer than the motion, which takes {trajectory.t_end:.6g} s")
+    period = chosen.dt if dt is None else dt
+    if period > trajectory.t_end:
+        print_error(f"the period of {period:g} s is longer than the motion, which takes {trajectory.t_end:.6g} s")
     result_console().print(f"wrote {out}")
 
 
@@ -59,9 +66,14 @@ def _sources(result: Path, trajectory: Trajectory) -> list[Path | None]:
     return [result, None if urdf is None else Path(urdf)]
 
 
-def schema_command(out: Path | None) -> None:
-    """Print or write the JSON schema of task files."""
-    text = json_text(json_schema())
+def schema_command(out: Path | None, of: str) -> None:
+    """Print or write the JSON schema of task files or of exported trajectories."""
+    from brachis.export import samples_schema  # noqa: PLC0415
+
+    schemas = {"task": json_schema, "trajectory": samples_schema}
+    if of not in schemas:
+        raise UnknownNameError("schema", of, schemas, where="--of")
+    text = json_text(schemas[of]())
     if out is None:
         sys.stdout.write(text)
         return

@@ -7,24 +7,31 @@ Examples
 True
 """
 
-from __future__ import annotations
-
-import os
-from typing import Protocol
-
 from brachis.export.csv_table import export_csv
-from brachis.trajectory import Trajectory
+from brachis.export.formats import FORMATS, Exporter, Format, format_of, write
+from brachis.export.gif import export_gif
+from brachis.export.json_samples import SCHEMA_ID, export_json, samples_schema
+from brachis.export.mcap_bag import TOPIC, export_mcap
+from brachis.export.mp4 import export_mp4
+from brachis.export.parquet_table import export_parquet
+from brachis.export.ros2_yaml import export_ros2_yaml
+from brachis.export.urscript import export_urscript
 
-
-class Exporter(Protocol):
-    """Writes the samples of a trajectory every `dt` seconds to one file; for `last` see `Trajectory.sample`."""
-
-    def __call__(self, trajectory: Trajectory, path: str | os.PathLike[str], dt: float, *, last: str) -> None:
-        """Write the file."""
-        ...
-
-
-FORMATS: dict[str, Exporter] = {"csv": export_csv}
-"""Exporters by file suffix without the dot."""
-
-__all__ = ["FORMATS", "Exporter", "export_csv"]
+__all__ = [
+    "FORMATS",
+    "SCHEMA_ID",
+    "TOPIC",
+    "Exporter",
+    "Format",
+    "export_csv",
+    "export_gif",
+    "export_json",
+    "export_mcap",
+    "export_mp4",
+    "export_parquet",
+    "export_ros2_yaml",
+    "export_urscript",
+    "format_of",
+    "samples_schema",
+    "write",
+]

@@ -12,6 +12,7 @@ Examples
 from brachis.ik.advice import NO_CLOSED_FORM, missing_eaik
 from brachis.ik.check import check_answers
 from brachis.ik.geometry import ChainGeometry, PosedScrews
+from brachis.ik.natural_space import natural_space
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError, ik_family, margin_gradient
 from brachis.ik.registry import BUILTIN, Candidate, Match, find, find_all
 
@@ -31,4 +32,5 @@ __all__ = [
     "ik_family",
     "margin_gradient",
     "missing_eaik",
+    "natural_space",
 ]

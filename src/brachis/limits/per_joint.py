@@ -13,6 +13,11 @@ from brachis.limits.protocol import Bound, Label, Limit
 from brachis.robot import Robot
 
 
+def in_words(quantity: str, position_unit: str) -> str:
+    """Name a joint's quantity: what is a torque of a revolute joint (rad) is a force of a prismatic one (m)."""
+    return quantity if position_unit == "rad" else quantity.replace("torque", "force")
+
+
 class JointRatioLimit(Limit):
     """A quantity of every limited joint over its limit; `kind` is also the key below ``robot.limits``.
 
@@ -32,10 +37,9 @@ class JointRatioLimit(Limit):
     def __init__(self, robot: Robot, joints: np.ndarray, figures: np.ndarray, units: Sequence[str]) -> None:
         low, high = self._figures = figures if figures.ndim > 1 else np.array([-figures, figures])
         self._joints, self._middle, self._scale = joints, 0.5 * (high + low), 2.0 / (high - low)
-        names = [robot.joint_names[i] for i in joints]
         self.labels = tuple(
-            Label(name, self.name, units[i], f"robot.limits.{self.kind}.{name}")
-            for i, name in zip(joints, names, strict=True)
+            Label(name, in_words(self.name, position_unit), units[i], f"robot.limits.{self.kind}.{name}")
+            for i, name, position_unit in ((i, robot.joint_names[i], robot.position_units[i]) for i in joints)
         )
         self.lower, self.upper = -np.ones(len(joints)), np.ones(len(joints))
         self._violation_scale = 0.5 * (high - low) / np.minimum(high, -low)

@@ -26,8 +26,7 @@ class RmsTorqueLimit(JointRatioLimit):
     where = "whole"
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
-        units = [{"rad": "Nm", "m": "N"}[unit] for unit in robot.position_units]
-        super().__init__(robot, joints, robot.limits.rms_torque[joints], units)
+        super().__init__(robot, joints, robot.limits.rms_torque[joints], robot.torque_units)
         self._robot = robot
         self.lower = np.full(len(joints), -np.inf)
 

@@ -25,8 +25,7 @@ class TorqueLimit(JointRatioLimit):
     refusal = "cannot hold the arm against gravity"
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
-        units = [{"rad": "Nm", "m": "N"}[unit] for unit in robot.position_units]
-        super().__init__(robot, joints, robot.limits.both_ways("torque")[:, joints], units)
+        super().__init__(robot, joints, robot.limits.both_ways("torque")[:, joints], robot.torque_units)
         self._robot = robot
 
     def values(self, motion: JointMotion) -> np.ndarray:

@@ -34,7 +34,7 @@ class TorqueRateLimit(JointRatioLimit):
     order = 3
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
-        units = [{"rad": "Nm/s", "m": "N/s"}[unit] for unit in robot.position_units]
+        units = [f"{unit}/s" for unit in robot.torque_units]
         super().__init__(robot, joints, robot.limits.torque_rate[joints], units)
         self._robot = robot
 

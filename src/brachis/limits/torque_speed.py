@@ -13,6 +13,7 @@ import itertools
 
 import numpy as np
 
+from brachis.limits.per_joint import in_words
 from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials
 from brachis.robot import Robot, dynamics
 from brachis.task import Task
@@ -48,7 +49,12 @@ class TorqueSpeedLimit(Limit):
     def _label(self, joint: int, speed: float, sign: float) -> Label:
         name, unit = self._robot.joint_names[joint], self._robot.position_units[joint]
         subject = f"{name} {'driving' if sign > 0.0 else 'braking'} from {speed:g} {unit}/s"
-        return Label(subject, "torque at speed", {"rad": "Nm", "m": "N"}[unit], f"robot.limits.torque_speed.{name}")
+        return Label(
+            subject,
+            in_words("torque at speed", unit),
+            {"rad": "Nm", "m": "N"}[unit],
+            f"robot.limits.torque_speed.{name}",
+        )
 
     @property
     def violation_scale(self) -> np.ndarray:

@@ -71,5 +71,5 @@ def _draw(ax: Axes, ratios: LimitRatios, kind: str, subjects: Sequence[str]) -> 
     values = ratios.values[:, columns]
     top = _RANGE * max(1.0, float(np.abs(values).max()))
     for level in (-1.0, 1.0) if values.min() < 0.0 else (1.0,):
-        ax.axhline(level, color=style.GREY, linewidth=0.8, linestyle=(0, (4, 2)), zorder=1.0)
+        ax.axhline(level, color=style.GREY, **style.LIMIT)
     ax.set_ylim(-top if values.min() < 0.0 else -0.05 * top, top)

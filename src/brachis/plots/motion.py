@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.plots import style
 from brachis.plots.curves import dense_samples, knot_times
+from brachis.plots.quantities import Quantity, quantities
 from brachis.trajectory import Samples, Trajectory
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _REACH = 0.3  # of the range of all data
+_LEAST_RANGE = 1e-9
+_JOINT_MM, _PROGRESS_MM, _FRAME_MM = 38.0, 26.0, 17.0
+_FEW_JOINTS = 2
+_LOW = 0.6
 
 
 def plot_motion(trajectory: Trajectory) -> Figure:
-    """Plot q, dq/dt, s and ds/dt in panels over one time axis.
+    """Plot q, dq/dt, s and ds/dt in panels over one time axis; joints in rad and joints in m have panels of their own.
 
     Parameters
     ----------
@@ -27,39 +34,64 @@ def plot_motion(trajectory: Trajectory) -> Figure:
     Returns
     -------
     Figure
-        One column wide. Dashed lines are limits, drawn where the motion comes near them; the faint ticks are the
-        knots of the splines.
+        One column wide. Thin dashed lines are limits in the colours of their joints, drawn where the motion comes near
+        them; the faint ticks are the knots of the splines.
     """
-    figure = style.new_figure(style.COLUMN_WIDTH, 145.0)
     samples = dense_samples(trajectory)
-    grid = figure.add_gridspec(4, 1, height_ratios=[1.5, 1.5, 1.0, 1.0])
-    top = figure.add_subplot(grid[0])
-    panels = [top, *(figure.add_subplot(grid[row], sharex=top) for row in range(1, 4))]
-    for ax, draw in zip(panels, (draw_positions, draw_velocities, draw_progress, draw_path_speed), strict=True):
-        draw(ax, trajectory, samples)
+    found = [part for kind in ("position", "velocity") for part in quantities(trajectory, samples, kind)]
+    heights = [*(_JOINT_MM * height_of(part) for part in found), _PROGRESS_MM, _PROGRESS_MM]
+    figure = style.new_figure(style.COLUMN_WIDTH, sum(heights) + _FRAME_MM)
+    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    panels = [figure.add_subplot(grid[row]) for row in range(len(heights))]
+    for ax, part in zip(panels, found, strict=False):
+        draw_quantity(ax, trajectory, part)
+    draw_progress(panels[-2], trajectory, samples)
+    draw_path_speed(panels[-1], trajectory, samples)
     for ax in panels[:-1]:
-        ax.tick_params(labelbottom=False)
-        ax.set_xlabel("")
-    style.legend_above(top, style.COLUMN_WIDTH - 15.0)
+        ax.sharex(panels[-1])
+    label_time_once(panels)
+    legend_joints(panels[:-2], trajectory, style.COLUMN_WIDTH - 15.0)
     style.mark_end(panels[-1], trajectory.t_end)
     figure.align_ylabels(panels)
     return figure
 
 
-def draw_positions(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
-    """Draw joint positions and the ends of their ranges."""
-    robot = trajectory.robot
-    _draw_joints(ax, trajectory, samples.t, samples.q)
-    _draw_limits(ax, np.array([robot.limits.position_lower, robot.limits.position_upper]), samples.q)
-    _dress(ax, trajectory, f"$q$ ({style.unit_of(robot.position_units)})")
+def height_of(part: Quantity) -> float:
+    """Height of a panel, relative to one with many joints."""
+    return 1.0 if len(part.joints) > _FEW_JOINTS else _LOW
 
 
-def draw_velocities(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
-    """Draw joint velocities and their limits."""
-    robot = trajectory.robot
-    _draw_joints(ax, trajectory, samples.t, samples.qdot)
-    _draw_limits(ax, robot.limits.both_ways("velocity"), samples.qdot)
-    _dress(ax, trajectory, rf"$\dot{{q}}$ ({style.unit_of(robot.position_units, '/s')})")
+def draw_quantity(ax: Axes, trajectory: Trajectory, part: Quantity) -> None:
+    """Draw one quantity of its joints, with their limits."""
+    draw_joints(ax, trajectory, part, part.values)
+    _draw_limits(ax, part)
+    _dress(ax, trajectory, f"${part.symbol}$ ({part.unit})")
+
+
+def label_time_once(panels: Sequence[Axes]) -> None:
+    """Leave the labels of time to the last one of panels one below the other."""
+    for ax in panels[:-1]:
+        ax.tick_params(labelbottom=False)
+        ax.set_xlabel("")
+
+
+def draw_joints(ax: Axes, trajectory: Trajectory, part: Quantity, values: np.ndarray) -> None:
+    """Draw values, (K, j), of a quantity's joints: one labelled line for each."""
+    for joint, column in zip(part.joints.tolist(), values.T, strict=True):
+        ax.plot(part.t, column, label=style.plain(trajectory.joint_names[joint]), **style.joint_style(joint))
+
+
+def joint_lines(panels: Sequence[Axes], trajectory: Trajectory) -> dict[str, Artist]:
+    """Collect one line of every joint that the panels show, in chain order, by its label."""
+    found = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    names = map(style.plain, trajectory.joint_names)
+    return {name: found[name] for name in names if name in found}
+
+
+def legend_joints(panels: Sequence[Axes], trajectory: Trajectory, width: float) -> None:
+    """Put a legend of all joints above the first panel; `width` is its room, mm."""
+    lines = joint_lines(panels, trajectory)
+    style.legend_above(panels[0], width, list(lines.values()), list(lines))
 
 
 def draw_progress(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
@@ -81,18 +113,13 @@ def _dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
     style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
 
 
-def _draw_joints(ax: Axes, trajectory: Trajectory, t: np.ndarray, values: np.ndarray) -> None:
-    for joint, name in enumerate(trajectory.joint_names):
-        ax.plot(t, values[:, joint], label=style.plain(name), **style.joint_style(joint))
-
-
-def _draw_limits(ax: Axes, levels: np.ndarray, values: np.ndarray) -> None:
-    """Draw the limits `levels` (2, n) that a joint comes near; one grey line where all joints share one."""
-    reach = _REACH * max(float(np.ptp(values)), 1e-9)
-    near = (levels >= values.min(axis=0) - reach) & (levels <= values.max(axis=0) + reach)
-    for level, close in zip(levels, near, strict=True):
-        shared = bool(np.all(level == level[0]))
-        for value in np.unique(level[close]):
-            joint = int(np.flatnonzero(close & (level == value))[0])
-            colour = style.GREY if shared else style.joint_style(joint)["color"]
-            ax.axhline(value, color=colour, linewidth=0.8, linestyle=(0, (4, 2)), zorder=1.0)
+def _draw_limits(ax: Axes, part: Quantity) -> None:
+    """Draw every joint's own limits where it comes near them; joints that share a level share its dashes."""
+    reach = _REACH * max(float(np.ptp(part.values)), _LEAST_RANGE)
+    levels = np.array([part.lower, part.upper])
+    near = (levels >= part.values.min(axis=0) - reach) & (levels <= part.values.max(axis=0) + reach)
+    for level in np.unique(levels[near]):
+        sharing = part.joints[np.any((levels == level) & near, axis=0)].tolist()
+        for place, joint in enumerate(sharing):
+            dashes = style.limit_dashes(place, len(sharing))
+            ax.axhline(level, color=style.joint_style(joint)["color"], **{**style.LIMIT, "linestyle": dashes})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,11 @@ _PATH_COLOUR = "#D55E00"
 _REDUNDANT_COLOUR = "#E69F00"
 _GROUND = ((0.0, 0.0), (-0.7, -1.0), (0.7, -1.0))
 _WORLD = "xyz"
+_ROOM = 0.78
+"""Part of the frame that the box of axes in space takes; their labels take the rest."""
+_LEAST_SPAN = 1e-3
+_VIEWS = tuple(itertools.product((15.0, 22.0, 30.0), (-75.0, -65.0, -55.0, -45.0, -35.0, -25.0, -15.0)))
+"""Elevations and azimuths from which axes in space may be seen, degrees."""
 
 
 def plot_postures(trajectory: Trajectory) -> Figure:
@@ -49,7 +55,7 @@ def plot_postures(trajectory: Trajectory) -> Figure:
 def add_posture_axes(figure: Figure | SubFigure, trajectory: Trajectory, place: SubplotSpec | None = None) -> Axes:
     """Add axes that suit the robot: in its plane, or in space."""
     where = () if place is None else (place,)
-    if _plane(trajectory) is not None:
+    if plane_of(trajectory) is not None:
         return figure.add_subplot(*where)
     axes: Axes = figure.add_subplot(*where, projection="3d", computed_zorder=False)
     return axes
@@ -57,7 +63,7 @@ def add_posture_axes(figure: Figure | SubFigure, trajectory: Trajectory, place: 
 
 def draw_postures(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
     """Draw tool path and postures into the axes that `add_posture_axes` made."""
-    plane = _plane(trajectory)
+    plane = plane_of(trajectory)
     view = list(plane or (0, 1, 2))
     robot = trajectory.robot
     tool = skeleton(robot, samples.q).tool[:, view]
@@ -70,7 +76,7 @@ def draw_postures(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
     ax.plot(*figures.bones[0, :1][:, view].T, marker=_GROUND, color=style.GREY, markersize=12.0, zorder=0.5)
     style.dress(ax, f"${_WORLD[view[0]]}$ (m)", f"${_WORLD[view[1]]}$ (m)")
     if plane is None:
-        _dress_space(ax)
+        _dress_space(ax, figures.bones.reshape(-1, 3))
     else:
         ax.set_aspect("equal", adjustable="datalim")
         ax.margins(0.06)
@@ -94,7 +100,8 @@ def legend_postures(ax: Axes, trajectory: Trajectory, width: float) -> None:
     style.legend_above(ax, width, handles, labels)
 
 
-def _plane(trajectory: Trajectory) -> tuple[int, int] | None:
+def plane_of(trajectory: Trajectory) -> tuple[int, int] | None:
+    """World axes of the plane in which a motion is drawn; None where it is drawn in space."""
     task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
     return drawing_plane(trajectory.robot, trajectory.q[0], task_map.axes)
 
@@ -132,15 +139,40 @@ def _draw_joints(ax: Axes, trajectory: Trajectory, joints: np.ndarray, shade: tu
         )
 
 
-def _dress_space(ax: Any) -> None:  # noqa: ANN401  (3-D axes have methods that Axes lacks)
-    """Labels, equal scales and quiet panes of axes in space."""
+def _dress_space(ax: Any, points: np.ndarray) -> None:  # noqa: ANN401  (3-D axes have methods that Axes lacks)
+    """Labels, equal scales and quiet panes of axes in space, seen from where points, (p, 3), fill the frame best."""
     ax.set_zlabel("$z$ (m)", fontsize=style.LABEL_SIZE, labelpad=-4.0)
     ax.xaxis.labelpad = ax.yaxis.labelpad = -4.0
     ax.tick_params(pad=-2.0)
-    ax.set_box_aspect([np.ptp(limits) for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())], zoom=0.95)
+    ax.set_proj_type("ortho")
+    spans = [max(np.ptp(limits), _LEAST_SPAN) for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())]
+    ax.set_box_aspect(spans)
+    elevation, azimuth = max(_VIEWS, key=lambda view: _filled(ax, points, *view))
+    ax.view_init(elevation, azimuth)
+    ax.set_box_aspect(spans, zoom=_ROOM / _extent(ax))
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis.set_major_locator(_few_ticks())
+
+
+def _filled(ax: Any, points: np.ndarray, elevation: float, azimuth: float) -> float:  # noqa: ANN401
+    """Tell how much of the frame points take when the axes' box just fits into it; dimensionless."""
+    ax.view_init(elevation, azimuth)
+    return float(np.prod(_spans(ax, points)) / _extent(ax) ** 2)
+
+
+def _extent(ax: Any) -> float:  # noqa: ANN401
+    """Part of the axes' frame that the box of 3-D axes takes, in the direction in which it takes more."""
+    corners = np.array(list(itertools.product(ax.get_xlim(), ax.get_ylim(), ax.get_zlim())))
+    return float(_spans(ax, corners).max())
+
+
+def _spans(ax: Any, points: np.ndarray) -> np.ndarray:  # noqa: ANN401
+    """Parts of the frame's width and height that points in space, (p, 3), take."""
+    from mpl_toolkits.mplot3d import proj3d  # noqa: PLC0415
+
+    across, up, _ = proj3d.proj_transform(*points.T, ax.get_proj())
+    return np.array([np.ptp(across) / ax.viewLim.width, np.ptp(up) / ax.viewLim.height])
 
 
 def _few_ticks() -> Any:  # noqa: ANN401

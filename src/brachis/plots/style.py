@@ -31,13 +31,24 @@ LINE_WIDTH = 1.2
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Okabe and Ito's colours, told apart by colour-blind readers; their yellow is too faint on white."""
-LINE_STYLES = ("-", "--", ":")
+LINE_STYLES: tuple[Any, ...] = (
+    "-",
+    (0, (6.0, 1.6)),
+    (0, (1.2, 1.2)),
+    (0, (6.0, 1.6, 1.2, 1.6)),
+    (0, (2.6, 1.2)),
+    (0, (6.0, 1.3, 1.2, 1.3, 1.2, 1.3)),
+)
+"""Told apart in print without colours. One fewer than colours, so that joints far down the chain still differ."""
+HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----")
+LIMIT: dict[str, Any] = {"linewidth": 0.7, "linestyle": (0, (4.0, 2.0)), "zorder": 1.0, "gid": "limit"}
+"""Line properties of limits."""
 GREY = "#666666"
 FAINT = "#CFCFCF"
 
 _MM_PER_INCH = 25.4
 _MM_PER_CHARACTER = 1.45  # of TICK_SIZE, with some reserve
-_MM_PER_HANDLE = 9.0
+_MM_PER_HANDLE = 10.5
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -49,9 +60,29 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def joint_style(joint: int) -> dict[str, Any]:
-    """Line properties of the joint with this index; other line styles begin where the colours are used up."""
-    turn, colour = divmod(joint, len(COLOURS))
-    return {"color": COLOURS[colour], "linestyle": LINE_STYLES[turn % len(LINE_STYLES)], "linewidth": LINE_WIDTH}
+    """Line properties of the joint with this index: a colour and, for print in greys, a line style."""
+    return {
+        "color": COLOURS[joint % len(COLOURS)],
+        "linestyle": LINE_STYLES[joint % len(LINE_STYLES)],
+        "linewidth": LINE_WIDTH,
+    }
+
+
+def bar_style(column: int) -> dict[str, Any]:
+    """Look of the bars of one choice: a colour and, for print in greys, a hatching."""
+    return {
+        "color": COLOURS[column % len(COLOURS)],
+        "hatch": HATCHES[column % len(HATCHES)],
+        "edgecolor": "white",
+        "linewidth": 0.0,
+    }
+
+
+def limit_dashes(place: int, sharing: int) -> tuple[float, tuple[float, float]]:
+    """Line style of a limit that some joints share: the dashes of each lie in the gaps of the others."""
+    dash, gap = 4.0, 2.0
+    period = (dash + gap) * sharing
+    return (period - place * (dash + gap)) % period, (dash, period - dash)
 
 
 def dress(ax: Axes, xlabel: str, ylabel: str) -> None:
@@ -109,7 +140,7 @@ def legend_above(
         ncols=_columns_that_fit(labels, width),
         fontsize=TICK_SIZE,
         frameon=False,
-        handlelength=1.6,
+        handlelength=2.3,
         columnspacing=1.2,
         borderaxespad=0.2,
         borderpad=0.2,
@@ -125,7 +156,7 @@ def legend_below(figure: Figure, width: float, handles: Sequence[Artist], labels
         ncols=_columns_that_fit(labels, width),
         fontsize=TICK_SIZE,
         frameon=False,
-        handlelength=1.6,
+        handlelength=2.3,
         columnspacing=1.2,
     )
 
@@ -144,8 +175,3 @@ def _columns_that_fit(labels: Sequence[str], width: float) -> int:
 def plain(name: str) -> str:
     """Keep Matplotlib from reading a joint's name as mathematics."""
     return name.replace("$", r"\$")
-
-
-def unit_of(units: Sequence[str], per_time: str = "") -> str:
-    """Join the units that occur: ``rad``, ``m`` or ``rad, m``, with ``/s`` and the like after each."""
-    return ", ".join(f"{unit}{per_time}" for unit in ("rad", "m", "Nm", "N") if unit in units)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.bottleneck.ratios import LimitRatios, limit_ratios
-from brachis.bottleneck.saturation import THRESHOLD, Saturation, saturations_of
+from brachis.bottleneck.saturation import RIPPLE, THRESHOLD, Saturation, saturations_of
 from brachis.limits import Label, Limit
 from brachis.plots import style
 from brachis.plots.curves import knot_times
@@ -41,8 +41,8 @@ def plot_timeline(trajectory: Trajectory, limits: Sequence[Limit] | None = None)
     -------
     Figure
         Two columns wide; a row for each value of a limit of which the motion ever uses more than half. The
-        deeper the blue the nearer to the limit; orange where the limit is active, from 99.9 % of it on. The faint ticks
-        are the knots of the splines.
+        deeper the blue the nearer to the limit; orange where the limit is active, from 99 % of it on, ripple down to
+        95 % included. The faint ticks are the knots of the splines.
 
     Examples
     --------
@@ -88,7 +88,7 @@ def _dress(figure: Figure, ax: Axes, trajectory: Trajectory, labels: list[Label]
     bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), _COLOURS), ax=ax, pad=0.01, fraction=0.03)
     bar.set_label("part of the limit", fontsize=style.LABEL_SIZE)
     bar.ax.tick_params(labelsize=style.TICK_SIZE, width=0.6, length=3.0)
-    words = f"active: at {100.0 * THRESHOLD:g} % of the limit or beyond"
+    words = f"active: at {100.0 * THRESHOLD:g} % of the limit or beyond, with ripple down to {100.0 * RIPPLE:g} %"
     style.legend_above(ax, style.PAGE_WIDTH - 20.0, [Patch(facecolor=_ACTIVE)], [words])
     ax.text(
         1.0,

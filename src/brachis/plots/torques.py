@@ -1,13 +1,16 @@
-"""Joint torques over time, as fractions of their limits."""
+"""Joint torques and forces over time, as fractions of their limits."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.plots import style
 from brachis.plots.curves import dense_samples, knot_times
+from brachis.plots.motion import draw_joints, draw_quantity, label_time_once, legend_joints
+from brachis.plots.quantities import Quantity, quantities
 from brachis.trajectory import Samples, Trajectory
 
 if TYPE_CHECKING:
@@ -15,10 +18,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _RANGE = 1.15
+_WHAT = "torque"
 
 
 def plot_torques(trajectory: Trajectory) -> Figure:
-    """Plot the normalised joint torques with the band of what is allowed (Fig. 2 of the paper).
+    """Plot the normalised joint torques, and forces, with the band of what is allowed (Fig. 2 of the paper).
 
     Parameters
     ----------
@@ -27,8 +31,8 @@ def plot_torques(trajectory: Trajectory) -> Figure:
     Returns
     -------
     Figure
-        One column wide. Joints without a torque limit are left out; where no joint has one, the torques themselves
-        are shown. The faint ticks are the knots of the splines.
+        One column wide. Joints without a limit are left out; where no joint has one, the torques themselves are shown,
+        and the forces of prismatic joints in a panel below. The faint ticks are the knots of the splines.
 
     Examples
     --------
@@ -36,38 +40,47 @@ def plot_torques(trajectory: Trajectory) -> Figure:
     >>> from brachis.plots import plot_torques, save_figure
     >>> save_figure(plot_torques(plan("examples/01_scara_line.yaml").trajectory), "torques.pdf")  # doctest: +SKIP
     """
-    figure = style.new_figure(style.COLUMN_WIDTH, 58.0)
-    ax = figure.add_subplot()
-    draw_torques(ax, trajectory, dense_samples(trajectory))
-    style.legend_above(ax, style.COLUMN_WIDTH - 15.0)
+    found = shown_torques(trajectory, dense_samples(trajectory))
+    figure = style.new_figure(style.COLUMN_WIDTH, 22.0 + 36.0 * len(found))
+    panels = [figure.add_subplot(len(found), 1, row + 1) for row in range(len(found))]
+    draw_torques(panels, trajectory, found)
+    legend_joints(panels, trajectory, style.COLUMN_WIDTH - 15.0)
     return figure
 
 
-def draw_torques(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
-    """Draw the torques into axes; one labelled line per joint, in chain order."""
-    lower, upper = trajectory.robot.limits.both_ways("torque")
-    limited = np.isfinite(upper)
-    if limited.any():
-        shown = np.flatnonzero(limited)
-        values, label = samples.tau / np.where(samples.tau > 0.0, upper, -lower), r"$\tau / \tau_\mathrm{max}$"
-        _draw_band(ax, np.abs(values[:, shown]).max())
-    else:
-        shown = np.arange(len(upper))
-        units = [{"rad": "Nm", "m": "N"}[unit] for unit in trajectory.robot.position_units]
-        values, label = samples.tau, rf"$\tau$ ({style.unit_of(units)})"
-    for joint in shown.tolist():
-        name = style.plain(trajectory.joint_names[joint])
-        ax.plot(samples.t, values[:, joint], label=name, **style.joint_style(joint))
-    style.dress(ax, r"$t$ (s)", label)
+def shown_torques(trajectory: Trajectory, samples: Samples) -> list[list[Quantity]]:
+    """Torques and forces by panels: those with limits in one, all of them apart by unit where no joint has a limit."""
+    found = [part.limited() for part in quantities(trajectory, samples, _WHAT)]
+    limited = [part for part in found if part is not None]
+    return [limited] if limited else [[part] for part in quantities(trajectory, samples, _WHAT)]
+
+
+def draw_torques(panels: Sequence[Axes], trajectory: Trajectory, found: Sequence[Sequence[Quantity]]) -> None:
+    """Draw what `shown_torques` found into as many axes; one labelled line per joint."""
+    for ax, parts in zip(panels, found, strict=True):
+        if parts[0].limited() is None:
+            draw_quantity(ax, trajectory, parts[0])
+        else:
+            _draw_ratios(ax, trajectory, parts)
+    label_time_once(panels)
+    style.mark_end(panels[-1], trajectory.t_end)
+
+
+def _draw_ratios(ax: Axes, trajectory: Trajectory, parts: Sequence[Quantity]) -> None:
+    """Draw torques and forces over their limits, which may differ in both directions."""
+    for part in parts:
+        draw_joints(ax, trajectory, part, part.ratios)
+    _draw_band(ax, max(float(np.abs(part.ratios).max()) for part in parts))
+    labels = (rf"${part.symbol} / {part.symbol}_\mathrm{{max}}$" for part in parts)
+    style.dress(ax, r"$t$ (s)", ", ".join(labels))
     style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
-    style.mark_end(ax, trajectory.t_end)
 
 
 def _draw_band(ax: Axes, largest: float) -> None:
     """Shade what is forbidden, so that the band stands out and the lines do not."""
     top = _RANGE * max(1.0, largest)
     for sign in (-1.0, 1.0):
-        ax.axhline(sign, color=style.GREY, linewidth=0.8, linestyle=(0, (4, 2)), zorder=1.0)
+        ax.axhline(sign, **style.LIMIT, color=style.GREY)
         ax.axhspan(sign, sign * top, facecolor="#EFEFEF", edgecolor="none", zorder=0.0)
     ax.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
     ax.set_ylim(-top, top)

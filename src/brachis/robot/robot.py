@@ -206,9 +206,10 @@ class Robot(Summary):
                 changes[kind] = value
         spec = LimitSpec(**{**vars(kept), **changes})
         resolved = resolve_limits(spec, own, self.stated_limits[: len(own)])
+        resolved = resolved.with_free_joint() if self.rolls_freely else resolved
         self.friction.check_against(self.joint_names, resolved.torque)
         settings = self.settings.model_copy(update={"limits": spec, "speed_override": 1.0})
-        return replace(self, limits=resolved.with_free_joint() if self.rolls_freely else resolved, settings=settings)
+        return replace(self, limits=resolved, settings=settings)
 
     def with_payload(
         self, mass: float | None, *, com: Sequence[float] = (0.0, 0.0, 0.0), inertia: Mapping[str, float] | None = None
@@ -273,7 +274,8 @@ class Robot(Summary):
         numbers = [f"{value:.4g}" if np.isfinite(value) else "none" for value in values]
         if len(set(units)) == 1:
             return f"{', '.join(numbers)} {units[0]}"
-        return ", ".join(f"{number} {unit}" for number, unit in zip(numbers, units, strict=True))
+        pairs = zip(numbers, units, strict=True)
+        return ", ".join(number if number == "none" else f"{number} {unit}" for number, unit in pairs)
 
     @property
     def n(self) -> int:
@@ -290,6 +292,11 @@ class Robot(Summary):
     def position_units(self) -> tuple[str, ...]:
         """Unit of every joint's position, ``rad`` or ``m``."""
         return tuple("m" if "P" in joint.shortname() else "rad" for joint in list(self.model.joints)[1:])
+
+    @property
+    def torque_units(self) -> tuple[str, ...]:
+        """Unit of every joint's torque, ``Nm``, or of its force, ``N``."""
+        return tuple("Nm" if unit == "rad" else "N" for unit in self.position_units)
 
     @property
     def revolute(self) -> np.ndarray:

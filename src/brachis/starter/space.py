@@ -5,23 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations
 
-import numpy as np
-
-from brachis import ik
+from brachis.ik import natural_space
 from brachis.robot import Robot
-from brachis.robot.task_map.rows import AXES, POSE_ROWS
-
-_PARALLEL = 1e-9
-
-
-def natural_space(robot: Robot) -> str | list[str]:
-    """Choose what a robot can prescribe at most: a pose, three rows, or those of the plane in which it moves."""
-    geometry = ik.ChainGeometry.of(robot)
-    along = np.abs(np.where(geometry.revolute[:, None], 1.0 - np.abs(geometry.axes), np.abs(geometry.axes)))
-    normals = np.flatnonzero(np.all(along < _PARALLEL, axis=0))
-    if len(normals):
-        return [row for i, row in enumerate(AXES) if i != normals[0]][: robot.n]
-    return "pose" if robot.n >= len(POSE_ROWS) else list(AXES[: robot.n])
+from brachis.robot.task_map.rows import AXES
 
 
 def spaces(robot: Robot) -> Iterator[str | list[str]]:

@@ -1,6 +1,7 @@
 """The trajectory: immutable, evaluated at any time, saved and loaded with all that is needed to verify it again."""
 
 from brachis.trajectory.pieces import one_sided_derivatives
+from brachis.trajectory.recovered import Recovered, check_tolerance
 from brachis.trajectory.result_file import SCHEMA
 from brachis.trajectory.samples import Samples
 from brachis.trajectory.trajectory import CONTINUOUS_TORQUE, Trajectory
@@ -8,7 +9,9 @@ from brachis.trajectory.trajectory import CONTINUOUS_TORQUE, Trajectory
 __all__ = [
     "CONTINUOUS_TORQUE",
     "SCHEMA",
+    "Recovered",
     "Samples",
     "Trajectory",
+    "check_tolerance",
     "one_sided_derivatives",
 ]

@@ -19,6 +19,7 @@ from brachis.kinds import Kind, check_kind
 from brachis.robot import Robot, bind
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import Task, load_task
+from brachis.trajectory.recovered import Recovered
 
 SCHEMA = 2
 ARRAYS = ("times", "q", "qdot", "qddot", "qddot_before", "knots", "control_points", "chart_rows", "chart_knots")
@@ -55,6 +56,7 @@ class Content:
     redundant_joints : tuple of str
     branch : str
     degree : int
+    recovered : Recovered or None
     arrays : dict of str to ndarray
         See `Trajectory` for their shapes.
     """
@@ -65,6 +67,7 @@ class Content:
     redundant_joints: tuple[str, ...]
     branch: str
     degree: int
+    recovered: Recovered | None
     arrays: dict[str, np.ndarray]
 
 
@@ -160,7 +163,8 @@ def _content(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Content:
             raise InputError("not all are finite numbers", where=name)
     r = _redundancy(arrays, robot.n, len(redundant))
     _check_arrays(arrays, robot.n, r, meta["degree"])
-    return Content(task, meta["urdf"], robot, tuple(redundant), meta["branch"], meta["degree"], arrays)
+    recovered = Recovered.of_dict(meta.get("recovered"))
+    return Content(task, meta["urdf"], robot, tuple(redundant), meta["branch"], meta["degree"], recovered, arrays)
 
 
 def _redundancy(arrays: dict[str, np.ndarray], n: int, named: int) -> int:

@@ -15,7 +15,8 @@ from brachis.summary import Summary
 if TYPE_CHECKING:
     import pandas as pd
 
-_COLUMNS = {"q": "q", "qd": "qdot", "qdd": "qddot", "tau": "tau"}
+COLUMNS = {"q": "q", "qd": "qdot", "qdd": "qddot", "tau": "tau"}
+"""Prefixes of a table's columns, and the quantities behind them."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -77,7 +78,7 @@ class Samples(Summary):
         except ImportError:
             raise NotInstalledError("a table", "pandas", "pandas") from None
         columns = {"t": self.t, "s": self.s}
-        for prefix, name in _COLUMNS.items():
+        for prefix, name in COLUMNS.items():
             columns |= {f"{prefix}_{joint}": getattr(self, name)[:, i] for i, joint in enumerate(joint_names)}
         columns |= {f"tool_{row}": self.tool_position[:, i] for i, row in enumerate("xyz")}
         columns |= {f"tool_q{row}": self.tool_quaternion[:, i] for i, row in enumerate("wxyz")}

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +19,7 @@ from brachis.robot import Robot, dynamics
 from brachis.summary import Summary
 from brachis.task import Task
 from brachis.trajectory.pieces import relative_coefficients
+from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
 from brachis.trajectory.samples import Samples
 from brachis.trajectory.tool import tool_motion
@@ -25,6 +27,8 @@ from brachis.trajectory.tool import tool_motion
 if TYPE_CHECKING:
     import pandas as pd
     from scipy.interpolate import BPoly, BSpline
+
+    from brachis.view import Viewer
 
 CONTINUOUS_TORQUE = 3
 """Least B-spline degree that gives continuous acceleration, and so torque."""
@@ -66,6 +70,8 @@ class Trajectory(Summary):
         closed form took its place.
     chart_knots : ndarray
         Knots of its splines; none where the rows are constant (B = 1).
+    recovered : Recovered or None
+        Where the motion comes from, if it was not planned; its path is then known to a tolerance.
 
     Examples
     --------
@@ -91,6 +97,7 @@ class Trajectory(Summary):
     control_points: np.ndarray
     chart_rows: np.ndarray
     chart_knots: np.ndarray
+    recovered: Recovered | None = None
 
     def __post_init__(self) -> None:
         """Take copies of the arrays that nobody can write to."""
@@ -242,8 +249,50 @@ class Trajectory(Summary):
             "branch": self.branch or "none",
             "start posture": self.robot.in_words(self.q[0]),
             "end posture": self.robot.in_words(self.q[-1]),
+            **({"recovered from": self.recovered.source} if self.recovered else {}),
             "splines": f"degree {self.degree}, {len(self.knots) - 2 * self.degree - 1} intervals",
         }
+
+    def view(
+        self,
+        candidates: Sequence[Mapping[str, Any]] = (),
+        *,
+        verified: bool | None = None,
+        host: str = "127.0.0.1",
+        port: int | None = None,
+        block: bool | None = None,
+    ) -> Viewer:
+        """Show the motion in the browser: robot, path, ghost postures, and plots that follow a slider.
+
+        Needs the extra ``view``.
+
+        Parameters
+        ----------
+        candidates : sequence of mapping, optional
+            What the search looked at, as `Result.to_dict` lists it.
+        verified : bool, optional
+            Whether the motion passed the verification, where that is known.
+        host : str, optional
+            Address that the viewer listens on; by default nobody but this machine reaches it.
+        port : int, optional
+            0 takes any free port; the first free one from 8080 on if left out.
+        block : bool, optional
+            Whether to wait until Ctrl-C. If left out, a script waits, an interactive session or a notebook does not.
+
+        Returns
+        -------
+        brachis.view.Viewer
+            With its ``url``; ``stop()`` ends it.
+
+        Raises
+        ------
+        InputError
+            Host or port cannot be listened on.
+        NotInstalledError
+            viser is not installed.
+        """
+        viewer = importlib.import_module("brachis.view")  # a later stage, which knows trajectories
+        return viewer.open_viewer(self, candidates, verified=verified, host=host, port=port, block=block)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file with all that is needed to load and verify the trajectory.
@@ -262,6 +311,7 @@ class Trajectory(Summary):
             "branch": self.branch,
             "degree": self.degree,
             "joint_names": list(self.joint_names),
+            "recovered": None if self.recovered is None else self.recovered.to_dict(),
         }
         write_result(path, meta, {name: getattr(self, name) for name in ARRAYS})
 
@@ -282,6 +332,7 @@ class Trajectory(Summary):
             redundant_joints=content.redundant_joints,
             branch=content.branch,
             degree=content.degree,
+            recovered=content.recovered,
             **content.arrays,
         )
 

@@ -111,7 +111,9 @@ def _path_error(
     found = q if of_joints else task_map.of_placements(*tool_placements(task_map.robot, q))
     errors = np.maximum(*task_map.norms(task_map.difference(found, targets)))
     worst = int(np.argmax(errors))
-    tolerance = options.path_tolerance
-    return Check(
-        "path error", float(errors[worst]), tolerance, "m, rad", bool(errors[worst] <= tolerance), time=float(t[worst])
-    )
+    tolerance, remark = options.path_tolerance, ""
+    if trajectory.recovered is not None:
+        tolerance = max(tolerance, trajectory.recovered.tolerance)
+        remark = "the path was recovered from the motion"
+    passed = bool(errors[worst] <= tolerance)
+    return Check("path error", float(errors[worst]), tolerance, "m, rad", passed, time=float(t[worst]), remark=remark)

@@ -1,0 +1,30 @@
+"""A motion that runs today, out of its CSV file, beside the one that brachis plans along the same path.
+
+Usage: python examples/12_today.py [FIGURE]
+
+The file has time and joint positions of the planar arm: a pseudo-inverse joint path, timed by toppra.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import brachis
+from brachis.comparison import plot_today
+from brachis.plots import save_figure
+
+ROOT = Path(__file__).parents[1]
+
+
+def main(figure: str | None = None) -> brachis.Comparison:
+    """Compare, print, and draw where a figure is named."""
+    found = brachis.compare(Path(__file__).with_suffix(".csv"), ROOT / "robots/scara3/robot.urdf")
+    print(found)
+    if figure:
+        save_figure(plot_today(found), figure)
+    return found
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:2])

@@ -1,0 +1,25 @@
+"""``brachis report``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from brachis.cli.folder import write_one
+from brachis.cli.output import exit_code, print_error, result_console
+from brachis.report import make_report
+from brachis.trajectory import Trajectory
+
+SUFFIX = ".html"
+
+
+def report_command(result: Path, *, out: Path | None, title: str | None) -> int:
+    """Write the report of a saved motion beside it, or where asked; returns the exit code."""
+    out = result.with_suffix(SUFFIX) if out is None else out
+    trajectory = Trajectory.load(result)
+    urdf = trajectory.task.robot.urdf
+    page = make_report(trajectory, title=str(result) if title is None else title)
+    write_one(out, page.save, (SUFFIX,), [result, None if urdf is None else Path(urdf)])
+    result_console().print(f"wrote {out} ({1e-6 * page.size:.1f} MB)")
+    if not page.verified:
+        print_error("the motion did not pass the verification; the report says so, and what failed")
+    return exit_code(page.verified, ())

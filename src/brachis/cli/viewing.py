@@ -1,0 +1,87 @@
+"""``brachis view``, and ``brachis plan --view``."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+import webbrowser
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from brachis import interrupts
+from brachis.cli.output import print_error, result_console
+from brachis.errors import ResultFileError
+from brachis.trajectory import Trajectory
+from brachis.verify import VerifyOptions, verify_trajectory
+from brachis.view import LOOPBACK, Viewer
+
+_NAMES = ("result.npz", "unverified.npz")
+"""What ``brachis plan --out`` calls a motion in its folder."""
+_LARGEST = 64_000_000
+"""Of result.json, bytes."""
+
+
+def view_command(result: Path, *, host: str, port: int | None, browser: bool) -> None:
+    """Show a saved motion until Ctrl-C."""
+    path = _motion_in(result)
+    trajectory = Trajectory.load(path)
+    options = VerifyOptions(ratio_tolerance=trajectory.task.refinement.tolerance)
+    verified = verify_trajectory(trajectory, options).passed
+    show(trajectory, _candidates_beside(path, trajectory), verified=verified, host=host, port=port, browser=browser)
+
+
+def show(
+    trajectory: Trajectory,
+    candidates: Sequence[Mapping[str, Any]],
+    *,
+    verified: bool,
+    host: str = LOOPBACK,
+    port: int | None = None,
+    browser: bool = True,
+) -> None:
+    """Show a motion until Ctrl-C; open the browser where there is a screen, and it is wanted."""
+    with Viewer(trajectory, candidates, verified=verified, host=host, port=port) as viewer, interrupts.expected():
+        if not viewer.local:
+            print_error(f"warning: whoever reaches {host} can look, and move the slider; leave --host out to be alone")
+        print_error("Ctrl-C stops the viewer")
+        result_console().print(f"look at {viewer.url}")
+        sys.stdout.flush()
+        if browser and sys.stdout.isatty() and _has_screen():
+            webbrowser.open(viewer.url)
+        viewer.wait()
+
+
+def _motion_in(result: Path) -> Path:
+    """Return the file of a motion: the one named, or the one in the folder named."""
+    if not result.is_dir():
+        return result
+    for name in _NAMES:
+        if (result / name).is_file():
+            return result / name
+    raise ResultFileError(
+        "there is no motion in the folder",
+        where=str(result),
+        allowed=" or ".join(_NAMES),
+        hint="Run brachis plan --out",
+    )
+
+
+def _candidates_beside(path: Path, trajectory: Trajectory) -> list[dict[str, Any]]:
+    """Read the candidates of a motion's search from the JSON that was written with it; none where it is another's."""
+    beside = path.with_suffix(".json")
+    try:
+        if beside.stat().st_size > _LARGEST:
+            return []
+        data = json.loads(beside.read_text())
+        same = math.isclose(data["t_end"], trajectory.t_end, rel_tol=1e-12)
+        return [dict(each) for each in data["candidates"]] if same else []
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+
+
+def _has_screen() -> bool:
+    """Tell whether a browser would have somewhere to open."""
+    return sys.platform == "darwin" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))

@@ -1,0 +1,7 @@
+"""A motion that runs today beside the one that is planned along its path, within the same limits."""
+
+from brachis.comparison.comparison import Comparison, Use
+from brachis.comparison.figure import plot_today
+from brachis.comparison.planned import compare
+
+__all__ = ["Comparison", "Use", "compare", "plot_today"]

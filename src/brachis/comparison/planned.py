@@ -1,0 +1,117 @@
+"""Plan the path of a motion that runs today."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+
+from brachis.comparison.comparison import Comparison
+from brachis.errors import PlanningError
+from brachis.planner import plan
+from brachis.recording import TOLERANCE, import_motion
+from brachis.result import Result
+from brachis.robot import Robot
+from brachis.robot.task_map import JOINTS
+from brachis.search import Listener
+from brachis.task import SplineSettings, Task
+from brachis.trajectory import Trajectory
+from brachis.verify import VerifyOptions, verify_trajectory
+
+_FINER = 3
+"""Times as many knot intervals, where a plan is slower than the motion given."""
+
+
+def compare(
+    today: str | os.PathLike[str] | Trajectory,
+    robot: str | os.PathLike[str] | Robot | None = None,
+    *,
+    task: str | os.PathLike[str] | Mapping[str, object] | Task | None = None,
+    task_space: str | Sequence[str] | None = None,
+    units: Mapping[str, str] | None = None,
+    tolerance: float = TOLERANCE,
+    noise: float | None = None,
+    keep_end: bool = False,
+    listener: Listener | None = None,
+) -> Comparison:
+    """Plan the path of today's motion within the same limits, from the same start posture, and compare.
+
+    Where the first plan is slower, a finer one is made; then today's own joint path is timed anew. The fastest verified
+    motion counts.
+
+    Parameters
+    ----------
+    today : path or Trajectory
+        CSV file, or what `brachis.import_motion` made of it.
+    robot, task, task_space, units, tolerance, noise : optional
+        See `brachis.import_motion`; for files alone.
+    keep_end : bool, optional
+        Whether the plan ends in today's end posture, too, and not in any whose tool is there.
+    listener : callable, optional
+        Told what happens.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        See `brachis.import_motion` and `brachis.plan`.
+    PlanningError
+        No plan could be made.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     brachis.export.write(result.trajectory, f"{folder}/today.csv", dt=0.004)
+    ...     found = brachis.compare(f"{folder}/today.csv", task=result.task)
+    >>> found.result.verified, found.saved > -1e-3
+    (True, True)
+    """
+    if not isinstance(today, Trajectory):
+        today = import_motion(
+            today, robot, task=task, task_space=task_space, units=units, tolerance=tolerance, noise=noise
+        )
+    options = VerifyOptions(ratio_tolerance=today.task.refinement.tolerance)
+    verification = verify_trajectory(today, options)
+    best: Result | None = None
+    failure: PlanningError | None = None
+    for wanted in _tasks(today, keep_end=keep_end):
+        try:
+            result = plan(today.robot, wanted, listener=listener)
+        except PlanningError as error:
+            failure = failure or error
+            continue
+        if best is None or (result.verified, -result.t_end) > (best.verified, -best.t_end):
+            best = result
+        if best.verified and best.t_end <= today.t_end:
+            break
+    if best is None:
+        assert failure is not None  # noqa: S101  (else there would be a plan)
+        raise failure
+    return Comparison(today, verification, best)
+
+
+def _tasks(today: Trajectory, *, keep_end: bool) -> Iterator[Task]:
+    """Yield tasks of today's path, each for the case that those before it gave no faster motion."""
+    task = today.task
+    if not keep_end:
+        task = task.model_copy(update={"end": "free"})
+    yield task
+    spline = task.spline
+    if spline.intervals != "auto":
+        spline = SplineSettings.model_validate({**spline.model_dump(), "intervals": _FINER * spline.intervals})
+        task = task.model_copy(update={"spline": spline})
+        yield task
+    if task.task_space != JOINTS:
+        yield _along_joints(today, task)
+
+
+def _along_joints(today: Trajectory, task: Task) -> Task:
+    """Return the task of today's own joint path."""
+    from brachis.recording.importing import joint_path_of  # noqa: PLC0415
+
+    return task.model_copy(update={"task_space": JOINTS, "path": joint_path_of(today)})

@@ -1,0 +1,76 @@
+"""JSON that names its schema."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from typing import Any, Final
+
+from brachis.export.rows import rows_of
+from brachis.files import atomic_write
+from brachis.trajectory import Trajectory
+from brachis.trajectory.samples import COLUMNS
+
+SCHEMA_ID: Final = "urn:brachis:joint-trajectory:1"
+
+
+def samples_schema() -> dict[str, Any]:
+    """Return the JSON schema of exported trajectories, draft 2020-12; also ``brachis schema --of trajectory``."""
+    names = {"type": "array", "items": {"type": "string"}, "minItems": 1}
+    numbers = {"type": "array", "items": {"type": "number"}, "minItems": 2}
+    per_joint = {"type": "array", "items": {"type": "array", "items": {"type": "number"}, "minItems": 1}, "minItems": 2}
+    units = {"type": "array", "items": {"enum": ["rad", "m"]}, "minItems": 1}
+    said = {
+        "t": ("s", numbers),
+        "s": ("path coordinate, 0 to 1", numbers),
+        "q": ("positions, rad or m, a row for each t, a column for each joint", per_joint),
+        "qdot": ("velocities, rad/s or m/s", per_joint),
+        "qddot": ("accelerations, rad/s^2 or m/s^2", per_joint),
+        "tau": ("torques, Nm, or forces, N", per_joint),
+    }
+    properties: dict[str, Any] = {
+        "$schema": {"const": SCHEMA_ID},
+        "joint_names": {**names, "description": "Joints in the order of the columns."},
+        "position_units": {**units, "description": "Unit of every joint's position."},
+        "t_end": {"type": "number", "exclusiveMinimum": 0, "description": "End time, s."},
+        "dt": {"type": "number", "exclusiveMinimum": 0, "description": "Period of the samples, s."},
+        "samples": {
+            "type": "object",
+            "properties": {name: {**shape, "description": text} for name, (text, shape) in said.items()},
+            "required": list(said),
+            "additionalProperties": False,
+        },
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": SCHEMA_ID,
+        "title": "A joint trajectory written by brachis",
+        "type": "object",
+        "properties": properties,
+        "required": list(properties),
+        "additionalProperties": False,
+    }
+
+
+def export_json(
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    dt: float,
+    *,
+    last: str = "exact",
+    joints: Sequence[str] | None = None,
+) -> None:
+    """Write samples as JSON that fulfils `samples_schema`; see `brachis.export.write` for the parameters."""
+    rows = rows_of(trajectory, dt, last, joints)
+    content = {
+        "$schema": SCHEMA_ID,
+        "joint_names": rows.joints,
+        "position_units": rows.units,
+        "t_end": trajectory.t_end,
+        "dt": dt,
+        "samples": {name: getattr(rows, name).tolist() for name in ("t", "s", *COLUMNS.values())},
+    }
+    lines = (f"  {json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in content.items())
+    with atomic_write(path) as stream:
+        stream.write(("{\n" + ",\n".join(lines) + "\n}\n").encode())

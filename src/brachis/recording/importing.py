@@ -1,0 +1,212 @@
+"""From a file of joint positions over time to a trajectory like those that are planned."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from brachis import ik
+from brachis.errors import InputError, PathError
+from brachis.recording.columns import Units
+from brachis.recording.nodes import Nodes, nodes_of
+from brachis.recording.path_coordinate import DEGREE, coordinate_spline
+from brachis.recording.recording import Recording, read_recording
+from brachis.recording.tool_path import Followed, path_followed
+from brachis.robot import Robot, TaskMap, bind
+from brachis.robot.combine import robot_for
+from brachis.robot.task_map import JOINTS
+from brachis.task import Segment, Task, load_task
+from brachis.trajectory import Recovered, Trajectory, check_tolerance
+
+TOLERANCE = 1e-6
+"""Of a recovered path, m and rad."""
+_BETWEEN = 4
+"""Places at which every piece of the motion is looked at."""
+
+
+def import_motion(
+    path: str | os.PathLike[str],
+    robot: str | os.PathLike[str] | Robot | None = None,
+    *,
+    task: str | os.PathLike[str] | Mapping[str, object] | Task | None = None,
+    task_space: str | Sequence[str] | None = None,
+    units: Mapping[str, str] | None = None,
+    tolerance: float = TOLERANCE,
+    noise: float | None = None,
+) -> Trajectory:
+    """Make a trajectory of a motion that runs today, to verify, draw, compare and export it.
+
+    Its velocities and accelerations, where the file has none, are those of polynomials through its positions; the path
+    of the tool follows by forward kinematics, as a smooth curve within a tolerance. What was found out, and what is not
+    known, is in ``trajectory.recovered.told``.
+
+    Parameters
+    ----------
+    path : path
+        CSV file whose first line names its columns: time (``t``, ``time_ms``, ...), the joints' positions (``j1``,
+        ``q_j1``, ``j1_pos [deg]``, ...) and, if known, velocities (``qd_j1``, ``j1_vel``, ...). Other columns are
+        left out.
+    robot : path or Robot, optional
+        URDF file or robot; needed unless the task names one.
+    task : path, mapping or Task, optional
+        A task whose robot, limits and settings hold; its start and path do not count.
+    task_space : str or sequence of str, optional
+        What of the motion is its path: rows, ``pose``, ``pose_free_roll``, ``joints``. The task's unless given, else
+        the most that the robot can prescribe.
+    units : mapping, optional
+        ``{"angle": "deg", "length": "mm", "time": "ms"}`` for columns whose header states none; rad, m and s otherwise.
+    tolerance : float, optional
+        Of the path, m and rad.
+    noise : float, optional
+        Standard deviation of measured positions, rad or m, which are then smoothed; that of the file's digits unless
+        given.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    TaskError
+        The file is not understood; the message names line and column.
+    PathError
+        The tool follows no smooth path within the tolerance.
+    InputError
+        Robot, task or task space are wrong.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     brachis.export.write(result.trajectory, f"{folder}/today.csv", dt=0.004)
+    ...     today = brachis.import_motion(f"{folder}/today.csv", brachis.robots.scara3, task_space=["x", "y"])
+    >>> today.recovered.tolerance, round(today.t_end - result.t_end, 9)
+    (1e-06, 0.0)
+    """
+    if noise is not None and not 0.0 < noise < np.inf:
+        raise InputError("is no standard deviation", where="noise", found=noise, allowed="> 0 rad or m")
+    check_tolerance(float(tolerance))
+    settings = None if task is None else load_task(task)
+    made = robot_for(robot, settings.robot) if settings else robot_for(robot, load_task(_BLANK).robot)
+    space = task_space or (settings.task_space if settings else ik.natural_space(made))
+    recording = read_recording(path, made, Units(**dict(units or {})))
+    bound, task_map = bind(made, space)
+    nodes = _with_roll(nodes_of(recording, noise), bound.n)
+    t, q, qdot = _densely(nodes)
+    followed = path_followed(task_map, q, qdot, t, tolerance)
+    if followed.miss > tolerance:
+        found, allowed = f"{followed.miss:.3g} m or rad off", f"{tolerance:g}"
+        hint = "Raise the tolerance"
+        raise PathError("the recovered path misses the motion", found=found, allowed=allowed, where="path", hint=hint)
+    recovered = Recovered(recording.source, float(tolerance), _told(recording, nodes, followed))
+    wanted = _task_of(settings, bound, task_map, nodes, followed, space)
+    return _trajectory(wanted, bound, nodes, coordinate_spline(t, followed.s, at_rest=nodes.at_rest[0]), recovered)
+
+
+_BLANK: dict[str, Any] = {
+    "brachis": 1,
+    "start": {"joints": [0.0]},
+    "task_space": ["x"],
+    "path": [{"line": {"by": [1.0]}}],
+}
+"""A task that only stands for the defaults of all settings."""
+
+
+def _with_roll(nodes: Nodes, n: int) -> Nodes:
+    """Add the virtual joint of a freely rolling tool, which stands still."""
+    still = np.zeros((len(nodes.t), n - nodes.q.shape[1]))
+    q, qdot, qddot = (np.hstack([part, still]) for part in (nodes.q, nodes.qdot, nodes.qddot))
+    return Nodes(nodes.t, q, qdot, qddot, nodes.told)
+
+
+def _densely(nodes: Nodes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times, positions and velocities at the nodes and between."""
+    from scipy.interpolate import BPoly  # noqa: PLC0415  (imports in 0.3 s)
+
+    steps = np.arange(_BETWEEN) / _BETWEEN
+    t = np.append((nodes.t[:-1, None] + np.diff(nodes.t)[:, None] * steps).ravel(), nodes.t[-1])
+    pieces = BPoly.from_derivatives(nodes.t, np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1))
+    return t, pieces(t), pieces(t, nu=1)
+
+
+def _told(recording: Recording, nodes: Nodes, followed: Followed) -> tuple[str, ...]:
+    h = 1e3 * float(np.median(np.diff(recording.t)))
+    return (
+        f"{len(recording.t)} rows over {recording.t[-1]:.6g} s, one every {h:.4g} ms",
+        *recording.told,
+        *nodes.told,
+        "not known: what the motion does between the rows, and the torques that were measured",
+        f"the tool's path follows by forward kinematics; the curve is at most {followed.miss:.1e} m or rad off",
+    )
+
+
+def _task_of(
+    settings: Task | None,
+    robot: Robot,
+    task_map: TaskMap,
+    nodes: Nodes,
+    followed: Followed,
+    space: str | Sequence[str],
+) -> Task:
+    """Write down the task that the motion fulfils."""
+    resting, calm = nodes.at_rest
+    jacobian = task_map.jacobian(task_map.twists(nodes.q[[0, -1]]))
+    speeds = task_map.norms(np.einsum("kmn,kn->km", jacobian, nodes.qdot[[0, -1]]))[0].tolist()
+    given: dict[str, Any] = {} if settings is None else settings.to_dict()
+    kept = ("tool_limits", "custom_limits", "search", "solver", "refinement")
+    content: dict[str, Any] = {
+        **{key: given[key] for key in kept if key in given},
+        "brachis": 1,
+        "robot": robot.settings.model_dump(),
+        "start": {"joints": nodes.q[0].tolist()},
+        "end": {"joints": nodes.q[-1].tolist()},
+        "task_space": space,
+        "path": [segment.model_dump() for segment in followed.segments],
+        "boundary": {} if resting else {"start_speed": speeds[0], "end_speed": speeds[1]},
+        "spline": {**given.get("spline", {}), "rest": "full" if calm else "velocity"},
+    }
+    return load_task(content)
+
+
+def _trajectory(
+    task: Task, robot: Robot, nodes: Nodes, spline: tuple[np.ndarray, np.ndarray], recovered: Recovered
+) -> Trajectory:
+    knots, control_points = spline
+    return Trajectory(
+        task=task,
+        urdf=robot.urdf,
+        robot=robot,
+        redundant_joints=(),
+        branch="",
+        times=nodes.t,
+        q=nodes.q,
+        qdot=nodes.qdot,
+        qddot=nodes.qddot,
+        qddot_before=nodes.qddot,
+        knots=knots,
+        degree=DEGREE,
+        control_points=control_points[None],
+        chart_rows=np.empty((0, 0, 0)),
+        chart_knots=np.empty(0),
+        recovered=recovered,
+    )
+
+
+def joint_path_of(trajectory: Trajectory) -> tuple[Segment, ...]:
+    """Return the path of all joints that an imported motion follows, for a task in their space.
+
+    Raises
+    ------
+    PathError
+        The joints follow no smooth path within the tolerance.
+    """
+    assert trajectory.recovered is not None  # noqa: S101  (it was imported)
+    _, task_map = bind(trajectory.robot, JOINTS)
+    nodes = Nodes(trajectory.times, trajectory.q, trajectory.qdot, trajectory.qddot, ())
+    t, q, qdot = _densely(nodes)
+    return path_followed(task_map, q, qdot, t, trajectory.recovered.tolerance).segments

@@ -1,0 +1,132 @@
+"""The web server, on this machine alone unless asked otherwise."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import importlib.util
+import io
+import ipaddress
+import socket
+from typing import TYPE_CHECKING
+
+from brachis.errors import InputError, NotInstalledError
+
+if TYPE_CHECKING:
+    import viser
+
+LOOPBACK = "127.0.0.1"
+FIRST_PORT = 8080
+"""The port that is tried first where none is asked for."""
+_TRIED = 100
+_HIGHEST = 65535
+
+
+def start_server(host: str, port: int | None) -> viser.ViserServer:
+    """Start a server.
+
+    Parameters
+    ----------
+    host : str
+        Address or name that it listens on.
+    port : int or None
+        0 takes any free port, None the first free one from `FIRST_PORT` on.
+
+    Raises
+    ------
+    InputError
+        There is no such host on this machine, or no such port, or it is in use.
+    NotInstalledError
+        viser is not installed.
+    """
+    require_viser()
+    import viser  # noqa: PLC0415
+
+    class Server(viser.ViserServer):  # type: ignore[misc]  # not read by mypy
+        """A server that is silent, and whose scene stays here: viser's own can be told by a page to publish it."""
+
+        def request_share_url(self, verbose: bool = True) -> None:  # noqa: FBT001, FBT002  (viser's signature)
+            """Refuse to give the scene a public address."""
+
+        def stop(self) -> None:
+            """Stop without a word."""
+            with _quiet():
+                super().stop()
+
+    chosen = _free_port(host) if port is None else port
+    _check(host, chosen)
+    with _quiet():
+        server = Server(host=host, port=chosen, label="brachis", verbose=False)
+    if chosen not in (0, server.get_port()):  # somebody took it in between
+        server.stop()
+        raise _in_use(host, chosen)
+    return server
+
+
+def require_viser() -> None:
+    """Refuse to go on without viser.
+
+    Raises
+    ------
+    NotInstalledError
+    """
+    if importlib.util.find_spec("viser") is None:
+        raise NotInstalledError("the viewer", "viser", "view")
+
+
+def is_local(host: str) -> bool:
+    """Whether an address that was listened on is reached from this machine alone."""
+    addresses = {str(found[4][0]) for found in socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)}
+    return all(ipaddress.ip_address(address).is_loopback for address in addresses)
+
+
+def _quiet() -> contextlib.redirect_stdout[io.StringIO]:
+    """Keep viser's own messages from standard output, which is for results."""
+    return contextlib.redirect_stdout(io.StringIO())
+
+
+def _free_port(host: str) -> int:
+    """Return the first free port from `FIRST_PORT` on."""
+    for port in range(FIRST_PORT, FIRST_PORT + _TRIED):
+        try:
+            _check(host, port)
+        except _InUseError:
+            continue
+        return port
+    raise InputError(
+        "no port is free", where="--port", found=f"all from {FIRST_PORT} to {FIRST_PORT + _TRIED - 1} are in use"
+    )
+
+
+class _InUseError(InputError):
+    """Somebody listens there already."""
+
+
+def _in_use(host: str, port: int) -> _InUseError:
+    return _InUseError(
+        "the port is in use",
+        where="--port",
+        found=f"{port} on {host}",
+        allowed="a free one",
+        hint="Leave --port out for the next free one",
+    )
+
+
+def _check(host: str, port: int) -> None:
+    """Refuse an address that cannot be listened on."""
+    if not 0 <= port <= _HIGHEST:
+        raise InputError("is no port", where="--port", found=port, allowed=f"0 to {_HIGHEST}")
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind, protocol) as trial:
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as the server does: none waits for old ones
+            trial.bind(address)
+    except (OSError, UnicodeError) as error:
+        if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
+            raise _in_use(host, port) from error
+        raise InputError(
+            "cannot be listened on",
+            where="--host",
+            found=f"{host}, port {port}: {getattr(error, 'strerror', None) or error}",
+            allowed=f"an address of this machine, for example {LOOPBACK}, or 0.0.0.0 for all of them",
+        ) from error

@@ -1,0 +1,110 @@
+"""Tables of the viewer's panel, as HTML; names come from files and are escaped."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from brachis.attempt import coordinates
+from brachis.search.record import SAME_MOTION
+from brachis.trajectory import Samples, Trajectory
+
+_MANY = 60
+"""Candidates that are listed."""
+_CELL = "padding:0 0.4em;white-space:nowrap"
+
+
+def state_table(trajectory: Trajectory, now: Samples) -> str:
+    """Time, path coordinate, tool, and every joint's position, speed and torque at one instant, with units.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    now : Samples
+        At one time.
+    """
+    place = ", ".join(f"{value:.4f}" for value in now.tool_position[0])
+    head = _paragraph(
+        f"t = {now.t[0]:.4f} s of {trajectory.t_end:.4f} s, s = {now.s[0]:.4f}",
+        f"tool at {place} m, {now.tool_speed[0]:.3f} m/s",
+    )
+    rows = []
+    for joint, (name, unit) in enumerate(zip(trajectory.joint_names, trajectory.robot.position_units, strict=True)):
+        force = {"rad": "Nm", "m": "N"}[unit]
+        rows.append(
+            (
+                name,
+                f"{_rounded(now.q[0, joint], 3)} {unit}",
+                f"{_rounded(now.qdot[0, joint], 3)} {unit}/s",
+                f"{_rounded(now.tau[0, joint], 2)} {force}",
+            )
+        )
+    return head + _table(("joint", "position", "speed", "torque, force"), rows)
+
+
+def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
+    """List what the search looked at, as `Attempt.to_dict` gives it, the fastest verified one first.
+
+    The same motion is listed once.
+    """
+    if not candidates:
+        return _paragraph("The candidates of the search are not known: they are in result.json beside result.npz.")
+    rows = [
+        (
+            coordinates(candidate.get("redundant_joints", ()), str(candidate.get("branch", ""))),
+            str(candidate.get("branch", "")),
+            str(candidate.get("origin", "")),
+            _seconds(candidate.get("coarse")),
+            _seconds(candidate.get("t_end")),
+            str(candidate.get("status", "")),
+        )
+        for candidate in candidates
+        if candidate.get("status") != SAME_MOTION
+    ]
+    left = len(candidates) - len(rows[:_MANY])
+    note = _paragraph(f"{left} more, slower or the same motion again") if left else ""
+    return _table(("joints", "branch", "origin", "coarse", "t_end", "status"), rows[:_MANY]) + note
+
+
+def speed_legend(stops: Sequence[str], fastest: float) -> str:
+    """Colour bar of the tool's speed from 0 to `fastest`, m/s; `stops` are CSS colours."""
+    marks = "".join(f"<span>{part * fastest:.3g}</span>" for part in (0.0, 0.25, 0.5, 0.75, 1.0))
+    return (
+        '<div style="margin:0.3em 0.8em;font-size:0.8em">tool speed (m/s)'
+        f'<div style="height:0.8em;border-radius:2px;background:linear-gradient(to right,{",".join(stops)})"></div>'
+        f'<div style="display:flex;justify-content:space-between">{marks}</div></div>'
+    )
+
+
+def summary(trajectory: Trajectory, notes: Sequence[str], *, verified: bool | None) -> str:
+    """End time, what is known of the verification, and what else the user should know."""
+    told = {None: "", True: ", verified", False: ', <b style="color:#D00000">NOT verified</b>'}[verified]
+    text = f'<div style="margin:0.3em 0.8em;font-size:0.9em"><b>t_E = {trajectory.t_end:.4f} s</b>{told}</div>'
+    return text + (_paragraph(*notes) if notes else "")
+
+
+def _rounded(value: float, digits: int) -> str:
+    """Write a number without a minus sign before zero."""
+    return f"{round(float(value), digits) + 0.0:.{digits}f}"
+
+
+def _seconds(value: object) -> str:
+    return f"{value:.4f} s" if isinstance(value, int | float) and math.isfinite(value) else ""
+
+
+def _paragraph(*lines: str) -> str:
+    text = "<br>".join(html.escape(line) for line in lines)
+    return f'<div style="margin:0.3em 0.8em;font-size:0.8em">{text}</div>'
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    head = "".join(f'<th style="{_CELL};text-align:left">{html.escape(column)}</th>' for column in columns)
+    body = "".join(
+        "<tr>" + "".join(f'<td style="{_CELL}">{html.escape(cell)}</td>' for cell in row) + "</tr>" for row in rows
+    )
+    return (
+        '<div style="margin:0.3em 0.8em;overflow-x:auto"><table style="font-size:0.78em;border-collapse:collapse">'
+        f"<tr>{head}</tr>{body}</table></div>"
+    )

@@ -1,0 +1,141 @@
+"""What a URDF says its links look like: primitives and meshes, with their colours."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lxml import etree
+
+from brachis.robot.urdf_tree import Element, read_tree
+
+if TYPE_CHECKING:
+    import trimesh
+
+_STEEL = (150, 160, 172, 255)
+"""Colour of a shape without one."""
+_PRIMITIVE = 2000
+"""Faces of a shape that is few enough to be given sharp edges."""
+_SHARP = 0.6
+"""Angle between faces from which on an edge is sharp, rad."""
+_UNREADABLE = (
+    OSError,
+    ValueError,
+    TypeError,
+    KeyError,
+    IndexError,
+    AttributeError,
+    ImportError,  # a reader of the mesh's format that is not installed
+    NotImplementedError,
+    RuntimeError,
+)
+"""What reading a shape may raise, whose file may be anything."""
+
+
+def link_shapes(urdf: str, folder: Path) -> tuple[dict[str, list[trimesh.Trimesh]], list[str]]:
+    """Read the shapes of the links that have any.
+
+    Parameters
+    ----------
+    urdf : str
+        Text of the URDF.
+    folder : Path
+        Where it is: names of mesh files are relative to it, and packages are looked for in the folders above it.
+
+    Returns
+    -------
+    shapes : dict of str to list of Trimesh
+        By link, in the link's frame, m.
+    unread : list of str
+        Of the shapes that cannot be shown, the link and the reason.
+    """
+    tree, shapes, unread = read_tree(urdf, "URDF"), {}, []
+    materials = [each for each in tree.robot if each.tag == "material"]
+    for name, link in tree.links.items():
+        found: list[trimesh.Trimesh] = []
+        for visual in link.findall("visual"):
+            missing = _find_mesh(visual, folder)
+            try:
+                found += [] if missing else _meshes(name, visual, materials)
+            except _UNREADABLE as error:
+                missing = f"{type(error).__name__}: {error}"
+            if missing:
+                unread.append(f"{name}: {missing}")
+        if found:
+            shapes[name] = found
+    return shapes, unread
+
+
+def mesh_file(name: str, folder: Path) -> Path | None:
+    """Find a mesh file that a URDF in `folder` names, plainly or as ``file://`` or ``package://``; None if it is not.
+
+    A package is looked for in the folders above the URDF, then where ROS has its packages.
+    """
+    from yourdfpy import filename_handler_magic  # noqa: PLC0415  (imports trimesh)
+
+    found = Path(filename_handler_magic(fname=name, dir=str(folder)))
+    if found.is_file():
+        return found
+    places = [Path(place) for place in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if place]
+    places += [Path(place) / "share" for place in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if place]
+    within = name.partition("://")[2]
+    return next((place / within for place in places if within and (place / within).is_file()), None)
+
+
+def _find_mesh(visual: Element, folder: Path) -> str:
+    """Put the path of a visual's mesh file in the place of its name; say what is missing."""
+    for mesh in visual.iter("mesh"):
+        name = str(mesh.get("filename"))
+        path = mesh_file(name, folder)
+        if path is None:
+            return f"no file {name}"
+        mesh.set("filename", str(path))
+    return ""
+
+
+def _meshes(name: str, visual: Element, materials: list[Element]) -> Iterator[trimesh.Trimesh]:
+    """Have yourdfpy read one visual, as the only one of a robot of one link."""
+    import trimesh  # noqa: PLC0415  (one second)
+    import yourdfpy  # noqa: PLC0415
+
+    robot = etree.Element("robot", name="robot")
+    robot.extend([_copied(each) for each in materials])
+    etree.SubElement(robot, "link", name=name).append(_copied(visual))
+    read = yourdfpy.URDF.load(
+        io.BytesIO(etree.tostring(robot)),
+        load_meshes=True,
+        build_scene_graph=True,
+        filename_handler=yourdfpy.filename_handler_null,
+    )
+    for node in read.scene.graph.nodes_geometry:
+        placement, geometry = read.scene.graph.get(node)
+        mesh = read.scene.geometry[geometry]
+        if isinstance(mesh, trimesh.Trimesh):
+            yield _placed(trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual), placement)
+
+
+def _copied(element: Element) -> Element:
+    return etree.fromstring(etree.tostring(element))
+
+
+def _placed(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:  # noqa: ANN401  (a matrix)
+    """Place a mesh, and see to its colour where it has no picture on it."""
+    look = getattr(mesh.visual, "material", mesh.visual)  # a material, or colours of the faces
+    if getattr(look, "baseColorTexture", None) is None and getattr(look, "image", None) is None:
+        mesh = coloured(mesh, tuple(map(int, look.main_color)) if mesh.visual.defined else _STEEL)
+    mesh.apply_transform(placement)
+    return mesh
+
+
+def coloured(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trimesh:
+    """Give a mesh one material that is no metal, RGBA from 0 to 255, and sharp edges unless it has too many faces."""
+    import trimesh  # noqa: PLC0415
+
+    if len(mesh.faces) <= _PRIMITIVE:
+        mesh = trimesh.graph.smooth_shade(mesh, angle=_SHARP)
+    material = trimesh.visual.material.PBRMaterial(baseColorFactor=colour, metallicFactor=0.1, roughnessFactor=0.65)
+    mesh.visual = trimesh.visual.TextureVisuals(material=material)
+    return mesh

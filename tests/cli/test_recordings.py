@@ -1,0 +1,87 @@
+"""``brachis import`` and ``brachis compare``."""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+
+import brachis
+
+from .conftest import ROOT, SCARA
+
+TASK = ROOT / "examples/01_scara_line.yaml"
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A slow motion as a file in degrees, and a task file with the robot and its settings."""
+    folder, task = tmp_path_factory.mktemp("recorded"), yaml.safe_load(TASK.read_text())
+    task["robot"]["urdf"] = str(SCARA)
+    task |= {"spline": {"intervals": 6}, "search": {"effort": "single", "least_motion": False}}
+    slow = {**task, "robot": {**task["robot"], "limits": {"torque": 5.0, "velocity": None}}}
+    trajectory = brachis.plan(slow).trajectory
+    samples = trajectory.sample(0.01)
+    table = np.column_stack([samples.t, np.rad2deg(samples.q)])
+    np.savetxt(folder / "today.csv", table, delimiter=",", header="t,j1,j2,j3", comments="", fmt="%.17g")
+    (folder / "cell.yaml").write_text(yaml.safe_dump(task))
+    return folder / "today.csv", folder / "cell.yaml", trajectory
+
+
+def test_import(run, recorded, tmp_path):
+    file, cell, trajectory = recorded
+    out = tmp_path / "today.npz"
+    outcome = run("import", file, "--robot", cell, "--angle", "deg", "--out", out)
+    assert outcome.code == 0, outcome.err
+    assert f"end time t_E: {trajectory.t_end:.4f} s" in outcome.out
+    assert "verification: passed" in outcome.out
+    assert "not known: what the motion does between the rows" in outcome.out
+    assert run("verify", out).code == 0
+    outcome = run("bottleneck", out)
+    assert outcome.code == 0, outcome.err
+    assert "the motion was not planned: what a limit costs is not known" in outcome.out
+    assert run("export", out, "--out", tmp_path / "again.json").code == 0
+    assert run("import", file, "--robot", cell, "--angle", "deg", "--out", cell).code == 2
+
+
+def test_import_of_a_urdf_alone(run, recorded, tmp_path):
+    file, _, trajectory = recorded
+    urdf = trajectory.task.robot.urdf
+    outcome = run("import", file, "--robot", urdf, "--angle", "deg", "--out", tmp_path / "today.npz", "--json")
+    assert outcome.code == 0, outcome.err
+    data = json.loads(outcome.out)
+    assert data["t_end"] == pytest.approx(trajectory.t_end)
+    assert data["recovered"]["source"] == str(file)
+
+
+def test_compare(run, recorded, tmp_path):
+    file, cell, trajectory = recorded
+    out = tmp_path / "out"
+    outcome = run("compare", file, "--robot", cell, "--angle", "deg", "--out", out)
+    assert outcome.code == 0, outcome.err
+    data = json.loads((out / "comparison.json").read_text())
+    assert data["t_end_today"] == pytest.approx(trajectory.t_end)
+    assert outcome.out.startswith(f"{100 * data['saved']:.1f} % faster: ")
+    assert "kept and verified" in outcome.out
+    assert {path.name for path in out.iterdir()} == {"today.npz", "result.npz", "comparison.json", "comparison.png"}
+    assert run("verify", out / "result.npz").code == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--angle", "grad"), "unknown unit of angle; found grad; allowed: rad, mrad, deg"),
+        (("--task-space", "x,z,y,yaw"), "yaw"),
+        (("--tolerance", "0.1"), "no tolerance of a path; found 0.1; allowed: 2e-07 to 0.001"),
+        (("--tolerance", "0"), "no tolerance of a path; found 0.0"),
+        (("--noise", "-1"), "noise"),
+        ((), "Degrees? Ask for units of the angle"),
+    ],
+)
+def test_wrong_options(run, recorded, tmp_path, options, told):
+    file, cell, _ = recorded
+    degrees = () if not options or "--angle" in options else ("--angle", "deg")
+    outcome = run("import", file, "--robot", cell, *degrees, *options, "--out", tmp_path / "today.npz")
+    assert outcome.code == 2, outcome.err
+    assert told in outcome.err
+    assert not (tmp_path / "today.npz").exists()

@@ -1,0 +1,102 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import urllib.request
+
+import pytest
+
+from brachis.cli.viewing import _candidates_beside
+from brachis.planner import plan
+from brachis.task import load_task
+from brachis.trajectory import Trajectory
+from brachis.view import Viewer
+from support.shown import ROOT
+
+pytest.importorskip("viser", reason="viser is not installed")
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    """A motion and the figures of its plan, as brachis plan --out writes them."""
+    folder = tmp_path_factory.mktemp("out")
+    task = load_task(ROOT / "examples/01_scara_line.yaml")
+    quick = task.search.model_copy(update={"effort": "single"})
+    result = plan(None, task.model_copy(update={"search": quick}))
+    result.trajectory.save(folder / "result.npz")
+    (folder / "result.json").write_text(json.dumps(result.to_dict(), default=str))
+    return folder / "result.npz"
+
+
+@pytest.fixture
+def looked_at(monkeypatch):
+    """Do not wait for Ctrl-C: look at the page once, and keep what was shown."""
+    seen = []
+
+    def look(viewer):
+        with urllib.request.urlopen(viewer.url, timeout=10) as answer:  # noqa: S310  (our own page)
+            assert answer.status == 200
+        seen.append(viewer.url)
+
+    monkeypatch.setattr(Viewer, "wait", look)
+    return seen
+
+
+def test_a_plan_is_shown(run, write, task, looked_at):
+    task["search"] = {"effort": "single"}
+    planned = run("plan", write(task), "--view")
+    assert planned.code == 0, planned.err
+    assert f"look at {looked_at.pop()}" in planned.out
+    assert "Ctrl-C stops the viewer" in planned.err
+
+
+@pytest.mark.parametrize("folder", [False, True])
+def test_a_saved_motion_is_shown_by_its_file_or_its_folder(run, saved, looked_at, folder):
+    shown = run("view", saved.parent if folder else saved, "--port", 0)
+    assert shown.code == 0, shown.err
+    assert f"look at {looked_at.pop()}" in shown.out
+
+
+def test_the_candidates_are_those_of_the_json_beside_the_motion(saved, tmp_path):
+    trajectory = Trajectory.load(saved)
+    beside = saved.with_suffix(".json")
+    data = json.loads(beside.read_text())
+    assert _candidates_beside(saved, trajectory) == data["candidates"] != []
+    for other in ("nonsense", json.dumps({**data, "t_end": 9.0}), json.dumps({"t_end": trajectory.t_end}), "[1]"):
+        (tmp_path / "result.json").write_text(other)
+        assert _candidates_beside(tmp_path / "result.npz", trajectory) == []
+
+
+def test_a_folder_without_a_motion_is_refused(run, tmp_path):
+    refused = run("view", tmp_path)
+    assert refused.code == 2
+    assert "there is no motion in the folder; allowed: result.npz or unverified.npz" in refused.err
+
+
+def test_a_port_in_use_is_refused(run, saved, looked_at, monkeypatch):
+    def second(viewer):
+        looked_at.append(run("view", saved, "--port", viewer.url.rpartition(":")[2]))
+
+    monkeypatch.setattr(Viewer, "wait", second)
+    run("view", saved, "--port", 0)
+    (refused,) = looked_at
+    assert refused.code == 2
+    assert "--port: the port is in use" in refused.err
+
+
+def test_other_machines_are_let_in_with_a_warning(run, saved, looked_at):
+    shown = run("view", saved, "--port", 0, "--host", "0.0.0.0")  # noqa: S104  (what is tested)
+    assert shown.code == 0, shown.err
+    assert "warning: whoever reaches 0.0.0.0 can look" in shown.err
+    assert looked_at.pop().startswith("http://127.0.0.1:")
+
+
+def test_ctrl_c_stops_the_viewer(saved):
+    command = [sys.executable, "-m", "brachis", "view", str(saved), "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as viewer:
+        assert "look at http://127.0.0.1:" in viewer.stdout.readline()
+        os.kill(viewer.pid, signal.SIGINT)
+        _, told = viewer.communicate(timeout=60)
+    assert viewer.returncode == 0
+    assert told == "brachis: Ctrl-C stops the viewer\n"

@@ -1,0 +1,131 @@
+"""Motions that run today beside their plans: never slower, along the same path, within the same limits."""
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis import comparison
+from brachis.comparison import compare, plot_today
+from brachis.robot import bind
+
+ROOT = Path(__file__).parents[2]
+SEED, DT = 4, 0.002
+
+
+@pytest.fixture(scope="module")
+def benchmark():
+    pytest.importorskip("toppra")
+    spec = importlib.util.spec_from_file_location("today", ROOT / "benchmarks/today.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["today"] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def today(benchmark):
+    return benchmark.case(SEED)
+
+
+@pytest.fixture(scope="module")
+def file(today, tmp_path_factory):
+    path = tmp_path_factory.mktemp("today") / "today.csv"
+    today.write(path, DT)
+    return path
+
+
+@pytest.fixture(scope="module")
+def task(today):
+    quick = {"spline": {"intervals": 12}, "search": {"effort": "single", "least_motion": False}}
+    return {**today.content, **quick, "start": {"joints": [0.0]}, "path": [{"line": {"by": [1.0]}}]}
+
+
+@pytest.fixture(scope="module")
+def found(file, task):
+    return compare(file, task=task)
+
+
+def test_the_path_is_recovered_and_the_plan_is_faster(found, today):
+    assert today.miss(found.today, DT) < 1e-6
+    assert found.result.verified
+    assert 0.05 < found.saved < 0.5
+    assert found.saved == 1.0 - found.result.t_end / found.today.t_end
+    assert found.verdict.startswith(f"{100 * found.saved:.1f} % faster: ")
+
+
+def test_both_begin_in_one_posture_and_end_in_one_place(found):
+    planned, given = found.result.trajectory, found.today
+    np.testing.assert_allclose(planned.q[0], given.q[0], atol=1e-9)
+    _, task_map = bind(given.robot, given.task.task_space)
+    off = task_map.difference(task_map.value(planned.q[-1]), task_map.value(given.q[-1]))
+    assert np.abs(off).max() < 1e-6
+    assert np.abs(planned.q[-1] - given.q[-1]).max() > 0.01
+
+
+def test_the_limits_are_the_same_and_what_todays_motion_exceeds_is_said(found, today):
+    assert [use.limit for use in found.uses] == ["torque", "velocity", "acceleration"]
+    assert all(use.planned <= 1.0 + 1e-4 for use in found.uses)
+    worst = max(use.today for use in found.uses)
+    assert worst == pytest.approx(today.largest_ratio(), abs=0.02)
+    assert bool(found.exceeded) == (worst > 1.0 + 1e-4) == bool(found.remarks)
+    assert all("today's motion exceeds the" in remark for remark in found.remarks)
+    data = json.loads(json.dumps(found.to_dict()))
+    assert data["t_end_today"] == found.today.t_end
+    assert data["today_within_limits"] is (not found.exceeded)
+    assert found.verdict in str(found)
+
+
+def test_the_figure_shows_both(found):
+    figure = plot_today(found)
+    progress, speed, ratio = figure.axes
+    for ax in (progress, speed, ratio):
+        ends = sorted(line.get_xdata()[-1] for line in ax.lines[:2])
+        assert ends == pytest.approx([found.result.t_end, found.today.t_end])
+    assert progress.get_title() == found.verdict
+    t, speeds = speed.lines[1].get_data()
+    trajectory = found.result.trajectory
+    places = trajectory.robot.tool_placements(trajectory.position(t))[0]
+    assert np.trapezoid(speeds, t) == pytest.approx(np.linalg.norm(np.diff(places, axis=0), axis=1).sum(), rel=1e-3)
+    assert max(ratio.lines[1].get_ydata()) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_the_end_posture_may_be_kept(found):
+    kept = compare(found.today, keep_end=True)
+    np.testing.assert_allclose(kept.result.trajectory.q[-1], found.today.q[-1], atol=1e-6)
+    assert kept.saved <= found.saved + 1e-3
+
+
+def test_where_the_first_plan_is_slower_others_are_made(found, monkeypatch):
+    """The motion of a plan cannot be beaten with the same intervals: finer ones come next, then its own joint path."""
+    wanted = []
+
+    def plan(_robot, task, **_):
+        wanted.append((task.spline.intervals, task.task_space))
+        raise brachis.PlanningError("none") if len(wanted) < 3 else Planned
+
+    class Planned(Exception):  # noqa: N818
+        pass
+
+    monkeypatch.setattr(sys.modules["brachis.comparison.planned"], "plan", plan)
+    with pytest.raises(Planned):
+        compare(found.today)
+    assert wanted == [(12, ("x", "y")), (36, ("x", "y")), (36, "joints")]
+
+
+def test_the_joint_path_of_today_is_timed(found):
+    from brachis.comparison.planned import _tasks  # noqa: PLC0415
+
+    *_, last = _tasks(found.today, keep_end=False)
+    result = brachis.plan(found.today.robot, last)
+    assert result.verified
+    assert result.t_end < 1.02 * found.today.t_end
+    assert brachis.compare is comparison.compare
+
+
+def test_the_names_are_public():
+    assert brachis.Comparison is comparison.Comparison

@@ -1,0 +1,247 @@
+"""Every format is read back by a reader of its own, and equals the motion."""
+
+import json
+import re
+import shutil
+import subprocess
+
+import jsonschema
+import numpy as np
+import pinocchio as pin
+import pyarrow.parquet
+import pytest
+import yaml
+from PIL import Image
+from rosbags.rosbag2.storage_mcap import McapReader
+from rosbags.typesys import Stores, get_typestore
+
+from brachis import export
+from brachis.errors import InputError, UnknownNameError
+from brachis.export.frames import frame_times, frames
+from brachis.robot import Robot
+from brachis.trajectory import Trajectory
+
+DT = 0.02
+NAMES = ("j1", "j2", "j3")
+MESSAGE = "trajectory_msgs/msg/JointTrajectory"
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+@pytest.fixture(scope="module")
+def written(line_trajectory, tmp_path_factory):
+    """Write a format and return the file."""
+    folder = tmp_path_factory.mktemp("formats")
+
+    def write(suffix, **parameters):
+        path = folder / f"motion{suffix}"
+        export.write(line_trajectory, path, **parameters)
+        return path
+
+    return write
+
+
+def equals_the_motion(trajectory, t, q, qdot, qddot):
+    motion = trajectory.sample(DT)
+    for found, expected in ((t, motion.t), (q, motion.q), (qdot, motion.qdot), (qddot, motion.qddot)):
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
+    assert len(t) > 100
+
+
+def test_parquet(line_trajectory, written):
+    table = pyarrow.parquet.read_table(written(".parquet", dt=DT))
+    frame = {name: table[name].to_numpy() for name in table.column_names}
+    parts = (np.column_stack([frame[f"{kind}_{name}"] for name in NAMES]) for kind in ("q", "qd", "qdd"))
+    equals_the_motion(line_trajectory, frame["t"], *parts)
+    about = json.loads(table.schema.metadata[b"brachis"])
+    assert about == {"joints": dict.fromkeys(NAMES, "rad"), "t_end_s": line_trajectory.t_end}
+
+
+def test_json_names_its_schema_and_fulfils_it(line_trajectory, written):
+    content, schema = json.loads(written(".json", dt=DT).read_text()), export.samples_schema()
+    assert content["$schema"] == schema["$id"]
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(content, schema)
+    samples = content["samples"]
+    equals_the_motion(line_trajectory, samples["t"], samples["q"], samples["qdot"], samples["qddot"])
+    assert content["joint_names"] == list(NAMES)
+    del samples["q"]
+    with pytest.raises(jsonschema.ValidationError, match="'q' is a required property"):
+        jsonschema.validate(content, schema)
+
+
+def ros_duration(duration):
+    return duration.sec + 1e-9 * duration.nanosec
+
+
+def equals_the_message(trajectory, message):
+    assert message.joint_names == list(NAMES)
+    points = message.points
+    t = [ros_duration(point.time_from_start) for point in points]
+    parts = ([getattr(point, name) for point in points] for name in ("positions", "velocities", "accelerations"))
+    equals_the_motion(trajectory, t, *parts)
+
+
+def test_mcap_bag(line_trajectory, written):
+    reader = McapReader(written(".mcap", dt=DT))
+    reader.open()
+    ((connection, stamp, data),) = reader.messages(reader.connections, 0, 1)
+    reader.close()
+    assert (connection.topic, connection.msgtype, stamp) == (export.TOPIC, MESSAGE, 0)
+    equals_the_message(line_trajectory, STORE.deserialize_cdr(data, MESSAGE))
+
+
+def test_the_bag_defines_its_messages_as_ros_does(written):
+    reader = McapReader(written(".mcap", dt=DT))
+    reader.open()
+    (schema,) = reader.schemas.values()
+    reader.close()
+    from rosbags.typesys import get_types_from_msg  # noqa: PLC0415
+
+    found = get_types_from_msg(schema.data, schema.name)
+    assert MESSAGE in found
+    for name, definition in found.items():
+        assert definition[1] == STORE.fielddefs[name][1], name
+
+
+def as_message(value, name):
+    """A message of ROS 2 out of plain data."""
+    kind = STORE.types[name]
+    fields = {}
+    for key, (form, detail) in STORE.fielddefs[name][1]:
+        given = value[key]
+        if form.name == "NAME":
+            given = as_message(given, detail)
+        elif form.name == "SEQUENCE" and detail[0][0].name == "NAME":
+            given = [as_message(each, detail[0][1]) for each in given]
+        elif form.name == "SEQUENCE" and detail[0][1][0] == "float64":
+            given = np.array(given, dtype=np.float64)
+        fields[key] = given
+    assert set(value) == set(fields)
+    return kind(**fields)
+
+
+def test_ros2_yaml(line_trajectory, written):
+    content = yaml.safe_load(written(".yaml", dt=DT).read_text())
+    data = STORE.serialize_cdr(as_message(content, MESSAGE), MESSAGE)
+    equals_the_message(line_trajectory, STORE.deserialize_cdr(data, MESSAGE))
+
+
+@pytest.fixture(scope="module")
+def ur10(line_trajectory):
+    """A motion of an arm of six joints on a rail, at rest in between."""
+    from pathlib import Path  # noqa: PLC0415
+
+    robot = Robot.from_urdf(Path(__file__).parents[2] / "robots/ur10_rail/robot.urdf")
+    times, q = np.array([0.0, 1.0]), np.array([np.zeros(7), np.linspace(0.1, 0.7, 7)])
+    rest = np.zeros((2, 7))
+    parts = {name: getattr(line_trajectory, name) for name in ("task", "knots", "degree", "control_points")}
+    parts |= {"urdf": robot.urdf, "robot": robot, "redundant_joints": (), "branch": "", "times": times, "q": q}
+    none = {"chart_rows": np.empty((0, 0, 0)), "chart_knots": np.empty(0)}
+    return Trajectory(**parts, **none, qdot=rest, qddot=rest, qddot_before=rest)
+
+
+def test_urscript(ur10, tmp_path):
+    path, joints = tmp_path / "motion.script", ur10.joint_names[1:]
+    with pytest.raises(InputError, match=r"six joints; found rail \(m\), .*Name the arm's six"):
+        export.write(ur10, path)
+    export.write(ur10, path, joints=joints, dt=0.008)
+    text = path.read_text()
+    postures = [json.loads(found) for found in re.findall(r"servoj\((\[.*?\])", text)]
+    times = [float(found) for found in re.findall(r"servoj\(\[.*?\], 0, 0, ([0-9.e-]+),", text)]
+    assert times == [0.008] * 125
+    np.testing.assert_allclose(postures, ur10.position(np.cumsum(times))[:, 1:], atol=1e-9)
+    (start,) = re.findall(r"start = (\[.*\])", text)
+    np.testing.assert_array_equal(json.loads(start), ur10.q[0, 1:])
+    assert [line.split()[0] for line in text.splitlines()].count("end") == 3  # of def, while and if
+
+
+def test_gif(line_trajectory, written):
+    path = written(".gif", dt=1.2)
+    times = frame_times(line_trajectory, 1.2)
+    assert times[-1] == line_trajectory.t_end
+    durations, pictures = [], []
+    with Image.open(path) as film:
+        for k in range(film.n_frames):
+            film.seek(k)
+            durations.append(film.info["duration"])
+            pictures.append(np.asarray(film.convert("RGB"), dtype=int))
+    assert durations == [1200, 1200, 1200, 1000]
+    assert len(pictures) == len(times)
+    for (figure, _), t, picture in zip(frames(line_trajectory, times), times, pictures, strict=True):
+        (ax,) = figure.axes
+        place = line_trajectory.robot.tool_placement(line_trajectory.position(t)).translation[:2]
+        x, y = ax.transData.transform(place)
+        assert picture[picture.shape[0] - round(y), round(x)].max() < 80  # the tool, black
+
+
+@pytest.mark.skipif(shutil.which("ffprobe") is None, reason="ffmpeg is not installed")
+def test_mp4(line_trajectory, written):
+    path = written(".mp4", dt=0.5)
+    asked = [
+        "-count_frames",
+        "-select_streams",
+        "v",
+        "-show_entries",
+        "stream=nb_read_frames,r_frame_rate",
+        "-of",
+        "json",
+    ]
+    done = subprocess.run(
+        [shutil.which("ffprobe"), "-v", "error", *asked, path], capture_output=True, text=True, check=True
+    )
+    (stream,) = json.loads(done.stdout)["streams"]
+    assert stream["nb_read_frames"] == str(len(frame_times(line_trajectory, 0.5)))
+    assert stream["r_frame_rate"] == "2/1"
+
+
+def test_without_ffmpeg_a_film_is_refused(line_trajectory, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(InputError, match=r"needs ffmpeg, which is not installed\. Install ffmpeg, or write a GIF"):
+        export.write(line_trajectory, tmp_path / "motion.mp4", dt=0.5)
+
+
+def test_without_its_library_a_format_is_refused(line_trajectory, tmp_path, monkeypatch):
+    for module, suffix in (("pyarrow", ".parquet"), ("mcap_ros2.writer", ".mcap")):
+        monkeypatch.setitem(__import__("sys").modules, module, None)
+        with pytest.raises(InputError, match=r'pip install "brachis\[export\]"'):
+            export.write(line_trajectory, tmp_path / f"motion{suffix}")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_some_joints_in_an_order_of_ones_own(line_trajectory, tmp_path):
+    export.write(line_trajectory, tmp_path / "motion.csv", joints=["j3", "j1"], dt=0.5)
+    header, first, *_ = (tmp_path / "motion.csv").read_text().splitlines()
+    assert header == "t,q_j3,q_j1,qd_j3,qd_j1,qdd_j3,qdd_j1,tau_j3,tau_j1"
+    assert [float(cell) for cell in first.split(",")[1:3]] == line_trajectory.q[0, [2, 0]].tolist()
+    with pytest.raises(UnknownNameError, match="there is no joint named 'j4'"):
+        export.write(line_trajectory, tmp_path / "motion.csv", joints=["j4"])
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "told"),
+    [
+        ("motion.txt", {}, r"cannot tell the format of the file; found suffix .txt; allowed: .csv, .parquet, .json"),
+        ("motion", {"form": "parkuet"}, "Did you mean 'parquet'"),
+        ("motion.gif", {"dt": 0.005}, r"no period of an animation; found 0.005 s; allowed: a multiple of 0.01 s"),
+        ("motion.gif", {"dt": 0.0}, "no period of an animation"),
+        ("motion.gif", {"joints": ["j1"]}, "an animation shows the whole robot; found j1"),
+        ("motion.json", {"last": "held"}, "Did you mean 'hold'"),
+    ],
+)
+def test_what_cannot_be_written(line_trajectory, tmp_path, name, parameters, told):
+    with pytest.raises(InputError, match=told):
+        export.write(line_trajectory, tmp_path / name, **parameters)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_every_format_has_a_suffix_of_its_own():
+    assert len({form.suffix for form in export.FORMATS.values()}) == len(export.FORMATS)
+
+
+def test_animations_in_space(ur10):
+    (figure, pixels), *_ = frames(ur10, np.array([0.0, 1.0]))
+    (ax,) = figure.axes
+    place = pin.SE3(ur10.robot.tool_placement(ur10.q[1])).translation
+    (tool,) = (line for line in ax.lines if line.get_gid() == "tool")
+    np.testing.assert_allclose([part[0] for part in tool.get_data_3d()], place, atol=1e-12)
+    assert pixels.shape[2] == 4

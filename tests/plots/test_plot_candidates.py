@@ -1,0 +1,68 @@
+"""Times at the first collocation points are compared with refined ones as refining would make them."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from brachis.attempt import Attempt
+from brachis.errors import InputError
+from brachis.plots import plot_candidates
+from brachis.search.record import SAME_MOTION
+
+
+def attempt(joint, coarse, t_end=math.inf, *, verified=False, status="planned"):
+    """An attempt with times of its own."""
+
+    class Made(Attempt):
+        pass
+
+    Made.t_end, Made.verified = property(lambda _: t_end), property(lambda _: verified)
+    return Made((joint,), "elbow_up", "lattice 1", "uno", 1.0, status, coarse=coarse)
+
+
+def drawn(candidates):
+    """Times by the labels of the marks."""
+    (ax,) = plot_candidates(candidates).axes
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    times = [marks.get_offsets()[:, 0].tolist() for marks in ax.collections]
+    return dict(zip(labels, times, strict=True)), [tick.get_text() for tick in ax.get_yticklabels()]
+
+
+@pytest.mark.parametrize("t_end", [2.002, 1.9])
+def test_no_first_plan_is_left_of_the_fastest_for_its_few_collocation_points(t_end):
+    """Refining the fastest made its time longer, or a finer mesh shorter: so it would with the others."""
+    fastest = attempt("j1", 2.0, t_end, verified=True)
+    marks, _ = drawn([fastest, attempt("j2", 2.0005), attempt("j3", 2.5)])
+    (star,) = marks["the fastest"]
+    assert star == t_end
+    (planned,) = (times for label, times in marks.items() if label.startswith("planned"))
+    assert planned == pytest.approx([2.0005 * t_end / 2.0, 2.5 * t_end / 2.0])
+    assert min(planned) > star
+
+
+def test_one_motion_is_drawn_once():
+    fastest = attempt("j1", 2.0, 2.002, verified=True)
+    marks, rows = drawn([fastest, attempt("j2", 1.9999, status=SAME_MOTION)])
+    assert marks == {"the fastest": [2.002]}
+    assert rows == ["j1: elbow_up"]
+
+
+def test_refined_times_are_drawn_as_they_are():
+    fastest = attempt("j1", 2.0, 2.002, verified=True)
+    marks, _ = drawn([fastest, attempt("j2", 2.3, 2.4, verified=True), attempt("j3", 2.1, 2.2)])
+    assert marks["refined and verified"] == [2.4]
+    (failed,) = (times for label, times in marks.items() if label.startswith("no verified"))
+    assert failed == [2.2]
+
+
+def test_without_a_motion_nothing_is_scaled():
+    marks, _ = drawn([attempt("j1", 2.0), attempt("j2", math.inf)])
+    (planned,) = (times for label, times in marks.items() if label.startswith("planned"))
+    assert planned == [2.0]
+
+
+def test_nothing_to_draw_is_refused():
+    with pytest.raises(InputError, match="nothing to draw"):
+        plot_candidates([])

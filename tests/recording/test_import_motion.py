@@ -1,0 +1,164 @@
+"""A motion that is written to a file and imported is the motion that it was, with its path."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis import bottleneck, export, plots
+from brachis.errors import InputError, PathError, ResultFileError
+from brachis.recording import import_motion
+from brachis.recording.nodes import nodes_of
+from brachis.recording.recording import Recording
+from brachis.robot import Robot
+from brachis.trajectory import Recovered, Trajectory
+from brachis.verify import verify_trajectory
+
+from .conftest import ROOT
+
+
+def test_the_motion_comes_back(imported, motion):
+    t = np.linspace(0.0, motion.t_end, 3001)
+    assert imported.t_end == motion.t_end
+    np.testing.assert_allclose(imported.position(t), motion.position(t), atol=1e-8)
+    np.testing.assert_allclose(imported.velocity(t), motion.velocity(t), atol=1e-5)
+    assert imported.task.spline.rest == "full"
+
+
+def test_its_path_comes_back_and_it_verifies(imported, motion):
+    found = verify_trajectory(imported)
+    assert {check.name for check in found.checks if not check.passed} <= {"torque ratio"}
+    assert found.worst_ratio == pytest.approx(1.0, abs=2e-3)
+    assert found.path_error < 1e-6
+    (path,) = (check for check in found.checks if check.name == "path error")
+    assert (path.allowed, path.remark) == (1e-6, "the path was recovered from the motion")
+    places = np.array([motion.robot.tool_placement(q).translation[:2] for q in imported.q])
+    start = places[0]
+    assert np.abs(places[:, 0] - start[0]).max() < 1e-9  # a line along y
+
+
+def test_what_is_known_of_it_is_saved(imported, tmp_path):
+    assert "accelerations are those of polynomials through five rows of velocities each" in imported.recovered.told
+    assert any(line.startswith("not known: ") for line in imported.recovered.told)
+    imported.save(tmp_path / "today.npz")
+    again = Trajectory.load(tmp_path / "today.npz")
+    assert again.recovered == imported.recovered
+    assert verify_trajectory(again) == verify_trajectory(imported)
+    export.write(again, tmp_path / "again.csv", dt=0.01)
+    (ax, *_) = plots.plot_motion(again).axes
+    assert ax.lines[0].get_xdata()[-1] == again.t_end
+
+
+def test_a_file_may_not_allow_itself_any_path(imported, tmp_path, monkeypatch):
+    with pytest.raises(InputError, match=r"no tolerance of a path; found 0.1; allowed: 2e-07 to 0.001"):
+        replace(imported.recovered, tolerance=0.1)
+    monkeypatch.setattr(Recovered, "to_dict", lambda self: {"source": self.source, "tolerance": 0.1, "told": []})
+    imported.save(tmp_path / "today.npz")
+    with pytest.raises(ResultFileError, match="no tolerance of a path"):
+        Trajectory.load(tmp_path / "today.npz")
+
+
+def test_a_motion_that_leaves_its_recovered_path_fails(imported):
+    q = np.array(imported.q)
+    q[len(q) // 2] += 1e-5
+    (path,) = (check for check in verify_trajectory(replace(imported, q=q)).checks if check.name == "path error")
+    assert not path.passed
+
+
+def test_bottlenecks_are_when_limits_are_active(imported):
+    found = bottleneck.report(imported)
+    assert found.sensitivities is None
+    assert found.to_dict()["sensitivities"] is None
+    text = str(found)
+    assert text.startswith("the motion was not planned: what a limit costs is not known\n")
+    assert "is at its torque limit for" in text
+    with pytest.raises(InputError, match="nothing of it can be solved again"):
+        bottleneck.report(imported, check=True)
+
+
+def test_positions_alone_will_do(motion, table, write):
+    t, q, _ = table
+    found = import_motion(write("t,j1,j2,j3", t, q), task=motion.task)
+    np.testing.assert_allclose(found.qdot, motion.velocity(found.times), atol=2e-4)
+    assert verify_trajectory(found).path_error < 1e-6
+
+
+def test_few_digits_are_smoothed(motion, table, write):
+    t, q, _ = table
+    found = import_motion(write("t,j1,j2,j3", t, q, fmt="%.6f"), task=motion.task, tolerance=1e-5)
+    assert any("smoothing spline" in line for line in found.recovered.told)
+    moves = np.abs(q.round(6) - q[0].round(6)).max(axis=1) > 1.1e-6  # before, the last digit at most moves
+    later = t[int(np.argmax(moves)) - 1]
+    assert found.t_end == pytest.approx(motion.t_end - later, abs=0.05)
+    middle = np.linspace(0.2, 2.0, 500)
+    np.testing.assert_allclose(found.position(middle), motion.position(middle + later), atol=2e-6)
+    np.testing.assert_allclose(found.acceleration(middle), motion.acceleration(middle + later), atol=0.2)
+
+
+def test_measured_positions_are_smoothed(motion, write):
+    samples, noise = motion.sample(0.002), 1e-5
+    q = samples.q + noise * np.random.default_rng(0).standard_normal(samples.q.shape)
+    path = write("t,j1,j2,j3", samples.t, q)
+    found = verify_trajectory(import_motion(path, task=motion.task, tolerance=1e-4, noise=noise))
+    assert found.path_error < 1e-4
+    assert found.worst_ratio == pytest.approx(1.0, abs=0.05)
+    with pytest.raises(PathError, match="say their noise, or raise the tolerance"):
+        import_motion(path, task=motion.task)
+
+
+def test_accelerations_that_jump_do_not_overshoot():
+    """Bang-bang: a spline through the rows would exceed the acceleration by a fifth of the jump."""
+    t = np.append(np.arange(0.0, 2.0, 0.01), 2.0)
+    switch = 1.0037
+    first, rest = np.minimum(t, switch), np.maximum(t - switch, 0.0)
+    q = (0.5 * first**2 + switch * rest - 0.5 * rest**2)[:, None]
+    nodes = nodes_of(Recording(t, q, None, 0.0, "here", ()))
+    from scipy.interpolate import BPoly  # noqa: PLC0415
+
+    pieces = BPoly.from_derivatives(nodes.t, np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1))
+    fine = np.linspace(0.0, 2.0, 20001)
+    assert np.abs(pieces(fine, nu=2)).max() < 1.005
+    np.testing.assert_allclose(pieces(t), q, atol=1e-12)
+    assert "accelerations jump between 1 pairs of rows" in nodes.told
+
+
+def test_ends_in_motion(motion, table, write):
+    t, q, qdot = table
+    kept = slice(60, -60)
+    found = import_motion(write("t,j1,j2,j3,qd_j1,qd_j2,qd_j3", t[kept], q[kept], qdot[kept]), task=motion.task)
+    boundary = found.task.boundary
+    for speed, end in ((boundary.start_speed, t[kept][0]), (boundary.end_speed, t[kept][-1])):
+        before, after = (
+            motion.robot.tool_placement(q).translation for q in motion.position(end + np.array([-1e-5, 1e-5]))
+        )
+        assert speed == pytest.approx(np.linalg.norm(after - before) / 2e-5, rel=1e-4)
+    failed = {check.name for check in verify_trajectory(found).checks if not check.passed}
+    assert failed <= {"torque ratio"}
+
+
+def test_a_tool_that_stops_and_turns_off_is_refused(motion, table, write):
+    t, q, _ = table
+    back = q + 0.5 * (q - q[0]) * [0.0, 0.0, 1.0]
+    path = write("t,j1,j2,j3", np.append(t, t[-1] + t[1:]), np.concatenate([q, back[-2::-1] + q[-1] - back[-1]]))
+    with pytest.raises(PathError, match=r"follows no smooth path within the tolerance.* divide the file there"):
+        import_motion(path, task=motion.task)
+
+
+def test_a_path_of_joints(file, motion):
+    found = import_motion(file, motion.robot, task_space="joints")
+    assert found.task.task_space == "joints"
+    assert verify_trajectory(found).path_error < 1e-6
+
+
+@pytest.mark.parametrize("space", ["pose", "pose_free_roll"])
+def test_poses_of_an_arm_in_space(space, write):
+    robot, t = Robot.from_urdf(ROOT / "robots/iiwa14/robot.urdf"), np.linspace(0.0, 2.0, 401)
+    u = t / 2.0
+    progress = (u**4 * (35.0 - 84.0 * u + 70.0 * u**2 - 20.0 * u**3))[:, None]
+    q = np.array([0.1, 0.5, 0.2, -1.2, 0.3, 0.9, 0.4]) + progress * [0.4, -0.2, 0.3, 0.3, -0.2, 0.1, 0.5]
+    found = import_motion(write(",".join(["t", *robot.joint_names]), t, q), robot, task_space=space)
+    result = verify_trajectory(found)
+    assert result.passed, result
+    assert result.path_error < 1e-6
+    assert brachis.import_motion is import_motion

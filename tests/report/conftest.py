@@ -1,0 +1,78 @@
+"""Short motions of a planar arm and of an arm on a rail, and a browser to look at their reports."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.report import make_report
+
+FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update")
+QUICK = {"search": {"effort": "single", "least_motion": False}, "spline": {"intervals": 8}}
+
+
+def quick(example):
+    task = brachis.load_task(example).to_dict()
+    return brachis.plan({**task, **{key: {**task[key], **value} for key, value in QUICK.items()}})
+
+
+@pytest.fixture(scope="session")
+def planar():
+    return quick(brachis.examples.scara_line)
+
+
+@pytest.fixture(scope="session")
+def rail():
+    return quick(brachis.examples.tx90l_rail_line)
+
+
+@pytest.fixture(scope="session")
+def planar_page(planar):
+    return make_report(planar)
+
+
+@pytest.fixture(scope="session")
+def rail_page(rail):
+    return make_report(rail)
+
+
+@pytest.fixture(scope="session")
+def weaker(rail):
+    """The motion on drives that are weaker by a tenth."""
+    trajectory = rail.trajectory
+    weak = trajectory.robot.limits.with_magnitudes(torque=0.9 * trajectory.robot.limits.torque)
+    return dataclasses.replace(trajectory, robot=dataclasses.replace(trajectory.robot, limits=weak))
+
+
+@pytest.fixture(scope="session")
+def weaker_page(weaker):
+    return make_report(weaker, title="<script>weaker</script>")
+
+
+def data_of(page):
+    """What the page's programs read."""
+    return json.loads(re.search(r'id="data">(.*?)</script>', page.html, re.DOTALL)[1])
+
+
+def floats(array):
+    values = np.frombuffer(base64.b64decode(array["bdata"]), dtype=array["dtype"])
+    return values.reshape([int(n) for n in array["shape"].split(",")]) if "shape" in array else values
+
+
+@pytest.fixture(scope="session")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if chromium is None:
+        pytest.skip("there is no Chromium on this machine")
+    with playwright.sync_playwright() as driver:
+        started = driver.chromium.launch(executable_path=chromium, args=list(FLAGS))
+        yield started
+        started.close()

@@ -1,0 +1,177 @@
+"""What a report says, and that it holds the motion itself."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import sys
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.errors import NotInstalledError
+from brachis.plausibility import Remark
+from brachis.report import make_report
+from brachis.report.whole import _plotly
+
+from .conftest import data_of, floats
+
+LARGEST = 3_500_000
+
+
+def test_the_verdict_the_time_and_what_limits_are_said_first(planar, planar_page):
+    header = re.search(r"<header.*?</header>", planar_page.html, re.DOTALL)[0]
+    assert 'class="verified"' in header
+    assert "<h1>VERIFIED</h1>" in header
+    assert f"{planar.t_end:.4f} s" in header
+    assert re.search(r"At its limits longest: j\d torque \(\d+ % of the time\)", header)
+    assert planar_page.verified
+
+
+def test_everything_is_in_the_file(planar_page):
+    without_plotly = re.sub(r'<script type="text/plain" id="plotly">.*?</script>', "", planar_page.html)
+    links = re.findall(r"""(?:src|href)\s*=\s*["']?([^"'\s>]{1,40})""", without_plotly)
+    assert links
+    assert all(link.startswith("data:image/png;base64,") for link in links)
+    assert "url(" not in without_plotly
+    assert "@import" not in without_plotly
+    assert "default-src 'none'" in without_plotly
+    assert planar_page.size < LARGEST
+    assert len(without_plotly) < 700_000
+
+
+def test_curves_are_the_motion(rail, rail_page):
+    data = data_of(rail_page)["motion"]
+    trajectory, axes = rail.trajectory, data["layout"]
+    functions = {
+        "position": trajectory.position,
+        "velocity": trajectory.velocity,
+        "acceleration": trajectory.acceleration,
+        "torque": trajectory.torque,
+        "force": trajectory.torque,
+    }
+    seen = set()
+    for trace in data["data"]:
+        title = axes["yaxis" if trace["yaxis"] == "y1" else trace["yaxis"].replace("y", "yaxis")]["title"]["text"]
+        kind, _, unit = title.partition(" (")
+        if trace.get("meta") == "limit" or kind not in functions or unit == "of the limit)":
+            continue
+        joint = trajectory.joint_names.index(trace["name"])
+        assert ("rad" in unit or "Nm" in unit) == (trace["name"] != "rail"), "joints in rad and in m are apart"
+        t = np.clip(floats(trace["x"]).astype(float), 0.0, rail.t_end)
+        expected = functions[kind](t)[:, joint]
+        np.testing.assert_allclose(floats(trace["y"]), expected, atol=2e-4 * max(1.0, np.abs(expected).max()))
+        seen.add((kind, trace["name"]))
+    assert seen >= {(kind, "joint_1") for kind in ("position", "velocity", "acceleration", "torque")}
+    assert ("force", "rail") in seen
+    assert ("torque", "rail") not in seen
+
+
+def test_limits_of_every_joint_are_drawn(weaker_page, weaker):
+    data = data_of(weaker_page)["motion"]
+    levels = {}
+    for trace in data["data"]:
+        if trace.get("meta") == "limit":
+            levels.setdefault(trace["name"], set()).update(floats(trace["y"]).tolist())
+    limits = weaker.robot.limits
+    for joint, name in enumerate(weaker.joint_names):
+        for level in (limits.torque_upper[joint], limits.torque_lower[joint], limits.position_upper[joint]):
+            assert np.float32(level) in levels[name]
+
+
+def test_the_animation_is_the_motion(rail, rail_page):
+    scene = data_of(rail_page)["scene"]
+    t, bones = floats(scene["t"]), floats(scene["bones"])
+    assert t[0] == 0.0
+    assert t[-1] == pytest.approx(rail.t_end)
+    samples = rail.trajectory.at(np.clip(t.astype(float), 0.0, rail.t_end))
+    np.testing.assert_allclose(bones[:, -1], samples.tool_position, atol=1e-4)
+    np.testing.assert_allclose(floats(scene["speed"]), samples.tool_speed, atol=1e-2)
+    assert scene["plane"] is None
+    assert [joint["name"] for joint in scene["joints"] if joint["prismatic"]] == ["rail"]
+    assert {len(joint["quantities"]) for joint in scene["joints"]} == {4}
+
+
+def test_a_planar_motion_is_drawn_in_its_plane(planar_page):
+    assert data_of(planar_page)["scene"]["plane"] == [0, 1]
+
+
+def test_the_timeline_shows_what_the_saturations_say(planar, planar_page):
+    (heat,) = data_of(planar_page)["timeline"]["data"]
+    found = {str(entry.label): entry for entry in brachis.bottleneck.saturations(planar.trajectory)}
+    assert heat["y"] == [name for name, entry in found.items() if entry.peak > 0.5][::-1]
+    t, colours = floats(heat["x"]), floats(heat["z"])
+    for name, row in zip(heat["y"], colours, strict=True):
+        for stretch in found[name].active:
+            inside = (t > stretch.begin + 1e-6) & (t < stretch.end - 1e-6)
+            assert row[inside].min() >= np.float32(0.99)
+
+
+def test_an_unverified_motion_says_so_and_what_failed(weaker_page):
+    header = re.search(r"<header.*?</header>", weaker_page.html, re.DOTALL)[0]
+    assert 'class="unverified"' in header
+    assert "<h1>NOT VERIFIED: do not run</h1>" in header
+    assert re.search(r"<b>torque ratio</b>: 1\.11\d* \((rail|joint_\d) at 0\.\d+ s\),\s+allowed 1\.0001", header)
+    assert "Verification: FAILED" in weaker_page.html
+    rows = re.findall(r'<tr class="(passed|failed)"><th>(.*?)</th>', weaker_page.html)
+    assert rows[0] == ("failed", "torque ratio")
+    assert {kind for kind, _ in rows[1:]} == {"passed"}
+    assert 'class="beyond"' in weaker_page.html
+    assert not weaker_page.verified
+    assert "What the limits cost is not known" in weaker_page.html
+
+
+def test_text_is_no_markup(weaker_page):
+    assert "<script>weaker" not in weaker_page.html
+    assert "&lt;script&gt;weaker" in weaker_page.html
+
+
+def test_every_joint_is_told_with_its_posture_and_how_near_it_comes_to_its_limits(rail, rail_page):
+    page = rail_page.html
+    rows = re.findall(r"<tr><th>([\w ]+?)( \*)?</th><td>(-?[\d.]+) (rad|m)</td><td>(-?[\d.]+) (?:rad|m)</td>", page)
+    assert [row[0] for row in rows] == list(rail.trajectory.joint_names)
+    assert [row[0] for row in rows if row[1]] == ["rail"]
+    starts, ends = ([float(row[i]) for row in rows] for i in (2, 4))
+    np.testing.assert_allclose(starts, rail.trajectory.position(0.0), atol=5e-5)
+    np.testing.assert_allclose(ends, rail.trajectory.position(rail.t_end), atol=5e-5)
+    assert re.search(r"100\.0 % of\s+1500 N", page)
+
+
+def test_a_saved_motion_is_verified_again_and_told_as_the_plan(planar, planar_page, tmp_path):
+    planar.save(tmp_path / "motion.npz")
+    page = make_report(brachis.Trajectory.load(tmp_path / "motion.npz"))
+
+    def verification(text):
+        return re.search(r'<table class="checks">.*?</table>', text, re.DOTALL)[0]
+
+    assert verification(page.html) == verification(planar_page.html)
+    assert data_of(page)["scene"]["bones"] == data_of(planar_page)["scene"]["bones"]
+    saves = [line for line in re.findall(r"<li>(.*?)</li>", page.html) if " saves " in line]
+    assert len(saves) >= 2, "the bottlenecks of a saved motion are found again"
+
+
+def test_a_result_writes_its_report_with_remarks_and_what_was_left_undone(planar, tmp_path):
+    remark = Remark("robot.limits.velocity", "looks like degrees", "120 rad/s", "1 to 60 rad/s")
+    result = dataclasses.replace(planar, warnings=(remark,), undone=("the knots",), interrupted=True)
+    page = result.report(tmp_path / "motion.html")
+    assert (tmp_path / "motion.html").read_text(encoding="utf-8") == page.html
+    aside = re.search(r"<aside>.*?</aside>", page.html, re.DOTALL)[0]
+    assert "robot.limits.velocity: looks like degrees (found 120 rad/s; usual: 1 to 60 rad/s)" in aside
+    assert "the knots" in aside
+    assert "ended early" in aside
+    assert len(repr(page)) < 80
+    assert page._repr_html_().startswith("<iframe")
+
+
+def test_the_task_and_the_versions_are_in_it(planar_page):
+    assert "angle_deg: 90" in planar_page.html
+    assert f"brachis {brachis.__version__}" in planar_page.html
+
+
+@pytest.mark.parametrize(("module", "name"), [("jinja2", "Jinja2"), ("plotly.offline", "Plotly")])
+def test_what_is_not_installed_is_said(module, name, planar, monkeypatch):
+    _plotly.cache_clear()
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(NotInstalledError, match=rf"{name}, which is not installed.*brachis\[report\]"):
+        make_report(planar)

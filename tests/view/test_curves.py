@@ -1,0 +1,66 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from brachis.robot import Robot
+from brachis.view.curves import all_curves
+from support.shown import ROBOTS
+
+
+def with_limits(motion, **limits):
+    return dataclasses.replace(
+        motion, robot=dataclasses.replace(motion.robot, limits=dataclasses.replace(motion.robot.limits, **limits))
+    )
+
+
+def curves_of(motion):
+    return {curves.title: curves for curves in all_curves(motion, motion.at(np.linspace(0.0, motion.t_end, 50)))}
+
+
+def test_a_planned_motion_reaches_its_torque_limits_and_keeps_them(line_result):
+    motion = line_result.trajectory
+    found = curves_of(motion)
+    largest = np.abs(found["torque / limit"].values).max()
+    assert 0.9 < largest < 1.0001
+    assert found["torque / limit"].bounds == (-1.0, 1.0)
+    use = found["largest of every kind / limit"]
+    assert "torque" in use.names
+    assert use.values[:, use.names.index("torque")].max() == pytest.approx(1.0, abs=1e-3)
+    assert (np.diff(use.t) > 0.0).all()
+
+
+def test_unequal_limits_count_in_their_own_direction(bare_robot, motion_of):
+    motion = motion_of(bare_robot)
+    motion = with_limits(motion, velocity_lower=np.array([-9.0, -9.0]), velocity_upper=np.array([1.0, 2.0]))
+    speed = curves_of(motion)["speed / limit"]
+    np.testing.assert_allclose(speed.values * [1.0, 2.0], motion.velocity(speed.t), atol=1e-12)
+
+
+def test_positions_count_from_the_middle_of_their_range(bare_robot, motion_of):
+    position = curves_of(motion_of(bare_robot, begin=0.5, end=2.0))["position in its range (ends at -1 and 1)"]
+    np.testing.assert_allclose(position.values[0], [0.0, 0.25], atol=1e-12)
+    np.testing.assert_allclose(position.values[-1], [1.0, 1.0], atol=1e-12)
+
+
+def test_joints_without_limits_are_plotted_in_their_units(bare_robot, motion_of):
+    motion = with_limits(motion_of(bare_robot), torque_upper=np.full(2, np.inf), torque_lower=np.full(2, -np.inf))
+    found = curves_of(motion)
+    assert "torque / limit" not in found
+    force, torque = found["torque (N), no limit"], found["torque (Nm), no limit"]
+    assert (force.names, torque.names) == (("rail",), ("turn",))
+    np.testing.assert_allclose(force.values[:, 0], motion.torque(force.t)[:, 0])
+    assert torque.styles == (1,)
+    assert torque.low < torque.values.min() <= torque.values.max() < torque.high
+
+
+@pytest.mark.parametrize("urdf", ROBOTS, ids=lambda path: path.parent.name)
+def test_every_robot_has_curves(urdf, motion_of):
+    motion = motion_of(Robot.from_urdf(urdf))
+    found = curves_of(motion).values()
+    assert len(found) >= 4
+    for curves in found:
+        assert np.isfinite(curves.values).all()
+        assert (curves.t[0], curves.t[-1]) == (0.0, motion.t_end)
+        assert (np.diff(curves.t) > 0.0).all()
+        assert curves.values.shape == (len(curves.t), len(curves.names))

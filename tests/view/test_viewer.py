@@ -1,0 +1,121 @@
+import math
+import socket
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+from brachis.robot import Robot
+from brachis.search.record import SAME_MOTION
+from brachis.view import Viewer
+from brachis.view.placements import placements
+from brachis.view.scene import LAYERS
+from brachis.view.tables import candidates_table, state_table, summary
+from support.shown import PANDA
+
+pytest.importorskip("viser", reason="viser is not installed")
+
+
+@pytest.fixture
+def shown(line_result):
+    candidates = [candidate.to_dict() for candidate in line_result.candidates]
+    with Viewer(line_result.trajectory, candidates, verified=True, port=0) as viewer:
+        yield viewer
+
+
+def poses(viewer):
+    return np.array([[*frame.position, *frame.wxyz] for frame in (*viewer._scene._frames, viewer._scene._tool)])
+
+
+def test_the_robot_is_where_the_motion_has_it_at_the_chosen_instant(shown, line_result):
+    motion = line_result.trajectory
+    before = poses(shown)
+    shown.playback.go_to(0.6 * motion.t_end)
+    shown.show()
+    found = placements(motion.robot, motion.position(0.6 * motion.t_end)[None])
+    np.testing.assert_allclose(poses(shown), np.hstack([found.positions[0], found.quaternions[0]]), atol=1e-6)
+    assert np.abs(poses(shown) - before).max() > 0.1
+    assert shown._panel._slider.value == pytest.approx(0.6 * motion.t_end, abs=0.01)
+
+
+def test_plots_and_table_follow_the_slider(shown, line_result):
+    motion = line_result.trajectory
+    shown.playback.go_to(0.25 * motion.t_end)
+    shown.show()
+    for chart in shown._panel._charts:
+        assert 'data-part="0.25000"' in chart._line.content
+    assert f"t = {0.25 * motion.t_end:.4f} s of {motion.t_end:.4f} s" in shown._panel._state.content
+
+
+def test_path_and_trace_are_one_curve_and_every_layer_can_be_hidden(shown):
+    motion = shown._scene._motion
+    np.testing.assert_allclose(motion.path, motion.frames.tool, atol=1e-8)
+    for name in LAYERS:
+        assert shown._scene.layers[name]
+        shown._scene.set_visible(name, visible=False)
+        assert not any(handle.visible for handle in shown._scene.layers[name])
+
+
+def test_the_motion_is_not_played_while_nobody_looks(shown):
+    assert shown.playback.playing
+    assert shown.playback.time == 0.0
+
+
+def test_a_stopped_viewer_leaves_its_port_and_no_thread(line_result):
+    with line_result.view(port=0, block=False) as viewer:
+        port = int(viewer.url.rpartition(":")[2])
+        assert viewer.url.startswith("http://127.0.0.1:")
+        assert viewer.url in viewer._repr_html_()
+        assert "brachis viewer" in {thread.name for thread in threading.enumerate()}
+    assert "brachis viewer" not in {thread.name for thread in threading.enumerate()}
+    with socket.socket() as trial:
+        assert trial.connect_ex(("127.0.0.1", port)) != 0
+
+
+def test_a_script_waits_and_a_notebook_does_not(line_result, monkeypatch):
+    waited = []
+    monkeypatch.setattr(Viewer, "wait", lambda self: waited.append(self.stop()))
+    line_result.trajectory.view(port=0)
+    assert len(waited) == 1
+    monkeypatch.setattr(sys, "ps1", ">>> ", raising=False)
+    line_result.trajectory.view(port=0).stop()
+    assert len(waited) == 1
+
+
+def test_robots_without_shapes_and_with_lost_meshes_are_shown_as_skeletons(bare_robot, motion_of):
+    robots = [bare_robot]
+    if PANDA is not None:
+        robots.append(Robot.from_urdf("/nowhere/panda.urdf", urdf_text=PANDA.read_text(), tool_frame="panda_hand_tcp"))
+    for robot in robots:
+        with Viewer(motion_of(robot), port=0) as viewer:
+            layers = viewer._scene.layers
+            assert all(handle.visible for handle in layers["skeleton"])
+            assert not any(handle.visible for handle in layers["robot"])
+            assert layers["ghost postures"]
+
+
+def test_tables_have_units_and_escape_names(bare_robot, motion_of):
+    motion = motion_of(bare_robot)
+    now = motion.at(np.array([0.5]))
+    table = state_table(motion, now)
+    for part in (f" m, {now.tool_speed[0]:.3f} m/s", " m/s</td>", " rad/s</td>", " N</td>", " Nm</td>"):
+        assert part in table
+    known = {"redundant_joints": ["<b>"], "branch": "up", "origin": "lattice 1", "status": "verified"}
+    listed = candidates_table([{**known, "coarse": 1.5, "t_end": math.inf}, {**known, "coarse": None, "t_end": None}])
+    assert "&lt;b&gt;" in listed
+    assert "1.5000 s" in listed
+    assert "inf" not in listed
+    assert "result.json" in candidates_table([])
+    assert "40 more" in candidates_table([known] * 100)
+    again = candidates_table([known, {**known, "origin": "twice", "status": SAME_MOTION}])
+    assert "twice" not in again
+    assert "1 more" in again
+
+
+def test_the_panel_says_whether_the_motion_is_verified(line_result):
+    assert ", verified" in summary(line_result.trajectory, (), verified=True)
+    assert "NOT verified" in summary(line_result.trajectory, (), verified=False)
+    told = summary(line_result.trajectory, ["not shown: a: no file <x>"], verified=None)
+    assert "erified" not in told
+    assert "no file &lt;x&gt;" in told

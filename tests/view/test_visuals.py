@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+import trimesh
+
+from brachis.view.visuals import link_shapes, mesh_file
+from support.shown import PANDA, ROBOTS
+
+LINK = '<robot name="r"><link name="a"><visual><origin xyz="1 0 0"/><geometry>{}</geometry>{}</visual></link></robot>'
+RED = '<material name="red"><color rgba="1 0 0 1"/></material>'
+
+
+@pytest.mark.parametrize("urdf", ROBOTS, ids=lambda path: path.parent.name)
+def test_every_shape_of_every_robot_is_read(urdf):
+    text = urdf.read_text()
+    shapes, unread = link_shapes(text, urdf.parent)
+    assert unread == []
+    assert sum(map(len, shapes.values())) == text.count("<visual>") > 0
+
+
+@pytest.mark.skipif(PANDA is None, reason="example-robot-data is not installed")
+def test_meshes_of_a_package_are_found_beside_the_urdf():
+    pytest.importorskip("collada", reason="pycollada is not installed")
+    shapes, unread = link_shapes(PANDA.read_text(), PANDA.parent)
+    assert unread == []
+    assert {"panda_link0", "panda_link7", "panda_hand", "panda_leftfinger", "panda_rightfinger"} <= set(shapes)
+    colours = {tuple(mesh.visual.material.baseColorFactor) for meshes in shapes.values() for mesh in meshes}
+    assert len(colours) > 3
+    assert 0.15 < np.ptp(shapes["panda_link5"][0].vertices, axis=0).max() < 0.5
+
+
+def test_shapes_stand_where_the_urdf_has_them_in_their_colour():
+    shapes, _ = link_shapes(LINK.format('<box size="0.2 0.4 0.6"/>', RED), None)
+    (box,) = shapes["a"]
+    np.testing.assert_allclose(box.bounds, [[0.9, -0.2, -0.3], [1.1, 0.2, 0.3]])
+    assert tuple(box.visual.material.baseColorFactor) == (255, 0, 0, 255)
+
+
+@pytest.mark.parametrize("name", ["part.stl", "meshes/../part.stl", "package://cell/part.stl", "file://{}/part.stl"])
+def test_mesh_files_are_found(name, tmp_path, monkeypatch):
+    folder = tmp_path / "cell"
+    (folder / "meshes").mkdir(parents=True)
+    trimesh.creation.box((1.0, 2.0, 3.0)).export(folder / "part.stl")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"/nowhere:{tmp_path}")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    found = mesh_file(name.format(folder), elsewhere if name.startswith("package") else folder)
+    assert found is not None
+    assert found.samefile(folder / "part.stl")
+    shapes, unread = link_shapes(LINK.format(f'<mesh filename="{name.format(folder)}" scale="2 2 2"/>', ""), folder)
+    assert unread == []
+    np.testing.assert_allclose(np.ptp(shapes["a"][0].vertices, axis=0), [2.0, 4.0, 6.0])
+
+
+def test_a_missing_mesh_is_named_and_the_other_links_are_read(tmp_path):
+    (tmp_path / "broken.stl").write_bytes(b"solid nonsense")
+    text = (
+        '<robot name="r">'
+        '<link name="a"><visual><geometry><mesh filename="package://none/a.dae"/></geometry></visual></link>'
+        '<link name="b"><visual><geometry><sphere radius="0.1"/></geometry></visual></link>'
+        '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint></robot>'
+    )
+    shapes, unread = link_shapes(text, tmp_path)
+    assert list(shapes) == ["b"]
+    assert unread == ["a: no file package://none/a.dae"]
+
+
+def test_a_broken_shape_is_told(tmp_path):
+    _, unread = link_shapes(LINK.format('<box size="wide"/>', ""), tmp_path)
+    assert len(unread) == 1
+    assert unread[0].startswith("a: ValueError")
