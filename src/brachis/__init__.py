@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from brachis.robot import Robot as Robot
     from brachis.robot import TaskMap as TaskMap
     from brachis.robot import task_map_of as task_map_of
+    from brachis.sweeps import SweepResult as SweepResult
+    from brachis.sweeps import sweep as sweep
     from brachis.task import LimitSpec as LimitSpec
     from brachis.task import Task as Task
     from brachis.task import fit_path as fit_path
@@ -46,6 +48,7 @@ _HOME = {
     "PlausibilityWarning": "brachis.plausibility",
     "Result": "brachis.result",
     "Robot": "brachis.robot",
+    "SweepResult": "brachis.sweeps",
     "Task": "brachis.task",
     "TaskMap": "brachis.robot",
     "Trajectory": "brachis.trajectory",
@@ -55,6 +58,7 @@ _HOME = {
     "load_task": "brachis.task",
     "plan": "brachis.planner",
     "read_limits": "brachis.task",
+    "sweep": "brachis.sweeps",
     "task_map_of": "brachis.robot",
     "transcribe": "brachis.planner",
     "verify_trajectory": "brachis.verify",
@@ -70,6 +74,7 @@ __all__ = [
     "PlausibilityWarning",
     "Result",
     "Robot",
+    "SweepResult",
     "Task",
     "TaskMap",
     "Trajectory",
@@ -82,6 +87,7 @@ __all__ = [
     "load_task",
     "plan",
     "read_limits",
+    "sweep",
     "task_map_of",
     "transcribe",
     "verify_trajectory",

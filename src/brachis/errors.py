@@ -212,6 +212,10 @@ class ResultFileError(InputError):
     """A saved result is missing, broken, or of another schema version."""
 
 
+class ClusterError(BrachisError):
+    """The cluster that plans were sent to cannot be reached, was lost, or cannot run them."""
+
+
 class UnreachableError(BrachisError):
     """A trial point of the optimiser has a collocation point outside the branch; solvers back off from it."""
 

@@ -1,4 +1,4 @@
-"""The command line: ``brachis plan | bottleneck | verify | export | plot | inspect | compose | schema``.
+"""The command line: ``brachis plan | bottleneck | verify | export | plot | inspect | compose | sweep | schema``.
 
 Exit codes: 0 planned and verified, 1 no verified plan, 2 wrong input, 3 planned and verified, but not all figures could
 be written, 130 interrupted. Results go to standard output, everything else to standard error. With ``--json`` standard
@@ -232,6 +232,36 @@ def inspect(
 
 
 app.command(cls=VectorCommand)(compose)
+
+
+@app.command()
+def sweep(
+    source: Annotated[Path, typer.Argument(help="Sweep file (YAML).", metavar="SWEEP")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for plans, table.parquet, table.csv and sweep.png; by default one in the current folder, "
+            "named as the file. A sweep that was ended goes on where it was."
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(help="Processes; by default, and at most, as many as there are processors.")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            help="Plan on a cluster: address of a Dask scheduler, such as tcp://host:8786, or its scheduler file; ray, "
+            "or ray://host:10001."
+        ),
+    ] = None,
+    retry: Annotated[bool, typer.Option("--retry", help="Plan stored failures again.")] = False,
+    json: Json = False,
+) -> None:
+    """Plan a task many times, with other values of its keys, and compare."""
+    with interrupts.postponed():
+        from brachis.cli import sweep as command  # noqa: PLC0415
+
+    raise typer.Exit(command.sweep_command(source, out=out, jobs=jobs, scheduler=scheduler, retry=retry, as_json=json))
 
 
 @app.command()
