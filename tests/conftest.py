@@ -18,6 +18,7 @@ _WITH_DEADLINES = ("brachis.deadline", "brachis.solvers.watch", "brachis.bottlen
 """Modules that look at the clock to see whether the time is up."""
 if str(_TESTS) not in sys.path:
     sys.path.append(str(_TESTS))
+    sys.modules["bottleneck"] = None  # type: ignore[assignment]  # pandas would take the folder for a package it may use
 
 # A shell that starts the tests in the background has Ctrl-C ignored; tests that press it want Python's usual handler.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

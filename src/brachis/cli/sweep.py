@@ -72,17 +72,14 @@ def _show(result: SweepResult, files: Sequence[str]) -> None:
     """Print the sweep for a person."""
     console, found = result_console(), result.summary()
     counts = ", ".join(f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED))
-    table = Table(title=f"sweep: {found['plans']} plans, {counts}", title_justify="left")
-    for column in ("", "plan", *result.keys, "t_end [s]"):
-        table.add_column(column, justify="left" if not column else "right", overflow="fold")
-    for name in ("best", "median", "worst"):
-        if name in found:
-            row = found[name]
-            table.add_row(name, str(row["plan"]), *(_text(row[key]) for key in result.keys), f"{row['t_end_s']:.4f}")
-    if table.rows:
-        console.print(table)
-    else:
-        console.print(table.title)
+    title = f"sweep: {found['plans']} plans, {counts}"
+    shown = [name for name in ("best", "median", "worst") if name in found]
+    table = Table(title=title, title_justify="left")
+    for column in ("", *shown):
+        table.add_column(column, justify="right" if column else "left", overflow="fold")
+    for key in ("t_end_s", "plan", *result.keys):
+        table.add_row("t_end [s]" if key == "t_end_s" else key, *(_text(found[name][key]) for name in shown))
+    console.print(table if shown else title)
     for error, told in found["failures"].items():
         console.print(f"{told['plans']} failed with {error}, for example: {told['message']}")
     console.print(f"planning took {in_words(found['wall_time_s'])} in all processes together")

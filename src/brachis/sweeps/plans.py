@@ -165,17 +165,15 @@ def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None
     tried: dict[str, BrachisError | None] = {}
     for key in settings.keys or ("task",):
         having = [row for row in rows if key in row.changes or not row.changes]
-        plans = [row.plan for row in having if isinstance(row.plan, Plan)]
-        for plan in plans[:: max(1, len(plans) // _TRIED)]:
+        sound = [row.plan for row in having if isinstance(row.plan, Plan)]
+        for plan in sound[:: max(1, len(sound) // _TRIED)]:
             if plan.digest not in tried:
                 tried[plan.digest] = _unknown_name(plan)
-        errors = [row.plan for row in having if isinstance(row.plan, BrachisError)] + [
-            error for plan in plans if (error := tried.get(plan.digest)) is not None
-        ]
-        if errors and not any(tried.get(plan.digest, errors) is None for plan in plans):
-            value = show(having[0].changes.get(key))
+        errors = [tried[plan.digest] for plan in sound if plan.digest in tried]
+        errors = errors or [row.plan for row in having if isinstance(row.plan, BrachisError)]
+        if all(errors):
             problem = f"refused in every plan that sets it ({len(having)}); the first: {errors[0]}"
-            raise TaskError(problem, where=f"{name}: {key}", found=None if key == "task" else value)
+            raise TaskError(problem, where=f"{name}: {key}")
 
 
 def _unknown_name(plan: Plan) -> BrachisError | None:

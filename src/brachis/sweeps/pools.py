@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import itertools
 import os
+import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
@@ -19,6 +21,7 @@ from brachis.errors import BrachisError, ClusterError, InputError
 from brachis.sweeps.plans import Plan
 from brachis.sweeps.worker import Outcome, planned
 
+_ENDED = "the plan ended its worker process each time: a crash, or too little memory"
 Pool = Callable[[Iterable[Plan]], Iterator[tuple[Plan, Outcome]]]
 Submit = Callable[[Plan], "Future[Outcome]"]
 
@@ -29,7 +32,7 @@ _ONE_THREAD = dict.fromkeys(
 _AHEAD = 2
 """Plans that are handed out for each process, so that none waits for the next one."""
 _HEARTBEAT = 1.0
-"""Seconds after which Ctrl-C is looked for at the latest."""
+"""Seconds after which Ctrl-C, or a parent that was killed, is noticed at the latest."""
 _CONNECTING = 10.0
 """Seconds within which a scheduler answers."""
 
@@ -84,7 +87,9 @@ def in_processes(plans: Iterable[Plan], jobs: int) -> Iterator[tuple[Plan, Outco
     from joblib.externals.loky import get_reusable_executor  # noqa: PLC0415  (a fifth of a second)
 
     def executor() -> Any:  # noqa: ANN401  (a new one where the last one broke)
-        return get_reusable_executor(max_workers=jobs, env=_ONE_THREAD)
+        return get_reusable_executor(
+            max_workers=jobs, env=_ONE_THREAD, initializer=_end_with_parent, initargs=(os.getpid(),)
+        )
 
     def submit(plan: Plan) -> Future[Outcome]:
         with interrupts.blocked():  # processes are started here, which are not to hear Ctrl-C
@@ -96,6 +101,17 @@ def in_processes(plans: Iterable[Plan], jobs: int) -> Iterator[tuple[Plan, Outco
         with interrupts.postponed():
             executor().shutdown(wait=True, kill_workers=True)
         raise
+
+
+def _end_with_parent(parent: int) -> None:
+    """End this worker process soon after its parent: one that was killed cannot, and its workers would wait for it."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_HEARTBEAT)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def on_dask(plans: Iterable[Plan], address: str, listener: Callable[[str], None]) -> Iterator[tuple[Plan, Outcome]]:
@@ -217,9 +233,9 @@ def _as_completed(
                 if plan is not tested:
                     suspects.append(plan)
                     continue
-                outcome = Outcome.of_error(error)
+                outcome = Outcome.of_error(error, message=_ENDED)
             except lost as error:
-                outcome = Outcome.of_error(error)
+                outcome = Outcome.of_error(error, message=_ENDED)
             except BrachisError:
                 raise
             except Exception as error:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import brachis
+from brachis import interrupts
 from brachis.sweeps.plans import Plan, SweepPlan, load_sweep
 from brachis.sweeps.pools import pool_for
 from brachis.sweeps.result import SweepResult
@@ -99,6 +100,7 @@ def sweep(
             found[plan.digest] = store.write(plan.digest, outcome)
             progress.tell()
     except KeyboardInterrupt as interrupt:
+        interrupts.forget()
         told = f"{len(found)} of {len(plans)} plans are stored in {store.folder}; the same sweep goes on from there"
         raise KeyboardInterrupt(told) from interrupt
     return _result(planned, store, found)

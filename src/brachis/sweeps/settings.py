@@ -195,4 +195,9 @@ class SweepSettings(Model):
         grid = [dict(zip(self.grid, values, strict=True)) for values in itertools.product(*columns)]
         parts = (grid, self.rows or ({},), self.random.draws() if self.random else [{}])
         changes = [{**cell, **row, **draw} for cell, row, draw in itertools.product(*parts)]
-        return list({json.dumps(each, sort_keys=True): each for each in changes}.values())
+        return list({_alike(each): each for each in reversed(changes)}.values())[::-1]
+
+
+def _alike(changes: dict[str, JsonValue]) -> str:
+    """Return a text that is the same for the same changes, whether a number is written as 90 or as 90.0."""
+    return json.dumps(json.loads(json.dumps(changes), parse_int=float), sort_keys=True)

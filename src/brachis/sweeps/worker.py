@@ -35,9 +35,9 @@ class Outcome:
     motion: bytes | None = None
 
     @classmethod
-    def of_error(cls, error: BaseException, wall_time: float | None = None) -> Outcome:
-        """Return the outcome of a plan that failed."""
-        message = str(error) or type(error).__name__
+    def of_error(cls, error: BaseException, wall_time: float | None = None, *, message: str = "") -> Outcome:
+        """Return the outcome of a plan that failed; the message is the error's own unless another is given."""
+        message = message or str(error) or type(error).__name__
         return cls({"status": FAILED, "error": type(error).__name__, "message": message, "wall_time_s": wall_time})
 
 
