@@ -19,7 +19,7 @@ CONTENT = {
         "search.least_motion": False,
         "spline.intervals": 5,
     },
-    "grid": {"path.0.line.angle_deg": [80, 90, 90.0, 100]},
+    "grid": {"path.0.line.angle_deg": [80, 90, 90.0]},
     "rows": [
         {"path.0.line.length": 0.9, "spline.degree": 3},
         {"path.0.line.length": 9.0, "spline.degree": 3},

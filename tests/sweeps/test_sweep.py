@@ -52,9 +52,9 @@ def here(monkeypatch):
 def test_every_plan_is_a_row_and_equal_ones_come_once(undisturbed):
     rows = undisturbed.rows()
     assert [(row["path.0.line.angle_deg"], row["path.0.line.length"]) for row in rows] == [
-        (angle, length) for angle in (80.0, 90.0, 100.0) for length in (0.9, 9.0, 0.9)
+        (angle, length) for angle in (80, 90) for length in (0.9, 9.0, 0.9)
     ]
-    assert [row["status"] for row in rows] == ["verified", "failed", "failed"] * 3
+    assert [row["status"] for row in rows] == ["verified", "failed", "failed"] * 2
     assert all(1.0 < row["t_end_s"] < 5.0 and row["worst_ratio"] < 1.001 for row in rows[::3])
 
 
@@ -64,7 +64,7 @@ def test_failures_say_why(undisturbed):
     assert "spline.degree: out of range; found 9; allowed: <= 7" in rows[2]["message"]
     assert rows[1]["error"] != "TaskError"
     assert "reach" in rows[1]["message"]
-    assert [count for count, _ in undisturbed.failures().values()] == [3, 3]
+    assert [count for count, _ in undisturbed.failures().values()] == [2, 2]
 
 
 def test_motions_are_those_of_the_plans(undisturbed, content):
@@ -75,16 +75,16 @@ def test_motions_are_those_of_the_plans(undisturbed, content):
     assert trajectory.task.spline.intervals == content["fixed"]["spline.intervals"]
     with pytest.raises(InputError, match=r"plan 1 failed; found \w+: "):
         undisturbed.trajectory(1)
-    with pytest.raises(InputError, match="0 to 8"):
-        undisturbed.trajectory(9)
+    with pytest.raises(InputError, match="0 to 5"):
+        undisturbed.trajectory(6)
 
 
 def test_a_sweep_is_summed_up(undisturbed):
     summary = undisturbed.summary()
-    assert (summary["plans"], summary["verified"], summary["failed"]) == (9, 3, 6)
+    assert (summary["plans"], summary["verified"], summary["failed"]) == (6, 2, 4)
     times = sorted(row["t_end_s"] for row in undisturbed.rows() if row["t_end_s"])
-    assert [summary[name]["t_end_s"] for name in ("best", "median", "worst")] == times
-    assert repr(undisturbed).startswith("SweepResult: 9 plans, 3 verified, 0 unverified, 6 failed; best ")
+    assert [summary[name]["t_end_s"] for name in ("best", "worst")] == times
+    assert repr(undisturbed).startswith("SweepResult: 6 plans, 2 verified, 0 unverified, 4 failed; best ")
 
 
 def test_tables_are_read_back(undisturbed):
@@ -92,13 +92,14 @@ def test_tables_are_read_back(undisturbed):
     assert again.keys == undisturbed.keys
     assert again.table.equals(undisturbed.table)
     frame = undisturbed.to_dataframe()
-    assert frame["t_end_s"].notna().sum() == 3
+    assert frame["t_end_s"].notna().sum() == 2
     csv = (undisturbed.folder / "table.csv").read_text().splitlines()
-    assert len(csv) == 10
+    assert len(csv) == 7
     assert csv[0].startswith('"plan","path.0.line.angle_deg","path.0.line.length","spline.degree","status","t_end_s"')
 
 
-def test_a_finished_sweep_is_not_run_again(undisturbed, content, nothing_runs, same_as_undisturbed):
+@pytest.mark.usefixtures("nothing_runs")
+def test_a_finished_sweep_is_not_run_again(undisturbed, content, same_as_undisturbed):
     assert same_as_undisturbed(brachis.sweep(content, undisturbed.folder).table)
 
 
@@ -114,7 +115,7 @@ def test_plans_of_a_changed_sweep_are_added(undisturbed, content, here, tmp_path
 def test_failures_are_planned_again_where_asked(undisturbed, content, here, tmp_path, same_as_undisturbed):
     folder = shutil.copytree(undisturbed.folder, tmp_path / "out")
     assert same_as_undisturbed(brachis.sweep(content, folder, retry=True).table)
-    assert [plan.task.path[0].line.length for plan in here] == [9.0] * 3
+    assert [plan.task.path[0].line.length for plan in here] == [9.0] * 2
 
 
 @pytest.mark.parametrize("damage", ["part", "motion", "cut"])
@@ -131,7 +132,8 @@ def test_what_is_not_stored_whole_is_planned_again(undisturbed, content, here, t
     assert brachis.Trajectory.load(motion).t_end == undisturbed.rows()[0]["t_end_s"]
 
 
-def test_folders_of_others_are_left_alone(content, tmp_path, nothing_runs):
+@pytest.mark.usefixtures("nothing_runs")
+def test_folders_of_others_are_left_alone(content, tmp_path):
     (tmp_path / "thesis.tex").write_text("...")
     for use in (lambda: brachis.sweep(content, tmp_path), lambda: brachis.SweepResult.load(tmp_path)):
         with pytest.raises(InputError, match="holds other files; allowed: a new folder, or one with a sweep's"):
@@ -139,6 +141,7 @@ def test_folders_of_others_are_left_alone(content, tmp_path, nothing_runs):
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
+@pytest.mark.usefixtures("nothing_runs")
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
@@ -148,7 +151,7 @@ def test_folders_of_others_are_left_alone(content, tmp_path, nothing_runs):
         ({"grid": {"start.joints.3": [0.1]}}, ["start.joints is a list of 3", "start.joints.0 to start.joints.2"]),
         (
             {"grid": {"robot.limits.acceleration.j9": [1.0, 2.0]}},
-            ["acceleration.j9", "no joint named 'j9'", "j1, j2, j3"],
+            ["joint named 'j9'", "j1, j2, j3"],
         ),
         ({"grid": {"spline.degree": []}}, ["grid.spline.degree", "too few items"]),
         ({"grid": {"spline.degree": {"linera": [1, 2, 3]}}}, ["Did you mean 'linear'"]),
@@ -160,23 +163,24 @@ def test_folders_of_others_are_left_alone(content, tmp_path, nothing_runs):
         ({"fixed": {"spline.degre": 3}}, ["Did you mean 'degree'"]),
     ],
 )
-def test_what_is_wrong_is_refused_before_anything_runs(content, tmp_path, nothing_runs, change, expected):
+def test_what_is_wrong_is_refused_before_anything_runs(content, tmp_path, change, expected):
     with pytest.raises(TaskError) as caught:
         brachis.sweep({**content, **change}, tmp_path / "out")
     assert [part for part in expected if part not in str(caught.value)] == []
     assert not (tmp_path / "out").exists()
 
 
-def test_the_time_that_is_left_is_told(undisturbed, content, here, tmp_path):
+@pytest.mark.usefixtures("here")
+def test_the_time_that_is_left_is_told(undisturbed, content, tmp_path):
     folder, told = shutil.copytree(undisturbed.folder, tmp_path / "out"), []
     motion = folder / undisturbed.rows()[0]["motion"]
     motion.unlink()
     brachis.sweep(content, folder, listener=told.append)
-    assert told[1] == "5 of 6 plans are stored already"
-    assert told[2] == "6 of 6 plans, 3 failed; 0 s left"
+    assert told[1] == "3 of 4 plans are stored already"
+    assert told[2] == "4 of 4 plans, 2 failed; 0 s left"
 
 
-def test_a_sweep_that_is_killed_goes_on(content, tmp_path, same_as_undisturbed):
+def test_a_sweep_that_is_killed_goes_on(content, here, tmp_path, same_as_undisturbed):
     source, folder = tmp_path / "sweep.yaml", tmp_path / "sweep"
     source.write_text(yaml.safe_dump(content))
     command = [sys.executable, "-m", "brachis", "sweep", str(source), "--jobs", "1"]
@@ -190,8 +194,9 @@ def test_a_sweep_that_is_killed_goes_on(content, tmp_path, same_as_undisturbed):
         finally:
             os.killpg(process.pid, signal.SIGKILL)
     finished = {path: path.stat().st_mtime_ns for path in folder.glob("plans/*/*.parquet")}
-    assert 2 <= len(finished) < 6
-    result = brachis.sweep(source, folder, jobs=1)
+    assert 2 <= len(finished) < 4
+    result = brachis.sweep(source, folder)
     assert same_as_undisturbed(result.table)
+    assert len(here) == 4 - len(finished)
     assert {path: path.stat().st_mtime_ns for path in finished} == finished
     assert json.loads((folder / "sweep.json").read_text())["settings"]["grid"] == content["grid"]
