@@ -177,7 +177,7 @@ def on_ray(plans: Iterable[Plan], address: str | None) -> Iterator[tuple[Plan, O
     InputError
         Ray is not installed.
     ClusterError
-        The cluster does not answer.
+        The cluster does not answer, or was lost, with it the batch that was under way.
     """
     try:
         import ray  # noqa: PLC0415  (not a dependency)
@@ -186,16 +186,20 @@ def on_ray(plans: Iterable[Plan], address: str | None) -> Iterator[tuple[Plan, O
         raise InputError("Ray is not installed", found=str(error), hint="pip install ray") from error
     from joblib import Parallel, delayed, parallel_config  # noqa: PLC0415
 
+    started = not ray.is_initialized()
     try:
         ray.init(address=address, ignore_reinit_error=True)
-    except (OSError, RuntimeError, ValueError) as error:
-        raise ClusterError("no Ray cluster answers", where=address or "ray", found=str(error)) from error
-    register_ray()
-    waiting = iter(plans)
-    with parallel_config(backend="ray", n_jobs=-1), Parallel() as parallel:
-        while batch := list(itertools.islice(waiting, _AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1))))):
-            interrupts.check()
-            yield from zip(batch, parallel(delayed(planned)(plan) for plan in batch), strict=True)
+        register_ray()
+        waiting, width = iter(plans), _AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1)))
+        with parallel_config(backend="ray", n_jobs=-1), Parallel() as parallel:
+            while batch := list(itertools.islice(waiting, width)):
+                interrupts.check()
+                yield from zip(batch, parallel(delayed(planned)(plan) for plan in batch), strict=True)
+    except (ray.exceptions.RayError, OSError, RuntimeError, ValueError) as error:
+        raise ClusterError("Ray does not answer, or was lost", where=address or "ray", found=str(error)) from error
+    finally:
+        if started:
+            ray.shutdown()
 
 
 def _as_completed(
