@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from brachis.errors import TaskError
 from brachis.sweeps import SweepSettings
+from brachis.sweeps.plans import Plan, load_sweep
+
+ROOT = Path(__file__).parents[2]
 
 
 def changes(**parts):
@@ -69,3 +75,15 @@ def test_too_many_plans_are_refused_at_once():
 def test_values_are_numbers():
     values = changes(grid={"a": {"linear": [0, 1, 2]}}) + drawn(2, a={"log_uniform": [1, 2]})
     assert all(type(each["a"]) is float and math.isfinite(each["a"]) for each in values)
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/sweeps.md"])
+def test_sweeps_of_the_documentation_are_ones(page, monkeypatch):
+    monkeypatch.chdir((ROOT / page).parent)
+    (text,) = re.findall(r"^```yml\n(sweep:.*?)^```", (ROOT / page).read_text(), re.DOTALL | re.MULTILINE)
+    content = yaml.safe_load(text)
+    if "random" in content:
+        content["random"]["count"] = 1
+    found = load_sweep(content)
+    assert len(found.rows) == (24 if page == "README.md" else 48)
+    assert all(isinstance(row.plan, Plan) for row in found.rows)
