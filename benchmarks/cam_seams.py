@@ -93,7 +93,7 @@ def run(seed: int, folder: Path, corner: float) -> bool:
     try:
         task = brachis.load_task(content)
         loaded = time.process_time() - start
-        result = brachis.plan(None, task)
+        result = brachis.plan(task)
     except brachis.BrachisError as error:
         print(line, error, flush=True)
         return False

@@ -54,7 +54,7 @@ def results() -> tuple[bytes, ...]:
             **changes,
         }
         with tempfile.TemporaryDirectory() as folder:
-            brachis.plan(None, task).trajectory.save(Path(folder) / "result.npz")
+            brachis.plan(task).trajectory.save(Path(folder) / "result.npz")
             found.append((Path(folder) / "result.npz").read_bytes())
     return tuple(found)
 
@@ -70,7 +70,7 @@ def run(case: fuzz_cases.Case, folder: Path) -> str:
                 trajectory = brachis.Trajectory.load(folder / "result.npz")
                 brachis.verify_trajectory(trajectory)
             elif what == "plan":
-                brachis.plan(None, folder / "task.yaml")
+                brachis.plan(folder / "task.yaml")
             else:
                 inspect_command(
                     folder / "robot.urdf", task_space="x,y", tool_frame=None, base_frame=None, lock=[], as_json=True

@@ -85,7 +85,7 @@ def main() -> None:
         theirs = time.process_time() - began
         began = time.process_time()
         try:
-            result = brachis.plan(None, task)
+            result = brachis.plan(task)
             t_end = result.t_end if result.verified else np.inf
             used = {check.name: check.value for check in result.verification.checks if check.of_limit}
             active.update(name for name, ratio in used.items() if ratio > ACTIVE)

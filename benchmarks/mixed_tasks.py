@@ -48,7 +48,7 @@ def planned(case: mixed_cases.Case, time_limit: float | None) -> dict[str, objec
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PlausibilityWarning)  # limits are scaled at will
-            result = plan(None, task)
+            result = plan(task)
         t_end = result.t_end
         search = {"attempts": len(result.candidates), "interrupted": result.interrupted}
         failed = [check.name for check in result.verification.checks if not check.passed]
@@ -137,7 +137,7 @@ def main() -> None:
     folder = given.folder or Path(tempfile.mkdtemp(prefix="mixed-tasks-"))
     print(f"task files in {folder}", flush=True)
     numbers = range(given.count) if given.number is None else [given.number]
-    plan(None, ROOT / "examples/01_scara_line.yaml")  # what is loaded on first use is not timed
+    plan(ROOT / "examples/01_scara_line.yaml")  # what is loaded on first use is not timed
     everything = []
     folder.mkdir(parents=True, exist_ok=True)
     with (given.out or folder / "results.jsonl").open("w", encoding="utf-8") as out:

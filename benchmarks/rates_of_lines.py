@@ -25,7 +25,7 @@ def planned(angle_deg: float, **limits: float) -> tuple[brachis.Result, float]:
     task["path"], task["redundant_joints"] = [{"line": {"length": 1.0, "angle_deg": angle_deg}}], "auto"
     task["robot"]["limits"] |= limits
     began = time.perf_counter()
-    return brachis.plan(None, task), time.perf_counter() - began
+    return brachis.plan(task), time.perf_counter() - began
 
 
 def understated(result: brachis.Result) -> np.ndarray:

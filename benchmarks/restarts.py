@@ -91,7 +91,7 @@ def main() -> None:
         print(f"best of all joints: {best:.4f} s (restart {restart}); limits {beyond:+.1e}, path {off:.1e} in between")
     began = time.perf_counter()
     try:
-        result = plan(None, task)
+        result = plan(task)
     except BrachisError as error:
         print(f"plan: {type(error).__name__}: {error}")
         return

@@ -35,13 +35,13 @@ def rail_arm() -> Iterator[tuple[str, Result]]:
     """Yield the line of examples/03 with every joint that has a closed form as the redundant one."""
     task = load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
     for joint in ("rail", "joint_1", "joint_2", "joint_3"):
-        yield f"TX90L, {joint}", plan(None, {**task, "redundant_joints": [joint]})
+        yield f"TX90L, {joint}", plan({**task, "redundant_joints": [joint]})
 
 
 def further() -> Iterator[tuple[str, Result]]:
     """Yield examples with many active limits and with a joint that none limits."""
     for name in ("04_ur10_rail_weld", "06_free_roll"):
-        yield name, plan(None, ROOT / "examples" / f"{name}.yaml")
+        yield name, plan(ROOT / "examples" / f"{name}.yaml")
 
 
 def print_case(name: str, result: Result) -> SensitivityCheck:

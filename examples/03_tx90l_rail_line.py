@@ -21,7 +21,7 @@ def plan_all() -> dict[tuple[str, int], brachis.Result]:
             task = brachis.load_task(TASK).to_dict()
             task["redundant_joints"] = [joint]
             task["spline"]["intervals"] = intervals
-            results[joint, intervals] = brachis.plan(None, task)
+            results[joint, intervals] = brachis.plan(task)
     return results
 
 

@@ -21,7 +21,7 @@ def main() -> dict[str, brachis.Result]:
         task = brachis.load_task(TASK).to_dict()
         task["task_space"] = space
         task["path"][0]["orientation"] = orientation
-        result = results[name] = brachis.plan(None, task)
+        result = results[name] = brachis.plan(task)
         joints = ", ".join(result.trajectory.redundant_joints)
         print(f"{name}: {result.t_end:.3f} s, verified: {result.verified}, redundant joints {joints}")
     return results

@@ -29,7 +29,7 @@ def variants(angle_deg: int) -> dict[str, dict[str, object]]:
 
 def plan_all() -> dict[tuple[int, str], brachis.Result]:
     """Plan all lines in all ways; keys are angle in degrees and name."""
-    return {(angle, name): brachis.plan(None, task) for angle in ANGLES_DEG for name, task in variants(angle).items()}
+    return {(angle, name): brachis.plan(task) for angle in ANGLES_DEG for name, task in variants(angle).items()}
 
 
 def markdown_table(results: dict[tuple[int, str], brachis.Result]) -> str:

@@ -44,7 +44,7 @@ def write(path: Path) -> None:
 def main(figure: str | None = None) -> brachis.Result:
     """Write the seam, plan along it and say how near the path is to the points."""
     write(TASK.with_suffix(".csv"))
-    result = brachis.plan(None, TASK)
+    result = brachis.plan(TASK)
     print(f"{result.t_end:.4f} s, verified: {result.verified}, planned in {result.timing['total']:.1f} s")
     for fit in result.fits:
         print(fit)

@@ -24,7 +24,7 @@ def main() -> dict[str, brachis.Result]:
         for key in left_out:
             *part, last = key.split(".")
             del (task["robot"][part[0]] if part else task["robot"])[last]
-        result = results[name] = brachis.plan(None, task)
+        result = results[name] = brachis.plan(task)
         print(f"{name}: {result.t_end:.3f} s, verified: {result.verified}")
     for name, text in result.to_dict()["in_use"].items():
         print(f"  {name}: {text}")

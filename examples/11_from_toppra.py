@@ -55,7 +55,7 @@ def by_toppra(robot: brachis.Robot, task: brachis.Task, intervals: int = 2000) -
 
 def main() -> tuple[brachis.Result, float | None]:
     """Plan with both and print the end times."""
-    result = brachis.plan(None, TASK)
+    result = brachis.plan(TASK)
     print(f"brachis: {result.t_end:.4f} s, verified: {result.verified}")
     try:
         least = by_toppra(result.trajectory.robot, result.task)

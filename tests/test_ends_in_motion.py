@@ -26,7 +26,7 @@ def variant(**changes):
 
 @pytest.fixture(scope="module")
 def circle():
-    return brachis.plan(None, variant(search=QUICK))
+    return brachis.plan(variant(search=QUICK))
 
 
 def failed(trajectory):
@@ -34,7 +34,7 @@ def failed(trajectory):
 
 
 def test_periodic_circle_is_faster_than_from_rest_to_rest(circle):
-    at_rest = brachis.plan(None, variant(boundary={}, search=QUICK))  # and its end posture is free
+    at_rest = brachis.plan(variant(boundary={}, search=QUICK))  # and its end posture is free
     assert circle.verified
     assert circle.t_end < 0.85 * at_rest.t_end
 
@@ -77,14 +77,14 @@ def test_three_turns_in_mujoco_without_drift(circle):
 
 
 def test_closed_forms_close_too(circle):
-    result = brachis.plan(None, variant(redundant_joints=["j1"], search=QUICK, spline={"intervals": 20}))
+    result = brachis.plan(variant(redundant_joints=["j1"], search=QUICK, spline={"intervals": 20}))
     assert result.verified
     assert result.t_end == pytest.approx(circle.t_end, rel=0.02)
 
 
 def test_a_free_start_posture_is_the_end_posture():
     place = [3.0**0.5, 0.0]
-    result = brachis.plan(None, variant(start="free", path_start=place, search=QUICK, spline={"intervals": 12}))
+    result = brachis.plan(variant(start="free", path_start=place, search=QUICK, spline={"intervals": 12}))
     assert result.verified
     np.testing.assert_allclose(result.trajectory.q[0], result.trajectory.q[-1], atol=1e-9)
 
@@ -111,7 +111,7 @@ def test_closed_path_of_joints():
         "path": [brachis.bspline_segment(ellipse, (0.0, 2.0 * np.pi), tolerance=1e-12)],
         "boundary": {"periodic": True},
     }
-    round_and_round, once = brachis.plan(None, task), brachis.plan(None, {**task, "boundary": {}})
+    round_and_round, once = brachis.plan(task), brachis.plan(None, {**task, "boundary": {}})
     assert round_and_round.verified
     assert round_and_round.t_end < 0.95 * once.t_end
 
@@ -122,7 +122,7 @@ def test_speeds_at_both_ends_with_redundancy(rest):
     path = [{"line": {"length": 0.6, "angle_deg": 90}}]
     spline = {"intervals": 12, "rest": rest}
     task = variant(path=path, boundary=speeds, spline=spline, redundant_joints=["j1"], search=QUICK)
-    result = brachis.plan(None, task)
+    result = brachis.plan(task)
     assert result.verified
     model, trajectory = result.trajectory.robot.model, result.trajectory
     data, frame = model.createData(), result.trajectory.robot.frame_id
@@ -130,7 +130,7 @@ def test_speeds_at_both_ends_with_redundancy(rest):
         pin.forwardKinematics(model, data, trajectory.position(time), trajectory.velocity(time))
         found = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).linear
         np.testing.assert_allclose(found, [0.0, speed, 0.0], atol=1e-9)
-    assert result.t_end < brachis.plan(None, {**task, "boundary": {}}).t_end
+    assert result.t_end < brachis.plan({**task, "boundary": {}}).t_end
     faster = replace(trajectory, task=brachis.load_task({**task, "boundary": {**speeds, "end_speed": 0.501}}))
     assert failed(faster) == {"end speed"}
 
@@ -138,7 +138,7 @@ def test_speeds_at_both_ends_with_redundancy(rest):
 def test_a_turn_on_the_spot_ends_at_an_angular_speed():
     path, boundary = [{"line": {"by": [0.0, 0.0, 0.5]}}], {"end_speed": 0.3}
     task = variant(task_space=["x", "y", "yaw"], path=path, boundary=boundary, search=QUICK, spline={"intervals": 12})
-    result = brachis.plan(None, task)
+    result = brachis.plan(task)
     assert result.verified
     assert result.trajectory.velocity(result.t_end).sum() == pytest.approx(0.3, abs=1e-9)
 
@@ -147,7 +147,7 @@ def test_a_speed_that_no_limit_allows_is_told():
     path, spline = [{"line": {"length": 0.6, "angle_deg": 90}}], {"intervals": 8}
     task = variant(path=path, boundary={"end_speed": 20.0}, redundant_joints=["j1"], search=QUICK, spline=spline)
     with pytest.raises(brachis.PlanningError, match=r"lower boundary.end_speed, which is 20 m/s"):
-        brachis.plan(None, task)
+        brachis.plan(task)
 
 
 def test_path_of_joints_with_speeds_takes_as_long_as_in_toppra():
@@ -163,7 +163,7 @@ def test_path_of_joints_with_speeds_takes_as_long_as_in_toppra():
         "spline": {"intervals": 120, "rest": "velocity"},
         "search": {"least_motion": False},
     }
-    result = brachis.plan(None, task)
+    result = brachis.plan(task)
     assert result.verified
     least = toppra_time(result)
     assert result.t_end == pytest.approx(least, rel=3e-3)
@@ -191,13 +191,13 @@ REFUSED = [
 @pytest.mark.parametrize(("changes", "words"), REFUSED)
 def test_what_is_refused(changes, words):
     with pytest.raises(brachis.BrachisError, match=words):
-        brachis.plan(None, variant(**changes))
+        brachis.plan(variant(**changes))
 
 
 def test_a_corner_at_the_seam_is_refused():
     corners = [{"line": {"by": [0.2, 0.0]}, "blend": 0.05}, {"line": {"by": [0.0, 0.2]}, "blend": 0.05}]
     with pytest.raises(brachis.BrachisError, match=r"the path's tangent jumps where it closes"):
-        brachis.plan(None, variant(path=[*corners, {"line": {"by": [-0.2, -0.2]}}]))
+        brachis.plan(variant(path=[*corners, {"line": {"by": [-0.2, -0.2]}}]))
 
 
 def test_a_motion_that_does_not_end_at_rest_is_not_held(circle):

@@ -57,13 +57,13 @@ def example():
 
 @pytest.fixture(scope="module")
 def planned():
-    return brachis.plan(None, task())
+    return brachis.plan(task())
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_end_time_is_that_of_toppra(bench, example, seed):
     pytest.importorskip("toppra")
-    result = brachis.plan(None, bench.case(seed, intervals=150))
+    result = brachis.plan(bench.case(seed, intervals=150))
     assert result.verified
     least = example.by_toppra(result.trajectory.robot, result.task)
     assert result.t_end == pytest.approx(least, rel=3e-3)
@@ -83,7 +83,7 @@ def test_every_limit_is_violated_without_it_and_met_with_it(planned, limit):
     """On the dense grid of the verification, which has formulas of its own."""
     scale = {"torque": {"scale": {"torque": 0.2}}, "velocity": {"velocity": 0.6}, "acceleration": {"acceleration": 2.0}}
     given = {"tool_limits": {"speed": 0.5}} if limit == "tool speed" else {"limits": scale[limit]}
-    held = brachis.plan(None, task(**given))
+    held = brachis.plan(task(**given))
     assert held.verified
     assert held.t_end > 1.01 * planned.t_end
     before = replace(planned.trajectory, task=held.trajectory.task, robot=held.trajectory.robot)
@@ -113,7 +113,7 @@ def test_a_spline_of_scipys_is_the_path():
     from scipy.interpolate import make_interp_spline  # noqa: PLC0415
 
     curve = make_interp_spline(np.linspace(0.0, 3.0, 6), np.vstack([WAYPOINTS, WAYPOINTS[:2]]), k=5)
-    result = brachis.plan(None, task([brachis.bspline_segment(curve)]))
+    result = brachis.plan(task([brachis.bspline_segment(curve)]))
     assert result.verified
     u = 3.0 * result.trajectory.path_coordinate(1.0)
     np.testing.assert_allclose(result.trajectory.position(1.0), curve(u), atol=1e-9)
@@ -121,16 +121,16 @@ def test_a_spline_of_scipys_is_the_path():
 
 @pytest.mark.parametrize("spline", [{"intervals": "auto", "tolerance": 0.01}, {"intervals": 6, "knots": "free"}])
 def test_calmest_motion_auto_intervals_and_free_knots(spline):
-    result = brachis.plan(None, task(spline=spline, search={"least_motion": True}))
+    result = brachis.plan(task(spline=spline, search={"least_motion": True}))
     assert result.verified
 
 
 def test_paths_beyond_a_limit_at_rest_are_refused_with_their_place():
     with pytest.raises(brachis.BrachisError, match=r"position limit of 'joint_2' .* found 3 rad at s = 1"):
-        brachis.plan(None, task([{"line": {"to": [0, 3.0, 0, 0, 0, 0, 0]}}]))
+        brachis.plan(task([{"line": {"to": [0, 3.0, 0, 0, 0, 0, 0]}}]))
     weak = {"torque": {"joint_2": 40.0}}
     with pytest.raises(brachis.BrachisError, match=r"torque limit of 'joint_2' .* Nm at s = .*40 N"):
-        brachis.plan(None, task([{"line": {"to": [0, 1.6, 0, 0, 0, 0, 0]}}], start={"joints": [0.0] * 7}, limits=weak))
+        brachis.plan(task([{"line": {"to": [0, 1.6, 0, 0, 0, 0, 0]}}], start={"joints": [0.0] * 7}, limits=weak))
 
 
 def test_momentum_carries_an_arm_through_postures_that_it_cannot_hold():
@@ -151,7 +151,7 @@ def test_momentum_carries_an_arm_through_postures_that_it_cannot_hold():
 
 def test_an_end_beside_the_path_is_refused():
     with pytest.raises(brachis.BrachisError, match=r"end posture is off the path.*in joint joint_3"):
-        brachis.plan(None, task(end={"joints": WAYPOINTS[-1] + [0, 0, 1e-3, 0, 0, 0, 0]}))
+        brachis.plan(task(end={"joints": WAYPOINTS[-1] + [0, 0, 1e-3, 0, 0, 0, 0]}))
 
 
 def test_sensitivities_are_those_of_solving_again(planned):

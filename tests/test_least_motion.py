@@ -69,7 +69,7 @@ def scara(**search) -> dict:
 
 @pytest.fixture(scope="module", params=[free_roll, seven_joints])
 def result(request):
-    return brachis.plan(None, request.param())
+    return brachis.plan(request.param())
 
 
 def test_no_joint_swings_to_and_fro_and_the_motion_is_as_fast(result):
@@ -96,14 +96,14 @@ def test_bottlenecks_are_those_of_the_fastest_motion(result):
 
 
 def test_it_can_be_switched_off():
-    result = brachis.plan(None, scara(least_motion=False))
+    result = brachis.plan(scara(least_motion=False))
     assert result.least_motion is None
     assert result.trajectory is result.attempt.trajectory
     assert result.to_dict()["least_motion"] is None
 
 
 def test_the_fastest_motion_stays_where_there_is_nothing_to_gain():
-    result = brachis.plan(None, scara())
+    result = brachis.plan(scara())
     assert result.trajectory is result.attempt.trajectory
     assert result.least_motion.reduction == result.least_motion.later == 0.0
     assert len(result.least_motion.reports) == 1
@@ -111,7 +111,7 @@ def test_the_fastest_motion_stays_where_there_is_nothing_to_gain():
 
 
 def test_a_slower_motion_is_calmer(tmp_path):
-    result = brachis.plan(None, scara(slower="1 %"))
+    result = brachis.plan(scara(slower="1 %"))
     assert result.verified
     assert 1.005 < result.t_end / result.attempt.t_end <= 1.01
     assert np.all(rms(result.trajectory) < 0.9 * rms(result.attempt.trajectory))
@@ -131,7 +131,7 @@ def test_without_time_or_a_verified_motion_the_fastest_stays():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("brachis.planner.calmest", keep)
-        brachis.plan(None, task.model_copy(update={"search": task.search.model_copy(update={"least_motion": True})}))
+        brachis.plan(task.model_copy(update={"search": task.search.model_copy(update={"least_motion": True})}))
     (fastest,) = kept
     over = least_motion.calmest(fastest, Deadline(0.0), lambda _text: None)
     assert over.trajectory is fastest.trajectory
@@ -146,7 +146,7 @@ def test_without_time_or_a_verified_motion_the_fastest_stays():
 
 
 def test_without_refinement_nothing_is_verified_and_the_fastest_stays():
-    result = brachis.plan(None, {**scara(), "refinement": {"max_rounds": 0}})
+    result = brachis.plan({**scara(), "refinement": {"max_rounds": 0}})
     assert not result.verified
     assert result.least_motion.status == "the fastest motion is not verified"
 

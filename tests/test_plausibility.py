@@ -146,14 +146,14 @@ def test_the_least_end_time():
     limits = {"torque": 1e12}
     content = task(robot={**task()["robot"], "limits": {**limits, "velocity": None}})
     with pytest.warns(brachis.PlausibilityWarning, match="the end time is the least that the planner knows"):
-        result = brachis.plan(None, content)
+        result = brachis.plan(content)
     assert [remark.where for remark in result.warnings] == ["t_end"]
 
 
 def test_warnings_are_emitted_and_kept_in_the_result():
     content = with_limits(scale={"velocity": 50})
     with pytest.warns(brachis.PlausibilityWarning, match=r"robot\.limits\.scale\.velocity.*found 50") as caught:
-        result = brachis.plan(None, content)
+        result = brachis.plan(content)
     assert len(caught) == 1
     assert caught[0].filename == __file__
     assert result.to_dict()["warnings"] == [
@@ -169,7 +169,7 @@ def test_warnings_are_emitted_and_kept_in_the_result():
 def test_a_plausible_plan_has_no_warnings():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        result = brachis.plan(None, task(), strict=True)
+        result = brachis.plan(task(), strict=True)
     assert result.warnings == ()
     assert result.to_dict()["warnings"] == []
 
@@ -177,7 +177,7 @@ def test_a_plausible_plan_has_no_warnings():
 def test_strict_refuses_before_anything_is_planned(monkeypatch):
     monkeypatch.setattr("brachis.planner.find_fastest", lambda *_: pytest.fail("planned"))
     with pytest.raises(PlausibilityError, match=r"scale\.velocity") as caught:
-        brachis.plan(None, with_limits(scale={"velocity": 50}), strict=True)
+        brachis.plan(with_limits(scale={"velocity": 50}), strict=True)
     assert caught.value.exit_code == 2
     assert len(caught.value.remarks) == 1
 
@@ -185,7 +185,7 @@ def test_strict_refuses_before_anything_is_planned(monkeypatch):
 def test_a_posture_in_degrees_where_joints_turn_without_end():
     # 30, -120 and 120 rad are reached all the same: joints of this arm have no range.
     with pytest.raises(PlausibilityError) as caught:
-        brachis.plan(None, task(start={"joints": [30.0, -120.0, 120.0]}), strict=True)
+        brachis.plan(task(start={"joints": [30.0, -120.0, 120.0]}), strict=True)
     assert [remark.split(":")[0] for remark in caught.value.remarks] == [f"start.joints.j{i}" for i in (1, 2, 3)]
 
 
@@ -193,7 +193,7 @@ def test_yaw_of_the_path_start_in_degrees():
     content = task(start="free", path_start=[1.7, 0.0, 90.0], task_space=["x", "y", "yaw"], redundant_joints=[])
     content["path"] = [{"line": {"by": [0.0, 0.2, 0.0]}}]
     with pytest.raises(PlausibilityError, match="path_start: yaw looks like degrees; found 90 rad"):
-        brachis.plan(None, content, strict=True)
+        brachis.plan(content, strict=True)
 
 
 @pytest.mark.parametrize(
@@ -209,7 +209,7 @@ def test_the_hint_of_a_posture_out_of_range(joints, hint):
     content = task(robot={"urdf": str(RAIL)}, start={"joints": joints}, task_space="pose", redundant_joints=["rail"])
     content["path"] = [{"line": {"by": [0, 0.2, 0]}}]
     with pytest.raises(StartError) as caught:
-        brachis.plan(None, content)
+        brachis.plan(content)
     assert caught.value.hint == hint
 
 
@@ -223,22 +223,22 @@ def test_the_hint_of_a_posture_out_of_range(joints, hint):
 )
 def test_a_path_in_mm_is_out_of_reach_and_the_hint_says_why(changes):
     with pytest.raises(PathError, match="out of reach") as caught:
-        brachis.plan(None, task(**changes))
+        brachis.plan(task(**changes))
     assert re.match(r"The path looks like mm: it is \d+ m away from a robot that reaches about 3 m", caught.value.hint)
 
 
 def test_a_path_that_is_too_long_in_metres_has_no_such_hint():
     with pytest.raises(PathError, match="out of reach") as caught:
-        brachis.plan(None, task(path=[{"line": {"length": 5.0, "angle_deg": 90}}]))
+        brachis.plan(task(path=[{"line": {"length": 5.0, "angle_deg": 90}}]))
     assert "mm" not in caught.value.hint
 
 
 def test_a_path_start_in_mm():
     with pytest.raises(StartError, match="off the path") as caught:
-        brachis.plan(None, task(path_start=[1732.05, 0.0]))
+        brachis.plan(task(path_start=[1732.05, 0.0]))
     assert caught.value.hint == "The path looks like mm: divided by 1000 it is where the tool is"
     with pytest.raises(StartError, match="off the path") as caught:
-        brachis.plan(None, task(path_start=[1.7, 0.0]))
+        brachis.plan(task(path_start=[1.7, 0.0]))
     assert "mm" not in caught.value.hint
 
 

@@ -30,7 +30,7 @@ def task_of_length(length):
 
 @pytest.fixture(scope="module")
 def trajectory():
-    return plan(None, task_of_length(0.3)).trajectory
+    return plan(task_of_length(0.3)).trajectory
 
 
 def test_nodes_are_met(trajectory):
@@ -65,7 +65,7 @@ def test_accelerations_of_a_very_short_motion_are_precise():
 
 @pytest.mark.parametrize("length", [1e-3, 1e-4])
 def test_very_short_lines_are_verified(length):
-    result = plan(None, task_of_length(length))
+    result = plan(task_of_length(length))
     assert result.t_end < 0.06
     assert result.verified, [check for check in result.verification.checks if not check.passed]
     torque_jump = next(check for check in result.verification.checks if check.name == "torque jump")

@@ -1,8 +1,26 @@
 """Minimum-time motion of redundant robots along prescribed paths.
 
-The names below are the public interface; they are imported when first used, so that ``import brachis`` is quick.
+    import brachis
+    from brachis import Line
+
+    result = brachis.plan("task.yaml")
+    result = brachis.plan("scara3", path=Line(by=[0, 1]), start=[0.52, -2.09, 2.09], task_space=["x", "y"])
+    result.plot()
+
+To plan            plan, plan_many, transcribe (the nonlinear program itself)
+Many plans         sweep, SweepResult: keys of a task varied over grids and draws, also on a cluster
+A path             Line, Arc, Circle, Helix, Spline, joined by +; fit_path, bspline_segment from points and curves
+A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (those that come along)
+A task             Task, load_task; examples (task files that come along)
+What comes out     Result, Trajectory, Samples, Attempt, Verification, BottleneckReport
+To look at it      Result.plot, plots, Result.bottleneck, bottleneck, verify_trajectory, export
+What goes wrong    errors; BrachisError, InputError, PlanningError, PlausibilityWarning
+To extend it       ik (closed forms), limits, compose (arms on rails), TaskMap, task_map_of
+
+All units are SI: m, rad, kg, s, N, Nm. ``help(brachis.plan)`` has the details, as have the files in ``docs/``.
 """
 
+# The names are imported when first used, so that ``import brachis`` is quick.
 from __future__ import annotations
 
 import importlib
@@ -11,11 +29,19 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from brachis import bottleneck as bottleneck
     from brachis import compose as compose
+    from brachis import errors as errors
+    from brachis import examples as examples
+    from brachis import export as export
+    from brachis import ik as ik
+    from brachis import limits as limits
+    from brachis import plots as plots
+    from brachis import robots as robots
     from brachis.attempt import Attempt as Attempt
     from brachis.bottleneck import BottleneckReport as BottleneckReport
     from brachis.errors import BrachisError as BrachisError
     from brachis.errors import InputError as InputError
     from brachis.errors import PlanningError as PlanningError
+    from brachis.many import plan_many as plan_many
     from brachis.path import bspline_segment as bspline_segment
     from brachis.planner import plan as plan
     from brachis.planner import transcribe as transcribe
@@ -31,77 +57,63 @@ if TYPE_CHECKING:
     from brachis.task import fit_path as fit_path
     from brachis.task import load_task as load_task
     from brachis.task import read_limits as read_limits
+    from brachis.task.constructors import Arc as Arc
+    from brachis.task.constructors import Circle as Circle
+    from brachis.task.constructors import Helix as Helix
+    from brachis.task.constructors import Line as Line
+    from brachis.task.constructors import Spline as Spline
+    from brachis.trajectory import Samples as Samples
     from brachis.trajectory import Trajectory as Trajectory
     from brachis.verify import Verification as Verification
     from brachis.verify import verify_trajectory as verify_trajectory
 
 __version__ = "0.1.0"
 
-_STAGES = ("bottleneck", "compose")
+_MODULES = ("bottleneck", "compose", "errors", "examples", "export", "ik", "limits", "plots", "robots")
 _HOME = {
-    "BottleneckReport": "brachis.bottleneck",
-    "BrachisError": "brachis.errors",
-    "Attempt": "brachis.attempt",
-    "InputError": "brachis.errors",
-    "LimitSpec": "brachis.task",
-    "PlanningError": "brachis.errors",
-    "PlausibilityWarning": "brachis.plausibility",
-    "Result": "brachis.result",
-    "Robot": "brachis.robot",
-    "SweepResult": "brachis.sweeps",
-    "Task": "brachis.task",
-    "TaskMap": "brachis.robot",
-    "Trajectory": "brachis.trajectory",
-    "Verification": "brachis.verify",
-    "bspline_segment": "brachis.path",
-    "fit_path": "brachis.task",
-    "load_task": "brachis.task",
-    "plan": "brachis.planner",
-    "read_limits": "brachis.task",
-    "sweep": "brachis.sweeps",
-    "task_map_of": "brachis.robot",
-    "transcribe": "brachis.planner",
-    "verify_trajectory": "brachis.verify",
+    "Arc": "task.constructors",
+    "Attempt": "attempt",
+    "BottleneckReport": "bottleneck",
+    "BrachisError": "errors",
+    "Circle": "task.constructors",
+    "Helix": "task.constructors",
+    "InputError": "errors",
+    "LimitSpec": "task",
+    "Line": "task.constructors",
+    "PlanningError": "errors",
+    "PlausibilityWarning": "plausibility",
+    "Result": "result",
+    "Robot": "robot",
+    "Samples": "trajectory",
+    "Spline": "task.constructors",
+    "SweepResult": "sweeps",
+    "Task": "task",
+    "TaskMap": "robot",
+    "Trajectory": "trajectory",
+    "Verification": "verify",
+    "bspline_segment": "path",
+    "fit_path": "task",
+    "load_task": "task",
+    "plan": "planner",
+    "plan_many": "many",
+    "read_limits": "task",
+    "sweep": "sweeps",
+    "task_map_of": "robot",
+    "transcribe": "planner",
+    "verify_trajectory": "verify",
 }
 
-__all__ = [
-    "Attempt",
-    "BottleneckReport",
-    "BrachisError",
-    "InputError",
-    "LimitSpec",
-    "PlanningError",
-    "PlausibilityWarning",
-    "Result",
-    "Robot",
-    "SweepResult",
-    "Task",
-    "TaskMap",
-    "Trajectory",
-    "Verification",
-    "__version__",
-    "bottleneck",
-    "bspline_segment",
-    "compose",
-    "fit_path",
-    "load_task",
-    "plan",
-    "read_limits",
-    "sweep",
-    "task_map_of",
-    "transcribe",
-    "verify_trajectory",
-]
+__all__ = ["__version__", *_MODULES, *_HOME]  # noqa: PLE0604  (names)
 
 
 def __getattr__(name: str) -> object:
     """Import a public name when it is first used."""
-    if name in _STAGES:
+    if name in _MODULES:
         return importlib.import_module(f"brachis.{name}")
     if name not in _HOME:
         message = f"module 'brachis' has no attribute {name!r}"
         raise AttributeError(message)
-    return getattr(importlib.import_module(_HOME[name]), name)
+    return getattr(importlib.import_module(f"brachis.{_HOME[name]}"), name)
 
 
 def __dir__() -> list[str]:

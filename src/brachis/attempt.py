@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ from brachis.nlp import Program
 from brachis.problem import Problem
 from brachis.refine import Refined
 from brachis.solvers import SolverReport
+from brachis.summary import Summary
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
 
@@ -26,8 +27,8 @@ def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
     return ", ".join(redundant_joints) or (CHART if branch == CHART else "none")
 
 
-@dataclass(frozen=True, eq=False)
-class Start:
+@dataclass(frozen=True, eq=False, repr=False)
+class Start(Summary):
     """A joint path from which a plan is begun.
 
     Attributes
@@ -68,8 +69,8 @@ class Start:
         return dataclasses.replace(self, solver=name)
 
 
-@dataclass(frozen=True, eq=False)
-class Attempt:
+@dataclass(frozen=True, eq=False, repr=False)
+class Attempt(Summary):
     """What came of a start: first a solved program, then, once it is finished, a verified motion.
 
     Attributes
@@ -104,6 +105,13 @@ class Attempt:
         Of the trajectory.
     undone : str
         What the time, or a solve that failed, left undone, in words; empty where nothing.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> result.candidates[0].status
+    'verified'
     """
 
     redundant_joints: tuple[str, ...]
@@ -224,6 +232,12 @@ class Attempt:
     def without_programs(self) -> Attempt:
         """Return the attempt without what only the search needs."""
         return dataclasses.replace(self, start=None, program=None, target=None)
+
+    def summary(self) -> Mapping[str, object]:
+        """Return what is shown: what was tried and what came of it."""
+        tried = {"joints": coordinates(self.redundant_joints, self.branch), "origin": self.origin}
+        ended = {"t_end": f"{self.t_end:.4f} s"} if np.isfinite(self.t_end) else {}
+        return {**tried, **ended, "status": self.status}
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""

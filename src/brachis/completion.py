@@ -61,7 +61,7 @@ def _verified(attempt: Attempt, before: tuple[SolverReport, ...], refined: Refin
         with contextlib.suppress(UnreachableError):
             trajectory = extract(start, refined)
             options = VerifyOptions(ratio_tolerance=problem.task.refinement.tolerance)
-            verification = verify_trajectory(trajectory, options, limits=problem.further)
+            verification = verify_trajectory(trajectory, options, own_limits=problem.further)
     return attempt.finished(
         reports=(*before, *refined.reports),
         refined=refined,

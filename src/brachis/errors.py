@@ -3,6 +3,12 @@
 Every message says what was found, what is allowed, where, and what to try; the same facts are attributes, so that a
 caller need not parse text. ``exit_code`` is what the command line returns: 2 for wrong input, 1 for a plan that could
 not be made although the input was sound.
+
+Examples
+--------
+>>> import brachis
+>>> brachis.errors.nearest("spine", ["spline", "solver"])
+'spline'
 """
 
 from __future__ import annotations
@@ -26,6 +32,15 @@ class BrachisError(Exception):
         File and key, joint, or interval of the path coordinate.
     hint : str, optional
         What to try.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> try:
+    ...     brachis.load_task({"brachis": 2})
+    ... except brachis.BrachisError as error:
+    ...     print(error.exit_code)
+    2
     """
 
     exit_code = 1
@@ -69,7 +84,17 @@ def _restored(kind: type[BrachisError], args: tuple[object, ...], data: dict[str
 
 
 class InputError(BrachisError):
-    """The input is wrong: a file, a key, a value."""
+    """The input is wrong: a file, a key, a value.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> try:
+    ...     brachis.robots.path_of("scara4")
+    ... except brachis.InputError as error:
+    ...     print(error.valid[-3:])
+    ('scara3', 'tx90l_rail', 'ur10_rail')
+    """
 
     exit_code = 2
 
@@ -216,12 +241,34 @@ class ClusterError(BrachisError):
     """The cluster that plans were sent to cannot be reached, was lost, or cannot run them."""
 
 
+class NotInstalledError(InputError):
+    """A library of an extra is not installed.
+
+    Attributes
+    ----------
+    library, extra : str
+        The library, and the extra of brachis that brings it.
+    """
+
+    def __init__(self, user: str, library: str, extra: str) -> None:
+        self.library = library
+        self.extra = extra
+        super().__init__(f"{user} needs {library}, which is not installed", hint=f'pip install "brachis[{extra}]"')
+
+
 class UnreachableError(BrachisError):
     """A trial point of the optimiser has a collocation point outside the branch; solvers back off from it."""
 
 
 class PlanningError(BrachisError):
-    """The input was sound, yet no plan could be made; the message says which attempts were made."""
+    """The input was sound, yet no plan could be made; the message says which attempts were made.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> issubclass(brachis.PlanningError, brachis.InputError), brachis.PlanningError("no motion").exit_code
+    (False, 1)
+    """
 
 
 def nearest(name: str, valid: Iterable[str]) -> str | None:

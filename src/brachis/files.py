@@ -195,3 +195,15 @@ class _File(io.FileIO):
         except OSError as error:
             self.failure = error
             raise
+
+
+def shipped(folder: str) -> Path:
+    """Return a folder of files that come with brachis: within an installed package, or in the source tree beside it.
+
+    Parameters
+    ----------
+    folder : {"robots", "examples"}
+    """
+    package = Path(__file__).parent
+    installed = package / "data" / folder
+    return installed if installed.is_dir() else package.parents[1] / folder

@@ -28,6 +28,7 @@ from brachis.refine import RefinementOptions, Solve
 from brachis.search import Listener
 from brachis.search.joint_path import reciprocals_near
 from brachis.solvers import SolverOptions, SolverReport, SolveStatus, solver_named
+from brachis.summary import Summary
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
 
@@ -47,8 +48,8 @@ _TIME = 0.5
 """Part of the remaining time that may be used."""
 
 
-@dataclass(frozen=True, eq=False)
-class LeastMotion:
+@dataclass(frozen=True, eq=False, repr=False)
+class LeastMotion(Summary):
     """What came of the search for the calmest motion.
 
     Attributes

@@ -11,7 +11,8 @@ from __future__ import annotations
 import dataclasses
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from typing import Unpack
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
@@ -25,12 +26,14 @@ from brachis.least_motion import calmest
 from brachis.mesh import adapt_mesh, coarsest
 from brachis.nlp import Program
 from brachis.nlp.layout import SHORTEST_TIME
-from brachis.problem import Problem, breaks_of, decompositions_of, phase_in, program_of
+from brachis.problem import Decomposition, Problem, breaks_of, decompositions_of, phase_in, program_of
 from brachis.refine import RefinementOptions, Solve
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.combine import robot_for
+from brachis.robots import is_robot, located
 from brachis.search import (
+    GIVEN,
     MARGINS,
     Listener,
     Stages,
@@ -41,12 +44,16 @@ from brachis.search import (
     first_breaks,
     first_map,
     first_point,
+    given_start,
     solve_with,
     solved_in_chart,
 )
 from brachis.solvers import SolveStatus, solver_named
-from brachis.task import Task, load_task
+from brachis.task import Source, Task, TaskKeywords, task_with
+from brachis.trajectory import Trajectory
 
+Given = Source | Robot | None
+"""A robot, or a task; both may be the name of a file."""
 _MANY_VARIABLES = 150
 """Above this a cold solve takes seconds, and the program is first solved over some of its knots."""
 _KNOT_TIME = 0.4
@@ -54,32 +61,46 @@ _KNOT_TIME = 0.4
 
 
 def plan(
-    robot: str | os.PathLike[str] | Robot | None,
-    task: str | os.PathLike[str] | Mapping[str, object] | Task,
+    robot_or_task: Given,
+    task: Source | None = None,
+    /,
     *,
+    start_from: Result | Trajectory | str | os.PathLike[str] | None = None,
     families: Sequence[ik.Family] = (),
-    limits: Sequence[LimitModel] = (),
+    own_limits: Sequence[LimitModel] = (),
     listener: Listener | None = None,
     strict: bool = False,
+    **keywords: Unpack[TaskKeywords],
 ) -> Result:
     """Plan the minimum-time motion of a robot along a path.
 
+    ``plan(task)``, ``plan(robot, task)`` and ``plan(robot, path=..., start=..., task_space=...)`` say the same in
+    different ways; keywords beside a task change it.
+
     Parameters
     ----------
-    robot : path, Robot or None
-        URDF file, in place of the one that the task names; None takes that one. A `Robot` stands for its URDF and what
-        it was made with; what else the task's ``robot`` part sets (limits, gravity, frames, ...) is added to it.
-    task : path, mapping or Task
+    robot_or_task : path, Robot, mapping, Task or None
+        A robot: a `Robot`, a URDF file, or the name of one that comes with brachis (`brachis.robots`). It takes the
+        place of the one that the task names; what else the task's ``robot`` part sets (limits, gravity, frames, ...) is
+        added to it. None: the task's own. Or, alone, a task as below.
+    task : path, mapping or Task, optional
         Task file, or its content.
+    start_from : Result, Trajectory or path, optional
+        A motion, or its file, of this task or one like it (other limits, another path), to start from in place of the
+        search. The optimum next to it is found, in a fraction of the time. Where the motion cannot be used, or leads to
+        no verified plan, the search goes on as usual, and ``result.undone`` says so.
     families : sequence of Family, optional
         Closed forms to try before the built-in ones.
-    limits : sequence of LimitModel, optional
+    own_limits : sequence of LimitModel, optional
         Limits of your own beside those of the task: objects whose ``bind(robot)`` returns a `brachis.limits.Limit`.
         They are not saved with the motion; those of installed packages are named in the task (``custom_limits``).
     listener : callable, optional
         Told what happens.
     strict : bool, optional
         Whether figures that are hardly meant (degrees for rad, mm for m) are errors, not warnings.
+    **keywords
+        Keys of the task, without their sections: ``path``, ``start``, ``task_space``, ``limits``, ``intervals``,
+        ``effort``, ...; all of them: `brachis.task.TaskKeywords`.
 
     Returns
     -------
@@ -103,35 +124,59 @@ def plan(
     Examples
     --------
     >>> import brachis
-    >>> result = brachis.plan(None, "examples/01_scara_line.yaml")
+    >>> result = brachis.plan("examples/01_scara_line.yaml", redundant_joints=["j1"], effort="single")
     >>> result.verified, round(result.t_end, 2)
-    (True, 2.48)
+    (True, 2.26)
+    >>> again = brachis.plan(result.task, limits={"torque": 12}, start_from=result)
+    >>> again.t_end < result.t_end
+    True
     """
     # Batches are small: a second BLAS thread costs up to twenty times what it gives where cores are busy.
     with ThreadpoolController().limit(limits=1, user_api="blas"):
-        return _plan(robot, load_task(task), families, limits, listener or (lambda _text: None), strict=strict)
+        began = time.perf_counter()
+        robot, asked = _read(robot_or_task, task, keywords)
+        known = _motion(start_from)
+        return _plan(robot, asked, families, own_limits, known, listener or (lambda _text: None), began, strict=strict)
+
+
+def _read(first: Given, task: Source | None, keywords: TaskKeywords) -> tuple[Robot, Task]:
+    """Return the robot, and the task with all that the robot was made with."""
+    # What is no robot is a task.
+    alone = task is None and first is not None and not is_robot(first)
+    given, source = (None, first) if alone else (first, task)
+    asked = task_with(source, **keywords)  # type: ignore[arg-type]
+    robot = robot_for(located(given), asked.robot)  # type: ignore[arg-type]
+    return robot, asked.model_copy(update={"robot": robot.settings})
+
+
+def _motion(given: Result | Trajectory | str | os.PathLike[str] | None) -> Trajectory | None:
+    if isinstance(given, str | os.PathLike):
+        return Trajectory.load(given)
+    return given.trajectory if isinstance(given, Result) else given
 
 
 def _plan(
-    robot: str | os.PathLike[str] | Robot | None,
+    robot: Robot,
     task: Task,
     families: Sequence[ik.Family],
-    limits: Sequence[LimitModel],
+    own_limits: Sequence[LimitModel],
+    known: Trajectory | None,
     listener: Listener,
+    began: float,
     *,
     strict: bool,
 ) -> Result:
     """Run the pipeline stage by stage."""
-    began = time.perf_counter()
-    robot = robot_for(robot, task.robot)
-    task = task.model_copy(update={"robot": robot.settings})
     loaded, deadline = time.perf_counter(), Deadline.after(task.search.time_limit)
     remarks = plausibility.of_robot(robot) + plausibility.of_points(task)
     remarks = plausibility.tell(remarks, strict=strict, stacklevel=4)
-    problem = Problem.of(robot, task, limits)
+    problem = Problem.of(robot, task, own_limits)
     places = plausibility.of_places(problem.task_map, problem.start, problem.end, task.path_start)
     remarks += plausibility.tell(places, strict=strict, stacklevel=4)
-    found = find_fastest(problem, decompositions_of(problem, families), Stages(solved, finished), deadline, listener)
+    decompositions = decompositions_of(problem, families)
+    first = None if known is None else _first(problem, decompositions, known)
+    warm = first if isinstance(first, Start) else None
+    found = find_fastest(problem, decompositions, Stages(solved, finished), deadline, listener, warm)
     best = found.best
     assert best is not None and best.start is not None  # noqa: PT018, S101  (else nothing would have come back)
     assert best.trajectory is not None and best.verification is not None  # noqa: PT018, S101
@@ -156,9 +201,25 @@ def _plan(
         },
         candidates=found.in_order(),
         interrupted=found.interrupted,
-        undone=found.undone(),
+        undone=(*_not_used(first, best), *found.undone()),
         warnings=remarks,
     )
+
+
+def _first(problem: Problem, decompositions: Sequence[Decomposition], known: Trajectory) -> Start | str:
+    """Make a start of a known motion, for the solver that is tried first; or say why there is none."""
+    curved = any(limit.where == "whole" for limit in problem.limits)
+    solver = solver_named(problem.task.solver.name, curved=curved)[0]
+    start = given_start(problem, decompositions, known)
+    return start if isinstance(start, str) else start.with_solver(solver.name)
+
+
+def _not_used(first: Start | str | None, best: Attempt) -> tuple[str, ...]:
+    """Say where the plan was to start from a known motion and does not."""
+    if first is None or best.origin == GIVEN:
+        return ()
+    reason = first if isinstance(first, str) else "it led to no verified plan"
+    return (f"the plan does not start from the given motion: {reason}; it was searched for as usual",)
 
 
 def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
@@ -183,7 +244,7 @@ def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
     solve = _solver(start, deadline, listener)
     try:
         x, before = eased(program, x, solve, MARGINS[0])
-        if start.in_chart:
+        if start.in_chart and not start.timed:
             program, reports = solved_in_chart(problem, program, x, solve)
             joint_map = program.phases[0].joint_map
             target = target.with_phases(phase_in(problem, joint_map, phase.grid) for phase in target.phases)
@@ -217,7 +278,7 @@ def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attemp
     options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, soon)
     solve = _solver(start, soon, listener)
     reports, target = attempt.reports, attempt.target
-    if attempt.keeps_knots and start.in_chart and not deadline.passed:
+    if attempt.keeps_knots and start.in_chart and not start.timed and not deadline.passed:
         program, further = best_of_joints(start.problem, program, reports[-1], solve)
         reports, target = (*reports[:-1], *further), program
     adapted = adapt_mesh(program, reports, solve, task.spline, options, target=target)
@@ -240,18 +301,19 @@ def _solver(start: Start, deadline: Deadline, listener: Listener) -> Solve:
 
 
 def transcribe(
-    robot: Robot, task: Task, *, families: Sequence[ik.Family] = (), limits: Sequence[LimitModel] = ()
+    robot_or_task: Given,
+    task: Source | None = None,
+    /,
+    *,
+    families: Sequence[ik.Family] = (),
+    own_limits: Sequence[LimitModel] = (),
+    **keywords: Unpack[TaskKeywords],
 ) -> tuple[Program, str]:
     """Turn a task into an NLP that can be inspected and solved.
 
     Parameters
     ----------
-    robot : Robot
-        As for `plan`.
-    task : Task
-    families : sequence of Family, optional
-        Closed forms to try before the built-in ones.
-    limits : sequence of LimitModel, optional
+    robot_or_task, task, families, own_limits, **keywords
         As for `plan`.
 
     Returns
@@ -264,7 +326,15 @@ def transcribe(
     ------
     InputError
         See `plan`.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> program, family = brachis.transcribe(brachis.examples.scara_line, redundant_joints=["j1"])
+    >>> program.variables, family
+    (36, 'planar')
     """
-    problem = Problem.of(robot_for(robot, task.robot), task, limits)
+    robot, asked = _read(robot_or_task, task, keywords)
+    problem = Problem.of(robot, asked, own_limits)
     joint_map, family = first_map(problem, decompositions_of(problem, families))
-    return program_of(problem, joint_map, breaks_of(task)), family
+    return program_of(problem, joint_map, breaks_of(problem.task)), family

@@ -34,7 +34,19 @@ _ROUNDED = 1e-3
 
 
 class PlausibilityWarning(UserWarning):
-    """A figure of the robot, the task or the motion is hardly meant."""
+    """A figure of the robot, the task or the motion is hardly meant.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> import warnings
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     fast = {"velocity": 180.0}  # degrees per second
+    ...     result = brachis.plan(brachis.examples.scara_line, limits=fast, redundant_joints=["j1"], effort="single")
+    >>> caught[0].category.__name__
+    'PlausibilityWarning'
+    """
 
 
 @dataclass(frozen=True)

@@ -26,14 +26,15 @@ from brachis.nlp import Boundary, FixedGrid, Grid, Phase, Program
 from brachis.path import Path, check_closed, path_of, path_speed, with_feed_rates
 from brachis.robot import ROLL_JOINT, Robot, TaskMap, bind
 from brachis.robot.task_map import JointSpace
+from brachis.summary import Summary
 from brachis.task import Task
 
 _EXACT = 1e-12
 """m or rad."""
 
 
-@dataclass(frozen=True)
-class Problem:
+@dataclass(frozen=True, repr=False)
+class Problem(Summary):
     """A task on a robot.
 
     Attributes
@@ -116,8 +117,8 @@ def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
     return found if np.isfinite(found).all() else posture
 
 
-@dataclass(frozen=True)
-class Decomposition:
+@dataclass(frozen=True, repr=False)
+class Decomposition(Summary):
     """Redundant joints with their closed form, and the branches on which a motion may begin.
 
     Attributes

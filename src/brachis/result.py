@@ -2,27 +2,40 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from brachis import bottleneck, plots
 from brachis.attempt import Attempt
+from brachis.errors import UnknownNameError
 from brachis.least_motion import LeastMotion
 from brachis.plausibility import Remark
 from brachis.robot import in_use
 from brachis.solvers import SolverReport
+from brachis.summary import Summary
 from brachis.task import FitReport, Task
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Samples, Trajectory
 from brachis.verify import Verification
 
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
-@dataclass(frozen=True)
-class Result:
+    from brachis.bottleneck import BottleneckReport
+
+CANDIDATES = "candidates"
+
+
+@dataclass(frozen=True, repr=False)
+class Result(Summary):
     """What a plan gives: trajectory, verification, and how they came about.
 
     Attributes
     ----------
     task : Task
-        All that was asked, with the robot's settings and all defaults; ``plan(None, result.task)`` repeats the plan.
+        All that was asked, with the robot's settings and all defaults; ``plan(result.task)`` repeats the plan.
     trajectory : Trajectory
     verification : Verification
     family : str
@@ -41,6 +54,16 @@ class Result:
         What was left undone, in plain words.
     warnings : tuple of Remark
         What of robot, task and motion is hardly meant.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> result.verified, result.sample(dt=0.004).q.shape
+    (True, (638, 3))
+    >>> figure = result.plot("torques")
+    >>> print(type(result.bottleneck()).__name__)
+    BottleneckReport
     """
 
     task: Task
@@ -54,6 +77,68 @@ class Result:
     interrupted: bool = False
     undone: tuple[str, ...] = ()
     warnings: tuple[Remark, ...] = ()
+
+    def sample(self, dt: float, *, last: str = "exact") -> Samples:
+        """Sample the trajectory every `dt` seconds; see `Trajectory.sample`."""
+        return self.trajectory.sample(dt, last=last)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the trajectory to an npz file, which `Trajectory.load` reads; see `Trajectory.save`."""
+        self.trajectory.save(path)
+
+    def to_dataframe(self, dt: float) -> pd.DataFrame:
+        """Return a pandas table, a row every `dt` seconds; see `Trajectory.to_dataframe`."""
+        return self.trajectory.to_dataframe(dt)
+
+    def plot(self, kind: str = "overview") -> Figure:
+        """Draw the motion.
+
+        Parameters
+        ----------
+        kind : str, optional
+            Out of `brachis.plots.PLOTS`; or ``candidates``, all that the search looked at.
+
+        Returns
+        -------
+        Figure
+            Of Matplotlib; a notebook shows it, `brachis.plots.save_figure` writes it.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such plot.
+        """
+        if kind == CANDIDATES:
+            return plots.plot_candidates(self.candidates)
+        if kind not in plots.PLOTS:
+            raise UnknownNameError("plot", kind, (*plots.PLOTS, CANDIDATES), where="kind")
+        return plots.PLOTS[kind](self.trajectory)
+
+    def bottleneck(self, *, check: bool = False, reference: bool = False) -> BottleneckReport:
+        """Find out what holds the motion back; see `brachis.bottleneck.report`."""
+        return bottleneck.report(self, check=check, reference=reference)
+
+    def summary(self) -> Mapping[str, object]:
+        """Return what is shown."""
+        trajectory, last = self.trajectory, self.solver_report
+        left = {"undone": "; ".join(self.undone)} if self.undone else {}
+        remarks = {"warnings": "; ".join(remark.message for remark in self.warnings)} if self.warnings else {}
+        return {
+            **trajectory.summary(),
+            "verified": "yes" if self.verified else "NO",
+            "worst ratio to a limit": f"{self.verification.worst_ratio:.5f}",
+            "path error": f"{self.verification.path_error:.1e} m or rad",
+            "solver": f"{last.solver}, {last.status.name.lower()}",
+            "candidates": f"{len(self.candidates)}, {sum(each.verified for each in self.candidates)} verified",
+            "wall time": f"{self.timing.get('total', 0.0):.2f} s",
+            **left,
+            **remarks,
+        }
+
+    def _repr_html_(self) -> str:
+        """Show the summary beside the overview in a notebook."""
+        picture = plots.as_html(self.plot())
+        return f'<div style="display:flex;align-items:flex-start">{super()._repr_html_()}{picture}</div>'
 
     @property
     def t_end(self) -> float:

@@ -35,7 +35,7 @@ def test_planar_line(scara, joint):
 
 def test_arm_on_a_rail():
     task = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
-    found = holds(brachis.plan(None, {**task, "redundant_joints": ["rail"]}), 3)
+    found = holds(brachis.plan({**task, "redundant_joints": ["rail"]}), 3)
     assert {entry.sensitivity.label.kind for entry in found.entries[:3]} == {"torque", "velocity"}
 
 

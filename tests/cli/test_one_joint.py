@@ -32,7 +32,7 @@ def files(request, tmp_path_factory):
         "spline": {"intervals": 10},
     }
     (folder / "task.yaml").write_text(yaml.safe_dump(task))
-    result = brachis.plan(None, folder / "task.yaml")
+    result = brachis.plan(folder / "task.yaml")
     assert result.verified
     result.trajectory.save(folder / "result.npz")
     return folder

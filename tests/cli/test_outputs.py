@@ -37,7 +37,7 @@ def saved(tmp_path_factory):
         "spline": {"intervals": 6},
     }
     (folder / "task.yaml").write_text(yaml.safe_dump(task))
-    brachis.plan(None, folder / "task.yaml").trajectory.save(folder / "result.npz")
+    brachis.plan(folder / "task.yaml").trajectory.save(folder / "result.npz")
     return folder
 
 

@@ -60,4 +60,4 @@ def test_points_in_other_units_are_warned_of(seam, tmp_path):
         load_task(seam)
     seam.write_text(seam.read_text().replace("0.12 mm", "0.12 m"))
     with pytest.raises(PlausibilityError, match=r"mm for m\? Set units: {length: mm}"):
-        plan(None, seam, strict=True)
+        plan(seam, strict=True)

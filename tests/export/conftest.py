@@ -9,4 +9,4 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "01_scara_line.yaml"
 
 @pytest.fixture(scope="session")
 def line_trajectory():
-    return plan(None, EXAMPLE).trajectory
+    return plan(EXAMPLE).trajectory

@@ -70,4 +70,4 @@ def test_nothing_is_missing_where_it_is_installed():
 @pytest.mark.parametrize("example", ["01_scara_line", "03_tx90l_rail_line"])
 def test_planning_without_it(example, monkeypatch):
     monkeypatch.setitem(sys.modules, "eaik.pybindings.EAIK", None)
-    assert brachis.plan(None, ROOT / f"examples/{example}.yaml").verification.passed
+    assert brachis.plan(ROOT / f"examples/{example}.yaml").verification.passed

@@ -17,7 +17,7 @@ from brachis.errors import DecompositionError
 PLUGIN = Path(__file__).parents[2] / "examples/ik_plugin"
 TASK = PLUGIN / "crane.yaml"
 LOOK = (
-    "import brachis, json, sys; result = brachis.plan(None, sys.argv[1]);"
+    "import brachis, json, sys; result = brachis.plan(sys.argv[1]);"
     "print(json.dumps([result.family, result.verified, result.t_end, result.trajectory.branch]))"
 )
 
@@ -47,7 +47,7 @@ def test_the_installed_family_plans(scratch):
 
 def test_without_the_plugin_there_is_no_closed_form():
     with pytest.raises(DecompositionError, match="no closed form"):
-        brachis.plan(None, TASK)
+        brachis.plan(TASK)
 
 
 def test_inspect_names_the_plugin(scratch):

@@ -120,7 +120,7 @@ def arm():
     """The planar arm's task without any of these limits, and its motion."""
     task = brachis.load_task(ROOT / "examples/01_scara_line.yaml").to_dict()
     task = {**task, "search": {"effort": "single", "least_motion": False}}
-    return task, brachis.plan(None, task)
+    return task, brachis.plan(task)
 
 
 def peaks(trajectory) -> dict[str, np.ndarray | float]:
@@ -174,7 +174,7 @@ def limited(task, kind, free):
 )
 def test_an_arm_without_it_violates_it_and_with_it_meets_it_and_is_slower(arm, kind, check, label):
     task, free = arm
-    result = brachis.plan(None, limited(task, kind, peaks(free.trajectory)))
+    result = brachis.plan(limited(task, kind, peaks(free.trajectory)))
     assert result.verified, result.verification
     assert result.t_end > free.t_end * 1.001
     assert ratio(result, check) == pytest.approx(1.0, abs=1e-3)
@@ -198,7 +198,7 @@ def test_an_arm_keeps_the_rms_torques_of_its_motors(arm):
     task, free = arm
     figures = 0.95 * peaks(free.trajectory)["rms_torque"]
     joints = {**task["robot"]["limits"], "rms_torque": {"j1": figures[0], "j2": figures[1]}}
-    result = brachis.plan(None, {**task, "robot": {**task["robot"], "limits": joints}})
+    result = brachis.plan({**task, "robot": {**task["robot"], "limits": joints}})
     assert result.verified, result.verification
     assert result.t_end > free.t_end * 1.001
     assert 0.999 < peaks(result.trajectory)["rms_torque"][0] / figures[0] < 1.0 + 1e-4

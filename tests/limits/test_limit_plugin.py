@@ -60,10 +60,10 @@ def test_it_is_one_short_file():
 
 def test_an_object_limits_the_motion(plugin):
     task = brachis.load_task(ROOT / "examples/01_scara_line.yaml")
-    free = brachis.plan(None, task)
+    free = brachis.plan(task)
     assert sums(free.trajectory).max() > UPPER + 0.2, "the limit should bind"
     model = plugin.CoupledRange(("j2", "j3"), -0.5, UPPER)
-    result = brachis.plan(None, task, limits=[model])
+    result = brachis.plan(task, own_limits=[model])
     assert result.verified
     assert sums(result.trajectory).max() == pytest.approx(UPPER, abs=1e-4)
     assert result.t_end > free.t_end
@@ -76,12 +76,12 @@ def test_an_object_limits_the_motion(plugin):
     (checked,) = [each for each in report.check.entries if each.sensitivity == entry]
     assert checked.deviation < 0.05
     # A motion that was planned without it does not pass with it.
-    assert not verify_trajectory(free.trajectory, limits=[model]).passed
+    assert not verify_trajectory(free.trajectory, own_limits=[model]).passed
 
 
 @pytest.mark.usefixtures("installed")
 def test_a_task_file_names_it():
-    result = brachis.plan(None, TASK)
+    result = brachis.plan(TASK)
     assert result.verified
     assert sums(result.trajectory).max() <= UPPER + 1e-4
     assert "coupled range ratio" in [check.name for check in verify_trajectory(result.trajectory).checks]
@@ -94,7 +94,7 @@ def test_a_check_of_its_own_takes_the_marks_place(plugin):
             assert q.shape == qdot.shape == qddot.shape == tau.shape == (len(q), robot.n)
             return np.abs(q[:, 1:].sum(axis=1))[:, None] / UPPER
 
-    result = brachis.plan(None, ROOT / "examples/01_scara_line.yaml", limits=[Checked(("j2", "j3"), -UPPER, UPPER)])
+    result = brachis.plan(ROOT / "examples/01_scara_line.yaml", own_limits=[Checked(("j2", "j3"), -UPPER, UPPER)])
     check = {each.name: each for each in result.verification.checks}["coupled range ratio"]
     assert check.remark == ""
     assert check.value == pytest.approx(1.0, abs=1e-3)
@@ -102,7 +102,7 @@ def test_a_check_of_its_own_takes_the_marks_place(plugin):
 
 def test_a_kind_that_is_not_installed():
     with pytest.raises(UnknownNameError, match="coupled_range"):
-        brachis.plan(None, TASK)
+        brachis.plan(TASK)
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_a_kind_that_is_not_installed():
 def test_wrong_parameters_are_said(parameters, said):
     task = brachis.load_task(TASK).to_dict()
     with pytest.raises(InputError, match=said) as caught:
-        brachis.plan(None, {**task, "custom_limits": {"coupled_range": parameters}})
+        brachis.plan({**task, "custom_limits": {"coupled_range": parameters}})
     assert "custom_limits.coupled_range" in str(caught.value)
 
 
@@ -125,7 +125,7 @@ def test_a_start_posture_beyond_it_is_refused(plugin):
     model = plugin.CoupledRange(("j2", "j3"), 0.5, 0.7)
     said = "the range limit of 'j2 + j3' is exceeded at rest; found 0 rad needed at rest; allowed: 0.5 to 0.7 rad"
     with pytest.raises(brachis.errors.StartError, match=re.escape(said)):
-        brachis.plan(None, ROOT / "examples/01_scara_line.yaml", limits=[model])
+        brachis.plan(ROOT / "examples/01_scara_line.yaml", own_limits=[model])
 
 
 class Rate(Limit):
@@ -165,22 +165,22 @@ LINE = ROOT / "examples/01_scara_line.yaml"
 @pytest.mark.parametrize(
     ("parts", "where", "said"),
     [
-        ({"labels": ()}, "limits[0].lower", "found (1,); allowed: (0,)"),
-        ({"lower": np.ones(2)}, "limits[0].lower", "(2,)"),
-        ({"lower": np.ones(1)}, "limits[0]", "lower is not below upper"),
-        ({"values": lambda motion: motion.qdot[:, 2]}, "limits[0].values", "found (2,) for 2 moments"),
-        ({"values": lambda motion: np.full((len(motion.q), 1), np.nan)}, "limits[0].values", "not finite"),
-        ({"partials": lambda motion: Partials(qdot=motion.q)}, "limits[0].partials.qdot", "(2, 1, 3)"),
-        ({"partials": lambda _motion: Partials()}, "limits[0].partials", "all None"),
-        ({"partials": lambda _motion: None}, "limits[0].partials", "is no brachis.limits.Partials"),
-        ({"labels": (Label("j1", "torque", "Nm"),)}, "limits[0].labels", "taken"),
-        ({"labels": ("j3",)}, "limits[0].labels", "Label"),
-        ({"labels": (), "lower": np.empty(0), "upper": np.empty(0)}, "limits[0].labels", "no values"),
+        ({"labels": ()}, "own_limits[0].lower", "found (1,); allowed: (0,)"),
+        ({"lower": np.ones(2)}, "own_limits[0].lower", "(2,)"),
+        ({"lower": np.ones(1)}, "own_limits[0]", "lower is not below upper"),
+        ({"values": lambda motion: motion.qdot[:, 2]}, "own_limits[0].values", "found (2,) for 2 moments"),
+        ({"values": lambda motion: np.full((len(motion.q), 1), np.nan)}, "own_limits[0].values", "not finite"),
+        ({"partials": lambda motion: Partials(qdot=motion.q)}, "own_limits[0].partials.qdot", "(2, 1, 3)"),
+        ({"partials": lambda _motion: Partials()}, "own_limits[0].partials", "all None"),
+        ({"partials": lambda _motion: None}, "own_limits[0].partials", "is no brachis.limits.Partials"),
+        ({"labels": (Label("j1", "torque", "Nm"),)}, "own_limits[0].labels", "taken"),
+        ({"labels": ("j3",)}, "own_limits[0].labels", "Label"),
+        ({"labels": (), "lower": np.empty(0), "upper": np.empty(0)}, "own_limits[0].labels", "no values"),
     ],
 )
 def test_a_limit_whose_parts_do_not_fit_is_refused(parts, where, said):
     with pytest.raises(InputError) as caught:
-        brachis.plan(None, LINE, limits=[Given(**parts)])
+        brachis.plan(LINE, own_limits=[Given(**parts)])
     assert str(caught.value).startswith(f"{where}: ")
     assert said in str(caught.value)
 
@@ -188,19 +188,19 @@ def test_a_limit_whose_parts_do_not_fit_is_refused(parts, where, said):
 @pytest.mark.parametrize("wrong", [Rate, 3.0, "torque"], ids=str)
 def test_what_is_no_limit_is_refused(wrong):
     with pytest.raises(InputError, match=r"limits\[0\]: is no limit that can be bound"):
-        brachis.plan(None, LINE, limits=[wrong])
+        brachis.plan(LINE, own_limits=[wrong])
 
 
 def test_limits_are_a_list():
     with pytest.raises(InputError, match="limits: is no list"):
-        brachis.plan(None, LINE, limits=Given())
+        brachis.plan(LINE, own_limits=Given())
 
 
 def test_two_processes_take_it_as_well():
     code = (
         "import brachis, sys; from brachis_coupled import CoupledRange;"
         "task = brachis.load_task(sys.argv[1]).to_dict() | {'search': {'jobs': 2}, 'redundant_joints': 'auto'};"
-        "result = brachis.plan(None, task, limits=[CoupledRange(('j2', 'j3'), -0.5, 0.7)]);"
+        "result = brachis.plan(task, own_limits=[CoupledRange(('j2', 'j3'), -0.5, 0.7)]);"
         "print(result.verified, 'coupled range ratio' in [check.name for check in result.verification.checks])"
     )
     search = os.pathsep.join([str(PLUGIN / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])

@@ -37,7 +37,7 @@ PART = {"speed": SPEED, "s": [BEGIN, END]}
 
 @pytest.fixture(scope="module")
 def result():
-    return brachis.plan(None, task(PART))
+    return brachis.plan(task(PART))
 
 
 def leg(way: float, speed: float) -> float:
@@ -55,7 +55,7 @@ def sampled(trajectory):
 
 
 def test_the_speed_is_constant_within_its_tolerance_and_reached_and_left_fast(result):
-    free = brachis.plan(None, task())
+    free = brachis.plan(task())
     s, speed = sampled(free.trajectory)
     assert speed[(s > BEGIN) & (s < END)].min() > 2.0 * SPEED, "without it the tool is much faster"
     assert result.verified
@@ -72,7 +72,7 @@ def test_the_speed_is_constant_within_its_tolerance_and_reached_and_left_fast(re
 def test_with_enough_knots_it_is_the_optimum():
     fastest = leg(BEGIN * LENGTH, 1.01 * SPEED) + leg((1.0 - END) * LENGTH, 1.01 * SPEED)
     fastest += (END - BEGIN) * LENGTH / (1.01 * SPEED)
-    result = brachis.plan(None, task(PART, intervals="auto", tolerance=5e-4))
+    result = brachis.plan(task(PART, intervals="auto", tolerance=5e-4))
     assert result.verified
     assert result.t_end == pytest.approx(fastest, rel=1e-3)
 
@@ -100,7 +100,7 @@ def test_its_tolerance_costs_what_is_said(result):
 
 def test_a_part_soon_after_the_start_is_reached_over_few_knots():
     """Uniform intervals would be longer than the time to reach the speed."""
-    result = brachis.plan(None, task({"speed": 0.3, "s": [0.02, 0.5]}))
+    result = brachis.plan(task({"speed": 0.3, "s": [0.02, 0.5]}))
     assert result.verified
     lengths = np.diff(np.unique(result.trajectory.knots))
     assert lengths[0] < 0.3 * lengths.max()
@@ -108,7 +108,7 @@ def test_a_part_soon_after_the_start_is_reached_over_few_knots():
 
 def test_two_parts_with_tolerances_of_their_own():
     parts = [{"speed": 0.5, "s": [0.2, 0.35], "tolerance": "2 %"}, {"speed": 0.8, "s": [0.6, 0.8], "tolerance": 0.05}]
-    result = brachis.plan(None, task(parts))
+    result = brachis.plan(task(parts))
     assert result.verified
     s, speed = sampled(result.trajectory)
     for part, tolerance in zip(parts, (0.02, 0.05), strict=True):

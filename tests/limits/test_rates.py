@@ -30,7 +30,7 @@ def task(*, spline=None, **limits):
 
 @pytest.fixture(scope="module")
 def free():
-    return brachis.plan(None, task())
+    return brachis.plan(task())
 
 
 @pytest.fixture(scope="module", params=FIGURES)
@@ -40,7 +40,7 @@ def kind(request):
 
 @pytest.fixture(scope="module")
 def result(kind):
-    return brachis.plan(None, task(**{kind: FIGURES[kind]}))
+    return brachis.plan(task(**{kind: FIGURES[kind]}))
 
 
 def rates(trajectory, kind, count=20_000):
@@ -126,9 +126,9 @@ def test_the_limits_of_rates_are_for_splines_that_can_hold_them(kind):
     figure = {kind: FIGURES[kind]}
     words = f"the {kind.replace('_', ' ')} limit asks for a continuous acceleration"
     with pytest.raises(InputError, match=rf"spline\.degree: {words}; found 2, .*; allowed: >= 3"):
-        brachis.plan(None, task(spline={"degree": 2, "rest": "velocity"}, **figure))
+        brachis.plan(task(spline={"degree": 2, "rest": "velocity"}, **figure))
     with pytest.raises(InputError, match=rf"spline\.rest: {words}; found velocity, .*; allowed: full or jerk"):
-        brachis.plan(None, task(spline={"rest": "velocity"}, **figure))
+        brachis.plan(task(spline={"rest": "velocity"}, **figure))
 
 
 def test_rates_of_the_verification_are_differences_of_its_torques(free):
@@ -166,6 +166,6 @@ class _Twist(Limit):
 def test_a_limit_of_the_users_own_may_ask_for_the_jerk(free):
     t = np.linspace(0.0, 1.0, 5001)
     assert np.abs(free.trajectory.jerk(t * free.t_end)[:, 1:].sum(axis=1)).max() > 20.0
-    result = brachis.plan(None, task(), limits=[_Twist()])
+    result = brachis.plan(task(), own_limits=[_Twist()])
     assert result.verified
     assert np.abs(result.trajectory.jerk(t * result.t_end)[:, 1:].sum(axis=1)).max() <= 15.0 * 1.0002

@@ -26,7 +26,7 @@ def task():
 
 @pytest.fixture(scope="module")
 def result(task):
-    return brachis.plan(None, task)
+    return brachis.plan(task)
 
 
 def speeds(trajectory, count=20_000):
@@ -37,7 +37,7 @@ def speeds(trajectory, count=20_000):
 
 
 def test_the_cap_holds_everywhere_and_is_used(task, result):
-    free = brachis.plan(None, {**task, "tool_limits": {"speed": None}})
+    free = brachis.plan({**task, "tool_limits": {"speed": None}})
     assert speeds(free.trajectory).max() > 2.0 * CAP, "without the cap the tool is much faster"
     assert result.verified
     assert speeds(result.trajectory).max() == pytest.approx(CAP, rel=1e-4)
@@ -110,6 +110,6 @@ def test_rows_that_leave_a_direction_free_count_the_whole_speed(rows):
         "tool_limits": {"speed": 0.4},
         "search": {"effort": "single"},
     }
-    result = brachis.plan(None, task)
+    result = brachis.plan(task)
     assert result.verified
     assert speeds(result.trajectory).max() <= 0.4 * (1.0 + 1e-4)

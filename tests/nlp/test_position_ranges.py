@@ -23,7 +23,7 @@ def plan(scara_urdf):
 
     def plan(ends):
         robot = task["robot"] | {"limits": task["robot"]["limits"] | {"position": {"j3": ends}}}
-        return brachis.plan(None, task | {"robot": robot})
+        return brachis.plan(task | {"robot": robot})
 
     return plan
 
@@ -53,7 +53,7 @@ def test_a_range_of_a_micrometre(scara_urdf, half):
         "path": [{"line": {"by": [0.5, 0.0]}}],
         "redundant_joints": [],
     }
-    assert brachis.plan(None, task).verified
+    assert brachis.plan(task).verified
 
 
 @pytest.mark.parametrize("far", [1e4, 1e6, np.inf])

@@ -54,6 +54,7 @@ CURVES: dict[str, tuple[dict[str, Any], list[float], list[str]]] = {
     "arc via": ({"arc": {"via": [1, 0, 1], "to": [2, 1, 3]}}, [0, 0, 0], XYZ),
     "arc along the tangent": ({"arc": {"center": [1, 0], "angle_deg": 130, "yaw": "tangent"}}, [0, 0, 1], XYW),
     "circle": ({"circle": {"center": [0.2, 0], "turns": -2.5}}, [0, 0], XY),
+    "helix": ({"helix": {"center": [0.2, 0, 1], "pitch": -0.1, "normal": [0, 0, 2], "turns": 2.5}}, [0, 0, 1], XYZ),
     "spline, one waypoint": ({"spline": {"through": [[1, 2]]}}, [0, 0], XY),
     "spline, two": ({"spline": {"through": [[1, 2], [2, 1]]}}, [0, 0], XY),
     "spline, three": ({"spline": {"through": [[1, 2], [2, 1], [2.5, 3]]}}, [0, 0], XY),
@@ -218,3 +219,23 @@ def test_a_centre_of_few_digits_is_moved_into_the_plane_of_the_arc():
     wrong = arc.model_copy(update={"arc": arc.arc.model_copy(update={"center": (0.3, 0.0, 0.18)})})
     with pytest.raises(PathError, match=r"Move the centre by 0\.00959559 m along the normal"):
         build_path([wrong], start, ["x", "y", "z"])
+
+
+def test_a_helix_climbs_by_its_pitch():
+    shape = {"center": [0.3, 0.0, 1.0], "pitch": 0.1, "normal": [0, 0, 2], "turns": -2.5}
+    curve = curve_of({"helix": shape}, [0.5, 0.0, 1.0], XYZ)
+    length = 2.5 * np.hypot(2 * np.pi * 0.2, 0.1)
+    assert curve.length == pytest.approx(length)
+    start, turn, end = curve.derivatives(np.array([0.0, length / 2.5, length]), 0)[0]
+    np.testing.assert_allclose(start, [0.5, 0.0, 1.0], atol=1e-12)
+    np.testing.assert_allclose(turn, [0.5, 0.0, 1.1], atol=1e-12)
+    np.testing.assert_allclose(end, [0.1, 0.0, 1.25], atol=1e-12)
+    tangents = curve.derivatives(np.linspace(0.0, length, 20), 1)[1]
+    np.testing.assert_allclose(np.linalg.norm(tangents, axis=1), 1.0)
+    assert tangents[0, 1] < 0.0, "against the right-hand rule about the normal"
+
+
+def test_a_helix_needs_space():
+    shape = {"center": [0.3, 0.0], "pitch": 0.1, "normal": [0, 0, 1]}
+    with pytest.raises(PathError, match="a helix needs 3 position rows"):
+        curve_of({"helix": shape}, [0.5, 0.0], XY)

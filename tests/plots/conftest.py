@@ -45,7 +45,7 @@ def chain():
 
 @pytest.fixture(scope="session")
 def line_trajectory():
-    return plan(None, EXAMPLE).trajectory
+    return plan(EXAMPLE).trajectory
 
 
 @pytest.fixture(scope="session")

@@ -67,7 +67,7 @@ def test_plans_under_narrow_friction_are_verified_by_refinement_alone(scara_urdf
     task["robot"] |= {"urdf": str(scara_urdf), "friction": friction}
     task |= {"redundant_joints": ["j3"], "path": [{"line": {"length": 0.8, "angle_deg": 180}}]}
     task["search"] = {"effort": "single"}
-    result = brachis.plan(None, task)
+    result = brachis.plan(task)
     assert result.verified
     assert result.attempt.refinement_rounds >= 2
     assert result.verification.worst_ratio - 1.0 <= result.attempt.violation + 1e-5

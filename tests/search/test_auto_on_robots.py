@@ -36,8 +36,8 @@ def bench():
 def test_auto_is_never_slower_than_the_rail_alone(intervals):
     task = brachis.load_task(RAIL_LINE).to_dict()
     task["spline"]["intervals"] = intervals
-    rail = brachis.plan(None, task)
-    auto = brachis.plan(None, {**task, "redundant_joints": "auto"})
+    rail = brachis.plan(task)
+    auto = brachis.plan({**task, "redundant_joints": "auto"})
     assert rail.verified
     assert auto.verified
     assert auto.t_end <= rail.t_end * (1.0 + 1e-6)

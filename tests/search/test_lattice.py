@@ -144,7 +144,7 @@ def test_a_narrow_range_of_the_redundant_joint_is_not_called_out_of_reach():
     task["robot"]["limits"]["position"] = {"rail": [-0.01, 0.01]}
     task["path"] = [{"line": {"by": [0.0, 1.9, 0.0]}}]
     with pytest.raises(PathError, match=r"within the joint ranges .*joint 'rail' .* beyond its range, -0.01 to 0.01 m"):
-        brachis.plan(None, task)
+        brachis.plan(task)
 
 
 def test_advice_names_what_was_kept_low():

@@ -176,8 +176,8 @@ def test_a_motion_planned_one_way_is_found_the_other_way_round():
     begin = np.array(task["start"]["joints"])
     begin[robot.joint_names.index("wrist_1_joint")] += 2.0 * math.pi
     task |= {"redundant_joints": ["rail"], "path": [{"line": {"by": [0.0, -0.4, 0.0]}}], "search": {"effort": "single"}}
-    there = brachis.plan(None, task | {"start": {"joints": begin.tolist()}})
-    back = brachis.plan(None, task | back_from(begin, robot, [0.0, 0.4, 0.0]) | {"redundant_joints": ["rail"]})
+    there = brachis.plan(task | {"start": {"joints": begin.tolist()}})
+    back = brachis.plan(task | back_from(begin, robot, [0.0, 0.4, 0.0]) | {"redundant_joints": ["rail"]})
     assert there.verified
     assert back.verified
     assert back.t_end == pytest.approx(there.t_end, rel=2e-3)

@@ -84,7 +84,7 @@ def test_a_sweep_is_summed_up(undisturbed):
     assert (summary["plans"], summary["verified"], summary["failed"]) == (6, 2, 4)
     times = sorted(row["t_end_s"] for row in undisturbed.rows() if row["t_end_s"])
     assert [summary[name]["t_end_s"] for name in ("best", "worst")] == times
-    assert repr(undisturbed).startswith("SweepResult: 6 plans, 2 verified, 0 unverified, 4 failed; best ")
+    assert repr(undisturbed).startswith("SweepResult\n  plans        6\n  verified     2\n")
 
 
 def test_tables_are_read_back(undisturbed):

@@ -15,6 +15,6 @@ def planned() -> Trajectory:
     task = yaml.safe_load((ROOT / "examples/01_scara_line.yaml").read_text())
     task["robot"]["urdf"] = str(ROOT / "robots/scara3/robot.urdf")
     task["robot"]["limits"] = {"torque": 10, "velocity": 50, "acceleration": 500, "position": [[-10, 10]] * 3}
-    result = plan(None, task)
+    result = plan(task)
     assert result.verified
     return result.trajectory

@@ -42,7 +42,7 @@ def saved(scara_urdf, tmp_path_factory):
         "search": {"effort": "single", "least_motion": False},
     }
     path = tmp_path_factory.mktemp("saved") / "result.npz"
-    brachis.plan(None, task).trajectory.save(path)
+    brachis.plan(task).trajectory.save(path)
     return brachis.Trajectory.load(path)
 
 

@@ -1,4 +1,12 @@
-"""What holds a motion back: what every limit costs, which limit is active when, and the distance to a reference."""
+"""What holds a motion back: what every limit costs, which limit is active when, and the distance to a reference.
+
+Examples
+--------
+>>> import brachis
+>>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+>>> print(brachis.bottleneck.report(result).saturations[0].label.kind)
+torque
+"""
 
 from brachis.bottleneck.check import CheckedSensitivity, SensitivityCheck, check_sensitivities
 from brachis.bottleneck.ratios import LimitRatios, limit_ratios

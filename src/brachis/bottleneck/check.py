@@ -22,6 +22,7 @@ from brachis.errors import PlanningError, UnreachableError
 from brachis.nlp import Program
 from brachis.refine import Refined
 from brachis.solvers import SolverOptions, residual, solver_named
+from brachis.summary import Summary
 
 STEP = 0.01
 """Fraction by which limits are raised, unless asked otherwise."""
@@ -99,8 +100,8 @@ def _deviation(predicted: float, found: float) -> float:
     return abs(predicted - found) / abs(found) if found else np.inf
 
 
-@dataclass(frozen=True)
-class SensitivityCheck:
+@dataclass(frozen=True, repr=False)
+class SensitivityCheck(Summary):
     """All predictions beside the changes that solving again gives.
 
     Attributes

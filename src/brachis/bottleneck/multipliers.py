@@ -21,6 +21,7 @@ import numpy as np
 from brachis.bottleneck.linearised import rows_and_jacobian
 from brachis.nlp import Program
 from brachis.refine import Refined
+from brachis.summary import Summary
 
 ACTIVE = (1e-8, 1e-7, 1e-6, 1e-5)
 """Distances from a bound within which rows and variables press on it; dimensionless. The least that gives a balance
@@ -31,8 +32,8 @@ _GOOD = 1e-5
 _DEPENDENT = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class ActiveSet:
+@dataclass(frozen=True, eq=False, repr=False)
+class ActiveSet(Summary):
     """What presses on a point x.
 
     Attributes
@@ -90,8 +91,8 @@ class ActiveSet:
         return np.asarray(nnls(self.slopes.T, gradient)[0]) if len(self.slopes) else np.empty(0)
 
 
-@dataclass(frozen=True, eq=False)
-class Multipliers:
+@dataclass(frozen=True, eq=False, repr=False)
+class Multipliers(Summary):
     """Multipliers at an answer, and how well they balance the gradient.
 
     Attributes

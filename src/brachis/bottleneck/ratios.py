@@ -10,14 +10,15 @@ import numpy as np
 from brachis.arrays import freeze
 from brachis.limits import Label, Limit, Moments, limits_of
 from brachis.robot import bind
+from brachis.summary import Summary
 from brachis.trajectory import Trajectory
 from brachis.trajectory.pieces import one_sided_derivatives
 
 _POINTS_PER_INTERVAL = 40
 
 
-@dataclass(frozen=True, eq=False)
-class LimitRatios:
+@dataclass(frozen=True, eq=False, repr=False)
+class LimitRatios(Summary):
     """Ratios of the motion to all limits of its task. The arrays are read-only.
 
     Attributes

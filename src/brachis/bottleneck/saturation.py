@@ -10,6 +10,7 @@ import numpy as np
 
 from brachis.bottleneck.ratios import LimitRatios, limit_ratios
 from brachis.limits import Label, Limit
+from brachis.summary import Summary
 from brachis.trajectory import Trajectory
 
 THRESHOLD = 0.999
@@ -33,8 +34,8 @@ class Stretch:
     side: str
 
 
-@dataclass(frozen=True)
-class Saturation:
+@dataclass(frozen=True, repr=False)
+class Saturation(Summary):
     """How long one value of a limit is at it.
 
     Attributes

@@ -19,6 +19,7 @@ from brachis.bottleneck.multipliers import Multipliers, multipliers_of_answer
 from brachis.limits import Bound, Label, Limit, Role
 from brachis.nlp import Program
 from brachis.refine import Refined
+from brachis.summary import Summary
 
 STATIONARY = 1e-3
 """With a larger residual the answer is not an optimum, and its multipliers say little."""
@@ -93,8 +94,8 @@ class BranchBoundary:
         return {"label": self.label, "margin": self.margin, "derivative_s": self.derivative}
 
 
-@dataclass(frozen=True)
-class Sensitivities:
+@dataclass(frozen=True, repr=False)
+class Sensitivities(Summary):
     """What all limits cost.
 
     Attributes

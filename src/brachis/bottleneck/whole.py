@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from html import escape
+from typing import TYPE_CHECKING, Any
 
 from brachis.bottleneck.check import SensitivityCheck, check_sensitivities
 from brachis.bottleneck.reference import Reference, find_reference
@@ -13,11 +14,14 @@ from brachis.bottleneck.sensitivities import Sensitivities, sensitivities
 from brachis.bottleneck.words import in_words
 from brachis.errors import InputError
 from brachis.limits import Role
-from brachis.result import Result
+from brachis.summary import LINES
 from brachis.trajectory import Trajectory
 
+if TYPE_CHECKING:
+    from brachis.result import Result
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class BottleneckReport:
     """What holds a motion back.
 
@@ -35,6 +39,13 @@ class BottleneckReport:
         The best value known, where asked for and found.
     reference_sought : bool
         True where it was asked for.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> print(str(result.bottleneck()).splitlines()[0])
+    10 % more torque at j1 (1 Nm) saves 3.4 % (87 ms)
     """
 
     t_end: float
@@ -47,6 +58,15 @@ class BottleneckReport:
     def __str__(self) -> str:
         """Say all in plain words."""
         return "\n".join(in_words(**vars(self)))
+
+    def __repr__(self) -> str:
+        """Say what there is room for on a screen."""
+        lines = str(self).split("\n")
+        return "\n".join([*lines[:LINES], "..."] if len(lines) > LINES else lines)
+
+    def _repr_html_(self) -> str:
+        """Say all in plain words in a notebook."""
+        return f"<pre>{escape(str(self))}</pre>"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -86,8 +106,10 @@ def report(motion: Result | Trajectory, *, check: bool = False, reference: bool 
     Examples
     --------
     >>> import brachis
-    >>> print(brachis.bottleneck.report(brachis.plan(None, "examples/01_scara_line.yaml")))  # doctest: +SKIP
-    >>> print(brachis.bottleneck.report(brachis.Trajectory.load("out/result.npz")))  # doctest: +SKIP
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> found = brachis.bottleneck.report(result.trajectory)  # as of a loaded one
+    >>> [sensitivity.label.subject for sensitivity in found.sensitivities.limits][0]
+    'j1'
     """
     if isinstance(motion, Trajectory):
         trajectory, refined = motion, solved_again(motion)

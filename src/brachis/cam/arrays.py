@@ -16,7 +16,7 @@ _HOMOGENEOUS = (4, 4)
 _MATRIX = (3, 3)
 
 
-def points_from(points: Any, orientations: Any, speed: Any, units: Units, source: str) -> Points:  # noqa: ANN401
+def points_from(points: Any, orientations: Any, speed: Any, units: Units, source: str, *, least: int = 2) -> Points:  # noqa: ANN401
     """Return points from what a program has.
 
     Parameters
@@ -31,6 +31,8 @@ def points_from(points: Any, orientations: Any, speed: Any, units: Units, source
         Of the numbers; m, rad and m/s where not stated.
     source : str
         What messages call the points.
+    least : int, optional
+        How many there must be.
 
     Raises
     ------
@@ -40,8 +42,8 @@ def points_from(points: Any, orientations: Any, speed: Any, units: Units, source
     values = _array(_matrices(points), source, source)
     if values.ndim == 3 and values.shape[1:] == _HOMOGENEOUS and orientations is None:  # noqa: PLR2004
         values, orientations = values[:, :3, 3], values[:, :3, :3]
-    if values.ndim != 2 or not 1 <= values.shape[1] <= _MOST_ROWS or len(values) < 2:  # noqa: PLR2004
-        allowed = "(n, 1 to 3) positions, or (n, 4, 4) matrices, of 2 rows or more"
+    if values.ndim != 2 or not 1 <= values.shape[1] <= _MOST_ROWS or len(values) < least:  # noqa: PLR2004
+        allowed = f"(n, 1 to 3) positions, or (n, 4, 4) matrices, of {least} rows or more"
         raise TaskError("points of the wrong shape", found=values.shape, allowed=allowed, where=source)
     turning = np.empty((len(values), 0)) if orientations is None else _turning(orientations, units, source)
     speeds = None
@@ -63,7 +65,7 @@ def _matrices(points: Any) -> Any:  # noqa: ANN401
     if not isinstance(points, np.ndarray) and callable(getattr(points, "as_matrix", None)):
         return points.as_matrix()
     if isinstance(points, list | tuple) and points:
-        if hasattr(points[0], "homogeneous"):
+        if all(hasattr(one, "homogeneous") for one in points):
             return [one.homogeneous for one in points]
         if callable(getattr(points[0], "as_matrix", None)):
             return [one.as_matrix() for one in points]

@@ -1,4 +1,11 @@
-"""Trajectories in the formats of other programs; a format is one file here and one line in `FORMATS`."""
+"""Trajectories in the formats of other programs; a format is one file here and one line in `FORMATS`.
+
+Examples
+--------
+>>> import brachis
+>>> "csv" in brachis.export.FORMATS
+True
+"""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def export_csv(trajectory: Trajectory, path: str | os.PathLike[str], dt: float, 
     --------
     >>> from brachis import plan
     >>> from brachis.export import export_csv
-    >>> trajectory = plan(None, "examples/01_scara_line.yaml").trajectory
+    >>> trajectory = plan("examples/01_scara_line.yaml").trajectory
     >>> export_csv(trajectory, "motion.csv", dt=0.004)  # doctest: +SKIP
     """
     samples = trajectory.sample(dt, last=last)

@@ -1,4 +1,13 @@
-"""Closed-form inverse kinematics: protocol, families, and the registry that finds them by geometry."""
+"""Closed-form inverse kinematics: protocol, families, and the registry that finds them by geometry.
+
+Examples
+--------
+>>> import brachis
+>>> task_map = brachis.task_map_of(brachis.robots.scara3, ["x", "y"])
+>>> match = brachis.ik.find(brachis.robots.scara3, task_map, ["j3"])
+>>> match.family, match.solver.branches
+('planar', ('elbow_positive', 'elbow_negative'))
+"""
 
 from brachis.ik.advice import NO_CLOSED_FORM, missing_eaik
 from brachis.ik.check import check_answers

@@ -4,6 +4,12 @@ A limit is a function of q, qdot, qddot and s, some of qdddot too. A new kind is
 field in `robot.limits` as well), its file here with a line in `TABLE`, and a file in `verify.limits` with a line in the
 table there. Nothing else asks which kind a limit is. Joint ranges are known elsewhere too: postures and turns are
 chosen within them.
+
+Examples
+--------
+>>> import brachis
+>>> "torque" in brachis.limits.TABLE
+True
 """
 
 from __future__ import annotations
@@ -83,7 +89,7 @@ def limits_of(robot: Robot, task: Task, further: Sequence[LimitModel] = ()) -> t
     """
     built = tuple(limit for build in TABLE.values() if (limit := build(robot, task)) is not None)
     named = bound_limits(custom_limits(task), robot, built, "custom_limits")
-    return (*built, *named, *bound_limits(further, robot, (*built, *named), "limits"))
+    return (*built, *named, *bound_limits(further, robot, (*built, *named), "own_limits"))
 
 
 __all__ = [

@@ -34,7 +34,7 @@ def bound_limits(models: Sequence[LimitModel], robot: Robot, others: Sequence[Li
         partials have the wrong shape or are not finite.
     """
     if not isinstance(models, Sequence):
-        raise InputError("is no list", where=where, found=models, allowed="a list of limits: limits=[...]")
+        raise InputError("is no list", where=where, found=models, allowed="a list of limits: own_limits=[...]")
     found: list[Limit] = []
     for number, model in enumerate(models):
         here = f"{where}[{number}]"

@@ -20,7 +20,7 @@ from brachis.limits.tool import ToolSpeed
 from brachis.robot import Robot
 from brachis.task import ProcessSpeed, Task
 
-_WIDEST, _OF_LENGTH, _OF_REST = 0.01, 0.02, 0.2
+_WIDEST, _OF_LENGTH, _OF_REST = 0.003, 0.02, 0.2
 """Width in s, as a share of the part's own length, and of the path before or behind it, on which the tool is at rest
 somewhere; the least of them counts."""
 _FARTHEST = 40.0
@@ -112,6 +112,7 @@ class LeastProcessSpeed(_ProcessSpeedLimit):
     """Nor do process speeds fall short by more."""
 
     kind = "least_process_speed"
+    least_speed = True
     _side = -1.0
 
     def __init__(self, robot: Robot, parts: Sequence[ProcessSpeed]) -> None:

@@ -179,6 +179,8 @@ class Limit(ABC):
         Whether it says something about an arm that stands still: position, torque against gravity.
     whole_turns : bool
         Whether it asks in which turn (multiple of 2 pi) an angle is.
+    least_speed : bool
+        Whether it asks for a least speed somewhere: starts follow the phase plane then.
     breaks : (b,) ndarray
         Path coordinates at which it changes so abruptly that the motion is to be looked at just there.
     order : int
@@ -201,6 +203,7 @@ class Limit(ABC):
     time_scaling: bool = False
     static: bool = False
     whole_turns: bool = False
+    least_speed: bool = False
     breaks: np.ndarray = np.empty(0)
     order: int = 2
     refusal: str = "is exceeded at rest"

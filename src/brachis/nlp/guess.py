@@ -135,7 +135,8 @@ def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
     """Scale the time until velocity, acceleration and torque limits just hold, or are exceeded least if they cannot.
 
     Far above the least time no limit is active, and a solver that has seen no curvature creeps towards it. Where an arm
-    passes postures that it cannot hold, long times do not hold the limits either.
+    passes postures that it cannot hold, long times do not hold the limits either, and between ends in motion they are
+    slower on the way alone.
 
     Raises
     ------
@@ -145,10 +146,11 @@ def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
     best, least = x, np.inf
     while program.end_time(x) < _LONGEST_TIME:
         worst = worst_time_scaling_ratio(program, x)
-        if worst < least:
-            best, least = x, worst
         if worst <= 1.0:
             break
+        if worst >= least:
+            return best
+        best, least = x, worst
         # Without gravity and friction, torque falls with the square of the time.
         x = program.time_scaled(x, _STRETCH * min(np.sqrt(worst), 8.0))
     else:

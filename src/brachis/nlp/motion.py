@@ -8,6 +8,7 @@ import numpy as np
 
 from brachis.bspline import insert_knots
 from brachis.nlp.boundary import LocalBasis
+from brachis.summary import Summary
 
 _BISECTIONS = 45
 
@@ -17,8 +18,8 @@ def per_second(orders: np.ndarray, t_end: float) -> tuple[np.ndarray, ...]:
     return tuple(part / t_end**order for order, part in enumerate(orders))
 
 
-@dataclass(frozen=True)
-class Motion:
+@dataclass(frozen=True, repr=False)
+class Motion(Summary):
     """A point x of a phase as curves.
 
     Attributes

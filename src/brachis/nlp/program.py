@@ -11,7 +11,7 @@ links. See `phase` for what a phase is.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -21,9 +21,10 @@ from brachis.nlp.link import Link
 from brachis.nlp.motion import Motion
 from brachis.nlp.objective import EndTime, Objective
 from brachis.nlp.phase import Phase
+from brachis.summary import Summary
 
 
-class Program:
+class Program(Summary):
     """The NLP as functions of x; what a solver sees.
 
     Parameters
@@ -44,6 +45,16 @@ class Program:
     jacobian_rows, jacobian_columns : (nnz,) int ndarray
         Fixed sparsity pattern; each place occurs once.
     """
+
+    def summary(self) -> Mapping[str, object]:
+        """Return what is shown: its size."""
+        return {
+            "phases": len(self.phases),
+            "intervals": self.intervals,
+            "collocation points": self.collocation_points,
+            "variables": self.variables,
+            "rows": len(self.lower),
+        }
 
     def __init__(self, phases: Iterable[Phase], links: Sequence[Link] = (), objective: Objective | None = None) -> None:
         self.phases, self.links, self.minimised = tuple(phases), tuple(links), objective or EndTime()

@@ -12,7 +12,7 @@ from brachis.path.site import ZERO_LENGTH, Site
 
 if TYPE_CHECKING:
     from brachis.path.protocol import Array
-    from brachis.task import ArcCenter, ArcVia, Circle
+    from brachis.task import ArcCenter, ArcVia, Circle, Helix
 
 _PLANE_ROWS = 2
 # Relative: coordinates are given with a few digits.
@@ -80,12 +80,12 @@ def arc_center(shape: ArcCenter, site: Site) -> ArcCurve:
     angle = float(np.deg2rad(shape.angle_deg))
     if abs(angle) < ZERO_LENGTH:
         raise site.zero_length(key=".angle_deg", found=shape.angle_deg)
-    return _about_center(shape, angle, site)
+    return _with_yaw(about_center(shape, angle, site), shape.yaw, site)
 
 
 def circle(shape: Circle, site: Site) -> ArcCurve:
     """Return the turns about a centre."""
-    return _about_center(shape, 2 * np.pi * shape.turns, site)
+    return _with_yaw(about_center(shape, 2 * np.pi * shape.turns, site), shape.yaw, site)
 
 
 def arc_via(shape: ArcVia, site: Site) -> ArcCurve:
@@ -129,7 +129,8 @@ def _angle_of(vector: Array, outward: Array, forward: Array) -> float:
     return float(np.arctan2(vector @ forward, vector @ outward) % (2 * np.pi))
 
 
-def _about_center(shape: ArcCenter | Circle, angle: float, site: Site) -> ArcCurve:
+def about_center(shape: ArcCenter | Circle | Helix, angle: float, site: Site) -> ArcCurve:
+    """Return the arc by a signed angle, rad, about the centre of a shape; yaw is left out."""
     site.need_plane("an arc")
     center = site.coordinates(shape.center, "center", site.positions)
     outward = site.position - center
@@ -148,7 +149,7 @@ def _about_center(shape: ArcCenter | Circle, angle: float, site: Site) -> ArcCur
         outward = site.position - center
         forward = np.cross(normal, outward)
     length = abs(angle) * float(np.linalg.norm(outward))
-    return _with_yaw(ArcCurve(center, outward, np.sign(angle) * forward, length), shape.yaw, site)
+    return ArcCurve(center, outward, np.sign(angle) * forward, length)
 
 
 def _normal(normal: tuple[float, float, float] | None, outward: Array, site: Site) -> Array:

@@ -50,6 +50,7 @@ def bspline_segment(
     Examples
     --------
     >>> import numpy as np
+    >>> from brachis import bspline_segment
     >>> segment = bspline_segment(lambda u: [np.sin(u), u, 1.0], (0.0, 1.0))
     >>> segment["bspline"]["degree"]
     5

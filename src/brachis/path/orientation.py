@@ -9,6 +9,7 @@ import numpy as np
 
 from brachis.errors import PathError
 from brachis.path.arc import ArcCurve
+from brachis.path.helix import HelixCurve
 from brachis.path.leibniz import product, unit
 from brachis.path.rotations import hat
 from brachis.path.sampling import smallest
@@ -101,7 +102,7 @@ def orientation_along(
 def _up(given: tuple[float, float, float] | None, curve: Curve) -> Array:
     if given is not None:
         return np.array(given) / np.linalg.norm(given)
-    return curve.normal if isinstance(curve, ArcCurve) else np.array([0.0, 0.0, 1.0])
+    return curve.normal if isinstance(curve, ArcCurve | HelixCurve) else np.array([0.0, 0.0, 1.0])
 
 
 def _with_tangent(curve: Curve, up: Array, start: Array, key: str) -> WithTangent:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 from brachis.errors import PathError
 from brachis.path.arc import arc_center, arc_via, circle
 from brachis.path.bspline import bspline_curve
+from brachis.path.helix import helix
 from brachis.path.line import line_by, line_heading, line_to
 from brachis.path.spline import spline_through
 from brachis.task import (
@@ -15,6 +16,7 @@ from brachis.task import (
     ArcVia,
     BSplineCurve,
     Circle,
+    Helix,
     LineBy,
     LineHeading,
     LineTo,
@@ -41,6 +43,7 @@ BUILDERS: Final[dict[type[Shape], Callable[[Any, Site], Curve]]] = {
     ArcCenter: arc_center,
     ArcVia: arc_via,
     Circle: circle,
+    Helix: helix,
     SplineThrough: spline_through,
     BSplineCurve: bspline_curve,
     PointFile: _unread,

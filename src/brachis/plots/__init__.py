@@ -2,6 +2,14 @@
 
 Every function returns a Matplotlib figure of its own, made without pyplot and without touching Matplotlib's settings.
 Matplotlib is imported when the first figure is made.
+
+Examples
+--------
+>>> import brachis
+>>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+>>> figure = brachis.plots.plot_torques(result.trajectory)
+>>> sorted(brachis.plots.PLOTS)[:3]
+['fit', 'limits', 'motion']
 """
 
 from __future__ import annotations
@@ -14,6 +22,7 @@ from brachis.plots.comparison import plot_comparison
 from brachis.plots.fit import plot_fit
 from brachis.plots.limits import plot_limits
 from brachis.plots.motion import plot_motion
+from brachis.plots.notebook import as_html
 from brachis.plots.overview import plot_overview
 from brachis.plots.postures import plot_postures
 from brachis.plots.save import SUFFIXES, check_suffix, save_figure
@@ -38,6 +47,7 @@ PLOTS: dict[str, Callable[[Trajectory], Figure]] = {
 __all__ = [
     "PLOTS",
     "SUFFIXES",
+    "as_html",
     "check_suffix",
     "plot_candidates",
     "plot_comparison",

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from brachis.plots.notebook import figure_class
+
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
@@ -40,9 +42,8 @@ _MM_PER_HANDLE = 9.0
 
 def new_figure(width: float, height: float) -> Figure:
     """Make an empty figure of `width` times `height`, mm, that no global state knows of."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  (imports in 0.3 s, and only plots need it)
-
-    figure = Figure(figsize=(width / _MM_PER_INCH, height / _MM_PER_INCH), layout="constrained", facecolor="white")
+    size = width / _MM_PER_INCH, height / _MM_PER_INCH
+    figure = figure_class()(figsize=size, layout="constrained", facecolor="white")
     figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.04)  # type: ignore[union-attr,call-arg]
     return figure
 

@@ -34,7 +34,7 @@ def plot_torques(trajectory: Trajectory) -> Figure:
     --------
     >>> from brachis import plan
     >>> from brachis.plots import plot_torques, save_figure
-    >>> save_figure(plot_torques(plan(None, "examples/01_scara_line.yaml").trajectory), "torques.pdf")  # doctest: +SKIP
+    >>> save_figure(plot_torques(plan("examples/01_scara_line.yaml").trajectory), "torques.pdf")  # doctest: +SKIP
     """
     figure = style.new_figure(style.COLUMN_WIDTH, 58.0)
     ax = figure.add_subplot()

@@ -17,6 +17,7 @@ from brachis.deadline import NEVER, Deadline
 from brachis.nlp import Program
 from brachis.refine.violations import dense_grid, merged, violations
 from brachis.solvers import SolverReport
+from brachis.summary import Summary
 
 Solve = Callable[[Program, np.ndarray], SolverReport]
 _LONGEST = 0.01
@@ -49,8 +50,8 @@ class RefinementOptions:
     longest: float = np.inf
 
 
-@dataclass(frozen=True)
-class Refined:
+@dataclass(frozen=True, repr=False)
+class Refined(Summary):
     """A solve and what refinement made of it.
 
     Attributes

@@ -13,7 +13,7 @@ from brachis.errors import InputError, TaskError
 from brachis.robot.free_roll import with_free_roll
 from brachis.robot.friction import Friction
 from brachis.robot.from_task import robot_from_settings
-from brachis.robot.limits import MAGNITUDES, Limits, per_joint_values, resolve_limits
+from brachis.robot.limits import MAGNITUDES, Limits, per_joint_values, resolve_limits, spelled_out
 from brachis.robot.robot import ROLL_JOINT, Robot
 from brachis.robot.urdf import read_chain
 from brachis.task import FrictionSettings, LimitSpec, RobotSettings
@@ -71,7 +71,7 @@ def _stated(robot: Robot) -> RobotSettings:
     changes: dict[str, object] = {}
     made = resolve_limits(settings.limits, names, robot.stated_limits[:n], settings.speed_override)
     if not _same(made, robot.limits, n):
-        changes |= {"limits": _limits(robot.limits, names), "speed_override": 1.0}
+        changes |= {"limits": spelled_out(robot.limits, names), "speed_override": 1.0}
     if not _same(Friction.of(names, robot.stated.friction, **settings.friction.model_dump()), robot.friction, n):
         changes["friction"] = _friction(robot.friction, names)
     gravity = tuple(float(component) for component in robot.model.gravity.linear)
@@ -94,23 +94,6 @@ def _same(first: Limits | Friction, second: Limits | Friction, n: int) -> bool:
         return bool(one[:n] == other[:n]) if isinstance(one, tuple) else bool(one == other)
 
     return all(same(getattr(first, each.name), getattr(second, each.name)) for each in fields(first))
-
-
-def _limits(limits: Limits, names: Sequence[str]) -> LimitSpec:
-    """Spell limits out joint by joint."""
-
-    def finite(values: np.ndarray) -> list[float | None]:
-        return [float(value) if np.isfinite(value) else None for value in values[: len(names)]]
-
-    ranges = zip(finite(limits.position_lower), finite(limits.position_upper), strict=True)
-    spelled: dict[str, Any] = {"position": ranges}
-    for kind in MAGNITUDES:
-        pairs = zip(*(finite(ends) for ends in limits.both_ways(kind)), strict=True)
-        spelled[kind] = [upper if lower is None or -lower == upper else (lower, upper) for lower, upper in pairs]
-    by_name = {kind: dict(zip(names, values, strict=True)) for kind, values in spelled.items()}
-    curves = {name: curve for name, curve in zip(names, limits.torque_speed, strict=False) if curve}
-    total = limits.total_power if np.isfinite(limits.total_power) else None
-    return LimitSpec(**by_name, total_power=total, torque_speed=curves or None)
 
 
 def _friction(friction: Friction, names: Sequence[str]) -> FrictionSettings:

@@ -10,13 +10,14 @@ import numpy as np
 from brachis.arrays import freeze
 from brachis.errors import InputError
 from brachis.robot.limits import LARGEST, per_joint_values
+from brachis.summary import Summary
 from brachis.task import FROM_URDF
 
 _LEAST_SPEED = 1e-9
 
 
-@dataclass(frozen=True)
-class Friction:
+@dataclass(frozen=True, repr=False)
+class Friction(Summary):
     """Armature, viscous and Coulomb terms of every joint. The arrays are read-only.
 
     The joint torque is ``rnea(q, qdot, qddot) + armature * qddot + viscous * qdot + coulomb * tanh(qdot / v_eps)``.

@@ -11,6 +11,7 @@ import numpy as np
 from brachis.arrays import freeze
 from brachis.errors import InputError, LimitError, UnknownNameError
 from brachis.robot.torque_curves import Curve, resolve_curves
+from brachis.summary import Summary
 from brachis.task import FROM_URDF, LimitScale, LimitSpec
 
 LEAST, LARGEST = 1e-6, 1e12
@@ -21,8 +22,8 @@ FARTHEST = 1e6
 _NARROWEST = 1e-9
 
 
-@dataclass(frozen=True)
-class Limits:
+@dataclass(frozen=True, repr=False)
+class Limits(Summary):
     """Limits of every joint of the chain; infinite where a joint is not limited. The arrays are read-only.
 
     Attributes
@@ -188,6 +189,23 @@ def resolve_limits(
         values |= dict(zip((f"{kind}_lower", f"{kind}_upper"), scaled[kind], strict=True))
     values |= {"total_power": _total_power(spec), "torque_speed": curves}
     return Limits(position_lower=lower, position_upper=upper, **values)
+
+
+def spelled_out(limits: Limits, names: Sequence[str]) -> LimitSpec:
+    """State limits joint by joint; joints beyond `names` are left out."""
+
+    def finite(values: np.ndarray) -> list[float | None]:
+        return [float(value) if np.isfinite(value) else None for value in values[: len(names)]]
+
+    ranges = zip(finite(limits.position_lower), finite(limits.position_upper), strict=True)
+    spelled: dict[str, Any] = {"position": ranges}
+    for kind in MAGNITUDES:
+        pairs = zip(*(finite(ends) for ends in limits.both_ways(kind)), strict=True)
+        spelled[kind] = [upper if lower is None or -lower == upper else (lower, upper) for lower, upper in pairs]
+    by_name = {kind: dict(zip(names, values, strict=True)) for kind, values in spelled.items()}
+    curves = {name: curve for name, curve in zip(names, limits.torque_speed, strict=False) if curve}
+    total = limits.total_power if np.isfinite(limits.total_power) else None
+    return LimitSpec(**by_name, total_power=total, torque_speed=curves or None)
 
 
 def _check_scale(scale: LimitScale) -> None:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import pinocchio as pin
 
-from brachis.errors import InputError
+from brachis.errors import InputError, UnknownNameError
 from brachis.robot.friction import Friction
 from brachis.robot.limits import (
     FARTHEST,
@@ -20,19 +20,22 @@ from brachis.robot.limits import (
     UrdfLimit,
     per_joint_values,
     resolve_limits,
+    spelled_out,
 )
 from brachis.robot.model import build_model
+from brachis.robot.settings import kept_settings
 from brachis.robot.urdf import read_chain, read_file
 from brachis.robot.urdf_bodies import StatedChain
-from brachis.task import FROM_URDF, LimitSpec, Payload, Placement, RobotSettings, check_robot_settings
+from brachis.summary import Summary
+from brachis.task import LimitKeywords, LimitSpec, Payload, Placement, RobotSettings, check_robot_settings
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 ROLL_JOINT = "tool_roll"
 """The virtual joint by which a tool rolls freely about its z axis; see `free_roll`."""
 
 
-@dataclass(frozen=True)
-class Robot:
+@dataclass(frozen=True, repr=False)
+class Robot(Summary):
     """A serial chain of one-coordinate joints with limits.
 
     Attributes
@@ -59,6 +62,13 @@ class Robot:
         Text of that file.
     rolls_freely : bool
         Whether the last joint is the virtual one by which the tool rolls freely; see `bind`.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> robot = brachis.Robot.from_urdf("robots/scara3/robot.urdf", tool_frame="tool", gravity=[0, 0, 0])
+    >>> robot.tool_placement([0.0, 0.0, 0.0]).translation.round(6).tolist()
+    [3.0, 0.0, 0.0]
     """
 
     model: pin.Model
@@ -157,10 +167,113 @@ class Robot:
             stated_limits=chain.limits,
             stated=chain.stated,
             friction=terms,
-            settings=_settings(added, path, names, tool_frame, base_frame, vector, locked_joints, spec, friction),
+            settings=kept_settings(added, path, names, tool_frame, base_frame, vector, locked_joints, spec, friction),
             source=str(path),
             urdf=text,
         )
+
+    def with_limits(self, **limits: Unpack[LimitKeywords]) -> Robot:
+        """Return the robot with some of its limits changed.
+
+        Parameters
+        ----------
+        **limits
+            Arguments of `LimitSpec`. A mapping by joint name changes those joints alone; ``scale`` multiplies the
+            limits that the robot has.
+
+        Raises
+        ------
+        LimitError, UnknownNameError, InputError
+            See `Robot.from_urdf`.
+
+        Examples
+        --------
+        >>> import brachis
+        >>> robot = brachis.robots.scara3.with_limits(torque={"j1": 20.0}, velocity=2.0)
+        >>> robot.limits.torque.tolist(), robot.limits.velocity.tolist()
+        ([20.0, 10.0, 10.0], [2.0, 2.0, 2.0])
+        """
+        own = self.joint_names[: len(self.joint_names) - self.rolls_freely]
+        kept = spelled_out(self.limits, own)
+        changes: dict[str, Any] = {}
+        for kind, value in limits.items():
+            if kind not in LimitKeywords.__annotations__:
+                raise UnknownNameError("limit", kind, LimitKeywords.__annotations__, where="with_limits")
+            stated = getattr(kept, kind)
+            if isinstance(value, Mapping) and isinstance(stated, Mapping):
+                changes[kind] = {**stated, **value}
+            else:
+                changes[kind] = value
+        spec = LimitSpec(**{**vars(kept), **changes})
+        resolved = resolve_limits(spec, own, self.stated_limits[: len(own)])
+        self.friction.check_against(self.joint_names, resolved.torque)
+        settings = self.settings.model_copy(update={"limits": spec, "speed_override": 1.0})
+        return replace(self, limits=resolved.with_free_joint() if self.rolls_freely else resolved, settings=settings)
+
+    def with_payload(
+        self, mass: float | None, *, com: Sequence[float] = (0.0, 0.0, 0.0), inertia: Mapping[str, float] | None = None
+    ) -> Robot:
+        """Return the robot with another payload, in place of the one that it has.
+
+        Parameters
+        ----------
+        mass : float or None
+            kg; None: no payload.
+        com : (3,) sequence of float, optional
+            Centre of mass in the tool frame of the URDF, m.
+        inertia : mapping, optional
+            ``ixx``, ``iyy``, ... about the centre of mass, kg m^2; a point mass unless given.
+
+        Raises
+        ------
+        TaskError, InputError
+            See `Robot.from_urdf`.
+
+        Examples
+        --------
+        >>> import brachis
+        >>> brachis.robots.iiwa14.with_payload(5.0, com=[0, 0, 0.1]).settings.payload
+        Payload(mass=5, com=[0, 0, 0.1])
+        """
+        settings = self.settings
+        payload = None if mass is None else {"mass": mass, "com": com, "inertia": inertia}
+        made = Robot.from_urdf(
+            self.source,
+            urdf_text=self.urdf,
+            tool_frame=settings.tool_frame,
+            base_frame=settings.base_frame,
+            gravity=self.model.gravity.linear,
+            locked_joints=settings.locked_joints,
+            limits=settings.limits,
+            friction=settings.friction.model_dump(),
+            payload=payload,
+            tool_offset=settings.tool_offset,
+            mounting=settings.mounting,
+            speed_override=settings.speed_override,
+        )
+        return made if self.rolls_freely else replace(made, limits=self.limits, friction=self.friction)
+
+    def summary(self) -> Mapping[str, object]:
+        """Return what is shown."""
+        limits, payload = self.limits, self.settings.payload
+        return {
+            "urdf": self.source,
+            "joints": ", ".join(self.joint_names),
+            "tool frame": self.tool_frame,
+            "from": self.in_words(limits.position_lower),
+            "to": self.in_words(limits.position_upper),
+            "torque": self.in_words(limits.torque, "Nm", "N"),
+            "velocity": self.in_words(limits.velocity, "rad/s", "m/s"),
+            **({} if payload is None else {"payload": f"{payload.mass:g} kg"}),
+        }
+
+    def in_words(self, values: np.ndarray, angular: str = "rad", linear: str = "m") -> str:
+        """Write a value for each joint, (n,), with the unit of revolute or of prismatic joints."""
+        units = [angular if turns else linear for turns in self.revolute]
+        numbers = [f"{value:.4g}" if np.isfinite(value) else "none" for value in values]
+        if len(set(units)) == 1:
+            return f"{', '.join(numbers)} {units[0]}"
+        return ", ".join(f"{number} {unit}" for number, unit in zip(numbers, units, strict=True))
 
     @property
     def n(self) -> int:
@@ -241,41 +354,3 @@ def _vector(gravity: Sequence[float]) -> np.ndarray:
         allowed = f"[x, y, z] in m/s^2, finite, at most {LARGEST:g} in size"
         raise InputError("is not a vector", where="robot.gravity", found=gravity, allowed=allowed)
     return vector
-
-
-def _settings(
-    added: RobotSettings,
-    path: str | os.PathLike[str],
-    names: Sequence[str],
-    tool_frame: str | None,
-    base_frame: str | None,
-    gravity: np.ndarray,
-    locked_joints: Mapping[str, float] | None,
-    limits: LimitSpec,
-    friction: Mapping[str, object] | None,
-) -> RobotSettings:
-    """Keep the arguments as the ``robot`` part of a task."""
-    by_name: dict[str, Any] = {
-        each.name: _by_name(getattr(limits, each.name), names, each.default) for each in fields(limits)
-    }
-    return check_robot_settings(
-        {
-            "urdf": str(Path(path).absolute()),
-            "tool_frame": tool_frame,
-            "base_frame": base_frame,
-            "gravity": gravity,
-            "locked_joints": dict(locked_joints or {}),
-            "limits": replace(limits, **by_name),
-            "friction": dict(friction or {}),
-            **{name: getattr(added, name) for name in ("payload", "tool_offset", "mounting", "speed_override")},
-        }
-    )
-
-
-def _by_name(value: object, names: Sequence[str], absent: object) -> object:
-    """Return a limit that is given joint by joint as a mapping, without the joints that take the URDF's."""
-    if not isinstance(value, tuple | dict):
-        return value
-    listed = per_joint_values("limits", value, names, FROM_URDF)
-    kept = {name: entry for name, entry in zip(names, listed, strict=True) if not isinstance(entry, str)}
-    return kept or absent

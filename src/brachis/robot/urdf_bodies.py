@@ -11,13 +11,14 @@ import pinocchio as pin
 from brachis.errors import UrdfError
 from brachis.robot.urdf_numbers import numbers_of
 from brachis.robot.urdf_tree import Element, UrdfTree, end_of
+from brachis.summary import Summary
 
 _ROUNDING = 1e-9
 _ZEROS = "0 0 0"
 
 
-@dataclass(frozen=True, eq=False)
-class Body:
+@dataclass(frozen=True, eq=False, repr=False)
+class Body(Summary):
     """What one joint of a chain moves: its child link and all that is held to it.
 
     Attributes
@@ -51,8 +52,8 @@ class Body:
     size: float
 
 
-@dataclass(frozen=True, eq=False)
-class StatedChain:
+@dataclass(frozen=True, eq=False, repr=False)
+class StatedChain(Summary):
     """What a URDF says of a chain.
 
     Attributes

@@ -1,6 +1,7 @@
 """Search for the fastest motion: joint paths from lattices, a portfolio over decompositions, branches and starts."""
 
 from brachis.search.chart_starts import first_map
+from brachis.search.given_motion import GIVEN, given_start
 from brachis.search.pacing import first_breaks, first_point
 from brachis.search.portfolio import Stages, find_fastest
 from brachis.search.recentring import best_of_joints, solved_in_chart
@@ -8,6 +9,7 @@ from brachis.search.record import Record
 from brachis.search.solving import MARGINS, Listener, continued, eased, solve_with
 
 __all__ = [
+    "GIVEN",
     "MARGINS",
     "Listener",
     "Record",
@@ -19,6 +21,7 @@ __all__ = [
     "first_breaks",
     "first_map",
     "first_point",
+    "given_start",
     "solve_with",
     "solved_in_chart",
 ]

@@ -11,20 +11,18 @@ alone may need no force at all, where no limit's change with the end time tells 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from brachis.attempt import Start
 from brachis.nlp import Program
 from brachis.nlp.guess import starting_point
 from brachis.problem import breaks_of
-from brachis.search.phase_plane import least_times, prescribed_times
+from brachis.search.phase_plane import least_times
 
 _STATIONS = 401
 _STEADY = 1e-6
 """Changes of the speed below this part of it are rounding."""
-_SPREAD = 0.4
+_SPREAD = 0.2
 """Part of the knots that is spread evenly over the time; the others are over the change of speed."""
 
 
@@ -68,13 +66,13 @@ def first_point(program: Program, start: Start) -> np.ndarray | None:
 
 def _paced(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     """Curves along the joint path, (S, c), and their times, (S,), s; None where no limit asks for a least speed."""
-    return _timed(start, prescribed_times)
+    return _timed(start) if any(limit.least_speed for limit in start.problem.limits) else None
 
 
 def _between_speeds(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     """Curves and times likewise where an end is in motion and the joint path is not a motion's yet; else None."""
     first, last = start.problem.end_rates
-    fastest = None if start.timed or first == last == 0.0 else _timed(start, least_times)
+    fastest = None if start.timed or first == last == 0.0 else _timed(start)
     if fastest is None:
         return None
     curves, times = fastest
@@ -84,7 +82,7 @@ def _between_speeds(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     return curves, 0.5 * (times + even)
 
 
-def _timed(start: Start, find_times: Callable[..., np.ndarray | None]) -> tuple[np.ndarray, np.ndarray] | None:
+def _timed(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     """Curves along the joint path at even stations, (S, c), and when the phase plane passes them, (S,), s."""
     s = np.linspace(0.0, 1.0, _STATIONS)
     joint_path = start.joint_path
@@ -92,5 +90,5 @@ def _timed(start: Start, find_times: Callable[..., np.ndarray | None]) -> tuple[
     q = start.joint_map.postures(curves)
     if not np.isfinite(q).all():
         return None
-    times = find_times(start.problem.limits, s, q, start.problem.end_rates)
+    times = least_times(start.problem.limits, s, q, start.problem.end_rates)
     return None if times is None or not np.isfinite(times[-1]) else (curves, times)

@@ -55,17 +55,6 @@ def least_times(
     return _times(_lines(limits, s, q), s[1] - s[0], rates)
 
 
-def prescribed_times(
-    limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, rates: tuple[float, float] = _AT_REST
-) -> np.ndarray | None:
-    """Find times as `least_times` does where a limit asks for a least speed; None where none does or can.
-
-    A start that is too slow there is no good one.
-    """
-    lines = _lines(limits, s, q)
-    return _times(lines, s[1] - s[0], rates) if lines.floor.any() else None
-
-
 @dataclass(frozen=True)
 class _Lines:
     """Limits along a joint path: bounds on u as lines in x, and bounds on x itself.

@@ -59,6 +59,7 @@ def find_fastest(
     stages: Stages,
     deadline: Deadline,
     listener: Listener,
+    first: Start | None = None,
 ) -> Record:
     """Search for the fastest verified motion.
 
@@ -71,6 +72,8 @@ def find_fastest(
     deadline : Deadline
         When to return the best motion so far; one that is not verified where none is.
     listener : callable
+    first : Start, optional
+        Tried alone; nothing else is where it leads to a verified motion.
 
     Returns
     -------
@@ -89,7 +92,10 @@ def find_fastest(
     search = _Search(problem, decompositions, stages, deadline, listener)
     record = search.record
     try:
-        search.run(batches(problem, decompositions, deadline, listener, record.note_lattice))
+        if first is not None:
+            search.run([Batch((first,), 1)])
+        if not record.content:
+            search.run(batches(problem, decompositions, deadline, listener, record.note_lattice))
     except KeyboardInterrupt:
         interrupts.forget()
         record.interrupted = True

@@ -25,7 +25,7 @@ from brachis.solvers import SolverReport, SolveStatus
 _TRANSVERSAL = 0.5
 """Least transversality along the motion with which a chart is kept."""
 _RECENTRINGS = 3
-_SELECTABLE = 0.05
+SELECTABLE = 0.05
 """Least transversality along the motion of joints that may take the place of the chart's rows."""
 _SELECTED = (0, 3, 1)
 """Choices of joints that are tried at most with no, one and several redundant joints: these solves take longest."""
@@ -174,4 +174,4 @@ def _selections(program: Program, x: np.ndarray) -> list[ChartRows]:
     choices = [list(joints) for joints in itertools.islice(itertools.combinations(range(n), r), _CHOICES)]
     least = [float(transversality(np.eye(n)[joints][None], null).min()) for joints in choices]
     ranked = sorted(range(len(choices)), key=lambda number: -least[number])[: _SELECTED[min(r, 2)]]
-    return [ChartRows.constant(np.eye(n)[choices[number]]) for number in ranked if least[number] >= _SELECTABLE]
+    return [ChartRows.constant(np.eye(n)[choices[number]]) for number in ranked if least[number] >= SELECTABLE]

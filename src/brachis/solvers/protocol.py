@@ -9,6 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
+from brachis.summary import Summary
+
 _FEASIBLE = 1e-5
 """Violation of rows and bounds, dimensionless, that refinement mends."""
 
@@ -83,8 +85,8 @@ class SolverOptions:
     patience: int = 15
 
 
-@dataclass(frozen=True)
-class SolverReport:
+@dataclass(frozen=True, repr=False)
+class SolverReport(Summary):
     """Answer of a solver.
 
     Attributes

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from brachis import interrupts
-from brachis.errors import BrachisError, ClusterError, InputError
+from brachis.errors import BrachisError, ClusterError, InputError, NotInstalledError
 from brachis.sweeps.plans import Plan
 from brachis.sweeps.worker import Outcome, planned
 
@@ -130,15 +130,15 @@ def on_dask(plans: Iterable[Plan], address: str, listener: Callable[[str], None]
 
     Raises
     ------
-    InputError
-        Dask is not installed.
+    NotInstalledError
+        Dask is not.
     ClusterError
         The scheduler does not answer, or was lost.
     """
     try:
         from dask.distributed import Client, KilledWorker  # noqa: PLC0415  (an extra)
     except ImportError as error:
-        raise InputError("Dask is not installed", found=str(error), hint="pip install 'brachis[cluster]'") from error
+        raise NotInstalledError("a Dask cluster", "dask", "cluster") from error
     where: dict[str, Any] = {"scheduler_file": address} if Path(address).is_file() else {"address": address}
     try:
         client: Any = Client(**where, timeout=_CONNECTING, set_as_default=False)  # type: ignore[no-untyped-call]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from brachis.errors import InputError, UnknownNameError
+from brachis.summary import Summary
 from brachis.sweeps.settings import SweepSettings
 from brachis.sweeps.store import TABLES, Store
 from brachis.sweeps.worker import FAILED, UNVERIFIED, VERIFIED
@@ -25,7 +26,7 @@ _MOST_AXES = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SweepResult:
+class SweepResult(Summary):
     """The plans of a sweep.
 
     Attributes
@@ -39,6 +40,24 @@ class SweepResult:
         failed), ``t_end_s`` (s), ``worst_ratio`` (to a limit), ``path_error`` (m or rad), ``chosen_joints``,
         ``chosen_branch``, ``solver``, ``iterations``, ``wall_time_s`` (s), ``error`` (its class) and ``message``,
         ``remarks``, ``motion`` (its file in the folder). Values that are neither numbers nor strings are JSON.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import brachis
+    >>> found = brachis.sweep(
+    ...     {
+    ...         "sweep": 1,
+    ...         "task": "examples/01_scara_line.yaml",
+    ...         "fixed": {"search.effort": "single"},
+    ...         "grid": {"spline.intervals": [6, 7]},
+    ...     },
+    ...     tempfile.mkdtemp(),
+    ... )
+    >>> [row["spline.intervals"] for row in found.ranked()]
+    [7, 6]
+    >>> round(found.trajectory(1).t_end, 1)
+    2.8
     """
 
     folder: Path
@@ -151,12 +170,3 @@ class SweepResult:
             if key not in self.varied:
                 raise UnknownNameError("key that varies", key, self.varied, where="keys")
         return plot_sweep(self.rows(), tuple(keys or self.varied[:_MOST_AXES]))
-
-    def __repr__(self) -> str:
-        """Say in short what came of the sweep."""
-        found = self.summary()
-        text = f"SweepResult: {found['plans']} plans, " + ", ".join(
-            f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED)
-        )
-        times = [f"{name} {found[name]['t_end_s']:.4g} s" for name in ("best", "median", "worst") if name in found]
-        return "; ".join([text, *times]) + f"; in {self.folder}"

@@ -70,6 +70,7 @@ def sweep(
 
     Examples
     --------
+    >>> import tempfile
     >>> import brachis
     >>> found = brachis.sweep(
     ...     {
@@ -78,7 +79,7 @@ def sweep(
     ...         "fixed": {"spline.intervals": 6, "search.effort": "single"},
     ...         "grid": {"path.0.line.angle_deg": [90, 270]},
     ...     },
-    ...     "out/sweep",
+    ...     tempfile.mkdtemp(),
     ... )
     >>> found.table.column("status").to_pylist()
     ['verified', 'verified']

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from brachis.errors import InputError
+from brachis.errors import InputError, NotInstalledError
 from brachis.files import atomic_write, read_file, writing_errors
 from brachis.sweeps.worker import Outcome
 
@@ -45,15 +45,15 @@ def arrow() -> ModuleType:
 
     Raises
     ------
-    InputError
-        It is not installed.
+    NotInstalledError
+        It is not.
     """
     try:
         import pyarrow as pa  # noqa: PLC0415  (an extra, and only sweeps need it)
         import pyarrow.csv  # noqa: PLC0415
         import pyarrow.parquet  # noqa: PLC0415
     except ImportError as error:
-        raise InputError("sweeps need pyarrow", found=str(error), hint="pip install 'brachis[sweep]'") from error
+        raise NotInstalledError("a sweep", "pyarrow", "sweep") from error
     return pa
 
 

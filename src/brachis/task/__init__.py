@@ -4,8 +4,9 @@ from brachis.task.arrays import fit_path
 from brachis.task.boundary import BoundarySettings
 from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.keys import read_assignment, set_key, with_keys
+from brachis.task.keywords import TaskKeywords, task_with
 from brachis.task.limits_file import LimitsFile, read_limits
-from brachis.task.load import check_robot_settings, load_task
+from brachis.task.load import Source, check_robot_settings, load_task
 from brachis.task.models import (
     Posture,
     RefinementSettings,
@@ -30,7 +31,7 @@ from brachis.task.orientation import (
     TurnTo,
 )
 from brachis.task.point_data import FileUnits, FitReport, FitTolerance, PointFile
-from brachis.task.robot_models import FROM_URDF, FrictionSettings, LimitScale, LimitSpec, RobotSettings
+from brachis.task.robot_models import FROM_URDF, FrictionSettings, LimitKeywords, LimitScale, LimitSpec, RobotSettings
 from brachis.task.schema import json_schema
 from brachis.task.segments import (
     ArcCenter,
@@ -40,6 +41,8 @@ from brachis.task.segments import (
     Circle,
     CircleSegment,
     CsvSegment,
+    Helix,
+    HelixSegment,
     LineBy,
     LineHeading,
     LineSegment,
@@ -71,7 +74,10 @@ __all__ = [
     "FitReport",
     "FitTolerance",
     "FrictionSettings",
+    "Helix",
+    "HelixSegment",
     "InertiaMatrix",
+    "LimitKeywords",
     "LimitScale",
     "LimitSpec",
     "LimitsFile",
@@ -97,12 +103,14 @@ __all__ = [
     "SegmentModel",
     "Shape",
     "SolverSettings",
+    "Source",
     "SpeedTable",
     "SplineSegment",
     "SplineSettings",
     "SplineThrough",
     "Tangent",
     "Task",
+    "TaskKeywords",
     "ToQuaternion",
     "ToRollPitchYaw",
     "ToRotationVector",
@@ -116,5 +124,6 @@ __all__ = [
     "read_assignment",
     "read_limits",
     "set_key",
+    "task_with",
     "with_keys",
 ]

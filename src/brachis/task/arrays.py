@@ -67,6 +67,7 @@ def fit_path(
     >>> import numpy as np
     >>> angle = np.linspace(0.0, 1.5, 500)
     >>> circle = np.column_stack([200.0 * np.cos(angle), 200.0 * np.sin(angle)])
+    >>> from brachis import fit_path
     >>> path = fit_path(circle, tolerance={"position": "0.01 mm"}, units={"length": "mm"})
     >>> path[0].bspline.fit.intervals < 5
     True

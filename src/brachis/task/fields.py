@@ -10,10 +10,12 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Strict, WithJsonSchema
 from pydantic_core import PydanticCustomError
+
+from brachis.summary import shown
 
 REFUSED = "brachis_refused"
 """Error type of a value that a validator of ours refuses; see `refuse`."""
@@ -31,6 +33,26 @@ class Model(BaseModel):
 
     # Instances are checked again, because a program can make limits that nobody has checked.
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, revalidate_instances="always")
+
+    def __repr_args__(self) -> list[tuple[str | None, Any]]:
+        """Leave out what is as by default; `__repr__` is pydantic's and shows these."""
+        fields = type(self).model_fields
+        given = [(name, getattr(self, name)) for name in fields if name in self.model_fields_set]
+        return [(name, _Shown(value)) for name, value in given if value != fields[name].default]
+
+    def __str__(self) -> str:
+        """Show it as `repr` does."""
+        return repr(self)
+
+
+class _Shown:
+    """A value that is shown as in summaries."""
+
+    def __init__(self, value: object) -> None:
+        self._value = value
+
+    def __repr__(self) -> str:
+        return repr(self._value) if isinstance(self._value, str | Model) else shown(self._value)
 
 
 _PERCENT = re.compile(r"^(100(\.0*)?|[0-9]{1,2}(\.[0-9]*)?) ?%$")

@@ -46,7 +46,8 @@ def read_limits(path: str | os.PathLike[str]) -> LimitSpec:
 
     Examples
     --------
-    >>> limits = read_limits("robots/panda_limits.yaml")
+    >>> import brachis
+    >>> limits = brachis.read_limits("robots/panda_limits.yaml")
     >>> limits.velocity["panda_joint1"]
     2.175
     """

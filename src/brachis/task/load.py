@@ -18,11 +18,13 @@ from brachis.task.robot_models import RobotSettings
 from brachis.task.text_file import read_text
 from brachis.task.yaml_reader import read_yaml
 
+Source = str | os.PathLike[str] | Mapping[str, object] | Task
+"""What a task is made of: its file, or its content."""
 LARGEST_TASK = 1_000_000
 """Bytes of YAML, which take some 20 s to read."""
 
 
-def load_task(source: str | os.PathLike[str] | Mapping[str, object] | Task) -> Task:
+def load_task(source: Source) -> Task:
     """Return the task that a file or a mapping describes.
 
     Parameters
@@ -47,6 +49,7 @@ def load_task(source: str | os.PathLike[str] | Mapping[str, object] | Task) -> T
 
     Examples
     --------
+    >>> from brachis import load_task
     >>> task = load_task({
     ...     "brachis": 1,
     ...     "start": {"joints": [0.1, 0.2, 0.3]},

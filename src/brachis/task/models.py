@@ -15,7 +15,7 @@ from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.fields import Count, Flag, Model, Name, Number, Positive, Share, by_form, refuse
 from brachis.task.point_data import FitReport
 from brachis.task.robot_models import JointValues, RobotSettings
-from brachis.task.segments import CsvSegment, Segment, SplineThrough
+from brachis.task.segments import CsvSegment, Segment, SegmentModel, SplineThrough
 from brachis.task.tool_limits import ToolLimits
 
 Row = Literal["x", "y", "z", "yaw"]
@@ -207,6 +207,13 @@ class Task(Model):
     """A task: a robot, a path for its tool, and how to plan.
 
     Constructed directly it raises pydantic's own errors; `brachis.task.load_task` puts them in plain words.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> task = brachis.load_task(brachis.examples.scara_line)
+    >>> task.task_space, task.redundant_joints
+    (('x', 'y'), ('j3',))
     """
 
     brachis: Literal[1] = Field(description="Version of the task format.")
@@ -261,6 +268,11 @@ class Task(Model):
             problem = "the version of the task format must be a whole number"
             raise refuse(problem, found=version, allowed="1")
         return version
+
+    @field_validator("path", mode="before")
+    @classmethod
+    def _one_segment_is_a_path(cls, path: object) -> object:
+        return (path,) if isinstance(path, SegmentModel) else path
 
     @field_validator("path")
     @classmethod

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Annotated, Any, Final, Literal, Protocol
+from typing import Annotated, Any, Final, Literal, Protocol, TypedDict
 
 from pydantic import AfterValidator, Field, Tag
 
@@ -126,6 +126,22 @@ StatedCurves = Mapping[str, Array | Sequence[_StatedPair] | None] | None
 StatedRange = Array | Sequence[_StatedPair] | Mapping[str, _StatedPair] | str | None
 
 
+class LimitKeywords(TypedDict, total=False):
+    """Arguments of `LimitSpec`."""
+
+    torque: StatedLimit
+    velocity: StatedLimit
+    acceleration: StatedLimit
+    position: StatedRange
+    scale: Mapping[str, float] | LimitScale | None
+    power: StatedLimit
+    total_power: float | None
+    rms_torque: StatedLimit
+    torque_speed: StatedCurves
+    jerk: StatedLimit
+    torque_rate: StatedLimit
+
+
 class LimitScale(Model):
     """Factors on the limits, to keep a distance from them."""
 
@@ -140,7 +156,14 @@ class LimitScale(Model):
 
 @dataclass(frozen=True, init=False)
 class LimitSpec:
-    """Joint limits: an absent key takes the URDF's, null removes the limit (see the module's documentation)."""
+    """Joint limits: an absent key takes the URDF's, null removes the limit (see the module's documentation).
+
+    Examples
+    --------
+    >>> import brachis
+    >>> brachis.LimitSpec(torque={"j1": 12.0}, velocity=2.0).velocity
+    2.0
+    """
 
     torque: Annotated[
         UrdfLimit,

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, Tag, field_validator, model_validator
+from pydantic import AfterValidator, Field, Tag, model_validator
 
 from brachis.task.bspline_curve import BSplineCurve, JointOrder
 from brachis.task.fields import Flag, Model, NonNegative, Number, Positive, Vector, by_key, refuse
-from brachis.task.orientation import Attitude, OrientationMode, Quaternion, Turning
+from brachis.task.orientation import Attitude, Direction, OrientationMode, Quaternion, Turning
 from brachis.task.point_data import FitReport, PointFile
 
 Yaw = Annotated[
@@ -28,6 +28,13 @@ Normal = Annotated[
 ]
 _POSE_COLUMNS = 7
 Centre = Annotated[Vector, Field(description="Centre, m: the position rows, without yaw.")]
+
+
+def _not_zero(turns: float) -> float:
+    if turns == 0:
+        problem = "a circle without turns has zero length"
+        raise refuse(problem, found=turns, allowed="a number other than 0")
+    return turns
 
 
 class LineTo(Model):
@@ -73,17 +80,22 @@ class Circle(Model):
     """Whole or fractional turns about a centre."""
 
     center: Centre
-    turns: Number = Field(default=1.0, description="Number of turns, signed as an arc's angle; not zero.")
+    turns: Annotated[Number, AfterValidator(_not_zero)] = Field(
+        default=1.0, description="Number of turns, signed as an arc's angle; not zero."
+    )
     normal: Normal = None
     yaw: Yaw = "fixed"
 
-    @field_validator("turns")
-    @classmethod
-    def _turns_not_zero(cls, turns: float) -> float:
-        if turns == 0:
-            problem = "a circle without turns has zero length"
-            raise refuse(problem, found=turns, allowed="a number other than 0")
-        return turns
+
+class Helix(Model):
+    """Turns about an axis that climb along it, in three position rows."""
+
+    center: Centre
+    turns: Annotated[Number, AfterValidator(_not_zero)] = Field(
+        default=1.0, description="Number of turns, signed about the normal; not zero."
+    )
+    pitch: Number = Field(description="Climb of each turn along the normal, m; negative: against it.")
+    normal: Direction = Field(description="Axis of rotation; right-hand rule. Any length but zero.")
 
 
 class SplineThrough(Model):
@@ -142,7 +154,7 @@ Arc = Annotated[
         {"ArcCenter": ("center", "angle_deg"), "ArcVia": ("via", "to")},
     ),
 ]
-Shape = LineTo | LineBy | LineHeading | ArcCenter | ArcVia | Circle | SplineThrough | BSplineCurve | PointFile
+Shape = LineTo | LineBy | LineHeading | ArcCenter | ArcVia | Circle | Helix | SplineThrough | BSplineCurve | PointFile
 
 
 class SegmentModel(Model):
@@ -152,6 +164,23 @@ class SegmentModel(Model):
         default=None,
         description="Rounds the corner at the END of this segment: metres taken from it and from the next one.",
     )
+
+    def __add__(self, other: SegmentModel | tuple[SegmentModel, ...]) -> tuple[SegmentModel, ...]:
+        """Join a segment, or a path, to the end of this segment."""
+        if isinstance(other, SegmentModel):
+            return (self, other)
+        return (self, *other) if isinstance(other, tuple) else NotImplemented
+
+    def __radd__(self, other: tuple[SegmentModel, ...]) -> tuple[SegmentModel, ...]:
+        """Join this segment to the end of a path."""
+        return (*other, self) if isinstance(other, tuple) else NotImplemented
+
+    def __repr__(self) -> str:
+        """Show it as a program makes it."""
+        shape = getattr(self, self.kind)
+        rest = [(name, value) for name, value in self.__repr_args__() if name != self.kind]
+        given = ", ".join(f"{name}={value!r}" for name, value in (*shape.__repr_args__(), *rest))
+        return f"{type(self).__name__.removesuffix('Segment')}({given})"
 
     @property
     def begins(self) -> tuple[float, ...] | None:
@@ -196,6 +225,12 @@ class CircleSegment(MovingSegment):
     """A circle."""
 
     circle: Circle
+
+
+class HelixSegment(MovingSegment):
+    """A helix."""
+
+    helix: Helix
 
 
 class SplineSegment(MovingSegment):
@@ -255,6 +290,7 @@ Segment = Annotated[
     Annotated[LineSegment, Tag("<LineSegment>")]
     | Annotated[ArcSegment, Tag("<ArcSegment>")]
     | Annotated[CircleSegment, Tag("<CircleSegment>")]
+    | Annotated[HelixSegment, Tag("<HelixSegment>")]
     | Annotated[SplineSegment, Tag("<SplineSegment>")]
     | Annotated[BSplineSegment, Tag("<BSplineSegment>")]
     | Annotated[TurnSegment, Tag("<TurnSegment>")]
@@ -265,6 +301,7 @@ Segment = Annotated[
             "LineSegment": ("line",),
             "ArcSegment": ("arc",),
             "CircleSegment": ("circle",),
+            "HelixSegment": ("helix",),
             "SplineSegment": ("spline",),
             "BSplineSegment": ("bspline",),
             "TurnSegment": ("turn",),

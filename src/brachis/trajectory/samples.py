@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from brachis.arrays import freeze
+from brachis.errors import NotInstalledError
+from brachis.summary import Summary
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_COLUMNS = {"q": "q", "qd": "qdot", "qdd": "qddot", "tau": "tau"}
 
 
-@dataclass(frozen=True, eq=False)
-class Samples:
+@dataclass(frozen=True, eq=False, repr=False)
+class Samples(Summary):
     """A trajectory at K times; joints in chain order. The arrays are read-only.
 
     Attributes
@@ -21,6 +30,20 @@ class Samples:
         Path coordinate, dimensionless.
     q, qdot, qddot, tau : (K, n) ndarray
         Position (rad or m), velocity, acceleration, torque (Nm or N).
+    tool_position : (K, 3) ndarray
+        Of the tool frame in the world, m.
+    tool_quaternion : (K, 4) ndarray
+        Its orientation, w, x, y, z, with signs such that neighbours are close.
+    tool_speed : (K,) ndarray
+        m/s.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single")
+    >>> samples = result.sample(dt=0.1)
+    >>> samples.tool_position[-1].round(3).tolist(), samples.tool_quaternion.shape
+    ([1.732, 1.0, 0.0], (24, 4))
     """
 
     t: np.ndarray
@@ -29,7 +52,41 @@ class Samples:
     qdot: np.ndarray
     qddot: np.ndarray
     tau: np.ndarray
+    tool_position: np.ndarray
+    tool_quaternion: np.ndarray
+    tool_speed: np.ndarray
 
     def __post_init__(self) -> None:
         """Take copies that nobody can write to."""
         freeze(self, *(field.name for field in fields(self)))
+
+    def __len__(self) -> int:
+        """Return the number of times, K."""
+        return len(self.t)
+
+    def to_dataframe(self, joint_names: tuple[str, ...]) -> pd.DataFrame:
+        """Return a pandas table, a row for each time; see `Trajectory.to_dataframe`.
+
+        Raises
+        ------
+        NotInstalledError
+            pandas is not installed.
+        """
+        try:
+            import pandas  # noqa: PLC0415, ICN001  (an extra)
+        except ImportError:
+            raise NotInstalledError("a table", "pandas", "pandas") from None
+        columns = {"t": self.t, "s": self.s}
+        for prefix, name in _COLUMNS.items():
+            columns |= {f"{prefix}_{joint}": getattr(self, name)[:, i] for i, joint in enumerate(joint_names)}
+        columns |= {f"tool_{row}": self.tool_position[:, i] for i, row in enumerate("xyz")}
+        columns |= {f"tool_q{row}": self.tool_quaternion[:, i] for i, row in enumerate("wxyz")}
+        return pandas.DataFrame({**columns, "tool_speed": self.tool_speed})
+
+    def summary(self) -> Mapping[str, object]:
+        """Return what is shown: the shapes."""
+        return {
+            "t": f"{self.t[0]:.4g} to {self.t[-1]:.4g} s" if len(self) else "none",
+            "K": len(self),
+            "n": self.q.shape[1],
+        }

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from brachis.arrays import freeze
 from brachis.errors import InputError, UnknownNameError
 from brachis.robot import Robot, dynamics
+from brachis.summary import Summary
 from brachis.task import Task
 from brachis.trajectory.pieces import relative_coefficients
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
 from brachis.trajectory.samples import Samples
+from brachis.trajectory.tool import tool_motion
 
 if TYPE_CHECKING:
+    import pandas as pd
     from scipy.interpolate import BPoly, BSpline
 
 CONTINUOUS_TORQUE = 3
@@ -27,8 +32,8 @@ ENDINGS = ("exact", "hold")
 """What the last sample of a motion may be; see `Trajectory.sample`."""
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Summary):
     """Joint motion along a path.
 
     Joint positions are quintic polynomials between nodes, which meet the closed form to 1e-11 rad or m and join with
@@ -61,6 +66,14 @@ class Trajectory:
         closed form took its place.
     chart_knots : ndarray
         Knots of its splines; none where the rows are constant (B = 1).
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> trajectory = result.trajectory
+    >>> trajectory.position(0.1).shape, trajectory.torque([0.1, 0.2]).shape
+    ((3,), (2, 3))
     """
 
     task: Task
@@ -117,11 +130,11 @@ class Trajectory:
 
         return BSpline(self.knots * self.t_end, self.control_points[1:].T, self.degree)
 
-    def path_coordinate(self, t: np.ndarray | float) -> np.ndarray:
+    def path_coordinate(self, t: ArrayLike) -> np.ndarray:
         """Path coordinate s at times `t`, same shape."""
         return np.asarray(self.path_spline(self._checked(t)))
 
-    def position(self, t: np.ndarray | float) -> np.ndarray:
+    def position(self, t: ArrayLike) -> np.ndarray:
         """Joint positions at times `t`: (n,) for a number, (K, n) for (K,); rad or m.
 
         Raises
@@ -133,29 +146,34 @@ class Trajectory:
         node = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
         return self.q[node] + np.asarray(self.pieces(times))
 
-    def velocity(self, t: np.ndarray | float) -> np.ndarray:
+    def velocity(self, t: ArrayLike) -> np.ndarray:
         """Joint velocities, as `position`; rad/s or m/s."""
         return np.asarray(self.pieces(self._checked(t), nu=1))
 
-    def acceleration(self, t: np.ndarray | float) -> np.ndarray:
+    def acceleration(self, t: ArrayLike) -> np.ndarray:
         """Joint accelerations, as `position`; rad/s^2 or m/s^2."""
         return np.asarray(self.pieces(self._checked(t), nu=2))
 
-    def jerk(self, t: np.ndarray | float) -> np.ndarray:
+    def jerk(self, t: ArrayLike) -> np.ndarray:
         """Joint jerks, as `position`; rad/s^3 or m/s^3. At a node the value behind it."""
         return np.asarray(self.pieces(self._checked(t), nu=3))
 
-    def torque(self, t: np.ndarray | float) -> np.ndarray:
+    def torque(self, t: ArrayLike) -> np.ndarray:
         """Joint torques, as `position`; Nm or N."""
         t = self._checked(t)
         states = (np.atleast_2d(part(t)) for part in (self.position, self.velocity, self.acceleration))
         tau = dynamics.torque(self.robot, *states)
         return tau if np.ndim(t) else tau[0]
 
-    def at(self, t: np.ndarray) -> Samples:
-        """All quantities at times `t`, (K,)."""
-        q, qdot, qddot = self.position(t), self.velocity(t), self.acceleration(t)
-        return Samples(t, self.path_coordinate(t), q, qdot, qddot, dynamics.torque(self.robot, q, qdot, qddot))
+    def at(self, t: ArrayLike) -> Samples:
+        """All quantities at times `t`, (K,), s; of a number K = 1."""
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        states = self.position(times), self.velocity(times), self.acceleration(times)
+        return self._samples(times, self.path_coordinate(times), *states)
+
+    def _samples(self, t: np.ndarray, s: np.ndarray, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> Samples:
+        tau = dynamics.torque(self.robot, q, qdot, qddot)
+        return Samples(t, s, q, qdot, qddot, tau, *tool_motion(self.robot, q, qdot))
 
     def sample(self, dt: float, *, last: str = "exact") -> Samples:
         """Sample at a controller's rate.
@@ -196,9 +214,36 @@ class Trajectory:
             return self.at(np.append(before, self.t_end))
         moving, rest = self.at(before), np.zeros((1, self.robot.n))
         end = self.position(self.t_end)[None]
-        held = (np.array([whole * dt]), np.ones(1), end, rest, rest, dynamics.torque(self.robot, end, rest, rest))
-        parts = (getattr(moving, field.name) for field in fields(moving))
-        return Samples(*(np.concatenate(pair) for pair in zip(parts, held, strict=True)))
+        held = self._samples(np.array([whole * dt]), np.ones(1), end, rest, rest)
+        names = (field.name for field in fields(moving))
+        return Samples(*(np.concatenate([getattr(moving, name), getattr(held, name)]) for name in names))
+
+    def to_dataframe(self, dt: float) -> pd.DataFrame:
+        """Return a pandas table, a row every `dt` seconds; see `sample`.
+
+        Columns: ``t`` (s), ``s``; for every joint ``q_<joint>`` (rad or m), ``qd_``, ``qdd_`` and ``tau_`` (Nm or N);
+        ``tool_x``, ``tool_y``, ``tool_z`` (m), ``tool_qw``, ..., ``tool_qz`` and ``tool_speed`` (m/s). Needs pandas
+        (``pip install "brachis[pandas]"``).
+
+        Raises
+        ------
+        InputError
+            `dt` is not a usable period; or, as `NotInstalledError`, pandas is not installed.
+        """
+        return self.sample(dt).to_dataframe(self.joint_names)
+
+    def summary(self) -> Mapping[str, object]:
+        """Return what is shown."""
+        return {
+            "end time": f"{self.t_end:.4f} s",
+            "robot": f"{Path(self.robot.source).parent.name}/{Path(self.robot.source).name}",
+            "joints": ", ".join(self.joint_names),
+            "redundant joints": ", ".join(self.redundant_joints) or "none",
+            "branch": self.branch or "none",
+            "start posture": self.robot.in_words(self.q[0]),
+            "end posture": self.robot.in_words(self.q[-1]),
+            "splines": f"degree {self.degree}, {len(self.knots) - 2 * self.degree - 1} intervals",
+        }
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file with all that is needed to load and verify the trajectory.
@@ -240,7 +285,7 @@ class Trajectory:
             **content.arrays,
         )
 
-    def _checked(self, t: np.ndarray | float) -> np.ndarray:
+    def _checked(self, t: ArrayLike) -> np.ndarray:
         """Refuse times outside the trajectory; rounding at the ends is forgiven."""
         times = np.asarray(t, dtype=float)
         slack = 1e-9 * self.t_end

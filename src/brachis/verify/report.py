@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
+
+from brachis.summary import Summary
 
 
 @dataclass(frozen=True)
@@ -41,9 +44,16 @@ class Check:
     remark: str = ""
     of_limit: bool = False
 
+    def in_words(self) -> str:
+        """Say what was found, and what is allowed."""
+        unit = "" if self.unit == "-" else f" {self.unit}"
+        blame = f", {self.subject}" if self.subject else ""
+        allowed = f"{'<=' if self.passed else 'FAILED, allowed'} {self.allowed:.4g}{unit}"
+        return f"{self.value:.4g}{unit} {allowed}{blame}" + (f" at {self.time:.4g} s" if self.time is not None else "")
 
-@dataclass(frozen=True)
-class Verification:
+
+@dataclass(frozen=True, repr=False)
+class Verification(Summary):
     """All checks of one trajectory.
 
     Attributes
@@ -55,6 +65,13 @@ class Verification:
         Largest ratio of any quantity to its limit.
     path_error : float
         Largest distance from the path: m for position rows, rad for yaw, whichever is larger.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> [check.name for check in result.verification.checks][:2]
+    ['path error', 'torque ratio']
     """
 
     checks: tuple[Check, ...]
@@ -70,3 +87,11 @@ class Verification:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
         return {"passed": self.passed, **asdict(self)}
+
+    def summary(self) -> Mapping[str, object]:
+        """Return what is shown: every check with its worst value."""
+        return {
+            "passed": "yes" if self.passed else "NO",
+            "worst ratio": self.worst_ratio,
+            **{check.name: check.in_words() for check in self.checks},
+        }

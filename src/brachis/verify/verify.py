@@ -31,7 +31,7 @@ def verify_trajectory(
     options: VerifyOptions | None = None,
     *,
     robot: Robot | None = None,
-    limits: Sequence[LimitModel] = (),
+    own_limits: Sequence[LimitModel] = (),
 ) -> Verification:
     """Check path, limits, progress, start and end, splines, and continuity of a trajectory.
 
@@ -42,7 +42,7 @@ def verify_trajectory(
     robot : Robot, optional
         Check against this robot and not the saved one, for example a newer URDF; its joints must have the same names
         in the same order.
-    limits : sequence of LimitModel, optional
+    own_limits : sequence of LimitModel, optional
         Limits of the user's own with which the trajectory was planned, beside those that its task names.
 
     Returns
@@ -55,6 +55,13 @@ def verify_trajectory(
     InputError
         `robot` has other joints than the trajectory; or the trajectory's task does not fit the robot: its postures
         (`InputError`, `StartError`), task space (`InputError`) or path (`PathError`).
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> brachis.verify_trajectory(result.trajectory).passed
+    True
     """
     options = options or VerifyOptions()
     robot, task_map = bind(trajectory.robot if robot is None else robot, trajectory.task.task_space)
@@ -75,7 +82,7 @@ def verify_trajectory(
     places = (np.concatenate(part) for part in zip(*parts, strict=True))
     states = States.at(pieces, robot, *places)
     path_check = _path_error(trajectory, path, task_map, states, options)
-    ratios = limit_checks(Given(robot, trajectory, pieces, states), limits, options)
+    ratios = limit_checks(Given(robot, trajectory, pieces, states), own_limits, options)
     checks = [
         path_check,
         *ratios,

@@ -28,6 +28,12 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
     ------
     InputError
         A row or word is unknown, no axis of the tool frame lies in the yaw plane, or the tool cannot roll freely.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> brachis.task_map_of(brachis.robots.iiwa14, "pose").m
+    6
     """
     if rows == "position":
         rows = AXES

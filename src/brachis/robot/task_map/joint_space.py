@@ -12,7 +12,7 @@ from brachis.robot.task_map.protocol import TaskDerivatives, TaskMap
 from brachis.robot.task_map.rows import joint_rows
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class JointSpace(TaskMap):
     """All n joint positions; the Jacobian is the identity."""
 

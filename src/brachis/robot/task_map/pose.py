@@ -19,7 +19,7 @@ _UNIT = 1e-2
 _NEARLY_HALF_A_TURN = 3.0  # rad
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Pose(TaskMap):
     """The tool frame's pose.
 

@@ -13,6 +13,7 @@ import pinocchio as pin
 from brachis.errors import InputError
 from brachis.robot.robot import Robot
 from brachis.robot.task_map.rows import AXES
+from brachis.summary import Summary
 
 
 @dataclass(frozen=True)
@@ -32,8 +33,8 @@ class TaskDerivatives:
     acceleration_qdot: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
-class TaskMap(ABC):
+@dataclass(frozen=True, eq=False, repr=False)
+class TaskMap(Summary, ABC):
     """Map from the joint positions of a robot to the c task coordinates of its tool, whose velocity has m rows.
 
     Attributes
@@ -43,6 +44,13 @@ class TaskMap(ABC):
         Names of the m rows, those of the position (m) first, then the angles (rad).
     axes : tuple of int
         World axes (0, 1, 2) of the position rows; none in a space of joints.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> task_map = brachis.task_map_of(brachis.robots.scara3, ["x", "y"])
+    >>> task_map.m, task_map.rows
+    (2, ('x', 'y'))
     """
 
     frame: ClassVar[pin.ReferenceFrame]

@@ -10,7 +10,7 @@ from brachis.robot.joint_space import principal
 from brachis.robot.task_map.world_rows import WorldRows
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RowsAndYaw(WorldRows):
     """Two rows of the tool frame's position in the world frame and, last, yaw (rad).
 

@@ -18,7 +18,7 @@ from brachis.robot.task_map.protocol import TaskDerivatives, TaskMap
 from brachis.robot.task_map.twists import tool_bias, tool_motion, turned
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class WorldRows(TaskMap):
     """Rows of the tool frame's position in the world frame; task coordinates are the rows themselves."""
 

@@ -1,0 +1,35 @@
+"""Task files that come with brachis: ``brachis.examples.scara_line`` is the path of ``01_scara_line.yaml``.
+
+Examples
+--------
+>>> import brachis
+>>> brachis.examples.scara_line.name
+'01_scara_line.yaml'
+>>> brachis.load_task(brachis.examples.scara_line).task_space
+('x', 'y')
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from brachis.files import shipped
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of the examples, from the easiest on."""
+    return tuple(path.stem.split("_", 1)[1] for path in sorted(shipped("examples").glob("[0-9]*_*.yaml")))
+
+
+def __getattr__(name: str) -> Path:
+    """Find an example's task file."""
+    found = list(shipped("examples").glob(f"[0-9][0-9]_{name}.yaml"))
+    if not found:
+        message = f"module 'brachis.examples' has no attribute {name!r}; examples: {', '.join(names())}"
+        raise AttributeError(message)
+    return found[0]
+
+
+def __dir__() -> list[str]:
+    """Names for completion."""
+    return ["names", *names()]

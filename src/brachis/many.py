@@ -1,0 +1,102 @@
+"""Many plans at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing, contextmanager
+from typing import Any, Unpack
+
+from brachis.errors import BrachisError
+from brachis.planner import Given, plan
+from brachis.result import Result
+from brachis.search.processes import each, processes
+from brachis.task import Source, TaskKeywords
+
+Outcome = Result | BrachisError
+OnProgress = Callable[[int, int, Outcome], None]
+"""Told after every plan: how many are done, of how many, and what came out."""
+
+
+def plan_many(
+    tasks: Iterable[Source | tuple[Given, Source]],
+    *,
+    jobs: int = 1,
+    progress: bool | OnProgress = False,
+    **keywords: Unpack[TaskKeywords],
+) -> list[Outcome]:
+    """Plan many tasks, in several processes; a plan that fails is an error in the list and stops no other.
+
+    Parameters
+    ----------
+    tasks : iterable of path, mapping, Task, or pair of robot and task
+        Each as `plan` takes it.
+    jobs : int, optional
+        Processes; no more than there are processors are used.
+    progress : bool or callable, optional
+        True: a bar on standard error. A function: called after every plan, in the order of the tasks, with the number
+        of those done, the number of all, and the outcome.
+    **keywords
+        Keys of all the tasks, as for `plan`.
+
+    Returns
+    -------
+    list of Result or BrachisError
+        In the order of the tasks. An error is what `plan` would have raised.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C ends all.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> tasks = [
+    ...     {
+    ...         "brachis": 1,
+    ...         "robot": {"urdf": brachis.robots.path_of("scara3"), "tool_frame": "tool"},
+    ...         "start": {"joints": [0.5236, -2.0944, 2.0944]},
+    ...         "task_space": ["x", "y"],
+    ...         "path": brachis.Line(by=[0.0, length]),
+    ...     }
+    ...     for length in (0.1, 9.0)
+    ... ]
+    >>> outcomes = brachis.plan_many(tasks, redundant_joints=["j1"], intervals=8, effort="single")
+    >>> [type(outcome).__name__ for outcome in outcomes]
+    ['Result', 'PathError']
+    """
+    given = list(tasks)
+    outcomes: list[Outcome] = []
+    work = _outcome, given, keywords
+    with _telling(progress) as tell, closing(each(*work, jobs=processes(jobs), listener=_deaf)) as made:
+        for outcome in made:
+            outcomes.append(outcome)
+            tell(len(outcomes), len(given), outcome)
+    return outcomes
+
+
+@contextmanager
+def _telling(progress: bool | OnProgress) -> Iterator[OnProgress]:  # noqa: FBT001
+    """Give what is told of every plan."""
+    if callable(progress):
+        yield progress
+        return
+    from rich.console import Console  # noqa: PLC0415  (for those who want a bar)
+    from rich.progress import Progress  # noqa: PLC0415
+
+    with Progress(console=Console(stderr=True), disable=not progress) as bars:
+        bar = bars.add_task("planning")
+        yield lambda done, total, _outcome: bars.update(bar, completed=done, total=total)
+
+
+def _deaf(_text: str) -> None:
+    """Listen to nothing."""
+
+
+def _outcome(given: Any, keywords: TaskKeywords, listener: Callable[[str], None]) -> Outcome:  # noqa: ANN401
+    """Plan one task."""
+    robot, task = given if isinstance(given, tuple) else (None, given)
+    try:
+        return plan(robot, task, listener=listener, **keywords)
+    except BrachisError as error:
+        return error

@@ -1,0 +1,68 @@
+"""Robots that come with brachis: ``brachis.robots.scara3`` is a `Robot`; `path_of` has its URDF, `names` all names.
+
+Examples
+--------
+>>> import brachis
+>>> brachis.robots.scara3.joint_names
+('j1', 'j2', 'j3')
+>>> brachis.robots.path_of("iiwa14").name
+'robot.urdf'
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from pathlib import Path
+
+from brachis.errors import UnknownNameError
+from brachis.files import shipped
+from brachis.robot import Robot
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of the robots, in alphabetical order."""
+    return tuple(sorted(path.parent.name for path in shipped("robots").glob("*/robot.urdf")))
+
+
+def path_of(name: str) -> Path:
+    """Return the URDF file of a robot.
+
+    Raises
+    ------
+    UnknownNameError
+        There is no such robot.
+    """
+    if name not in names():
+        raise UnknownNameError("robot", name, names(), where="brachis.robots")
+    return shipped("robots") / name / "robot.urdf"
+
+
+def is_robot(given: object) -> bool:
+    """Tell whether something is a robot: a `Robot`, the file name of a URDF, or a name from `names`."""
+    if isinstance(given, Robot):
+        return True
+    return isinstance(given, str | os.PathLike) and (Path(given).suffix.lower() == ".urdf" or given in names())
+
+
+def located(robot: str | os.PathLike[str] | Robot | None) -> str | os.PathLike[str] | Robot | None:
+    """Return the URDF file where a robot is given by its name, and everything else as it is."""
+    return path_of(robot) if isinstance(robot, str) and robot in names() else robot
+
+
+@cache
+def _robot(name: str) -> Robot:
+    return Robot.from_urdf(path_of(name))
+
+
+def __getattr__(name: str) -> Robot:
+    """Read a robot when it is first used."""
+    if name not in names():
+        message = f"module 'brachis.robots' has no attribute {name!r}; robots: {', '.join(names())}"
+        raise AttributeError(message)
+    return _robot(name)
+
+
+def __dir__() -> list[str]:
+    """Names for completion."""
+    return ["names", "path_of", *names()]

@@ -1,0 +1,275 @@
+"""Segments as a program makes them: the models that a task file fills, from numbers, arrays and transforms.
+
+Every function returns one segment; ``+`` joins segments to a path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal, Protocol, TypeVar
+
+from pydantic import ValidationError
+
+from brachis.task.fields import plain
+from brachis.task.messages import task_error
+from brachis.task.orientation import OrientationMode
+from brachis.task.robot_models import Array
+from brachis.task.segments import (
+    ArcSegment,
+    CircleSegment,
+    HelixSegment,
+    LineSegment,
+    MovingSegment,
+    SplineSegment,
+)
+
+_S = TypeVar("_S", bound=MovingSegment)
+
+
+class Transform(Protocol):
+    """A pose such as Pinocchio's ``SE3``."""
+
+    @property
+    def homogeneous(self) -> Any:  # noqa: ANN401
+        """Return the homogeneous matrix, (4, 4)."""
+
+
+Point = float | Array | Sequence[float]
+Orientation = OrientationMode | dict[str, Any]
+
+
+def Line(  # noqa: N802
+    *,
+    to: Point | Transform | None = None,
+    by: Point | None = None,
+    length: float | None = None,
+    angle_deg: float | None = None,
+    blend: float | None = None,
+    orientation: Orientation = None,
+) -> LineSegment:
+    """Make a straight line: `to` a point, `by` a displacement, or of a `length` in a direction.
+
+    Parameters
+    ----------
+    to : float, (m,) array_like or SE3, optional
+        End point, all rows of the task space: m, yaw in rad. A transform says how the tool is oriented there too.
+    by : float or (m,) array_like, optional
+        Displacement likewise.
+    length : float, optional
+        m; in the plane of two position rows.
+    angle_deg : float, optional
+        Direction, degrees, from the first towards the second position row; beside `length`.
+    blend : float, optional
+        Rounds the corner at the end: m taken from this segment and from the next one.
+    orientation : str or mapping, optional
+        How the tool turns along it, as in a task file.
+
+    Raises
+    ------
+    TaskError
+        None or several of the three are given, or a value is wrong.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> path = brachis.Line(by=[0.1, 0.0], blend=0.02) + brachis.Line(by=[0.0, 0.2])
+    >>> [segment.kind for segment in path]
+    ['line', 'line']
+    """
+    if hasattr(to, "homogeneous"):
+        ((place, turn),) = _poses([to], "Line.to")
+        to, orientation = place, orientation or {"to": turn}
+    return _segment(LineSegment, "line", blend, orientation, to=to, by=by, length=length, angle_deg=angle_deg)
+
+
+def Arc(  # noqa: N802
+    *,
+    center: Point | None = None,
+    angle_deg: float | None = None,
+    normal: Point | None = None,
+    via: Point | None = None,
+    to: Point | None = None,
+    yaw: Literal["fixed", "tangent"] | None = None,
+    blend: float | None = None,
+    orientation: Orientation = None,
+) -> ArcSegment:
+    """Make a circular arc: about a `center` by an angle, or `via` a point `to` another one.
+
+    Parameters
+    ----------
+    center : (p,) array_like, optional
+        m; the position rows.
+    angle_deg : float, optional
+        Swept angle, degrees, signed; beside `center`.
+    normal : (3,) array_like, optional
+        Axis of rotation, for three position rows; beside `center`.
+    via, to : (p,) array_like, optional
+        m; the position rows.
+    yaw : {"fixed", "tangent"}, optional
+        In task spaces with yaw.
+    blend, orientation : optional
+        As of `Line`.
+
+    Raises
+    ------
+    TaskError
+        See `Line`.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> brachis.Arc(center=[0.5, 0.0], angle_deg=90)
+    Arc(center=[0.5, 0], angle_deg=90)
+    """
+    shape = {"center": center, "angle_deg": angle_deg, "normal": normal, "via": via, "to": to, "yaw": yaw}
+    return _segment(ArcSegment, "arc", blend, orientation, **shape)
+
+
+def Circle(  # noqa: N802
+    center: Point,
+    *,
+    turns: float = 1.0,
+    normal: Point | None = None,
+    yaw: Literal["fixed", "tangent"] | None = None,
+    blend: float | None = None,
+    orientation: Orientation = None,
+) -> CircleSegment:
+    """Make whole or fractional turns about a centre.
+
+    Parameters
+    ----------
+    center : (p,) array_like
+        m; the position rows.
+    turns : float, optional
+        Signed as an arc's angle; not zero.
+    normal, yaw, blend, orientation : optional
+        As of `Arc`.
+
+    Raises
+    ------
+    TaskError
+        A value is wrong.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> brachis.Circle([0.5, 0.0], turns=2)
+    Circle(center=[0.5, 0], turns=2)
+    """
+    return _segment(CircleSegment, "circle", blend, orientation, center=center, turns=turns, normal=normal, yaw=yaw)
+
+
+def Helix(  # noqa: N802
+    center: Point,
+    *,
+    pitch: float,
+    normal: Point = (0.0, 0.0, 1.0),
+    turns: float = 1.0,
+    blend: float | None = None,
+    orientation: Orientation = None,
+) -> HelixSegment:
+    """Make turns about an axis that climb along it, in three position rows.
+
+    Parameters
+    ----------
+    center : (3,) array_like
+        m; of the first turn, in the plane through the segment's start that is perpendicular to the axis.
+    pitch : float
+        Climb of each turn along the normal, m.
+    normal : (3,) array_like, optional
+        The axis; upwards unless given.
+    turns : float, optional
+        Signed about the normal; not zero.
+    blend, orientation : optional
+        As of `Line`.
+
+    Raises
+    ------
+    TaskError
+        A value is wrong.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> brachis.Helix([0.5, 0.0, 0.3], pitch=0.02, turns=3)
+    Helix(center=[0.5, 0, 0.3], turns=3, pitch=0.02, normal=[0, 0, 1])
+    """
+    return _segment(HelixSegment, "helix", blend, orientation, center=center, pitch=pitch, normal=normal, turns=turns)
+
+
+def Spline(  # noqa: N802
+    through: Array | Sequence[Point | Transform],
+    *,
+    orientations: Array | Sequence[Any] | None = None,
+    relative: bool = False,
+    blend: float | None = None,
+    orientation: Orientation = None,
+) -> SplineSegment:
+    """Make a smooth curve through waypoints, from the end of the segment before it or the path's start.
+
+    `fit_path` takes points within a tolerance, and the first one as the path's beginning.
+
+    Parameters
+    ----------
+    through : (n, m) or (n, 4, 4) array_like, or sequence of SE3
+        All rows of the task space each, m, yaw in rad; or poses. The segment's start is not among them.
+    orientations : (n, 4) or (n, 3, 3) array_like, or SciPy's Rotation, optional
+        Of the tool in the world frame, beside positions: quaternions w, x, y, z, or matrices.
+    relative : bool, optional
+        Whether the waypoints are relative to the segment's start.
+    blend, orientation : optional
+        As of `Line`.
+
+    Raises
+    ------
+    TaskError
+        A value is wrong; the message names the row, from 0 on.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> import numpy as np
+    >>> x = np.linspace(0.1, 0.5, 500)
+    >>> wave = brachis.Spline(through=np.column_stack([x, np.sin(x)]), relative=True)
+    >>> len(wave.spline.through)
+    500
+    """
+    if orientations is None and _are_positions(through):
+        points = [_vector(point) for point in through]  # type: ignore[union-attr]
+        return _segment(SplineSegment, "spline", blend, orientation, through=points, relative=relative)
+    poses = _poses(through, "Spline.through", orientations)
+    shape = {"through": [place for place, _ in poses], "orientations": [turn for _, turn in poses]}
+    return _segment(SplineSegment, "spline", blend, orientation, relative=relative, **shape)
+
+
+def _are_positions(through: object) -> bool:
+    """Tell rows of numbers from transforms."""
+    rows = plain(through)
+    first = rows[0] if isinstance(rows, list) and rows else None
+    return isinstance(first, int | float) or (isinstance(first, list) and not any(isinstance(c, list) for c in first))
+
+
+def _poses(transforms: Any, source: str, orientations: Any = None) -> list[tuple[list[float], dict[str, Any]]]:  # noqa: ANN401
+    """Positions, m, and orientations as a task file writes them."""
+    from brachis.cam.arrays import points_from  # noqa: PLC0415  (NumPy, for those who need it)
+    from brachis.cam.units import Units  # noqa: PLC0415
+
+    points = points_from(transforms, orientations, None, Units(), source, least=1)
+    turns = [{"quaternion": turn} for turn in points.turning.tolist()]
+    return list(zip(points.position.tolist(), turns, strict=True))
+
+
+def _vector(value: object) -> object:
+    """Return a number as the one coordinate that it is."""
+    value = plain(value)
+    return [value] if isinstance(value, int | float) else value
+
+
+def _segment(model: type[_S], kind: str, blend: float | None, orientation: Orientation, **shape: object) -> _S:
+    """Validate what is given of a segment."""
+    given = {key: _vector(value) if key in {"to", "by"} else value for key, value in shape.items() if value is not None}
+    content = {kind: given, "blend": blend, "orientation": orientation}
+    try:
+        return model.model_validate(plain({key: value for key, value in content.items() if value is not None}))
+    except ValidationError as error:
+        raise task_error(error, kind.capitalize(), model) from None

@@ -1,0 +1,136 @@
+"""Tasks from keywords: the keys of a task file without its sections, for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, TypedDict, Unpack
+
+from brachis.errors import UnknownNameError
+from brachis.task.boundary import BoundarySettings
+from brachis.task.fields import Model, plain
+from brachis.task.load import Source, load_task
+from brachis.task.models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings, Task
+from brachis.task.mounting_models import Payload, Placement
+from brachis.task.robot_models import Array, LimitKeywords, LimitSpec, RobotSettings
+from brachis.task.segments import SegmentModel
+from brachis.task.tool_limits import ToolLimits
+
+Posture = Array | Sequence[float] | Mapping[str, float] | Mapping[str, Sequence[float]] | Literal["free"]
+Settings = Mapping[str, Any]
+
+
+class TaskKeywords(TypedDict, total=False):
+    """Keys of a task; those of its sections ``robot``, ``boundary``, ``spline`` and ``search`` stand for themselves.
+
+    A posture may be an array, a list or a mapping by joint name; a path one segment.
+    """
+
+    path: SegmentModel | Sequence[SegmentModel | Mapping[str, Any]]
+    start: Posture
+    end: Posture
+    path_start: Array | Sequence[float] | None
+    task_space: str | Sequence[str]
+    redundant_joints: Sequence[str] | Literal["auto"]
+    branch: str
+    tool_limits: ToolLimits | Settings
+    custom_limits: Mapping[str, Settings]
+    # robot
+    tool_frame: str | None
+    tool_offset: Placement | Settings
+    base_frame: str | None
+    mounting: Placement | Settings | Literal["floor", "wall", "ceiling"]
+    gravity: Array | Sequence[float]
+    locked_joints: Mapping[str, float]
+    payload: Payload | Settings | None
+    limits: LimitSpec | LimitKeywords | Settings
+    speed_override: float | str
+    friction: Settings
+    # boundary
+    start_speed: float
+    end_speed: float
+    periodic: bool
+    # spline
+    degree: int
+    intervals: int | Literal["auto"]
+    knots: Literal["uniform", "free"]
+    rest: Literal["velocity", "full", "jerk"]
+    points_per_interval: int
+    # search
+    effort: Literal["single", "fast", "thorough", "exhaustive"]
+    time_limit: float
+    seed: int
+    least_motion: bool
+    slower: float | str
+    # whole sections, for the keys that stand in several of them
+    robot: RobotSettings | Settings
+    boundary: BoundarySettings | Settings
+    spline: SplineSettings | Settings
+    search: SearchSettings | Settings
+    solver: SolverSettings | Settings
+    refinement: RefinementSettings | Settings
+
+
+_SECTIONS: dict[str, type[Model]] = {
+    "robot": RobotSettings,
+    "boundary": BoundarySettings,
+    "spline": SplineSettings,
+    "search": SearchSettings,
+}
+_SECTION_OF = {key: section for section, model in _SECTIONS.items() for key in model.model_fields}
+
+
+def task_with(source: Source | None = None, /, **keywords: Unpack[TaskKeywords]) -> Task:
+    """Return a task made of keywords, or one with some of its keys changed.
+
+    Parameters
+    ----------
+    source : path-like, mapping or Task, optional
+        The task to change; see `load_task`.
+    **keywords
+        See `TaskKeywords`. Mappings are merged with those of `source` key by key, everything else takes its place.
+
+    Raises
+    ------
+    UnknownNameError
+        There is no such keyword.
+    TaskError
+        See `load_task`.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> from brachis.task import task_with
+    >>> task = task_with(
+    ...     path=brachis.Line(by=[0.0, 0.5]), start=[0.5, -2.1, 2.1], task_space=["x", "y"], intervals=12
+    ... )
+    >>> task.spline.intervals, task.start.joints
+    (12, (0.5, -2.1, 2.1))
+    >>> task_with(task, intervals=40).spline.intervals
+    40
+    """
+    if source is not None and not keywords:
+        return load_task(source)
+    content = {"brachis": 1} if source is None else load_task(source).model_dump(exclude_unset=True)
+    for key, value in keywords.items():
+        if key not in TaskKeywords.__annotations__:
+            raise UnknownNameError("keyword", key, sorted(TaskKeywords.__annotations__), where="plan")
+        whole = {_SECTION_OF[key]: {key: value}} if key in _SECTION_OF else {key: _in_full(key, value)}
+        content = _merged(content, whole)
+    return load_task(content)
+
+
+def _in_full(key: str, value: object) -> object:
+    """Write a posture as a task file does."""
+    if key not in {"start", "end"} or isinstance(value, str | Model):
+        return value
+    return value if isinstance(value, Mapping) and set(value) == {"joints"} else {"joints": plain(value)}
+
+
+def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Merge mappings key by key; everything else of `changes` takes the place of what there is."""
+    both = {
+        key: _merged(content[key], value)
+        for key, value in changes.items()
+        if isinstance(value, Mapping) and isinstance(content.get(key), Mapping)
+    }
+    return {**content, **changes, **both}

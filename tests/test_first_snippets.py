@@ -1,0 +1,183 @@
+"""What a new user writes first runs, and means what the task file means."""
+
+from __future__ import annotations
+
+import runpy
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import brachis
+from brachis.errors import LimitError, TaskError, UnknownNameError
+from brachis.task import task_with
+
+ROOT = Path(__file__).parents[1]
+Q0 = [0.5236, -2.0944, 2.0944]
+QUICK = {"redundant_joints": ["j1"], "intervals": 8, "effort": "single"}
+LINE = {"path": brachis.Line(by=[0.0, 0.3]), "start": Q0, "task_space": ["x", "y"], **QUICK}
+
+
+def test_the_script_of_a_new_user_runs(tmp_path, capsys):
+    runpy.run_path(str(ROOT / "tests/user_script.py"))["main"](tmp_path)
+    assert "verified: True" in capsys.readouterr().out
+    assert {path.name for path in tmp_path.iterdir()} == {"result.npz", "overview.png"}
+
+
+def test_all_forms_of_a_plan_are_the_same_plan(tmp_path):
+    urdf = ROOT / "robots/scara3/robot.urdf"
+    content = {
+        "brachis": 1,
+        "robot": {"urdf": str(urdf)},
+        "start": {"joints": Q0},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"by": [0.0, 0.3]}}],
+        "redundant_joints": ["j1"],
+        "spline": {"intervals": 8},
+        "search": {"effort": "single"},
+    }
+    (tmp_path / "task.yaml").write_text(str(content))
+    ends = {
+        brachis.plan(tmp_path / "task.yaml").t_end,
+        brachis.plan(content).t_end,
+        brachis.plan(urdf, content).t_end,
+        brachis.plan(str(urdf), **LINE).t_end,
+        brachis.plan("scara3", **LINE).t_end,
+        brachis.plan(brachis.robots.scara3, **{**LINE, "start": np.array(Q0)}).t_end,
+    }
+    assert len(ends) == 1
+
+
+def test_keywords_change_a_task():
+    task = task_with(brachis.examples.payload_friction_jerk, payload={"mass": 2.0}, intervals=7, periodic=False)
+    file = brachis.load_task(brachis.examples.payload_friction_jerk)
+    assert task.robot.payload.mass == 2.0
+    assert task.robot.limits == file.robot.limits
+    assert task.spline.intervals == 7
+    assert task.path == file.path
+    assert task_with(file) is file
+    assert task_with(file.to_dict(), effort="single").search.effort == "single"
+
+
+def test_a_wrong_keyword_is_answered_with_the_nearest():
+    with pytest.raises(UnknownNameError, match="intervals"):
+        brachis.plan("scara3", **LINE, interval=8)
+    with pytest.raises(TaskError, match="task_space: this key is required"):
+        brachis.plan("scara3", path=brachis.Line(by=[0.0, 1.0]), start=Q0)
+    with pytest.raises(TaskError, match=r"start\.joints\[0\]"):
+        task_with(**{**LINE, "start": ["a", 0.0, 0.0]})
+
+
+def test_segments_are_those_of_the_task_file():
+    content = {
+        "brachis": 1,
+        "start": {"joints": [0.0]},
+        "task_space": "pose",
+        "path": [
+            {"line": {"to": [0.5, 0.0, 0.3]}, "orientation": {"to": {"quaternion": [1, 0, 0, 0]}}, "blend": 0.01},
+            {"arc": {"center": [0.4, 0.0, 0.3], "angle_deg": 90, "normal": [0, 0, 1]}},
+            {"circle": {"center": [0.4, 0.0, 0.3], "turns": 2, "normal": [0, 0, 1]}},
+            {"helix": {"center": [0.4, 0.0, 0.3], "pitch": 0.01, "normal": [0, 0, 1]}},
+            {
+                "spline": {
+                    "through": [[0.1, 0.2, 0.3], [0.2, 0.2, 0.3]],
+                    "orientations": [{"quaternion": [1, 0, 0, 0]}] * 2,
+                }
+            },
+        ],
+    }
+    here, up = [0.4, 0.0, 0.3], np.array([0, 0, 1])
+    poses = [pin.SE3(np.eye(3), np.array([x, 0.2, 0.3])) for x in (0.1, 0.2)]
+    joined = (
+        brachis.Line(to=pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.3])), blend=0.01)
+        + brachis.Arc(center=here, angle_deg=90, normal=up)
+        + brachis.Circle(np.array(here), turns=2, normal=up)
+        + brachis.Helix(here, pitch=0.01)
+        + brachis.Spline(through=poses)
+    )
+    assert joined == brachis.load_task(content).path
+    assert brachis.Spline(through=[pose.homogeneous for pose in poses]) == joined[-1]
+    assert brachis.Spline(through=np.stack([pose.homogeneous for pose in poses])) == joined[-1]
+    assert brachis.load_task({**content, "path": joined[0].model_copy(update={"blend": None})}).path[0].kind == "line"
+
+
+@pytest.mark.parametrize(
+    ("make", "parts"),
+    [
+        (brachis.Line, ["Line", "exactly one of its forms"]),
+        (lambda: brachis.Line(to=[1], by=[1]), ["Line", "exactly one of its forms"]),
+        (lambda: brachis.Line(by=["a", 1]), ["Line", "line.by[0]"]),
+        (lambda: brachis.Helix([0, 0, 0], pitch=0.1, turns=0), ["helix.turns"]),
+        (lambda: brachis.Spline(through=[]), ["Spline.through"]),
+        (lambda: brachis.Spline(through=[pin.SE3.Identity(), 3.0]), ["Spline.through"]),
+    ],
+)
+def test_wrong_segments_are_refused(make, parts):
+    with pytest.raises(TaskError) as caught:
+        make()
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
+    with pytest.raises(TypeError):
+        _ = brachis.Line(by=[1.0]) + 3
+
+
+def test_a_robot_with_other_limits_keeps_the_rest():
+    robot = brachis.robots.tx90l_rail
+    changed = robot.with_limits(torque={"joint_1": 100.0}, velocity=1.0, scale={"torque": 0.5})
+    assert changed.limits.torque[1] == 50.0
+    np.testing.assert_array_equal(changed.limits.torque[2:], 0.5 * robot.limits.torque[2:])
+    np.testing.assert_array_equal(changed.limits.velocity, 1.0)
+    np.testing.assert_array_equal(changed.limits.position_lower, robot.limits.position_lower)
+    again = changed.with_limits(torque={"joint_2": 20.0}).with_payload(2.0).limits
+    assert again.torque[1:3].tolist() == [50.0, 20.0]
+    assert robot.limits.torque[1] == 318.0
+    with pytest.raises(UnknownNameError, match="torque"):
+        robot.with_limits(torques=3.0)
+    with pytest.raises(UnknownNameError, match="joint_1"):
+        robot.with_limits(torque={"joint1": 3.0})
+    with pytest.raises(LimitError, match="positive"):
+        robot.with_limits(torque=-3.0)
+
+
+def test_a_payload_is_carried():
+    robot = brachis.robots.scara3
+    heavy = robot.with_payload(1.5, com=(0.0, 0.0, 0.1)).with_limits(velocity=3.0)
+    assert sum(body.mass for body in heavy.model.inertias) - sum(body.mass for body in robot.model.inertias) == 1.5
+    assert heavy.with_payload(None).settings.payload is None
+    given = brachis.plan(heavy, **LINE)
+    assert given.t_end == brachis.plan(robot, **LINE, payload=heavy.settings.payload, limits={"velocity": 3.0}).t_end
+    assert given.t_end > brachis.plan(robot, **LINE, limits={"velocity": 3.0}).t_end
+
+
+def test_samples_carry_the_tool():
+    result = brachis.plan("scara3", **LINE)
+    samples = result.sample(0.01)
+    placement = result.trajectory.robot.tool_placement(samples.q[30])
+    np.testing.assert_allclose(samples.tool_position[30], placement.translation, atol=1e-12)
+    rotation = pin.Quaternion(*samples.tool_quaternion[30]).matrix()
+    np.testing.assert_allclose(rotation, placement.rotation, atol=1e-12)
+    step = 1e-6
+    before, behind = result.trajectory.at([0.3 - step, 0.3 + step]).tool_position
+    speed = result.trajectory.at(0.3).tool_speed
+    np.testing.assert_allclose(speed, np.linalg.norm(behind - before) / (2 * step), rtol=1e-6)
+    held = result.sample(0.01, last="hold")
+    assert held.tool_speed[-1] == 0.0
+
+
+def test_many_plans_keep_their_order_and_failures_are_values():
+    tasks = [{"brachis": 1}, ("scara3", task_with(**LINE)), (None, brachis.examples.scara_line)]
+    told = []
+    outcomes = brachis.plan_many(tasks, jobs=2, progress=lambda done, total, _: told.append((done, total)), **QUICK)
+    assert [type(outcome).__name__ for outcome in outcomes] == ["TaskError", "Result", "Result"]
+    assert told == [(1, 3), (2, 3), (3, 3)]
+    assert outcomes[1].t_end == brachis.plan("scara3", **LINE).t_end
+    assert outcomes[2].bottleneck().sensitivities.limits
+
+
+def test_a_bar_tells_of_many_plans(capsys):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (outcome,) = brachis.plan_many([{"brachis": 1}], progress=True)
+    assert isinstance(outcome, TaskError)
+    assert "100%" in capsys.readouterr().err

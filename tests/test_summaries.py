@@ -1,0 +1,97 @@
+"""What objects show of themselves fits on a screen, has units, and is escaped in notebooks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.summary import COLUMNS, LINES, shown
+
+PUBLIC = {
+    "result": lambda result: result,
+    "trajectory": lambda result: result.trajectory,
+    "samples": lambda result: result.sample(0.001),
+    "attempt": lambda result: result.attempt,
+    "verification": lambda result: result.verification,
+    "solver report": lambda result: result.solver_report,
+    "refined": lambda result: result.attempt.refined,
+    "program": lambda result: result.attempt.refined.program,
+    "least motion": lambda result: result.least_motion,
+    "bottleneck": lambda result: result.bottleneck(),
+    "sensitivities": lambda result: result.bottleneck().sensitivities,
+    "task": lambda result: result.task,
+    "robot": lambda result: result.trajectory.robot,
+    "limits": lambda result: result.trajectory.robot.limits,
+    "friction": lambda result: result.trajectory.robot.friction,
+    "stated": lambda result: result.trajectory.robot.stated,
+    "task map": lambda result: brachis.task_map_of(result.trajectory.robot, ["x", "y"]),
+    "limit spec": lambda result: result.task.robot.limits,
+    "spline": lambda _result: brachis.Spline(through=np.random.default_rng(0).normal(size=(5000, 2))),
+    "path": lambda result: result.task.path,
+}
+
+
+@pytest.fixture(scope="module")
+def result():
+    return brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], intervals=8, effort="single")
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_reprs_fit_on_a_screen(name, result):
+    text = repr(PUBLIC[name](result))
+    assert "0x" not in text
+    lines = text.splitlines()
+    assert len(lines) <= LINES + 2
+    assert sum(1 + len(line) // (COLUMNS + 20) for line in lines) <= LINES + 2, "where a terminal breaks them, too"
+
+
+def test_figures_have_units(result):
+    assert "end time                2.5" in repr(result)
+    assert " s\n" in repr(result)
+    assert "1500 N, 318 Nm" in repr(brachis.robots.tx90l_rail)
+    assert "-2 m, -3.142 rad" in repr(brachis.robots.tx90l_rail)
+
+
+def test_notebooks_show_a_figure_beside_a_table_and_figures_as_pictures(result):
+    html = result._repr_html_()
+    assert html.count("<table>") == html.count("</table>") == 1
+    assert "data:image/png;base64," in html
+    assert result.plot("torques")._repr_png_().startswith(b"\x89PNG")
+    assert "<table>" in result.trajectory._repr_html_()
+    assert "&lt;" in result.verification._repr_html_(), "signs are escaped"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (1.23456789, "1.23457"),
+        (np.zeros((3, 4)), "array (3, 4)"),
+        (np.arange(3), "[0, 1, 2]"),
+        (list(range(100)), "100 items"),
+        ({"a": 1}, "a: 1"),
+        ("x" * 500 + "\n", "x" * 70 + "... (501 characters)"),
+    ],
+)
+def test_values_are_shortened(value, text):
+    assert shown(value) == text
+
+
+def test_a_plot_that_does_not_exist_is_answered_with_those_that_do(result):
+    with pytest.raises(brachis.errors.UnknownNameError, match="overview"):
+        result.plot("torque_plot")
+    assert result.plot("candidates").axes
+
+
+def test_a_table_has_the_samples(result):
+    pandas = pytest.importorskip("pandas")
+    table, samples = result.to_dataframe(0.1), result.sample(0.1)
+    assert isinstance(table, pandas.DataFrame)
+    np.testing.assert_array_equal(table[["qd_j1", "qd_j2", "qd_j3"]], samples.qdot)
+    np.testing.assert_array_equal(table[["tool_x", "tool_y", "tool_z"]], samples.tool_position)
+
+
+def test_a_missing_pandas_is_said(result, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
+    with pytest.raises(brachis.errors.NotInstalledError, match=r"brachis\[pandas\]"):
+        result.to_dataframe(0.1)
