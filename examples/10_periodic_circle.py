@@ -17,7 +17,7 @@ TASK = Path(__file__).with_suffix(".yaml")
 def plan_both() -> dict[str, brachis.Result]:
     """Plan the periodic motion, and the one from rest to rest, whose posture at the end is free."""
     task = brachis.load_task(TASK).to_dict()
-    return {"periodic": brachis.plan(task), "rest to rest": brachis.plan(None, {**task, "boundary": {}})}
+    return {"periodic": brachis.plan(task), "rest to rest": brachis.plan({**task, "boundary": {}})}
 
 
 def turns(trajectory: brachis.Trajectory, count: int, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

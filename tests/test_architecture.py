@@ -25,6 +25,7 @@ SOURCE = Path(__file__).parents[1] / "src/brachis"
 ORDER = (
     "errors",
     "files",
+    "kinds",
     "arrays",
     "deadline",
     "interrupts",
@@ -62,6 +63,7 @@ ORDER = (
     "planner",
     "many",
     "sweeps",
+    "starter",
     "cli",
 )
 VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "limits", "bspline", "nlp", "solvers", "refine", "mesh"}

@@ -111,7 +111,7 @@ def test_closed_path_of_joints():
         "path": [brachis.bspline_segment(ellipse, (0.0, 2.0 * np.pi), tolerance=1e-12)],
         "boundary": {"periodic": True},
     }
-    round_and_round, once = brachis.plan(task), brachis.plan(None, {**task, "boundary": {}})
+    round_and_round, once = brachis.plan(task), brachis.plan({**task, "boundary": {}})
     assert round_and_round.verified
     assert round_and_round.t_end < 0.95 * once.t_end
 

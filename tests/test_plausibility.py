@@ -16,7 +16,8 @@ from brachis import LimitSpec
 from brachis.errors import BrachisError, PathError, PlausibilityError, StartError, UrdfError
 from brachis.plausibility import of_end_time, of_robot
 from brachis.robot import Robot
-from brachis.robot.urdf import last_common_link, read_file
+from brachis.robot.limb import first_limb
+from brachis.robot.urdf import read_file
 from support.chains import Joint, chain_urdf
 
 ROOT = Path(__file__).parents[1]
@@ -57,11 +58,14 @@ def told(robot: Robot) -> list[tuple[str, str]]:
     return [(remark.where, remark.message) for remark in of_robot(robot)]
 
 
+UNLIMITED = LimitSpec(torque=None, velocity=None, acceleration=1.0)
+
+
 def with_stated_speeds(file: Path) -> Robot | None:
     """The robot with the URDF's limits but for torques; None for files that hold no arm."""
     try:
-        tool, _ = last_common_link(read_file(file), file.name)
-        robot = Robot.from_urdf(file, tool_frame=tool, limits=LimitSpec(torque=None, velocity=None, acceleration=1.0))
+        limb = first_limb(read_file(file), file.name)
+        robot = Robot.from_urdf(file, tool_frame=limb.tool, base_frame=limb.base, limits=UNLIMITED)
     except BrachisError:
         return None
     speeds = [np.inf if limit.velocity is None else limit.velocity for limit in robot.stated_limits]

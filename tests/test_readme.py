@@ -41,20 +41,17 @@ def load(path: Path):
     return module
 
 
-SNIPPETS = [
-    (page, number)
-    for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
-    for number in range(len(blocks(page, "python")))
-]
+PAGES = [page for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))) if blocks(page, "python")]
 
 
 def test_there_are_snippets():
-    assert {page.name for page, _ in SNIPPETS} == {"README.md", "closed_forms.md", "from_toppra.md"}
+    assert {page.name for page in PAGES} == {"README.md", "closed_forms.md", "from_toppra.md", "python.md"}
 
 
-@pytest.mark.parametrize(("page", "number"), SNIPPETS, ids=lambda value: getattr(value, "name", str(value)))
-def test_python_snippet_runs(page, number, clone):
-    code = blocks(page, "python")[number]
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_python_snippets_run(page, clone):
+    """Those of a page in order, as one program."""
+    code = "\n".join(blocks(page, "python"))
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], cwd=clone, capture_output=True, text=True)  # noqa: PLW1510
     assert done.returncode == 0, done.stderr
 

@@ -43,7 +43,7 @@ class PlausibilityWarning(UserWarning):
     >>> with warnings.catch_warnings(record=True) as caught:
     ...     warnings.simplefilter("always")
     ...     fast = {"velocity": 180.0}  # degrees per second
-    ...     result = brachis.plan(brachis.examples.scara_line, limits=fast, redundant_joints=["j1"], effort="single")
+    ...     result = brachis.plan(brachis.examples.scara_line, limits=fast, redundant_joints=["j1"], intervals=8)
     >>> caught[0].category.__name__
     'PlausibilityWarning'
     """

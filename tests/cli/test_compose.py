@@ -80,7 +80,7 @@ def test_no_figure_is_guessed(run, tmp_path, missing):
     del words[place : place + (3 if missing == "--range" else 2)]
     outcome = run("compose", SCARA, *words)
     assert outcome.code == 2
-    assert "Missing option" in outcome.err
+    assert "missing option" in outcome.err
     assert missing in outcome.err
     assert not list(tmp_path.iterdir())
 

@@ -124,10 +124,14 @@ def test_the_chosen_tool_frame_is_named(run):
     assert json.loads(named)["remarks"] == [space]
 
 
-def test_a_robot_of_several_arms_asks_for_one(run):
-    outcome = run("inspect", published("Baxter"))
-    assert outcome.code == 2
-    assert "r_gripper_l_finger_tip" in outcome.err
+LIMB = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
+
+
+def test_of_several_arms_the_first_one_is_shown(run):
+    data = json.loads(run("inspect", published("Baxter"), "--json").out)
+    assert [joint["joint"] for joint in data["joints"]] == [f"left_{part}" for part in LIMB]
+    assert data["remarks"][0].endswith("from which several limbs part; --base-frame names another one")
+    assert "--tool-frame names another one" in data["remarks"][1]
     kinds = decompositions(run, published("Baxter"), "--tool-frame", "left_gripper")
     assert set(kinds.values()) == {"-"}  # offsets at the shoulder and the wrist
 

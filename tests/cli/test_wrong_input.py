@@ -161,6 +161,7 @@ def test_error_as_json(run, task, write, tmp_path, monkeypatch):
         raise PlanningError("no motion")
 
     monkeypatch.setattr("brachis.planner.plan", no_plan)
+    task["robot"]["limits"]["torque"] = 10
     outcome = run("plan", write(task), "--json")
     assert (outcome.code, json.loads(outcome.out)["exit_code"], json.loads(outcome.out)["error"]) == (1, 1, "no motion")
 

@@ -11,7 +11,7 @@ import pytest
 from brachis import LimitSpec
 from brachis.errors import InputError, LimitError, UnknownNameError, UrdfError
 from brachis.robot import Robot
-from brachis.robot.urdf import last_common_link
+from brachis.robot.limb import Limb, first_limb
 from support.chains import INERTIAL, Joint, chain_urdf, planar_robot, planar_urdf
 
 TURN = Joint("revolute", xyz=(0.4, 0.0, 0.0))
@@ -96,9 +96,9 @@ def test_a_joint_without_an_axis_is_refused():
 
 def test_the_last_link_before_the_chains_part():
     text = chain_urdf([TURN, TURN])
-    assert last_common_link(text, "file.urdf") == ("tool", ("tool",))
+    assert first_limb(text, "file.urdf") == Limb(None, "tool", ("tool",))
     branching = text.replace("</robot>", GRIPPER + "</robot>")
-    assert last_common_link(branching, "file.urdf") == ("palm", ("finger1", "finger2"))
+    assert first_limb(branching, "file.urdf") == Limb(None, "palm", ("finger1", "finger2"))
 
 
 def test_mimic_on_the_chain_is_refused_by_name():

@@ -4,8 +4,8 @@ Examples
 --------
 >>> import brachis
 >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
->>> print(brachis.bottleneck.report(result).saturations[0].label.kind)
-torque
+>>> print(str(brachis.bottleneck.report(result)).splitlines()[0])
+10 % more torque at j1 (1 Nm) saves 3.4 % (87 ms)
 """
 
 from brachis.bottleneck.check import CheckedSensitivity, SensitivityCheck, check_sensitivities

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,8 +20,10 @@ from brachis.cli.output import (
     result_console,
     shown_warnings,
 )
+from brachis.cli.settings import changed_task, urdf_of
 from brachis.errors import InputError
 from brachis.result import Result
+from brachis.task import Task
 from brachis.trajectory import Trajectory
 from brachis.verify import VerifyOptions, verify_trajectory
 
@@ -47,15 +49,24 @@ class _Motion:
 
 
 def bottleneck_command(
-    source: Path, *, urdf: Path | None, check: bool, reference: bool, out: Path | None, strict: bool, as_json: bool
+    source: Path,
+    changes: Sequence[str],
+    *,
+    urdf: Path | None,
+    check: bool,
+    reference: bool,
+    out: Path | None,
+    strict: bool,
+    as_json: bool,
 ) -> int:
     """Plan a task or take a saved motion, find the bottlenecks, show, write; returns the exit code."""
     if out is not None:
         make_folder(out, (*_FILES[True], *_FILES[False]), (source, urdf))
     with shown_warnings(), progress() as listener:
-        motion = (
-            _saved(source, urdf) if source.suffix.lower() == _SAVED else _planned(source, urdf, listener, strict=strict)
-        )
+        if source.suffix.lower() == _SAVED:
+            motion = _saved(source, {"--urdf": urdf, "--set": changes})
+        else:
+            motion = _planned(changed_task(source, changes), urdf, listener, strict=strict)
         listener("looking for what holds the motion back")
         found = bottleneck.report(motion.made, check=check, reference=reference)
     data = {**motion.data, "bottleneck": found.to_dict()}
@@ -73,17 +84,17 @@ def bottleneck_command(
     return exit_code(motion.verified, written.failures)
 
 
-def _planned(task: Path, urdf: Path | None, listener: Callable[[str], None], *, strict: bool) -> _Motion:
-    result = planner.plan(urdf, task, listener=listener, strict=strict)
+def _planned(task: Task, urdf: Path | None, listener: Callable[[str], None], *, strict: bool) -> _Motion:
+    result = planner.plan(urdf and urdf_of(urdf), task, listener=listener, strict=strict)
     return _Motion(result, result.trajectory, result.verified, result.to_dict(), result.interrupted, result.undone)
 
 
-def _saved(path: Path, urdf: Path | None) -> _Motion:
-    """Load a motion and verify it again."""
-    if urdf is not None:
-        raise InputError(
-            "a saved motion belongs to the URDF that it was planned for", where="--urdf", found=urdf, allowed="a task"
-        )
+def _saved(path: Path, given: Mapping[str, object]) -> _Motion:
+    """Load a motion and verify it again; options are for tasks."""
+    for option, value in given.items():
+        if value:
+            problem = "a saved motion belongs to the robot and task that it was planned for"
+            raise InputError(problem, where=option, found=value, allowed="this option with a task file")
     trajectory = Trajectory.load(path)
     verification = verify_trajectory(trajectory, VerifyOptions(ratio_tolerance=trajectory.task.refinement.tolerance))
     data = {

@@ -45,7 +45,7 @@ def _split(word: str) -> list[str]:
 
 
 def compose(
-    arm: Annotated[Path, typer.Argument(help="URDF file of the arm.", metavar="ARM")],
+    arm: Annotated[Path, typer.Argument(help="URDF file of the arm, or the name of a robot.", metavar="ARM")],
     travel: Annotated[tuple[float, float], typer.Option("--range", help="Lowest and highest position on the rail, m.")],
     velocity: Annotated[float, typer.Option(help="Limit of the rail's speed, m/s.")],
     force: Annotated[float, typer.Option(help="Limit of the rail's drive force, N.")],
@@ -70,7 +70,11 @@ def compose(
     meshes: Annotated[bool, typer.Option(help="Keep the arm's meshes, or drop them.")] = True,
     json: Json = False,
 ) -> None:
-    """Mount an arm on a linear axis and write the URDF of both. No figure of the axis is guessed."""
+    """Mount an arm on a linear axis, as a new URDF.
+
+    No figure of the axis is guessed.
+    """
+    from brachis.cli.settings import urdf_of  # noqa: PLC0415
     from brachis.compose import Rail, on_rail  # noqa: PLC0415  (loads Pinocchio, which no help needs)
 
     rail = Rail(
@@ -84,6 +88,7 @@ def compose(
         name=name,
         root=root,
     )
+    arm = urdf_of(arm)
     write_one(out, lambda path: on_rail(arm, rail, meshes=meshes, output=path), (".urdf",), (arm,))
     if json:
         print_json({"urdf": str(out), "arm": str(arm), "joint": name, "root": root})

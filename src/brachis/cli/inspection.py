@@ -10,22 +10,25 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from rich.console import Console
-from rich.table import Table
 
 from brachis import ik
-from brachis.cli.joint_table import NONE, joint_rows
+from brachis.cli.joint_table import NONE, WORDS, joint_rows
 from brachis.cli.output import print_json, result_console
 from brachis.cli.point_inspection import print_points
+from brachis.cli.settings import changed_task, urdf_of
+from brachis.cli.tables import Column, print_table
 from brachis.errors import InputError
+from brachis.kinds import Kind, kind_of
 from brachis.plausibility import of_robot
 from brachis.robot import Robot, bind, in_use
 from brachis.robot.from_task import robot_from_settings
-from brachis.robot.task_map.rows import AXES, POSE_ROWS, YAW
-from brachis.robot.urdf import last_common_link, read_file
-from brachis.task import LimitSpec, Task, load_task
+from brachis.robot.limb import first_limb
+from brachis.robot.task_map.rows import AXES, YAW
+from brachis.robot.urdf import read_file
+from brachis.starter import natural_space
+from brachis.task import LimitSpec, Task
 
 _TASK_FILES = (".yaml", ".yml")
-_PARALLEL = 1e-9
 _LISTED = 12
 _OTHER_TASKS = (
     "a whole pose is prescribed",
@@ -38,6 +41,7 @@ _OTHER_TASKS = (
 
 def inspect_command(
     source: Path,
+    changes: Sequence[str],
     *,
     task_space: str | None,
     tool_frame: str | None,
@@ -48,15 +52,16 @@ def inspect_command(
 ) -> None:
     """Print a robot's joints and its decompositions."""
     remarks: list[str] = []
-    if source.suffix in _TASK_FILES:
+    if source.suffix in _TASK_FILES or kind_of(source) is Kind.TASK:
         given = {"--tool-frame": tool_frame, "--base-frame": base_frame, "--lock": lock}
-        task = _task_of(source, [option for option, value in given.items() if value])
+        task = _task_of(source, changes, [option for option, value in given.items() if value])
         robot = robot_from_settings(task.robot)
     else:
-        task = None
-        robot = _of_urdf(source, tool_frame or _tool(source, remarks), base_frame, lock)
+        task, source = None, urdf_of(source)
+        base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
+        robot = _of_urdf(source, tool_frame, base_frame, lock)
     asked: str | Sequence[str] | None = None if task is None else task.task_space
-    robot, rows = bind(robot, _space(task_space) if task_space else asked or _natural_space(robot, remarks))
+    robot, rows = bind(robot, _space(task_space) if task_space else asked or _natural(robot, remarks))
     remarks += [f"warning: {remark}" for remark in of_robot(robot)]
     joints, acting = joint_rows(robot), in_use(robot)
     candidates = ik.find_all(robot, rows)
@@ -85,7 +90,8 @@ def inspect_command(
     for remark in remarks:
         console.print(remark)
     shown = [key for key in joints[0] if any(row[key] != NONE for row in joints)]
-    console.print(_table("joints", [{key: row[key] for key in shown} for row in joints]))
+    columns = [Column(key, number=key not in WORDS) for key in shown]
+    print_table(console, "joints", columns, [[row[key] for key in shown] for row in joints])
     for name, text in acting.items():
         console.print(f"{name}: {text}")
     if task:
@@ -98,12 +104,12 @@ def inspect_command(
     _print_decompositions(console, decompositions)
 
 
-def _task_of(path: Path, options: Sequence[str]) -> Task:
+def _task_of(path: Path, changes: Sequence[str], options: Sequence[str]) -> Task:
     """Read a task file, beside which no options are given."""
     if options:
         hint = "Leave the option away, or inspect the URDF"
         raise InputError("is for URDFs; a task says it itself", where=options[0], hint=hint)
-    return load_task(path)
+    return changed_task(path, changes)
 
 
 def _of_urdf(path: Path, tool_frame: str, base_frame: str | None, lock: list[str]) -> Robot:
@@ -123,15 +129,19 @@ def _of_urdf(path: Path, tool_frame: str, base_frame: str | None, lock: list[str
     return replace(robot, limits=robot.limits.with_magnitudes(acceleration=np.full(robot.n, np.inf), **stated))
 
 
-def _tool(urdf: Path, remarks: list[str]) -> str:
-    """Take the last link before the URDF's chains part, and say so where they do."""
-    link, leaves = last_common_link(read_file(urdf), str(urdf))
-    if len(leaves) > 1:
+def _frames(urdf: Path, base: str | None, tool: str | None, remarks: list[str]) -> tuple[str | None, str]:
+    """Take the first limb of the URDF where base and tool frame are not given, and say so where there is a choice."""
+    if tool is not None:
+        return base, tool
+    limb = first_limb(read_file(urdf), str(urdf))
+    if limb.base and base is None:
+        remarks.append(f"base frame: {limb.base}, from which several limbs part; --base-frame names another one")
+    if len(limb.leaves) > 1:
         remarks.append(
-            f"tool frame: {link}, the last link before the chains to {', '.join(leaves)} part; "
+            f"tool frame: {limb.tool}, the last link before the chains to {', '.join(limb.leaves)} part; "
             "--tool-frame names another one"
         )
-    return link
+    return base or limb.base, limb.tool
 
 
 def _space(text: str) -> str | list[str]:
@@ -140,14 +150,9 @@ def _space(text: str) -> str | list[str]:
     return rows[0] if len(rows) == 1 and rows[0] not in (*AXES, YAW) else rows
 
 
-def _natural_space(robot: Robot, remarks: list[str]) -> str | list[str]:
-    """Choose what the robot can prescribe at most: a pose, three rows, or those of the plane in which it moves."""
-    geometry = ik.ChainGeometry.of(robot)
-    along = np.abs(np.where(geometry.revolute[:, None], 1.0 - np.abs(geometry.axes), np.abs(geometry.axes)))
-    normals = np.flatnonzero(np.all(along < _PARALLEL, axis=0))
-    space: str | list[str] = "pose" if robot.n >= len(POSE_ROWS) else list(AXES[: robot.n])
-    if len(normals):
-        space = [row for i, row in enumerate(AXES) if i != normals[0]][: robot.n]
+def _natural(robot: Robot, remarks: list[str]) -> str | list[str]:
+    """Choose what the robot can prescribe at most, and say so."""
+    space = natural_space(robot)
     remarks.append(
         f"task space: {space if isinstance(space, str) else ','.join(space)}; --task-space names another one"
     )
@@ -211,7 +216,9 @@ def _print_decompositions(console: Console, rows: list[dict[str, Any]]) -> None:
         *(["remark"] if any(r["remark"] for r in solved) else []),
     ]
     if solved:
-        console.print(_table("choices of redundant joints", [{name: row[name] for name in columns} for row in solved]))
+        print_table(
+            console, "choices of redundant joints", columns, [[row[name] for name in columns] for row in solved]
+        )
     for labels in dict.fromkeys(row["labels"] for row in solved):
         choices = "; ".join(row["redundant joints"] for row in solved if row["labels"] == labels)
         console.print(f"branches with {choices} redundant: {labels}")
@@ -234,12 +241,3 @@ def _tool_pose(robot: Robot, text: str) -> str:
     x, y, z, qx, qy, qz, qw = pin.SE3ToXYZQUAT(placement)
     position = ", ".join(f"{value:.9g}" for value in (x, y, z))
     return f"tool at [{position}] m, quaternion w, x, y, z [{', '.join(f'{value:.9g}' for value in (qw, qx, qy, qz))}]"
-
-
-def _table(title: str, rows: list[dict[str, Any]]) -> Table:
-    table = Table(title=title, title_justify="left")
-    for column in rows[0] if rows else ():
-        table.add_column(column, overflow="fold")
-    for row in rows:
-        table.add_row(*(str(value) for value in row.values()))
-    return table

@@ -9,6 +9,8 @@ from brachis.robot import Robot
 from brachis.robot.limits import MAGNITUDES
 
 NONE = "none"
+WORDS = ("joint", "type")
+"""Columns that are no figures with units."""
 _LIMITS = {
     "velocity": {"rad": "rad/s", "m": "m/s"},
     "acceleration": {"rad": "rad/s^2", "m": "m/s^2"},

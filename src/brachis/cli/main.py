@@ -1,56 +1,30 @@
-"""The command line: ``brachis plan | bottleneck | verify | export | plot | inspect | compose | sweep | schema``.
+"""The command line: a function for each command, which imports what it needs when it is called.
 
-Exit codes: 0 planned and verified, 1 no verified plan, 2 wrong input, 3 planned and verified, but not all figures could
-be written, 130 interrupted. Results go to standard output, everything else to standard error. With ``--json`` standard
-output gets one JSON object, also for an error.
+Results go to standard output, everything else to standard error. With ``--json`` standard output gets one JSON object,
+also for an error. The exit codes are in `brachis.cli.examples`.
 """
 
 from __future__ import annotations
 
-import os
 import sys
+import traceback
 from contextlib import redirect_stdout
+from contextvars import copy_context
+from functools import partial
 from pathlib import Path
 from typing import Annotated, TextIO, cast
 
 import typer
-from typer.core import TyperGroup
 
 from brachis import interrupts
+from brachis.cli.app import app
 from brachis.cli.composition import VectorCommand, compose
-from brachis.cli.output import Json, StandardOutput, open_streams, print_failure
+from brachis.cli.output import Json, StandardOutput, open_streams, print_failure, print_usage_error
+from brachis.cli.verbosity import Verbosity, chosen
 from brachis.errors import BrachisError
-from brachis.interrupts import INTERRUPTED
 
-
-class InterruptedByUserError(BrachisError):
-    """The user pressed Ctrl-C."""
-
-    exit_code = INTERRUPTED
-
-
-class _Commands(TyperGroup):
-    """Commands that the user may interrupt."""
-
-    def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override]
-        """Run a command, its imports included; however it ends, a press that nobody heard ends it."""
-        try:
-            with interrupts.heard():
-                return super().invoke(ctx)
-        except KeyboardInterrupt as interrupt:
-            told = str(interrupt)
-            raise InterruptedByUserError(f"interrupted; {told}" if told else "interrupted") from interrupt
-
-
-app = typer.Typer(
-    name="brachis",
-    cls=_Commands,
-    help="Plan minimum-time motions of redundant robots along prescribed paths.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
+_UsageError = cast("type[Exception]", typer.BadParameter.__bases__[0])
+"""What Typer raises for wrong options; it names it nowhere else."""
 
 TaskFile = Annotated[Path, typer.Argument(help="Task file (YAML).", metavar="TASK")]
 ResultFile = Annotated[
@@ -60,25 +34,43 @@ Strict = Annotated[
     bool,
     typer.Option("--strict", help="Refuse figures that are hardly meant, such as degrees for rad, instead of warning."),
 ]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a key of the task, dotted as in spline.intervals=40 or path.0.line.length=0.5; the value is YAML. "
+        "Repeatable.",
+    ),
+]
 
 
-def _print_version(asked: bool) -> None:  # noqa: FBT001  (Typer calls it so)
-    """Print the version and stop, where asked."""
-    if asked:
-        import brachis  # noqa: PLC0415
+@app.command(name="robots")
+def list_robots(json: Json = False) -> None:
+    """List the robots that come with brachis."""
+    with interrupts.postponed():
+        from brachis.cli import starting  # noqa: PLC0415  (each command imports what it needs)
 
-        typer.echo(f"brachis {brachis.__version__}")
-        raise typer.Exit
+    starting.robots_command(as_json=json)
 
 
-@app.callback()
-def options(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
-    ] = False,
+@app.command()
+def new(
+    urdf: Annotated[Path, typer.Argument(help="URDF file, or the name of a robot that comes along.", metavar="URDF")],
+    out: Annotated[Path, typer.Option(help="Task file to write, a new one.")] = Path("task.yaml"),
+    tool_frame: Annotated[str | None, typer.Option(help="Link at the chain's end.")] = None,
+    base_frame: Annotated[str | None, typer.Option(help="Link at the chain's beginning.")] = None,
+    json: Json = False,
 ) -> None:
-    """Plan minimum-time motions of redundant robots along prescribed paths."""
-    del version
+    """Write a first task for a robot, with comments.
+
+    It has a posture away from limits and singularities and a short line that can be reached from it, and it has been
+    planned and verified.
+    """
+    with interrupts.postponed():
+        from brachis.cli import starting  # noqa: PLC0415
+
+    starting.new_command(urdf, out, tool_frame=tool_frame, base_frame=base_frame, as_json=json)
 
 
 @app.command()
@@ -92,14 +84,15 @@ def plan(
         ),
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
+    changes: Changes = None,
     strict: Strict = False,
     json: Json = False,
 ) -> None:
     """Plan a task, verify the motion, and show what came out."""
     with interrupts.postponed():
-        from brachis.cli import planning  # noqa: PLC0415  (each command imports what it needs)
+        from brachis.cli import planning  # noqa: PLC0415
 
-    raise typer.Exit(planning.plan_command(task, urdf=urdf, out=out, strict=strict, as_json=json))
+    raise typer.Exit(planning.plan_command(task, changes or [], urdf=urdf, out=out, strict=strict, as_json=json))
 
 
 @app.command()
@@ -129,16 +122,20 @@ def bottleneck(
         ),
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
+    changes: Changes = None,
     strict: Strict = False,
     json: Json = False,
 ) -> None:
-    """Plan a task, or take a saved motion, and say which limits cost how much time, and which is active when."""
+    """Say what holds a motion back: which limits cost time.
+
+    How much each of them costs, and when it is active, of a task that is planned for it or of a saved motion.
+    """
     with interrupts.postponed():
         from brachis.cli import bottleneck as command  # noqa: PLC0415
 
     raise typer.Exit(
         command.bottleneck_command(
-            task, urdf=urdf, check=check, reference=reference, out=out, strict=strict, as_json=json
+            task, changes or [], urdf=urdf, check=check, reference=reference, out=out, strict=strict, as_json=json
         )
     )
 
@@ -149,7 +146,7 @@ def verify(
     urdf: Annotated[Path | None, typer.Option(help="Check against this URDF instead of the saved one.")] = None,
     json: Json = False,
 ) -> None:
-    """Check a saved motion again: path, limits, start and end, continuity."""
+    """Check a saved motion again: path, limits, ends."""
     with interrupts.postponed():
         from brachis.cli import results  # noqa: PLC0415
 
@@ -196,8 +193,8 @@ def inspect(
     source: Annotated[
         Path,
         typer.Argument(
-            help="URDF file, or a task file (.yaml): the robot as the task has it, with the limits and masses in use, "
-            "and the points that its path follows.",
+            help="URDF file or name of a robot; or a task file: its robot with the limits and masses in use, and the "
+            "points that its path follows.",
             metavar="URDF|TASK",
         ),
     ],
@@ -214,14 +211,19 @@ def inspect(
         str | None, typer.Option(help="Say where the tool is at these joint positions, for example '0, 0.3, 1.2'.")
     ] = None,
     lock: Annotated[list[str] | None, typer.Option(help="Joint held at a position: name=value, repeatable.")] = None,
+    changes: Changes = None,
     json: Json = False,
 ) -> None:
-    """List a robot's joints, limits, masses and friction, and which choices of redundant joints have a closed form."""
+    """Show a robot's joints and its closed forms.
+
+    Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
+    """
     with interrupts.postponed():
         from brachis.cli import inspection  # noqa: PLC0415
 
     inspection.inspect_command(
         source,
+        changes or [],
         task_space=task_space,
         tool_frame=tool_frame,
         base_frame=base_frame,
@@ -257,7 +259,7 @@ def sweep(
     retry: Annotated[bool, typer.Option("--retry", help="Plan stored failures again.")] = False,
     json: Json = False,
 ) -> None:
-    """Plan a task many times, with other values of its keys, and compare."""
+    """Plan a task many times, with its keys varied."""
     with interrupts.postponed():
         from brachis.cli import sweep as command  # noqa: PLC0415
 
@@ -268,7 +270,7 @@ def sweep(
 def schema(
     out: Annotated[Path | None, typer.Option(help="File to write instead of standard output.")] = None,
 ) -> None:
-    """Print the JSON schema of task files, for editors."""
+    """Print the JSON schema of task files."""
     with interrupts.postponed():
         from brachis.cli import results  # noqa: PLC0415
 
@@ -280,28 +282,27 @@ def main() -> None:
     open_streams()
     output = StandardOutput(sys.stdout)
     with redirect_stdout(cast(TextIO, output)):
-        code = _run(output, as_json="--json" in sys.argv[1:])
+        code = copy_context().run(partial(_run, output, as_json="--json" in sys.argv[1:]))
     sys.exit(code if output.finish() else 1)
 
 
 def _run(output: StandardOutput, *, as_json: bool) -> int | str | None:
     """Run a command and return its exit code."""
     try:
-        app()
+        return cast("int | None", app(prog_name="brachis", standalone_mode=False)) or 0
     except SystemExit as stop:
         return stop.code
     except BrachisError as error:
-        print_failure(str(error), error.exit_code, as_json=as_json)
-        return error.exit_code
-    except Exception as error:
+        return print_failure(str(error), error.exit_code, as_json=as_json)
+    except _UsageError as error:
+        return print_usage_error(error, as_json=as_json)
+    except Exception as error:  # noqa: BLE001  (whatever it is, it is told and not raised)
         if error is output.failure:
             return 1
-        if os.environ.get("BRACHIS_DEBUG"):
-            raise
+        if chosen() is Verbosity.VERBOSE:
+            traceback.print_exc()
         message = (
             f"internal error: {type(error).__name__}: {error}. This is a fault of brachis; "
-            "run again with BRACHIS_DEBUG=1 for the traceback and report it"
+            "run again with --verbose for the traceback and report it"
         )
-        print_failure(message, 1, as_json=as_json)
-        return 1
-    return 0
+        return print_failure(message, 1, as_json=as_json)

@@ -6,23 +6,28 @@ import json
 import math
 import os
 import sys
+import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from brachis import interrupts
+from brachis.cli.tables import Column, print_table
+from brachis.cli.verbosity import Verbosity, chosen
 from brachis.errors import InputError
 
 if TYPE_CHECKING:  # loads Pinocchio, which no error message and no help needs
     from brachis.verify import Verification
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+WRONG_INPUT = 2
+"""Exit code of what is refused before anything is done."""
 _NO_FIGURE = 3
 """Exit code of a verified motion whose figures could not all be written."""
 
@@ -43,12 +48,29 @@ def print_json(data: Mapping[str, object]) -> None:
     sys.stdout.write(json_text(data))
 
 
-def print_failure(message: str, exit_code: int, *, as_json: bool) -> None:
-    """Say on standard error what went wrong; with `as_json` also as one JSON object on standard output."""
+def print_failure(message: str, code: int, *, as_json: bool) -> int:
+    """Say on standard error what went wrong; with `as_json` also as one JSON object on standard output.
+
+    Returns the exit code.
+    """
     with suppress(OSError):  # `StandardOutput.finish` says so
         if as_json:
-            print_json({"verified": False, "status": "error", "error": message, "t_end": None, "exit_code": exit_code})
+            print_json({"verified": False, "status": "error", "error": message, "t_end": None, "exit_code": code})
     print_error(message)
+    return code
+
+
+def print_usage_error(error: Any, *, as_json: bool) -> int:  # noqa: ANN401  (Typer does not name the class)
+    """Say that the command line is not understood, and where help is; the exit code of wrong input."""
+    if type(error).__name__ == "NoArgsIsHelpError":
+        with suppress(OSError):
+            sys.stderr.write(f"{error.ctx.get_help()}\n")
+        return WRONG_INPUT
+    message = str(error.format_message()).rstrip(".")
+    message = message[:1].lower() + message[1:]
+    context = error.ctx
+    more = "" if context is None else f"; see {context.command_path} --help"
+    return print_failure(message + more, WRONG_INPUT, as_json=as_json)
 
 
 def exit_code(verified: bool, failures: Sequence[InputError]) -> int:  # noqa: FBT001  (what the code is of)
@@ -141,12 +163,13 @@ def _plain(value: object) -> object:
 
 def result_console() -> Console:
     """Console for results."""
-    return Console(highlight=False, markup=False, soft_wrap=not sys.stdout.isatty())
+    quiet = chosen() is Verbosity.QUIET
+    return Console(highlight=False, markup=False, soft_wrap=not sys.stdout.isatty(), quiet=quiet)
 
 
 @contextmanager
 def shown_warnings() -> Iterator[None]:
-    """Print warnings of implausible figures as messages on standard error."""
+    """Print warnings of implausible figures as messages on standard error; a quiet command prints none."""
     from brachis.plausibility import PlausibilityWarning  # noqa: PLC0415  (loads Pinocchio)
 
     with warnings.catch_warnings():
@@ -154,10 +177,10 @@ def shown_warnings() -> Iterator[None]:
         usual = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *where: Any) -> None:  # noqa: ANN401
-            if issubclass(category, PlausibilityWarning):
-                print_error(f"warning: {message}")
-            else:
+            if not issubclass(category, PlausibilityWarning):
                 usual(message, category, *where)
+            elif chosen() is not Verbosity.QUIET:
+                print_error(f"warning: {message}")
 
         warnings.showwarning = show  # type: ignore[assignment]
         yield
@@ -165,9 +188,16 @@ def shown_warnings() -> Iterator[None]:
 
 @contextmanager
 def progress() -> Iterator[Callable[[str], None]]:
-    """Give a listener that shows what the planner does on a terminal, and nothing in a pipe; it hears lost Ctrl-C."""
+    """Give a listener that shows what the planner does; it hears lost Ctrl-C.
+
+    On a terminal it shows the present step; in a pipe, and for a quiet command, nothing. For a verbose one it writes
+    every step with its time.
+    """
     console = Console(stderr=True)
-    if not console.is_terminal:
+    if chosen() is Verbosity.VERBOSE:
+        yield _log()
+        return
+    if chosen() is Verbosity.QUIET or not console.is_terminal:
         yield lambda _text: interrupts.check()
         return
     with console.status("reading the task") as status:
@@ -179,21 +209,34 @@ def progress() -> Iterator[Callable[[str], None]]:
         yield show
 
 
-def verification_table(verification: Verification) -> Table:
-    """Lay out the checks, one a row."""
+def _log() -> Callable[[str], None]:
+    """Make a listener that writes every step on a line of its own."""
+    began = time.perf_counter()
+
+    def show(text: str) -> None:
+        interrupts.check()
+        print_error(f"{time.perf_counter() - began:.2f} s: {text}")
+
+    return show
+
+
+def print_verification(console: Console, verification: Verification) -> None:
+    """Print the checks, one a row."""
     title = "verification: passed" if verification.passed else "verification: FAILED"
-    table = Table(title=f"{title} (checked at {verification.points} instants)", title_justify="left")
-    for column in ("check", "worst", "allowed", "unit", "of", "time [s]", ""):
-        table.add_column(column, justify="right" if column in ("worst", "allowed", "time [s]") else "left")
+    rows = []
     for check in verification.checks:
         ratio = check.unit == "-" and check.allowed > 1.0
-        table.add_row(
-            check.name,
-            f"{check.value:.6f}" if ratio else f"{check.value:.1e}",
-            f"{check.allowed:.6g}",
-            check.unit,
-            check.subject or "",
-            "" if check.time is None else f"{check.time:.4f}",
-            ("ok" if check.passed else "FAILED") + (f" ({check.remark})" if check.remark else ""),
+        rows.append(
+            (
+                check.name,
+                f"{check.value:.6f}" if ratio else f"{check.value:.1e}",
+                f"{check.allowed:.6g}",
+                check.unit,
+                check.subject or "",
+                "" if check.time is None else f"{check.time:.4f}",
+                ("ok" if check.passed else "FAILED") + (f" ({check.remark})" if check.remark else ""),
+            )
         )
-    return table
+    number = partial(Column, number=True)
+    columns = ("check", number("worst"), number("allowed"), "unit", "of", number("time [s]"), "")
+    print_table(console, f"{title} (checked at {verification.points} instants)", columns, rows)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.table import Table
+from rich.console import Console
 
 from brachis import planner
 from brachis.attempt import coordinates
@@ -16,12 +17,14 @@ from brachis.cli.output import (
     json_text,
     print_error,
     print_json,
+    print_verification,
     print_what_was_left,
     progress,
     result_console,
     shown_warnings,
-    verification_table,
 )
+from brachis.cli.settings import changed_task, urdf_of
+from brachis.cli.tables import Column, print_table
 from brachis.errors import InputError
 from brachis.result import Result
 from brachis.search.record import SAME_MOTION
@@ -35,12 +38,14 @@ _MANY = 40
 """Candidates that are listed on the screen."""
 
 
-def plan_command(task: Path, *, urdf: Path | None, out: Path | None, strict: bool, as_json: bool) -> int:
+def plan_command(
+    task: Path, changes: Sequence[str], *, urdf: Path | None, out: Path | None, strict: bool, as_json: bool
+) -> int:
     """Plan, show, write; returns the exit code."""
     if out is not None:
         make_folder(out, (*_FILES[True], *_FILES[False]), (task, urdf))
     with shown_warnings(), progress() as listener:
-        result = planner.plan(urdf, task, listener=listener, strict=strict)
+        result = planner.plan(urdf and urdf_of(urdf), changed_task(task, changes), listener=listener, strict=strict)
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
     failures: tuple[InputError, ...] = ()
     if out is not None:
@@ -82,7 +87,6 @@ def _show(result: Result, data: dict[str, Any]) -> None:
     console = result_console()
     attempt, trajectory = result.attempt, result.trajectory
     named = trajectory.branch not in {"", result.family}
-    table = Table(show_header=False, title="plan", title_justify="left")
     rows = {
         "end time t_E": f"{result.t_end:.4f} s",
         "redundant joints": coordinates(trajectory.redundant_joints, trajectory.branch),
@@ -102,14 +106,12 @@ def _show(result: Result, data: dict[str, Any]) -> None:
     if attempt.time_scaled > 1.0:
         lengthened = f"{100.0 * (attempt.time_scaled - 1.0):.2g} % to meet the limits between collocation points"
         rows["end time lengthened by"] = lengthened
-    for name, value in rows.items():
-        table.add_row(name, value)
-    console.print(table)
+    print_table(console, "plan", ("", ""), rows.items(), header=False)
     for fit in result.fits:
         console.print(f"path from {fit}")
     if len(result.candidates) > 1:
-        console.print(_candidates_table(result))
-    console.print(verification_table(result.verification))
+        _print_candidates(console, result)
+    print_verification(console, result.verification)
     for name in data.get("files", []):
         console.print(f"wrote {name}")
 
@@ -120,25 +122,23 @@ def _posture(data: dict[str, Any], key: str) -> str:
     return ", ".join(f"{name} {value:.4f} {unit}" for name, value, unit in values)
 
 
-def _candidates_table(result: Result) -> Table:
-    """Lay out what the search looked at, one candidate a row, the fastest first; the same motion is shown once.
+def _print_candidates(console: Console, result: Result) -> None:
+    """Print what the search looked at, one candidate a row, the fastest first; the same motion is shown once.
 
     Columns are named as in the JSON.
     """
     shown = [candidate for candidate in result.candidates if candidate.status != SAME_MOTION]
     others = len(result.candidates) - len(shown[:_MANY])
     title = f"candidates ({len(result.candidates)}" + (f", {others} of them in the JSON only)" if others else ")")
-    table = Table(title=title, title_justify="left")
-    for column in ("joints", "branch", "origin", "coarse [s]", "t_end [s]", "status"):
-        numeric = column.endswith("[s]")
-        table.add_column(column, justify="right" if numeric else "left", overflow="fold", no_wrap=numeric)
-    for candidate in shown[:_MANY]:
-        times = (candidate.coarse, candidate.t_end)
-        table.add_row(
+    rows = [
+        (
             coordinates(candidate.redundant_joints, candidate.branch),
             candidate.branch,
             candidate.origin,
-            *(f"{time:.4f}" if math.isfinite(time) else "" for time in times),
+            *(f"{time:.4f}" if math.isfinite(time) else "" for time in (candidate.coarse, candidate.t_end)),
             candidate.status,
         )
-    return table
+        for candidate in shown[:_MANY]
+    ]
+    times = (Column("coarse [s]", number=True), Column("t_end [s]", number=True))
+    print_table(console, title, ("joints", "branch", "origin", *times, "status"), rows)

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from brachis.cli.folder import write_one, write_text
-from brachis.cli.output import json_text, print_error, print_json, result_console, verification_table
+from brachis.cli.output import json_text, print_error, print_json, print_verification, result_console
 from brachis.errors import UnknownNameError
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import json_schema
@@ -23,7 +23,7 @@ def verify_command(result: Path, *, urdf: Path | None, as_json: bool) -> int:
     if as_json:
         print_json(verification.to_dict())
     else:
-        result_console().print(verification_table(verification))
+        print_verification(result_console(), verification)
     return 0 if verification.passed else 1
 
 

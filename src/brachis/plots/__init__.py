@@ -6,8 +6,6 @@ Matplotlib is imported when the first figure is made.
 Examples
 --------
 >>> import brachis
->>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
->>> figure = brachis.plots.plot_torques(result.trajectory)
 >>> sorted(brachis.plots.PLOTS)[:3]
 ['fit', 'limits', 'motion']
 """

@@ -14,6 +14,7 @@ from lxml import etree
 
 from brachis import files
 from brachis.errors import UnknownNameError, UrdfError
+from brachis.kinds import Kind, check_kind
 from brachis.robot.limits import FARTHEST, UrdfLimit
 from brachis.robot.urdf_bodies import StatedChain, stated_chain
 from brachis.robot.urdf_checks import MOVING_TYPES, check_inertias, check_joints
@@ -94,7 +95,7 @@ def read_chain(
     base = base_frame if base_frame is not None else tree.root
     if base not in links:
         raise UnknownNameError("frame", base, links, where=f"{where}: base_frame")
-    path_joints = _joints_between(base, tool, parents, where)
+    path_joints = joints_between(base, tool, parents, where)
     by_name = {joint.name: joint for joint in urdf.robot.joints if joint.type != "fixed"}
     for name in locked_joints:
         if name not in by_name:
@@ -119,47 +120,15 @@ def read_chain(
     return UrdfChain(names, limits, locked, tool, base, _plain_xml(urdf), stated_chain(tree, names, locked, tool))
 
 
-def last_common_link(text: str, where: str) -> tuple[str, tuple[str, ...]]:
-    """Return the last link before a URDF's longest moving chains part, and the links at their ends.
-
-    For an arm with a gripper that is the link to which the fingers are attached; for a single chain its end.
-
-    Raises
-    ------
-    UrdfError
-        The text is broken, or the chains part before a joint moves.
-    """
-    tree, urdf = parse_urdf(text, where)
-    parents = {joint.child: joint for joint in urdf.robot.joints}
-    inner = {joint.parent for joint in urdf.robot.joints}
-    leaves = tuple(name for name in tree.links if name not in inner)
-    chains = {leaf: _joints_between(tree.root, leaf, parents, where) for leaf in leaves}
-    counts = {leaf: sum(joint.type in MOVING_TYPES for joint in chain) for leaf, chain in chains.items()}
-    # Frames half way up the arm are no tools: the chains of most joints count.
-    moving = {leaf: chain for leaf, chain in chains.items() if counts[leaf] == max(counts.values())}
-    shared = []
-    for step in zip(*moving.values(), strict=False):
-        if len({joint.child for joint in step}) > 1:
-            break
-        shared.append(step[0])
-    if not any(joint.type in MOVING_TYPES for joint in shared):
-        raise UrdfError(
-            "the tool frame is not clear: no joint moves all chains",
-            where=where,
-            found=f"chains to {', '.join(moving) or 'nowhere'}",
-            hint="Name the link at the end of one of them as tool frame",
-        )
-    return shared[-1].child, tuple(moving)
-
-
 def read_file(path: Path) -> str:
     """Text of a URDF file.
 
     Raises
     ------
     UrdfError
-        The file is missing, not text, or no regular file of a size that a URDF may have.
+        The file is missing, not text, another file of brachis, or no regular file of a size that a URDF may have.
     """
+    check_kind(path, Kind.URDF, UrdfError)
     try:
         return files.read_file(path).decode()
     except FileNotFoundError as error:
@@ -219,7 +188,7 @@ def _tool(urdf: yourdfpy.URDF, tool_frame: str | None, where: str) -> str:
     return leaves[0]
 
 
-def _joints_between(base: str, tool: str, parents: Mapping[str, Any], where: str) -> list[Any]:
+def joints_between(base: str, tool: str, parents: Mapping[str, Any], where: str) -> list[Any]:
     """List the joints from base to tool, in chain order."""
     joints: list[Any] = []
     link = tool

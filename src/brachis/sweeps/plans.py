@@ -143,7 +143,7 @@ def _base(settings: SweepSettings, name: str, folder: Path) -> tuple[Mapping[str
 
 def _plan(base: Mapping[str, Any], changes: Mapping[str, Any], name: str, folder: Path) -> Plan | BrachisError:
     try:
-        task = task_from(with_keys(base, changes), name, folder)
+        task = task_from(with_keys(base, changes), name, folder, {})
         if task.robot.urdf is None:
             raise TaskError("no robot", where=f"{name}: robot.urdf", hint="Give the URDF's path")
         urdf = read_file(Path(task.robot.urdf))

@@ -11,9 +11,9 @@ from typing import Any, Literal, Protocol, TypeVar
 from pydantic import ValidationError
 
 from brachis.task.fields import plain
+from brachis.task.limit_models import Array
 from brachis.task.messages import task_error
 from brachis.task.orientation import OrientationMode
-from brachis.task.robot_models import Array
 from brachis.task.segments import (
     ArcSegment,
     CircleSegment,

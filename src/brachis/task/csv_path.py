@@ -10,7 +10,8 @@ from brachis.errors import TaskError
 from brachis.task.fitted import Wanted, segments_along
 from brachis.task.models import Task
 from brachis.task.point_data import PointFile
-from brachis.task.segments import BSplineSegment, CsvSegment, Segment, SplineSegment, SplineThrough
+from brachis.task.segments import BSplineSegment, CsvSegment, Segment, SplineSegment
+from brachis.task.shapes import SplineThrough
 from brachis.task.text_file import read_text
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ from brachis.errors import TaskError
 from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.orientation import OrientationMode, Quaternion, Rotate, TurnTo
 from brachis.task.point_data import FitReport, FitTolerance
-from brachis.task.segments import BSplineSegment, SplineSegment, SplineThrough
+from brachis.task.segments import BSplineSegment, SplineSegment
+from brachis.task.shapes import SplineThrough
 
 if TYPE_CHECKING:
     from brachis.cam.curves import FittedCurve

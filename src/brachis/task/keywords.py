@@ -8,10 +8,12 @@ from typing import Any, Literal, TypedDict, Unpack
 from brachis.errors import UnknownNameError
 from brachis.task.boundary import BoundarySettings
 from brachis.task.fields import Model, plain
+from brachis.task.limit_models import Array, LimitKeywords, LimitSpec
 from brachis.task.load import Source, load_task
-from brachis.task.models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings, Task
+from brachis.task.models import Task
 from brachis.task.mounting_models import Payload, Placement
-from brachis.task.robot_models import Array, LimitKeywords, LimitSpec, RobotSettings
+from brachis.task.planning_models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings
+from brachis.task.robot_models import RobotSettings
 from brachis.task.segments import SegmentModel
 from brachis.task.tool_limits import ToolLimits
 

@@ -12,8 +12,8 @@ from pydantic import Field, ValidationError
 
 from brachis.errors import TaskError, UnknownNameError
 from brachis.task.fields import Model, Name, plain
+from brachis.task.limit_models import LimitSpec
 from brachis.task.messages import show, task_error
-from brachis.task.robot_models import LimitSpec
 from brachis.task.text_file import read_text
 from brachis.task.yaml_reader import read_yaml
 

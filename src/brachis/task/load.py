@@ -9,8 +9,10 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from brachis.errors import TaskError
+from brachis.kinds import Kind, check_kind
 from brachis.task.csv_path import expand_csv_files
 from brachis.task.fields import plain
+from brachis.task.keys import with_keys
 from brachis.task.limits_file import with_limits_of_file
 from brachis.task.messages import show, task_error
 from brachis.task.models import Task
@@ -24,14 +26,17 @@ LARGEST_TASK = 1_000_000
 """Bytes of YAML, which take some 20 s to read."""
 
 
-def load_task(source: Source) -> Task:
+def load_task(source: Source, *, changes: Mapping[str, object] | None = None) -> Task:
     """Return the task that a file or a mapping describes.
 
     Parameters
     ----------
     source : path-like, mapping or Task
         A YAML file; or what such a file would contain, as a mapping (NumPy arrays are accepted as lists); or a task,
-        which is returned as it is.
+        which is returned as it is unless keys are to be changed.
+    changes : mapping of str to object, optional
+        Values by dotted keys, such as ``{"spline.intervals": 40, "path.0.line.length": 0.5}``: they take the place of
+        what `source` says.
 
     Returns
     -------
@@ -61,16 +66,17 @@ def load_task(source: Source) -> Task:
     3
     """
     if isinstance(source, Task):
-        return source
+        return load_task(source.to_dict(), changes=changes) if changes else source
     if isinstance(source, Mapping):
-        return task_from(source, "task", Path.cwd())
+        return task_from(source, "task", Path.cwd(), changes or {})
     if not isinstance(source, str | os.PathLike):
         problem = "a task is loaded from a file or a mapping"
         raise TaskError(problem, found=type(source).__name__, allowed="a file name, a mapping, or a Task")
     path = Path(source)
+    check_kind(path, Kind.TASK, TaskError)
     hint = "Long lists of waypoints belong in a CSV file"
     text = read_text(path, where=str(path), folder=Path.cwd(), largest=LARGEST_TASK, hint=hint)
-    task = task_from(read_yaml(text, str(path)), str(path), path.absolute().parent)
+    task = task_from(read_yaml(text, str(path)), str(path), path.absolute().parent, changes or {})
     if task.robot.urdf is None:
         problem = "this key is required in a task file, and missing"
         raise TaskError(problem, where=f"{path}: robot.urdf", hint="Give the URDF's path, relative to the task file")
@@ -91,7 +97,7 @@ def check_robot_settings(content: Mapping[str, object]) -> RobotSettings:
         raise task_error(error, "robot", RobotSettings) from None
 
 
-def task_from(content: object, source: str, folder: Path) -> Task:
+def task_from(content: object, source: str, folder: Path, changes: Mapping[str, object]) -> Task:
     """Return the task that has this content.
 
     Parameters
@@ -102,6 +108,8 @@ def task_from(content: object, source: str, folder: Path) -> Task:
         What messages name as the place of mistakes.
     folder : Path
         What paths of files in it are relative to.
+    changes : mapping
+        Dotted keys that are set.
 
     Raises
     ------
@@ -111,6 +119,9 @@ def task_from(content: object, source: str, folder: Path) -> Task:
     if not isinstance(content, Mapping):
         problem = "a task is a mapping"
         raise TaskError(problem, found=show(content), allowed=", ".join(Task.model_fields), where=source)
+    if changes:
+        content = with_keys(content, changes)
+        source = f"{source} with {', '.join(changes)} set"
     try:
         task = Task.model_validate(plain(with_limits_of_file(content, source, folder)))
     except ValidationError as error:

@@ -15,6 +15,7 @@ import numpy as np
 
 from brachis.errors import InputError, ResultFileError
 from brachis.files import atomic_write, open_file
+from brachis.kinds import Kind, check_kind
 from brachis.robot import Robot, bind
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import Task, load_task
@@ -88,6 +89,7 @@ def read_result(path: Path) -> Content:
     ResultFileError
         The file is missing, broken or of another schema version, or its parts do not fit each other.
     """
+    check_kind(path, Kind.RESULT, ResultFileError)
     try:
         with open_file(path, LARGEST) as stream:
             meta, arrays = _parts(stream)

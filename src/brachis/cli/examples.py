@@ -1,0 +1,39 @@
+"""Examples of every command, and the exit codes, as the help shows them.
+
+Run in this order the examples work, given a sweep file ``lines.yaml`` (docs/sweeps.md).
+"""
+
+from __future__ import annotations
+
+EXIT_CODES = (
+    "0    done; of a plan: planned and verified",
+    "1    no verified plan; a fault of brachis; output that cannot be written",
+    "2    wrong input: a file, a key, an option",
+    "3    planned and verified, but a figure could not be written",
+    "130  interrupted (Ctrl-C) before there was a motion",
+)
+
+EXAMPLES: dict[str, tuple[str, ...]] = {
+    "": (
+        "brachis new scara3                # a task for a robot that comes along",
+        "brachis plan task.yaml --out out  # plan, verify, draw",
+    ),
+    "robots": ("brachis robots", "brachis robots --json"),
+    "new": ("brachis new scara3", "brachis new iiwa14 --out iiwa.yaml"),
+    "plan": (
+        "brachis plan task.yaml --out out",
+        "brachis plan task.yaml --set search.effort=single --set 'path.0.line.by=[0, 0.4]'",
+    ),
+    "bottleneck": ("brachis bottleneck task.yaml --set search.effort=single",),
+    "verify": ("brachis verify out/result.npz",),
+    "export": ("brachis export out/result.npz --csv out/motion.csv --dt 0.004",),
+    "plot": ("brachis plot out/result.npz --kind torques --out out/torques.svg",),
+    "inspect": ("brachis inspect task.yaml", "brachis inspect tx90l_rail --task-space pose"),
+    "compose": ("brachis compose iiwa14 --range -2 2 --velocity 2 --force 1500 --mass 50 --out cell.urdf",),
+    "sweep": (
+        "brachis sweep lines.yaml --jobs 2",
+        "brachis sweep lines.yaml --retry  # goes on where it was ended",
+    ),
+    "schema": ("brachis schema --out task.schema.json",),
+}
+"""By command; those of the whole program under no name."""

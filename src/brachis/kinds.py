@@ -1,0 +1,68 @@
+"""What a file is, told from how it begins, and what to do with it where another kind is expected."""
+
+from __future__ import annotations
+
+import codecs
+import os
+import re
+from enum import Enum
+
+from brachis.errors import InputError
+from brachis.files import LARGEST_TEXT, open_file
+
+_LOOKED_AT = 16_384
+"""Bytes at the beginning of a file."""
+_TASK = re.compile(rb"^brachis\s*:", re.MULTILINE)
+_FIGURES = b'{\n  "t_end"'
+
+
+class Kind(Enum):
+    """A kind of file, in words."""
+
+    TASK = "a task file"
+    URDF = "a URDF"
+    RESULT = "a result"
+    FIGURES = "the figures of a plan"
+
+
+_ADVICE = {
+    Kind.TASK: "brachis plan {path} --out out makes a result of it; its key robot.urdf names its URDF",
+    Kind.URDF: "brachis new {path} writes a task for it",
+    Kind.RESULT: "brachis verify, plot and bottleneck take it; it was planned from a task file, for a URDF",
+    Kind.FIGURES: "The motion itself is in the npz file beside it",
+}
+
+
+def kind_of(path: str | os.PathLike[str]) -> Kind | None:
+    """Tell what a file is; None where it cannot be read, or is something else."""
+    try:
+        with open_file(path, 4 * LARGEST_TEXT) as stream:
+            beginning = stream.read(_LOOKED_AT).removeprefix(codecs.BOM_UTF8)
+    except OSError:
+        return None
+    if beginning.startswith(b"PK"):
+        return Kind.RESULT
+    if beginning.startswith(_FIGURES):
+        return Kind.FIGURES
+    if re.search(rb"<robot\b", beginning) and beginning.lstrip().startswith(b"<"):
+        return Kind.URDF
+    return Kind.TASK if _TASK.search(beginning) else None
+
+
+def check_kind(path: str | os.PathLike[str], expected: Kind, error: type[InputError]) -> None:
+    """Refuse a file that is of another kind than is expected; what is none of them is for its reader to refuse.
+
+    Raises
+    ------
+    InputError
+        Of the class `error`.
+    """
+    found = kind_of(path)
+    if found not in (None, expected):
+        raise error(
+            "the file is of another kind",
+            where=os.fspath(path),
+            found=found.value,
+            allowed=expected.value,
+            hint=_ADVICE[found].format(path=os.fspath(path)),
+        )

@@ -1,0 +1,140 @@
+"""How to plan, as the task file says it: splines, search, solver, refinement."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+from pydantic import Field, Tag, model_validator
+
+from brachis.task.fields import Count, Flag, Model, Name, Positive, Share, by_form, refuse
+
+_VANISHING: Final = {"velocity": 1, "full": 2, "jerk": 3}
+Intervals = Annotated[
+    Annotated[Literal["auto"], Tag("<word>")] | Annotated[Annotated[Count, Field(ge=4, le=10_000)], Tag("<number>")],
+    by_form("auto, or a whole number", "auto"),
+]
+
+
+class SplineSettings(Model):
+    """The B-splines of the path coordinate and the redundant joints."""
+
+    degree: Count = Field(
+        default=3, ge=2, le=7, description="Degree; 3 gives continuous torque, 4 continuous torque rate."
+    )
+    intervals: Intervals = Field(
+        default=20,
+        description="Number of knot intervals; auto doubles them where it pays until another doubling gains less than "
+        "the tolerance. Free knots need a number.",
+    )
+    tolerance: Positive = Field(
+        default=1.0e-3, le=0.1, description="With intervals: auto, the gain, as a fraction of t_E, that ends it."
+    )
+    knots: Literal["uniform", "free"] = Field(
+        default="uniform", description="Equal intervals, or their lengths as variables of the optimisation."
+    )
+    shortest_interval: Positive = Field(
+        default=0.1,
+        lt=1.0,
+        description="With knots: free, the least length of an interval, in mean intervals; never less than 5e-5 t_E.",
+    )
+    rest: Literal["velocity", "full", "jerk"] = Field(
+        default="full",
+        description="What vanishes at both ends: velocity alone; velocity and acceleration (full); or velocity, "
+        "acceleration and jerk, and with them the rates of the torques (jerk; degree 4 at least).",
+    )
+    points_per_interval: Count = Field(default=3, ge=1, le=100, description="Collocation points per knot interval.")
+
+    @property
+    def vanishing(self) -> int:
+        """How many derivatives of the joint positions vanish at both ends."""
+        return _VANISHING[self.rest]
+
+    @model_validator(mode="after")
+    def _rest_needs_degree(self) -> SplineSettings:
+        order = self.vanishing
+        if order > 1 and self.degree <= order:
+            last = {2: "acceleration", 3: "jerk"}[order]
+            problem = (
+                f"rest: {self.rest} asks for a continuous {last} that is zero at the ends: "
+                f"degree {self.degree} cannot give it"
+            )
+            lower = " or ".join(
+                f"rest: {word}" for word, level in _VANISHING.items() if level < min(order, self.degree)
+            )
+            raise refuse(problem, key=".degree", found=self.degree, allowed=f">= {order + 1}, or {lower}")
+        return self
+
+    @model_validator(mode="after")
+    def _free_knots_are_counted(self) -> SplineSettings:
+        if self.knots == "free" and self.intervals == "auto":
+            problem = "free knots move; how many there are must be given"
+            raise refuse(problem, key=".intervals", found="auto", allowed="a whole number, or knots: uniform")
+        return self
+
+
+class SearchSettings(Model):
+    """The search over redundant joints, branches and initial guesses."""
+
+    effort: Literal["single", "fast", "thorough", "exhaustive"] = Field(
+        default="fast",
+        description="How far the search goes: single plans once, from the most promising guess, and goes on only if "
+        "that fails.",
+    )
+    guesses: Literal["lattice", "numeric"] = Field(
+        default="lattice",
+        description="Where initial guesses come from: a lattice of postures, or numeric inverse kinematics "
+        "from the start posture.",
+    )
+    jobs: Count = Field(
+        default=1, ge=1, description="Processes that plan at the same time; no more than there are processors are used."
+    )
+    time_limit: Positive = Field(
+        default=60.0,
+        le=1e6,
+        description="Time after which the best motion so far is returned, s; one that is not verified where none is.",
+    )
+    seed: Count = Field(default=0, ge=0, description="Seed of what is drawn at random.")
+    least_motion: Flag = Field(
+        default=True,
+        description="Whether, of motions that are as fast as the fastest one to 1e-4, the calmest one is taken: that "
+        "with the least joint accelerations.",
+    )
+    slower: Share = Field(
+        default=0.0, description="How much slower the calmest motion may be, for example 1 %, or 0.01."
+    )
+
+    @model_validator(mode="after")
+    def _slower_is_for_least_motion(self) -> SearchSettings:
+        if self.slower and not self.least_motion:
+            problem = "a slower motion is of use for least motion alone"
+            raise refuse(problem, key=".slower", found=self.slower, allowed="0, or least_motion: true")
+        return self
+
+
+class SolverSettings(Model):
+    """The solver of the optimisation problem and its bounds."""
+
+    name: Name = Field(default="auto", description="Solver; auto takes the best one installed.")
+    max_iterations: Count = Field(default=300, ge=1, le=1_000_000, description="Largest number of iterations.")
+    time_limit: Positive = Field(
+        default=20.0, le=1e6, description="Largest time of one solve, s; search.time_limit bounds the whole plan."
+    )
+    tolerance: Positive = Field(default=1.0e-6, description="Tolerance of the optimality conditions.")
+
+
+class RefinementSettings(Model):
+    """Adding collocation points until the limits hold in between them as well."""
+
+    tolerance: Positive = Field(
+        default=1.0e-4,
+        ge=1.0e-5,
+        le=0.01,
+        description="Largest relative violation of a limit, anywhere; of a position, beyond its range, in rad (m), or "
+        "in half ranges where these are shorter. What is less than 1e-5 the checks do not show.",
+    )
+    density: Count = Field(
+        default=10, ge=10, le=1000, description="Grid points for checking limits, per collocation point."
+    )
+    max_rounds: Count = Field(
+        default=10, ge=0, le=1000, description="Largest number of rounds; 0 switches refinement off."
+    )

@@ -1,0 +1,179 @@
+"""What all commands have in common: help with examples that work, completion, how much is said, changes of a task."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+
+import pytest
+
+from brachis import planner
+from brachis.cli.examples import EXAMPLES
+from brachis.cli.main import app
+
+from .conftest import ROOT, SCARA
+
+COMMAND = [sys.executable, "-m", "brachis"]
+COMMANDS = [each.name or each.callback.__name__ for each in app.registered_commands]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("option", ["-h", "--help"])
+def test_help_of_every_command_has_an_example(command, option, run):
+    outcome = run(command, option, columns=60)
+    assert outcome.code == 0
+    assert f"Usage: brachis {command} " in outcome.out
+    examples = outcome.out.split("Examples:\n")[1].splitlines()
+    assert [line.strip() for line in examples if line] == list(EXAMPLES[command])
+    assert all(line.startswith(f"brachis {command}") for line in EXAMPLES[command])
+    assert "--quiet" in outcome.out
+    assert "--verbose" in outcome.out
+
+
+def test_examples_work_in_this_order(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out").mkdir()
+    fixed = "fixed: {search.effort: single, spline.intervals: 6}"
+    (tmp_path / "lines.yaml").write_text(f"sweep: 1\ntask: task.yaml\n{fixed}\ngrid: {{spline.degree: [3, 4]}}\n")
+    assert set(EXAMPLES) == {"", *COMMANDS}
+    assert {line.split("  #")[0].strip() for line in EXAMPLES[""]} <= {*EXAMPLES["new"], *EXAMPLES["plan"]}
+    for command, lines in EXAMPLES.items():
+        for line in lines if command else ():
+            outcome = run(*shlex.split(line, comments=True)[1:])
+            assert outcome.code == 0, f"{line}: {outcome.err}"
+
+
+def test_help_of_the_program(run):
+    outcome = run("-h", columns=80)
+    assert outcome.code == 0
+    assert all(f"\n  {command} " in outcome.out for command in COMMANDS)
+    assert "..." not in outcome.out.split("Commands:")[1]
+    assert "130  interrupted" in outcome.out
+    nothing = run(columns=80)
+    assert (nothing.code, nothing.out, nothing.err) == (2, "", outcome.out)
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_script(shell):
+    environment = {**os.environ, "_BRACHIS_COMPLETE": f"source_{shell}"}
+    done = subprocess.run(COMMAND, env=environment, capture_output=True, text=True, check=True)
+    assert f"_BRACHIS_COMPLETE=complete_{shell}" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"), [("brachis pl", ["plan", "plot"]), ("brachis plan --s", ["--set", "--strict"])]
+)
+def test_completion(words, expected):
+    last = str(len(words.split()) - 1)
+    environment = {**os.environ, "_BRACHIS_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": last}
+    done = subprocess.run(COMMAND, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == expected
+
+
+WRONG = {
+    "a typo": (("plna", "task.yaml"), ["no such command 'plna'", "Did you mean 'plan'?", "see brachis --help"]),
+    "no command": ((ROOT / "examples/01_scara_line.yaml",), ["a command comes before a file: brachis plan "]),
+    "a URDF alone": ((SCARA,), ["a command comes before a file: brachis inspect "]),
+    "an option's typo": (("plan", "task.yaml", "--outt"), ["--outt", "--out", "see brachis plan --help"]),
+    "no argument": (("plan",), ["missing argument 'TASK'"]),
+    "a robot's typo": (("new", "scara4"), ["'scara4'", "Did you mean 'scara3'?"]),
+    "no robot": (("inspect", "gone.urdf"), ["gone.urdf: the URDF file does not exist"]),
+    "a URDF for a task": (("plan", SCARA), ["found a URDF; allowed: a task file", f"brachis new {SCARA}"]),
+    "a URDF for a result": (("verify", SCARA), ["found a URDF; allowed: a result", f"brachis new {SCARA}"]),
+    "a task for a URDF": (("new", ROOT / "examples/01_scara_line.yaml"), ["a task file; allowed: a URDF"]),
+    "a task for a result": (("verify", ROOT / "examples/01_scara_line.yaml"), ["found a task file", "brachis plan "]),
+    "no assignment": (("plan", ROOT / "examples/01_scara_line.yaml", "--set", "spline"), ["key=value", "'spline'"]),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+@pytest.mark.parametrize("more", [(), ("--json",)])
+def test_wrong_command_lines(case, more, run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words, expected = WRONG[case]
+    outcome = run(*words, *more)
+    assert outcome.code == 2
+    assert outcome.err.startswith("brachis: ")
+    assert outcome.err.count("\n") == 1
+    assert all(part in outcome.err for part in expected)
+    if more:
+        assert f"brachis: {json.loads(outcome.out)['error']}\n" == outcome.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_results_are_told_from_tasks(run, tmp_path):
+    for content, expected in ((b"PK\x03\x04", "found a result"), (b'{\n  "t_end": 1.0\n}', "the figures of a plan")):
+        (tmp_path / "file").write_bytes(content)
+        outcome = run("plan", tmp_path / "file")
+        assert outcome.code == 2
+        assert expected in outcome.err
+
+
+SMALL = ("--set", "spline.intervals=6", "--set", "search={effort: single, least_motion: false}")
+
+
+def test_set_changes_the_task(run, task, write, tmp_path):
+    path = write(task)
+    outcome = run("plan", path, *SMALL, "--set", "path.0.line.length=0.3", "--set", "robot.limits.torque=8", "--json")
+    assert outcome.code == 0, outcome.err
+    data = json.loads(outcome.out)
+    assert 1.0 < data["t_end"] < 2.4
+    shown = json.loads(run("inspect", path, "--set", "robot.limits.torque=8", "--json").out)
+    assert [joint["torque"] for joint in shown["joints"]] == ["8 Nm"] * 3
+    assert "torque" in run("bottleneck", path, *SMALL).out
+    outcome = run("bottleneck", tmp_path / "result.npz", "--set", "spline.intervals=6")
+    assert outcome.code == 2
+    assert "--set: a saved motion" in outcome.err
+
+
+@pytest.mark.parametrize("command", ["plan", "bottleneck", "inspect"])
+def test_set_names_the_key_and_its_alternatives(command, run, task, write):
+    outcome = run(command, write(task), "--set", "robot.limits.torqe=8")
+    assert outcome.code == 2
+    for part in ("with robot.limits.torqe set: ", "unknown key", "velocity, acceleration", "Did you mean 'torque'"):
+        assert part in outcome.err
+
+
+def test_how_much_is_said(run, task, write):
+    path = write(task)
+    assert run("plan", path, *SMALL, "--quiet") == run("-q", "plan", path, *SMALL)
+    quiet = run("plan", path, *SMALL, "--set", "robot.limits.velocity=1e9", "-q")
+    assert (quiet.code, quiet.out, quiet.err) == (0, "", "")
+    verbose = run("plan", path, *SMALL, "-v")
+    assert "verification: passed" in verbose.out
+    steps = verbose.err.splitlines()
+    assert len(steps) > 3
+    assert all(" s: " in line and line.startswith("brachis: ") for line in steps)
+    assert run("plan", path, *SMALL).err == "", "what one command is told does not hold for the next one"
+    assert json.loads(run("plan", path, *SMALL, "--json", "--quiet").out)["verified"]
+    assert "gone.yaml" in run("plan", "gone.yaml", "--quiet").err
+
+
+def test_tracebacks_are_for_those_who_ask(run, task, write, monkeypatch):
+    def broken(*_arguments, **_options):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(planner, "plan", broken)
+    outcome = run("plan", write(task))
+    assert outcome.code == 1
+    assert "Traceback" not in outcome.err
+    assert "fault of brachis; run again with --verbose" in outcome.err
+    assert "Traceback" in run("plan", write(task), "--verbose").err
+
+
+def test_new_and_robots(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    listed = json.loads(run("robots", "--json").out)["robots"]
+    assert {"name": "gantry2", "what": "two linear axes", "joints": ["x_axis", "y_axis"]}.items() <= listed[1].items()
+    data = json.loads(run("new", listed[1]["urdf"], "--json").out)
+    assert data["verified"]
+    assert data["file"] == "task.yaml"
+    before = (tmp_path / "task.yaml").read_text()
+    outcome = run("new", "scara3")
+    assert outcome.code == 2
+    assert "task.yaml: the file exists" in outcome.err
+    assert (tmp_path / "task.yaml").read_text() == before
+    assert run("plan", "task.yaml", *SMALL).code == 0

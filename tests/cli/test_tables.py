@@ -1,0 +1,91 @@
+"""Tables fit the terminal, and no number in them is cut or wrapped, whichever command prints them."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from rich.console import Console
+
+import brachis
+from brachis.cli.tables import Column, print_table
+
+from .conftest import ROOT
+
+WIDTHS = (60, 80, 120)
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
+
+
+def printed(width, columns, rows, **options):
+    console = Console(width=width, highlight=False, markup=False)
+    with console.capture() as capture:
+        print_table(console, "title", columns, rows, **options)
+    return capture.get()
+
+
+COLUMNS = ("what", *(Column(f"value {i} [s]", number=True) for i in range(6)), "remark")
+ROWS = [
+    ("first thing", *(f"{-1.23456 * 10**i:.5f}" for i in range(6)), "a remark of many words that has to be wrapped"),
+    ("second thing", *("1.2e-13" for _ in range(6)), ""),
+]
+
+
+@pytest.mark.parametrize("width", [30, *WIDTHS, 200])
+def test_numbers_stay_whole_at_every_width(width):
+    text = printed(width, COLUMNS, ROWS)
+    assert max(map(len, text.splitlines())) <= width
+    words = text.replace("│", " ").split()
+    for row in ROWS:
+        assert {str(cell) for cell in row[1:-1]} <= set(words)
+
+
+def test_a_table_has_lines_where_they_fit_and_parts_where_nothing_else_does():
+    assert "━" in printed(200, COLUMNS, ROWS)
+    assert "━" not in printed(60, COLUMNS, ROWS)
+    assert "title (2 of " in printed(60, COLUMNS, ROWS)
+    assert printed(60, COLUMNS, ROWS).count("first") >= 2
+
+
+def test_long_words_of_text_are_broken_not_lost():
+    text = printed(30, ("", ""), [("branch", "shoulder_front_elbow_up_wrist_flipped")], header=False)
+    assert "shoulder_front_elbow_up_wrist_flipped" in re.sub(r"\s|│|branch", "", text)
+    assert max(map(len, text.splitlines())) <= 30
+
+
+@pytest.fixture(scope="module")
+def result():
+    return brachis.plan(ROOT / "examples/01_scara_line.yaml", effort="single", intervals=6, least_motion=False)
+
+
+@pytest.fixture
+def points(task, write, tmp_path):
+    """A task along points with a corner that is rounded."""
+    there = [(1.8, 0.004 * i) for i in range(100)]
+    back = [(1.8 - 0.004 * i, 0.396) for i in range(1, 100)]
+    (tmp_path / "points.csv").write_text("\n".join(["x;y", *(f"{x};{y}" for x, y in there + back)]))
+    tolerance = {"position": "0.1 mm", "corner": "5 mm"}
+    task["path"] = [{"csv": {"file": "points.csv", "tolerance": tolerance, "corner": "blend"}}]
+    return write({**task, "start": "free"})
+
+
+SHOWING = {
+    "plan": ("plan", ROOT / "examples/01_scara_line.yaml"),
+    "verify": ("verify", "RESULT"),
+    "inspect an arm on a rail": ("inspect", "tx90l_rail"),
+    "inspect points": ("inspect", "POINTS"),
+    "robots": ("robots",),
+}
+
+
+@pytest.mark.parametrize("case", SHOWING)
+def test_no_command_cuts_numbers(case, run, result, points, tmp_path, monkeypatch):
+    result.trajectory.save(tmp_path / "result.npz")
+    monkeypatch.setattr("brachis.planner.plan", lambda *_arguments, **_options: result)
+    given = {"RESULT": tmp_path / "result.npz", "POINTS": points}
+    arguments = [given.get(word, word) for word in SHOWING[case]]
+    texts = {width: run(*arguments, columns=width).out for width in (*WIDTHS, 200)}
+    numbers = set(NUMBER.findall(texts[200]))
+    assert len(numbers) > 5
+    for width in WIDTHS:
+        assert numbers <= set(NUMBER.findall(texts[width])), width
+        assert all(len(line) <= width for line in texts[width].splitlines() if "━" in line or "│" in line)

@@ -1,0 +1,96 @@
+"""First tasks: they plan and verify at once, for whichever robot."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import brachis
+from brachis.errors import PlanningError, UrdfError
+from brachis.robot.limits import UrdfLimit
+from brachis.starter import Starter, starter_task
+from brachis.starter.missing import placeholders
+from support.chains import Joint, chain_urdf
+
+PACKAGE = "cmeel.prefix/share/example-robot-data/robots"
+FOREIGN = {
+    "panda_description/urdf/panda.urdf": ("panda_hand", 7),
+    "ur_description/urdf/ur5_robot.urdf": ("wrist_3_link", 6),
+    "baxter_description/urdf/baxter.urdf": ("left_gripper_base_link", 7),
+    "double_pendulum_description/urdf/double_pendulum.urdf": ("link2", 2),
+}
+
+
+def check(starter: Starter, folder: Path) -> None:
+    """The quick plan is one of the task file as it was written, and begins well within all ranges."""
+    path = folder / "task.yaml"
+    path.write_text(starter.text)
+    task = brachis.load_task(path)
+    assert starter.result.verified
+    assert task.path == starter.result.task.path
+    assert Path(task.robot.urdf).samefile(starter.robot.source)
+    limits, q = starter.robot.limits, starter.result.trajectory.position(0.0)
+    inner = 0.1 * np.where(np.isfinite(limits.position_upper), limits.position_upper - limits.position_lower, 0.0)
+    assert np.all((q > limits.position_lower + inner) & (q < limits.position_upper - inner))
+
+
+def two_joints(axis: tuple[float, ...] = (0.0, 0.0, 1.0), effort: float = 60.0) -> str:
+    """A chain whose first joint may be weak."""
+    limit = {"lower": -3.1, "upper": 3.1, "velocity": 3.0, "effort": effort}
+    joints = [Joint("revolute", axis, limit=limit), Joint("revolute", axis, xyz=(0.5, 0.0, 0.0))]
+    return chain_urdf(joints, tool=(0.5, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("name", brachis.robots.names())
+def test_robots_that_come_along(name, tmp_path):
+    check(starter_task(brachis.robots.path_of(name), folder=tmp_path), tmp_path)
+
+
+@pytest.mark.parametrize("file", FOREIGN)
+def test_robots_of_others(file, tmp_path):
+    found = [folder / PACKAGE / file for folder in map(Path, sys.path) if (folder / PACKAGE / file).exists()]
+    if not found:
+        pytest.skip("example-robot-data is not installed")
+    starter = starter_task(found[0], folder=tmp_path)
+    check(starter, tmp_path)
+    assert (starter.robot.tool_frame, starter.robot.n) == FOREIGN[file]
+
+
+def test_names_that_yaml_would_misread(tmp_path):
+    text = two_joints()
+    urdf = tmp_path / "robot # 1.urdf"
+    urdf.write_text(text.replace("'j1'", "'on'").replace("'j2'", "'2: a # b'").replace("'tool'", "'null'"))
+    starter = starter_task(urdf, folder=tmp_path)
+    check(starter, tmp_path)
+    assert list(yaml.safe_load(starter.text)["start"]["joints"]) == ["on", "2: a # b"]
+
+
+def test_limits_that_are_missing_are_marked(tmp_path):
+    (tmp_path / "robot.urdf").write_text(two_joints(effort=0.0))
+    starter = starter_task(tmp_path / "robot.urdf", folder=tmp_path)
+    assert "PUT THE MAKER'S FIGURES HERE" in starter.text
+    assert yaml.safe_load(starter.text)["robot"]["limits"] == {"torque": {"j1": None}, "acceleration": {"j1": 1.0}}
+
+
+def test_placeholders_of_every_kind():
+    limits = placeholders(("a", "b"), (UrdfLimit(-1.0, 1.0, 2.0, 3.0), UrdfLimit(0.0, 0.0, 0.0, None)))
+    assert limits.torque == {"b": None}
+    assert limits.velocity == {"b": None}
+    assert limits.position == {"b": (-1.5, 1.5)}
+    assert limits.acceleration == {"b": 1.0}
+
+
+def test_an_arm_that_cannot_hold_itself(tmp_path):
+    (tmp_path / "robot.urdf").write_text(two_joints(axis=(0.0, 1.0, 0.0), effort=0.001))
+    with pytest.raises(PlanningError, match=r"no first motion was found.*j1, j2"):
+        starter_task(tmp_path / "robot.urdf")
+
+
+def test_what_is_no_arm(tmp_path):
+    (tmp_path / "robot.urdf").write_text("<robot name='x'><link name='a'/></robot>")
+    with pytest.raises(UrdfError, match="no joint moves"):
+        starter_task(tmp_path / "robot.urdf")
