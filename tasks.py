@@ -4,7 +4,8 @@
     python3 tasks.py test        run the tests
     python3 tasks.py lint        ruff
     python3 tasks.py types       mypy
-    python3 tasks.py check       test, lint and types
+    python3 tasks.py docs        build the documentation into out/site, run its cells, check its links
+    python3 tasks.py check       test, lint, types and docs
     python3 tasks.py bench       timings (minutes)
 
 Arguments after the task's name go to the command. Only the standard library is needed to run this file.
@@ -29,6 +30,7 @@ INSTALL = {
     "lint": ".[lint]",
     "types": ".[lint]",
     "bench": ".[benchmark]",
+    "docs": ".[docs]",
 }
 COMMANDS = {
     "demo": [["brachis", "plan", "examples/01_scara_line.yaml", "--out", "out"]],
@@ -36,6 +38,10 @@ COMMANDS = {
     "lint": [["ruff", "check", "."], ["ruff", "format", "--check", "."]],
     "types": [["mypy"]],
     "bench": [["python", "-m", "pytest", "benchmarks", "-p", "no:xdist"], ["python", "benchmarks/growth.py"]],
+    "docs": [
+        ["python", "-m", "sphinx", "-q", "-E", "-W", "--keep-going", "docs", "out/site"],
+        ["python", "docs/check_links.py", "out/site"],
+    ],
 }
 
 
@@ -57,7 +63,7 @@ def prepare(extra: str) -> None:
 def run(task: str, arguments: list[str]) -> int:
     """Run one task; returns its exit code."""
     if task == "check":
-        return max(run(each, []) for each in ("test", "lint", "types"))
+        return max(run(each, []) for each in ("test", "lint", "types", "docs"))
     prepare(INSTALL[task])
     code = 0
     for command in COMMANDS[task]:

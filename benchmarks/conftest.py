@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+import sys
 from pathlib import Path
 
 import pytest
@@ -43,3 +45,15 @@ def make_task():
         )
 
     return make
+
+
+def pytest_benchmark_update_json(output_json):
+    """Keep a table of what is saved (``--benchmark-save`` or ``--benchmark-json``) in benchmarks/results."""
+    sys.path.insert(0, str(ROOT / "benchmarks"))
+    committed = importlib.import_module("committed")
+    rows = [
+        (each["fullname"].split("::")[1], *(f"{1e3 * each['stats'][name]:.3g} ms" for name in ("median", "min", "max")))
+        for each in output_json["benchmarks"]
+    ]
+    command = "python -m pytest benchmarks --benchmark-json FILE --benchmark-timer time.process_time"
+    committed.write("speed", command, "Timings", ("what", "median", "least", "most"), rows, "")

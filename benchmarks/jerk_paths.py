@@ -1,6 +1,6 @@
 """Seeded paths of a seven-joint arm with jerk limits, timed by brachis and by copp-py's third-order solver.
 
-Usage: python benchmarks/jerk_paths.py [--count 20] [--first 0] [--intervals 100] [--stations 1601]
+Usage: python benchmarks/jerk_paths.py [--count 20] [--first 0] [--intervals 100] [--stations 1601] [--save]
 
 The paths, and the limits on velocity, acceleration and torque, are those of `joint_paths`; the jerk of every joint is
 limited as well, and the acceleration is zero at both ends. brachis plans cubic splines s(t), refined and verified.
@@ -22,6 +22,7 @@ import brachis
 import joint_paths
 from brachis.path import Path, path_of
 from brachis.robot import Robot, bind
+from committed import save
 
 SETTLED, MOST_ROUNDS = 1e-5, 20
 WITHIN = 1.002
@@ -100,6 +101,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--intervals", type=int, default=100)
     parser.add_argument("--stations", type=int, default=1601)
+    parser.add_argument("--save", action="store_true", help="into benchmarks/results")
     given = parser.parse_args()
     rows = []
     print("case   brachis t_E   copp t_E   difference   copp's worst ratio   brachis     copp (processor time)")
@@ -122,14 +124,24 @@ def main() -> None:
             f"{seed:4d} {t_end:11.4f} s {least:8.4f} s {100.0 * gap:10.3f} % {worst:18.4f} "
             f"{ours:10.2f} s {theirs:6.2f} s"
         )
-    gaps, worst_ratios, ours_all, theirs_all = np.array(rows).T
+    summarise(np.array(rows))
+
+
+def summarise(rows: np.ndarray) -> None:
+    """Print, and keep if asked, what came of all cases: difference, copp's worst ratio, both processor times, s."""
+    gaps, worst_ratios, ours_all, theirs_all = rows.T
     both = np.isfinite(gaps) & (worst_ratios <= WITHIN)
-    print(
-        f"{len(rows)} cases, {int(np.isinf(gaps).sum())} of brachis failed, {int((worst_ratios > WITHIN).sum())} of "
-        f"copp-py are beyond a limit between stations by more than 0.2 %; where both hold: difference "
-        f"{100.0 * np.min(gaps[both], initial=np.inf):.3f} to {100.0 * np.max(gaps[both], initial=-np.inf):.3f} %; "
-        f"processor time, median: brachis {np.median(ours_all):.2f} s, copp-py {np.median(theirs_all):.2f} s"
-    )
+    span = f"{100.0 * gaps[both].min(initial=np.inf):+.2f} % to {100.0 * gaps[both].max(initial=-np.inf):+.2f} %"
+    cells = [
+        ("failed", f"{int(np.isinf(gaps).sum())}", "0"),
+        ("beyond a limit by more than 0.2 % between stations", "0, verified", f"{int((worst_ratios > WITHIN).sum())}"),
+        ("end time beside copp-py's, where both hold", span, ""),
+        ("processor time, median", f"{np.median(ours_all):.2f} s", f"{np.median(theirs_all):.2f} s"),
+    ]
+    columns = (f"{len(rows)} paths", "brachis", "copp-py")
+    for cell in (columns, *cells):
+        print(" | ".join(cell))
+    save("Paths of joints with limited jerk, beside copp-py", columns, cells)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Seeded paths of a seven-joint arm, timed by brachis and by toppra under the same limits, side by side.
 
-Usage: python benchmarks/joint_paths.py [--count 100] [--first 0] [--intervals 150]
+Usage: python benchmarks/joint_paths.py [--count 100] [--first 0] [--intervals 150] [--save]
 
 Natural quintic splines through random waypoints of the KUKA iiwa 14, with limits on velocity, acceleration and torque.
 brachis plans cubic splines s(t) (continuous torque), from rest to rest, and its motion is refined and verified; toppra
@@ -22,6 +22,7 @@ import pinocchio as pin
 import brachis
 from brachis.path import path_of
 from brachis.robot import bind
+from committed import save
 
 ROOT = Path(__file__).parents[1]
 URDF = ROOT / "robots/iiwa14/robot.urdf"
@@ -62,7 +63,7 @@ def _drawn(rng: np.random.Generator, intervals: int) -> dict[str, Any]:
         "task_space": "joints",
         "path": [{"spline": {"through": waypoints[1:].tolist()}}],
         "spline": {"intervals": intervals, "rest": "velocity"},
-        "search": {"least_motion": False},
+        "search": {"least_motion": False, "time_limit": 600.0},  # no busy machine ends a search early
     }
 
 
@@ -72,6 +73,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--intervals", type=int, default=150)
+    parser.add_argument("--save", action="store_true", help="into benchmarks/results")
     given = parser.parse_args()
     spec = importlib.util.spec_from_file_location("example", ROOT / "examples/11_from_toppra.py")
     example = importlib.util.module_from_spec(spec)
@@ -95,13 +97,34 @@ def main() -> None:
         ours = time.process_time() - began
         rows.append((t_end / least - 1.0, ours, theirs))
         print(f"{seed:4d} {t_end:11.4f} s {least:10.4f} s {100.0 * rows[-1][0]:10.3f} % {ours:7.2f} s {theirs:6.2f} s")
-    gaps, ours_all, theirs_all = np.array(rows).T
+    summarise(np.array(rows), active)
+
+
+def summarise(rows: np.ndarray, active: Counter[str]) -> None:
+    """Print, and keep if asked, what came of all cases: rows of relative difference and both processor times, s."""
+    gaps, ours_all, theirs_all = rows.T
     print(
         f"{len(rows)} cases, {int(np.isinf(gaps).sum())} failed; difference {100.0 * gaps.min():.3f} to "
         f"{100.0 * gaps.max():.3f} %, median {100.0 * np.median(gaps):.3f} %; processor time, median: brachis "
         f"{np.median(ours_all):.2f} s (refined and verified), toppra {np.median(theirs_all):.2f} s (2000 intervals)"
     )
-    print(", ".join(f"{name.removesuffix(' ratio')} limit active in {count}" for name, count in active.items()))
+    limits = ", ".join(f"{name.removesuffix(' ratio')} limit active in {count}" for name, count in active.items())
+    print(limits)
+    about = f"Paths of the KUKA iiwa 14 through three to seven random waypoints; {limits}."
+    cells = [
+        ("planned and verified", str(len(rows) - int(np.isinf(gaps).sum())), str(len(rows))),
+        (
+            "end time beside toppra's",
+            f"{100.0 * gaps.min():+.3f} % to {100.0 * gaps.max():+.3f} %, median {100.0 * np.median(gaps):+.3f} %",
+            "grid of 2000 intervals",
+        ),
+        (
+            "processor time, median",
+            f"{np.median(ours_all):.2f} s, refined and verified",
+            f"{np.median(theirs_all):.2f} s",
+        ),
+    ]
+    save("Paths of joints, beside toppra", (f"{len(rows)} paths", "brachis", "toppra"), cells, about)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Random tasks of mixed kinds on every robot, each with a known solution: how many end in a verified plan, how fast.
 
 Usage: python benchmarks/mixed_tasks.py [--robot NAME] [--seed 0] [--count 24] [--number K] [--folder DIR]
-       [--out FILE] [--compare FILE] [--time-limit S]
+       [--out FILE] [--compare FILE] [--time-limit S] [--save]
 
 The shapes of the path (lines, arcs, circles, splines, blended corners, CSV files) and the task spaces of a robot
 (poses, poses with free roll, positions, positions with a joint locked) go round with the number of the task; all else
@@ -32,6 +32,7 @@ from brachis import plan
 from brachis.errors import BrachisError
 from brachis.plausibility import PlausibilityWarning
 from brachis.task import load_task
+from committed import save
 from mixed_robots import ROBOTS, ROOT
 
 SOON = 3.0
@@ -72,15 +73,18 @@ def planned(case: mixed_cases.Case, time_limit: float | None) -> dict[str, objec
     }
 
 
-def summary(robot: str, results: list[dict[str, object]]) -> str:
-    """One robot's counts and times."""
+def summary(robot: str, results: list[dict[str, object]]) -> tuple[str, ...]:
+    """One robot's counts and times, as cells."""
     times = np.array([result["seconds"] for result in results])
     busy = np.array([result["cpu"] for result in results])
     verified = sum(bool(result["verified"]) for result in results)
     return (
-        f"{robot}: {verified} of {len(results)} verified; median {np.median(times):.2f} s "
-        f"(processor {np.median(busy):.2f} s), longest {times.max():.1f} s ({busy.max():.1f} s), "
-        f"{np.mean(times <= SOON):.0%} within {SOON:g} s"
+        robot,
+        f"{verified} of {len(results)}",
+        f"{np.median(times):.2f} s",
+        f"{np.median(busy):.2f} s",
+        f"{times.max():.1f} s ({busy.max():.1f} s processor)",
+        f"{np.mean(times <= SOON):.0%}",
     )
 
 
@@ -127,6 +131,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--folder", type=Path, help="where task files go; a new one under the temporary folder")
     parser.add_argument("--out", type=Path, help="results, a line of JSON for a task")
     parser.add_argument("--compare", type=Path, help="results of an earlier run")
+    parser.add_argument("--save", action="store_true", help="the summary, into benchmarks/results")
     parser.add_argument("--time-limit", type=float, help="search.time_limit, s; the default of the task file")
     return parser.parse_args()
 
@@ -138,7 +143,7 @@ def main() -> None:
     print(f"task files in {folder}", flush=True)
     numbers = range(given.count) if given.number is None else [given.number]
     plan(ROOT / "examples/01_scara_line.yaml")  # what is loaded on first use is not timed
-    everything = []
+    everything, kept = [], []
     folder.mkdir(parents=True, exist_ok=True)
     with (given.out or folder / "results.jsonl").open("w", encoding="utf-8") as out:
         for robot in [given.robot] if given.robot else ROBOTS:
@@ -149,8 +154,11 @@ def main() -> None:
                 print(json.dumps(result), file=out, flush=True)
                 if result["message"]:
                     print(f"{result['task']} ({result['kind']}): {result['message']}", flush=True)
-            print(summary(robot, results), flush=True)
+            kept.append(summary(robot, results))
+            print(", ".join(kept[-1]), flush=True)
             everything += results
+    columns = ("robot", "verified", "plan time, median", "processor time, median", "longest", f"within {SOON:g} s")
+    save("Random tasks of mixed kinds", columns, kept, "Each task has a known solution; everything is left open.")
     if given.compare:
         compare(read(given.compare), everything)
 

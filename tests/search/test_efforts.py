@@ -11,7 +11,7 @@ from brachis.search.chart_starts import SCREENED
 from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.schedule import looked_at
 
-PAGE = Path(__file__).parents[2] / "docs/search.md"
+PAGE = Path(__file__).parents[2] / "docs/fastest_motion.md"
 
 
 def table(columns):

@@ -42,6 +42,5 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "brachis sweep lines.yaml --jobs 2",
         "brachis sweep lines.yaml --retry  # goes on where it was ended",
     ),
-    "schema": ("brachis schema --out task.schema.json",),
 }
 """By command; those of the whole program under no name."""

@@ -30,7 +30,7 @@ def figure_class() -> type[Figure]:
 def as_html(figure: Figure) -> str:
     """Return an image element with the figure in it."""
     data = base64.b64encode(_png(figure)).decode()
-    return f'<img alt="figure" src="data:image/png;base64,{data}"/>'
+    return f'<img alt="figure" style="min-width:0;max-width:100%;height:auto" src="data:image/png;base64,{data}"/>'
 
 
 def _png(figure: Figure) -> bytes:

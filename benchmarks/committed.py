@@ -1,0 +1,57 @@
+"""Results that are kept: ``--save`` of a benchmark writes them, docs/make_pages.py makes tables of them."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import brachis
+
+FOLDER = Path(__file__).parent / "results"
+
+
+def save(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], about: str = "") -> None:
+    """Write benchmarks/results/NAME.json, named after the script that runs, if the command line has ``--save``.
+
+    Parameters
+    ----------
+    title : str
+    columns : sequence of str
+    rows : sequence of sequence of str
+        Cells as they are printed, with units.
+    about : str, optional
+        A sentence or two above the table.
+    """
+    script, *arguments = sys.argv
+    if "--save" in arguments:
+        arguments.remove("--save")
+        write(
+            Path(script).stem,
+            " ".join(["python", f"benchmarks/{Path(script).name}", *arguments]),
+            title,
+            columns,
+            rows,
+            about,
+        )
+
+
+def write(
+    name: str, command: str, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], about: str
+) -> None:
+    """Write one file of results."""
+    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+    content = {
+        "title": title,
+        "command": command,
+        "version": brachis.__version__,
+        "machine": machine,
+        "about": about,
+        "columns": list(columns),
+        "rows": [list(row) for row in rows],
+    }
+    FOLDER.mkdir(exist_ok=True)
+    (FOLDER / f"{name}.json").write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

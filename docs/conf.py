@@ -1,0 +1,50 @@
+"""Sphinx: the documentation site. ``python3 tasks.py docs`` builds it with warnings as errors."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+import brachis
+
+ROOT = Path(__file__).parents[1]
+project = "brachis"
+author = project_copyright = "The brachis authors"
+version = release = brachis.__version__
+sys.path.insert(0, str(ROOT / "docs"))
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.mathjax", "numpydoc", "myst_nb", "sphinx_design", "docstring_links"]
+nitpicky = True
+templates_path: list[str] = []
+
+myst_enable_extensions = ["colon_fence", "dollarmath"]
+myst_heading_anchors = 3
+nb_execution_mode = "force"
+nb_execution_show_tb = True
+nb_execution_timeout = 600
+nb_merge_streams = True
+
+autodoc_typehints = "none"  # the sections of numpydoc have them, with shapes and units
+autodoc_default_options = {"exclude-members": "model_config"}
+default_role = "py:obj"  # docstring_links.py says what becomes of it
+numpydoc_show_class_members = False
+
+html_theme = "furo"
+html_title = "brachis"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+
+
+def _isolated_clone(folder: Path) -> None:
+    """Have cells run in a folder that looks like the repository and may be written to."""
+    for name in ("robots", "examples"):
+        (folder / name).symlink_to(ROOT / name)
+    startup = folder / ".ipython/profile_default/startup"
+    startup.mkdir(parents=True)
+    (startup / "clone.py").write_text(f"import os\nos.chdir({str(folder)!r})\n")
+    os.environ["IPYTHONDIR"] = str(folder / ".ipython")
+
+
+_CLONE = tempfile.TemporaryDirectory(prefix="brachis-docs-")  # until Sphinx ends
+_isolated_clone(Path(_CLONE.name))

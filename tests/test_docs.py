@@ -1,0 +1,69 @@
+"""The documentation is made of what is in the repository: pages from results, pictures, links, names, citation."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+import brachis
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+README = (ROOT / "README.md").read_text()
+MOST_BYTES = 1_000_000
+
+
+@pytest.fixture(scope="module")
+def pages():
+    spec = importlib.util.spec_from_file_location("make_pages", DOCS / "make_pages.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_generated_pages_are_up_to_date(pages):
+    assert (DOCS / "gallery.md").read_text() == pages.gallery(), "run python docs/make_pages.py"
+    assert (DOCS / "benchmarks.md").read_text() == pages.benchmarks(), "run python docs/make_pages.py"
+
+
+def test_every_example_has_its_picture(pages):
+    numbers = {path.name.split("_")[0] for path in (ROOT / "examples").glob("[0-9]*")}
+    plugins = {path.name for path in (ROOT / "examples").glob("*_plugin")}
+    assert set(pages.PICTURES) == numbers | plugins
+    for picture in pages.PICTURES.values():
+        assert 1000 < (DOCS / "figures" / picture).stat().st_size < MOST_BYTES
+
+
+def test_every_public_name_is_in_the_reference():
+    page = (DOCS / "reference.md").read_text()
+    named = {"__version__", *re.findall(r":: (?:brachis\.)?(\w+)", page)}  # of modules: the package itself
+    for module in re.findall(r"automodule:: (\S+)", page):
+        named |= set(importlib.import_module(module).__dict__)
+    assert set(brachis.__all__) - named == set()
+
+
+def test_links_to_files_lead_somewhere():
+    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *DOCS.glob("*.md")):
+        for link in re.findall(r"\]\(([^)#\s]+)", page.read_text()):
+            assert "://" in link or (page.parent / link).exists(), f"{page.name}: {link}"
+
+
+def test_parts_of_the_readme_that_pages_include():
+    site = "".join(page.read_text() for page in DOCS.glob("*.md"))
+    parts = set(re.findall(r":start-after: (<!-- .* -->)", site))
+    assert len(parts) >= 4
+    for begin in parts:
+        assert README.index(begin) < README.index(begin.replace("<!-- ", "<!-- end of "))
+
+
+def test_citation_is_that_of_this_version():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)  # what its schema requires
+    assert citation["version"] == citation["preferred-citation"]["version"] == brachis.__version__
+    assert isinstance(citation["preferred-citation"]["year"], int)
+    assert citation["references"][0]["title"] in README
