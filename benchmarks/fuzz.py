@@ -113,7 +113,7 @@ class Worker:
         self._errors = tempfile.TemporaryFile("w+")  # noqa: SIM115
         command = [sys.executable, __file__, "--worker"]
         pipe = subprocess.PIPE
-        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._errors, text=True)  # noqa: S603
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._errors, text=True)
         self._process.stdout.readline()
 
     def run(self, number: int, seconds: float) -> dict[str, str | None]:

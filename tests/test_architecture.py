@@ -66,12 +66,13 @@ ORDER = (
     "planner",
     "many",
     "comparison",
+    "sweeps",
     "starter",
     "cli",
 )
 VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "limits", "bspline", "nlp", "solvers", "refine", "mesh"}
 MAY_NAME_KINDS = ("limits", "verify/limits", "task", "robot")
-HEAVY = {"matplotlib", "viser", "yourdfpy", "unopy", "ipyopt"}
+HEAVY = {"matplotlib", "viser", "yourdfpy", "unopy", "ipyopt", "pyarrow", "pandas", "dask", "ray"}
 MOST_LINES = 400
 
 

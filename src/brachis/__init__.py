@@ -8,6 +8,7 @@
     result.plot()
 
 To plan            plan, plan_many, transcribe (the nonlinear program itself)
+Many plans         sweep, SweepResult: keys of a task varied over grids and draws, also on a cluster
 A path             Line, Arc, Circle, Helix, Spline, joined by +; fit_path, bspline_segment from points and curves
 A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (those that come along)
 A task             Task, load_task; examples (task files that come along)
@@ -54,6 +55,8 @@ if TYPE_CHECKING:
     from brachis.robot import Robot as Robot
     from brachis.robot import TaskMap as TaskMap
     from brachis.robot import task_map_of as task_map_of
+    from brachis.sweeps import SweepResult as SweepResult
+    from brachis.sweeps import sweep as sweep
     from brachis.task import LimitSpec as LimitSpec
     from brachis.task import Task as Task
     from brachis.task import fit_path as fit_path
@@ -89,6 +92,7 @@ _HOME = {
     "Robot": "robot",
     "Samples": "trajectory",
     "Spline": "task.constructors",
+    "SweepResult": "sweeps",
     "Task": "task",
     "TaskMap": "robot",
     "Trajectory": "trajectory",
@@ -101,6 +105,7 @@ _HOME = {
     "plan": "planner",
     "plan_many": "many",
     "read_limits": "task",
+    "sweep": "sweeps",
     "task_map_of": "robot",
     "transcribe": "planner",
     "verify_trajectory": "verify",

@@ -237,6 +237,10 @@ class ResultFileError(InputError):
     """A saved result is missing, broken, or of another schema version."""
 
 
+class ClusterError(BrachisError):
+    """The cluster that plans were sent to cannot be reached, was lost, or cannot run them."""
+
+
 class NotInstalledError(InputError):
     """A library of an extra is not installed.
 

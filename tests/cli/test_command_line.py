@@ -37,11 +37,13 @@ def test_examples_work_in_this_order(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("brachis.view.Viewer.wait", lambda _viewer: None)  # for Ctrl-C
     (tmp_path / "out").mkdir()
+    fixed = "fixed: {search.effort: single, spline.intervals: 6}"
+    (tmp_path / "lines.yaml").write_text(f"sweep: 1\ntask: task.yaml\n{fixed}\ngrid: {{spline.degree: [3, 4]}}\n")
     assert set(EXAMPLES) == {"", *COMMANDS}
     assert {line.split("  #")[0].strip() for line in EXAMPLES[""]} <= {*EXAMPLES["new"], *EXAMPLES["plan"]}
     for command, lines in EXAMPLES.items():
         for line in lines if command else ():
-            outcome = run(*shlex.split(line)[1:])
+            outcome = run(*shlex.split(line, comments=True)[1:])
             assert outcome.code == 0, f"{line}: {outcome.err}"
 
 

@@ -1,4 +1,7 @@
-"""Examples of every command, and the exit codes, as the help shows them. Run in this order the examples work."""
+"""Examples of every command, and the exit codes, as the help shows them.
+
+Run in this order the examples work, given a sweep file ``lines.yaml`` (docs/sweeps.md).
+"""
 
 from __future__ import annotations
 
@@ -35,5 +38,9 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "inspect": ("brachis inspect task.yaml", "brachis inspect tx90l_rail --task-space pose"),
     "compose": ("brachis compose iiwa14 --range -2 2 --velocity 2 --force 1500 --mass 50 --out cell.urdf",),
     "schema": ("brachis schema --out task.schema.json", "brachis schema --of trajectory"),
+    "sweep": (
+        "brachis sweep lines.yaml --jobs 2",
+        "brachis sweep lines.yaml --retry  # goes on where it was ended",
+    ),
 }
 """By command; those of the whole program under no name."""

@@ -308,6 +308,36 @@ app.command()(compare)
 
 
 @app.command()
+def sweep(
+    source: Annotated[Path, typer.Argument(help="Sweep file (YAML).", metavar="SWEEP")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for plans, table.parquet, table.csv and sweep.png; by default one in the current folder, "
+            "named as the file. A sweep that was ended goes on where it was."
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(help="Processes; by default, and at most, as many as there are processors.")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            help="Plan on a cluster: address of a Dask scheduler, such as tcp://host:8786, or its scheduler file; ray, "
+            "or ray://host:10001."
+        ),
+    ] = None,
+    retry: Annotated[bool, typer.Option("--retry", help="Plan stored failures again.")] = False,
+    json: Json = False,
+) -> None:
+    """Plan a task many times, with its keys varied."""
+    with interrupts.postponed():
+        from brachis.cli import sweep as command  # noqa: PLC0415
+
+    raise typer.Exit(command.sweep_command(source, out=out, jobs=jobs, scheduler=scheduler, retry=retry, as_json=json))
+
+
+@app.command()
 def schema(
     out: Annotated[Path | None, typer.Option(help="File to write instead of standard output.")] = None,
     of: Annotated[str, typer.Option(help="Of what: task files, or trajectory (exported as JSON).")] = "task",

@@ -22,7 +22,7 @@ from brachis.task.yaml_reader import read_yaml
 
 Source = str | os.PathLike[str] | Mapping[str, object] | Task
 """What a task is made of: its file, or its content."""
-_LARGEST_TASK = 1_000_000
+LARGEST_TASK = 1_000_000
 """Bytes of YAML, which take some 20 s to read."""
 
 
@@ -68,15 +68,15 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
     if isinstance(source, Task):
         return load_task(source.to_dict(), changes=changes) if changes else source
     if isinstance(source, Mapping):
-        return _task_from(source, "task", Path.cwd(), changes or {})
+        return task_from(source, "task", Path.cwd(), changes or {})
     if not isinstance(source, str | os.PathLike):
         problem = "a task is loaded from a file or a mapping"
         raise TaskError(problem, found=type(source).__name__, allowed="a file name, a mapping, or a Task")
     path = Path(source)
     check_kind(path, Kind.TASK, TaskError)
     hint = "Long lists of waypoints belong in a CSV file"
-    text = read_text(path, where=str(path), folder=Path.cwd(), largest=_LARGEST_TASK, hint=hint)
-    task = _task_from(read_yaml(text, str(path)), str(path), path.absolute().parent, changes or {})
+    text = read_text(path, where=str(path), folder=Path.cwd(), largest=LARGEST_TASK, hint=hint)
+    task = task_from(read_yaml(text, str(path)), str(path), path.absolute().parent, changes or {})
     if task.robot.urdf is None:
         problem = "this key is required in a task file, and missing"
         raise TaskError(problem, where=f"{path}: robot.urdf", hint="Give the URDF's path, relative to the task file")
@@ -97,7 +97,25 @@ def check_robot_settings(content: Mapping[str, object]) -> RobotSettings:
         raise task_error(error, "robot", RobotSettings) from None
 
 
-def _task_from(content: object, source: str, folder: Path, changes: Mapping[str, object]) -> Task:
+def task_from(content: object, source: str, folder: Path, changes: Mapping[str, object]) -> Task:
+    """Return the task that has this content.
+
+    Parameters
+    ----------
+    content : object
+        As a task file has it.
+    source : str
+        What messages name as the place of mistakes.
+    folder : Path
+        What paths of files in it are relative to.
+    changes : mapping
+        Dotted keys that are set.
+
+    Raises
+    ------
+    TaskError
+        See `load_task`.
+    """
     if not isinstance(content, Mapping):
         problem = "a task is a mapping"
         raise TaskError(problem, found=show(content), allowed=", ".join(Task.model_fields), where=source)

@@ -1,0 +1,79 @@
+"""``brachis sweep``, with plans that cost nothing."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import yaml
+
+from brachis.sweeps import run as sweeps_run
+from brachis.sweeps.worker import Outcome
+
+
+@pytest.fixture
+def sweep_file(tmp_path, write, task, monkeypatch):
+    """A file of four plans, of which the fourth fails; end times are made up."""
+
+    def pool(plans):
+        for plan in plans:
+            length = plan.task.path[0].line.length
+            if length > 3.0:
+                yield plan, Outcome({"status": "failed", "error": "PathError", "message": "out of reach"})
+            else:
+                yield plan, Outcome({"status": "verified", "t_end_s": length / 2.0, "wall_time_s": 40.0})
+
+    monkeypatch.setattr(sweeps_run, "pool_for", lambda *_settings: pool)
+    content = {"sweep": 1, "task": str(write(task)), "grid": {"path.0.line.length": [1.0, 2.0, 3.0, 4.0]}}
+    path = tmp_path / "lengths.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def test_a_sweep_is_shown(run, sweep_file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = run("sweep", sweep_file)
+    assert done.code == 0
+    lines = done.out.splitlines()
+    assert lines[0].strip() == "sweep: 4 plans, 3 verified, 0 unverified, 1 failed"
+    cells = [[cell.strip() for cell in line.strip("│").split("│")] for line in lines if line.startswith("│")]
+    assert cells == [
+        ["t_end [s]", "0.5", "1", "1.5"],
+        ["plan", "0", "1", "2"],
+        ["path.0.line.length", "1", "2", "3"],
+    ]
+    assert "1 failed with PathError, for example: out of reach" in lines
+    assert "planning took 2 min 00 s in all processes together" in lines
+    assert [line for line in lines if line.startswith("wrote")] == [
+        f"wrote lengths/{name}" for name in ("table.parquet", "table.csv", "sweep.png")
+    ]
+    assert (tmp_path / "lengths/sweep.png").read_bytes().startswith(b"\x89PNG")
+    assert "brachis: 0 of 4 plans\n" in done.err
+    assert "4 of 4 plans, 1 failed; 0 s left" in done.err
+
+
+def test_a_sweep_as_json(run, sweep_file, tmp_path):
+    done = run("sweep", sweep_file, "--out", tmp_path / "out", "--json")
+    told = json.loads(done.out)
+    assert (told["plans"], told["verified"], told["failed"]) == (4, 3, 1)
+    assert told["best"] == {"plan": 0, "path.0.line.length": 1.0, "t_end_s": 0.5}
+    assert told["failures"] == {"PathError": {"plans": 1, "message": "out of reach"}}
+    assert [name.rsplit("/")[-1] for name in told["files"]] == ["table.parquet", "table.csv", "sweep.png"]
+
+
+def test_no_verified_plan_is_exit_code_1(run, sweep_file, tmp_path):
+    content = yaml.safe_load(sweep_file.read_text())
+    content["grid"]["path.0.line.length"] = [4.0, 5.0]
+    sweep_file.write_text(yaml.safe_dump(content))
+    done = run("sweep", sweep_file, "--out", tmp_path / "out")
+    assert done.code == 1
+    assert "2 failed with PathError" in done.out
+    assert not (tmp_path / "out/sweep.png").exists()
+
+
+def test_a_wrong_key_is_exit_code_2(run, sweep_file, tmp_path):
+    sweep_file.write_text(sweep_file.read_text().replace("length", "lenght"))
+    done = run("sweep", sweep_file, "--out", tmp_path / "out")
+    assert done.code == 2
+    assert "Did you mean 'length'?" in done.err
+    assert not (tmp_path / "out").exists()

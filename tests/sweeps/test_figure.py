@@ -1,0 +1,64 @@
+"""Figures of sweeps."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from brachis.errors import InputError, UnknownNameError
+from brachis.sweeps.figure import plot_sweep
+
+
+def row(t_end, **keys):
+    return {**keys, "status": "verified" if t_end else "failed", "t_end_s": t_end}
+
+
+def test_a_line_over_one_key():
+    figure = plot_sweep([row(2.0, a=3), row(1.0, a=1), row(None, a=2), row(1.5, a=1)], ["a"])
+    (ax,) = figure.axes
+    (line,) = ax.lines
+    assert line.get_xdata().tolist() == [1.0, 2.0, 3.0]
+    assert line.get_ydata()[[0, 2]].tolist() == [1.0, 2.0]
+    assert math.isnan(line.get_ydata()[1])
+    assert ax.collections[0].get_offsets().tolist() == [[2.0, 2.0]]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("a", r"$t_\mathrm{E}$ (s)")
+
+
+def test_a_heat_map_over_two_keys():
+    rows = [row(1.0 + a + b if a + b < 3 else None, a=a, b=word) for a in (0, 1, 2) for b, word in enumerate("xy")]
+    figure = plot_sweep(rows, ["a", "b"])
+    ax, bar = figure.axes
+    shown = np.ma.filled(ax.images[0].get_array(), np.nan)
+    assert shown[:, :2].tolist() == [[1.0, 2.0], [2.0, 3.0]]
+    assert math.isnan(shown[1, 2])
+    assert [tick.get_text() for tick in ax.get_yticklabels()] == ["x", "y"]
+    assert ax.collections[0].get_offsets().tolist() == [[2.0, 1.0]]
+    assert sorted(text.get_text() for text in ax.texts) == ["1", "2", "2", "3", "3"]
+    assert bar.get_ylabel() == r"$t_\mathrm{E}$ (s)"
+
+
+def test_draws_of_two_keys_are_points():
+    generator = np.random.default_rng(0)
+    rows = [row(1.0 + x, a=x, b=y) for x, y in generator.random((40, 2)).tolist()]
+    ax = plot_sweep(rows, ["a", "b"]).axes[0]
+    assert not ax.images
+    assert ax.collections[0].get_offsets().tolist() == [[each["a"], each["b"]] for each in rows]
+
+
+@pytest.mark.parametrize("rows", [[], [row(None, a=1)]])
+def test_nothing_to_draw(rows):
+    with pytest.raises(InputError, match="nothing to draw"):
+        plot_sweep(rows, ["a"])
+
+
+def test_which_keys_are_drawn(undisturbed):
+    assert undisturbed.varied == ("path.0.line.angle_deg", "path.0.line.length", "spline.degree")
+    ax = undisturbed.plot().axes[0]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == undisturbed.varied[:2]
+    assert undisturbed.plot(["spline.degree"]).axes[0].get_xlabel() == "spline.degree"
+    with pytest.raises(UnknownNameError, match=r"path\.0\.line\.length"):
+        undisturbed.plot(["line.length"])
+    with pytest.raises(InputError, match="1 or 2 keys"):
+        undisturbed.plot(undisturbed.varied)

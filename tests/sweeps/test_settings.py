@@ -1,0 +1,89 @@
+"""What a sweep varies: grids, rows, draws."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from brachis.errors import TaskError
+from brachis.sweeps import SweepSettings
+from brachis.sweeps.plans import Plan, load_sweep
+
+ROOT = Path(__file__).parents[2]
+
+
+def changes(**parts):
+    return SweepSettings(sweep=1, task="task.yaml", **parts).changes()
+
+
+def drawn(count=1000, seed=0, **keys):
+    return changes(random={"count": count, "seed": seed, "keys": keys})
+
+
+def test_every_combination_of_grid_rows_and_draws():
+    found = changes(
+        grid={"a": [1, 2], "b": {"linear": [0.0, 1.0, 3]}},
+        rows=[{"c": "x", "d": [1]}, {"c": "y"}],
+        random={"count": 2, "keys": {"e": {"uniform": [0, 1]}}},
+    )
+    assert len(found) == 2 * 3 * 2 * 2
+    assert list(found[0]) == ["a", "b", "c", "d", "e"]
+    assert [each["b"] for each in found[::4]] == [0.0, 0.5, 1.0] * 2
+    assert found[0]["e"] == found[2]["e"] != found[1]["e"]  # the same draws for all combinations
+
+
+def test_values_at_equal_ratios():
+    found = changes(grid={"a": {"logarithmic": [0.1, 10, 3]}})
+    assert [each["a"] for each in found] == pytest.approx([0.1, 1.0, 10.0])
+
+
+def test_nothing_varied_is_one_plan():
+    assert changes() == [{}]
+
+
+def test_draws_follow_their_distributions():
+    found = drawn(
+        u={"uniform": [1, 3]}, l={"log_uniform": [0.01, 100]}, n={"normal": [5, 0.5]}, c={"choice": ["x", [1]]}
+    )
+    u, logs, n = (np.array([each[key] for each in found]) for key in ("u", "l", "n"))
+    assert u.min() >= 1.0
+    assert u.max() <= 3.0
+    assert u.mean() == pytest.approx(2.0, abs=0.1)
+    assert np.log10(logs).mean() == pytest.approx(0.0, abs=0.2)
+    assert np.log10(logs).min() >= -2.0
+    assert (n.mean(), n.std()) == pytest.approx((5.0, 0.5), abs=0.1)
+    assert sum(each["c"] == "x" for each in found) == pytest.approx(500, abs=60)
+
+
+def test_more_draws_and_further_keys_leave_the_first_ones():
+    few = drawn(10, a={"normal": [0, 1]}, b={"choice": [1, 2, 3]})
+    many = drawn(100, b={"choice": [1, 2, 3]}, a={"normal": [0, 1]}, c={"uniform": [0, 1]})
+    assert [(each["a"], each["b"]) for each in many[:10]] == [(each["a"], each["b"]) for each in few]
+    assert drawn(10, seed=1, a={"normal": [0, 1]}) != drawn(10, a={"normal": [0, 1]})
+
+
+def test_too_many_plans_are_refused_at_once():
+    with pytest.raises(TaskError, match=r"too many plans; found 1e\+12; allowed: at most 1000000"):
+        changes(grid={"a": {"linear": [0, 1, 10**6]}, "b": {"linear": [0, 1, 10**6]}})
+
+
+def test_values_are_numbers():
+    values = changes(grid={"a": {"linear": [0, 1, 2]}}) + drawn(2, a={"log_uniform": [1, 2]})
+    assert all(type(each["a"]) is float and math.isfinite(each["a"]) for each in values)
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/sweeps.md"])
+def test_sweeps_of_the_documentation_are_ones(page, monkeypatch):
+    monkeypatch.chdir((ROOT / page).parent)
+    (text,) = re.findall(r"^```yml\n(sweep:.*?)^```", (ROOT / page).read_text(), re.DOTALL | re.MULTILINE)
+    content = yaml.safe_load(text)
+    if "random" in content:
+        content["random"]["count"] = 1
+    found = load_sweep(content)
+    assert len(found.rows) == (24 if page == "README.md" else 48)
+    assert all(isinstance(row.plan, Plan) for row in found.rows)

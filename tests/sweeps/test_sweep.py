@@ -1,0 +1,202 @@
+"""Sweeps in processes of this machine: outcomes, folders, and going on."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import yaml
+
+import brachis
+from brachis.errors import InputError, TaskError
+from brachis.sweeps import run
+from brachis.sweeps.worker import planned
+
+WAIT = 120.0
+
+
+@pytest.fixture
+def nothing_runs(monkeypatch):
+    """Planning anything is an error."""
+
+    def pool_for(*_settings):
+        def pool(plans):
+            assert plans == []
+            return iter(())
+
+        return pool
+
+    monkeypatch.setattr(run, "pool_for", pool_for)
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """Plans are made in this process; returns those that were."""
+    made = []
+
+    def pool(plans):
+        for plan in plans:
+            made.append(plan)
+            yield plan, planned(plan)
+
+    monkeypatch.setattr(run, "pool_for", lambda *_settings: pool)
+    return made
+
+
+def test_every_plan_is_a_row_and_equal_ones_come_once(undisturbed):
+    rows = undisturbed.rows()
+    assert [(row["path.0.line.angle_deg"], row["path.0.line.length"]) for row in rows] == [
+        (angle, length) for angle in (80, 90) for length in (0.9, 9.0, 0.9)
+    ]
+    assert [row["status"] for row in rows] == ["verified", "failed", "failed"] * 2
+    assert all(1.0 < row["t_end_s"] < 5.0 and row["worst_ratio"] < 1.001 for row in rows[::3])
+
+
+def test_failures_say_why(undisturbed):
+    rows = undisturbed.rows()
+    assert rows[2]["error"] == "TaskError"
+    assert "spline.degree: out of range; found 9; allowed: <= 7" in rows[2]["message"]
+    assert rows[1]["error"] != "TaskError"
+    assert "reach" in rows[1]["message"]
+    assert [count for count, _ in undisturbed.failures().values()] == [2, 2]
+
+
+def test_motions_are_those_of_the_plans(undisturbed, content):
+    trajectory = undisturbed.trajectory(3)
+    assert trajectory.t_end == undisturbed.rows()[3]["t_end_s"]
+    assert trajectory.task.path[0].line.angle_deg == 90.0
+    assert brachis.verify_trajectory(trajectory).passed
+    assert trajectory.task.spline.intervals == content["fixed"]["spline.intervals"]
+    with pytest.raises(InputError, match=r"plan 1 failed; found \w+: "):
+        undisturbed.trajectory(1)
+    with pytest.raises(InputError, match="0 to 5"):
+        undisturbed.trajectory(6)
+
+
+def test_a_sweep_is_summed_up(undisturbed):
+    summary = undisturbed.summary()
+    assert (summary["plans"], summary["verified"], summary["failed"]) == (6, 2, 4)
+    times = sorted(row["t_end_s"] for row in undisturbed.rows() if row["t_end_s"])
+    assert [summary[name]["t_end_s"] for name in ("best", "worst")] == times
+    assert repr(undisturbed).startswith("SweepResult\n  plans        6\n  verified     2\n")
+
+
+def test_tables_are_read_back(undisturbed):
+    again = brachis.SweepResult.load(undisturbed.folder)
+    assert again.keys == undisturbed.keys
+    assert again.table.equals(undisturbed.table)
+    frame = undisturbed.to_dataframe()
+    assert frame["t_end_s"].notna().sum() == 2
+    csv = (undisturbed.folder / "table.csv").read_text().splitlines()
+    assert len(csv) == 7
+    assert csv[0].startswith('"plan","path.0.line.angle_deg","path.0.line.length","spline.degree","status","t_end_s"')
+
+
+@pytest.mark.usefixtures("nothing_runs")
+def test_a_finished_sweep_is_not_run_again(undisturbed, content, same_as_undisturbed):
+    assert same_as_undisturbed(brachis.sweep(content, undisturbed.folder).table)
+
+
+def test_plans_of_a_changed_sweep_are_added(undisturbed, content, here, tmp_path):
+    folder = shutil.copytree(undisturbed.folder, tmp_path / "out")
+    content |= {"grid": {"path.0.line.length": [9.0, 0.9], "path.0.line.angle_deg": [95, 90]}, "rows": []}
+    result = brachis.sweep(content, folder)
+    assert [plan.task.path[0].line.angle_deg for plan in here] == [95.0, 95.0]
+    assert [row["status"] for row in result.rows()] == ["failed", "failed", "verified", "verified"]
+    assert result.rows()[3]["t_end_s"] == undisturbed.rows()[3]["t_end_s"]
+
+
+def test_failures_are_planned_again_where_asked(undisturbed, content, here, tmp_path, same_as_undisturbed):
+    folder = shutil.copytree(undisturbed.folder, tmp_path / "out")
+    assert same_as_undisturbed(brachis.sweep(content, folder, retry=True).table)
+    assert [plan.task.path[0].line.length for plan in here] == [9.0] * 2
+
+
+@pytest.mark.parametrize("damage", ["part", "motion", "cut"])
+def test_what_is_not_stored_whole_is_planned_again(undisturbed, content, here, tmp_path, damage, same_as_undisturbed):
+    folder = shutil.copytree(undisturbed.folder, tmp_path / "out")
+    motion = folder / undisturbed.rows()[0]["motion"]
+    part = motion.with_suffix(".parquet")
+    if damage == "cut":
+        part.write_bytes(part.read_bytes()[:-20])
+    else:
+        (part if damage == "part" else motion).unlink()
+    assert same_as_undisturbed(brachis.sweep(content, folder).table)
+    assert [plan.digest for plan in here] == [motion.stem]
+    assert brachis.Trajectory.load(motion).t_end == undisturbed.rows()[0]["t_end_s"]
+
+
+@pytest.mark.usefixtures("nothing_runs")
+def test_folders_of_others_are_left_alone(content, tmp_path):
+    (tmp_path / "thesis.tex").write_text("...")
+    for use in (lambda: brachis.sweep(content, tmp_path), lambda: brachis.SweepResult.load(tmp_path)):
+        with pytest.raises(InputError, match="holds other files; allowed: a new folder, or one with a sweep's"):
+            use()
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+@pytest.mark.usefixtures("nothing_runs")
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"grid": {"path.0.line.lenght": [1, 2]}}, ["sweep: path.0.line.lenght", "(6)", "Did you mean 'length'"]),
+        ({"grid": {"path.1.line.length": [1, 2]}}, ["path is a list of 1", "path.1"]),
+        ({"grid": {"robot.limits.torque.scale": [1, 2]}}, ["robot.limits.torque has no keys of its own", "found 10"]),
+        ({"grid": {"start.joints.3": [0.1]}}, ["start.joints is a list of 3", "start.joints.0 to start.joints.2"]),
+        (
+            {"grid": {"robot.limits.acceleration.j9": [1.0, 2.0]}},
+            ["joint named 'j9'", "j1, j2, j3"],
+        ),
+        ({"grid": {"spline.degree": []}}, ["grid.spline.degree", "too few items"]),
+        ({"grid": {"spline.degree": {"linera": [1, 2, 3]}}}, ["Did you mean 'linear'"]),
+        ({"random": {"count": 2, "keys": {"start.joints.0": {"uniform": [1, 0]}}}}, ["low < high", "found [1"]),
+        ({"rows": [{"path.0.line.angle_deg": 1.0}]}, ["path.0.line.angle_deg is varied twice", "in grid and in rows"]),
+        ({"gird": {}}, ["gird", "Did you mean 'grid'"]),
+        ({"task": 3}, ["no task", "found 3"]),
+        ({"task": "nothing.yaml"}, ["nothing.yaml", "no such file"]),
+        ({"fixed": {"spline.degre": 3}}, ["Did you mean 'degree'"]),
+    ],
+)
+def test_what_is_wrong_is_refused_before_anything_runs(content, tmp_path, change, expected):
+    with pytest.raises(TaskError) as caught:
+        brachis.sweep({**content, **change}, tmp_path / "out")
+    assert [part for part in expected if part not in str(caught.value)] == []
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("here")
+def test_the_time_that_is_left_is_told(undisturbed, content, tmp_path):
+    folder, told = shutil.copytree(undisturbed.folder, tmp_path / "out"), []
+    motion = folder / undisturbed.rows()[0]["motion"]
+    motion.unlink()
+    brachis.sweep(content, folder, listener=told.append)
+    assert told[1] == "3 of 4 plans are stored already"
+    assert told[2] == "4 of 4 plans, 2 failed; 0 s left"
+
+
+def test_a_sweep_that_is_killed_goes_on(content, here, tmp_path, same_as_undisturbed):
+    source, folder = tmp_path / "sweep.yaml", tmp_path / "sweep"
+    source.write_text(yaml.safe_dump(content))
+    command = [sys.executable, "-m", "brachis", "sweep", str(source), "--jobs", "1"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL, start_new_session=True) as process:
+        try:
+            until = time.monotonic() + WAIT
+            while len(list(folder.glob("plans/*/*.parquet"))) < 2:
+                assert process.poll() is None
+                assert time.monotonic() < until
+                time.sleep(0.01)
+        finally:
+            os.killpg(process.pid, signal.SIGKILL)
+    finished = {path: path.stat().st_mtime_ns for path in folder.glob("plans/*/*.parquet")}
+    assert 2 <= len(finished) < 4
+    result = brachis.sweep(source, folder)
+    assert same_as_undisturbed(result.table)
+    assert len(here) == 4 - len(finished)
+    assert {path: path.stat().st_mtime_ns for path in finished} == finished
+    assert json.loads((folder / "sweep.json").read_text())["settings"]["grid"] == content["grid"]
