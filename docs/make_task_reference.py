@@ -32,17 +32,8 @@ from brachis.task import (
 from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.orientation import Quaternion, RollPitchYaw, Rotation, RotationVector, Tangent, ToQuaternion
 from brachis.task.point_data import FileUnits, FitTolerance, PointFile
-from brachis.task.segments import (
-    ArcCenter,
-    ArcVia,
-    Circle,
-    Helix,
-    LineBy,
-    LineHeading,
-    LineTo,
-    MovingSegment,
-    SplineThrough,
-)
+from brachis.task.segments import MovingSegment
+from brachis.task.shapes import ArcCenter, ArcVia, Circle, Helix, LineBy, LineHeading, LineTo, SplineThrough
 
 PAGE = Path(__file__).parent / "task_files.md"
 
