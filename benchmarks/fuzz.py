@@ -72,9 +72,8 @@ def run(case: fuzz_cases.Case, folder: Path) -> str:
             elif what == "plan":
                 brachis.plan(folder / "task.yaml")
             else:
-                inspect_command(
-                    folder / "robot.urdf", task_space="x,y", tool_frame=None, base_frame=None, lock=[], as_json=True
-                )
+                options = {"task_space": "x,y", "tool_frame": None, "base_frame": None, "lock": [], "changes": []}
+                inspect_command(folder / "robot.urdf", **options, as_json=True)
         except brachis.BrachisError as error:
             outcome = type(error).__name__
             _ = str(error)

@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 _TESTS = Path(__file__).resolve().parent
 _LONG = ("test_readme.py", "test_random_poses.py", "test_random_lines.py", "test_fuzz.py", "test_auto_on_robots.py")
 """Tests of these files take up to a minute each: they come first, so that no worker is left alone with one at last."""
+_CHROMIUM = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--enable-unsafe-swiftshader",
+)
 _WITH_DEADLINES = ("brachis.deadline", "brachis.solvers.watch", "brachis.bottleneck.reference")
 """Modules that look at the clock to see whether the time is up."""
 if str(_TESTS) not in sys.path:
@@ -51,3 +64,16 @@ def wall_clock(monkeypatch: pytest.MonkeyPatch) -> None:
 def scara_urdf() -> Path:
     """URDF of the planar arm that comes with brachis."""
     return _TESTS.parent / "robots" / "scara3" / "robot.urdf"
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """A Chromium that is installed here, without a window; one for all tests, as its driver allows."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if chromium is None:
+        pytest.skip("there is no Chromium: apt-get install chromium")
+    with playwright.sync_playwright() as driver:
+        started = driver.chromium.launch(executable_path=chromium, args=list(_CHROMIUM))
+        yield started
+        started.close()

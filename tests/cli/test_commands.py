@@ -295,7 +295,8 @@ def test_plot_of_unknown_kind(run, planned, tmp_path):
 def test_the_saved_motion_is_not_written_over(run, planned):
     saved = planned[1] / "result.npz"
     before = saved.read_bytes()
-    outcome = run("export", saved, "--out", saved)
+    assert run("export", saved, "--out", saved).code == 2
+    outcome = run("export", saved, "--out", saved, "--format", "csv")
     assert outcome.code == 2
     assert "would be written over an input" in outcome.err
     assert run("plot", saved, "--out", saved).code == 2

@@ -305,7 +305,8 @@ def test_xarm7_of_example_robot_data_has_decompositions():
 
 def test_inspect_says_what_is_polished(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "240")
-    inspect = functools.partial(inspect_command, xarm(), task_space="pose", tool_frame=None, base_frame=None, lock=[])
+    options = {"task_space": "pose", "tool_frame": None, "base_frame": None, "lock": [], "changes": []}
+    inspect = functools.partial(inspect_command, xarm(), **options)
     inspect(as_json=True)
     data = json.loads(capsys.readouterr().out)
     assert data["tool_frame"] == "link_eef"

@@ -6,7 +6,6 @@ import base64
 import dataclasses
 import json
 import re
-import shutil
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ import pytest
 import brachis
 from brachis.report import make_report
 
-FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update")
 QUICK = {"search": {"effort": "single", "least_motion": False}, "spline": {"intervals": 8}}
 
 
@@ -64,15 +62,3 @@ def data_of(page):
 def floats(array):
     values = np.frombuffer(base64.b64decode(array["bdata"]), dtype=array["dtype"])
     return values.reshape([int(n) for n in array["shape"].split(",")]) if "shape" in array else values
-
-
-@pytest.fixture(scope="session")
-def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if chromium is None:
-        pytest.skip("there is no Chromium on this machine")
-    with playwright.sync_playwright() as driver:
-        started = driver.chromium.launch(executable_path=chromium, args=list(FLAGS))
-        yield started
-        started.close()

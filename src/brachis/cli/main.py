@@ -230,7 +230,7 @@ def report(
     ] = None,
     title: Annotated[str | None, typer.Option(help="Title of the page; default: the result's name.")] = None,
 ) -> None:
-    """Write a saved motion as one HTML page, from which a person decides whether to run it."""
+    """Write a saved motion as one HTML page to judge it by."""
     with interrupts.postponed():
         from brachis.cli import report as command  # noqa: PLC0415
 

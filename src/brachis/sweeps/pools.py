@@ -70,7 +70,7 @@ def pool_for(jobs: int | None, scheduler: str | None, listener: Callable[[str], 
 
 
 def in_processes(plans: Iterable[Plan], jobs: int) -> Iterator[tuple[Plan, Outcome]]:
-    """Make plans in processes of this machine, which stay for some seconds for the next sweep.
+    """Make plans in processes of this machine.
 
     A plan that ends its process (memory, a crash) fails; those that were made beside it are made again, one at a time.
 
@@ -84,23 +84,28 @@ def in_processes(plans: Iterable[Plan], jobs: int) -> Iterator[tuple[Plan, Outco
     ------
     Plan, Outcome
     """
-    from joblib.externals.loky import get_reusable_executor  # noqa: PLC0415  (a fifth of a second)
+    from joblib.externals.loky import ProcessPoolExecutor  # noqa: PLC0415  (a fifth of a second)
 
-    def executor() -> Any:  # noqa: ANN401  (a new one where the last one broke)
-        return get_reusable_executor(
-            max_workers=jobs, env=_ONE_THREAD, initializer=_end_with_parent, initargs=(os.getpid(),)
-        )
+    def executor() -> Any:  # noqa: ANN401
+        parent = (os.getpid(),)
+        return ProcessPoolExecutor(jobs, env=_ONE_THREAD, initializer=_end_with_parent, initargs=parent)
+
+    processes = executor()
 
     def submit(plan: Plan) -> Future[Outcome]:
+        nonlocal processes
         with interrupts.blocked():  # processes are started here, which are not to hear Ctrl-C
-            return executor().submit(planned, plan)
+            try:
+                return processes.submit(planned, plan)
+            except BrokenExecutor:
+                processes = executor()
+                return processes.submit(planned, plan)
 
     try:
         yield from _as_completed(plans, submit, lambda: _AHEAD * jobs)
-    except BaseException:
+    finally:
         with interrupts.postponed():
-            executor().shutdown(wait=True, kill_workers=True)
-        raise
+            processes.shutdown(wait=True, kill_workers=True)
 
 
 def _end_with_parent(parent: int) -> None:
