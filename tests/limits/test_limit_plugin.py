@@ -199,7 +199,8 @@ def test_limits_are_a_list():
 def test_two_processes_take_it_as_well():
     code = (
         "import brachis, sys; from brachis_coupled import CoupledRange;"
-        "task = brachis.load_task(sys.argv[1]).to_dict() | {'search': {'jobs': 2}, 'redundant_joints': 'auto', 'spline': {'intervals': 8}};"
+        "task = brachis.load_task(sys.argv[1]).to_dict();"
+        "task |= {'search': {'jobs': 2}, 'redundant_joints': 'auto', 'spline': {'intervals': 8}};"
         "result = brachis.plan(task, own_limits=[CoupledRange(('j2', 'j3'), -0.5, 0.7)]);"
         "print(result.verified, 'coupled range ratio' in [check.name for check in result.verification.checks])"
     )
