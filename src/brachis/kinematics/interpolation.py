@@ -27,6 +27,10 @@ _ROUNDS = 8
 _JUST_BEFORE = 1e-11
 _ROUNDING = 60.0 * np.finfo(float).eps
 """Jerk of a piece of 1 s that comes of the rounding of positions of 1 rad."""
+_NOISE = 1e-12
+"""Of positions near a branch boundary, rad or m, at most."""
+_GAIN = 0.5
+"""Halving a piece leaves at most this part of a gap that is no noise."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,7 @@ def interpolate(joint_map: JointMap, curves: Curves, breaks: np.ndarray, *, jump
     """
     steps = np.arange(_PIECES_PER_INTERVAL) / _PIECES_PER_INTERVAL
     times = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel(), breaks[-1])
-    error = np.inf
+    error, inherited = np.inf, np.full(len(times) - 1, np.inf)
     for _ in range(_ROUNDS):
         middle = 0.5 * (times[1:] + times[:-1])
         merged = np.sort(np.concatenate([times, middle]))
@@ -85,18 +89,34 @@ def interpolate(joint_map: JointMap, curves: Curves, breaks: np.ndarray, *, jump
         if jumps:
             shift = _JUST_BEFORE * breaks[-1] * (np.arange(len(merged)) > 0)
             before = joint_map.state(*curves(merged - shift), near=state.q).qddot
-        gap_q, gap_qddot = _middle_gaps(times, state, before)
-        error = float(gap_q.max())
-        bad = (gap_q > _POSITION_TOLERANCE) | (gap_qddot > _ACCELERATION_TOLERANCE * (1.0 + np.abs(state.qddot).max()))
-        if not jumps:
-            bad |= _jerk_gaps(times, state) > _JERK_TOLERANCE * (1.0 + np.abs(state.qdddot).max())
+        excess, noise, error = _excess(times, state, before, jumps=jumps)
+        # What halving did not lessen, and what is as small as noise, is noise.
+        bad = (excess > 1.0) & ((excess > noise) | (excess < _GAIN * inherited))
         if not bad.any():
             break
         times = np.union1d(times, middle[bad])
+        inherited = np.repeat(np.where(bad, excess, 0.0), 1 + bad)
     if error > _LARGEST_ERROR:
         raise UnreachableError("the motion is too sharp for polynomial pieces")
     # The middles are known exactly as well; as nodes they make the error 64 times smaller still.
     return Nodes(merged, state.q, state.qdot, state.qddot, before, error)
+
+
+def _excess(
+    times: np.ndarray, state: JointState, before: np.ndarray, *, jumps: bool
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Gaps of every piece in units of their tolerances, the largest of them, (L,); the same of noise; that of q."""
+    h = np.diff(times)
+    gap_q, gap_qddot = _middle_gaps(times, state, before)
+    tolerances = [_POSITION_TOLERANCE, _ACCELERATION_TOLERANCE * (1.0 + np.abs(state.qddot).max())]
+    gaps, noises = [gap_q, gap_qddot], [np.full(len(h), _NOISE), 6.0 * _NOISE / h**2]
+    if not jumps:
+        tolerances.append(_JERK_TOLERANCE * (1.0 + np.abs(state.qdddot).max()))
+        gaps.append(_jerk_gaps(times, state))
+        noises.append(60.0 * _NOISE / h**3)
+    in_units = (np.array(values) / np.array(tolerances)[:, None] for values in (gaps, noises))
+    excess, noise = (values.max(axis=0) for values in in_units)
+    return excess, noise, float(gap_q.max())
 
 
 def _middle_gaps(times: np.ndarray, state: JointState, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
