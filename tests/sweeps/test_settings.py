@@ -13,6 +13,8 @@ import yaml
 from brachis.errors import TaskError
 from brachis.sweeps import SweepSettings
 from brachis.sweeps.plans import Plan, load_sweep
+from brachis.sweeps.store import COLUMNS
+from brachis.task import Task
 
 ROOT = Path(__file__).parents[2]
 
@@ -87,3 +89,21 @@ def test_sweeps_of_the_documentation_are_ones(page, monkeypatch):
     found = load_sweep(content)
     assert len(found.rows) == (24 if page == "README.md" else 48)
     assert all(isinstance(row.plan, Plan) for row in found.rows)
+
+
+def test_a_key_is_refused_only_where_every_plan_that_sets_it_is(tmp_path):
+    content = {
+        "sweep": 1,
+        "task": str(ROOT / "examples/01_scara_line.yaml"),
+        "grid": {"spline.intervals": [6, 7, 8], "robot.tool_frame": ["nope", "tool"]},
+    }
+    (tmp_path / "sweep.yaml").write_text(yaml.safe_dump(content))
+    assert len(load_sweep(tmp_path / "sweep.yaml").rows) == 6
+    content["grid"]["robot.tool_frame"] = ["nope"]
+    (tmp_path / "sweep.yaml").write_text(yaml.safe_dump(content))
+    with pytest.raises(TaskError, match="refused in every plan"):
+        load_sweep(tmp_path / "sweep.yaml")
+
+
+def test_no_column_has_the_name_of_a_key():
+    assert not set(COLUMNS) & set(Task.model_fields)

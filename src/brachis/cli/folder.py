@@ -17,11 +17,12 @@ from brachis.files import atomic_write, temporary_in, writing_errors
 Writer = Callable[[Path], object]
 """Writes one file to a path."""
 
+_SCHEMA = b'{\n  "$schema": "https://json-schema.org/draft/2020-12/schema",\n  "$id": "urn:brachis:'
 BEGINNINGS = {
     ".csv": (b"t,q_",),
     ".html": (b"<!doctype html>\n<!-- brachis report -->",),
     ".gif": (b"GIF8",),
-    ".json": (b'{\n  "t_end"', b'{\n  "$schema"'),
+    ".json": (b'{\n  "t_end"', b'{\n  "$schema": "urn:brachis:', _SCHEMA),
     ".mcap": (b"\x89MCAP0",),
     ".mp4": (b"\0\0\0\x1cftyp", b"\0\0\0\x20ftyp"),
     ".npz": (b"PK",),

@@ -66,5 +66,5 @@ def robots_command(*, as_json: bool) -> None:
 
 def _what(urdf: Path) -> str:
     """Read what a robot is from the heading of its page, ``# name: what it is``."""
-    heading = urdf.with_name("README.md").read_text().partition("\n")[0]
+    heading = urdf.with_name("README.md").read_text(encoding="utf-8").partition("\n")[0]
     return heading.partition(": ")[2]

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from brachis.cli.folder import ended_cleanly
 from brachis.cli.output import exit_code, print_error, print_json, progress, result_console
+from brachis.cli.verbosity import Verbosity, chosen
 from brachis.errors import InputError
 from brachis.files import writing_errors
 from brachis.plots import save_figure
@@ -51,7 +52,7 @@ def sweep_command(
 def _progress() -> Iterator[Callable[[str], None]]:
     """Show how far the sweep is: in place on a terminal, else in some lines on standard error, for the logs of jobs."""
     with progress() as status:
-        if sys.stderr.isatty():
+        if sys.stderr.isatty() or chosen() is not Verbosity.NORMAL:
             yield status
             return
         told = -1

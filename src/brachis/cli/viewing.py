@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from brachis import interrupts
-from brachis.cli.output import print_error, result_console
+from brachis.cli.output import print_error
+from brachis.cli.verbosity import Verbosity, chosen
 from brachis.errors import ResultFileError
+from brachis.files import read_file
 from brachis.trajectory import Trajectory
 from brachis.verify import VerifyOptions, verify_trajectory
 from brachis.view import LOOPBACK, Viewer
@@ -46,9 +48,9 @@ def show(
     with Viewer(trajectory, candidates, verified=verified, host=host, port=port) as viewer, interrupts.expected():
         if not viewer.local:
             print_error(f"warning: whoever reaches {host} can look, and move the slider; leave --host out to be alone")
-        print_error("Ctrl-C stops the viewer")
-        result_console().print(f"look at {viewer.url}")
-        sys.stdout.flush()
+        if chosen() is not Verbosity.QUIET:
+            print_error("Ctrl-C stops the viewer")
+        print(f"look at {viewer.url}", flush=True)  # noqa: T201  (what the command is for, however quiet)
         if browser and sys.stdout.isatty() and _has_screen():
             webbrowser.open(viewer.url)
         viewer.wait()
@@ -73,9 +75,7 @@ def _candidates_beside(path: Path, trajectory: Trajectory) -> list[dict[str, Any
     """Read the candidates of a motion's search from the JSON that was written with it; none where it is another's."""
     beside = path.with_suffix(".json")
     try:
-        if beside.stat().st_size > _LARGEST:
-            return []
-        data = json.loads(beside.read_text())
+        data = json.loads(read_file(beside, _LARGEST))
         same = math.isclose(data["t_end"], trajectory.t_end, rel_tol=1e-12)
         return [dict(each) for each in data["candidates"]] if same else []
     except (OSError, ValueError, KeyError, TypeError):

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 
 from brachis.comparison.comparison import Comparison
-from brachis.errors import PlanningError
+from brachis.errors import PathError, PlanningError
 from brachis.planner import plan
 from brachis.recording import TOLERANCE, import_motion
 from brachis.result import Result
@@ -17,7 +17,7 @@ from brachis.task import SplineSettings, Task
 from brachis.trajectory import Trajectory
 from brachis.verify import VerifyOptions, verify_trajectory
 
-_FINER = 3
+_FINER, _MOST = 3, 10_000
 """Times as many knot intervals, where a plan is slower than the motion given."""
 
 
@@ -103,11 +103,16 @@ def _tasks(today: Trajectory, *, keep_end: bool) -> Iterator[Task]:
     yield task
     spline = task.spline
     if spline.intervals != "auto":
-        spline = SplineSettings.model_validate({**spline.model_dump(), "intervals": _FINER * spline.intervals})
+        finer = min(_MOST, _FINER * spline.intervals)
+        spline = SplineSettings.model_validate({**spline.model_dump(), "intervals": finer})
         task = task.model_copy(update={"spline": spline})
         yield task
     if task.task_space != JOINTS:
-        yield _along_joints(today, task)
+        try:
+            along = _along_joints(today, task)
+        except PathError:  # the plans before it count
+            return
+        yield along
 
 
 def _along_joints(today: Trajectory, task: Task) -> Task:

@@ -74,7 +74,8 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
     fastest = int(np.argmax(samples.tool_speed))
     ends = "goes round for ever" if boundary.periodic else "from rest to rest"
     if boundary.start_speed or boundary.end_speed:
-        ends = f"begins at {boundary.start_speed:g} m/s and ends at {boundary.end_speed:g} m/s along the path"
+        first, last = samples.tool_speed[[0, -1]]
+        ends = f"begins with the tool at {first:.3f} m/s and ends with it at {last:.3f} m/s"
     return {
         "end time t_E": f"{trajectory.t_end:.4f} s",
         "moves": ends,

@@ -26,9 +26,6 @@ from brachis.task.messages import show, task_error
 from brachis.task.text_file import read_text
 from brachis.task.yaml_reader import read_yaml
 
-_TRIED = 3
-"""Plans of a key that are looked at together with the robot before anything runs."""
-
 
 @dataclass(frozen=True)
 class Plan:
@@ -151,7 +148,9 @@ def _plan(base: Mapping[str, Any], changes: Mapping[str, Any], name: str, folder
         return error
     # Plans are made side by side already; how many processes a single one may use must not tell them apart.
     task = task.model_copy(update={"search": task.search.model_copy(update={"jobs": 1})})
-    said = json.dumps([task.to_dict(), urdf, brachis.__version__], sort_keys=True)
+    known = task.to_dict()
+    known["robot"].pop("urdf", None)  # its text counts, not where it is
+    said = json.dumps([known, urdf, brachis.__version__], sort_keys=True)
     return Plan(hashlib.sha256(said.encode()).hexdigest()[:16], task, urdf, brachis.__version__)
 
 
@@ -166,9 +165,11 @@ def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None
     for key in settings.keys or ("task",):
         having = [row for row in rows if key in row.changes or not row.changes]
         sound = [row.plan for row in having if isinstance(row.plan, Plan)]
-        for plan in sound[:: max(1, len(sound) // _TRIED)]:
+        for plan in sound:
             if plan.digest not in tried:
                 tried[plan.digest] = _unknown_name(plan)
+            if tried[plan.digest] is None:
+                break
         errors = [tried[plan.digest] for plan in sound if plan.digest in tried]
         errors = errors or [row.plan for row in having if isinstance(row.plan, BrachisError)]
         if all(errors):

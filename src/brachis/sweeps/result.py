@@ -38,8 +38,9 @@ class SweepResult(Summary):
     table : pyarrow.Table
         One row for each plan: ``plan`` (its number), the keys, and what came of it: ``status`` (verified, unverified or
         failed), ``t_end_s`` (s), ``worst_ratio`` (to a limit), ``path_error`` (m or rad), ``chosen_joints``,
-        ``chosen_branch``, ``solver``, ``iterations``, ``wall_time_s`` (s), ``error`` (its class) and ``message``,
-        ``remarks``, ``motion`` (its file in the folder). Values that are neither numbers nor strings are JSON.
+        ``chosen_branch``, ``chosen_solver``, ``iterations``, ``wall_time_s`` (s), ``error`` (its class) and
+        ``message``, ``remarks``, ``motion`` (its file in the folder). Values that are neither numbers nor strings are
+        JSON.
 
     Examples
     --------

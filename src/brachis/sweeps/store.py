@@ -26,7 +26,7 @@ COLUMNS = {
     "path_error": "double",
     "chosen_joints": "string",
     "chosen_branch": "string",
-    "solver": "string",
+    "chosen_solver": "string",
     "iterations": "int64",
     "wall_time_s": "double",
     "error": "string",

@@ -57,9 +57,9 @@ def planned(plan: Plan) -> Outcome:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PlausibilityWarning)  # they are among the outcome's remarks
             result = planner.plan(robot_of(plan), plan.task)
+        return Outcome(_facts(result, time.perf_counter() - began), _saved(result))
     except Exception as error:  # noqa: BLE001  (of thousands of plans one must not end the others, whatever it is)
         return Outcome.of_error(error, time.perf_counter() - began)
-    return Outcome(_facts(result, time.perf_counter() - began), _saved(result))
 
 
 def _facts(result: Result, wall_time: float) -> dict[str, Any]:
@@ -71,7 +71,7 @@ def _facts(result: Result, wall_time: float) -> dict[str, Any]:
         "path_error": result.verification.path_error,
         "chosen_joints": ", ".join(result.trajectory.redundant_joints),
         "chosen_branch": result.trajectory.branch,
-        "solver": result.solver_report.solver,
+        "chosen_solver": result.solver_report.solver,
         "iterations": sum(report.iterations for report in result.attempt.reports),
         "wall_time_s": wall_time,
         "remarks": "; ".join(remarks) or None,

@@ -17,6 +17,7 @@ def json_schema() -> dict[str, Any]:
     schema = Task.model_json_schema(mode="validation")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": "urn:brachis:task:1",
         **schema,
         "title": "brachis task",
     }
