@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 
 import brachis
-from brachis.errors import LimitError, TaskError, UnknownNameError
+from brachis.errors import InputError, LimitError, TaskError, UnknownNameError
 from brachis.robot import bind
 from brachis.task import (
     BoundarySettings,
@@ -191,6 +191,12 @@ def test_many_plans_keep_their_order_and_failures_are_values():
     assert told == [(1, 3), (2, 3), (3, 3)]
     assert outcomes[1].t_end == pytest.approx(brachis.plan("scara3", **LINE).t_end, rel=1e-9)
     assert outcomes[2].bottleneck().sensitivities.limits
+
+
+def test_one_task_is_no_list_of_tasks():
+    for one in (brachis.examples.scara_line, str(brachis.examples.scara_line), {"brachis": 1}):
+        with pytest.raises(InputError, match="a list of tasks"):
+            brachis.plan_many(one)
 
 
 def test_a_bar_tells_of_many_plans(capsys):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from typing import Any, Unpack
 
-from brachis.errors import BrachisError
+from brachis.errors import BrachisError, InputError
 from brachis.planner import Given, plan
 from brachis.result import Result
 from brachis.search.processes import each, processes
@@ -45,6 +46,8 @@ def plan_many(
 
     Raises
     ------
+    InputError
+        One task is given in place of several.
     KeyboardInterrupt
         Ctrl-C ends all.
 
@@ -65,6 +68,8 @@ def plan_many(
     >>> [type(outcome).__name__ for outcome in outcomes]
     ['Result', 'PathError']
     """
+    if isinstance(tasks, str | os.PathLike | Mapping):
+        raise InputError("is one task", where="tasks", found=type(tasks).__name__, allowed="a list of tasks")
     given = list(tasks)
     outcomes: list[Outcome] = []
     work = _outcome, given, keywords

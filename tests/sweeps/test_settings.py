@@ -105,5 +105,13 @@ def test_a_key_is_refused_only_where_every_plan_that_sets_it_is(tmp_path):
         load_sweep(tmp_path / "sweep.yaml")
 
 
+def test_the_wrong_key_is_named(tmp_path):
+    grid = {"spline.intervals": [6, 7], "robot.limits.scale.torqe": [1, 2]}
+    content = {"sweep": 1, "task": str(ROOT / "examples/01_scara_line.yaml"), "grid": grid}
+    (tmp_path / "sweep.yaml").write_text(yaml.safe_dump(content))
+    with pytest.raises(TaskError, match=r"sweep\.yaml: robot\.limits\.scale\.torqe: refused"):
+        load_sweep(tmp_path / "sweep.yaml")
+
+
 def test_no_column_has_the_name_of_a_key():
     assert not set(COLUMNS) & set(Task.model_fields)

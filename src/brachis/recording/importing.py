@@ -18,6 +18,7 @@ from brachis.recording.tool_path import Followed, path_followed
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.combine import robot_for
 from brachis.robot.task_map import JOINTS
+from brachis.robots import located
 from brachis.task import Segment, Task, load_task
 from brachis.trajectory import Recovered, Trajectory, check_tolerance
 
@@ -92,7 +93,7 @@ def import_motion(
         raise InputError("is no standard deviation", where="noise", found=noise, allowed="> 0 rad or m")
     check_tolerance(float(tolerance))
     settings = None if task is None else load_task(task)
-    made = robot_for(robot, settings.robot) if settings else robot_for(robot, load_task(_BLANK).robot)
+    made = robot_for(located(robot), (settings or load_task(_BLANK)).robot)
     space = task_space or (settings.task_space if settings else ik.natural_space(made))
     recording = read_recording(path, made, Units(**dict(units or {})))
     bound, task_map = bind(made, space)

@@ -162,6 +162,7 @@ def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None
     TaskError
     """
     tried: dict[str, BrachisError | None] = {}
+    refused: dict[str, str] = {}
     for key in settings.keys or ("task",):
         having = [row for row in rows if key in row.changes or not row.changes]
         sound = [row.plan for row in having if isinstance(row.plan, Plan)]
@@ -173,8 +174,11 @@ def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None
         errors = [tried[plan.digest] for plan in sound if plan.digest in tried]
         errors = errors or [row.plan for row in having if isinstance(row.plan, BrachisError)]
         if all(errors):
-            problem = f"refused in every plan that sets it ({len(having)}); the first: {errors[0]}"
-            raise TaskError(problem, where=f"{name}: {key}")
+            refused[key] = f"refused in every plan that sets it ({len(having)}); the first: {errors[0]}"
+    if refused:
+        # One wrong key refuses the plans of all others.
+        key = next((each for each in refused if each in refused[each]), next(iter(refused)))
+        raise TaskError(refused[key], where=f"{name}: {key}")
 
 
 def _unknown_name(plan: Plan) -> BrachisError | None:
