@@ -65,7 +65,7 @@ class Recorded:
         of_task = self.robot.suffix.lower() in _TASKS
         return import_motion(
             self.file,
-            None if of_task else self.robot,
+            None if of_task else str(self.robot),
             task=self.robot if of_task else None,
             task_space=rows[0] if rows and len(rows) == 1 and rows[0] not in {"x", "y", "z"} else rows,
             units={name: unit for name, unit in given.items() if unit is not None},
