@@ -12,7 +12,7 @@ from brachis.extract import extract, where_it_failed
 from brachis.nlp import Program
 from brachis.refine import Refined, RefinementOptions, Solve, refine
 from brachis.solvers import SolverReport
-from brachis.verify import VerifyOptions, verify_trajectory
+from brachis.verify import verify_trajectory
 
 _SECOND_LOOKS = 4
 """Times that a motion which the verification refuses is refined again where it failed."""
@@ -60,8 +60,7 @@ def _verified(attempt: Attempt, before: tuple[SolverReport, ...], refined: Refin
     if refined.converged and np.isfinite(refined.violation):
         with contextlib.suppress(UnreachableError):
             trajectory = extract(start, refined)
-            options = VerifyOptions(ratio_tolerance=problem.task.refinement.tolerance)
-            verification = verify_trajectory(trajectory, options, own_limits=problem.further)
+            verification = verify_trajectory(trajectory, own_limits=problem.further)
     return attempt.finished(
         reports=(*before, *refined.reports),
         refined=refined,

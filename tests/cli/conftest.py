@@ -59,7 +59,7 @@ def too_strict(monkeypatch: pytest.MonkeyPatch) -> None:
     honest, now = completion.verify_trajectory, [0.0]
     strict = VerifyOptions(ratio_tolerance=-0.5)
 
-    def refusing(trajectory: Trajectory, _options: VerifyOptions, **more: object) -> Verification:
+    def refusing(trajectory: Trajectory, **more: object) -> Verification:
         now[0] += 90.0
         return honest(trajectory, strict, **more)
 

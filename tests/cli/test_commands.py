@@ -145,8 +145,8 @@ def test_folder_in_the_place_of_a_result(run, task, write, tmp_path):
 def test_json_knows_no_nan(run, task, write, tmp_path, monkeypatch):
     honest = completion.verify_trajectory
 
-    def endless(trajectory, options, **more):
-        return replace(honest(trajectory, options, **more), worst_ratio=math.inf, path_error=math.nan)
+    def endless(trajectory, **more):
+        return replace(honest(trajectory, **more), worst_ratio=math.inf, path_error=math.nan)
 
     monkeypatch.setattr(completion, "verify_trajectory", endless)
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
@@ -244,6 +244,15 @@ def test_help_loads_neither_pinocchio_nor_numpy():
     code = "import sys, brachis.cli.main\nprint(sorted({'pinocchio', 'numpy', 'scipy'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_the_folder_of_a_motion_stands_for_it(run, planned, tmp_path):
+    for words in (["verify"], ["plot", "--out", tmp_path / "x.png"], ["export", "--out", tmp_path / "x.csv"]):
+        assert run(words[0], planned[1], *words[1:]).code == 0
+    (tmp_path / "empty").mkdir()
+    outcome = run("verify", tmp_path / "empty")
+    assert outcome.code == 2
+    assert "there is no motion in the folder; allowed: result.npz or unverified.npz" in outcome.err
 
 
 def test_verify(run, planned):

@@ -13,6 +13,14 @@ ROBOT = Robot.from_urdf(SCARA)
 NAMES = ("j1", "j2", "j3")
 
 
+def test_rows_in_which_the_motion_sets_out_gently_belong_to_it(write):
+    t = np.linspace(0.0, 1.0, 1001)
+    way = t**4 * (35.0 - 84.0 * t + 70.0 * t**2 - 20.0 * t**3)  # 3.5e-11 rad in the first millisecond
+    found = read_recording(write("t,j1,j2,j3", t, way, -way, 0.5 * way), ROBOT, Units())
+    assert found.t[-1] == 1.0
+    assert not any("stands still" in line for line in found.told)
+
+
 @pytest.mark.parametrize(
     ("header", "units", "factors"),
     [

@@ -20,12 +20,12 @@ from brachis.cli.output import (
     result_console,
     shown_warnings,
 )
-from brachis.cli.settings import changed_task, urdf_of
+from brachis.cli.settings import changed_task, motion_file, urdf_of
 from brachis.errors import InputError
 from brachis.result import Result
 from brachis.task import Task
 from brachis.trajectory import Trajectory
-from brachis.verify import VerifyOptions, verify_trajectory
+from brachis.verify import verify_trajectory
 
 _FILES = {
     True: ("bottleneck.json", "timeline.png"),
@@ -62,6 +62,7 @@ def bottleneck_command(
     """Plan a task or take a saved motion, find the bottlenecks, show, write; returns the exit code."""
     if out is not None:
         make_folder(out, (*_FILES[True], *_FILES[False]), (source, urdf))
+    source = motion_file(source)
     with shown_warnings(), progress() as listener:
         if source.suffix.lower() == _SAVED:
             motion = _saved(source, {"--urdf": urdf, "--set": changes})
@@ -96,7 +97,7 @@ def _saved(path: Path, given: Mapping[str, object]) -> _Motion:
             problem = "a saved motion belongs to the robot and task that it was planned for"
             raise InputError(problem, where=option, found=value, allowed="this option with a task file")
     trajectory = Trajectory.load(path)
-    verification = verify_trajectory(trajectory, VerifyOptions(ratio_tolerance=trajectory.task.refinement.tolerance))
+    verification = verify_trajectory(trajectory)
     data = {
         "t_end": trajectory.t_end,
         "redundant_joints": list(trajectory.redundant_joints),

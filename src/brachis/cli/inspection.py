@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,14 @@ from brachis import ik
 from brachis.cli.joint_table import NONE, WORDS, joint_rows
 from brachis.cli.output import print_json, result_console
 from brachis.cli.point_inspection import print_points
-from brachis.cli.settings import changed_task, urdf_of
+from brachis.cli.settings import changed_task, task_space_of, urdf_of
 from brachis.cli.tables import Column, print_table
 from brachis.errors import InputError
 from brachis.kinds import Kind, kind_of
 from brachis.plausibility import of_robot
-from brachis.robot import Robot, bind, in_use
+from brachis.robot import Robot, TaskMap, bind, in_use
 from brachis.robot.from_task import robot_from_settings
 from brachis.robot.limb import first_limb
-from brachis.robot.task_map.rows import AXES, YAW
 from brachis.robot.urdf import read_file
 from brachis.task import LimitSpec, Task
 
@@ -60,47 +59,66 @@ def inspect_command(
         base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
         robot = _of_urdf(source, tool_frame, base_frame, lock)
     asked: str | Sequence[str] | None = None if task is None else task.task_space
-    robot, rows = bind(robot, _space(task_space) if task_space else asked or _natural(robot, remarks))
+    robot, rows = bind(robot, task_space_of(task_space) if task_space else asked or _natural(robot, remarks))
     remarks += [f"warning: {remark}" for remark in of_robot(robot)]
-    joints, acting = joint_rows(robot), in_use(robot)
     candidates = ik.find_all(robot, rows)
     remarks += _remarks_on_closed_forms(candidates)
     decompositions = _decompositions(candidates)
     if posture is not None:
         remarks.append(_tool_pose(robot, posture))
+    inspected = _Inspected(source, robot, rows, tuple(remarks), task, decompositions)
     if as_json:
-        print_json(
-            {
-                "robot": str(source),
-                "tool_frame": robot.tool_frame,
-                "base_frame": robot.base_frame,
-                "task_space": list(rows.rows),
-                "degree_of_redundancy": robot.n - rows.m,
-                "remarks": remarks,
-                "in_use": acting,
-                "joints": joints,
-                "decompositions": decompositions,
-                "fits": [fit.to_dict() for fit in task.fits] if task else [],
-            }
-        )
-        return
-    console = result_console()
-    console.print(f"{source}: {robot.base_frame} -> {robot.tool_frame}, {robot.n} joints")
-    for remark in remarks:
-        console.print(remark)
-    shown = [key for key in joints[0] if any(row[key] != NONE for row in joints)]
-    columns = [Column(key, number=key not in WORDS) for key in shown]
-    print_table(console, "joints", columns, [[row[key] for key in shown] for row in joints])
-    for name, text in acting.items():
-        console.print(f"{name}: {text}")
-    if task:
-        print_points(console, task)
-    r = robot.n - rows.m
-    console.print(f"task space [{', '.join(rows.rows)}]: degree of redundancy {r}")
-    if r < 0:
-        console.print("The robot has fewer joints than the task space has rows; prescribe fewer rows.")
-        return
-    _print_decompositions(console, decompositions)
+        print_json(inspected.to_dict())
+    else:
+        inspected.show(result_console())
+
+
+@dataclass(frozen=True)
+class _Inspected:
+    """What there is to say of a robot."""
+
+    source: Path
+    robot: Robot
+    rows: TaskMap
+    remarks: tuple[str, ...]
+    task: Task | None
+    decompositions: list[dict[str, Any]]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all as plain data for JSON."""
+        robot = self.robot
+        return {
+            "robot": str(self.source),
+            "tool_frame": robot.tool_frame,
+            "base_frame": robot.base_frame,
+            "task_space": list(self.rows.rows),
+            "degree_of_redundancy": robot.n - self.rows.m,
+            "remarks": list(self.remarks),
+            "in_use": in_use(robot),
+            "joints": joint_rows(robot),
+            "decompositions": self.decompositions,
+            "fits": [fit.to_dict() for fit in self.task.fits] if self.task else [],
+        }
+
+    def show(self, console: Console) -> None:
+        """Print all for a person."""
+        robot, joints = self.robot, joint_rows(self.robot)
+        console.print(f"{self.source}: {robot.base_frame} -> {robot.tool_frame}, {robot.n} joints")
+        for remark in self.remarks:
+            console.print(remark)
+        shown = [key for key in joints[0] if any(row[key] != NONE for row in joints)]
+        columns = [Column(key, number=key not in WORDS) for key in shown]
+        print_table(console, "joints", columns, [[row[key] for key in shown] for row in joints])
+        for name, text in in_use(robot).items():
+            console.print(f"{name}: {text}")
+        if self.task:
+            print_points(console, self.task)
+        r = robot.n - self.rows.m
+        console.print(f"task space [{', '.join(self.rows.rows)}]: degree of redundancy {r}")
+        if r < 0:
+            console.print("The robot has fewer joints than the task space has rows; prescribe fewer rows.")
+            return
+        _print_decompositions(console, self.decompositions)
 
 
 def _task_of(path: Path, changes: Sequence[str], options: Sequence[str]) -> Task:
@@ -141,12 +159,6 @@ def _frames(urdf: Path, base: str | None, tool: str | None, remarks: list[str]) 
             "--tool-frame names another one"
         )
     return base or limb.base, limb.tool
-
-
-def _space(text: str) -> str | list[str]:
-    """Read a word or a list of rows."""
-    rows = [row.strip() for row in text.split(",") if row.strip()]
-    return rows[0] if len(rows) == 1 and rows[0] not in (*AXES, YAW) else rows
 
 
 def _natural(robot: Robot, remarks: list[str]) -> str | list[str]:

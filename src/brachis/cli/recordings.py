@@ -19,9 +19,10 @@ from brachis.cli.output import (
     result_console,
     shown_warnings,
 )
+from brachis.cli.settings import task_space_of
 from brachis.cli.tables import Column, print_table
 from brachis.recording import import_motion
-from brachis.verify import VerifyOptions, verify_trajectory
+from brachis.verify import verify_trajectory
 
 if TYPE_CHECKING:
     from brachis.trajectory import Trajectory
@@ -61,13 +62,12 @@ class Recorded:
     def load(self) -> Trajectory:
         """Import the motion."""
         given = {"angle": self.angle, "length": self.length, "time": self.time}
-        rows = None if self.task_space is None else [row.strip() for row in self.task_space.split(",")]
         of_task = self.robot.suffix.lower() in _TASKS
         return import_motion(
             self.file,
             None if of_task else str(self.robot),
             task=self.robot if of_task else None,
-            task_space=rows[0] if rows and len(rows) == 1 and rows[0] not in {"x", "y", "z"} else rows,
+            task_space=None if self.task_space is None else task_space_of(self.task_space),
             units={name: unit for name, unit in given.items() if unit is not None},
             tolerance=self.tolerance,
             noise=self.noise,
@@ -78,8 +78,7 @@ def import_command(recorded: Recorded, *, out: Path, as_json: bool) -> None:
     """Import a motion, verify and save it, and say what is known of it."""
     trajectory = recorded.load()
     write_one(out, trajectory.save, (".npz",), (recorded.file, recorded.robot))
-    options = VerifyOptions(ratio_tolerance=trajectory.task.refinement.tolerance)
-    verification = verify_trajectory(trajectory, options)
+    verification = verify_trajectory(trajectory)
     assert trajectory.recovered is not None  # noqa: S101
     if as_json:
         about = {"t_end": trajectory.t_end, "verified": verification.passed, "file": str(out)}

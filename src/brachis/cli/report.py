@@ -6,6 +6,7 @@ from pathlib import Path
 
 from brachis.cli.folder import write_one
 from brachis.cli.output import exit_code, print_error, result_console
+from brachis.cli.settings import motion_file
 from brachis.report import make_report
 from brachis.trajectory import Trajectory
 
@@ -14,6 +15,7 @@ SUFFIX = ".html"
 
 def report_command(result: Path, *, out: Path | None, title: str | None) -> int:
     """Write the report of a saved motion beside it, or where asked; returns the exit code."""
+    result = motion_file(result)
     out = result.with_suffix(SUFFIX) if out is None else out
     trajectory = Trajectory.load(result)
     urdf = trajectory.task.robot.urdf

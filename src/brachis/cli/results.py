@@ -7,19 +7,19 @@ from pathlib import Path
 
 from brachis.cli.folder import write_one, write_text
 from brachis.cli.output import json_text, print_error, print_json, print_verification, result_console
+from brachis.cli.settings import motion_file
 from brachis.errors import UnknownNameError
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import json_schema
 from brachis.trajectory import Trajectory
-from brachis.verify import VerifyOptions, verify_trajectory
+from brachis.verify import verify_trajectory
 
 
 def verify_command(result: Path, *, urdf: Path | None, as_json: bool) -> int:
     """Verify a saved motion; returns the exit code."""
-    trajectory = Trajectory.load(result)
+    trajectory = Trajectory.load(motion_file(result))
     robot = None if urdf is None else robot_from_settings(trajectory.task.robot, urdf=urdf)
-    options = VerifyOptions(ratio_tolerance=trajectory.task.refinement.tolerance)
-    verification = verify_trajectory(trajectory, options, robot=robot)
+    verification = verify_trajectory(trajectory, robot=robot)
     if as_json:
         print_json(verification.to_dict())
     else:
@@ -33,6 +33,7 @@ def export_command(
     """Write a saved motion in one of the formats of `brachis.export.FORMATS`."""
     from brachis import export  # noqa: PLC0415
 
+    result = motion_file(result)
     chosen, trajectory = export.format_of(out, form), Trajectory.load(result)
     names = None if joints is None else [name.strip() for name in joints.split(",")]
     write_one(
@@ -54,6 +55,7 @@ def plot_command(result: Path, *, out: Path, kind: str) -> None:
     if kind not in PLOTS:
         raise UnknownNameError("figure", kind, PLOTS, where="--kind")
     check_suffix(out)
+    result = motion_file(result)
     trajectory = Trajectory.load(result)
     suffixes = [f".{suffix}" for suffix in SUFFIXES]
     write_one(out, lambda path: save_figure(PLOTS[kind](trajectory), path), suffixes, _sources(result, trajectory))

@@ -1,4 +1,4 @@
-"""What a command takes: a task file with the keys that ``--set`` changes, a URDF or the name of a robot."""
+"""What a command takes: a motion or its folder, a task file with what ``--set`` changes, a URDF, names of robots."""
 
 from __future__ import annotations
 
@@ -6,8 +6,35 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from brachis import robots
-from brachis.errors import UnknownNameError
+from brachis.errors import ResultFileError, UnknownNameError
+from brachis.robot.task_map.rows import AXES, YAW
 from brachis.task import Task, load_task, read_assignment
+
+_MOTIONS = ("result.npz", "unverified.npz")
+"""What ``brachis plan --out`` calls a motion in its folder."""
+
+
+def motion_file(result: Path) -> Path:
+    """Return the file of a motion: the one named, or the one in the folder named.
+
+    Raises
+    ------
+    ResultFileError
+        There is none in the folder.
+    """
+    if not result.is_dir():
+        return result
+    for name in _MOTIONS:
+        if (result / name).is_file():
+            return result / name
+    problem, hint = "there is no motion in the folder", "Run brachis plan --out"
+    raise ResultFileError(problem, where=str(result), allowed=" or ".join(_MOTIONS), hint=hint)
+
+
+def task_space_of(text: str) -> str | list[str]:
+    """Read a word or a list of rows, as ``--task-space`` has them."""
+    rows = [row.strip() for row in text.split(",") if row.strip()]
+    return rows[0] if len(rows) == 1 and rows[0] not in (*AXES, YAW) else rows
 
 
 def changed_task(path: Path, changes: Sequence[str]) -> Task:

@@ -8,10 +8,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from rich.table import Table
-
 from brachis.cli.folder import ended_cleanly
 from brachis.cli.output import exit_code, print_error, print_json, progress, result_console
+from brachis.cli.tables import Column, print_table
 from brachis.cli.verbosity import Verbosity, chosen
 from brachis.errors import InputError
 from brachis.files import writing_errors
@@ -75,12 +74,12 @@ def _show(result: SweepResult, files: Sequence[str]) -> None:
     counts = ", ".join(f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED))
     title = f"sweep: {found['plans']} plans, {counts}"
     shown = [name for name in ("best", "median", "worst") if name in found]
-    table = Table(title=title, title_justify="left")
-    for column in ("", *shown):
-        table.add_column(column, justify="right" if column else "left", overflow="fold")
-    for key in ("t_end_s", "plan", *result.keys):
-        table.add_row("t_end [s]" if key == "t_end_s" else key, *(_text(found[name][key]) for name in shown))
-    console.print(table if shown else title)
+    if shown:
+        keys = {"t_end_s": "t_end [s]", "plan": "plan", **{key: key for key in result.keys}}
+        rows = [(words, *(_text(found[name][key]) for name in shown)) for key, words in keys.items()]
+        print_table(console, title, ("", *(Column(name, number=True) for name in shown)), rows)
+    else:
+        console.print(title)
     for error, told in found["failures"].items():
         console.print(f"{told['plans']} failed with {error}, for example: {told['message']}")
     console.print(f"planning took {in_words(found['wall_time_s'])} in all processes together")

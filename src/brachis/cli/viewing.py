@@ -13,25 +13,22 @@ from typing import Any
 
 from brachis import interrupts
 from brachis.cli.output import print_error
+from brachis.cli.settings import motion_file
 from brachis.cli.verbosity import Verbosity, chosen
-from brachis.errors import ResultFileError
 from brachis.files import read_file
 from brachis.trajectory import Trajectory
-from brachis.verify import VerifyOptions, verify_trajectory
+from brachis.verify import verify_trajectory
 from brachis.view import LOOPBACK, Viewer
 
-_NAMES = ("result.npz", "unverified.npz")
-"""What ``brachis plan --out`` calls a motion in its folder."""
 _LARGEST = 64_000_000
 """Of result.json, bytes."""
 
 
 def view_command(result: Path, *, host: str, port: int | None, browser: bool) -> None:
     """Show a saved motion until Ctrl-C."""
-    path = _motion_in(result)
+    path = motion_file(result)
     trajectory = Trajectory.load(path)
-    options = VerifyOptions(ratio_tolerance=trajectory.task.refinement.tolerance)
-    verified = verify_trajectory(trajectory, options).passed
+    verified = verify_trajectory(trajectory).passed
     show(trajectory, _candidates_beside(path, trajectory), verified=verified, host=host, port=port, browser=browser)
 
 
@@ -54,21 +51,6 @@ def show(
         if browser and sys.stdout.isatty() and _has_screen():
             webbrowser.open(viewer.url)
         viewer.wait()
-
-
-def _motion_in(result: Path) -> Path:
-    """Return the file of a motion: the one named, or the one in the folder named."""
-    if not result.is_dir():
-        return result
-    for name in _NAMES:
-        if (result / name).is_file():
-            return result / name
-    raise ResultFileError(
-        "there is no motion in the folder",
-        where=str(result),
-        allowed=" or ".join(_NAMES),
-        hint="Run brachis plan --out",
-    )
 
 
 def _candidates_beside(path: Path, trajectory: Trajectory) -> list[dict[str, Any]]:

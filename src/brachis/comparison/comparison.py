@@ -98,11 +98,13 @@ class Comparison(Summary):
     @property
     def remarks(self) -> tuple[str, ...]:
         """Say what of today's motion has to be known beside the times."""
-        return tuple(
+        jumps = "today's rows begin or end with an acceleration, so the plan may do so as well (rest: velocity)"
+        exceeded = (
             f"today's motion exceeds the {check.name.removesuffix(' ratio')} limit of {check.subject or 'the robot'} "
             f"by {100.0 * (check.value - 1.0):.2g} % at {check.time or 0.0:.4f} s, as far as its rows tell"
             for check in self.exceeded
         )
+        return (*exceeded, *([jumps] if self.today.task.spline.rest != "full" else []))
 
     def summary(self) -> dict[str, object]:
         """Return what is shown."""

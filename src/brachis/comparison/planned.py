@@ -15,7 +15,7 @@ from brachis.robot.task_map import JOINTS
 from brachis.search import Listener
 from brachis.task import SplineSettings, Task
 from brachis.trajectory import Trajectory
-from brachis.verify import VerifyOptions, verify_trajectory
+from brachis.verify import verify_trajectory
 
 _FINER, _MOST = 3, 10_000
 """Times as many knot intervals, where a plan is slower than the motion given."""
@@ -75,8 +75,7 @@ def compare(
         today = import_motion(
             today, robot, task=task, task_space=task_space, units=units, tolerance=tolerance, noise=noise
         )
-    options = VerifyOptions(ratio_tolerance=today.task.refinement.tolerance)
-    verification = verify_trajectory(today, options)
+    verification = verify_trajectory(today)
     best: Result | None = None
     failure: PlanningError | None = None
     for wanted in _tasks(today, keep_end=keep_end):

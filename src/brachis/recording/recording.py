@@ -19,7 +19,8 @@ from brachis.task.text_file import read_text
 FEWEST = 5
 """Rows; a polynomial through so many gives the derivatives."""
 _LARGEST_FILE = 64_000_000
-_STILL = 1e-9
+_STILL = 1e-12
+"""rad or m: what moves less between rows with all digits stands still."""
 _MANY_TURNS = 6.0 * np.pi
 
 
@@ -135,7 +136,8 @@ def _trimmed(recording: Recording) -> Recording:
     told = recording.told
     for rows, time, when in ((first, t[first] - t[0], "before"), (len(t) - 1 - last, t[-1] - t[last], "after")):
         if rows:
-            told = (*told, f"left out {time:.6g} s {when} the motion, in which the robot stands still ({rows} rows)")
+            many = f"{rows} row{'s' * (rows > 1)}"
+            told = (*told, f"left out {time:.6g} s {when} the motion, in which the robot stands still ({many})")
     kept = slice(first, last + 1)
     qdot = None if recording.qdot is None else recording.qdot[kept]
     return Recording(t[kept] - t[first], q[kept], qdot, recording.rounding, recording.source, told)

@@ -16,7 +16,7 @@ from brachis.limits import Limit, Role
 from brachis.plausibility import Remark
 from brachis.plots.curves import dense_samples
 from brachis.trajectory import Samples, Trajectory
-from brachis.verify import Verification, VerifyOptions, verify_trajectory
+from brachis.verify import Verification, verify_trajectory
 
 if TYPE_CHECKING:
     from brachis.result import Result
@@ -62,11 +62,10 @@ class ReportedMotion:
 def reported_motion(motion: Result | Trajectory) -> ReportedMotion:
     """Gather what there is to say of a planned or a saved motion; a saved one is verified again."""
     if isinstance(motion, Trajectory):
-        options = VerifyOptions(ratio_tolerance=motion.task.refinement.tolerance)
         return _gathered(
             motion,
             motion,
-            verify_trajectory(motion, options),
+            verify_trajectory(motion),
             limits=None,
             remarks=plausibility.of_robot(motion.robot) + plausibility.of_points(motion.task),
         )

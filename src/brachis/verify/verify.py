@@ -39,6 +39,7 @@ def verify_trajectory(
     ----------
     trajectory : Trajectory
     options : VerifyOptions, optional
+        Unless given, limits may be exceeded by as much as the task's ``refinement.tolerance`` allows.
     robot : Robot, optional
         Check against this robot and not the saved one, for example a newer URDF; its joints must have the same names
         in the same order.
@@ -63,7 +64,7 @@ def verify_trajectory(
     >>> brachis.verify_trajectory(result.trajectory).passed
     True
     """
-    options = options or VerifyOptions()
+    options = options or VerifyOptions(ratio_tolerance=trajectory.task.refinement.tolerance)
     robot, task_map = bind(trajectory.robot if robot is None else robot, trajectory.task.task_space)
     if robot.joint_names != trajectory.joint_names:
         raise InputError(

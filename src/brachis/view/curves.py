@@ -47,15 +47,14 @@ class Curves:
 def all_curves(trajectory: Trajectory, samples: Samples) -> list[Curves]:
     """Return the curves of all plots of a motion."""
     robot = trajectory.robot
-    units, limits, rest = robot.position_units, robot.limits, np.zeros(robot.n)
-    forces = tuple({"rad": "Nm", "m": "N"}[unit] for unit in units)
+    units, limits, zero = robot.position_units, robot.limits, np.zeros(robot.n)
     rates = tuple(f"{unit}/s" for unit in units)
     ranges = np.array([limits.position_lower, limits.position_upper])
     ended = np.isfinite(ranges).all(axis=0)
     middle = np.where(ended, 0.5 * np.where(ended, ranges, 0.0).sum(axis=0), 0.0)
     kinds = (
-        ("torque", "torque / limit", forces, samples.tau, limits.both_ways("torque"), rest),
-        ("speed", "speed / limit", rates, samples.qdot, limits.both_ways("velocity"), rest),
+        ("torque", "torque / limit", robot.torque_units, samples.tau, limits.both_ways("torque"), zero),
+        ("speed", "speed / limit", rates, samples.qdot, limits.both_ways("velocity"), zero),
         ("position", "position in its range (ends at -1 and 1)", units, samples.q, ranges, middle),
     )
     plots = [plot for kind in kinds for plot in _plots_of(trajectory, samples.t, *kind)]

@@ -31,8 +31,9 @@ def state_table(trajectory: Trajectory, now: Samples) -> str:
         f"tool at {place} m, {now.tool_speed[0]:.3f} m/s",
     )
     rows = []
-    for joint, (name, unit) in enumerate(zip(trajectory.joint_names, trajectory.robot.position_units, strict=True)):
-        force = {"rad": "Nm", "m": "N"}[unit]
+    robot = trajectory.robot
+    columns = zip(trajectory.joint_names, robot.position_units, robot.torque_units, strict=True)
+    for joint, (name, unit, force) in enumerate(columns):
         rows.append(
             (
                 name,
