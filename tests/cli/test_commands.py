@@ -252,7 +252,7 @@ def test_the_folder_of_a_motion_stands_for_it(run, planned, tmp_path):
     (tmp_path / "empty").mkdir()
     outcome = run("verify", tmp_path / "empty")
     assert outcome.code == 2
-    assert "there is no motion in the folder; allowed: result.npz or unverified.npz" in outcome.err
+    assert "is a folder in which there is no motion; allowed: result.npz or unverified.npz" in outcome.err
 
 
 def test_verify(run, planned):

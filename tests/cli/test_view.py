@@ -71,7 +71,7 @@ def test_the_candidates_are_those_of_the_json_beside_the_motion(saved, tmp_path)
 def test_a_folder_without_a_motion_is_refused(run, tmp_path):
     refused = run("view", tmp_path)
     assert refused.code == 2
-    assert "there is no motion in the folder; allowed: result.npz or unverified.npz" in refused.err
+    assert "is a folder in which there is no motion; allowed: result.npz or unverified.npz" in refused.err
 
 
 def test_a_port_in_use_is_refused(run, saved, looked_at, monkeypatch):

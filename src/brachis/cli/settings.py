@@ -27,7 +27,7 @@ def motion_file(result: Path) -> Path:
     for name in _MOTIONS:
         if (result / name).is_file():
             return result / name
-    problem, hint = "there is no motion in the folder", "Run brachis plan --out"
+    problem, hint = "is a folder in which there is no motion", "Run brachis plan --out"
     raise ResultFileError(problem, where=str(result), allowed=" or ".join(_MOTIONS), hint=hint)
 
 
