@@ -21,6 +21,7 @@ from brachis.feasibility import (
 )
 from brachis.kinematics import ChartMap, ClosedFormMap, JointMap, Newton
 from brachis.limits import Limit, limits_of
+from brachis.limits.process_ramps import with_ramps
 from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Boundary, FixedGrid, Grid, Phase, Program
 from brachis.path import Path, check_closed, path_of, path_speed, with_feed_rates
@@ -86,6 +87,7 @@ class Problem(Summary):
         if task.boundary.periodic:
             check_closed(task_map, path)
             end = start
+        task = with_ramps(task, robot, task_map, path, end if start is None else start)
         limits = limits_of(robot, task, further)
         check_smoothness(limits, task.spline)
         check_postures(task_map, limits, start, end, path)

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import brachis
-from brachis.errors import TaskError
+from brachis.errors import InputError, TaskError
+from brachis.limits.process_ramps import largest_acceleration
 from brachis.limits.speed_table import SpeedTable
+from brachis.robot import dynamics, task_map_of
+from brachis.task import LimitSpec
 from brachis.verify import verify_trajectory
+from support.chains import planar_robot
 
 ROOT = Path(__file__).parents[2]
 SPEED, BEGIN, END, LENGTH = 1.0, 0.25, 0.75, 1.2
@@ -69,12 +74,47 @@ def test_the_speed_is_constant_within_its_tolerance_and_reached_and_left_fast(re
     assert fastest <= result.t_end < 1.1 * fastest
 
 
-def test_with_enough_knots_it_is_the_optimum():
-    fastest = leg(BEGIN * LENGTH, 1.01 * SPEED) + leg((1.0 - END) * LENGTH, 1.01 * SPEED)
-    fastest += (END - BEGIN) * LENGTH / (1.01 * SPEED)
-    result = brachis.plan(task(PART, intervals="auto", tolerance=5e-4))
+@pytest.mark.parametrize("speed", [1.0, 0.3, 0.1])
+def test_with_enough_knots_it_is_the_optimum(speed):
+    fastest = leg(BEGIN * LENGTH, 1.01 * speed) + leg((1.0 - END) * LENGTH, 1.01 * speed)
+    fastest += (END - BEGIN) * LENGTH / (1.01 * speed)
+    result = brachis.plan(task({**PART, "speed": speed}, intervals="auto", tolerance=5e-4))
     assert result.verified
     assert result.t_end == pytest.approx(fastest, rel=1e-3)
+
+
+def test_a_part_may_begin_and_end_with_a_path_that_is_passed_at_its_speed():
+    whole = {"speed": 0.3, "s": [0.0, 1.0]}
+    for given, key, found in (
+        ({}, "s[0]", "0 m/s"),
+        ({"start_speed": 0.3}, "s[1]", "0 m/s"),
+        ({"start_speed": 0.3, "end_speed": 0.31}, "s[1]", "0.31 m/s"),
+    ):
+        with pytest.raises(InputError) as caught:
+            brachis.plan({**task(whole), "boundary": given})
+        assert f"tool_limits.process_speed[0].{key}" in str(caught.value)
+        assert found in str(caught.value)
+        assert "0.297 to 0.303 m/s" in str(caught.value)
+    result = brachis.plan({**task(whole), "boundary": {"start_speed": 0.3, "end_speed": 0.3}})
+    assert result.verified
+    assert LENGTH / 0.303 <= result.t_end < LENGTH / 0.3
+    begun = {**task({"speed": 0.3, "s": [0.0, 0.5]}), "boundary": {"start_speed": 0.3}}
+    result = brachis.plan(begun)
+    assert result.verified
+    assert result.t_end == pytest.approx(0.5 * LENGTH / 0.303 + leg(0.5 * LENGTH, 0.303), rel=0.02)
+
+
+def test_the_largest_acceleration_bounds_that_of_every_torque():
+    q = np.array([0.4, -0.8, 0.3])
+    robot = planar_robot("RRP")
+    tool = task_map_of(robot, "position")
+    jacobian = tool.jacobian(tool.twists(q[None]))[0]
+    mass = dynamics.mass_matrices(robot, q[None])[0]
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    by_torque = jacobian @ np.linalg.solve(mass, (robot.limits.torque_upper * corners).T)
+    for limits, found in ((LimitSpec(), by_torque), (LimitSpec(acceleration=0.1), 0.1 * jacobian @ corners.T)):
+        most = np.linalg.norm(found, axis=0).max()
+        assert most <= largest_acceleration(planar_robot("RRP", limits=limits), q) <= np.sqrt(3.0) * most
 
 
 def test_verification_looks_at_both_sides(result):
@@ -121,7 +161,7 @@ def test_two_parts_with_tolerances_of_their_own():
     ("tool", "where", "said"),
     [
         ({"process_speed": {"speed": 0.1, "s": [0.6, 0.3]}}, "process_speed[0].s", "begin < end"),
-        ({"process_speed": {"speed": 0.1, "s": [0.0, 0.3]}}, "process_speed[0].s[0]", "> 0"),
+        ({"process_speed": {"speed": 0.1, "s": [-0.1, 0.3]}}, "process_speed[0].s[0]", ">= 0"),
         ({"process_speed": {"speed": 0.1, "s": [0.1, 0.3], "tolerance": 1e-5}}, "process_speed[0].tolerance", "0.001"),
         ({"process_speed": [PART, {"speed": 0.1, "s": [0.6, 0.9]}]}, "process_speed[1].s", "begin above 0.75"),
         ({"process_speed": PART, "speed": 0.5}, "process_speed[0].speed", "at most 0.5 m/s"),

@@ -21,7 +21,7 @@ TASK = {
 
 def breaks(times: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> np.ndarray:
     start = SimpleNamespace(problem=SimpleNamespace(task=load_task(TASK)))
-    monkeypatch.setattr(pacing, "_paced", lambda _start: (np.zeros((len(times), 1)), times))
+    monkeypatch.setattr(pacing, "_paced", lambda _start: (np.linspace(0.0, 1.0, len(times))[:, None], times))
     return pacing.first_breaks(start)
 
 
@@ -35,6 +35,8 @@ def test_knots_are_closer_where_the_speed_changes(monkeypatch):
     found = breaks(np.where(s < 0.5, s, 0.5 + 4.0 * (s - 0.5)), monkeypatch)
     lengths, place = np.diff(found), 0.2  # at s = 0.5 in normalised time
     near = np.abs(0.5 * (found[1:] + found[:-1]) - place) < 0.02
-    assert lengths[near].max() < 0.3 * lengths[~near].min()
+    assert np.abs(found - place).min() < 0.01
+    assert lengths[near].min() < 0.1 * lengths[~near].min()
+    assert np.abs(np.diff(np.log(lengths[1:-1]))).max() < np.log(5.0), "and not too different from their neighbours"
     assert found[0] == 0.0
     assert found[-1] == 1.0

@@ -1,12 +1,14 @@
 """A constant speed v of the tool over parts of the path: (1 - tolerance) v <= |velocity| <= (1 + tolerance) v there.
 
-A bound that sets in at once would have no slope by which a solver could see it coming, and one that sets in with a kink
-would be met at the collocation points alone. So each side fades out smoothly over a short way d beyond the part, in s:
+A bound that sets in at once would have no slope by which a solver could see it coming. So each side gives way beside
+the part, the faster the farther, over the way that the tool needs for it: with d the distance from the part and
+l = v^2 / 2 a the way on which the largest acceleration a leads from rest to v,
 
-    |velocity| >= v (1 - tolerance - g),   |velocity| <= v (1 + tolerance + g),   g = cosh(d / width) - 1,
+    |velocity| >= v (1 - g),   |velocity| <= v (1 + g),   g = 2 f(d) / l,
 
-as rows (|velocity| / v - 1) tolerance / (tolerance + g) >= -tolerance, and <= tolerance. What that costs is about the
-time for one width at the process speed on either side, where the arm could have braked or gathered speed faster.
+up to the tolerance, where f is d but for a corner rounded over a width w: d^2 / 2 w up to there, d - w / 2 beyond. As
+rows ((|velocity| / v - 1) +- g) / (1 + g) >= -tolerance, and <= tolerance. No motion from rest to v, or from higher
+speeds to it, is as steep as that; the corner alone holds back, over the way w, by about 0.06 w^2 / l v of time.
 """
 
 from __future__ import annotations
@@ -20,11 +22,16 @@ from brachis.limits.tool import ToolSpeed
 from brachis.robot import Robot
 from brachis.task import ProcessSpeed, Task
 
-_WIDEST, _OF_LENGTH, _OF_REST = 0.003, 0.02, 0.2
-"""Width in s, as a share of the part's own length, and of the path before or behind it, on which the tool is at rest
-somewhere; the least of them counts."""
-_FARTHEST = 40.0
-"""In widths: beyond it nothing is left of the bounds."""
+_STEEPNESS = 2.0
+"""So many times as steep as the largest acceleration the bounds give way beside a part."""
+_COST = 2e-3
+"""The square of the corner's width is this share of l times the part, 4 l^2 at most."""
+_RAMP = 3e-3
+"""Way to the speed in s, where robot and path have not been asked for it."""
+_SHORTEST = 1e-6
+"""Least way to the speed, in s."""
+_FARTHEST = 1e3
+"""Largest g: beyond it nothing is left of the bounds."""
 
 
 class _ProcessSpeedLimit(Limit):
@@ -43,11 +50,13 @@ class _ProcessSpeedLimit(Limit):
     def __init__(self, robot: Robot, parts: Sequence[ProcessSpeed]) -> None:
         self._tool = ToolSpeed(robot)
         self._speeds, self._tolerances = (np.array([getattr(part, name) for part in parts]) for name in _FIGURES)
-        self._begin, self._end = np.array([part.s for part in parts]).T
-        beside = np.minimum(self._begin, 1.0 - self._end)
-        widths = (np.full(len(parts), _WIDEST), _OF_LENGTH * (self._end - self._begin), _OF_REST * beside)
-        self._width = np.min(widths, axis=0)
-        self.breaks = np.concatenate([self._begin, self._end])
+        self._part = np.array([part.s for part in parts]).T
+        # Also where the robot accelerates faster than estimated, the path before a part is way enough.
+        beside = np.array([self._part[0], 1.0 - self._part[1]])
+        ramps = np.array([part.ramps or (_RAMP, _RAMP) for part in parts]).T
+        self._ramp = np.maximum(np.minimum(ramps, beside), _SHORTEST)
+        self._width = np.minimum(2.0 * self._ramp, np.sqrt(_COST * self._ramp * np.diff(self._part, axis=0)))
+        self.breaks = self._part.ravel()
         what = "process speed" if self._side > 0.0 else "least process speed"
         subjects = ["tool"] if len(parts) == 1 else [f"tool, s = {part.s[0]:g} to {part.s[1]:g}" for part in parts]
         self.labels = tuple(Label(subject, what, "m/s", "tool_limits.process_speed") for subject in subjects)
@@ -61,32 +70,35 @@ class _ProcessSpeedLimit(Limit):
         rows = zip(figures.tolist(), self._speeds.tolist(), self._tolerances.tolist(), strict=True)
         return tuple(Bound(c, figure, share * v, 1.0 / v, end) for c, (figure, v, share) in enumerate(rows))
 
-    def _window(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How much of each bound is in force, and its derivative by s, (K, c)."""
-        s = np.where(np.isnan(s), np.inf, s)  # off the path
-        before, behind = self._begin - s[:, None], s[:, None] - self._end
-        way = np.maximum(np.maximum(before, behind), 0.0) / self._width
-        sign = np.where(way <= 0.0, 0.0, np.where(before > behind, -1.0, 1.0)) / self._width
-        near = np.minimum(way, _FARTHEST)
-        force = self._tolerances / (self._tolerances + np.cosh(near) - 1.0)
-        slope = -(force**2) / self._tolerances * np.sinh(near) * sign
-        return force, np.where(way < _FARTHEST, slope, 0.0)
+    def _giving(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How much each bound gives way, g, and its derivative by s, (K, c); infinitely much off the path."""
+        s = np.where(np.isnan(s), np.inf, s)
+        before, behind = self._part[0] - s[:, None], s[:, None] - self._part[1]
+        end = (behind > before).astype(int)
+        column = np.arange(len(self._speeds))
+        ramp, width = self._ramp[end, column], self._width[end, column]
+        way = np.maximum(np.maximum(before, behind), 0.0)
+        given = _STEEPNESS / ramp * np.where(way < width, 0.5 * way**2 / width, way - 0.5 * width)
+        slope = _STEEPNESS / ramp * np.minimum(way / width, 1.0) * np.where(end, 1.0, -1.0)
+        near = given < _FARTHEST
+        return np.where(near, given, _FARTHEST), np.where(near, slope, 0.0)
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        return (self._tool.speed(motion)[:, None] / self._speeds - 1.0) * self._window(motion.s)[0]
+        given, _ = self._giving(motion.s)
+        return (self._tool.speed(motion)[:, None] / self._speeds - 1.0 - self._side * given) / (1.0 + given)
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
-        force, slope = self._window(motion.s)
+        given, slope = self._giving(motion.s)
         speed, by_q, by_qdot = self._tool.derivatives(motion)
-        share = (force / self._speeds)[:, :, None]
-        by_s = (speed[:, None] / self._speeds - 1.0) * slope
-        return Partials(q=share * by_q[:, None], qdot=share * by_qdot[:, None], s=by_s)
+        share = (1.0 / self._speeds / (1.0 + given))[:, :, None]
+        by_s = -(self._side + (speed[:, None] / self._speeds - 1.0 - self._side * given) / (1.0 + given))
+        return Partials(q=share * by_q[:, None], qdot=share * by_qdot[:, None], s=by_s * slope / (1.0 + given))
 
     def lines(self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
         """See `Limit.lines`: within the parts alone, as the square of the ratio; for the least speeds 2 minus it."""
-        inside = (s[:, None] >= self._begin) & (s[:, None] <= self._end)
+        inside = (s[:, None] >= self._part[0]) & (s[:, None] <= self._part[1])
         level = self._speeds * (1.0 + self._side * self._tolerances)
         squares = np.where(inside, (self._tool.slope(q, q_ds)[:, None] / level) ** 2, 0.0)
         constant = np.where(inside & (self._side < 0.0), 2.0, 0.0)

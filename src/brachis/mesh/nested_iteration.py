@@ -17,8 +17,8 @@ from brachis.nlp import Phase, Program
 from brachis.refine import Solve
 from brachis.solvers import SolverReport
 
-_FEWEST = 12
-"""Intervals of the coarsest level, at least."""
+_FEWEST, _WITH_LEAST_SPEED = 12, 36
+"""Intervals of the coarsest level, at least; more where a limit asks for a least speed, for fewer may not keep it."""
 
 
 def coarsest(program: Program) -> Program:
@@ -70,7 +70,8 @@ def solve_nested(
 
 def _levels(program: Program) -> Iterator[Program]:
     """Programs over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
-    steps = [int(np.log2(max(phase.intervals / _FEWEST, 1.0))) for phase in program.phases]
+    fewest = _WITH_LEAST_SPEED if any(limit.least_speed for limit in program.limits) else _FEWEST
+    steps = [int(np.log2(max(phase.intervals / fewest, 1.0))) for phase in program.phases]
     for k in range(max(steps), 0, -1):
         pairs = zip(program.phases, steps, strict=True)
         yield program.with_phases(_thinned(phase, 2 ** min(k, own)) for phase, own in pairs)

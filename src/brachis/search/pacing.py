@@ -11,17 +11,26 @@ alone may need no force at all, where no limit's change with the end time tells 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from brachis.attempt import Start
+from brachis.limits import Limit
 from brachis.nlp import Program
 from brachis.nlp.guess import starting_point
 from brachis.problem import breaks_of
 from brachis.search.phase_plane import least_times
 
 _STATIONS = 401
+_HALVINGS = 12
+"""How often the way to an abrupt change is halved by stations."""
 _STEADY = 1e-6
 """Changes of the speed below this part of it are rounding."""
+_GRADING = 0.3
+"""Largest change of the length of knot intervals over their own length: short ones beside abrupt changes of speed."""
+_FIRST_INTERVALS = 40
+"""Of a mesh that is refined."""
 _SPREAD = 0.2
 """Part of the knots that is spread evenly over the time; the others are over the change of speed."""
 
@@ -31,13 +40,19 @@ def first_breaks(start: Start) -> np.ndarray:
     breaks, paced = breaks_of(start.problem.task), _paced(start)
     if paced is None:
         return breaks
-    _, times = paced
-    t_norm = np.linspace(0.0, 1.0, _STATIONS)
-    speed = np.gradient(np.interp(t_norm, times / times[-1], np.linspace(0.0, 1.0, len(times))), t_norm)
-    change = np.append(0.0, np.cumsum(np.abs(np.diff(speed))))
-    if change[-1] <= _STEADY * np.abs(speed).max():
+    curves, times = paced
+    t_norm, speed = 0.5 * (times[1:] + times[:-1]) / times[-1], np.diff(curves[:, 0]) / np.diff(times)
+    change = np.abs(np.gradient(speed, t_norm))
+    total = np.trapezoid(change, t_norm)
+    if total <= _STEADY * speed.max():
         return breaks
-    return np.asarray(np.interp(breaks, _SPREAD * t_norm + (1.0 - _SPREAD) * change / change[-1], t_norm))
+    if start.problem.task.spline.intervals == "auto":
+        breaks = np.linspace(0.0, 1.0, _FIRST_INTERVALS + 1)
+    length = 1.0 / (len(breaks) - 1) / (_SPREAD + (1.0 - _SPREAD) * change / total)
+    length = (length + _GRADING * np.abs(t_norm[:, None] - t_norm)).min(axis=1)
+    count = np.append(0.0, np.cumsum(0.5 * (1.0 / length[1:] + 1.0 / length[:-1]) * np.diff(t_norm)))
+    t_norm[[0, -1]] = 0.0, 1.0
+    return np.asarray(np.interp(breaks, count / count[-1], t_norm))
 
 
 def first_point(program: Program, start: Start) -> np.ndarray | None:
@@ -76,19 +91,34 @@ def _between_speeds(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     if fastest is None:
         return None
     curves, times = fastest
-    s = np.linspace(0.0, 1.0, _STATIONS)
+    s = curves[:, 0]
     with np.errstate(invalid="ignore"):  # 0 / 0 where the motion starts from rest
         even = np.nan_to_num(2.0 * s / (first + np.sqrt(first**2 + (last**2 - first**2) * s)))
     return curves, 0.5 * (times + even)
 
 
 def _timed(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
-    """Curves along the joint path at even stations, (S, c), and when the phase plane passes them, (S,), s."""
+    """Curves along the joint path, (S, c), and when the phase plane passes them, (S,), s."""
+    problem, joint_path = start.problem, start.joint_path
     s = np.linspace(0.0, 1.0, _STATIONS)
-    joint_path = start.joint_path
-    curves = np.column_stack([s, *(np.interp(s, joint_path[:, 0], column) for column in joint_path.T[1:])])
-    q = start.joint_map.postures(curves)
+    q = start.joint_map.postures(_along(joint_path, s))
     if not np.isfinite(q).all():
         return None
-    times = least_times(start.problem.limits, s, q, start.problem.end_rates)
-    return None if times is None or not np.isfinite(times[-1]) else (curves, times)
+    stations = _stations(problem.limits)
+    times = least_times(problem.limits, s, q, problem.end_rates, stations)
+    return None if times is None or not np.isfinite(times[-1]) else (_along(joint_path, stations), times)
+
+
+def _along(joint_path: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Curves, (S, c), of a joint path at path coordinates, (S,)."""
+    return np.column_stack([s, *(np.interp(s, joint_path[:, 0], column) for column in joint_path.T[1:])])
+
+
+def _stations(limits: Sequence[Limit]) -> np.ndarray:
+    """Spread stations evenly, and ever closer towards where a least speed sets in or ends."""
+    even = np.linspace(0.0, 1.0, _STATIONS)
+    steps = even[1] * 0.5 ** np.arange(_HALVINGS)
+    breaks = np.concatenate([np.empty(0), *(limit.breaks for limit in limits if limit.least_speed)])
+    near = breaks[:, None] + np.r_[-steps, 0.0, steps]
+    places = np.union1d(even, np.clip(near, 0.0, 1.0))
+    return places[np.append(np.diff(places) > 0.5 * steps[-1], True)]

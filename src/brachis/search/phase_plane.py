@@ -32,7 +32,7 @@ def least_time(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> float:
     ----------
     limits : sequence of Limit
     s : (S,) ndarray
-        Path coordinates, ascending, evenly spaced.
+        Path coordinates, ascending.
     q : (S, n) ndarray
         Postures there, rad or m, continuous.
 
@@ -46,13 +46,26 @@ def least_time(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> float:
 
 
 def least_times(
-    limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, rates: tuple[float, float] = _AT_REST
+    limits: Sequence[Limit],
+    s: np.ndarray,
+    q: np.ndarray,
+    rates: tuple[float, float] = _AT_REST,
+    stations: np.ndarray | None = None,
 ) -> np.ndarray | None:
-    """Estimate when the stations are passed, (S,), s; see `least_time`. None where they cannot be.
+    """Estimate when stations are passed, s; None where they cannot be.
 
-    `rates` are ds/dt at both ends, 1/s.
+    Parameters
+    ----------
+    limits, s, q
+        See `least_time`.
+    rates : tuple of float, optional
+        ds/dt at both ends, 1/s.
+    stations : (P,) ndarray, optional
+        Path coordinates, ascending from s[0] to s[-1]; s where left out. Between places of the joint path its
+        derivatives are interpolated.
     """
-    return _times(_lines(limits, s, q), s[1] - s[0], rates)
+    places = s if stations is None else stations
+    return _times(_lines(limits, s, q, places), np.diff(places), rates)
 
 
 @dataclass(frozen=True)
@@ -73,27 +86,28 @@ class _Lines:
     ceiling: np.ndarray
 
 
-def _times(lines: _Lines, step: float, rates: tuple[float, float]) -> np.ndarray | None:
+def _times(lines: _Lines, steps: np.ndarray, rates: tuple[float, float]) -> np.ndarray | None:
     """Find the times at the stations, (S,), s, under the largest u; None where the joint path cannot be followed."""
     first, last = (rate**2 for rate in rates)
-    intervals = _controllable(lines, step, last)
+    intervals = _controllable(lines, steps, last)
     if intervals is None or not intervals[0][0] <= first <= intervals[1][0]:
         return None
-    x = _fastest(lines.slope, lines.offset, *intervals, step, first)
+    x = _fastest(lines.slope, lines.offset, *intervals, steps, first)
     if not x.max() > 0.0:
         return None
     # Between stations nothing stops; a station where the grid says so is an artefact of its width.
     x[1:-1] = np.maximum(x[1:-1], _STANDING * np.median(x))
     speed = np.sqrt(x)
-    return np.append(0.0, np.cumsum(2.0 * step / (speed[1:] + speed[:-1])))
+    return np.append(0.0, np.cumsum(2.0 * steps / (speed[1:] + speed[:-1])))
 
 
-def _lines(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> _Lines:
-    """Collect the lines of all limits."""
-    step = s[1] - s[0]
-    q_ds = np.gradient(q, step, axis=0, edge_order=2)
-    lines = [limit.lines(s, q, q_ds, np.gradient(q_ds, step, axis=0, edge_order=2)) for limit in limits]
-    floor, ceiling = np.zeros(len(q)), np.full(len(q), np.inf)
+def _lines(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, places: np.ndarray) -> _Lines:
+    """Collect the lines of all limits at places of a joint path."""
+    q_ds = np.gradient(q, s, axis=0, edge_order=2)
+    orders = q, q_ds, np.gradient(q_ds, s, axis=0, edge_order=2)
+    joints = [np.column_stack([np.interp(places, s, column) for column in order.T]) for order in orders]
+    lines = [limit.lines(places, *joints) for limit in limits]
+    floor, ceiling = np.zeros(len(places)), np.full(len(places), np.inf)
     sloped = []
     for line in lines:
         if line is None:
@@ -112,12 +126,13 @@ def _lines(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> _Lines:
     return _Lines((-b / a, -b / a), (np.maximum(first, second), np.minimum(first, second)), floor, ceiling)
 
 
-def _controllable(lines: _Lines, step: float, last: float) -> tuple[np.ndarray, np.ndarray] | None:
+def _controllable(lines: _Lines, steps: np.ndarray, last: float) -> tuple[np.ndarray, np.ndarray] | None:
     """Go backwards: the intervals of x, (S,), from which the end can be reached with x = `last`; None where empty."""
     slope, offset = lines.slope, lines.offset
     count = len(lines.ceiling)
     low, high = np.full(count, last), np.full(count, last)
     for i in range(count - 2, -1, -1):
+        step = steps[i]
         # u >= (low' - x) / 2 step and u <= (high' - x) / 2 step join the lines.
         up = np.append(slope[0][i], -0.5 / step), np.append(offset[0][i], 0.5 * high[i + 1] / step)
         down = np.append(slope[1][i], -0.5 / step), np.append(offset[1][i], 0.5 * low[i + 1] / step)
@@ -138,12 +153,12 @@ def _fastest(
     offset: tuple[np.ndarray, np.ndarray],
     low: np.ndarray,
     high: np.ndarray,
-    step: float,
+    steps: np.ndarray,
     first: float,
 ) -> np.ndarray:
     """Go forwards from x = `first`: x, (S,), under the largest u."""
     x = np.full(len(low), first)
     for i in range(len(low) - 1):
         largest = np.min(slope[0][i] * x[i] + offset[0][i], initial=np.inf)
-        x[i + 1] = np.clip(x[i] + 2.0 * step * largest, low[i + 1], high[i + 1])
+        x[i + 1] = np.clip(x[i] + 2.0 * steps[i] * largest, low[i + 1], high[i + 1])
     return x

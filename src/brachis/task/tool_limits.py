@@ -64,14 +64,20 @@ class ProcessSpeed(Model):
 
     speed: Speed = Field(description="Speed of the tool frame's origin, m/s.")
     s: Annotated[
-        tuple[Annotated[Number, Field(gt=0.0, lt=1.0)], Annotated[Number, Field(gt=0.0, lt=1.0)]],
+        tuple[Annotated[Number, Field(ge=0.0, lt=1.0)], Annotated[Number, Field(gt=0.0, le=1.0)]],
         AfterValidator(_between),
     ] = Field(
         description="[begin, end], path coordinates between which it is held; outside, as fast as the limits allow. "
-        "Both lie strictly within the path, also where the motion does not begin or end at rest."
+        "A part may begin or end with the path where boundary.start_speed or end_speed is its speed, or the motion is "
+        "periodic."
     )
     tolerance: Annotated[Share, Field(ge=_LEAST_TOLERANCE, le=0.5)] = Field(
         default=0.01, description="Largest deviation either way, as a share of the speed: 1 %, or 0.01."
+    )
+    ramps: tuple[Positive, Positive] | None = Field(
+        default=None,
+        description="Ways before and behind the part, in s, on which the tool could reach the speed from rest, beside "
+        "which the bounds give way; written by brachis from robot and path.",
     )
 
 

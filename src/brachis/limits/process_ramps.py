@@ -1,0 +1,103 @@
+"""Process speeds on a robot and a path: the ways on which they are reached, and ends of the path at such a speed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.errors import InputError
+from brachis.limits.tool import ToolSpeed
+from brachis.path import Path, path_speed
+from brachis.robot import Robot, TaskMap, dynamics, task_map_of
+from brachis.robot.task_map import JointSpace
+from brachis.task import Task
+
+_STILL = 1e-9
+"""m per unit s below which the tool stands still along the path."""
+_PLANE = 2
+"""Rows of the position from which on the path alone says how fast the tool is."""
+
+
+def with_ramps(task: Task, robot: Robot, task_map: TaskMap, path: Path, posture: np.ndarray | None) -> Task:
+    """Return the task with the ways, in s, on which its process speeds are reached from rest.
+
+    Parameters
+    ----------
+    task : Task
+    robot : Robot
+    task_map : TaskMap
+    path : Path
+    posture : (n,) ndarray or None
+        In which the tool's largest acceleration is taken, of which no more than the size matters; None: that in the
+        middle of the joint ranges.
+
+    Raises
+    ------
+    InputError
+        A part of the path with a process speed begins or ends with the path, where that is passed at another speed.
+    """
+    tool = task.tool_limits
+    if not tool.process_speed:
+        return task
+    q = _middle(robot) if posture is None else posture
+    largest = min(largest_acceleration(robot, q), tool.acceleration or np.inf)
+    parts = []
+    for number, part in enumerate(tool.process_speed):
+        lengths = [_tool_path_speed(task_map, path, s) for s in part.s]
+        _check_ends(task, task_map, path, number)
+        ramps = tuple(0.5 * part.speed**2 / largest / max(length, _STILL) for length in lengths)
+        parts.append(part.model_copy(update={"ramps": ramps}))
+    return task.model_copy(update={"tool_limits": tool.model_copy(update={"process_speed": tuple(parts)})})
+
+
+def largest_acceleration(robot: Robot, posture: np.ndarray) -> float:
+    """Bound the acceleration of the tool, m/s^2, at rest in a posture, (n,), without gravity, from above.
+
+    With rows A of joint accelerations over what torque and acceleration limits allow, |A qddot| <= 1, no component of
+    J qddot exceeds the sum of the sizes in its row of J A^-1.
+    """
+    tool = task_map_of(robot, "position")
+    jacobian = tool.jacobian(tool.twists(posture[None]))[0]
+    mass = dynamics.mass_matrices(robot, posture[None])[0]
+    torque, rate = (np.abs(robot.limits.both_ways(kind)).max(axis=0) for kind in ("torque", "acceleration"))
+    found = []
+    for first in (torque, np.full(robot.n, np.inf)):
+        by_torque = np.isfinite(first) | (np.isfinite(torque) & ~np.isfinite(rate))
+        rows = np.where(by_torque[:, None], mass, np.eye(robot.n))
+        figures = np.where(by_torque, torque, np.where(np.isfinite(rate), rate, 0.0))
+        found.append(float(np.linalg.norm(np.abs(jacobian @ np.linalg.inv(rows) * figures).sum(axis=1))))
+    return max(min(found), _STILL)
+
+
+def _tool_path_speed(task_map: TaskMap, path: Path, s: float) -> float:
+    """Return how far the tool moves per unit s, m; where only some rows of its position are prescribed, in those."""
+    if not isinstance(task_map, JointSpace):
+        return path_speed(task_map, path, s)
+    place = path.sample(np.array([s]))
+    return float(ToolSpeed(task_map.robot).slope(place.target, place.xi)[0])
+
+
+def _check_ends(task: Task, task_map: TaskMap, path: Path, number: int) -> None:
+    """Refuse a part that begins or ends with the path, unless the speed there is its own."""
+    part, given = task.tool_limits.process_speed[number], task.boundary
+    for s, end, speed in ((0.0, 0, given.start_speed), (1.0, 1, given.end_speed)):
+        if part.s[end] != s or given.periodic:
+            continue
+        found = speed * _tool_path_speed(task_map, path, s) / max(path_speed(task_map, path, s), _STILL)
+        low, high = (1.0 - part.tolerance) * part.speed, (1.0 + part.tolerance) * part.speed
+        free = not isinstance(task_map, JointSpace) and len(task_map.axes) < _PLANE
+        if not (0.0 if free else low) <= found <= high or not found > 0.0:
+            name, begins, reach = (("start", "begins", "reach"), ("end", "ends", "leave"))[end]
+            raise InputError(
+                f"the part with a constant speed {begins} with the path, which is passed there at another one",
+                where=f"tool_limits.process_speed[{number}].s[{end}]",
+                found=f"{found:g} m/s, by boundary.{name}_speed",
+                allowed=f"{low:g} to {high:g} m/s at the path's {name}, or a place within the path",
+                hint=f"Set boundary.{name}_speed to {part.speed:g}, or leave way to {reach} the speed",
+            )
+
+
+def _middle(robot: Robot) -> np.ndarray:
+    """Return the posture in the middle of the joint ranges, (n,); zero where a joint has none."""
+    low, high = robot.limits.position_lower, robot.limits.position_upper
+    ranged = np.isfinite(low) & np.isfinite(high)
+    return np.where(ranged, 0.5 * (np.where(ranged, low, 0.0) + np.where(ranged, high, 0.0)), 0.0)
