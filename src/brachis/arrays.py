@@ -58,3 +58,10 @@ def rates(parts: Callable[..., Sequence[np.ndarray]], motion: Sequence[np.ndarra
     )
     sides = (np.split(part, 2) for part in parts(*moved))
     return [(ahead - behind) / (2.0 * h.reshape(-1, *[1] * (ahead.ndim - 1))) for ahead, behind in sides]
+
+
+def with_like_signs(quaternions: np.ndarray) -> np.ndarray:
+    """Return quaternions, (n, 4), of length 1, with signs such that neighbours are close; the first keeps its own."""
+    unit = quaternions / np.linalg.norm(quaternions, axis=1)[:, None]
+    signs = np.cumprod(np.where(np.sum(unit[1:] * unit[:-1], axis=1) < 0.0, -1.0, 1.0))
+    return np.concatenate([unit[:1], signs[:, None] * unit[1:]])

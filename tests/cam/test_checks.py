@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from brachis.arrays import with_like_signs
 from brachis.cam.checks import of_size, refuse_spikes, without_repetitions
 from brachis.cam.curves import fit_curves, interpolated
 from brachis.cam.least_squares import Tolerance
-from brachis.cam.points import with_like_signs
 from brachis.cam.scatter import decimals_of, scatter_of
 from brachis.errors import TaskError
 from support.seams import bent, points, wave

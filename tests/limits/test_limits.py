@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from brachis.limits import TABLE, Label, Limit, Moments, Partials, limits_of
+from brachis.robot import dynamics
 from brachis.task import LimitSpec, SpeedTable, ToolLimits
 from support.chains import planar_robot
 from support.phases import FRICTION
@@ -194,3 +195,18 @@ def test_pairs_of_limits_bound_the_phase_plane_by_the_direction_of_motion():
     lines = torque.lines(s, q, q_ds, q_dds)
     values = torque.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, 0.0 * q, s))
     np.testing.assert_allclose(lines.u * u + lines.x * speed**2 + lines.constant, values, atol=1e-9)
+
+
+def test_torques_of_a_motion_are_computed_once(monkeypatch):
+    robot = dataclasses.replace(ROBOT, limits=dataclasses.replace(ROBOT.limits, torque_rate=np.full(3, 100.0)))
+    built = [TABLE[kind](robot, TASK) for kind in ("torque", "power", "total_power", "torque_speed", "rms_torque")]
+    motion = Moments(STATES.q, STATES.qdot, STATES.qddot, STATES.qdddot, STATES.s)
+    calls = []
+    for name in ("torque", "torque_derivatives"):
+        own = getattr(dynamics, name)
+        monkeypatch.setattr(dynamics, name, lambda *given, own=own, name=name: calls.append(name) or own(*given))
+    for limit in built:
+        limit.values(motion)
+        limit.partials(motion)
+    assert sorted(calls) == ["torque", "torque_derivatives"]
+    np.testing.assert_array_equal(motion.torque(robot), dynamics.torque(robot, STATES.q, STATES.qdot, STATES.qddot))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from brachis.arrays import with_like_signs
 from brachis.path.leibniz import product, sine_cosine, unit
 from brachis.path.rotations import (
     angular_velocity,
@@ -15,7 +16,6 @@ from brachis.path.rotations import (
     quaternions_of,
     rotation_from,
     rotation_of,
-    with_like_signs,
 )
 from brachis.path.sampling import smallest
 from brachis.task import Quaternion, RollPitchYaw, RotationVector

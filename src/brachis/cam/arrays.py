@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from brachis.cam.points import QUATERNION, Array, Points, with_like_signs
+from brachis.arrays import with_like_signs
+from brachis.cam.points import QUATERNION, Array, Points
 from brachis.cam.units import ANGLES, LENGTHS, SPEEDS, Units
 from brachis.errors import TaskError
 

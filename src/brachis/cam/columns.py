@@ -7,7 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from brachis.cam.points import Array, Points, with_like_signs
+from brachis.arrays import with_like_signs
+from brachis.cam.points import Array, Points
 from brachis.cam.table import Table
 from brachis.cam.units import ANGLES, LENGTHS, SPEEDS, Units
 from brachis.errors import TaskError

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from brachis.cam.points import QUATERNION, Points, with_like_signs
+from brachis.arrays import with_like_signs
+from brachis.cam.points import QUATERNION, Points
 
 _FEWEST = 20
 _LONG = 5.0

@@ -72,13 +72,6 @@ class Points:
         return TaskError(problem, found=found, allowed=allowed, where=f"{self.source}: {self.named(i)}", hint=hint)
 
 
-def with_like_signs(quaternions: Array) -> Array:
-    """Return quaternions, (n, 4), of length 1, with signs such that neighbours are close; the first keeps its own."""
-    unit = quaternions / np.linalg.norm(quaternions, axis=1)[:, None]
-    signs = np.cumprod(np.where(np.sum(unit[1:] * unit[:-1], axis=1) < 0.0, -1.0, 1.0))
-    return np.concatenate([unit[:1], signs[:, None] * unit[1:]])
-
-
 def angles_between(one: Array, other: Array) -> Array:
     """Return the angles, (n,), rad, between what `Points.turning` holds, (n, q) both; zero where it holds nothing."""
     if one.shape[1] != QUATERNION:

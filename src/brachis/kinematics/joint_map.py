@@ -27,10 +27,11 @@ import numpy as np
 from brachis.arrays import rates
 from brachis.path import Path, PathSample
 from brachis.robot import Robot
+from brachis.robot.dynamics import SharedTorques
 
 
 @dataclass(frozen=True)
-class JointState:
+class JointState(SharedTorques):
     """Motion of all joints at K times.
 
     Attributes

@@ -6,7 +6,7 @@ import numpy as np
 
 from brachis.limits.per_joint import JointRatioLimit
 from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials
-from brachis.robot import Robot, dynamics
+from brachis.robot import Robot
 from brachis.task import Task
 
 
@@ -69,15 +69,15 @@ class TotalPowerLimit(Limit):
 
 def _powers(robot: Robot, motion: JointMotion) -> np.ndarray:
     """Powers of all joints, (K, n), W."""
-    return dynamics.torque(robot, motion.q, motion.qdot, motion.qddot) * motion.qdot
+    return motion.torque(robot) * motion.qdot
 
 
 def _power_partials(robot: Robot, motion: JointMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Differentiate the powers of all joints with respect to q, qdot, qddot, (K, n, n) each."""
-    exact = dynamics.torque_derivatives(robot, motion.q, motion.qdot, motion.qddot)
+    exact = motion.torque_derivatives(robot)
     by_q, by_qdot, by_qddot = (part * motion.qdot[:, :, None] for part in (exact.q, exact.qdot, exact.qddot))
     every = np.arange(robot.n)
-    by_qdot[:, every, every] += dynamics.torque(robot, motion.q, motion.qdot, motion.qddot)
+    by_qdot[:, every, every] += motion.torque(robot)
     return by_q, by_qdot, by_qddot
 
 

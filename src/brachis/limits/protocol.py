@@ -19,6 +19,9 @@ from typing import Literal, Protocol, Self
 
 import numpy as np
 
+from brachis.robot import Robot
+from brachis.robot.dynamics import SharedTorques, TorqueDerivatives
+
 Where = Literal["points", "whole"]
 """Where the rows of a limit are: its values at every moment, or their mean over the whole motion."""
 
@@ -44,10 +47,17 @@ class JointMotion(Protocol):
     def qdddot(self) -> np.ndarray: ...  # noqa: D102
     @property
     def s(self) -> np.ndarray: ...  # noqa: D102
+    def torque(self, robot: Robot) -> np.ndarray:
+        """Joint torques, (K, n), computed once."""
+        ...
+
+    def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
+        """Differentiate `torque`, once."""
+        ...
 
 
 @dataclass(frozen=True)
-class Moments:
+class Moments(SharedTorques):
     """Joint motion at K moments, made from arrays; see `JointMotion`."""
 
     q: np.ndarray

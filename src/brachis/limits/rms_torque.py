@@ -8,7 +8,7 @@ import numpy as np
 
 from brachis.limits.per_joint import JointRatioLimit
 from brachis.limits.protocol import Bound, JointMotion, Partials
-from brachis.robot import Robot, dynamics
+from brachis.robot import Robot
 from brachis.task import Task
 
 
@@ -37,13 +37,13 @@ class RmsTorqueLimit(JointRatioLimit):
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        tau = dynamics.torque(self._robot, motion.q, motion.qdot, motion.qddot)
+        tau = motion.torque(self._robot)
         return self._normalised(tau) ** 2
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
-        tau = dynamics.torque(self._robot, motion.q, motion.qdot, motion.qddot)[:, self._joints]
-        exact = dynamics.torque_derivatives(self._robot, motion.q, motion.qdot, motion.qddot)
+        tau = motion.torque(self._robot)[:, self._joints]
+        exact = motion.torque_derivatives(self._robot)
         factors = (2.0 * tau * self._scale**2)[:, :, None]
         return Partials(*(factors * part[:, self._joints] for part in (exact.q, exact.qdot, exact.qddot)))
 

@@ -30,11 +30,11 @@ class TorqueLimit(JointRatioLimit):
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        return self._normalised(dynamics.torque(self._robot, motion.q, motion.qdot, motion.qddot))
+        return self._normalised(motion.torque(self._robot))
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
-        exact = dynamics.torque_derivatives(self._robot, motion.q, motion.qdot, motion.qddot)
+        exact = motion.torque_derivatives(self._robot)
         parts = (part[:, self._joints] * self._scale[:, None] for part in (exact.q, exact.qdot, exact.qddot))
         return Partials(*parts)
 

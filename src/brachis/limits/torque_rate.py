@@ -38,23 +38,26 @@ class TorqueRateLimit(JointRatioLimit):
         super().__init__(robot, joints, robot.limits.torque_rate[joints], units)
         self._robot = robot
 
-    def _slopes(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _slopes(self, exact: dynamics.TorqueDerivatives) -> tuple[np.ndarray, ...]:
         """Differentiate the torque over the limits by q, qdot and qddot, (K, c, n) each."""
-        exact = dynamics.torque_derivatives(self._robot, q, qdot, qddot)
         parts = (exact.q, exact.qdot, exact.qddot)
         return tuple(part[:, self._joints] * self._scale[:, None] for part in parts)
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        slopes = self._slopes(motion.q, motion.qdot, motion.qddot)
+        slopes = self._slopes(motion.torque_derivatives(self._robot))
         pairs = zip(slopes, (motion.qdot, motion.qddot, motion.qdddot), strict=True)
         return np.asarray(sum(np.einsum("kcj,kj->kc", slope, part) for slope, part in pairs))
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
-        by_q, by_qdot, by_qddot = self._slopes(motion.q, motion.qdot, motion.qddot)
+        by_q, by_qdot, by_qddot = self._slopes(motion.torque_derivatives(self._robot))
         whole = motion.q, motion.qdot, motion.qddot, motion.qdddot
-        q, qdot, qddot = rates(lambda q, qdot, qddot, _: self._slopes(q, qdot, qddot), whole)
+
+        def slopes(q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, ...]:
+            return self._slopes(dynamics.torque_derivatives(self._robot, q, qdot, qddot))
+
+        q, qdot, qddot = rates(slopes, whole)
         return Partials(q, qdot + by_q, qddot + by_qdot, by_qddot)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from brachis.limits.per_joint import in_words
 from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials
-from brachis.robot import Robot, dynamics
+from brachis.robot import Robot
 from brachis.task import Task
 
 
@@ -68,12 +68,12 @@ class TorqueSpeedLimit(Limit):
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        tau = dynamics.torque(self._robot, motion.q, motion.qdot, motion.qddot)
+        tau = motion.torque(self._robot)
         return (tau[:, self._joints] + self._slope * motion.qdot[:, self._joints]) / self._level
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
-        exact = dynamics.torque_derivatives(self._robot, motion.q, motion.qdot, motion.qddot)
+        exact = motion.torque_derivatives(self._robot)
         by_q, by_qdot, by_qddot = (part[:, self._joints] for part in (exact.q, exact.qdot, exact.qddot))
         by_qdot[:, np.arange(len(self._joints)), self._joints] += self._slope
         return Partials(*(part / self._level[:, None] for part in (by_q, by_qdot, by_qddot)))

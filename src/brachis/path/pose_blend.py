@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.arrays import with_like_signs
 from brachis.errors import PathError
 from brachis.path.blend import check_neighbours, checked_septic, ends
 from brachis.path.pose import LEAST_QUALITY, POSITIONS, QuaternionPoseCurve, rotations
-from brachis.path.rotations import quaternion_derivatives, quaternions_of, rotation_of, with_like_signs
+from brachis.path.rotations import quaternion_derivatives, quaternions_of, rotation_of
 from brachis.path.sampling import smallest
 
 if TYPE_CHECKING:

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.arrays import with_like_signs
 from brachis.errors import PathError
 from brachis.path.line import LineCurve
 from brachis.path.pose import LEAST_QUALITY, PoseCurve, QuaternionPoseCurve
-from brachis.path.rotations import quaternions_of, rotation_from, rotation_of, with_like_signs
+from brachis.path.rotations import quaternions_of, rotation_from, rotation_of
 from brachis.path.sampling import smallest
 from brachis.path.spline import START_TOLERANCE, chord_knots, interpolate, starts_elsewhere, waypoints_of
 from brachis.path.turns import AMBIGUOUS, half_turn, turn_between

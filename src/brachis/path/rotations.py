@@ -37,13 +37,6 @@ def matrices(quaternions: Array) -> Array:
     return 2.0 * (of_vector + hat(products[..., 0, 1:])) + diagonal[..., None, None] * np.eye(3)
 
 
-def with_like_signs(quaternions: Array) -> Array:
-    """Return quaternions, shape (n, 4), with signs chosen so that neighbours are close; the first keeps its own."""
-    neighbours = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
-    signs = np.cumprod(np.where(neighbours < 0.0, -1.0, 1.0))
-    return np.concatenate([quaternions[:1], signs[:, None] * quaternions[1:]])
-
-
 def quaternion_derivatives(rotation: Array) -> Array:
     """Return the derivatives of a unit quaternion, (order + 1, 4), from those of a rotation matrix, (order + 1, 3, 3).
 

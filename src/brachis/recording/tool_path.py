@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.arrays import freeze
-from brachis.cam.points import Points, with_like_signs
+from brachis.arrays import freeze, with_like_signs
+from brachis.cam.points import Points
 from brachis.errors import PathError, TaskError
 from brachis.path import Path, build_path
 from brachis.robot import TaskMap

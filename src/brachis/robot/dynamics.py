@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -23,6 +24,40 @@ class TorqueDerivatives:
     q: np.ndarray
     qdot: np.ndarray
     qddot: np.ndarray
+
+
+class SharedTorques:
+    """A joint motion whose torques, and their derivatives, are computed once for all who ask.
+
+    Attributes
+    ----------
+    q, qdot, qddot : (K, n) ndarray
+    """
+
+    q: np.ndarray
+    qdot: np.ndarray
+    qddot: np.ndarray
+
+    @cached_property
+    def _torques(self) -> dict[int, tuple[Robot, np.ndarray]]:
+        return {}
+
+    @cached_property
+    def _derivatives_of_torques(self) -> dict[int, tuple[Robot, TorqueDerivatives]]:
+        return {}
+
+    def torque(self, robot: Robot) -> np.ndarray:
+        """See `torque`; not to be written to."""
+        if id(robot) not in self._torques:  # the robot is kept, so that its number stays its own
+            self._torques[id(robot)] = robot, torque(robot, self.q, self.qdot, self.qddot)
+        return self._torques[id(robot)][1]
+
+    def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
+        """See `torque_derivatives`; not to be written to."""
+        known = self._derivatives_of_torques
+        if id(robot) not in known:
+            known[id(robot)] = robot, torque_derivatives(robot, self.q, self.qdot, self.qddot)
+        return known[id(robot)][1]
 
 
 def torque(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
