@@ -17,6 +17,7 @@ from brachis import completion
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification, VerifyOptions
 from support.command_line import code_of, interrupts_kept
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 SCARA = ROOT / "robots/scara3/robot.urdf"
@@ -62,7 +63,7 @@ def too_strict(monkeypatch: pytest.MonkeyPatch) -> None:
 def quick_task() -> dict:
     content = yaml.safe_load((ROOT / "examples/01_scara_line.yaml").read_text())
     content["robot"]["urdf"] = str(SCARA)
-    content["search"] = {"effort": "single", "least_motion": False}
+    content["search"] = QUICK
     return content
 
 

@@ -32,7 +32,7 @@ def published(name: str) -> Path:
 
 
 def inspected(run, urdf: Path, *options: str) -> tuple[dict[str, str], list[str], str]:
-    """Kind of every choice of redundant joints, remarks, and what people read, after a look at what is printed besides."""
+    """Kind of every choice of redundant joints, remarks, and what people read, after a look at what else is printed."""
     outcome = run("inspect", urdf, *options, "--json")
     assert outcome.code == 0, outcome.err
     data = json.loads(outcome.out)
