@@ -102,7 +102,7 @@ def test_built_arms_with_all_choices_of_redundant_joints(name):
         rest = [i for i in range(robot.n) if i not in redundant]
         singular = np.abs(np.linalg.det(jacobian[:, :, rest])).max() < 1e-9
         try:
-            bench(robot, redundant).check()
+            bench(robot, redundant, 500).check()
         except NotApplicableError as reason:
             named = all(robot.joint_names[i] in str(reason) for i in rest)
             assert str(reason).startswith("J_nr is singular everywhere") if singular else named  # noqa: PT017

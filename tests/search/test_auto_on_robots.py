@@ -48,6 +48,7 @@ def test_auto_is_never_slower_than_the_rail_alone(intervals):
 
 
 def test_closed_forms_are_left_for_the_last_and_thorough_looks_at_polynomials_too(monkeypatch):
+    monkeypatch.setattr("brachis.search.schedule.numeric_starts", lambda *_given: [])  # come after the lattices
     for effort, levels in SEARCH_LEVELS.items():  # which choices are looked at does not depend on how closely
         monkeypatch.setitem(SEARCH_LEVELS, effort, tuple(replace(each, **COARSE) for each in levels))
     task = brachis.load_task({**brachis.load_task(RAIL_LINE).to_dict(), "redundant_joints": "auto"})
