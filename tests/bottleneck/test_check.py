@@ -12,6 +12,7 @@ import brachis
 from brachis.bottleneck import check, check_sensitivities, sensitivities
 from brachis.errors import InputError
 from brachis.solvers import solver_named
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 LARGE = 1e-4
@@ -35,7 +36,7 @@ def test_planar_line(scara, joint):
 
 def test_arm_on_a_rail():
     task = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
-    found = holds(brachis.plan({**task, "redundant_joints": ["rail"]}), 3)
+    found = holds(brachis.plan({**task, "redundant_joints": ["rail"], "search": QUICK}), 3)
     assert {entry.sensitivity.label.kind for entry in found.entries[:3]} == {"torque", "force", "velocity"}
 
 
@@ -130,8 +131,13 @@ def test_a_raised_limit_that_no_solver_copes_with_leaves_the_answer(scara, monke
             return dataclasses.replace(answer, violation=np.inf) if broken else answer
 
     monkeypatch.setattr(check, "solver_named", lambda _name, **_order: (Broken,))
-    found = [entry for entry in check_sensitivities(refined).entries if entry.predicted]
+    answers = check_sensitivities(refined)
+    found = [entry for entry in answers.entries if entry.predicted]
     assert found
     for entry in found:
         assert not entry.optimal
         assert entry.re_solved == pytest.approx(0.0, abs=1e-6)
+    large = [entry for entry in found if entry.predicted < -LARGE]
+    assert answers.larger(LARGE) == tuple(large)
+    told = str(dataclasses.replace(brachis.bottleneck.report(scara("j3")), check=answers))
+    assert f"within 0 %, but for {len(large)} that no solver brought to an optimum" in told

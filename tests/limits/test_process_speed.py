@@ -17,6 +17,7 @@ from brachis.robot import dynamics, task_map_of
 from brachis.task import LimitSpec
 from brachis.verify import verify_trajectory
 from support.chains import planar_robot
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 SPEED, BEGIN, END, LENGTH = 1.0, 0.25, 0.75, 1.2
@@ -33,7 +34,7 @@ def task(part=None, *, speed=None, **spline):
         "path": [{"line": {"by": [LENGTH, 0.0]}}],
         "tool_limits": {"speed": speed, "process_speed": part or []},
         "spline": {"intervals": 20, "rest": "velocity", **spline},
-        "search": {"effort": "single", "least_motion": False},
+        "search": QUICK,
     }
 
 
