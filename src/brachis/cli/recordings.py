@@ -44,7 +44,7 @@ class Recorded:
     file, robot : Path
         CSV file; URDF, or task file whose robot and settings hold.
     task_space, angle, length, time : str or None
-    tolerance : float
+    tolerance : float or None
         m and rad.
     noise : float or None
         rad or m.
@@ -56,7 +56,7 @@ class Recorded:
     angle: str | None
     length: str | None
     time: str | None
-    tolerance: float
+    tolerance: float | None
     noise: float | None
 
     def load(self) -> Trajectory:

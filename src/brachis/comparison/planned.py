@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from brachis.comparison.comparison import Comparison
 from brachis.errors import PathError, PlanningError
 from brachis.planner import plan
-from brachis.recording import TOLERANCE, import_motion
+from brachis.recording import import_motion
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.task_map import JOINTS
@@ -28,8 +28,8 @@ def compare(
     task: str | os.PathLike[str] | Mapping[str, object] | Task | None = None,
     task_space: str | Sequence[str] | None = None,
     units: Mapping[str, str] | None = None,
-    tolerance: float = TOLERANCE,
-    noise: float | None = None,
+    tolerance: float | None = None,
+    noise: float | Sequence[float] | None = None,
     keep_end: bool = False,
     listener: Listener | None = None,
 ) -> Comparison:
