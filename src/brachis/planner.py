@@ -168,7 +168,7 @@ def _plan(
 ) -> Result:
     """Run the pipeline stage by stage."""
     loaded, deadline = time.perf_counter(), Deadline.after(task.search.time_limit)
-    remarks = plausibility.of_robot(robot) + plausibility.of_points(task)
+    remarks = plausibility.of_robot(robot) + plausibility.of_task(task)
     remarks = plausibility.tell(remarks, strict=strict, stacklevel=4)
     problem = Problem.of(robot, task, own_limits)
     places = plausibility.of_places(problem.task_map, problem.start, problem.end, task.path_start)

@@ -163,8 +163,8 @@ def _told(recording: Recording, nodes: Nodes, followed: Followed, tolerance: flo
         *recording.told,
         *nodes.told,
         "not known: what the motion does between the rows, and the torques that were measured",
-        f"the tool's path follows by forward kinematics; the curve is at most {followed.miss:.1e} m or rad off, "
-        f"of {tolerance:.1e} allowed",
+        f"the tool's path follows by forward kinematics; the curve is at most {followed.miss:.1e} m or rad off",
+        f"its tolerance is {tolerance:.1e} m and rad",
     )
 
 

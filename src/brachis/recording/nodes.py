@@ -21,8 +21,8 @@ from brachis.recording.recording import FEWEST, Recording
 from brachis.recording.smoothing import smoothed
 
 _ROUNDED, _NOISY = 1e-3, 0.2
-"""Of a joint's largest acceleration, what rounding makes of it where a smoothing spline takes its place if it is as near
-to the rows as they are exact, and where in any case."""
+"""Of a joint's largest acceleration, what rounding makes of it where a smoothing spline takes its place if it is as
+near to the rows as they are exact, and where in any case."""
 _BETWEEN = 60.0
 """Acceleration of a quintic piece of 1 s, for a position that is 1 rad off."""
 _AGREES = 0.02

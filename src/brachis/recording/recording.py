@@ -90,18 +90,20 @@ def read_recording(path: str | os.PathLike[str], robot: Robot, units: Units) -> 
     bases = tuple(zip(joints, robot.position_units, strict=True))
     parts = [in_si(table, columns, "q", name, unit, units, where) for name, unit in bases]
     t, q = time.values, np.column_stack([part.values for part in parts])
-    rates: dict[Kind, np.ndarray | None] = {"qdot": None, "qddot": None}
-    for kind in rates:
-        if any(column.kind == kind for column in columns.values()):
-            found = [in_si(table, columns, kind, name, unit, units, where).values for name, unit in bases]
-            rates[kind] = np.column_stack(found)
+
+    def rates(kind: Kind) -> np.ndarray | None:
+        if not any(column.kind == kind for column in columns.values()):
+            return None
+        return np.column_stack([in_si(table, columns, kind, name, unit, units, where).values for name, unit in bases])
+
     _check_times(t, table, source)
     _check_angles(q, robot, units, source)
     told = [*table.told, f"units: {', '.join(dict.fromkeys(part.unit for part in (time, *parts)))}"]
     ignored = [name for i, name in enumerate(table.header) if i not in columns]
     told += [f"left out the columns {', '.join(ignored)}"] if ignored else []
     rounding = np.array([part.rounding for part in parts])
-    return _trimmed(Recording(t, q, *rates.values(), rounding, robot.position_units, str(source), tuple(told)))
+    read = Recording(t, q, rates("qdot"), rates("qddot"), rounding, robot.position_units, str(source), tuple(told))
+    return _trimmed(read)
 
 
 def _check_times(t: np.ndarray, table: Table, source: Path) -> None:
