@@ -164,7 +164,10 @@ def test_a_payload_in_g_and_mm(payload, where):
     ("limits", "remark"),
     [
         ({"speed": 250.0}, "tool_limits.speed: the limit looks like mm/s; found 250 m/s; usual: below 50 m/s, or null"),
-        ({"speed": {"s": [0.0, 1.0], "speed": [0.2, 200.0]}}, "tool_limits.speed: the limit looks like mm/s; found 200"),
+        (
+            {"speed": {"s": [0.0, 1.0], "speed": [0.2, 200.0]}},
+            "tool_limits.speed: the limit looks like mm/s; found 200",
+        ),
         ({"process_speed": {"speed": 100.0, "s": [0.2, 0.8]}}, "tool_limits.process_speed: the limit looks like mm/s"),
         ({"acceleration": 1000.0}, "tool_limits.acceleration: the limit looks like mm/s^2; found 1000 m/s^2"),
         ({"angular_speed": 90.0}, "tool_limits.angular_speed: the limit looks like degrees per second; found 90 rad/s"),

@@ -27,7 +27,6 @@ from brachis.verify import verify_trajectory
 if TYPE_CHECKING:
     from brachis.trajectory import Trajectory
 
-_TASKS = (".yaml", ".yml")
 _FILES = {
     True: ("today.npz", "result.npz", "comparison.json", "comparison.png"),
     False: ("today.npz", "unverified.npz", "unverified_comparison.json", "unverified_comparison.png"),
@@ -62,11 +61,9 @@ class Recorded:
     def load(self) -> Trajectory:
         """Import the motion."""
         given = {"angle": self.angle, "length": self.length, "time": self.time}
-        of_task = self.robot.suffix.lower() in _TASKS
         return import_motion(
             self.file,
-            None if of_task else str(self.robot),
-            task=self.robot if of_task else None,
+            str(self.robot),
             task_space=None if self.task_space is None else task_space_of(self.task_space),
             units={name: unit for name, unit in given.items() if unit is not None},
             tolerance=self.tolerance,

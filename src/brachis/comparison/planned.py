@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 
+from brachis.arguments import named
 from brachis.comparison.comparison import Comparison
 from brachis.errors import PathError, PlanningError
 from brachis.planner import plan
@@ -21,9 +22,10 @@ _FINER, _MOST = 3, 10_000
 """Times as many knot intervals, where a plan is slower than the motion given."""
 
 
+@named
 def compare(
     today: str | os.PathLike[str] | Trajectory,
-    robot: str | os.PathLike[str] | Robot | None = None,
+    robot: str | os.PathLike[str] | Robot | Task | None = None,
     *,
     task: str | os.PathLike[str] | Mapping[str, object] | Task | None = None,
     task_space: str | Sequence[str] | None = None,

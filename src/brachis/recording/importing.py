@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from brachis import ik
+from brachis.arguments import named, numbers
 from brachis.errors import InputError, PathError
+from brachis.kinds import Kind, kind_of
 from brachis.recording.columns import Units
 from brachis.recording.nodes import Nodes, nodes_of
 from brachis.recording.path_coordinate import DEGREE, coordinate_spline
@@ -29,9 +31,10 @@ _BETWEEN = 4
 """Places at which every piece of the motion is looked at."""
 
 
+@named
 def import_motion(
     path: str | os.PathLike[str],
-    robot: str | os.PathLike[str] | Robot | None = None,
+    robot: str | os.PathLike[str] | Robot | Task | None = None,
     *,
     task: str | os.PathLike[str] | Mapping[str, object] | Task | None = None,
     task_space: str | Sequence[str] | None = None,
@@ -51,8 +54,8 @@ def import_motion(
         CSV file whose first line names its columns: time (``t``, ``time_ms``, ...), the joints' positions (``j1``,
         ``q_j1``, ``j1_pos [deg]``, ...) and, if known, velocities (``qd_j1``, ``j1_vel``, ...). Other columns are
         left out.
-    robot : path or Robot, optional
-        URDF file or robot; needed unless the task names one.
+    robot : path, Robot or Task, optional
+        URDF file, name of a robot, or robot; or a task file, as if it were `task`. Needed unless the task names one.
     task : path, mapping or Task, optional
         A task whose robot, limits and settings hold; its start and path do not count.
     task_space : str or sequence of str, optional
@@ -91,11 +94,16 @@ def import_motion(
     (1e-06, 0.0)
     """
     if tolerance is not None:
-        check_tolerance(tolerance)
+        tolerance = check_tolerance(tolerance)
+    if task is None and _is_task(robot):
+        robot, task = None, robot
     settings = None if task is None else load_task(task)
-    made = robot_for(located(robot), (settings or load_task(_BLANK)).robot)
+    if robot is None and (settings is None or settings.robot.urdf is None):
+        allowed = "a URDF file, the name of a robot (brachis.robots), a Robot, or a task file"
+        raise InputError("the robot is missing", where="robot", allowed=allowed)
+    made = robot_for(located(robot), (settings or load_task(_BLANK)).robot)  # type: ignore[arg-type]
     space = task_space or (settings.task_space if settings else ik.natural_space(made))
-    recording = read_recording(path, made, Units(**dict(units or {})))
+    recording = read_recording(path, made, _units(units))
     bound, task_map = bind(made, space)
     deviation = _deviation(recording, noise)
     nodes = _with_roll(nodes_of(recording, deviation), bound.n)
@@ -122,6 +130,24 @@ _BLANK: dict[str, Any] = {
 """A task that only stands for the defaults of all settings."""
 
 
+def _is_task(given: object) -> bool:
+    """Tell a task, or its file, from a robot."""
+    return isinstance(given, Task | Mapping) or (isinstance(given, str | os.PathLike) and kind_of(given) is Kind.TASK)
+
+
+def _units(given: Mapping[str, str] | None) -> Units:
+    """Read units by the quantities that have them.
+
+    Raises
+    ------
+    InputError
+    """
+    if given is not None and not isinstance(given, Mapping):
+        allowed = '{"angle": "deg", "length": "mm", "time": "ms"}, or some of them'
+        raise InputError("wrong type", where="units", found=repr(given), allowed=allowed)
+    return named(Units)(**dict(given or {}))
+
+
 def _deviation(recording: Recording, noise: float | Sequence[float] | None) -> np.ndarray:
     """Return the standard deviation of every joint's positions, (n,), rad or m: as it is said, else of the digits.
 
@@ -131,7 +157,7 @@ def _deviation(recording: Recording, noise: float | Sequence[float] | None) -> n
     """
     if noise is None:
         return recording.rounding / np.sqrt(3.0)
-    given = np.asarray(noise, dtype=float)
+    given = numbers(noise, "noise", "rad or m")
     n = recording.q.shape[1]
     if given.shape not in ((), (n,)) or not ((given > 0.0) & (given < np.inf)).all():
         allowed = f"> 0 rad or m, one figure or {n}"

@@ -12,6 +12,7 @@ import numpy as np
 from brachis.arrays import freeze
 from brachis.cam.table import Table, read_table
 from brachis.errors import TaskError
+from brachis.kinds import check_kind
 from brachis.recording.columns import Kind, Units, allowed_columns, in_si, understood
 from brachis.robot import Robot
 from brachis.task.text_file import read_text
@@ -81,6 +82,7 @@ def read_recording(path: str | os.PathLike[str], robot: Robot, units: Units) -> 
         The file cannot be read, columns are missing, times do not ascend, or nothing moves.
     """
     source, joints = Path(path), robot.joint_names
+    check_kind(source, "a CSV file", TaskError)
     text = read_text(source, where=str(source), folder=Path.cwd(), largest=_LARGEST_FILE)
     allowed = allowed_columns(joints)
     table = read_table(text, str(source), allowed, lambda header, where: understood(header, joints, where))
@@ -123,7 +125,7 @@ def _check_angles(q: np.ndarray, robot: Robot, units: Units, source: Path) -> No
     if bad.size and units.angle is None:
         joint = int(bad[0])
         found = f"{np.abs(q[:, joint]).max():.4g} rad at {robot.joint_names[joint]}"
-        hint = "Degrees? Ask for units of the angle, deg; rad where it is meant so"
+        hint = 'Degrees? Say so: units={"angle": "deg"}, or --angle deg; rad where it is meant so'
         raise TaskError("an angle is hardly meant", found=found, where=str(source), hint=hint)
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from brachis import interrupts
+from brachis.arguments import count
 from brachis.errors import BrachisError, ClusterError, InputError, NotInstalledError
 from brachis.sweeps.plans import Plan
 from brachis.sweeps.worker import Outcome, planned
@@ -56,10 +57,9 @@ def pool_for(jobs: int | None, scheduler: str | None, listener: Callable[[str], 
         Both are given, or one is wrong.
     """
     if scheduler is None:
-        if jobs is not None and jobs < 1:
-            raise InputError("is no number of processes", where="jobs", found=jobs, allowed=">= 1")
+        wanted = None if jobs is None else count(jobs, "jobs")
         processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        return lambda plans: in_processes(plans, min(jobs or processors, processors))
+        return lambda plans: in_processes(plans, min(wanted or processors, processors))
     if jobs is not None:
         raise InputError(
             "a cluster has as many processes as it has workers", where="jobs", found=jobs, allowed="jobs or scheduler"
