@@ -116,7 +116,7 @@ def test_rows_that_are_no_motion(table, write):
         read_recording(write("t,j1,j2,j3", t[:4], q[:4]), ROBOT, Units())
     with pytest.raises(TaskError, match="the robot does not move"):
         read_recording(write("t,j1,j2,j3", t, 0.0 * q), ROBOT, Units())
-    with pytest.raises(TaskError, match=r"an angle is hardly meant; found [0-9.]+ rad at j1. Degrees\? Ask for"):
+    with pytest.raises(TaskError, match=r"an angle is hardly meant; found [0-9.]+ rad at j1. Degrees\? Say so"):
         read_recording(write("t,j1,j2,j3", t, 100.0 * q), ROBOT, Units())
     with pytest.raises(TaskError, match="there is no such file"):
         read_recording("nowhere.csv", ROBOT, Units())

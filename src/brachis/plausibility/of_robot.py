@@ -10,6 +10,7 @@ import numpy as np
 from brachis.plausibility.remark import Remark
 from brachis.plausibility.size import link_lengths, reach
 from brachis.robot import Robot
+from brachis.robot.units import UNITS
 
 _FASTEST = {"rad": 60.0, "m": 50.0}
 """The quickest axes of small SCARA and delta robots turn at 50 rad/s; rails move at 10 m/s. In degrees and mm: more."""
@@ -75,7 +76,7 @@ def _friction(robot: Robot) -> Iterator[Remark]:
         fastest, torque = limits.velocity[i], limits.torque[i]
         slow = np.isfinite([fastest, torque]).all() and fastest <= _FASTEST[robot.position_units[i]]
         if slow and damping == robot.friction.viscous[i] and damping * fastest > torque:
-            unit = {"rad": "Nm s/rad", "m": "N s/m"}[robot.position_units[i]]
+            unit = UNITS["viscous"][robot.position_units[i]]
             message = "the damping of the URDF takes more than the largest torque at the largest speed"
             usual = f"below {torque / fastest:.3g} {unit}; viscous: null leaves it out"
             yield Remark(f"robot.friction.viscous.{robot.joint_names[i]}", message, f"{damping:.6g} {unit}", usual)
