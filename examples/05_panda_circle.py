@@ -13,6 +13,7 @@ import brachis
 URDF = "cmeel.prefix/share/example-robot-data/robots/panda_description/urdf/panda.urdf"
 START = (0.3, -0.5, 0.2, -2.2, 0.3, 1.9, 0.8)  # rad
 RADIUS = 0.1  # m
+JOINTS = ("panda_joint4", "panda_joint5", "panda_joint6", "panda_joint7")
 
 
 def panda() -> brachis.Robot:
@@ -28,7 +29,7 @@ def main() -> dict[str, brachis.Result]:
     robot = panda()
     x, y, z = robot.tool_placement(robot.posture(START, "START")).translation
     results = {}
-    for joint in ("panda_joint4", "panda_joint5", "panda_joint6", "panda_joint7"):
+    for joint in JOINTS:
         task = {
             "brachis": 1,
             "start": {"joints": START},

@@ -67,6 +67,20 @@ def scara_urdf() -> Path:
 
 
 @pytest.fixture(scope="session")
+def line_result() -> Any:
+    """The first example, planned from one start."""
+    import brachis  # noqa: PLC0415
+    from support.effort import QUICK  # noqa: PLC0415  (importable from here on)
+
+    return brachis.plan(brachis.examples.scara_line, **QUICK)
+
+
+@pytest.fixture(scope="session")
+def line_trajectory(line_result: Any) -> Any:
+    return line_result.trajectory
+
+
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
     """A Chromium that is installed here, without a window; one for all tests, as its driver allows."""
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")

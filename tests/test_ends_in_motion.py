@@ -11,12 +11,12 @@ import pytest
 
 import brachis
 from brachis.verify import verify_trajectory
+from support.effort import QUICK
 from support.mujoco_models import mujoco_model
 
 ROOT = Path(__file__).parents[1]
 CIRCLE = ROOT / "examples/10_periodic_circle.yaml"
 BANDWIDTH, STEP, TURNS = 50.0, 4e-4, 3
-QUICK = {"effort": "single", "least_motion": False}
 IIWA = ROOT / "robots/iiwa14/robot.urdf"
 
 

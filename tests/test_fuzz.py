@@ -1,4 +1,4 @@
-"""The first 100 cases of ``benchmarks/fuzz.py``: broken inputs end with an error of brachis or a valid outcome."""
+"""The first 50 cases of ``benchmarks/fuzz.py``: broken inputs end with an error of brachis or a valid outcome."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SCRIPT = Path(__file__).parents[1] / "benchmarks/fuzz.py"
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the memory limit is read off /proc")
 def test_broken_inputs():
-    done = subprocess.run([sys.executable, SCRIPT, "--cases", "100"], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, SCRIPT, "--cases", "50"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "100 cases" in done.stdout
+    assert "50 cases" in done.stdout
     assert done.stdout.count("valid") >= 3  # not everything is refused

@@ -12,6 +12,7 @@ import brachis
 from brachis import least_motion
 from brachis.deadline import NEVER, Deadline
 from brachis.robot.combine import robot_for
+from brachis.task import task_with
 from brachis.trajectory import Trajectory
 from support.starts import starting_points
 
@@ -33,9 +34,8 @@ def rms(trajectory: Trajectory) -> np.ndarray:
     return np.sqrt((trajectory.acceleration(np.linspace(0.0, trajectory.t_end, 4001)) ** 2).mean(axis=0))
 
 
-def free_roll(**search) -> brachis.Task:
-    task = brachis.load_task(ROOT / "examples/06_free_roll.yaml")
-    return task.model_copy(update={"search": task.search.model_copy(update=search)})
+def free_roll() -> brachis.Task:
+    return task_with(brachis.examples.free_roll, effort="single", intervals=12)
 
 
 def seven_joints() -> brachis.Task:

@@ -10,6 +10,7 @@ import pytest
 
 import brachis
 from brachis.verify import verify_trajectory
+from support.effort import QUICK
 from support.mujoco_models import mujoco_model
 
 mujoco = pytest.importorskip("mujoco")
@@ -32,7 +33,7 @@ BANDWIDTH = 50.0
 def motion(request):
     """A planned trajectory and MuJoCo's own model of its robot."""
     urdf = ROOT / f"robots/{request.param}/robot.urdf"
-    trajectory = brachis.plan(urdf, TASKS[request.param]).trajectory
+    trajectory = brachis.plan(urdf, TASKS[request.param], **QUICK).trajectory
     assert verify_trajectory(trajectory).passed
     return trajectory, *mujoco_model(trajectory.robot)
 

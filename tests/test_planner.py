@@ -15,6 +15,7 @@ from brachis.errors import StartError
 from brachis.refine import RefinementOptions, refine
 from brachis.search.solving import MARGINS, continued
 from brachis.solvers import SolverOptions, SolveStatus, solver_named
+from support.effort import QUICK
 from support.starts import starting_points
 
 ROOT = Path(__file__).parents[1]
@@ -29,6 +30,7 @@ def task(**changes) -> dict:
         "task_space": ["x", "y"],
         "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
         "redundant_joints": ["j3"],
+        "search": QUICK,
     }
     return {**base, **changes}
 
@@ -185,6 +187,7 @@ def test_a_blend_of_millimetres_is_not_stepped_over(scara_urdf, size):
         "task_space": ["x", "y"],
         "path": corner,
         "redundant_joints": ["j1"],
+        "search": QUICK,
     }
     result = brachis.plan(scara_urdf, task)
     assert result.verified

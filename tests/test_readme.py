@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import re
 import shlex
 import signal
@@ -17,6 +16,7 @@ import yaml
 
 import brachis
 from brachis.task import check_robot_settings
+from support.command_line import code_of, interrupts_kept
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -57,26 +57,28 @@ def test_python_snippets_run(page, clone):
     assert done.returncode == 0, done.stderr
 
 
-def test_commands_run(clone):
+def test_commands_run(clone, monkeypatch, capfd):
     """Every brachis command of the README, in order."""
     lines = [line.split("#")[0].strip() for line in README.splitlines() if re.match(r"brachis \w", line)]
     assert len(lines) >= 6
-    environment = {**os.environ, "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
+    monkeypatch.chdir(clone)
     for line in lines:
+        name, *words = shlex.split(line)
         if "view" in line:
-            look(shlex.split(line), clone, environment)
+            look([BIN / name, *words])
             continue
-        done = subprocess.run(shlex.split(line), cwd=clone, env=environment, capture_output=True, text=True)  # noqa: PLW1510
-        assert done.returncode == 0, f"{line}: {done.stderr}"
+        with interrupts_kept():
+            code = code_of(*words)
+        assert code == 0, f"{line}: {capfd.readouterr().err}"
     assert (clone / "out/motion.csv").stat().st_size > 1000
     assert (clone / "out/torques.pdf").read_bytes().startswith(b"%PDF")
 
 
-def look(command: list[str], folder: Path, environment: dict[str, str]) -> None:
+def look(command: list[str | Path]) -> None:
     """Start a viewer, and stop it once it says where to look."""
     if importlib.util.find_spec("viser") is None:
         return
-    with subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True) as viewer:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as viewer:
         assert any("look at http://127.0.0.1:" in line for line in viewer.stdout)
         viewer.send_signal(signal.SIGINT)
     assert viewer.returncode == 0
@@ -105,9 +107,9 @@ def test_example_01_python(capsys):
 
 def test_example_02(monkeypatch):
     module = load(ROOT / "examples/02_scara_table.py")
-    monkeypatch.setattr(module, "ANGLES_DEG", (0, 90, 180, 270))  # half of the lines, for time
+    monkeypatch.setattr(module, "ANGLES_DEG", (90, 180))  # some of the lines, for time
     results = module.plan_all()
-    assert len(results) == 12
+    assert len(results) == 6
     assert all(result.verified for result in results.values())
     assert max(result.verification.worst_ratio for result in results.values()) <= 1 + 1e-4
     assert max(result.verification.path_error for result in results.values()) <= 1e-9
@@ -141,10 +143,11 @@ def test_robot_part_of_the_readme_is_one(clone):
     assert settings.mounting.rpy_deg == (180.0, 0.0, 0.0)
 
 
-def test_example_03():
+def test_example_03(monkeypatch):
     module = load(ROOT / "examples/03_tx90l_rail_line.py")
+    monkeypatch.setattr(module, "JOINTS", ("rail", "joint_2"))  # half of the lines, for time
     results = module.plan_all()
-    assert len(results) == 12
+    assert len(results) == 6
     assert all(result.verified for result in results.values())
     assert results["rail", 10].t_end <= 0.4275
     assert results["rail", 20].t_end <= 0.4027
@@ -160,14 +163,15 @@ def test_example_04():
     assert np.rad2deg(angle) == pytest.approx(25.0, abs=1.0)  # 20 and 15 degrees about perpendicular axes
 
 
-def test_example_05():
+def test_example_05(monkeypatch):
     module = load(ROOT / "examples/05_panda_circle.py")
+    monkeypatch.setattr(module, "JOINTS", module.JOINTS[:2])  # of both families, for time
     try:
         module.panda()
     except SystemExit:
         pytest.skip("example-robot-data is not installed")
     results = module.main()
-    assert len(results) == 4
+    assert {result.family for result in results.values()} == {"spherical_wrist", "eaik"}
     assert all(result.verified for result in results.values())
 
 
@@ -180,7 +184,7 @@ def test_example_06():
 
 def test_example_07(monkeypatch):
     module = load(ROOT / "examples/07_find_the_fastest.py")
-    monkeypatch.setattr(module, "ANGLES_DEG", (45, 135, 180, 315))  # half of the lines, for time
+    monkeypatch.setattr(module, "ANGLES_DEG", (45, 180, 315))  # some of the lines, for time
     results = module.plan_all()
     assert all(result.verified for result in results.values())
     for angle in module.ANGLES_DEG:

@@ -16,6 +16,7 @@ from brachis.planner import plan
 from brachis.robot import Robot, dynamics
 from brachis.trajectory import Trajectory
 from brachis.trajectory.pieces import one_sided_derivatives, relative_coefficients
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[1]
 SCARA = ROOT / "robots/scara3/robot.urdf"
@@ -24,7 +25,7 @@ SCARA = ROOT / "robots/scara3/robot.urdf"
 def task_of_length(length):
     task = yaml.safe_load((ROOT / "examples/01_scara_line.yaml").read_text())
     task["robot"]["urdf"] = str(ROOT / "robots/scara3/robot.urdf")
-    task["path"] = [{"line": {"length": length, "angle_deg": 90}}]
+    task |= {"path": [{"line": {"length": length, "angle_deg": 90}}], "search": QUICK}
     return task
 
 

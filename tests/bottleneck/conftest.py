@@ -9,6 +9,7 @@ import pytest
 
 import brachis
 from support.chains import INERTIAL, Joint, chain_urdf
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -31,6 +32,7 @@ def slide():
             "redundant_joints": extra.pop("redundant", []),
             "spline": {"degree": degree, "intervals": intervals, "rest": rest},
             "solver": {"name": extra.pop("solver", "auto")},
+            "search": QUICK,
         }
         settings = task["robot"]
         limits = brachis.LimitSpec(**settings.get("limits", {}))
@@ -58,6 +60,7 @@ def scara():
                 "redundant_joints": [joint],
                 "spline": {"degree": 3, "intervals": 20, "rest": "full"},
                 "solver": {"name": solver},
+                "search": QUICK,
             }
             made[joint, solver] = brachis.plan(robot, task)
         return made[joint, solver]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import copy
-import signal
-import sys
+import contextlib
+import io
+import json
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +14,10 @@ import pytest
 import yaml
 
 from brachis import completion
-from brachis.cli.main import main
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification, VerifyOptions
+from support.command_line import code_of, interrupts_kept
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 SCARA = ROOT / "robots/scara3/robot.urdf"
@@ -29,26 +31,17 @@ class Outcome:
 
 
 @pytest.fixture(autouse=True)
-def own_interrupts(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The command line takes over SIGINT for good; the next test gets it back."""
-    before = signal.getsignal(signal.SIGINT)
-    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
-    yield
-    signal.signal(signal.SIGINT, before)
+def own_interrupts() -> Iterator[None]:
+    with interrupts_kept():
+        yield
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
+def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
     def run(*arguments: object, columns: int = 200) -> Outcome:
-        monkeypatch.setattr(sys, "argv", ["brachis", *map(str, arguments)])
-        monkeypatch.setenv("COLUMNS", str(columns))
-        code: object = 0
-        try:
-            main()
-        except SystemExit as stop:
-            code = stop.code or 0
+        code = code_of(*arguments, columns=columns)
         streams = capfd.readouterr()
-        return Outcome(int(code), streams.out, streams.err)
+        return Outcome(code, streams.out, streams.err)
 
     return run
 
@@ -67,12 +60,37 @@ def too_strict(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("brachis.deadline.time.monotonic", lambda: now[0])
 
 
-@pytest.fixture
-def task() -> dict:
-    """The first example as a mapping, with an absolute URDF path."""
+def quick_task() -> dict:
     content = yaml.safe_load((ROOT / "examples/01_scara_line.yaml").read_text())
     content["robot"]["urdf"] = str(SCARA)
-    return copy.deepcopy(content)
+    content["search"] = QUICK
+    return content
+
+
+@pytest.fixture
+def task() -> dict:
+    """The first example as a mapping, with an absolute URDF path, planned from one start: it has one optimum."""
+    return quick_task()
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What ``brachis plan --out`` printed and wrote of that task; for those who write, a copy is theirs."""
+
+    data: dict
+    out: Path
+
+    def copied(self, to: Path) -> Path:
+        return shutil.copytree(self.out, to)
+
+
+@pytest.fixture(scope="session")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Planned:
+    folder, printed = tmp_path_factory.mktemp("planned"), io.StringIO()
+    (folder / "task.yaml").write_text(yaml.safe_dump(quick_task()))
+    with interrupts_kept(), contextlib.redirect_stdout(printed):
+        assert code_of("plan", folder / "task.yaml", "--out", folder / "out", "--json") == 0
+    return Planned(json.loads(printed.getvalue()), folder / "out")
 
 
 @pytest.fixture

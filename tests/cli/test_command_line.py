@@ -13,6 +13,7 @@ import pytest
 from brachis import planner
 from brachis.cli.examples import EXAMPLES
 from brachis.cli.main import app
+from support.effort import QUICK
 
 from .conftest import ROOT, SCARA
 
@@ -45,6 +46,11 @@ def test_examples_work_in_this_order(run, tmp_path, monkeypatch):
         for line in lines if command else ():
             outcome = run(*shlex.split(line, comments=True)[1:])
             assert outcome.code == 0, f"{line}: {outcome.err}"
+        if command == "new":  # what follows is about commands: with a plan that takes less time
+            content = (tmp_path / "task.yaml").read_text()
+            content = content.replace("{effort: fast}", str(QUICK)).replace("intervals: 20", "intervals: 8")
+            assert str(QUICK) in content
+            (tmp_path / "task.yaml").write_text(content.replace("False", "false"))
 
 
 def test_help_of_the_program(run):

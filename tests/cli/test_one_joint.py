@@ -11,6 +11,7 @@ import yaml
 import brachis
 from brachis.plots import PLOTS
 from support.chains import Joint, chain_urdf
+from support.effort import QUICK
 
 LIMIT = {"lower": -1.0, "upper": 1.0, "velocity": 3.0, "effort": 20.0}
 ROBOTS = {"prismatic": ((1.0, 0.0, 0.0), "x", 0.5), "revolute": ((0.0, 0.0, 1.0), "y", 0.2)}
@@ -30,6 +31,7 @@ def files(request, tmp_path_factory):
         "task_space": [row],
         "path": [{"line": {"by": [length]}}],
         "spline": {"intervals": 10},
+        "search": QUICK,
     }
     (folder / "task.yaml").write_text(yaml.safe_dump(task))
     result = brachis.plan(folder / "task.yaml")

@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 import brachis
+from support.effort import QUICK
 
 from .conftest import SCARA
 
@@ -35,6 +36,7 @@ def saved(tmp_path_factory):
         "path": [{"csv": {"file": "points.csv", "relative": True}}],
         "redundant_joints": ["j3"],
         "spline": {"intervals": 6},
+        "search": QUICK,
     }
     (folder / "task.yaml").write_text(yaml.safe_dump(task))
     brachis.plan(folder / "task.yaml").trajectory.save(folder / "result.npz")

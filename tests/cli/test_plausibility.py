@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from support.effort import QUICK
+
 SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
 WARNING = "brachis: warning: robot.limits.scale.velocity: the factor raises limits far beyond what was stated"
 
@@ -14,7 +16,7 @@ WARNING = "brachis: warning: robot.limits.scale.velocity: the factor raises limi
 @pytest.fixture
 def percent(task, write):
     task["robot"]["limits"] = {"torque": 10, "scale": {"velocity": 80}}
-    task |= {"search": {"effort": "single"}, "spline": {"intervals": 10}}
+    task |= {"search": QUICK, "spline": {"intervals": 10}}
     return write(task)
 
 

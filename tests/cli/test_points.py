@@ -12,6 +12,7 @@ from brachis.cli.main import app
 from brachis.errors import PlausibilityError, TaskError
 from brachis.planner import plan
 from brachis.task import load_task
+from support.effort import QUICK
 
 RUNNER = CliRunner()
 
@@ -25,7 +26,7 @@ def seam(task, write, tmp_path):
     rows = (f"{a:.4f};{b:.4f}".replace(".", ",") for a, b in zip(x + scatter[0], y + scatter[1], strict=True))
     (tmp_path / "seam.csv").write_text("\n".join(["x_mm;y_mm", *rows]))
     task["path"] = [{"csv": {"file": "seam.csv", "tolerance": {"position": "0.12 mm"}}}]
-    return write({**task, "start": "free", "redundant_joints": ["j1"], "search": {"effort": "single"}})
+    return write({**task, "start": "free", "redundant_joints": ["j1"], "search": QUICK})
 
 
 def test_inspect_says_what_was_found(seam):

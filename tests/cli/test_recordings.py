@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 import brachis
+from support.effort import QUICK
 
 from .conftest import ROOT, SCARA
 
@@ -18,7 +19,7 @@ def recorded(tmp_path_factory):
     """A slow motion as a file in degrees, and a task file with the robot and its settings."""
     folder, task = tmp_path_factory.mktemp("recorded"), yaml.safe_load(TASK.read_text())
     task["robot"]["urdf"] = str(SCARA)
-    task |= {"spline": {"intervals": 6}, "search": {"effort": "single", "least_motion": False}}
+    task |= {"spline": {"intervals": 6}, "search": QUICK}
     slow = {**task, "robot": {**task["robot"], "limits": {"torque": 5.0, "velocity": None}}}
     trajectory = brachis.plan(slow).trajectory
     samples = trajectory.sample(0.01)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import brachis
+from support.effort import QUICK
 
 from .conftest import ROOT
 
@@ -12,7 +13,7 @@ from .conftest import ROOT
 def saved(folder, torque=None):
     """Save a motion of the example, on drives with other limits than it was planned for."""
     task = brachis.load_task(ROOT / "examples/01_scara_line.yaml").to_dict()
-    quick = {**task, "spline": {**task["spline"], "intervals": 6}, "search": {"effort": "single"}}
+    quick = {**task, "spline": {**task["spline"], "intervals": 6}, "search": QUICK}
     trajectory = brachis.plan(quick).trajectory
     if torque is not None:
         settings = trajectory.task.robot

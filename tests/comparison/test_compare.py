@@ -12,6 +12,7 @@ import brachis
 from brachis import comparison
 from brachis.comparison import compare, plot_today
 from brachis.robot import bind
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 SEED, DT = 4, 0.002
@@ -41,7 +42,7 @@ def file(today, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def task(today):
-    quick = {"spline": {"intervals": 12}, "search": {"effort": "single", "least_motion": False}}
+    quick = {"spline": {"intervals": 12}, "search": QUICK}
     return {**today.content, **quick, "start": {"joints": [0.0]}, "path": [{"line": {"by": [1.0]}}]}
 
 

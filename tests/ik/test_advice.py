@@ -11,6 +11,7 @@ from packaging.requirements import Requirement
 
 import brachis
 from brachis import ik
+from support.effort import QUICK
 from support.pose_arms import gen3, iiwa, panda_lengths
 
 ROOT = Path(__file__).parents[2]
@@ -70,4 +71,4 @@ def test_nothing_is_missing_where_it_is_installed():
 @pytest.mark.parametrize("example", ["01_scara_line", "03_tx90l_rail_line"])
 def test_planning_without_it(example, monkeypatch):
     monkeypatch.setitem(sys.modules, "eaik.pybindings.EAIK", None)
-    assert brachis.plan(ROOT / f"examples/{example}.yaml").verification.passed
+    assert brachis.plan(ROOT / f"examples/{example}.yaml", **QUICK).verification.passed

@@ -16,6 +16,7 @@ from brachis.ik.positioning import positioning
 from brachis.robot import Robot, task_map_of
 from brachis.robot.task_map import RowsAndYaw
 from support.chains import Joint, chain_urdf
+from support.effort import QUICK
 from support.factored_bench import Bench
 from support.pose_arms import panda as panda_urdf
 from support.screw_arms import BASES, SLIDE, Axis, extra, panda, screw_robot, seven_joints, unit
@@ -101,7 +102,7 @@ def test_built_arms_with_all_choices_of_redundant_joints(name):
         rest = [i for i in range(robot.n) if i not in redundant]
         singular = np.abs(np.linalg.det(jacobian[:, :, rest])).max() < 1e-9
         try:
-            bench(robot, redundant).check()
+            bench(robot, redundant, 500).check()
         except NotApplicableError as reason:
             named = all(robot.joint_names[i] in str(reason) for i in rest)
             assert str(reason).startswith("J_nr is singular everywhere") if singular else named  # noqa: PT017
@@ -232,6 +233,7 @@ def test_four_redundant_joints_are_faster_than_one(name):
         "path": [{"line": {"by": by}}],
         "spline": {"intervals": 8},
         "solver": {"max_iterations": 600},
+        "search": QUICK,
     }
     result = brachis.plan(urdf, {**task, "task_space": "position", "redundant_joints": redundant})
     assert (result.family, result.trajectory.branch) == ("positioning", branch)

@@ -23,6 +23,7 @@ from brachis.robot import Robot, bind, task_map_of
 from support.arms import Arm, PoseBench, Y, tx90l
 from support.chains import Joint, chain_urdf
 from support.closed_forms import wrapped
+from support.effort import QUICK
 from support.rounded import ANY_DIGITS, ARMS, by_angles
 
 ROUNDED, EXACT = 4, ANY_DIGITS
@@ -325,6 +326,8 @@ def test_xarm7_plans_as_the_ideal_arm_does(joint):
         "start": {"joints": XARM_START},
         "path": [{"line": {"by": [0.0, 0.2, -0.1]}}],
         "redundant_joints": [joint],
+        "spline": {"intervals": 10},
+        "search": QUICK,
     }
     text = xarm().read_text()
     results = [

@@ -14,6 +14,7 @@ import brachis
 from brachis.limits import limits_of
 from brachis.verify import verify_trajectory
 from support.chains import INERTIAL, Joint, chain_urdf
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
@@ -39,7 +40,7 @@ def slide(tmp_path):
             "redundant_joints": ["j1"] if len(forces) > 1 else [],
             "tool_limits": tool or {},
             "spline": {"intervals": intervals, "rest": "velocity", **spline},
-            "search": {"effort": "single", "least_motion": False},
+            "search": QUICK,
         }
         result = brachis.plan(str(file), task)
         assert result.verified, result.verification
@@ -120,7 +121,7 @@ def test_a_speed_table_is_a_staircase_of_cruises(slide):
 def arm():
     """The planar arm's task without any of these limits, and its motion."""
     task = brachis.load_task(ROOT / "examples/01_scara_line.yaml").to_dict()
-    task = {**task, "search": {"effort": "single", "least_motion": False}}
+    task = {**task, "search": QUICK}
     return task, brachis.plan(task)
 
 

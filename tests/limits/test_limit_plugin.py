@@ -17,7 +17,9 @@ import pytest
 import brachis
 from brachis.errors import InputError, UnknownNameError
 from brachis.limits import Label, Limit, Partials
+from brachis.task import task_with
 from brachis.verify import verify_trajectory
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 PLUGIN = ROOT / "examples/limit_plugin"
@@ -59,7 +61,7 @@ def test_it_is_one_short_file():
 
 
 def test_an_object_limits_the_motion(plugin):
-    task = brachis.load_task(ROOT / "examples/01_scara_line.yaml")
+    task = task_with(ROOT / "examples/01_scara_line.yaml", **QUICK)
     free = brachis.plan(task)
     assert sums(free.trajectory).max() > UPPER + 0.2, "the limit should bind"
     model = plugin.CoupledRange(("j2", "j3"), -0.5, UPPER)
@@ -81,7 +83,7 @@ def test_an_object_limits_the_motion(plugin):
 
 @pytest.mark.usefixtures("installed")
 def test_a_task_file_names_it():
-    result = brachis.plan(TASK)
+    result = brachis.plan(TASK, **QUICK)
     assert result.verified
     assert sums(result.trajectory).max() <= UPPER + 1e-4
     assert "coupled range ratio" in [check.name for check in verify_trajectory(result.trajectory).checks]
@@ -94,7 +96,7 @@ def test_a_check_of_its_own_takes_the_marks_place(plugin):
             assert q.shape == qdot.shape == qddot.shape == tau.shape == (len(q), robot.n)
             return np.abs(q[:, 1:].sum(axis=1))[:, None] / UPPER
 
-    result = brachis.plan(ROOT / "examples/01_scara_line.yaml", own_limits=[Checked(("j2", "j3"), -UPPER, UPPER)])
+    result = brachis.plan(LINE, own_limits=[Checked(("j2", "j3"), -UPPER, UPPER)], **QUICK)
     check = {each.name: each for each in result.verification.checks}["coupled range ratio"]
     assert check.remark == ""
     assert check.value == pytest.approx(1.0, abs=1e-3)
@@ -200,7 +202,8 @@ def test_two_processes_take_it_as_well():
     code = (
         "import brachis, sys; from brachis_coupled import CoupledRange;"
         "task = brachis.load_task(sys.argv[1]).to_dict();"
-        "task |= {'search': {'jobs': 2}, 'redundant_joints': 'auto', 'spline': {'intervals': 8}};"
+        "search = {'jobs': 2, 'least_motion': False};"
+        "task |= {'search': search, 'redundant_joints': 'auto', 'spline': {'intervals': 5}};"
         "result = brachis.plan(task, own_limits=[CoupledRange(('j2', 'j3'), -0.5, 0.7)]);"
         "print(result.verified, 'coupled range ratio' in [check.name for check in result.verification.checks])"
     )

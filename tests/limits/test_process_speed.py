@@ -12,6 +12,7 @@ import brachis
 from brachis.errors import TaskError
 from brachis.limits.speed_table import SpeedTable
 from brachis.verify import verify_trajectory
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 SPEED, BEGIN, END, LENGTH = 1.0, 0.25, 0.75, 1.2
@@ -28,7 +29,7 @@ def task(part=None, *, speed=None, **spline):
         "path": [{"line": {"by": [LENGTH, 0.0]}}],
         "tool_limits": {"speed": speed, "process_speed": part or []},
         "spline": {"intervals": 20, "rest": "velocity", **spline},
-        "search": {"effort": "single", "least_motion": False},
+        "search": QUICK,
     }
 
 

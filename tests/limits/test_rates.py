@@ -15,6 +15,7 @@ from brachis.limits import Label, Limit, Partials
 from brachis.plots import plot_timeline
 from brachis.verify import verify_trajectory
 from brachis.verify.mechanics import torque_rates, torques
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 FIGURES = {"jerk": 12.0, "torque_rate": 25.0}  # rad/s^3 and Nm/s
@@ -25,7 +26,7 @@ def task(*, spline=None, **limits):
     found["path"] = [{"line": {"length": 1.0, "angle_deg": 45.0}}]
     found["robot"]["limits"] |= limits
     settings = found["spline"] | (spline or {})
-    return {**found, "spline": settings, "search": {"effort": "single", "least_motion": False}}
+    return {**found, "spline": settings, "search": QUICK}
 
 
 @pytest.fixture(scope="module")

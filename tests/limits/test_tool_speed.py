@@ -13,6 +13,7 @@ import brachis
 from brachis.errors import TaskError
 from brachis.plots import plot_timeline
 from brachis.verify import verify_trajectory
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 CAP = 1.0
@@ -21,7 +22,7 @@ CAP = 1.0
 @pytest.fixture(scope="module")
 def task():
     found = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
-    return {**found, "tool_limits": {"speed": CAP}, "search": {"effort": "single"}}
+    return {**found, "tool_limits": {"speed": CAP}, "search": QUICK}
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +109,7 @@ def test_rows_that_leave_a_direction_free_count_the_whole_speed(rows):
         "task_space": rows,
         "path": [{"line": {"by": [-0.5, 0.3][: len(rows)]}}],
         "tool_limits": {"speed": 0.4},
-        "search": {"effort": "single"},
+        "search": QUICK,
     }
     result = brachis.plan(task)
     assert result.verified

@@ -14,6 +14,7 @@ from brachis.mesh import MeshOptions, adapt_mesh, coarsest, knot_optimisation, o
 from brachis.refine import RefinementOptions, refine
 from brachis.solvers import SolverOptions, SolveStatus, solver_named
 from brachis.task import SplineSettings
+from support.effort import QUICK
 from support.starts import starting_points
 
 SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
@@ -30,6 +31,7 @@ def task(joint="j1", **spline) -> brachis.Task:
             "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
             "redundant_joints": [joint],
             "spline": spline,
+            "search": QUICK,
         }
     )
 

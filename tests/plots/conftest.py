@@ -1,14 +1,10 @@
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from brachis.planner import plan
 from brachis.robot import Robot
 from brachis.robot.limits import MAGNITUDES
-
-EXAMPLE = Path(__file__).parents[2] / "examples" / "01_scara_line.yaml"
 
 SPATIAL_JOINTS = {
     "rail": ("prismatic", "0 1 0", "0 0 0.2"),
@@ -41,11 +37,6 @@ def build_robot(joints):
 @pytest.fixture(scope="session")
 def chain():
     return build_robot
-
-
-@pytest.fixture(scope="session")
-def line_trajectory():
-    return plan(EXAMPLE).trajectory
 
 
 @pytest.fixture(scope="session")

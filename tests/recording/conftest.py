@@ -6,6 +6,7 @@ import pytest
 from brachis.export import export_csv
 from brachis.planner import plan
 from brachis.recording import import_motion
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 SCARA = ROOT / "robots/scara3/robot.urdf"
@@ -22,7 +23,7 @@ def motion():
         "task_space": ["x", "y"],
         "path": [{"line": {"length": 0.8, "angle_deg": 90}}],
         "redundant_joints": ["j3"],
-        "search": {"effort": "single", "least_motion": False},
+        "search": QUICK,
         "spline": {"intervals": 10},
     }
     return plan(content).trajectory

@@ -12,13 +12,14 @@ import pytest
 
 import brachis
 from brachis.report import make_report
+from support.effort import QUICK
 
-QUICK = {"search": {"effort": "single", "least_motion": False}, "spline": {"intervals": 8}}
+SMALL = {"search": QUICK, "spline": {"intervals": 8}}
 
 
 def quick(example):
     task = brachis.load_task(example).to_dict()
-    return brachis.plan({**task, **{key: {**task[key], **value} for key, value in QUICK.items()}})
+    return brachis.plan({**task, **{key: {**task[key], **value} for key, value in SMALL.items()}})
 
 
 @pytest.fixture(scope="session")

@@ -123,7 +123,7 @@ class Bench:
         """Two answers meet where a margin vanishes; `steps` are the joints whose answers do, None for a linear step."""
         assert self.margins(self.q[:1]).shape[2] == len(steps)
         largest, met = np.abs(self.determinant(self.q)).max(), [0] * len(steps)
-        for (start, end), kind in itertools.product(itertools.pairwise(self.q[:100] * 0.8), range(len(steps))):
+        for (start, end), kind in itertools.product(itertools.pairwise(self.q[:50] * 0.8), range(len(steps))):
 
             def margin(x, start=start, end=end, kind=kind):
                 return self.solver.branch_margins((start + x * (end - start))[None], 0)[0, kind]

@@ -5,6 +5,7 @@ import yaml
 
 from brachis.planner import plan
 from brachis.trajectory import Trajectory
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]
 
@@ -15,6 +16,6 @@ def planned() -> Trajectory:
     task = yaml.safe_load((ROOT / "examples/01_scara_line.yaml").read_text())
     task["robot"]["urdf"] = str(ROOT / "robots/scara3/robot.urdf")
     task["robot"]["limits"] = {"torque": 10, "velocity": 50, "acceleration": 500, "position": [[-10, 10]] * 3}
-    result = plan(task)
+    result = plan(task, **QUICK)
     assert result.verified
     return result.trajectory

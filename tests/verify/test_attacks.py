@@ -13,6 +13,7 @@ from brachis.bspline import insert_knots
 from brachis.robot import dynamics
 from brachis.robot.limits import MAGNITUDES
 from brachis.verify import verify_trajectory
+from support.effort import QUICK
 
 MIDDLE = 60
 
@@ -22,7 +23,7 @@ def rubbing(scara_urdf):
     """A motion of the planar arm under Coulomb friction, whose joints reverse, with a torque limit out of the way."""
     task = yaml.safe_load((scara_urdf.parents[2] / "examples/01_scara_line.yaml").read_text())
     task["robot"] |= {"urdf": str(scara_urdf), "friction": {"coulomb": 0.5, "coulomb_velocity": 0.01}}
-    return brachis.plan(task).trajectory
+    return brachis.plan(task, **QUICK).trajectory
 
 
 def failed(trajectory):

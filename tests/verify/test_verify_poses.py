@@ -10,6 +10,7 @@ import pytest
 import brachis
 from brachis import Trajectory, verify_trajectory
 from brachis.export import export_csv
+from support.effort import QUICK
 from support.spatial import START, rail_arm
 
 
@@ -22,6 +23,7 @@ def motion(request):
         "path": [{"line": {"by": [0.1, 0.3, 0.0]}, "orientation": {"rotate": {"axis": [1, 0, 0], "angle_deg": 20}}}],
         "redundant_joints": ["j1"],
         "spline": {"intervals": 10},
+        "search": QUICK,
     }
     return brachis.plan(rail_arm(tool=(0.0, 0.0, 0.12)), task).trajectory
 

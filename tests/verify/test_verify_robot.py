@@ -9,6 +9,7 @@ import brachis
 from brachis.robot import Robot
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import check_robot_settings
+from support.effort import QUICK
 
 ROBOT = {
     "tool_frame": "tool",
@@ -39,7 +40,7 @@ def saved(scara_urdf, tmp_path_factory):
         "path": [{"line": {"by": [-0.5, 0.4]}}],
         "redundant_joints": ["j3"],
         "spline": {"intervals": 12},
-        "search": {"effort": "single", "least_motion": False},
+        "search": QUICK,
     }
     path = tmp_path_factory.mktemp("saved") / "result.npz"
     brachis.plan(task).trajectory.save(path)
@@ -86,7 +87,7 @@ def test_an_arm_on_a_wall_is_the_arm_on_the_floor_turned(scara_urdf):
             "path": [{"line": {"by": by}}],
             "redundant_joints": ["j3"],
             "spline": {"intervals": 10},
-            "search": {"effort": "single", "least_motion": False},
+            "search": QUICK,
         }
         return brachis.plan(scara_urdf, task)
 

@@ -7,14 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from brachis.planner import plan
 from brachis.robot import Robot
-from support.shown import NO_VISUALS, ROOT
-
-
-@pytest.fixture(scope="session")
-def line_result():
-    return plan(None, ROOT / "examples/01_scara_line.yaml")
+from support.shown import NO_VISUALS
 
 
 @pytest.fixture(scope="session")

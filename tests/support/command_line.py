@@ -1,0 +1,32 @@
+"""The command line in this process."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from brachis.cli.main import main
+
+
+def code_of(*arguments: object, columns: int = 200) -> int:
+    """Exit code of a command."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["brachis", *map(str, arguments)])
+        patch.setenv("COLUMNS", str(columns))
+        with pytest.raises(SystemExit) as stop:
+            main()
+    return int(stop.value.code or 0)
+
+
+@contextlib.contextmanager
+def interrupts_kept() -> Iterator[None]:
+    """The command line takes over SIGINT for good; what comes next gets it back."""
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "unraisablehook", sys.unraisablehook)
+        yield
+    signal.signal(signal.SIGINT, before)
