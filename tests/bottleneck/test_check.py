@@ -131,8 +131,13 @@ def test_a_raised_limit_that_no_solver_copes_with_leaves_the_answer(scara, monke
             return dataclasses.replace(answer, violation=np.inf) if broken else answer
 
     monkeypatch.setattr(check, "solver_named", lambda _name, **_order: (Broken,))
-    found = [entry for entry in check_sensitivities(refined).entries if entry.predicted]
+    answers = check_sensitivities(refined)
+    found = [entry for entry in answers.entries if entry.predicted]
     assert found
     for entry in found:
         assert not entry.optimal
         assert entry.re_solved == pytest.approx(0.0, abs=1e-6)
+    large = [entry for entry in found if entry.predicted < -LARGE]
+    assert answers.larger(LARGE) == tuple(large)
+    told = str(dataclasses.replace(brachis.bottleneck.report(scara("j3")), check=answers))
+    assert f"within 0 %, but for {len(large)} that no solver brought to an optimum" in told

@@ -26,7 +26,7 @@ from brachis.summary import Summary
 
 STEP = 0.01
 """Fraction by which limits are raised, unless asked otherwise."""
-_TOLERANCE, _ITERATIONS, _SECONDS = 1e-8, 300, 3.0
+_OPTIONS = SolverOptions(tolerance=1e-8)
 _OPTIMAL = 1e-5
 _FEASIBLE = 1e-7
 _EXACT = 1e-9
@@ -122,12 +122,12 @@ class SensitivityCheck(Summary):
     wall_time: float
 
     def worst_deviation(self, above: float = 1e-4) -> float:
-        """Largest deviation among the re-solved changes larger than `above`, s; 0 where there are none."""
-        return max((entry.deviation for entry in self.larger(above)), default=0.0)
+        """Largest deviation among `larger` changes that were solved to an optimum; 0 where there are none."""
+        return max((entry.deviation for entry in self.larger(above) if entry.optimal), default=0.0)
 
     def larger(self, above: float = 1e-4) -> tuple[CheckedSensitivity, ...]:
-        """Entries whose re-solved change is larger than `above`, s."""
-        return tuple(entry for entry in self.entries if abs(entry.re_solved) > above)
+        """Entries whose change, as predicted or as solved again, is larger than `above`, s."""
+        return tuple(entry for entry in self.entries if max(abs(entry.predicted), abs(entry.re_solved)) > above)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -152,7 +152,7 @@ def check_sensitivities(
     predictions : Sensitivities, optional
         What is checked; by default what `sensitivities` says.
     step : float, optional
-        Fraction by which each limit leaves more room.
+        Fraction by which each limit leaves more room; less where it is negative.
 
     Returns
     -------
@@ -219,7 +219,7 @@ def _solved_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
     curved = any(limit.where == "whole" for limit in program.limits)
     for solver in solver_named("auto", curved=curved):
         try:
-            report = solver.solve(program, x, SolverOptions(_TOLERANCE, _ITERATIONS, _SECONDS), None)
+            report = solver.solve(program, x, _OPTIONS, None)
         except ImportError:
             continue
         if report.violation > _FEASIBLE:

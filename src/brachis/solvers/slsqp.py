@@ -16,6 +16,9 @@ _STATUS = {0: SolveStatus.OPTIMAL, 4: SolveStatus.INFEASIBLE, 8: SolveStatus.ACC
 _UNREACHABLE_ROWS = -1e3
 """SLSQP cannot back off from NaN; a violation far above any real one makes its line search shorten the step."""
 
+_FLAT = 1e-3
+"""SLSQP ends where the objective changes by less than this part of the tolerance: around an optimum that is no vertex
+it changes by the square of what is left of the gradient."""
 _ACTIVE = 1e-5
 _STATIONARY = 1e-3
 
@@ -68,7 +71,7 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
                 bounds=Bounds(problem.x_lower, problem.x_upper),
                 constraints=[{"type": "ineq", "fun": rows, "jac": jacobian}],
                 callback=callback,
-                options={"maxiter": options.max_iterations, "ftol": options.tolerance},
+                options={"maxiter": options.max_iterations, "ftol": _FLAT * options.tolerance},
             )
     except (_StopSolveError, UnreachableError):
         status = SolveStatus.TIME_LIMIT if watch.timed_out else SolveStatus.EVALUATION_ERROR
