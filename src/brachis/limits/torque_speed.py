@@ -52,7 +52,7 @@ class TorqueSpeedLimit(Limit):
         return Label(
             subject,
             in_words("torque at speed", unit),
-            {"rad": "Nm", "m": "N"}[unit],
+            self._robot.torque_units[joint],
             f"robot.limits.torque_speed.{name}",
         )
 
