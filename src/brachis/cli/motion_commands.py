@@ -1,0 +1,168 @@
+"""Commands on motions; each imports what it needs when it is called."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from brachis import interrupts
+from brachis.cli.options import Changes, Strict
+from brachis.cli.output import Json
+
+ResultFile = Annotated[
+    Path, typer.Argument(help="Result file (npz) written by 'brachis plan --out'.", metavar="RESULT")
+]
+Host = Annotated[
+    str, typer.Option(help="Address that the viewer listens on; 0.0.0.0 lets other machines look.", metavar="ADDRESS")
+]
+Port = Annotated[
+    int | None, typer.Option(help="Port of the viewer; 0 for any free one. Default: the first free one from 8080 on.")
+]
+Browser = Annotated[
+    bool, typer.Option("--browser/--no-browser", help="Open the browser, where there is a screen and a terminal.")
+]
+
+
+def bottleneck(
+    task: Annotated[
+        Path,
+        typer.Argument(
+            help="Task file (YAML), or result file (npz) of a motion planned before.", metavar="TASK|RESULT"
+        ),
+    ],
+    check: Annotated[
+        bool, typer.Option("--check", help="Solve again with every limit raised by 1 %, and compare.")
+    ] = False,
+    reference: Annotated[
+        bool,
+        typer.Option(
+            "--reference",
+            help="Compare with the best value known: the same problem with discontinuous torque allowed, on a fine "
+            "mesh; not a proven bound. Takes seconds.",
+        ),
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for bottleneck.json and timeline.png; of a motion that fails the verification the names "
+            "begin with unverified_."
+        ),
+    ] = None,
+    urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
+    changes: Changes = None,
+    strict: Strict = False,
+    json: Json = False,
+) -> None:
+    """Say what holds a motion back: which limits cost time.
+
+    How much each of them costs, and when it is active, of a task that is planned for it or of a saved motion.
+    """
+    with interrupts.postponed():
+        from brachis.cli import bottleneck as command  # noqa: PLC0415  (each command imports what it needs)
+
+    raise typer.Exit(
+        command.bottleneck_command(
+            task, changes or [], urdf=urdf, check=check, reference=reference, out=out, strict=strict, as_json=json
+        )
+    )
+
+
+def verify(
+    result: ResultFile,
+    urdf: Annotated[Path | None, typer.Option(help="Check against this URDF instead of the saved one.")] = None,
+    json: Json = False,
+) -> None:
+    """Check a saved motion again: path, limits, ends."""
+    with interrupts.postponed():
+        from brachis.cli import results  # noqa: PLC0415
+
+    raise typer.Exit(results.verify_command(result, urdf=urdf, as_json=json))
+
+
+def export(
+    result: ResultFile,
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="File to write; its suffix says the format: .csv and .parquet (t, then q_, qd_, qdd_, tau_ of every "
+            "joint; SI units), .json, .yaml and .mcap (ROS 2's JointTrajectory), .script (URScript), .gif and .mp4."
+        ),
+    ],
+    form: Annotated[
+        str | None,
+        typer.Option("--format", help="Format, by name: csv, parquet, json, ros2, mcap, urscript, gif or mp4."),
+    ] = None,
+    dt: Annotated[
+        float | None,
+        typer.Option(
+            help="Period, s. Default: 0.001; 0.01 for ROS 2, 0.002 for URScript, 0.04 for animations.",
+            show_default=False,
+        ),
+    ] = None,
+    last: Annotated[
+        str | None,
+        typer.Option(
+            help="Where the rows end: exact, at the end time, which need not be a multiple of the period; or hold, at "
+            "the first multiple of it that is not before the end time, with the end posture held at rest. Default: "
+            "exact; hold for URScript.",
+            show_default=False,
+        ),
+    ] = None,
+    joints: Annotated[
+        str | None, typer.Option(help="Joints to write, in this order: j1,j2,... Default: all.", show_default=False)
+    ] = None,
+) -> None:
+    """Sample a saved motion for a controller, or animate it."""
+    with interrupts.postponed():
+        from brachis.cli import results  # noqa: PLC0415
+
+    results.export_command(result, out, form=form, dt=dt, last=last, joints=joints)
+
+
+def plot(
+    result: ResultFile,
+    out: Annotated[Path, typer.Option(help="Figure to write: png, pdf or svg.")],
+    kind: Annotated[
+        str, typer.Option(help="Which figure: torques, postures, motion, overview, timeline or limits.")
+    ] = "overview",
+) -> None:
+    """Draw a saved motion."""
+    with interrupts.postponed():
+        from brachis.cli import results  # noqa: PLC0415
+
+    results.plot_command(result, out=out, kind=kind)
+
+
+def report(
+    result: ResultFile,
+    out: Annotated[
+        Path | None, typer.Option(help="HTML file to write; default: beside the result, as result.html.")
+    ] = None,
+    title: Annotated[str | None, typer.Option(help="Title of the page; default: the result's name.")] = None,
+) -> None:
+    """Write a saved motion as one HTML page to judge it by."""
+    with interrupts.postponed():
+        from brachis.cli import report as command  # noqa: PLC0415
+
+    raise typer.Exit(command.report_command(result, out=out, title=title))
+
+
+def view(
+    result: Annotated[
+        Path,
+        typer.Argument(help="Result file (npz) written by 'brachis plan --out', or the folder.", metavar="RESULT"),
+    ],
+    host: Host = "127.0.0.1",
+    port: Port = None,
+    browser: Browser = True,
+) -> None:
+    """Show a saved motion in the browser.
+
+    Robot, path, tool trace and ghost postures, with plots over the limits that follow a slider. Ctrl-C ends it.
+    """
+    with interrupts.postponed():
+        from brachis.cli import viewing  # noqa: PLC0415
+
+    viewing.view_command(result, host=host, port=port, browser=browser)
