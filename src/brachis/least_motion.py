@@ -38,7 +38,7 @@ _KEPT_BACK = 0.1e-4
 """Part of the end time by which refinement may still lengthen the motion."""
 _WORTH_IT = 0.05
 """A motion whose accelerations are lower by less than this fraction does not replace the fastest one."""
-_TOLERANCE, _ITERATIONS = 1e-5, 60
+_TOLERANCE, _ITERATIONS = 1e-6, 60
 _PROGRESS, _PATIENCE, _ROUND = 1e-2, 5, 2
 """A solve ends where so many iterations lower the mean square by less than this fraction: near enough will do.
 
@@ -178,7 +178,7 @@ def _solver(name: str, deadline: Deadline, listener: Listener, patience: int) ->
         listener(f"least motion: iteration {iteration}, joint accelerations (rms) {100.0 * objective**0.5:.1f} %")
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.for_a_solve, _PROGRESS, patience)
+        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.for_a_solve, _PROGRESS, patience, anywhere=True)
         report = backend.solve(program, x, options, progress)
         return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if report.feasible else report
 

@@ -76,6 +76,8 @@ class SolverOptions:
         Relative change of the objective over the last feasible iterates below which a solve has stagnated.
     patience : int
         How many iterates these are.
+    anywhere : bool
+        Whether iterates far from stationarity count too: where near enough will do, and not where a solver creeps.
     """
 
     tolerance: float = 1e-6
@@ -83,6 +85,7 @@ class SolverOptions:
     time_limit: float = 20.0
     progress: float = 1e-6
     patience: int = 15
+    anywhere: bool = False
 
 
 @dataclass(frozen=True, repr=False)

@@ -98,7 +98,8 @@ class _Stall:
         objective = objective_at(problem, self._units * point[: len(self._units)])
         self._objectives.append(objective)
         stop = self._watch.between_iterations(objective) or self._watch.iterations >= self._watch.options.max_iterations
-        stop = self._watch.has_settled(objective, infeasibility if settled else np.inf) or stop  # type: ignore[arg-type]
+        counts = settled or (self._watch.options.anywhere and objective_multiplier != 0.0)
+        stop = self._watch.has_settled(objective, infeasibility if counts else np.inf) or stop  # type: ignore[arg-type]
         recent = self._objectives[-_STALL_ITERATIONS:]
         self.seen = (
             not stop
