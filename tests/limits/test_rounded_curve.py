@@ -37,7 +37,7 @@ def test_it_lies_below_the_curve_by_little_and_falls_to_zero_at_most(pieces):
     near = (speed[:, None] + speed[-1] * np.linspace(-0.01, 0.01, 41)).ravel()
     speeds = np.unique(np.concatenate([np.linspace(0.0, 2.0 * speed[-1], 2001), near.clip(0.0)]))
     values, true = rounded.values(speeds), true_torque(curve, speeds)
-    eps = 1e-9 * max(rounded.at_rest, 1.0)
+    eps = 1e-7 + 1e-9 * rounded.at_rest
     within = np.minimum(values, 50.0)  # what lies above the torque at rest is cut by the plain limit
     assert np.all(within <= true + eps)
     assert np.all(within >= true - WIDTH * 50.0 - eps)

@@ -24,6 +24,8 @@ from brachis.robot.torque_curves import Curve
 
 WIDTH = 0.002
 """Half the width of a rounded corner, as a part of the shorter one of the pieces beside it."""
+_NOTHING = 1e-9
+"""Of the torque at rest: so little counts as none, and need not fall any further."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class RoundedCurve:
         """
         speed, torque = np.array(curve).T
         slope = np.diff(torque) / np.diff(speed)
-        if slope[-1] < 0.0 < torque[-1]:
+        if slope[-1] < 0.0 and torque[-1] > _NOTHING * torque[0]:
             speed, torque = np.append(speed, speed[-1] - torque[-1] / slope[-1]), np.append(torque, 0.0)
             slope = np.append(slope, slope[-1])
         if not np.any(slope < 0.0):
