@@ -14,11 +14,11 @@ project = "brachis"
 author = project_copyright = "The brachis authors"
 version = release = brachis.__version__
 sys.path.insert(0, str(ROOT / "docs"))
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.mathjax", "numpydoc", "myst_nb", "sphinx_design", "docstring_links"]
+extensions = ["sphinx.ext.autodoc", "numpydoc", "myst_nb", "sphinx_design", "docstring_links"]
 nitpicky = True
 templates_path: list[str] = []
 
-myst_enable_extensions = ["colon_fence", "dollarmath"]
+myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 3
 nb_execution_mode = "force"
 nb_execution_show_tb = True

@@ -26,6 +26,7 @@ ORDER = (
     "errors",
     "files",
     "kinds",
+    "arguments",
     "arrays",
     "deadline",
     "interrupts",

@@ -14,7 +14,7 @@ import pytest
 import brachis
 from brachis import LimitSpec
 from brachis.errors import BrachisError, PathError, PlausibilityError, StartError, UrdfError
-from brachis.plausibility import of_end_time, of_robot
+from brachis.plausibility import of_end_time, of_robot, of_task
 from brachis.robot import Robot
 from brachis.robot.limb import first_limb
 from brachis.robot.urdf import read_file
@@ -142,6 +142,43 @@ def test_lengths_in_mm():
 def test_masses_in_g_and_inertias_in_kg_mm2():
     assert {message for _, message in told(arm(mass=2000.0, inertia=10.0))} == {"the mass looks like g"}
     assert {message for _, message in told(arm(mass=2.0, inertia=1e4))} == {"the inertia looks like kg mm^2"}
+
+
+@pytest.mark.parametrize(
+    ("payload", "where"),
+    [
+        ({"mass": 500.0}, "robot.payload.mass"),
+        ({"mass": 5000.0}, "robot.payload.mass"),
+        ({"mass": 2.0, "com": [0.0, 0.0, 120.0]}, "robot.payload.com"),
+        ({"mass": 2.0, "inertia": {"ixx": 3000, "iyy": 3000, "izz": 3000}}, "robot.payload.inertia"),
+    ],
+)
+def test_a_payload_in_g_and_mm(payload, where):
+    """And the links of the URDF, which are sound, are not blamed for it."""
+    robot = brachis.robots.iiwa14
+    assert not of_robot(robot.with_payload(14.0, com=[0.0, 0.0, 0.12]))
+    assert [key for key, _ in told(robot.with_payload(**payload))] == [where]
+
+
+@pytest.mark.parametrize(
+    ("limits", "remark"),
+    [
+        ({"speed": 250.0}, "tool_limits.speed: the limit looks like mm/s; found 250 m/s; usual: below 50 m/s, or null"),
+        (
+            {"speed": {"s": [0.0, 1.0], "speed": [0.2, 200.0]}},
+            "tool_limits.speed: the limit looks like mm/s; found 200",
+        ),
+        ({"process_speed": {"speed": 100.0, "s": [0.2, 0.8]}}, "tool_limits.process_speed: the limit looks like mm/s"),
+        ({"acceleration": 1000.0}, "tool_limits.acceleration: the limit looks like mm/s^2; found 1000 m/s^2"),
+        ({"angular_speed": 90.0}, "tool_limits.angular_speed: the limit looks like degrees per second; found 90 rad/s"),
+    ],
+)
+def test_limits_of_the_tool_in_mm_and_degrees(limits, remark):
+    (found,) = of_task(brachis.load_task(task(tool_limits=limits)))
+    assert str(found).startswith(remark)
+    usual = {"speed": 2.0, "acceleration": 20.0, "angular_speed": 3.0}
+    assert not of_task(brachis.load_task(task(tool_limits=usual)))
+    assert not of_task(brachis.load_task(task(tool_limits={"speed": 1e6})))  # written for "no limit"
 
 
 def test_the_least_end_time():

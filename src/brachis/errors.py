@@ -134,7 +134,9 @@ class UnknownNameError(InputError):
         The names that exist.
     """
 
-    def __init__(self, kind: str, name: str, valid: Iterable[str], *, where: str | None = None) -> None:
+    def __init__(
+        self, kind: str, name: str, valid: Iterable[str], *, where: str | None = None, hint: str | None = None
+    ) -> None:
         self.kind = kind
         self.name = name
         self.valid = tuple(valid)
@@ -143,7 +145,7 @@ class UnknownNameError(InputError):
             f"there is no {kind} named {name!r}",
             allowed=", ".join(self.valid) or "none",
             where=where,
-            hint=f"Did you mean {near!r}?" if near else None,
+            hint=hint or (f"Did you mean {near!r}?" if near else None),
         )
 
 
@@ -275,3 +277,10 @@ def nearest(name: str, valid: Iterable[str]) -> str | None:
     """Return the valid name most like `name`, or None where none is near."""
     near = difflib.get_close_matches(name, list(valid), n=1, cutoff=0.5)
     return near[0] if near else None
+
+
+def no_attribute(module: str, kind: str, name: str, valid: Sequence[str]) -> AttributeError:
+    """Return what a module raises that has things of one kind, such as robots, by their names."""
+    near = nearest(name, valid)
+    hint = f". Did you mean {near!r}?" if near else ""
+    return AttributeError(f"module {module!r} has no attribute {name!r}; {kind}: {', '.join(valid)}{hint}")

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from brachis.errors import no_attribute
 from brachis.files import shipped
 
 
@@ -25,8 +26,7 @@ def __getattr__(name: str) -> Path:
     """Find an example's task file."""
     found = list(shipped("examples").glob(f"[0-9][0-9]_{name}.yaml"))
     if not found:
-        message = f"module 'brachis.examples' has no attribute {name!r}; examples: {', '.join(names())}"
-        raise AttributeError(message)
+        raise no_attribute(__name__, "examples", name, names())
     return found[0]
 
 

@@ -119,6 +119,19 @@ def _remove(path: Path) -> None:
             path.unlink()
 
 
+def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
+    """Refuse a file name that ends as one of another format; one without a suffix may have any content.
+
+    Raises
+    ------
+    InputError
+    """
+    suffix = Path(path).suffix
+    if suffix and suffix.lower() != allowed:
+        problem = "the suffix is that of another format"
+        raise InputError(problem, where=os.fspath(path), found=suffix, allowed=allowed, hint=hint)
+
+
 @contextmanager
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """Open a temporary file in the folder of `path`; it takes that name once the block has ended without an error.

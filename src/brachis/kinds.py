@@ -13,6 +13,7 @@ from brachis.files import LARGEST_TEXT, open_file
 _LOOKED_AT = 16_384
 """Bytes at the beginning of a file."""
 _TASK = re.compile(rb"^brachis\s*:", re.MULTILINE)
+_SWEEP = re.compile(rb"^sweep\s*:", re.MULTILINE)
 _FIGURES = b'{\n  "t_end"'
 
 
@@ -20,6 +21,7 @@ class Kind(Enum):
     """A kind of file, in words."""
 
     TASK = "a task file"
+    SWEEP = "a sweep file"
     URDF = "a URDF"
     RESULT = "a result"
     FIGURES = "the figures of a plan"
@@ -27,6 +29,7 @@ class Kind(Enum):
 
 _ADVICE = {
     Kind.TASK: "brachis plan {path} --out out makes a result of it; its key robot.urdf names its URDF",
+    Kind.SWEEP: "brachis sweep {path} plans it",
     Kind.URDF: "brachis new {path} writes a task for it",
     Kind.RESULT: "brachis verify, plot and bottleneck take it; it was planned from a task file, for a URDF",
     Kind.FIGURES: "The motion itself is in the npz file beside it",
@@ -46,11 +49,21 @@ def kind_of(path: str | os.PathLike[str]) -> Kind | None:
         return Kind.FIGURES
     if re.search(rb"<robot\b", beginning) and beginning.lstrip().startswith(b"<"):
         return Kind.URDF
+    if _SWEEP.search(beginning):
+        return Kind.SWEEP
     return Kind.TASK if _TASK.search(beginning) else None
 
 
-def check_kind(path: str | os.PathLike[str], expected: Kind, error: type[InputError]) -> None:
+def check_kind(path: str | os.PathLike[str], expected: Kind | str, error: type[InputError]) -> None:
     """Refuse a file that is of another kind than is expected; what is none of them is for its reader to refuse.
+
+    Parameters
+    ----------
+    path : path
+    expected : Kind or str
+        In words where it is a kind that cannot be told.
+    error : type
+        What is raised.
 
     Raises
     ------
@@ -63,6 +76,6 @@ def check_kind(path: str | os.PathLike[str], expected: Kind, error: type[InputEr
             "the file is of another kind",
             where=os.fspath(path),
             found=found.value,
-            allowed=expected.value,
+            allowed=expected.value if isinstance(expected, Kind) else expected,
             hint=_ADVICE[found].format(path=os.fspath(path)),
         )

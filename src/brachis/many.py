@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from typing import Any, Unpack
 
+from brachis.arguments import count
 from brachis.errors import BrachisError, InputError
 from brachis.planner import Given, plan
 from brachis.result import Result
@@ -47,7 +48,7 @@ def plan_many(
     Raises
     ------
     InputError
-        One task is given in place of several.
+        One task is given in place of several, or `jobs` is no number of processes.
     KeyboardInterrupt
         Ctrl-C ends all.
 
@@ -70,10 +71,10 @@ def plan_many(
     """
     if isinstance(tasks, str | os.PathLike | Mapping):
         raise InputError("is one task", where="tasks", found=type(tasks).__name__, allowed="a list of tasks")
-    given = list(tasks)
+    given, jobs = list(tasks), processes(count(jobs, "jobs"))
     outcomes: list[Outcome] = []
     work = _outcome, given, keywords
-    with _telling(progress) as tell, closing(each(*work, jobs=processes(jobs), listener=_deaf)) as made:
+    with _telling(progress) as tell, closing(each(*work, jobs=jobs, listener=_deaf)) as made:
         for outcome in made:
             outcomes.append(outcome)
             tell(len(outcomes), len(given), outcome)

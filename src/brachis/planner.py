@@ -9,7 +9,6 @@ The search decides what is solved and finished, and in which order; the two func
 from __future__ import annotations
 
 import dataclasses
-import os
 import time
 from collections.abc import Sequence
 from typing import Unpack
@@ -50,7 +49,7 @@ from brachis.search import (
 )
 from brachis.solvers import SolveStatus, solver_named
 from brachis.task import Source, Task, TaskKeywords, task_with
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Motion, Trajectory, motion_of
 
 Given = Source | Robot | None
 """A robot, or a task; both may be the name of a file."""
@@ -65,7 +64,7 @@ def plan(
     task: Source | None = None,
     /,
     *,
-    start_from: Result | Trajectory | str | os.PathLike[str] | None = None,
+    start_from: Motion | None = None,
     families: Sequence[ik.Family] = (),
     own_limits: Sequence[LimitModel] = (),
     listener: Listener | None = None,
@@ -135,7 +134,7 @@ def plan(
     with ThreadpoolController().limit(limits=1, user_api="blas"):
         began = time.perf_counter()
         robot, asked = _read(robot_or_task, task, keywords)
-        known = _motion(start_from)
+        known = None if start_from is None else motion_of(start_from)
         return _plan(robot, asked, families, own_limits, known, listener or (lambda _text: None), began, strict=strict)
 
 
@@ -144,15 +143,10 @@ def _read(first: Given, task: Source | None, keywords: TaskKeywords) -> tuple[Ro
     # What is no robot is a task.
     alone = task is None and first is not None and not is_robot(first)
     given, source = (None, first) if alone else (first, task)
+    named = located(given)  # type: ignore[arg-type]
     asked = task_with(source, **keywords)  # type: ignore[arg-type]
-    robot = robot_for(located(given), asked.robot)  # type: ignore[arg-type]
+    robot = robot_for(named, asked.robot)
     return robot, asked.model_copy(update={"robot": robot.settings})
-
-
-def _motion(given: Result | Trajectory | str | os.PathLike[str] | None) -> Trajectory | None:
-    if isinstance(given, str | os.PathLike):
-        return Trajectory.load(given)
-    return given.trajectory if isinstance(given, Result) else given
 
 
 def _plan(
@@ -168,7 +162,7 @@ def _plan(
 ) -> Result:
     """Run the pipeline stage by stage."""
     loaded, deadline = time.perf_counter(), Deadline.after(task.search.time_limit)
-    remarks = plausibility.of_robot(robot) + plausibility.of_points(task)
+    remarks = plausibility.of_robot(robot) + plausibility.of_task(task)
     remarks = plausibility.tell(remarks, strict=strict, stacklevel=4)
     problem = Problem.of(robot, task, own_limits)
     places = plausibility.of_places(problem.task_map, problem.start, problem.end, task.path_start)

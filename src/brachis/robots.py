@@ -15,7 +15,7 @@ import os
 from functools import cache
 from pathlib import Path
 
-from brachis.errors import UnknownNameError
+from brachis.errors import UnknownNameError, nearest, no_attribute
 from brachis.files import shipped
 from brachis.robot import Robot
 
@@ -39,15 +39,30 @@ def path_of(name: str) -> Path:
 
 
 def is_robot(given: object) -> bool:
-    """Tell whether something is a robot: a `Robot`, the file name of a URDF, or a name from `names`."""
+    """Tell whether something is a robot: a `Robot`, the file name of a URDF, or a name from `names` or like one."""
     if isinstance(given, Robot):
         return True
-    return isinstance(given, str | os.PathLike) and (Path(given).suffix.lower() == ".urdf" or given in names())
+    return isinstance(given, str | os.PathLike) and (Path(given).suffix.lower() == ".urdf" or _is_name(given))
 
 
 def located(robot: str | os.PathLike[str] | Robot | None) -> str | os.PathLike[str] | Robot | None:
-    """Return the URDF file where a robot is given by its name, and everything else as it is."""
-    return path_of(robot) if isinstance(robot, str) and robot in names() else robot
+    """Return the URDF file where a robot is given by its name, and everything else as it is.
+
+    Raises
+    ------
+    UnknownNameError
+        It is no file, and no name, but like one.
+    """
+    return path_of(robot) if isinstance(robot, str) and _is_name(robot) else robot
+
+
+def _is_name(given: str | os.PathLike[str]) -> bool:
+    """Tell a name, misspelt perhaps, from the file name of something."""
+    if given in names():
+        return True
+    path = Path(given)
+    bare = not path.suffix and len(path.parts) == 1 and not path.exists()
+    return bare and nearest(str(given), names()) is not None
 
 
 @cache
@@ -58,8 +73,7 @@ def _robot(name: str) -> Robot:
 def __getattr__(name: str) -> Robot:
     """Read a robot when it is first used."""
     if name not in names():
-        message = f"module 'brachis.robots' has no attribute {name!r}; robots: {', '.join(names())}"
-        raise AttributeError(message)
+        raise no_attribute(__name__, "robots", name, names())
     return _robot(name)
 
 

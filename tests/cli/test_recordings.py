@@ -76,7 +76,7 @@ def test_compare(run, recorded, tmp_path):
         (("--tolerance", "0.1"), "no tolerance of a path; found 0.1; allowed: 2e-07 to 0.001"),
         (("--tolerance", "0"), "no tolerance of a path; found 0.0"),
         (("--noise", "-1"), "noise"),
-        ((), "Degrees? Ask for units of the angle"),
+        ((), 'Degrees? Say so: units={"angle": "deg"}, or --angle deg'),
     ],
 )
 def test_wrong_options(run, recorded, tmp_path, options, told):

@@ -177,3 +177,22 @@ def test_fault_of_our_own_is_not_a_traceback(run, task, write, monkeypatch):
 def test_suggestions_come_from_the_valid_names():
     assert nearest("torqe", ["torque", "velocity"]) == "torque"
     assert nearest("xyz", ["torque", "velocity"]) is None
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        (("plan", "scara3"), "scara3: is a robot; allowed: a task file. brachis new scara3 writes a first task for it"),
+        (("plan", "scara4"), "there is no robot named 'scara4'"),
+        (("plan", "sweep.yaml"), "found a sweep file; allowed: a task file. brachis sweep sweep.yaml plans it"),
+        (("sweep", "task.yaml"), "found a task file; allowed: a sweep file"),
+        (("import", "task.yaml", "--robot", "scara3", "--out", "x.npz"), "found a task file; allowed: a CSV file"),
+    ],
+)
+def test_other_things_than_are_asked_for(run, tmp_path, monkeypatch, command, told):
+    (tmp_path / "task.yaml").write_text("brachis: 1\n")
+    (tmp_path / "sweep.yaml").write_text("sweep: 1\ntask: task.yaml\n")
+    monkeypatch.chdir(tmp_path)
+    outcome = run(*command)
+    assert outcome.code == 2
+    assert told in outcome.err

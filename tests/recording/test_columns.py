@@ -39,6 +39,13 @@ def test_names_and_units(header, units, factors, table, write):
     assert found.qdot is None
 
 
+@pytest.mark.parametrize("unit", ["deg/s^2", "deg/s2"])
+def test_accelerations_with_their_unit(unit, table, write):
+    t, q, qdot = table
+    path = write(f"t,j1,j2,j3,qdd_j1 [{unit}],j2_acc [{unit}],a_j3_deg_per_s2", t, q, np.rad2deg(qdot))
+    np.testing.assert_allclose(read_recording(path, ROBOT, Units()).qddot, qdot, rtol=1e-12)
+
+
 def test_columns_in_any_order_and_others_beside_them(table, write):
     t, q, qdot = table
     columns = (q[:, 2], qdot[:, [1, 0, 2]], t, q[:, :2], q[:, 0])
@@ -109,7 +116,7 @@ def test_rows_that_are_no_motion(table, write):
         read_recording(write("t,j1,j2,j3", t[:4], q[:4]), ROBOT, Units())
     with pytest.raises(TaskError, match="the robot does not move"):
         read_recording(write("t,j1,j2,j3", t, 0.0 * q), ROBOT, Units())
-    with pytest.raises(TaskError, match=r"an angle is hardly meant; found [0-9.]+ rad at j1. Degrees\? Ask for"):
+    with pytest.raises(TaskError, match=r"an angle is hardly meant; found [0-9.]+ rad at j1. Degrees\? Say so"):
         read_recording(write("t,j1,j2,j3", t, 100.0 * q), ROBOT, Units())
     with pytest.raises(TaskError, match="there is no such file"):
         read_recording("nowhere.csv", ROBOT, Units())

@@ -8,14 +8,14 @@ import pytest
 import brachis
 from brachis import bottleneck, export, plots
 from brachis.errors import InputError, PathError, ResultFileError
-from brachis.recording import import_motion
+from brachis.recording import Units, import_motion, read_recording
 from brachis.recording.nodes import nodes_of
 from brachis.recording.recording import Recording
 from brachis.robot import Robot
 from brachis.trajectory import Recovered, Trajectory
 from brachis.verify import verify_trajectory
 
-from .conftest import ROOT
+from .conftest import DT, ROOT, SCARA
 
 
 def test_the_motion_comes_back(imported, motion):
@@ -39,7 +39,7 @@ def test_its_path_comes_back_and_it_verifies(imported, motion):
 
 
 def test_what_is_known_of_it_is_saved(imported, tmp_path):
-    assert "accelerations are those of polynomials through five rows of velocities each" in imported.recovered.told
+    assert "accelerations are the file's" in imported.recovered.told
     assert any(line.startswith("not known: ") for line in imported.recovered.told)
     imported.save(tmp_path / "today.npz")
     again = Trajectory.load(tmp_path / "today.npz")
@@ -86,14 +86,59 @@ def test_positions_alone_will_do(motion, table, write):
 
 def test_few_digits_are_smoothed(motion, table, write):
     t, q, _ = table
-    found = import_motion(write("t,j1,j2,j3", t, q, fmt="%.6f"), task=motion.task, tolerance=1e-5)
-    assert any("smoothing spline" in line for line in found.recovered.told)
-    moves = np.abs(q.round(6) - q[0].round(6)).max(axis=1) > 1.1e-6  # before, the last digit at most moves
-    later = t[int(np.argmax(moves)) - 1]
-    assert found.t_end == pytest.approx(motion.t_end - later, abs=0.05)
+    found = import_motion(write("t,j1,j2,j3", t, q, fmt="%.6f"), task=motion.task)
+    assert any("smoothing spline, 2.9e-07 rad (rms) off" in line for line in found.recovered.told)
+    assert 1e-6 < found.recovered.tolerance < 1e-5  # as the digits have it
+    assert found.t_end == pytest.approx(motion.t_end, abs=2.5 * DT)
     middle = np.linspace(0.2, 2.0, 500)
+    times = np.linspace(0.0, 2.0 * DT, 3)  # the rows that were left out at the beginning are whole ones
+    later = min(times, key=lambda late: np.abs(found.position(middle) - motion.position(middle + late)).max())
     np.testing.assert_allclose(found.position(middle), motion.position(middle + later), atol=2e-6)
     np.testing.assert_allclose(found.acceleration(middle), motion.acceleration(middle + later), atol=0.2)
+
+
+@pytest.mark.parametrize("digits", [4, 5, 6, 8])
+def test_rest_is_found_in_few_digits(digits, motion, table, write):
+    """And the time in which the last digit does not show yet that the motion has begun belongs to it."""
+    t, q, _ = table
+    recording = read_recording(write("t,j1,j2,j3", t, q, fmt=f"%.{digits}f"), motion.robot, Units())
+    nodes = nodes_of(recording, recording.rounding / np.sqrt(3.0))
+    assert nodes.at_rest == (True, True)
+    assert recording.t[-1] == pytest.approx(motion.t_end, abs=2.5 * DT)
+
+
+@pytest.mark.parametrize("digits", [4, 5, 6, 8])
+def test_accelerations_that_set_in_with_a_jump_are_no_rest(digits, write):
+    t = np.arange(0.0, 2.001, DT)
+    way = np.where(t < 1.0, 0.5 * t**2, 1.0 - 0.5 * (2.0 - t) ** 2)[:, None] * [1.0, -0.5, 0.02]
+    recording = read_recording(write("t,j1,j2,j3", t, way, fmt=f"%.{digits}f"), Robot.from_urdf(SCARA), Units())
+    assert nodes_of(recording, recording.rounding / np.sqrt(3.0)).at_rest == (True, False)
+
+
+def test_few_digits_of_a_rail_say_nothing_of_the_joints(write):
+    robot, t = Robot.from_urdf(ROOT / "robots/tx90l_rail/robot.urdf"), np.linspace(0.0, 1.0, 251)
+    way = (t**4 * (35.0 - 84.0 * t + 70.0 * t**2 - 20.0 * t**3))[:, None] * np.full(robot.n, 0.3)
+    rail = robot.position_units.index("m")
+    way[:, rail] = way[:, rail].round(4)  # 0.1 mm
+    recording = read_recording(write(",".join(["t", *robot.joint_names]), t, way), robot, Units())
+    assert recording.rounding[rail] == pytest.approx(5e-5)
+    assert not np.delete(recording.rounding, rail).any()
+    nodes = nodes_of(recording, recording.rounding / np.sqrt(3.0))
+    assert "positions in m, velocities and accelerations of a smoothing spline, 2.9e-05 m (rms) off" in nodes.told
+    assert not any("rad" in line for line in nodes.told)
+    exact = [joint for joint in range(robot.n) if joint != rail]
+    assert set(nodes.q[:, exact].ravel()) >= set(recording.q[:, exact].ravel())
+    again = nodes_of(recording, np.full(robot.n, 1e-4))
+    assert {line.split(",")[0] for line in again.told} == {"positions in rad", "positions in m"}
+
+
+def test_rates_that_contradict_the_positions_are_left_out(motion, write):
+    samples = motion.sample(DT)
+    header = ",".join(["t", *(f"{kind}{joint}" for kind in ("", "qd_", "qdd_") for joint in ("j1", "j2", "j3"))])
+    path = write(header, samples.t, samples.q, samples.qdot, 2.0 * samples.qddot)
+    found = import_motion(path, task=motion.task)
+    assert any("the file's accelerations do not agree" in line for line in found.recovered.told)
+    np.testing.assert_allclose(found.acceleration(samples.t), samples.qddot, atol=0.05)
 
 
 def test_measured_positions_are_smoothed(motion, write):
@@ -113,7 +158,7 @@ def test_accelerations_that_jump_do_not_overshoot():
     switch = 1.0037
     first, rest = np.minimum(t, switch), np.maximum(t - switch, 0.0)
     q = (0.5 * first**2 + switch * rest - 0.5 * rest**2)[:, None]
-    nodes = nodes_of(Recording(t, q, None, 0.0, "here", ()))
+    nodes = nodes_of(Recording(t, q, None, None, np.zeros(1), ("rad",), "here", ()), np.zeros(1))
     from scipy.interpolate import BPoly  # noqa: PLC0415
 
     pieces = BPoly.from_derivatives(nodes.t, np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1))

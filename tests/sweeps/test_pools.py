@@ -12,7 +12,9 @@ import pytest
 
 import brachis
 from brachis.errors import ClusterError, InputError
-from brachis.sweeps.pools import _as_completed, pool_for
+from brachis.sweeps.clusters import on_dask
+from brachis.sweeps.completed import as_completed
+from brachis.sweeps.pools import pool_for
 from brachis.sweeps.worker import Outcome
 
 DASK = Path(sys.executable).with_name("dask")
@@ -50,8 +52,8 @@ def test_a_plan_that_ends_its_process_fails_and_no_other(monkeypatch):
             processes.work()
         return {future for future in futures if future.done()}, None
 
-    monkeypatch.setattr("brachis.sweeps.pools.wait", wait)
-    found = dict(_as_completed(range(10), processes.submit, lambda: 3))
+    monkeypatch.setattr("brachis.sweeps.completed.wait", wait)
+    found = dict(as_completed(range(10), processes.submit, lambda: 3))
     assert sorted(found) == list(range(10))
     assert processes.most == 3
     assert {plan for plan, outcome in found.items() if outcome.facts["status"] == "failed"} == {4, 7}
@@ -63,12 +65,15 @@ def test_what_no_worker_can_run_ends_the_sweep():
     future = Future()
     future.set_exception(ModuleNotFoundError("No module named 'brachis'"))
     with pytest.raises(ClusterError, match="plans cannot be made there; found ModuleNotFoundError: No module"):
-        next(_as_completed([0], lambda _plan: future, lambda: 1))
+        next(as_completed([0], lambda _plan: future, lambda: 1))
 
 
 @pytest.mark.parametrize(
     ("jobs", "scheduler", "expected"),
-    [(0, None, "number of processes; found 0"), (2, "tcp://127.0.0.1:8786", "jobs or scheduler")],
+    [
+        (0, None, "jobs: out of range; found 0; allowed: a whole number >= 1"),
+        (2, "tcp://127.0.0.1:8786", "jobs or scheduler"),
+    ],
 )
 def test_wrong_pools_are_refused(jobs, scheduler, expected):
     with pytest.raises(InputError, match=expected):
@@ -114,9 +119,33 @@ def test_a_sweep_on_dask_survives_a_worker_that_is_killed(cluster, content, tmp_
 
 def test_no_scheduler_answers(content, tmp_path, monkeypatch):
     pytest.importorskip("distributed", reason="Dask is not installed: pip install 'brachis[cluster]'")
-    monkeypatch.setattr("brachis.sweeps.pools._CONNECTING", 0.1)
+    monkeypatch.setattr("brachis.sweeps.clusters._CONNECTING", 0.1)
     with pytest.raises(ClusterError, match=r"tcp://127\.0\.0\.1:9: no Dask scheduler answers"):
         brachis.sweep(content, tmp_path / "out", scheduler="tcp://127.0.0.1:9")
+
+
+def test_a_scheduler_that_is_lost(monkeypatch):
+    """The client says so with an error of its own, whatever it is asked for."""
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'brachis[cluster]'")
+
+    class Client:
+        def __init__(self, **_):
+            pass
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+        def nthreads(self):
+            raise distributed.comm.CommClosedError("in <TCP (closed)>: Connection reset by peer")
+
+    monkeypatch.setattr("dask.distributed.Client", Client)
+    with pytest.raises(
+        ClusterError, match=r"tcp://here:1: the Dask scheduler was lost; found in <TCP .closed.*goes on"
+    ):
+        list(on_dask([], "tcp://here:1", print))
 
 
 def test_a_sweep_through_ray(content, tmp_path, same_as_undisturbed):

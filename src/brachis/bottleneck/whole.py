@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -80,13 +81,16 @@ class BottleneckReport:
         }
 
 
-def report(motion: Result | Trajectory, *, check: bool = False, reference: bool = False) -> BottleneckReport:
+def report(
+    motion: Result | Trajectory | str | os.PathLike[str], *, check: bool = False, reference: bool = False
+) -> BottleneckReport:
     """Find out what holds a planned motion back.
 
     Parameters
     ----------
-    motion : Result or Trajectory
-        Of `brachis.plan`; or a trajectory, a loaded one for example, whose problem is solved again (`solved_again`).
+    motion : Result, Trajectory or path
+        Of `brachis.plan`; or a trajectory, a loaded one for example, or its file, whose problem is solved again
+        (`solved_again`).
     check : bool, optional
         Solve again with every limit raised by 1 % and compare with the multipliers' predictions.
     reference : bool, optional
@@ -111,6 +115,8 @@ def report(motion: Result | Trajectory, *, check: bool = False, reference: bool 
     >>> [sensitivity.label.subject for sensitivity in found.sensitivities.limits][0]
     'j1'
     """
+    if isinstance(motion, str | os.PathLike):
+        motion = Trajectory.load(motion)
     if isinstance(motion, Trajectory) and motion.recovered is not None:
         if check or reference:
             hint = "brachis compare plans the same path; ask for the bottlenecks of that plan"

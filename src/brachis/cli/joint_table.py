@@ -7,24 +7,12 @@ import numpy as np
 from brachis import ik
 from brachis.robot import Robot
 from brachis.robot.limits import MAGNITUDES
+from brachis.robot.units import UNITS
 
 NONE = "none"
 WORDS = ("joint", "type")
 """Columns that are no figures with units."""
-_LIMITS = {
-    "velocity": {"rad": "rad/s", "m": "m/s"},
-    "acceleration": {"rad": "rad/s^2", "m": "m/s^2"},
-    "torque": {"rad": "Nm", "m": "N"},
-    "power": {"rad": "W", "m": "W"},
-    "rms_torque": {"rad": "Nm", "m": "N"},
-    "jerk": {"rad": "rad/s^3", "m": "m/s^3"},
-    "torque_rate": {"rad": "Nm/s", "m": "N/s"},
-}
-_FRICTION = {
-    "viscous": {"rad": "Nm s/rad", "m": "N s/m"},
-    "coulomb": {"rad": "Nm", "m": "N"},
-    "armature": {"rad": "kg m^2", "m": "kg"},
-}
+_FRICTION = ("viscous", "coulomb", "armature")
 
 
 def joint_rows(robot: Robot) -> list[dict[str, str]]:
@@ -43,11 +31,11 @@ def joint_rows(robot: Robot) -> list[dict[str, str]]:
                 "axis at zero": " ".join(f"{round(component, 6) + 0.0:.4g}" for component in geometry.axes[i]),
                 "range": _range(limits.position_lower[i], limits.position_upper[i], unit),
                 **{
-                    kind.replace("_", " "): _limit(limits.both_ways(kind)[:, i], _LIMITS[kind][unit])
+                    kind.replace("_", " "): _limit(limits.both_ways(kind)[:, i], UNITS[kind][unit])
                     for kind in MAGNITUDES
                 },
                 "mass": f"{robot.model.inertias[i + 1].mass:.4g} kg",
-                **{key: f"{value:.4g} {_FRICTION[key][unit]}" if value else NONE for key, value in friction.items()},
+                **{key: f"{value:.4g} {UNITS[key][unit]}" if value else NONE for key, value in friction.items()},
             }
         )
     return rows

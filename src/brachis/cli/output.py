@@ -223,20 +223,17 @@ def _log() -> Callable[[str], None]:
 def print_verification(console: Console, verification: Verification) -> None:
     """Print the checks, one a row."""
     title = "verification: passed" if verification.passed else "verification: FAILED"
-    rows = []
-    for check in verification.checks:
-        ratio = check.unit == "-" and check.allowed > 1.0
-        rows.append(
-            (
-                check.name,
-                f"{check.value:.6f}" if ratio else f"{check.value:.1e}",
-                f"{check.allowed:.6g}",
-                check.unit,
-                check.subject or "",
-                "" if check.time is None else f"{check.time:.4f}",
-                ("ok" if check.passed else "FAILED") + (f" ({check.remark})" if check.remark else ""),
-            )
+    rows = [
+        (
+            check.name,
+            *check.figures,
+            check.unit,
+            check.subject or "",
+            "" if check.time is None else f"{check.time:.4f}",
+            ("ok" if check.passed else "FAILED") + (f" ({check.remark})" if check.remark else ""),
         )
+        for check in verification.checks
+    ]
     number = partial(Column, number=True)
     columns = ("check", number("worst"), number("allowed"), "unit", "of", number("time [s]"), "")
     print_table(console, f"{title} (checked at {verification.points} instants)", columns, rows)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from brachis.cli.tables import Column, print_table
 from brachis.cli.viewing import show
 from brachis.errors import InputError
 from brachis.result import Result
-from brachis.search.record import SAME_MOTION
+from brachis.search.listing import STATUS, TIMES, WORDS, candidate_rows
 from brachis.view import require_viser
 
 _FILES = {
@@ -115,8 +114,8 @@ def _show(result: Result, data: dict[str, Any]) -> None:
     print_table(console, "plan", ("", ""), rows.items(), header=False)
     for fit in result.fits:
         console.print(f"path from {fit}")
-    if len(result.candidates) > 1:
-        _print_candidates(console, result)
+    if len(data["candidates"]) > 1:
+        _print_candidates(console, data["candidates"])
     print_verification(console, result.verification)
     for name in data.get("files", []):
         console.print(f"wrote {name}")
@@ -128,23 +127,10 @@ def _posture(data: dict[str, Any], key: str) -> str:
     return ", ".join(f"{name} {value:.4f} {unit}" for name, value, unit in values)
 
 
-def _print_candidates(console: Console, result: Result) -> None:
-    """Print what the search looked at, one candidate a row, the fastest first; the same motion is shown once.
-
-    Columns are named as in the JSON.
-    """
-    shown = [candidate for candidate in result.candidates if candidate.status != SAME_MOTION]
-    others = len(result.candidates) - len(shown[:_MANY])
-    title = f"candidates ({len(result.candidates)}" + (f", {others} of them in the JSON only)" if others else ")")
-    rows = [
-        (
-            coordinates(candidate.redundant_joints, candidate.branch),
-            candidate.branch,
-            candidate.origin,
-            *(f"{time:.4f}" if math.isfinite(time) else "" for time in (candidate.coarse, candidate.t_end)),
-            candidate.status,
-        )
-        for candidate in shown[:_MANY]
-    ]
-    times = (Column("coarse [s]", number=True), Column("t_end [s]", number=True))
-    print_table(console, title, ("joints", "branch", "origin", *times, "status"), rows)
+def _print_candidates(console: Console, candidates: Sequence[Mapping[str, Any]]) -> None:
+    """Print what the search looked at, one candidate a row, the fastest first; the same motion is shown once."""
+    rows = candidate_rows(candidates)
+    others = len(candidates) - len(rows[:_MANY])
+    title = f"candidates ({len(candidates)}" + (f", {others} of them in the JSON only)" if others else ")")
+    times = (Column(name, number=True) for name in TIMES)
+    print_table(console, title, (*WORDS, *times, STATUS), rows[:_MANY])

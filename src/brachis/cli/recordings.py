@@ -27,7 +27,6 @@ from brachis.verify import verify_trajectory
 if TYPE_CHECKING:
     from brachis.trajectory import Trajectory
 
-_TASKS = (".yaml", ".yml")
 _FILES = {
     True: ("today.npz", "result.npz", "comparison.json", "comparison.png"),
     False: ("today.npz", "unverified.npz", "unverified_comparison.json", "unverified_comparison.png"),
@@ -44,7 +43,7 @@ class Recorded:
     file, robot : Path
         CSV file; URDF, or task file whose robot and settings hold.
     task_space, angle, length, time : str or None
-    tolerance : float
+    tolerance : float or None
         m and rad.
     noise : float or None
         rad or m.
@@ -56,17 +55,15 @@ class Recorded:
     angle: str | None
     length: str | None
     time: str | None
-    tolerance: float
+    tolerance: float | None
     noise: float | None
 
     def load(self) -> Trajectory:
         """Import the motion."""
         given = {"angle": self.angle, "length": self.length, "time": self.time}
-        of_task = self.robot.suffix.lower() in _TASKS
         return import_motion(
             self.file,
-            None if of_task else str(self.robot),
-            task=self.robot if of_task else None,
+            str(self.robot),
             task_space=None if self.task_space is None else task_space_of(self.task_space),
             units={name: unit for name, unit in given.items() if unit is not None},
             tolerance=self.tolerance,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from brachis import robots
-from brachis.errors import ResultFileError, UnknownNameError
+from brachis.errors import ResultFileError, TaskError, UnknownNameError
 from brachis.robot.task_map.rows import AXES, YAW
 from brachis.task import Task, load_task, read_assignment
 
@@ -45,6 +45,10 @@ def changed_task(path: Path, changes: Sequence[str]) -> Task:
     TaskError
         See `load_task` and `read_assignment`.
     """
+    if robots.is_robot(str(path)) and path.suffix == "":
+        name = robots.path_of(str(path)).parent.name
+        hint = f"brachis new {name} writes a first task for it"
+        raise TaskError("is a robot", where=name, allowed="a task file", hint=hint)
     return load_task(path, changes=dict(read_assignment(text) for text in changes))
 
 

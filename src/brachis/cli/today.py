@@ -14,7 +14,7 @@ RecordedFile = Annotated[
     Path,
     typer.Argument(
         help="CSV file: time (t, time_ms, ...), joint positions (j1, q_j1, j1_pos [deg], ...), and velocities (qd_j1, "
-        "...) where they are known.",
+        "...) and accelerations (qdd_j1, ...) where they are known.",
         metavar="CSV",
     ),
 ]
@@ -33,7 +33,14 @@ RecordedSpace = Annotated[
 AngleUnit = Annotated[str | None, typer.Option("--angle", help="Unit of angles whose column states none: rad, deg.")]
 LengthUnit = Annotated[str | None, typer.Option("--length", help="Unit of lengths whose column states none: m, mm.")]
 TimeUnit = Annotated[str | None, typer.Option("--time", help="Unit of a time whose column states none: s, ms.")]
-PathTolerance = Annotated[float, typer.Option("--tolerance", help="How far the recovered path may be off, m and rad.")]
+PathTolerance = Annotated[
+    float | None,
+    typer.Option(
+        help="How far the recovered path may be off, m and rad. Default: 1e-6, or what the file's last digits, or the "
+        "noise, leave open.",
+        show_default=False,
+    ),
+]
 Noise = Annotated[
     float | None,
     typer.Option(
@@ -52,7 +59,7 @@ def import_(
     angle: AngleUnit = None,
     length: LengthUnit = None,
     time: TimeUnit = None,
-    tolerance: PathTolerance = 1e-6,
+    tolerance: PathTolerance = None,
     noise: Noise = None,
     json: Json = False,
 ) -> None:
@@ -77,7 +84,7 @@ def compare(
     angle: AngleUnit = None,
     length: LengthUnit = None,
     time: TimeUnit = None,
-    tolerance: PathTolerance = 1e-6,
+    tolerance: PathTolerance = None,
     noise: Noise = None,
     json: Json = False,
 ) -> None:

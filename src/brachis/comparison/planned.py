@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 
+from brachis.arguments import named
 from brachis.comparison.comparison import Comparison
 from brachis.errors import PathError, PlanningError
 from brachis.planner import plan
-from brachis.recording import TOLERANCE, import_motion
+from brachis.recording import import_motion
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.task_map import JOINTS
@@ -21,15 +22,16 @@ _FINER, _MOST = 3, 10_000
 """Times as many knot intervals, where a plan is slower than the motion given."""
 
 
+@named
 def compare(
     today: str | os.PathLike[str] | Trajectory,
-    robot: str | os.PathLike[str] | Robot | None = None,
+    robot: str | os.PathLike[str] | Robot | Task | None = None,
     *,
     task: str | os.PathLike[str] | Mapping[str, object] | Task | None = None,
     task_space: str | Sequence[str] | None = None,
     units: Mapping[str, str] | None = None,
-    tolerance: float = TOLERANCE,
-    noise: float | None = None,
+    tolerance: float | None = None,
+    noise: float | Sequence[float] | None = None,
     keep_end: bool = False,
     listener: Listener | None = None,
 ) -> Comparison:

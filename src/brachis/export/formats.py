@@ -17,7 +17,7 @@ from brachis.export.mp4 import export_mp4
 from brachis.export.parquet_table import export_parquet
 from brachis.export.ros2_yaml import export_ros2_yaml
 from brachis.export.urscript import export_urscript
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Motion, Trajectory, motion_of
 
 
 class Exporter(Protocol):
@@ -101,7 +101,7 @@ def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
 
 
 def write(
-    trajectory: Trajectory,
+    trajectory: Motion,
     path: str | os.PathLike[str],
     *,
     form: str | None = None,
@@ -113,7 +113,8 @@ def write(
 
     Parameters
     ----------
-    trajectory : Trajectory
+    trajectory : Trajectory, Result or path
+        A motion, or its file.
     path : path
         File to write; an older one is replaced, and kept if writing fails.
     form : str, optional
@@ -144,5 +145,9 @@ def write(
     """
     chosen = format_of(path, form)
     chosen.export(
-        trajectory, path, chosen.dt if dt is None else dt, last=chosen.last if last is None else last, joints=joints
+        motion_of(trajectory),
+        path,
+        chosen.dt if dt is None else dt,
+        last=chosen.last if last is None else last,
+        joints=joints,
     )

@@ -17,13 +17,15 @@ TIMES: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _TIME = ("t", "time", "timestamp")
 _POSITION = ("{}", "q_{}", "pos_{}", "position_{}", "{}_pos", "{}_position")
 _VELOCITY = ("qd_{}", "dq_{}", "v_{}", "vel_{}", "velocity_{}", "{}_vel", "{}_velocity")
+_ACCELERATION = ("qdd_{}", "ddq_{}", "a_{}", "acc_{}", "acceleration_{}", "{}_acc", "{}_acceleration")
 _UNITS = "|".join({**TIMES, **ANGLES, **LENGTHS})
-_STATED = re.compile(rf"^(.+?)\s*(?:[\[(]\s*([a-z/]+)\s*[\])]|_((?:{_UNITS})(?:/s|_s|_per_s)?))$")
+_STATED = re.compile(rf"^(.+?)\s*(?:[\[(]\s*([a-z0-9/^]+)\s*[\])]|_((?:{_UNITS})(?:(?:/|_|_per_)s(?:\^?2)?)?))$")
 _DIGITS = 12
 _LISTED = 8
 
-Kind = Literal["t", "q", "qdot"]
-_WORDS: Final = {"t": "time", "q": "position", "qdot": "velocity"}
+Kind = Literal["t", "q", "qdot", "qddot"]
+_WORDS: Final = {"t": "time", "q": "position", "qdot": "velocity", "qddot": "acceleration"}
+_PER: Final = {"t": "", "q": "", "qdot": "/s", "qddot": "/s^2"}
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,10 @@ class _Column:
 
 def allowed_columns(joints: Sequence[str]) -> str:
     """Say which columns a file has, for messages."""
-    return f"t, then {', '.join(joints)} (or q_{joints[0]}, ...), and qd_{joints[0]}, ... where velocities are known"
+    first = joints[0]
+    return (
+        f"t, then {', '.join(joints)} (or q_{first}, ...), and qd_{first}, ..., qdd_{first}, ... where rates are known"
+    )
 
 
 def understood(header: Sequence[str], joints: Sequence[str], where: str) -> dict[int, _Column]:
@@ -73,10 +78,12 @@ def understood(header: Sequence[str], joints: Sequence[str], where: str) -> dict
     Raises
     ------
     TaskError
-        Time or a joint's position is missing or stands there twice, or only some joints have velocities.
+        Time or a joint's position is missing or stands there twice, or only some joints have velocities or
+        accelerations.
     """
     known: dict[str, tuple[Kind, str]] = dict.fromkeys(_TIME, ("t", ""))
     for joint in joints:
+        known |= {form.format(joint.lower()): ("qddot", joint) for form in _ACCELERATION}
         known |= {form.format(joint.lower()): ("qdot", joint) for form in _VELOCITY}
         known |= {form.format(joint.lower()): ("q", joint) for form in _POSITION}
     found: dict[int, _Column] = {}
@@ -84,13 +91,13 @@ def understood(header: Sequence[str], joints: Sequence[str], where: str) -> dict
         name, unit = text.strip().lower(), None
         match = None if name in known else _STATED.match(name)
         if match is not None:
-            name, unit = match[1], (match[2] or match[3]).replace("_per_", "/").replace("_", "/")
+            name, unit = match[1], (match[2] or match[3]).replace("_per_", "/").replace("_", "/").replace("s2", "s^2")
         if name in known:
             found[i] = _Column(*known[name], unit)
     listed = [(column.kind, column.joint) for column in found.values()]
     wanted: list[tuple[Kind, str]] = [("t", ""), *(("q", joint) for joint in joints)]
-    if any(kind == "qdot" for kind, _ in listed):
-        wanted += [("qdot", joint) for joint in joints]
+    rates: tuple[Kind, ...] = ("qdot", "qddot")
+    wanted += [(kind, joint) for kind in rates if any(kind == one for one, _ in listed) for joint in joints]
     for kind, joint in wanted:
         if listed.count((kind, joint)) != 1:
             what = f"the {_WORDS[kind]} of {joint!r}" if joint else "the time"
@@ -128,7 +135,7 @@ def in_si(
     table : Table
     columns : dict
         Of `understood`.
-    kind : {"t", "q", "qdot"}
+    kind : {"t", "q", "qdot", "qddot"}
     joint : str
     base : {"s", "rad", "m"}
         SI unit of the joint's position, or of time.
@@ -144,7 +151,7 @@ def in_si(
     """
     i = next(i for i, column in columns.items() if (column.kind, column.joint) == (kind, joint))
     factors, asked = {"s": (TIMES, units.time), "rad": (ANGLES, units.angle), "m": (LENGTHS, units.length)}[base]
-    per = "/s" if kind == "qdot" else ""
+    per = _PER[kind]
     stated, values = columns[i].unit, table.values[:, i]
     unit = (asked or base) if stated is None else stated.removesuffix(per)
     if unit not in factors or (stated is not None and not stated.endswith(per)):

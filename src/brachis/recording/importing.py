@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from brachis import ik
+from brachis.arguments import named, numbers
 from brachis.errors import InputError, PathError
+from brachis.kinds import Kind, kind_of
 from brachis.recording.columns import Units
 from brachis.recording.nodes import Nodes, nodes_of
 from brachis.recording.path_coordinate import DEGREE, coordinate_spline
@@ -20,23 +22,25 @@ from brachis.robot.combine import robot_for
 from brachis.robot.task_map import JOINTS
 from brachis.robots import located
 from brachis.task import Segment, Task, load_task
-from brachis.trajectory import Recovered, Trajectory, check_tolerance
+from brachis.trajectory import Recovered, Trajectory
+from brachis.trajectory.recovered import LARGEST, check_tolerance
 
-TOLERANCE = 1e-6
-"""Of a recovered path, m and rad."""
+_TOLERANCE, _DIGITS = 1e-6, 3.0
+"""Of a recovered path, m and rad; and how many times what positions' errors move the tool at most."""
 _BETWEEN = 4
 """Places at which every piece of the motion is looked at."""
 
 
+@named
 def import_motion(
     path: str | os.PathLike[str],
-    robot: str | os.PathLike[str] | Robot | None = None,
+    robot: str | os.PathLike[str] | Robot | Task | None = None,
     *,
     task: str | os.PathLike[str] | Mapping[str, object] | Task | None = None,
     task_space: str | Sequence[str] | None = None,
     units: Mapping[str, str] | None = None,
-    tolerance: float = TOLERANCE,
-    noise: float | None = None,
+    tolerance: float | None = None,
+    noise: float | Sequence[float] | None = None,
 ) -> Trajectory:
     """Make a trajectory of a motion that runs today, to verify, draw, compare and export it.
 
@@ -50,8 +54,8 @@ def import_motion(
         CSV file whose first line names its columns: time (``t``, ``time_ms``, ...), the joints' positions (``j1``,
         ``q_j1``, ``j1_pos [deg]``, ...) and, if known, velocities (``qd_j1``, ``j1_vel``, ...). Other columns are
         left out.
-    robot : path or Robot, optional
-        URDF file or robot; needed unless the task names one.
+    robot : path, Robot or Task, optional
+        URDF file, name of a robot, or robot; or a task file, as if it were `task`. Needed unless the task names one.
     task : path, mapping or Task, optional
         A task whose robot, limits and settings hold; its start and path do not count.
     task_space : str or sequence of str, optional
@@ -60,8 +64,8 @@ def import_motion(
     units : mapping, optional
         ``{"angle": "deg", "length": "mm", "time": "ms"}`` for columns whose header states none; rad, m and s otherwise.
     tolerance : float, optional
-        Of the path, m and rad.
-    noise : float, optional
+        Of the path, m and rad: 1e-6 unless given, or what the file's last digits, or the noise, leave open of it.
+    noise : float or (n,) array_like, optional
         Standard deviation of measured positions, rad or m, which are then smoothed; that of the file's digits unless
         given.
 
@@ -89,22 +93,30 @@ def import_motion(
     >>> today.recovered.tolerance, round(today.t_end - result.t_end, 9)
     (1e-06, 0.0)
     """
-    if noise is not None and not 0.0 < noise < np.inf:
-        raise InputError("is no standard deviation", where="noise", found=noise, allowed="> 0 rad or m")
-    check_tolerance(float(tolerance))
+    if tolerance is not None:
+        tolerance = check_tolerance(tolerance)
+    if task is None and _is_task(robot):
+        robot, task = None, robot
     settings = None if task is None else load_task(task)
-    made = robot_for(located(robot), (settings or load_task(_BLANK)).robot)
+    if robot is None and (settings is None or settings.robot.urdf is None):
+        allowed = "a URDF file, the name of a robot (brachis.robots), a Robot, or a task file"
+        raise InputError("the robot is missing", where="robot", allowed=allowed)
+    made = robot_for(located(robot), (settings or load_task(_BLANK)).robot)  # type: ignore[arg-type]
     space = task_space or (settings.task_space if settings else ik.natural_space(made))
-    recording = read_recording(path, made, Units(**dict(units or {})))
+    recording = read_recording(path, made, _units(units))
     bound, task_map = bind(made, space)
-    nodes = _with_roll(nodes_of(recording, noise), bound.n)
+    deviation = _deviation(recording, noise)
+    nodes = _with_roll(nodes_of(recording, deviation), bound.n)
     t, q, qdot = _densely(nodes)
+    if tolerance is None:
+        moved = np.abs(task_map.jacobian(task_map.twists(nodes.q)))[:, :, : len(deviation)] @ deviation
+        tolerance = float(np.clip(_DIGITS * moved.max(), _TOLERANCE, LARGEST))
     followed = path_followed(task_map, q, qdot, t, tolerance)
     if followed.miss > tolerance:
-        found, allowed = f"{followed.miss:.3g} m or rad off", f"{tolerance:g}"
+        found, allowed = f"{followed.miss:.3g} m or rad off", f"{tolerance:.3g}"
         hint = "Raise the tolerance"
         raise PathError("the recovered path misses the motion", found=found, allowed=allowed, where="path", hint=hint)
-    recovered = Recovered(recording.source, float(tolerance), _told(recording, nodes, followed))
+    recovered = Recovered(recording.source, tolerance, _told(recording, nodes, followed, tolerance))
     wanted = _task_of(settings, bound, task_map, nodes, followed, space)
     return _trajectory(wanted, bound, nodes, coordinate_spline(t, followed.s, at_rest=nodes.at_rest[0]), recovered)
 
@@ -116,6 +128,41 @@ _BLANK: dict[str, Any] = {
     "path": [{"line": {"by": [1.0]}}],
 }
 """A task that only stands for the defaults of all settings."""
+
+
+def _is_task(given: object) -> bool:
+    """Tell a task, or its file, from a robot."""
+    return isinstance(given, Task | Mapping) or (isinstance(given, str | os.PathLike) and kind_of(given) is Kind.TASK)
+
+
+def _units(given: Mapping[str, str] | None) -> Units:
+    """Read units by the quantities that have them.
+
+    Raises
+    ------
+    InputError
+    """
+    if given is not None and not isinstance(given, Mapping):
+        allowed = '{"angle": "deg", "length": "mm", "time": "ms"}, or some of them'
+        raise InputError("wrong type", where="units", found=repr(given), allowed=allowed)
+    return named(Units)(**dict(given or {}))
+
+
+def _deviation(recording: Recording, noise: float | Sequence[float] | None) -> np.ndarray:
+    """Return the standard deviation of every joint's positions, (n,), rad or m: as it is said, else of the digits.
+
+    Raises
+    ------
+    InputError
+    """
+    if noise is None:
+        return recording.rounding / np.sqrt(3.0)
+    given = numbers(noise, "noise", "rad or m")
+    n = recording.q.shape[1]
+    if given.shape not in ((), (n,)) or not ((given > 0.0) & (given < np.inf)).all():
+        allowed = f"> 0 rad or m, one figure or {n}"
+        raise InputError("is no standard deviation", where="noise", found=noise, allowed=allowed)
+    return np.broadcast_to(given, n)
 
 
 def _with_roll(nodes: Nodes, n: int) -> Nodes:
@@ -135,7 +182,7 @@ def _densely(nodes: Nodes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return t, pieces(t), pieces(t, nu=1)
 
 
-def _told(recording: Recording, nodes: Nodes, followed: Followed) -> tuple[str, ...]:
+def _told(recording: Recording, nodes: Nodes, followed: Followed, tolerance: float) -> tuple[str, ...]:
     h = 1e3 * float(np.median(np.diff(recording.t)))
     return (
         f"{len(recording.t)} rows over {recording.t[-1]:.6g} s, one every {h:.4g} ms",
@@ -143,6 +190,7 @@ def _told(recording: Recording, nodes: Nodes, followed: Followed) -> tuple[str, 
         *nodes.told,
         "not known: what the motion does between the rows, and the torques that were measured",
         f"the tool's path follows by forward kinematics; the curve is at most {followed.miss:.1e} m or rad off",
+        f"its tolerance is {tolerance:.1e} m and rad",
     )
 
 

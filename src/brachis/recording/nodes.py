@@ -5,32 +5,32 @@ it those are taken through which the polynomial bends least (essentially non-osc
 B. Engquist, S. Osher, S. R. Chakravarthy, Journal of Computational Physics 71, 1987): where accelerations jump, as they
 do in time-optimal motions, a spline through all rows would overshoot by a fifth of the jump and ring on both sides.
 
-Positions that are rounded to few digits have no second derivatives of their own: a spline of degree 5 with few knots
-takes their place, as near to them as their rounding lets it be.
+Velocities and accelerations of the file take their place where they agree with them.
+
+Positions that are rounded to few digits have no second derivatives of their own: a smoothing spline takes their place.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from brachis.recording.jumps import States, with_jumps
 from brachis.recording.recording import FEWEST, Recording
+from brachis.recording.smoothing import smoothed
 
-_NOISY = 0.01
-"""Of the largest acceleration, what rounding may make of it."""
+_ROUNDED, _NOISY = 1e-3, 0.2
+"""Of a joint's largest acceleration, what rounding makes of it where a smoothing spline takes its place if it is as
+near to the rows as they are exact, and where in any case."""
+_BETWEEN = 60.0
+"""Acceleration of a quintic piece of 1 s, for a position that is 1 rad off."""
+_AGREES = 0.02
+"""Of the largest one, what half of the file's rates may differ from those of polynomials."""
 _CENTRED = 0.25
 """Factor on the bend around a row, which is taken unless others bend much less."""
 _AT_REST = (1e-3, 1e-2)
 """Of the largest velocity and acceleration: what is less at an end is rest."""
-_DEGREE, _FEWEST_INTERVALS, _MORE, _ROWS = 5, 4, 1.2, 3.0
-"""Of smoothing splines: the first number of intervals, the factor to the next one, and the fewest rows in each."""
-_SLOW = 0.02
-"""Of the largest speed: an end that is slower is taken to be at rest."""
-_NEAR = 1.05
-"""Standard deviations that a smoothing spline may be off, where noise alone is off by one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,30 +59,64 @@ class Nodes:
         return not self.qdot[ends].any(), not self.qddot[ends].any()
 
 
-def nodes_of(recording: Recording, noise: float | None = None) -> Nodes:
+def nodes_of(recording: Recording, deviation: np.ndarray) -> Nodes:
     """Find velocities and accelerations.
 
     Parameters
     ----------
     recording : Recording
-    noise : float, optional
-        Standard deviation of the positions' errors, rad or m; that of their rounding unless given.
+    deviation : (n,) ndarray
+        Standard deviation of every joint's positions, rad or m; 0 where they are exact.
     """
-    t, q = recording.t, recording.q
-    deviation = recording.rounding / np.sqrt(3.0) if noise is None else noise
-    h = float(np.median(np.diff(t)))
-    rough = np.abs(np.diff(q, n=2, axis=0)).max() / h**2
-    if noise is not None or 4.0 * deviation / h**2 > _NOISY * rough:
-        told = f"positions, velocities and accelerations of a smoothing spline, {deviation:.2g} rad or m (rms) off"
-        return _nodes(States(t, *_smoothed(t, q, deviation)), told)
-    if recording.qdot is None:
-        _, qdot, qddot, jerk = _differentiated(t, q)
-        told = "velocities and accelerations are those of polynomials through five rows each"
-    else:
-        qdot, qddot, jerk, _ = _differentiated(t, recording.qdot)
-        told = "accelerations are those of polynomials through five rows of velocities each"
-    motion, jumps = with_jumps(States(t, q, qdot, qddot), jerk)
-    return _nodes(motion, told, *([f"accelerations jump between {jumps} pairs of rows"] if jumps else []))
+    t, told = recording.t, []
+    parts = _smoothed(t, recording.q, deviation)
+    exact = np.isnan(parts[0, 0])
+    for unit in dict.fromkeys(recording.units):
+        of_unit = ~exact & (np.array(recording.units) == unit)
+        if of_unit.any():
+            off = f"{deviation[of_unit].max():.2g} {unit} (rms) off"
+            told.append(f"positions in {unit}, velocities and accelerations of a smoothing spline, {off}")
+    if not exact.any():
+        return _nodes(States(t, *parts[:3]), *told)
+    parts[:, :, exact], how = _interpolated(recording, exact)
+    motion, jumps = with_jumps(States(t, *parts[:3]), parts[3])
+    return _nodes(motion, *told, how, *([f"accelerations jump between {jumps} pairs of rows"] if jumps else []))
+
+
+def _smoothed(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> np.ndarray:
+    """Return positions and three derivatives of splines, (4, K, n), NaN of joints that need none."""
+    parts = np.full((4, *q.shape), np.nan)
+    bends = np.maximum(np.abs(np.diff(q, n=2, axis=0)).max(axis=0), np.finfo(float).tiny)
+    doubt = _BETWEEN * deviation / bends
+    for least in (_ROUNDED, _NOISY):
+        rough = doubt > least
+        if rough.any():
+            spline = smoothed(t, q[:, rough], deviation[rough])
+            if spline.explains or least == _NOISY:
+                parts[:, :, rough] = spline.derivatives
+                break
+    return parts
+
+
+def _interpolated(recording: Recording, joints: np.ndarray) -> tuple[np.ndarray, str]:
+    """Return positions and three derivatives, (4, K, j), of some joints, and how they were found."""
+    parts = _differentiated(recording.t, recording.q[:, joints])
+    told = "velocities and accelerations are those of polynomials through five rows each"
+    names = {1: ("qdot", "velocities"), 2: ("qddot", "accelerations")}
+    for order, (name, words) in names.items():
+        given = getattr(recording, name)
+        if given is None:
+            continue
+        given = given[:, joints]
+        largest = np.abs(parts[order]).max(axis=0)
+        if (np.median(np.abs(given - parts[order]), axis=0) > _AGREES * largest).any():
+            told += f"; the file's {words} do not agree with them and are left out"
+            continue
+        parts[order:] = _differentiated(recording.t, given)[: 4 - order]
+        told = f"{words} are the file's"
+        if order == 1:
+            told = "velocities are the file's, accelerations are those of polynomials through five rows of them"
+    return parts, told
 
 
 def _nodes(motion: States, *told: str) -> Nodes:
@@ -99,8 +133,8 @@ def _with_rest(values: np.ndarray, least: float) -> np.ndarray:
     return values
 
 
-def _differentiated(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return values, (K, n), and three derivatives at their times."""
+def _differentiated(t: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return values, (K, n), and three derivatives at their times, (4, K, n)."""
     count = len(t)
     h = float(np.median(np.diff(t)))
     first = np.arange(count - FEWEST + 1)[:, None] + np.arange(FEWEST)
@@ -117,38 +151,4 @@ def _differentiated(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, ...]
     rows = first[chosen]
     local = ((t[rows] - t[:, None]) / h)[:, :, None] ** powers
     coefficients = np.linalg.solve(local, values[rows])
-    return values, coefficients[:, 1] / h, 2.0 * coefficients[:, 2] / h**2, 6.0 * coefficients[:, 3] / h**3
-
-
-def _smoothed(t: np.ndarray, q: np.ndarray, deviation: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a least-squares spline and two derivatives at the times: that of the fewest intervals that will do.
-
-    An end at which the spline is slow is one at rest: both control points there are the same.
-    """
-    from scipy.interpolate import BSpline  # noqa: PLC0415  (imports in 0.3 s)
-    from scipy.sparse.linalg import spsolve  # noqa: PLC0415
-
-    outer, count, resting = np.ones(_DEGREE), float(_FEWEST_INTERVALS), np.zeros(2, dtype=bool)
-    while True:
-        breaks = np.interp(np.linspace(0.0, 1.0, int(count) + 1), np.linspace(0.0, 1.0, len(t)), t)
-        knots = np.concatenate([t[0] * outer, breaks, t[-1] * outer])
-        rows = BSpline.design_matrix(t, knots, _DEGREE) @ _tied(len(knots) - _DEGREE - 1, resting)
-        spline = BSpline(knots, _tied(len(knots) - _DEGREE - 1, resting) @ spsolve(rows.T @ rows, rows.T @ q), _DEGREE)
-        off = np.sqrt(np.mean((spline(t) - q) ** 2, axis=0)).max()
-        found = tuple(np.asarray(spline(t, nu=order)) for order in range(3))
-        speed = np.abs(found[1]).max(axis=1)
-        slow = speed[[0, -1]] < _SLOW * speed.max()
-        done = off <= _NEAR * deviation or _MORE * count > len(t) / _ROWS
-        if done and (slow <= resting).all():
-            return found  # type: ignore[return-value]
-        resting, count = (slow, count) if done else (resting, _MORE * count)
-
-
-def _tied(count: int, resting: np.ndarray) -> Any:  # noqa: ANN401  (SciPy's sparse arrays)
-    """Return the matrix, (count, free), from free control points to all; at an end at rest the first two are one."""
-    from scipy.sparse import csr_array  # noqa: PLC0415
-
-    columns = np.arange(count)
-    columns[1:] -= int(resting[0])
-    columns[-1] -= int(resting[1])
-    return csr_array((np.ones(count), (np.arange(count), columns)), shape=(count, int(columns[-1]) + 1))
+    return np.stack([values, coefficients[:, 1] / h, 2.0 * coefficients[:, 2] / h**2, 6.0 * coefficients[:, 3] / h**3])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -12,7 +12,8 @@ import numpy as np
 from brachis.arrays import freeze
 from brachis.cam.table import Table, read_table
 from brachis.errors import TaskError
-from brachis.recording.columns import Units, allowed_columns, in_si, understood
+from brachis.kinds import check_kind
+from brachis.recording.columns import Kind, Units, allowed_columns, in_si, understood
 from brachis.robot import Robot
 from brachis.task.text_file import read_text
 
@@ -21,6 +22,8 @@ FEWEST = 5
 _LARGEST_FILE = 64_000_000
 _STILL = 1e-12
 """rad or m: what moves less between rows with all digits stands still."""
+_SHOWS, _CLEAR = 2.2, 24.0
+"""Of the rounding: a digit has changed, which flicker does not; and the digit moves through a dozen."""
 _MANY_TURNS = 6.0 * np.pi
 
 
@@ -34,10 +37,12 @@ class Recording:
         From 0 on, s.
     q : (K, n) ndarray
         rad or m.
-    qdot : (K, n) ndarray or None
-        Where the file says it; rad/s or m/s.
-    rounding : float
-        Half of the last digit of the positions, rad or m, where the file has few digits; else 0.
+    qdot, qddot : (K, n) ndarray or None
+        Where the file says them; rad/s or m/s, rad/s^2 or m/s^2.
+    rounding : (n,) ndarray
+        Half of the last digit of every joint's positions, rad or m, where the file has few digits; else 0.
+    units : tuple of str
+        Of every joint's positions: rad or m.
     source : str
         The file.
     told : tuple of str
@@ -47,13 +52,16 @@ class Recording:
     t: np.ndarray
     q: np.ndarray
     qdot: np.ndarray | None
-    rounding: float
+    qddot: np.ndarray | None
+    rounding: np.ndarray
+    units: tuple[str, ...]
     source: str
     told: tuple[str, ...]
 
     def __post_init__(self) -> None:
         """Take copies that nobody can write to."""
-        freeze(self, "t", "q", *(["qdot"] if self.qdot is not None else []))
+        rates = (name for name in ("qdot", "qddot") if getattr(self, name) is not None)
+        freeze(self, "t", "q", "rounding", *rates)
 
 
 def read_recording(path: str | os.PathLike[str], robot: Robot, units: Units) -> Recording:
@@ -74,6 +82,7 @@ def read_recording(path: str | os.PathLike[str], robot: Robot, units: Units) -> 
         The file cannot be read, columns are missing, times do not ascend, or nothing moves.
     """
     source, joints = Path(path), robot.joint_names
+    check_kind(source, "a CSV file", TaskError)
     text = read_text(source, where=str(source), folder=Path.cwd(), largest=_LARGEST_FILE)
     allowed = allowed_columns(joints)
     table = read_table(text, str(source), allowed, lambda header, where: understood(header, joints, where))
@@ -82,17 +91,21 @@ def read_recording(path: str | os.PathLike[str], robot: Robot, units: Units) -> 
     time = in_si(table, columns, "t", "", "s", units, where)
     bases = tuple(zip(joints, robot.position_units, strict=True))
     parts = [in_si(table, columns, "q", name, unit, units, where) for name, unit in bases]
-    t, q, qdot = time.values, np.column_stack([part.values for part in parts]), None
-    if any(column.kind == "qdot" for column in columns.values()):
-        rates = (in_si(table, columns, "qdot", name, unit, units, where) for name, unit in bases)
-        qdot = np.column_stack([part.values for part in rates])
+    t, q = time.values, np.column_stack([part.values for part in parts])
+
+    def rates(kind: Kind) -> np.ndarray | None:
+        if not any(column.kind == kind for column in columns.values()):
+            return None
+        return np.column_stack([in_si(table, columns, kind, name, unit, units, where).values for name, unit in bases])
+
     _check_times(t, table, source)
     _check_angles(q, robot, units, source)
     told = [*table.told, f"units: {', '.join(dict.fromkeys(part.unit for part in (time, *parts)))}"]
     ignored = [name for i, name in enumerate(table.header) if i not in columns]
     told += [f"left out the columns {', '.join(ignored)}"] if ignored else []
-    rounding = max(part.rounding for part in parts)
-    return _trimmed(Recording(t, q, qdot, rounding, str(source), tuple(told)))
+    rounding = np.array([part.rounding for part in parts])
+    read = Recording(t, q, rates("qdot"), rates("qddot"), rounding, robot.position_units, str(source), tuple(told))
+    return _trimmed(read)
 
 
 def _check_times(t: np.ndarray, table: Table, source: Path) -> None:
@@ -112,7 +125,7 @@ def _check_angles(q: np.ndarray, robot: Robot, units: Units, source: Path) -> No
     if bad.size and units.angle is None:
         joint = int(bad[0])
         found = f"{np.abs(q[:, joint]).max():.4g} rad at {robot.joint_names[joint]}"
-        hint = "Degrees? Ask for units of the angle, deg; rad where it is meant so"
+        hint = 'Degrees? Say so: units={"angle": "deg"}, or --angle deg; rad where it is meant so'
         raise TaskError("an angle is hardly meant", found=found, where=str(source), hint=hint)
 
 
@@ -125,12 +138,7 @@ def _reach(robot: Robot) -> np.ndarray:
 def _trimmed(recording: Recording) -> Recording:
     """Leave out rows in which nothing moves before the motion begins and after it has ended."""
     t, q = recording.t, recording.q
-    still = max(_STILL, 2.2 * recording.rounding)  # the last digit may flicker
-    moving = np.flatnonzero(np.abs(q - q[0]).max(axis=1) > still)
-    if not moving.size:
-        _refuse("the robot does not move", recording)
-    first = int(moving[0]) - 1
-    last = int(np.flatnonzero(np.abs(q - q[-1]).max(axis=1) > still)[-1]) + 1
+    first, last = _beginning(t, q, recording), len(t) - 1 - _beginning(-t[::-1], q[::-1], recording)
     if last - first + 1 < FEWEST:
         _refuse(f"the robot moves in fewer than {FEWEST} rows", recording)
     told = recording.told
@@ -139,8 +147,23 @@ def _trimmed(recording: Recording) -> Recording:
             many = f"{rows} row{'s' * (rows > 1)}"
             told = (*told, f"left out {time:.6g} s {when} the motion, in which the robot stands still ({many})")
     kept = slice(first, last + 1)
-    qdot = None if recording.qdot is None else recording.qdot[kept]
-    return Recording(t[kept] - t[first], q[kept], qdot, recording.rounding, recording.source, told)
+    rates = {name: part[kept] for name in ("qdot", "qddot") if (part := getattr(recording, name)) is not None}
+    return replace(recording, t=t[kept] - t[first], q=q[kept], **rates, told=told)
+
+
+def _beginning(t: np.ndarray, q: np.ndarray, recording: Recording) -> int:
+    """Return the row at which motion sets in.
+
+    Where digits are few, a gentle motion has been going on for a while when the last digit shows it: it goes as the
+    cube of time, and is so far after twice the time where it is eight times as large.
+    """
+    away = np.abs(q - q[0])
+    shown = np.flatnonzero((away > np.maximum(_STILL, _SHOWS * recording.rounding)).any(axis=1))
+    if not shown.size:
+        _refuse("the robot does not move", recording)
+    clear = np.flatnonzero((away > np.maximum(_STILL, _CLEAR * recording.rounding)).any(axis=1))
+    lead = t[clear[0]] - t[shown[0]] if clear.size else 0.0
+    return int(np.clip(np.searchsorted(t, t[shown[0]] - lead, side="right") - 1, 0, shown[0] - 1))
 
 
 def _refuse(problem: str, recording: Recording) -> NoReturn:

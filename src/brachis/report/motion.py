@@ -67,7 +67,7 @@ def reported_motion(motion: Result | Trajectory) -> ReportedMotion:
             motion,
             verify_trajectory(motion),
             limits=None,
-            remarks=plausibility.of_robot(motion.robot) + plausibility.of_points(motion.task),
+            remarks=plausibility.of_robot(motion.robot) + plausibility.of_task(motion.task),
         )
     refined = motion.attempt.refined
     limits = None if refined is None else [each for each in refined.program.limits if each.role is not Role.SAFEGUARD]

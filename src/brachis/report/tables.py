@@ -167,12 +167,11 @@ def check_rows(motion: ReportedMotion) -> list[CheckRow]:
 
 def _check_row(check: Check) -> CheckRow:
     unit = "" if check.unit == "-" else f" {check.unit}"
-    ratio = check.of_limit or (check.unit == "-" and check.allowed > 1.0)
     parts = [check.subject or "", "" if check.time is None else f"{check.time:.4f} s"]
     return CheckRow(
         name=check.name,
-        found=(f"{check.value:.6f}" if ratio else f"{check.value:.1e}") + unit,
-        allowed=f"{check.allowed:.6g}{unit}",
+        found=check.figures[0] + unit,
+        allowed=check.figures[1] + unit,
         where=" at ".join(part for part in parts if part),
         passed=check.passed,
         remark=check.remark,

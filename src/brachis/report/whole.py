@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from brachis.errors import NotInstalledError
-from brachis.files import atomic_write
+from brachis.files import atomic_write, check_suffix
 from brachis.plots import as_html, plot_candidates, plot_fit, plot_overview
 from brachis.report import tables
 from brachis.report.figures import motion_figure, timeline_figure
@@ -53,8 +53,9 @@ class Report:
         Raises
         ------
         InputError
-            The file cannot be written.
+            The suffix is another than html, or the file cannot be written.
         """
+        check_suffix(path, ".html", "A browser prints it as PDF")
         with atomic_write(path) as stream:
             stream.write(self.html.encode())
 

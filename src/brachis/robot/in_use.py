@@ -7,13 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.robot.robot import Robot
+from brachis.robot.units import UNITS
 from brachis.task import Placement
 
-_UNITS = {
-    "armature": {"rad": "kg m^2", "m": "kg"},
-    "viscous": {"rad": "Nm s/rad", "m": "N s/m"},
-    "coulomb": {"rad": "Nm", "m": "N"},
-}
 _NAMES = {"armature": "armature", "viscous": "viscous friction", "coulomb": "Coulomb friction"}
 
 
@@ -48,9 +44,7 @@ def in_use(robot: Robot) -> dict[str, str]:
 def _by_joint(robot: Robot, kind: str) -> str:
     """Write one term of the friction with its units, joint by joint unless it is the same at all."""
     figures, n = getattr(robot.friction, kind), len(robot.stated.bodies)
-    rows = [
-        f"{value:g} {_UNITS[kind][unit]}" for value, unit in zip(figures[:n], robot.position_units[:n], strict=True)
-    ]
+    rows = [f"{value:g} {UNITS[kind][unit]}" for value, unit in zip(figures[:n], robot.position_units[:n], strict=True)]
     if len(set(rows)) == 1 and n > 1:
         return f"{rows[0]} at every joint"
     return ", ".join(f"{name} {row}" for name, row in zip(robot.joint_names[:n], rows, strict=True))

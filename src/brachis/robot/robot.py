@@ -24,6 +24,7 @@ from brachis.robot.limits import (
 )
 from brachis.robot.model import build_model
 from brachis.robot.settings import kept_settings
+from brachis.robot.units import UNITS
 from brachis.robot.urdf import read_chain, read_file
 from brachis.robot.urdf_bodies import StatedChain
 from brachis.summary import Summary
@@ -263,14 +264,14 @@ class Robot(Summary):
             "tool frame": self.tool_frame,
             "from": self.in_words(limits.position_lower),
             "to": self.in_words(limits.position_upper),
-            "torque": self.in_words(limits.torque, "Nm", "N"),
-            "velocity": self.in_words(limits.velocity, "rad/s", "m/s"),
+            "torque": self.in_words(limits.torque, "torque"),
+            "velocity": self.in_words(limits.velocity, "velocity"),
             **({} if payload is None else {"payload": f"{payload.mass:g} kg"}),
         }
 
-    def in_words(self, values: np.ndarray, angular: str = "rad", linear: str = "m") -> str:
-        """Write a value for each joint, (n,), with the unit of revolute or of prismatic joints."""
-        units = [angular if turns else linear for turns in self.revolute]
+    def in_words(self, values: np.ndarray, quantity: str = "position") -> str:
+        """Write a value for each joint, (n,), with the unit of such a quantity."""
+        units = [UNITS[quantity][unit] for unit in self.position_units]
         numbers = [f"{value:.4g}" if np.isfinite(value) else "none" for value in values]
         if len(set(units)) == 1:
             return f"{', '.join(numbers)} {units[0]}"
@@ -296,7 +297,7 @@ class Robot(Summary):
     @property
     def torque_units(self) -> tuple[str, ...]:
         """Unit of every joint's torque, ``Nm``, or of its force, ``N``."""
-        return tuple("Nm" if unit == "rad" else "N" for unit in self.position_units)
+        return tuple(UNITS["torque"][unit] for unit in self.position_units)
 
     @property
     def revolute(self) -> np.ndarray:

@@ -21,10 +21,13 @@ from brachis.search.posture_lattice import PostureLattice
 from brachis.search.screening import screened
 from brachis.search.solving import Listener
 from brachis.search.starts import PIECES, fine_places, lattice_starts, smoothed
+from brachis.search.variations import varied
 
 _FINER = 2
 SCREENED = 4
 """So many times the joint paths that a level plans are looked at."""
+_AT_LEAST = 2
+"""With several redundant joints, where the lattice has fewer, others around these make up so many times as many."""
 _HOPELESS = 3.0
 """Joint paths whose estimated time is so many times the least one are left out."""
 
@@ -69,13 +72,17 @@ def chart_starts(
     if isinstance(found, DeadEnd):
         return found
     newton = Newton(problem.task_map)
+    named = [(_origin(number, joint_path), joint_path) for number, joint_path in enumerate(found, 1)]
+    if problem.robot.n - problem.task_map.m > 1 and level.in_charts > 1:
+        more = varied(found, _AT_LEAST * level.in_charts - len(found), problem.task.search.seed)
+        named += [(f"varied {number}", joint_path) for number, joint_path in enumerate(more, 1)]
     starts = (
-        None if number > 1 and deadline.passed else _start_along(newton, joint_path, _origin(number, joint_path))
-        for number, joint_path in enumerate(found, 1)
+        None if number and deadline.passed else _start_along(newton, joint_path, origin)
+        for number, (origin, joint_path) in enumerate(named)
     )
     ranked = sorted((start for start in starts if start is not None), key=lambda start: start.estimate)
     if not ranked and not deadline.passed:
-        return DeadEnd(0.0, {NO_CHART: len(found)})
+        return DeadEnd(0.0, {NO_CHART: len(named)})
     hopeful = [start for start in ranked if start.estimate <= _HOPELESS * ranked[0].estimate or start is ranked[0]]
     return screened(hopeful, level.in_charts, deadline, listener) if hopeful else []
 

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 import brachis
 from brachis.errors import BrachisError, TaskError, UnknownNameError
+from brachis.kinds import Kind, check_kind
 from brachis.problem import Problem
 from brachis.robot import Robot
 from brachis.robot.from_task import robot_from_settings
@@ -104,6 +105,7 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
     name, folder = "sweep", Path.cwd()
     if not isinstance(source, Mapping):
         path = Path(source)
+        check_kind(path, Kind.SWEEP, TaskError)
         content, name, folder = _yaml(path, Path.cwd()), str(path), path.absolute().parent
     if not isinstance(content, Mapping):
         raise TaskError(

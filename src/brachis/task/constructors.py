@@ -10,6 +10,7 @@ from typing import Any, Literal, Protocol, TypeVar
 
 from pydantic import ValidationError
 
+from brachis.arguments import named
 from brachis.task.fields import plain
 from brachis.task.limit_models import Array
 from brachis.task.messages import task_error
@@ -38,6 +39,7 @@ Point = float | Array | Sequence[float]
 Orientation = OrientationMode | dict[str, Any]
 
 
+@named
 def Line(  # noqa: N802
     *,
     to: Point | Transform | None = None,
@@ -82,6 +84,7 @@ def Line(  # noqa: N802
     return _segment(LineSegment, "line", blend, orientation, to=to, by=by, length=length, angle_deg=angle_deg)
 
 
+@named
 def Arc(  # noqa: N802
     *,
     center: Point | None = None,
@@ -125,6 +128,7 @@ def Arc(  # noqa: N802
     return _segment(ArcSegment, "arc", blend, orientation, **shape)
 
 
+@named
 def Circle(  # noqa: N802
     center: Point,
     *,
@@ -159,6 +163,7 @@ def Circle(  # noqa: N802
     return _segment(CircleSegment, "circle", blend, orientation, center=center, turns=turns, normal=normal, yaw=yaw)
 
 
+@named
 def Helix(  # noqa: N802
     center: Point,
     *,
@@ -197,6 +202,7 @@ def Helix(  # noqa: N802
     return _segment(HelixSegment, "helix", blend, orientation, center=center, pitch=pitch, normal=normal, turns=turns)
 
 
+@named
 def Spline(  # noqa: N802
     through: Array | Sequence[Point | Transform],
     *,

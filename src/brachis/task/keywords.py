@@ -10,6 +10,7 @@ from brachis.task.boundary import BoundarySettings
 from brachis.task.fields import Model, plain
 from brachis.task.limit_models import Array, LimitKeywords, LimitSpec
 from brachis.task.load import Source, load_task
+from brachis.task.messages import key_paths
 from brachis.task.models import Task
 from brachis.task.mounting_models import Payload, Placement
 from brachis.task.planning_models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings
@@ -115,10 +116,27 @@ def task_with(source: Source | None = None, /, **keywords: Unpack[TaskKeywords])
     content = {"brachis": 1} if source is None else load_task(source).model_dump(exclude_unset=True)
     for key, value in keywords.items():
         if key not in TaskKeywords.__annotations__:
-            raise UnknownNameError("keyword", key, sorted(TaskKeywords.__annotations__), where="plan")
+            raise _no_keyword(key)
         whole = {_SECTION_OF[key]: {key: value}} if key in _SECTION_OF else {key: _in_full(key, value)}
         content = _merged(content, whole)
     return load_task(content)
+
+
+def _no_keyword(name: str) -> UnknownNameError:
+    """Say where a key that is no keyword belongs, or which is meant."""
+    hint = " or ".join(_as_keyword(path.split(".")) for path in key_paths(name, Task))
+    valid = sorted(TaskKeywords.__annotations__)
+    return UnknownNameError("keyword", name, valid, where="plan", hint=hint and f"It is a key of others: {hint}")
+
+
+def _as_keyword(parts: Sequence[str]) -> str:
+    """Write a dotted key as a keyword: ``limits={'torque': ...}``."""
+    own = parts[1:-1] and _SECTION_OF.get(parts[1]) == parts[0]
+    first, *others = parts[1:] if own else parts
+    text = "..."
+    for key in reversed(others):
+        text = f"{{{key!r}: {text}}}"
+    return f"{first}={text}"
 
 
 def _in_full(key: str, value: object) -> object:

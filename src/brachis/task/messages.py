@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass, is_dataclass, replace
 from typing import Any, Final, get_args, get_type_hints
 
 from pydantic import ValidationError
@@ -13,6 +13,9 @@ from brachis.errors import TaskError, nearest
 from brachis.task.fields import REFUSED, WRONG_FORM, WRONG_KEYS, Model
 
 _LONGEST_VALUE = 60
+_DEEPEST = 3
+"""Parts of a dotted key."""
+_MAPPING = "a mapping"
 
 
 @dataclass(frozen=True)
@@ -116,6 +119,30 @@ def _keys_at(location: tuple[str | int, ...], model: type[Model]) -> list[str]:
     return [name for one in models for name in _fields_of(one)]
 
 
+def key_paths(name: str, model: type[Model]) -> list[str]:
+    """Return the dotted keys, of the fewest parts, that end in a name: ``refinement.tolerance``."""
+    level: list[tuple[str, type]] = [("", model)]
+    for _ in range(_DEEPEST):
+        found = [f"{path}{name}" for path, one in level if name in _fields_of(one)]
+        if found:
+            return list(dict.fromkeys(found))
+        inside = ((f"{path}{key}.", kind) for path, one in level for key, kind in _fields_of(one).items())
+        level = [(path, each) for path, annotation in inside for each in _models_in(annotation)]
+    return []
+
+
+def _description_at(location: tuple[str | int, ...], model: type[Model]) -> str | None:
+    """Return what is said of the key at a location."""
+    *before, last = [part for part in location if isinstance(part, str) and not _is_tag(part)] or [""]
+    models: list[type] = [model]
+    for part in before:
+        fields = [_fields_of(one).get(part) for one in models]
+        models = [found for annotation in fields for found in _models_in(annotation)]
+    known = [one.model_fields.get(last) for one in models if issubclass(one, Model)]
+    found = [field.description for field in known if field is not None and field.description]
+    return f"{last}: {found[0].removesuffix('.')}" if len(found) == 1 else None
+
+
 def _is_echo(detail: ErrorDetails) -> bool:
     """Whether a list is called too short only because pydantic does not count its wrong items."""
     return detail["type"] == "too_short" and len(detail["input"]) >= detail["ctx"]["min_length"]
@@ -130,8 +157,9 @@ def _missing(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
 def _unknown(detail: ErrorDetails, model: type[Model]) -> _Complaint:
     name = str(detail["loc"][-1])
     keys = _keys_at(detail["loc"][:-1], model)
-    near = nearest(name, keys)
-    return _Complaint("unknown key", name, ", ".join(keys), f"Did you mean {near!r}?" if near else None)
+    elsewhere, near = key_paths(name, model), nearest(name, keys)
+    hint = f"It is a key of its own: {' or '.join(elsewhere)}" if elsewhere else near and f"Did you mean {near!r}?"
+    return _Complaint("unknown key", name, ", ".join(keys), hint)
 
 
 def _refused(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
@@ -170,6 +198,19 @@ def _plain(problem: str, allowed: str | None = None) -> Callable[[ErrorDetails, 
     return describe
 
 
+def _wrong_type(form: str) -> Callable[[ErrorDetails, type[Model]], _Complaint]:
+    """Return a description that names the form, the keys of a mapping, and what the key is for."""
+    plainly = _plain("wrong type", form)
+
+    def describe(detail: ErrorDetails, model: type[Model]) -> _Complaint:
+        complaint = plainly(detail, model)
+        keys = _keys_at(detail["loc"], model) if form == _MAPPING else []
+        allowed = f"{form} with keys out of {', '.join(keys)}" if keys else complaint.allowed
+        return replace(complaint, allowed=allowed, hint=_description_at(detail["loc"], model))
+
+    return describe
+
+
 _DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Complaint]]] = {
     REFUSED: _refused,
     WRONG_FORM: _wrong_form,
@@ -177,15 +218,15 @@ _DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Complaint]
     "missing": _missing,
     "extra_forbidden": _unknown,
     "unexpected_keyword_argument": _unknown,
-    "float_type": _plain("wrong type", "a number"),
-    "int_type": _plain("wrong type", "a whole number"),
-    "bool_type": _plain("wrong type", "true or false"),
-    "string_type": _plain("wrong type", "a string"),
-    "tuple_type": _plain("wrong type", "a list"),
-    "dict_type": _plain("wrong type", "a mapping"),
-    "model_type": _plain("wrong type", "a mapping"),
-    "dataclass_type": _plain("wrong type", "a mapping"),
-    "none_required": _plain("wrong type", "null"),
+    "float_type": _wrong_type("a number"),
+    "int_type": _wrong_type("a whole number"),
+    "bool_type": _wrong_type("true or false"),
+    "string_type": _wrong_type("a string"),
+    "tuple_type": _wrong_type("a list"),
+    "dict_type": _wrong_type(_MAPPING),
+    "model_type": _wrong_type(_MAPPING),
+    "dataclass_type": _wrong_type(_MAPPING),
+    "none_required": _wrong_type("null"),
     "finite_number": _plain("not a finite number", "a finite number"),
     "greater_than": _plain("out of range", "> {gt:g}"),
     "greater_than_equal": _plain("out of range", ">= {ge:g}"),

@@ -78,7 +78,7 @@ class RobotSettings(Model):
         "ceiling (upside down, about x), or {xyz: ..., rpy_deg: ...}. Gravity and the path are in the world frame.",
     )
     gravity: tuple[Number, Number, Number] = Field(
-        default=(0.0, 0.0, -9.81), description="Gravity, m/s^2, world frame."
+        default=(0.0, 0.0, -9.81), description="Gravity [x, y, z], m/s^2, world frame."
     )
     locked_joints: dict[Name, Number] = Field(default={}, description="Joints that stay at a value, rad (m), by name.")
     payload: Payload | None = Field(default=None, description="Rigid body held to the tool frame. Null: none.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 from pathlib import Path
 
@@ -27,7 +28,7 @@ def read_text(
     largest : int, optional
         Longer files are refused, bytes.
     hint : str, optional
-        What to try where the file cannot be read.
+        What to try where the file is too long.
 
     Raises
     ------
@@ -42,5 +43,5 @@ def read_text(
     except UnicodeDecodeError as error:
         problem, hint = f"not a text file in UTF-8: {error.reason} at byte {error.start}", ""
     except OSError as error:
-        problem = f"the file cannot be read: {error.strerror}"
+        problem, hint = f"the file cannot be read: {error.strerror}", hint if error.errno == errno.EFBIG else ""
     raise TaskError(problem, found=found, where=where, hint=hint or None)

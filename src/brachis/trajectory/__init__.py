@@ -1,5 +1,6 @@
 """The trajectory: immutable, evaluated at any time, saved and loaded with all that is needed to verify it again."""
 
+from brachis.trajectory.given import Motion, motion_of
 from brachis.trajectory.pieces import one_sided_derivatives
 from brachis.trajectory.recovered import Recovered, check_tolerance
 from brachis.trajectory.result_file import SCHEMA
@@ -9,9 +10,11 @@ from brachis.trajectory.trajectory import CONTINUOUS_TORQUE, Trajectory
 __all__ = [
     "CONTINUOUS_TORQUE",
     "SCHEMA",
+    "Motion",
     "Recovered",
     "Samples",
     "Trajectory",
     "check_tolerance",
+    "motion_of",
     "one_sided_derivatives",
 ]

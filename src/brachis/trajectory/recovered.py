@@ -6,22 +6,25 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from brachis.arguments import number
 from brachis.errors import InputError
 
 SMALLEST, LARGEST = 2e-7, 1e-3
 """Tolerances, m and rad."""
 
 
-def check_tolerance(tolerance: float) -> None:
-    """Refuse what is too wide to say anything about a path, m and rad, or narrower than paths are fitted.
+def check_tolerance(tolerance: float) -> float:
+    """Return a tolerance, m and rad; refuse one that says nothing of a path, or is narrower than paths are fitted.
 
     Raises
     ------
     InputError
     """
+    tolerance = number(tolerance, "tolerance", "m and rad")
     if not SMALLEST <= tolerance <= LARGEST:
         allowed = f"{SMALLEST:g} to {LARGEST:g} m and rad"
         raise InputError("is no tolerance of a path", where="tolerance", found=tolerance, allowed=allowed)
+    return tolerance
 
 
 @dataclass(frozen=True)

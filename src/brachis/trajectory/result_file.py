@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from brachis.errors import InputError, ResultFileError
-from brachis.files import atomic_write, open_file
+from brachis.files import atomic_write, check_suffix, open_file
 from brachis.kinds import Kind, check_kind
 from brachis.robot import Robot, bind
 from brachis.robot.from_task import robot_from_settings
@@ -77,8 +77,9 @@ def write_result(path: str | os.PathLike[str], meta: Mapping[str, object], array
     Raises
     ------
     InputError
-        The folder does not exist or cannot be written.
+        The suffix is another than npz, or the folder does not exist or cannot be written.
     """
+    check_suffix(path, ".npz", "brachis.export.write writes tables and formats of controllers")
     contents: dict[str, Any] = {"meta": np.array(json.dumps({"schema": SCHEMA, **meta})), **arrays}
     with atomic_write(path) as stream:
         np.savez(stream, **contents)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from brachis.arguments import number, numbers
 from brachis.arrays import freeze
 from brachis.errors import InputError, UnknownNameError
 from brachis.robot import Robot, dynamics
@@ -174,7 +175,7 @@ class Trajectory(Summary):
 
     def at(self, t: ArrayLike) -> Samples:
         """All quantities at times `t`, (K,), s; of a number K = 1."""
-        times = np.atleast_1d(np.asarray(t, dtype=float))
+        times = np.atleast_1d(numbers(t, "t", "s"))
         states = self.position(times), self.velocity(times), self.acceleration(times)
         return self._samples(times, self.path_coordinate(times), *states)
 
@@ -209,6 +210,7 @@ class Trajectory(Summary):
         """
         if last not in ENDINGS:
             raise UnknownNameError("ending", last, ENDINGS, where="last")
+        dt = number(dt, "dt", "s")
         if not (np.isfinite(dt) and dt > 0.0 and self.t_end / dt < 1e7):  # noqa: PLR2004
             raise InputError(
                 "is not a usable period", where="dt", found=f"{dt} s", allowed="> 0 s, at most 1e7 samples"
@@ -302,7 +304,7 @@ class Trajectory(Summary):
         Raises
         ------
         InputError
-            The folder does not exist or cannot be written.
+            The suffix is another than npz, or the folder does not exist or cannot be written.
         """
         meta = {
             "task": self.task.to_dict(),
@@ -338,7 +340,7 @@ class Trajectory(Summary):
 
     def _checked(self, t: ArrayLike) -> np.ndarray:
         """Refuse times outside the trajectory; rounding at the ends is forgiven."""
-        times = np.asarray(t, dtype=float)
+        times = numbers(t, "t", "s")
         slack = 1e-9 * self.t_end
         if times.size and not (times.min() >= -slack and times.max() <= self.t_end + slack):
             raise InputError(

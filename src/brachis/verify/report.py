@@ -44,6 +44,12 @@ class Check:
     remark: str = ""
     of_limit: bool = False
 
+    @property
+    def figures(self) -> tuple[str, str]:
+        """What was found and what is allowed, as text without the unit; ratios to a limit with six decimals."""
+        ratio = self.of_limit or (self.unit == "-" and self.allowed > 1.0)
+        return f"{self.value:.6f}" if ratio else f"{self.value:.1e}", f"{self.allowed:.6g}"
+
     def in_words(self) -> str:
         """Say what was found, and what is allowed."""
         unit = "" if self.unit == "-" else f" {self.unit}"

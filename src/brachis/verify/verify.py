@@ -16,7 +16,7 @@ from brachis.errors import InputError
 from brachis.path import Path, path_of
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.task_map import JointSpace
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Motion, Trajectory, motion_of
 from brachis.verify.checks import continuity_checks, end_checks, progress_checks, seam_checks, spline_checks
 from brachis.verify.limits import Given, limit_checks
 from brachis.verify.mechanics import tool_placements
@@ -27,7 +27,7 @@ from brachis.verify.report import Check, Verification
 
 
 def verify_trajectory(
-    trajectory: Trajectory,
+    trajectory: Motion,
     options: VerifyOptions | None = None,
     *,
     robot: Robot | None = None,
@@ -37,7 +37,8 @@ def verify_trajectory(
 
     Parameters
     ----------
-    trajectory : Trajectory
+    trajectory : Trajectory, Result or path
+        A motion, or its file.
     options : VerifyOptions, optional
         Unless given, limits may be exceeded by as much as the task's ``refinement.tolerance`` allows.
     robot : Robot, optional
@@ -64,6 +65,7 @@ def verify_trajectory(
     >>> brachis.verify_trajectory(result.trajectory).passed
     True
     """
+    trajectory = motion_of(trajectory)
     options = options or VerifyOptions(ratio_tolerance=trajectory.task.refinement.tolerance)
     robot, task_map = bind(trajectory.robot if robot is None else robot, trajectory.task.task_space)
     if robot.joint_names != trajectory.joint_names:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import html
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from brachis.attempt import coordinates
-from brachis.search.record import SAME_MOTION
+from brachis.search.listing import STATUS, TIMES, WORDS, candidate_rows
 from brachis.trajectory import Samples, Trajectory
 
 _MANY = 60
@@ -52,21 +50,10 @@ def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
     """
     if not candidates:
         return _paragraph("The candidates of the search are not known: they are in result.json beside result.npz.")
-    rows = [
-        (
-            coordinates(candidate.get("redundant_joints", ()), str(candidate.get("branch", ""))),
-            str(candidate.get("branch", "")),
-            str(candidate.get("origin", "")),
-            _seconds(candidate.get("coarse")),
-            _seconds(candidate.get("t_end")),
-            str(candidate.get("status", "")),
-        )
-        for candidate in candidates
-        if candidate.get("status") != SAME_MOTION
-    ]
+    rows = candidate_rows(candidates)
     left = len(candidates) - len(rows[:_MANY])
     note = _paragraph(f"{left} more, slower or the same motion again") if left else ""
-    return _table(("joints", "branch", "origin", "coarse", "t_end", "status"), rows[:_MANY]) + note
+    return _table((*WORDS, *TIMES, STATUS), rows[:_MANY]) + note
 
 
 def speed_legend(stops: Sequence[str], fastest: float) -> str:
@@ -89,10 +76,6 @@ def summary(trajectory: Trajectory, notes: Sequence[str], *, verified: bool | No
 def _rounded(value: float, digits: int) -> str:
     """Write a number without a minus sign before zero."""
     return f"{round(float(value), digits) + 0.0:.{digits}f}"
-
-
-def _seconds(value: object) -> str:
-    return f"{value:.4f} s" if isinstance(value, int | float) and math.isfinite(value) else ""
 
 
 def _paragraph(*lines: str) -> str:

@@ -1,0 +1,87 @@
+"""Arguments of public functions: wrong names and types, told like all wrong input."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from brachis.errors import InputError, UnknownNameError
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+def named(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Let a function refuse keywords that it does not have by naming those that it has.
+
+    Raises
+    ------
+    UnknownNameError
+        There is no such keyword.
+    InputError
+        One that is needed is missing, or there are too many without a name.
+    """
+    signature, name = inspect.signature(function), function.__name__
+    parameters = signature.parameters
+
+    @wraps(function)
+    def checked(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        for keyword in kwargs:
+            if keyword not in parameters:
+                raise UnknownNameError("keyword", keyword, parameters, where=name)
+        try:
+            signature.bind(*args, **kwargs)
+        except TypeError as error:
+            allowed = ", ".join(_in_words(parameter) for parameter in parameters.values())
+            raise InputError(str(error), where=name, allowed=allowed) from None
+        return function(*args, **kwargs)
+
+    return checked
+
+
+def _in_words(parameter: inspect.Parameter) -> str:
+    """Say how an argument is given."""
+    needed = " (needed)" if parameter.default is parameter.empty else ""
+    return f"{parameter.name}{'=' if parameter.kind is parameter.KEYWORD_ONLY else ''}{needed}"
+
+
+def numbers(value: ArrayLike, where: str, unit: str) -> np.ndarray:
+    """Return a number, or an array of numbers, as floats.
+
+    Raises
+    ------
+    InputError
+        It is something else.
+    """
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError("wrong type", where=where, found=repr(value), allowed=f"a number, {unit}") from None
+
+
+def number(value: float, where: str, unit: str) -> float:
+    """Return one number as a float; see `numbers`."""
+    found = numbers(value, where, unit)
+    if found.ndim:
+        raise InputError("wrong type", where=where, found=f"an array {found.shape}", allowed=f"a number, {unit}")
+    return float(found)
+
+
+def count(value: int, where: str) -> int:
+    """Return a number of things, 1 or more.
+
+    Raises
+    ------
+    InputError
+        It is something else.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise InputError("wrong type", where=where, found=repr(value), allowed="a whole number >= 1")
+    if value < 1:
+        raise InputError("out of range", where=where, found=value, allowed="a whole number >= 1")
+    return int(value)

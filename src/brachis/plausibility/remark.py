@@ -1,0 +1,76 @@
+"""Figures that are hardly meant, as warnings or errors."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import asdict, dataclass
+
+from brachis.errors import PlausibilityError
+
+
+class PlausibilityWarning(UserWarning):
+    """A figure of the robot, the task or the motion is hardly meant.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> import warnings
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     fast = {"velocity": 180.0}  # degrees per second
+    ...     result = brachis.plan(brachis.examples.scara_line, limits=fast, redundant_joints=["j1"], intervals=8)
+    >>> caught[0].category.__name__
+    'PlausibilityWarning'
+    """
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A figure that is allowed and hardly meant.
+
+    Attributes
+    ----------
+    where : str
+        Task key, or joint or link of the robot.
+    message : str
+        What it looks like.
+    found : str
+        The figure with its unit.
+    usual : str
+        What such figures usually are.
+    """
+
+    where: str
+    message: str
+    found: str
+    usual: str
+
+    def __str__(self) -> str:
+        """Say it in one line."""
+        return f"{self.where}: {self.message}; found {self.found}; usual: {self.usual}"
+
+    def to_dict(self) -> dict[str, str]:
+        """Return plain data for JSON."""
+        return asdict(self)
+
+
+def tell(remarks: tuple[Remark, ...], *, strict: bool, stacklevel: int = 2) -> tuple[Remark, ...]:
+    """Warn of every remark, or refuse them all; return them.
+
+    Parameters
+    ----------
+    remarks : tuple of Remark
+    strict : bool
+        Whether they are errors.
+    stacklevel : int, optional
+        As of `warnings.warn`; 2 blames the caller.
+
+    Raises
+    ------
+    PlausibilityError
+    """
+    if strict and remarks:
+        raise PlausibilityError([str(remark) for remark in remarks])
+    for remark in remarks:
+        warnings.warn(str(remark), PlausibilityWarning, stacklevel=stacklevel)
+    return remarks
