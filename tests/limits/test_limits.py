@@ -14,7 +14,7 @@ from brachis.task import LimitSpec, SpeedTable, ToolLimits
 from support.chains import planar_robot
 from support.phases import FRICTION
 
-FALLING = {"j1": [[0, 90], [1, 80], [2, 40]], "j3": [[0, 100], [1, 100], [2, 20]]}
+FALLING = {"j1": [[0, 90], [1, 80], [2, 40]], "j2": [[0, 90], [0.5, 30], [1, 20]], "j3": [[0, 100], [1, 100], [2, 20]]}
 ROBOT = planar_robot(
     "RRP",
     "xz",

@@ -1,91 +1,77 @@
-"""|tau| <= T(|qdot|) with T piecewise linear, concave and falling.
+"""|tau| <= T(|qdot|) with T piecewise linear and falling, driving and braking alike.
 
-A piece T = a - b |qdot| holds for torque and speed of either sign, driving and braking alike, as two values in [-1, 1]:
+Two values for each joint with such a curve, over its torque at rest, with T rounded from below (`RoundedCurve`):
 
-    (tau + b qdot) / a,        (tau - b qdot) / a.
+    (tau - T(qdot)) / T_0 <= 0,        (-tau - T(qdot)) / T_0 <= 0.
 
-The level piece of a curve is the plain torque limit.
+A curve that begins level is there the plain torque limit.
 """
 
 from __future__ import annotations
-
-import itertools
 
 import numpy as np
 
 from brachis.limits.per_joint import in_words
 from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials
+from brachis.limits.rounded_curve import RoundedCurve
 from brachis.robot import Robot
 from brachis.task import Task
 
 
 class TorqueSpeedLimit(Limit):
-    """Torques and speeds over the falling pieces of the joints' curves.
+    """Torques in both directions over the joints' curves.
 
     Parameters
     ----------
     robot : Robot
-        With at least one such piece.
+    curves : dict of int to RoundedCurve
+        Those of the joints that have one, by index.
     """
 
     kind = "torque_speed"
     time_scaling = True
 
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
-        pieces = [
-            (joint, v, tau + slope * v, slope, sign, curve[0][1])
-            for joint, curve in enumerate(robot.limits.torque_speed)
-            for (v, tau), slope in _falling(curve)
-            for sign in (1.0, -1.0)
-        ]
-        joint, speed, level, slope, sign, at_rest = (np.array(column) for column in zip(*pieces, strict=True))
-        self._joints, self._level, self._slope = joint.astype(int), level, sign * slope
-        # Measured by the torque at rest, as a user would.
-        self._violation_scale = level / at_rest
-        self.labels = tuple(self._label(*piece) for piece in zip(self._joints, speed, sign, strict=True))
-        self.lower, self.upper = -np.ones(len(pieces)), np.ones(len(pieces))
+    def __init__(self, robot: Robot, curves: dict[int, RoundedCurve]) -> None:
+        self._robot, self._curves = robot, tuple(curves.values())
+        self._joints = np.repeat(list(curves), 2)
+        self._signs = np.tile([1.0, -1.0], len(curves))
+        self._at_rest = np.array([robot.limits.torque_speed[joint][0][1] for joint in self._joints])
+        self.labels = tuple(self._label(*row) for row in zip(self._joints, self._signs, strict=True))
+        self.lower, self.upper = np.full(len(self._joints), -np.inf), np.zeros(len(self._joints))
 
-    def _label(self, joint: int, speed: float, sign: float) -> Label:
+    def _label(self, joint: int, sign: float) -> Label:
         name, unit = self._robot.joint_names[joint], self._robot.position_units[joint]
-        subject = f"{name} {'driving' if sign > 0.0 else 'braking'} from {speed:g} {unit}/s"
         return Label(
-            subject,
+            f"{name} {'positive' if sign > 0.0 else 'negative'}",
             in_words("torque at speed", unit),
             self._robot.torque_units[joint],
             f"robot.limits.torque_speed.{name}",
         )
 
     @property
-    def violation_scale(self) -> np.ndarray:
-        """See `Limit`."""
-        return self._violation_scale
-
-    @property
     def bounds(self) -> tuple[Bound, ...]:
-        """See `Limit`: the torque at which the piece meets speed 0."""
-        return tuple(Bound(column, level, level, 1.0 / level) for column, level in enumerate(self._level.tolist()))
+        """See `Limit`: the torque at rest, with which the whole curve rises."""
+        levels = enumerate(self._at_rest.tolist())
+        return tuple(Bound(column, level, level, 1.0 / level, "upper") for column, level in levels)
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        tau = motion.torque(self._robot)
-        return (tau[:, self._joints] + self._slope * motion.qdot[:, self._joints]) / self._level
+        tau, qdot = (part[:, self._joints] for part in (motion.torque(self._robot), motion.qdot))
+        allowed = [curve.values(part) for curve, part in zip(self._curves, qdot.T[::2], strict=True)]
+        return np.asarray((self._signs * tau - np.repeat(allowed, 2, axis=0).T) / self._at_rest)
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
-        exact = motion.torque_derivatives(self._robot)
-        by_q, by_qdot, by_qddot = (part[:, self._joints] for part in (exact.q, exact.qdot, exact.qddot))
-        by_qdot[:, np.arange(len(self._joints)), self._joints] += self._slope
-        return Partials(*(part / self._level[:, None] for part in (by_q, by_qdot, by_qddot)))
-
-
-def _falling(curve: tuple[tuple[float, float], ...]) -> list[tuple[tuple[float, float], float]]:
-    """Beginnings of the falling pieces of a curve, and how much torque each loses per unit of speed."""
-    pairs = itertools.pairwise(curve)
-    slopes = [(first, (first[1] - second[1]) / (second[0] - first[0])) for first, second in pairs]
-    return [(first, slope) for first, slope in slopes if slope > 0.0]
+        exact, scale = motion.torque_derivatives(self._robot), (self._signs / self._at_rest)[:, None]
+        by_q, by_qdot, by_qddot = (part[:, self._joints] * scale for part in (exact.q, exact.qdot, exact.qddot))
+        qdot = motion.qdot[:, self._joints[::2]]
+        slopes = [curve.slopes(part) for curve, part in zip(self._curves, qdot.T, strict=True)]
+        by_qdot[:, np.arange(len(self._joints)), self._joints] -= np.repeat(slopes, 2, axis=0).T / self._at_rest
+        return Partials(by_q, by_qdot, by_qddot)
 
 
 def build(robot: Robot, _task: Task) -> TorqueSpeedLimit | None:
     """Build the limit where a joint's torque falls with its speed."""
-    return TorqueSpeedLimit(robot) if any(_falling(curve) for curve in robot.limits.torque_speed) else None
+    rounded = {joint: RoundedCurve.below(curve) for joint, curve in enumerate(robot.limits.torque_speed) if curve}
+    falling = {joint: curve for joint, curve in rounded.items() if curve is not None}
+    return TorqueSpeedLimit(robot, falling) if falling else None

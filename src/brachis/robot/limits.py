@@ -152,8 +152,8 @@ def resolve_limits(
         A limit is not positive or, before or after scaling, outside [`LEAST`, `LARGEST`]; a joint has neither a torque
         nor an acceleration limit; a range is empty or ends beyond `FARTHEST`.
     InputError
-        There is a speed override and no velocity limit; the total power is none, or a torque curve does not fall ever
-        more steeply.
+        There is a speed override and no velocity limit; the total power is none, or a torque curve is none or
+        rises.
     UnknownNameError
         A limit names a joint that is not of the chain.
     """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -16,7 +15,8 @@ _KEY = "robot.limits.torque_speed"
 _FEWEST = 2
 _LEAST, _LARGEST = 1e-6, 1e12
 """Of a torque at rest and of the last speed, in SI units."""
-_STRAIGHT = 1e-12
+_LEVEL = 1e-12
+"""Torques that rise by less, as a part of the torque at rest, are rounded figures of the same torque."""
 
 
 def resolve_curves(stated: object, names: Sequence[str], factor: float) -> tuple[Curve, ...]:
@@ -37,7 +37,7 @@ def resolve_curves(stated: object, names: Sequence[str], factor: float) -> tuple
     Raises
     ------
     InputError
-        A curve does not begin at speed 0, its speeds do not ascend, or it does not fall ever more steeply.
+        A curve does not begin at speed 0, its speeds do not ascend, a torque is negative, or it rises.
     UnknownNameError
         A joint is not of the chain.
     """
@@ -73,15 +73,13 @@ def _checked(points: object, joint: str, factor: float) -> Curve:
     if not (_LEAST <= torque[0] * factor <= _LARGEST and np.all(torque >= 0.0)):
         allowed = f"torques >= 0, at rest from {_LEAST:g} to {_LARGEST:g}, scaled too"
         raise InputError("torques are none of a drive", where=key, found=found, allowed=allowed)
-    slopes = np.diff(torque) / np.diff(speed)
-    steps = [0.0, *slopes.tolist()]
-    for number, (before, slope) in enumerate(itertools.pairwise(steps)):
-        if slope > before + _STRAIGHT * torque[0]:
-            raise InputError(
-                "the curve does not fall ever more steeply",
-                where=f"{key}[{number + 1}]",
-                found=found,
-                allowed="slopes <= 0, each at least as steep as the one before",
-                hint=f"Where the torque falls as 1 / speed, give robot.limits.power.{joint} in its place",
-            )
-    return tuple((float(v), float(tau * factor)) for v, tau in table)
+    rising = np.flatnonzero(np.diff(torque) > _LEVEL * torque[0])
+    if len(rising):
+        raise InputError(
+            "the torque rises with the speed",
+            where=f"{key}[{rising[0] + 1}]",
+            found=found,
+            allowed="torques that stay or fall from point to point",
+            hint="Leave out the points to which it rises; the curve then lies below them",
+        )
+    return tuple(zip(speed.tolist(), (np.minimum.accumulate(torque) * factor).tolist(), strict=True))

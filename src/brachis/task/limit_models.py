@@ -167,7 +167,7 @@ class LimitSpec:
         dict[Name, TorqueCurve | None] | None,
         Field(
             description="Torque limits that fall with speed, by joint name: points [speed, torque] from speed 0 on, "
-            "joined by a line that falls ever more steeply; the last slope goes on. Absent or null: none."
+            "joined by a line that never rises; the last slope goes on to zero torque. Absent or null: none."
         ),
     ] = None
     jerk: Annotated[OwnLimit, Field(description="Largest jerk, rad/s^3 (m/s^3). Absent or null: none.")] = None

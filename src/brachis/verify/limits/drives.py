@@ -49,7 +49,8 @@ def worst_torque_at_speed(given: Given) -> Worst | None:
             speed, torque = np.array(robot.limits.torque_speed[joint]).T
             moving = np.abs(states.qdot[:, joint])
             last = (torque[-1] - torque[-2]) / (speed[-1] - speed[-2])
-            allowed = np.interp(moving, speed, torque) + last * np.maximum(moving - speed[-1], 0.0)
+            beyond = last * np.maximum(moving - speed[-1], 0.0)
+            allowed = np.maximum(np.interp(moving, speed, torque) + beyond, 0.0)
             found[:, column] = 1.0 + (np.abs(states.tau[:, joint]) - allowed) / torque[0]
         return found
 
