@@ -273,9 +273,9 @@ class PlanningError(BrachisError):
     """
 
 
-def nearest(name: str, valid: Iterable[str]) -> str | None:
-    """Return the valid name most like `name`, or None where none is near."""
-    near = difflib.get_close_matches(name, list(valid), n=1, cutoff=0.5)
+def nearest(name: str, valid: Iterable[str], likeness: float = 0.5) -> str | None:
+    """Return the valid name most like `name`, or None where none is; names with a likeness of 1 are the same."""
+    near = difflib.get_close_matches(name, list(valid), n=1, cutoff=likeness)
     return near[0] if near else None
 
 

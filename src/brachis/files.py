@@ -120,14 +120,14 @@ def _remove(path: Path) -> None:
 
 
 def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
-    """Refuse a file name that ends as one of another format; one without a suffix may have any content.
+    """Refuse a file name that ends as one of another format; one without a suffix, or in digits, may have any content.
 
     Raises
     ------
     InputError
     """
     suffix = Path(path).suffix
-    if suffix and suffix.lower() != allowed:
+    if suffix and not suffix[1:].isdigit() and suffix.lower() != allowed:
         problem = "the suffix is that of another format"
         raise InputError(problem, where=os.fspath(path), found=suffix, allowed=allowed, hint=hint)
 

@@ -19,6 +19,9 @@ from brachis.errors import UnknownNameError, nearest, no_attribute
 from brachis.files import shipped
 from brachis.robot import Robot
 
+_MISSPELT = 0.75
+"""Likeness to a name from which on a word is taken for it; so are its first letters."""
+
 
 def names() -> tuple[str, ...]:
     """Return the names of the robots, in alphabetical order."""
@@ -62,7 +65,8 @@ def _is_name(given: str | os.PathLike[str]) -> bool:
         return True
     path = Path(given)
     bare = not path.suffix and len(path.parts) == 1 and not path.exists()
-    return bare and nearest(str(given), names()) is not None
+    begun = any(name.startswith(str(given)) for name in names())
+    return bare and (begun or nearest(str(given), names(), _MISSPELT) is not None)
 
 
 @cache

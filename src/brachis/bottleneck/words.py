@@ -100,6 +100,8 @@ def _checked(check: SensitivityCheck) -> list[str]:
         lines.append(line if entry.optimal else f"{line} (solved again without reaching an optimum)")
     if not check.larger():
         return [*lines, "checked: no change is larger than 0.1 ms"]
+    if all(not entry.optimal for entry in check.larger()):
+        return [*lines, "checked: no solver brought the changes that are larger than 0.1 ms to an optimum"]
     worst = f"{100.0 * check.worst_deviation():.2g} %"
     lost = sum(not entry.optimal for entry in check.larger())
     but = f", but for {lost} that no solver brought to an optimum" if lost else ""

@@ -82,17 +82,19 @@ def _check_ends(task: Task, task_map: TaskMap, path: Path, number: int) -> None:
     for s, end, speed in ((0.0, 0, given.start_speed), (1.0, 1, given.end_speed)):
         if part.s[end] != s or given.periodic:
             continue
-        found = speed * _tool_path_speed(task_map, path, s) / max(path_speed(task_map, path, s), _STILL)
+        ratio = _tool_path_speed(task_map, path, s) / max(path_speed(task_map, path, s), _STILL)
+        found = speed * ratio
         low, high = (1.0 - part.tolerance) * part.speed, (1.0 + part.tolerance) * part.speed
         free = not isinstance(task_map, JointSpace) and len(task_map.axes) < _PLANE
         if not (0.0 if free else low) <= found <= high or not found > 0.0:
+            wanted = part.speed / max(ratio, _STILL)
             name, begins, reach = (("start", "begins", "reach"), ("end", "ends", "leave"))[end]
             raise InputError(
                 f"the part with a constant speed {begins} with the path, which is passed there at another one",
                 where=f"tool_limits.process_speed[{number}].s[{end}]",
                 found=f"{found:g} m/s, by boundary.{name}_speed",
                 allowed=f"{low:g} to {high:g} m/s at the path's {name}, or a place within the path",
-                hint=f"Set boundary.{name}_speed to {part.speed:g}, or leave way to {reach} the speed",
+                hint=f"Set boundary.{name}_speed to {wanted:g}, or leave way to {reach} the speed",
             )
 
 

@@ -7,8 +7,9 @@ l = v^2 / 2 a the way on which the largest acceleration a leads from rest to v,
     |velocity| >= v (1 - g),   |velocity| <= v (1 + g),   g = 2 f(d) / l,
 
 up to the tolerance, where f is d but for a corner rounded over a width w: d^2 / 2 w up to there, d - w / 2 beyond. As
-rows ((|velocity| / v - 1) +- g) / (1 + g) >= -tolerance, and <= tolerance. No motion from rest to v, or from higher
-speeds to it, is as steep as that; the corner alone holds back, over the way w, by about 0.06 w^2 / l v of time.
+rows ((|velocity| / v - 1) +- g) / (1 + g) >= -tolerance, and <= tolerance. The acceleration a is taken at rest
+in the start posture: no motion to v is as steep as that unless the tool accelerates more than twice as much elsewhere;
+the corner alone holds back, over the way w, by about 0.06 w^2 / l v of time.
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -130,9 +131,15 @@ _BLANK: dict[str, Any] = {
 """A task that only stands for the defaults of all settings."""
 
 
+_TASK_SUFFIXES = (".yaml", ".yml")
+
+
 def _is_task(given: object) -> bool:
     """Tell a task, or its file, from a robot."""
-    return isinstance(given, Task | Mapping) or (isinstance(given, str | os.PathLike) and kind_of(given) is Kind.TASK)
+    return isinstance(given, Task | Mapping) or (
+        isinstance(given, str | os.PathLike)
+        and (kind_of(given) is Kind.TASK or Path(given).suffix.lower() in _TASK_SUFFIXES)
+    )
 
 
 def _units(given: Mapping[str, str] | None) -> Units:

@@ -48,16 +48,18 @@ class SharedTorques:
 
     def torque(self, robot: Robot) -> np.ndarray:
         """See `torque`; not to be written to."""
-        if id(robot) not in self._torques:  # the robot is kept, so that its number stays its own
-            self._torques[id(robot)] = robot, torque(robot, self.q, self.qdot, self.qddot)
-        return self._torques[id(robot)][1]
+        known = self._torques.get(id(robot))
+        if known is None or known[0] is not robot:  # a number says nothing in another process
+            known = self._torques[id(robot)] = robot, torque(robot, self.q, self.qdot, self.qddot)
+        return known[1]
 
     def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
         """See `torque_derivatives`; not to be written to."""
-        known = self._derivatives_of_torques
-        if id(robot) not in known:
-            known[id(robot)] = robot, torque_derivatives(robot, self.q, self.qdot, self.qddot)
-        return known[id(robot)][1]
+        known = self._derivatives_of_torques.get(id(robot))
+        if known is None or known[0] is not robot:
+            slopes = torque_derivatives(robot, self.q, self.qdot, self.qddot)
+            known = self._derivatives_of_torques[id(robot)] = robot, slopes
+        return known[1]
 
 
 def torque(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:

@@ -1,8 +1,8 @@
 """Joint paths around others, for arms with several redundant joints.
 
-Where both ends are given, the lattice's sample of such an arm's postures may hold a single class of joint paths, and a
-solve from it ends at the optimum next to it. Solves from joint paths around it, displaced by waves over s, end at
-others.
+The lattice's sample of such an arm's postures may hold a single class of joint paths, above all where both ends are
+given, and a solve from it ends at the optimum next to it. Solves from joint paths around it, displaced by waves over s,
+end at others.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def varied(joint_paths: Sequence[JointPath], most: int, seed: int) -> list[Joint
     for number in range(most):
         given = joint_paths[number % len(joint_paths)]
         waves = _waves(given)
-        heights = rng.normal(0.0, size / 2.0 ** (number % _SIZES), (len(waves), robot.n))
+        heights = rng.normal(0.0, size / 2.0 ** (number // len(joint_paths) % _SIZES), (len(waves), robot.n))
         q = np.clip(given.q + waves.T @ heights, limits.position_lower, limits.position_upper)
         found.append(dataclasses.replace(given, q=q))
     return found

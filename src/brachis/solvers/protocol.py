@@ -77,7 +77,8 @@ class SolverOptions:
     patience : int
         How many iterates these are.
     anywhere : bool
-        Whether iterates far from stationarity count too: where near enough will do, and not where a solver creeps.
+        Whether iterates far from stationarity count too: where near enough will do, and not where a solver creeps. Uno
+        asks; IPOPT counts all feasible iterates in any case.
     """
 
     tolerance: float = 1e-6

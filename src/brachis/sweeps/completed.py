@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 
 from brachis import interrupts
 from brachis.errors import BrachisError, ClusterError
@@ -58,7 +58,7 @@ def as_completed(
                 outcome = Outcome.of_error(error, message=_ENDED)
             except lost as error:
                 outcome = Outcome.of_error(error, message=_ENDED)
-            except BrachisError:
+            except (BrachisError, CancelledError):  # of the connection, in whose words the caller speaks
                 raise
             except Exception as error:
                 found = f"{type(error).__name__}: {error}"

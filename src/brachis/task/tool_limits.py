@@ -77,7 +77,7 @@ class ProcessSpeed(Model):
     ramps: tuple[Positive, Positive] | None = Field(
         default=None,
         description="Ways before and behind the part, in s, on which the tool could reach the speed from rest, beside "
-        "which the bounds give way; written by brachis from robot and path.",
+        "which the bounds give way; written by brachis from robot and path, whatever stands here.",
     )
 
 
