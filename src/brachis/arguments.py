@@ -27,7 +27,7 @@ def named(function: Callable[_P, _R]) -> Callable[_P, _R]:
         One that is needed is missing, or there are too many without a name.
     """
     signature, name = inspect.signature(function), function.__name__
-    parameters = signature.parameters
+    parameters = {each: own for each, own in signature.parameters.items() if each != "self"}
 
     @wraps(function)
     def checked(*args: _P.args, **kwargs: _P.kwargs) -> _R:

@@ -107,3 +107,11 @@ def test_nothing_after_the_end_is_a_move():
 def test_a_plane_needs_no_third_axis():
     points, _ = points_of("G0 X0 Y0\nG1 X10 F600\nG1 Y10\n", ("x", "y"))
     np.testing.assert_allclose(points.position[-1], [0.01, 0.01])
+
+
+@pytest.mark.parametrize("end", ["X1550 Y50", "X1650 Y50"])
+def test_an_arc_that_begins_backwards_is_told_with_its_line(end):
+    """Three quarters of a turn, or one, on from a line that comes the other way."""
+    program = f"G21 G90 G17\nG0 X1700 Y0\nG1 X1600 Y0\nG3 {end} I0 J50\n"
+    with pytest.raises(TaskError, match="line 3: the path turns back, by 17.* degrees"):
+        fit_curves(points_of(program, rows=("x", "y")), Tolerance(5e-5, 1.0, 5e-3))

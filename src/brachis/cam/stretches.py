@@ -64,8 +64,13 @@ def fit_between(
     Raises
     ------
     TaskError
-        There is no smooth curve within the tolerance.
+        The path turns back, or there is no smooth curve within the tolerance.
     """
+    for sharp in corners:
+        if sharp.angle > _SHARPEST:
+            problem = f"the path turns back, by {np.rad2deg(sharp.angle):.4g} degrees"
+            found, hint = points.described(sharp.index), "A path that stops there is for two tasks"
+            raise points.wrong(sharp.index, problem, found=found, allowed="corners up to 150 degrees", hint=hint)
     starts, ends = [None, *corners], [*corners, None]
     stretches = []
     for start, end in zip(starts, ends, strict=True):
@@ -112,14 +117,10 @@ def blend_between(first: Stretch, second: Stretch, corner: Corner, tolerance: To
     Raises
     ------
     TaskError
-        It turns back, or the points leave no room.
+        The points leave no room.
     """
     corner_at = first.points.described(len(first.points) - 1)
     wrong = first.points.wrong
-    if corner.angle > _SHARPEST:
-        problem = f"the path turns back, by {np.rad2deg(corner.angle):.4g} degrees"
-        hint = "A path that stops there is for two tasks"
-        raise wrong(-1, problem, found=corner_at, allowed="corners up to 150 degrees", hint=hint)
     shortest = min(first.length, second.length)
     widest = blend_size(corner.angle, tolerance.corner, shortest)
     taken = max(
@@ -142,7 +143,14 @@ def _fitted(points: Points, tolerance: Tolerance, scatter: Scatter, doubt: str |
     ------
     TaskError
     """
-    fit = fit_points(points, tolerance, scatter)
+    try:
+        fit = fit_points(points, tolerance, scatter)
+    except ValueError as error:
+        problem, allowed = "no smooth curve follows these points", "points that move on from each to the next"
+        hint = doubt or "Does the path turn back, or stand still, near there?"
+        raise points.wrong(
+            0, problem, found=f"{error}, from {points.described(0)}", allowed=allowed, hint=hint
+        ) from error
     ratios = fit.ratios(tolerance)
     i = int(np.argmax(ratios))
     if ratios[i] <= 1.0 + _ROUNDING:

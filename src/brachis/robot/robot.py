@@ -11,6 +11,7 @@ from typing import Any, Unpack
 import numpy as np
 import pinocchio as pin
 
+from brachis.arguments import named
 from brachis.errors import InputError, UnknownNameError
 from brachis.robot.friction import Friction
 from brachis.robot.limits import (
@@ -212,6 +213,7 @@ class Robot(Summary):
         settings = self.settings.model_copy(update={"limits": spec, "speed_override": 1.0})
         return replace(self, limits=resolved, settings=settings)
 
+    @named
     def with_payload(
         self, mass: float | None, *, com: Sequence[float] = (0.0, 0.0, 0.0), inertia: Mapping[str, float] | None = None
     ) -> Robot:

@@ -132,7 +132,8 @@ def read_file(path: Path) -> str:
     try:
         return files.read_file(path).decode()
     except FileNotFoundError as error:
-        raise UrdfError("the URDF file does not exist", where=str(path)) from error
+        of_ours = "" if path.suffix else "A task gives robots that come along by their files, as brachis new does"
+        raise UrdfError("the URDF file does not exist", where=str(path), hint=of_ours) from error
     except UnicodeDecodeError as error:
         raise UrdfError("the URDF file cannot be read", where=str(path), found=str(error)) from error
     except OSError as error:
