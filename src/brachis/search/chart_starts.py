@@ -21,6 +21,7 @@ from brachis.search.posture_lattice import PostureLattice
 from brachis.search.screening import screened
 from brachis.search.solving import Listener
 from brachis.search.starts import PIECES, fine_places, lattice_starts, smoothed
+from brachis.search.too_fast import refuse_hopeless_speeds
 from brachis.search.variations import varied
 
 _FINER = 2
@@ -83,6 +84,7 @@ def chart_starts(
     ranked = sorted((start for start in starts if start is not None), key=lambda start: start.estimate)
     if not ranked and not deadline.passed:
         return DeadEnd(0.0, {NO_CHART: len(named)})
+    refuse_hopeless_speeds(ranked)
     hopeful = [start for start in ranked if start.estimate <= _HOPELESS * ranked[0].estimate or start is ranked[0]]
     return screened(hopeful, level.in_charts, deadline, listener) if hopeful else []
 

@@ -101,20 +101,20 @@ def _timed(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     """Curves along the joint path, (S, c), and when the phase plane passes them, (S,), s."""
     problem, joint_path = start.problem, start.joint_path
     s = np.linspace(0.0, 1.0, _STATIONS)
-    q = start.joint_map.postures(_along(joint_path, s))
+    q = start.joint_map.postures(along(joint_path, s))
     if not np.isfinite(q).all():
         return None
-    stations = _stations(problem.limits)
+    stations = graded(problem.limits)
     times = least_times(problem.limits, s, q, problem.end_rates, stations)
-    return None if times is None or not np.isfinite(times[-1]) else (_along(joint_path, stations), times)
+    return None if times is None or not np.isfinite(times[-1]) else (along(joint_path, stations), times)
 
 
-def _along(joint_path: np.ndarray, s: np.ndarray) -> np.ndarray:
+def along(joint_path: np.ndarray, s: np.ndarray) -> np.ndarray:
     """Curves, (S, c), of a joint path at path coordinates, (S,)."""
     return np.column_stack([s, *(np.interp(s, joint_path[:, 0], column) for column in joint_path.T[1:])])
 
 
-def _stations(limits: Sequence[Limit]) -> np.ndarray:
+def graded(limits: Sequence[Limit]) -> np.ndarray:
     """Spread stations evenly, and ever closer towards where a least speed sets in or ends."""
     even = np.linspace(0.0, 1.0, _STATIONS)
     steps = even[1] * 0.5 ** np.arange(_HALVINGS)

@@ -65,7 +65,31 @@ def least_times(
         derivatives are interpolated.
     """
     places = s if stations is None else stations
-    return _times(_lines(limits, s, q, places), np.diff(places), rates)
+    rate = fastest(limits, s, q, rates, places)
+    return None if rate is None else np.append(0.0, np.cumsum(2.0 * np.diff(places) / (rate[1:] + rate[:-1])))
+
+
+def fastest(
+    limits: Sequence[Limit],
+    s: np.ndarray,
+    q: np.ndarray,
+    rates: tuple[float, float],
+    stations: np.ndarray,
+) -> np.ndarray | None:
+    """Largest ds/dt at the stations, (P,), 1/s, each as large as any motion along the joint path has it there.
+
+    Parameters
+    ----------
+    limits, s, q, rates, stations
+        See `least_times`.
+
+    Returns
+    -------
+    (P,) ndarray or None
+        None where the joint path cannot be followed.
+    """
+    x = _squares(_lines(limits, s, q, stations), np.diff(stations), rates)
+    return None if x is None else np.sqrt(x)
 
 
 @dataclass(frozen=True)
@@ -86,19 +110,18 @@ class _Lines:
     ceiling: np.ndarray
 
 
-def _times(lines: _Lines, steps: np.ndarray, rates: tuple[float, float]) -> np.ndarray | None:
-    """Find the times at the stations, (S,), s, under the largest u; None where the joint path cannot be followed."""
+def _squares(lines: _Lines, steps: np.ndarray, rates: tuple[float, float]) -> np.ndarray | None:
+    """Find x at the stations, (S,), under the largest u; None where the joint path cannot be followed."""
     first, last = (rate**2 for rate in rates)
     intervals = _controllable(lines, steps, last)
     if intervals is None or not intervals[0][0] <= first <= intervals[1][0]:
         return None
-    x = _fastest(lines.slope, lines.offset, *intervals, steps, first)
+    x = _forwards(lines.slope, lines.offset, *intervals, steps, first)
     if not x.max() > 0.0:
         return None
     # Between stations nothing stops; a station where the grid says so is an artefact of its width.
     x[1:-1] = np.maximum(x[1:-1], _STANDING * np.median(x))
-    speed = np.sqrt(x)
-    return np.append(0.0, np.cumsum(2.0 * steps / (speed[1:] + speed[:-1])))
+    return x
 
 
 def _lines(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, places: np.ndarray) -> _Lines:
@@ -148,7 +171,7 @@ def _controllable(lines: _Lines, steps: np.ndarray, last: float) -> tuple[np.nda
     return low, high
 
 
-def _fastest(
+def _forwards(
     slope: tuple[np.ndarray, np.ndarray],
     offset: tuple[np.ndarray, np.ndarray],
     low: np.ndarray,

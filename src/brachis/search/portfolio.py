@@ -25,6 +25,7 @@ from brachis.search.processes import each, processes
 from brachis.search.record import NOT_TRIED, Numbered, Record, rounded
 from brachis.search.schedule import Batch, batches
 from brachis.search.solving import Listener
+from brachis.search.too_fast import out_of_reach, unlikely
 
 _COARSE_SHARE = 0.6
 """Part of the time limit after which no start is solved while nothing is verified."""
@@ -104,6 +105,8 @@ def find_fastest(
             raise KeyboardInterrupt(record.best_in_words()) from None
     if record.best is not None:
         return record
+    if record.too_fast is not None:
+        raise record.too_fast.error
     if record.interrupted:
         raise out_of_time(problem.task, record.undone())
     raise no_motion(problem, decompositions, record.attempts, record.dead_ends)
@@ -121,7 +124,7 @@ class _Search:
         listener: Listener,
     ) -> None:
         self._decompositions, self._stages, self._deadline, self._listener = decompositions, stages, deadline, listener
-        self._task = problem.task
+        self._problem, self._task = problem, problem.task
         self._jobs = processes(self._task.search.jobs)
         self.record = Record(refined=self._task.refinement.max_rounds > 0)
 
@@ -142,10 +145,19 @@ class _Search:
                 break
             if batch.last_resort and not refused:
                 refuse_what_is_out_of_reach(self._decompositions, self.record.attempts)
+                self._refuse_what_is_too_fast()
                 refused = True
             self._finish(self._solve(batch), batch.refined)
         if self.record.interrupted:
             self.take_what_there_is()
+
+    def _refuse_what_is_too_fast(self) -> None:
+        """Find out whether a least speed is to blame that nothing was found, and refuse one that is far too high."""
+        limit = self._deadline.part(_COARSE_SHARE).within(_LEAST_SHARE)
+        record = self.record
+        record.too_fast = out_of_reach(record.attempts, lambda start: self._stages.solve(start, limit, self._listener))
+        if record.too_fast is not None and unlikely(record.too_fast, self._problem):
+            raise record.too_fast.error
 
     def _solve(self, batch: Batch) -> list[Numbered]:
         """Solve the starts of a batch coarsely, and rank those that differ."""

@@ -11,6 +11,7 @@ from brachis.attempt import Attempt
 from brachis.errors import UnreachableError
 from brachis.problem import Decomposition
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
+from brachis.search.too_fast import TooFast
 
 NOT_TRIED = "not tried: the time was up"
 """Status of an attempt for which there was no time."""
@@ -44,6 +45,7 @@ class Record:
         self.dead_ends: dict[str, DeadEnd] = {}
         self.best: Attempt | None = None
         self.interrupted = False
+        self.too_fast: TooFast | None = None
         self.solved: list[Numbered] = []
         self._unsolved = 0
         self._waiting: list[Numbered] = []

@@ -24,6 +24,7 @@ from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.processes import each, processes
 from brachis.search.solving import Listener
 from brachis.search.starts import lattice_starts, numeric_starts
+from brachis.search.too_fast import refuse_hopeless_speeds
 from brachis.solvers import solver_named
 
 _SIZE = 12
@@ -88,6 +89,7 @@ def batches(
 def _timings(problem: Problem, solvers: Sequence[str]) -> Iterator[Batch]:
     """Yield batches for a path of joints: its timing alone is planned, solver after solver."""
     start = joint_space_start(problem)
+    refuse_hopeless_speeds([start])
     for solver in solvers:
         yield Batch((start.with_solver(solver),), 1, last_resort=solver != solvers[0])
 
@@ -119,6 +121,7 @@ def _in_closed_forms(
                 ]
             else:
                 starts = _from_lattices(batch, level, deadline, listener, note)
+        refuse_hopeless_speeds(starts)
         known += starts
         for first in range(0, len(starts), _SIZE):
             yield Batch(

@@ -1,0 +1,205 @@
+"""Speeds that are asked for and out of reach: which, where, how far, and what would do.
+
+In the phase plane the fastest motion along a joint path has at every place the largest speed that any motion along that
+joint path has there. So where a limit that asks for a least speed is left out and falls short of in that motion, it does
+so in every one; and what the motion has there is what could be asked for. A redundant robot may have better joint paths
+than those that are known: only what is far from possible is refused before a plan is tried.
+
+Limits on the jerk are unknown to the phase plane. What they leave is told by the plan without the least speed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.attempt import Attempt, Start
+from brachis.errors import PlanningError, UnreachableError
+from brachis.feasibility import in_figures
+from brachis.limits import JointMotion, Limit, Moments
+from brachis.problem import Problem
+from brachis.search.pacing import along, graded
+from brachis.search.phase_plane import fastest
+
+_EXACT, _HOPELESS, _UNLIKELY = 0.97, 0.5, 0.8
+"""Share of a speed above which it may be possible yet: without redundancy, before plans are tried, and after."""
+_STATIONS, _BISECTIONS, _SAMPLES = 401, 20, 400
+_DIGITS = 2
+_AT_REST = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class TooFast:
+    """A speed that is out of reach.
+
+    Attributes
+    ----------
+    share : float
+        Of it that is possible, below 1.
+    error : PlanningError
+    """
+
+    share: float
+    error: PlanningError
+
+
+def refuse_hopeless_speeds(starts: Sequence[Start]) -> None:
+    """Refuse speeds that are far out of reach along the joint paths of all starts.
+
+    Raises
+    ------
+    PlanningError
+    """
+    found = None
+    for start in starts:
+        possible = _in_phase_plane(start)
+        if possible is None:
+            return
+        found = possible if found is None or possible.share > found.share else found
+    if found is not None and found.share < (_HOPELESS if starts[0].joint_map.r else _EXACT):
+        raise found.error
+
+
+def out_of_reach(attempts: Sequence[Attempt], solve: Callable[[Start], Attempt]) -> TooFast | None:
+    """Tell which least speed no attempt could hold, by a plan without it from the start of the most promising one.
+
+    Parameters
+    ----------
+    attempts : sequence of Attempt
+        That failed.
+    solve : callable
+        Plans from a start at the first collocation points.
+
+    Returns
+    -------
+    TooFast or None
+        None where no least speed is asked for, or another reason is to blame.
+    """
+    starts = [attempt.start for attempt in attempts if attempt.start is not None and attempt.solver]
+    if not starts or not any(limit.least_speed for limit in starts[0].problem.limits):
+        return None
+    start = min(starts, key=lambda start: start.estimate)
+    problem = dataclasses.replace(start.problem, limits=tuple(_others(start.problem)))
+    attempt = solve(dataclasses.replace(start, problem=problem))
+    if not attempt.usable or attempt.program is None:
+        return None
+    (phase,), (motion,) = attempt.program.phases, attempt.program.motions(attempt.reports[-1].x)
+    t = np.linspace(0.0, motion.t_end, _SAMPLES)
+    try:
+        moments = phase.joint_map.state(*motion.at(t), t=t)
+    except UnreachableError:
+        return None
+    return _falling_short(start.problem, moments, "in the fastest motion without it")
+
+
+def unlikely(found: TooFast | None, problem: Problem) -> bool:
+    """Tell whether what a plan falls short of is so much that no other joint path will make up for it."""
+    redundant = problem.robot.n > problem.task_map.m
+    return found is not None and found.share < (_UNLIKELY if redundant else _EXACT)
+
+
+def _others(problem: Problem) -> Iterator[Limit]:
+    return (limit for limit in problem.limits if not limit.least_speed)
+
+
+def _in_phase_plane(start: Start) -> TooFast | None:
+    """Tell which speed no motion along the start's joint path has; None where all are possible, or none is asked for."""
+    problem, rates = start.problem, start.problem.end_rates
+    asked = any(limit.least_speed for limit in problem.limits)
+    if problem.task.boundary.periodic or not (asked or any(rates)):
+        return None
+    s = np.linspace(0.0, 1.0, _STATIONS)
+    q = start.joint_map.postures(along(start.joint_path, s))
+    if not np.isfinite(q).all():
+        return None
+    stations, others = graded(problem.limits), list(_others(problem))
+    if fastest(problem.limits, s, q, rates, stations) is not None:
+        return None
+    rate = fastest(others, s, q, rates, stations)
+    if rate is None:
+        return _ends_too_fast(problem, s, q, stations)
+    q_ds = np.gradient(q, s, axis=0, edge_order=2)
+    places, slopes = (np.column_stack([np.interp(stations, s, joint) for joint in part.T]) for part in (q, q_ds))
+    still = np.zeros_like(places)
+    moments = Moments(places, slopes * rate[:, None], still, still, stations)
+    best = "along the best joint path that was found" if start.joint_map.r else "as the phase plane tells"
+    return _falling_short(problem, moments, best)
+
+
+def _ends_too_fast(problem: Problem, s: np.ndarray, q: np.ndarray, stations: np.ndarray) -> TooFast | None:
+    """Tell at which end the path cannot be passed as fast as asked for, whatever the other end's speed is."""
+    others = list(_others(problem))
+    if fastest(others, s, q, _AT_REST, stations) is None:
+        return None
+    found: list[tuple[float, str]] = []
+    for end, key in enumerate(("start_speed", "end_speed")):
+        rates = np.where(np.arange(2) == end, problem.end_rates, 0.0)
+        low, high = 0.0, 1.0
+        for _ in range(_BISECTIONS if rates.any() else 0):
+            middle = 0.5 * (low + high)
+            first, last = (middle * rates).tolist()
+            possible = fastest(others, s, q, (first, last), stations) is not None
+            low, high = (middle, high) if possible else (low, middle)
+        if rates.any():
+            found.append((low, key))
+    share, key = min(found, default=(1.0, ""))
+    if share >= _EXACT:
+        return None
+    asked = getattr(problem.task.boundary, key)
+    error = PlanningError(
+        f"the limits do not allow so high a speed at the path's {key.removesuffix('_speed')}",
+        where=f"boundary.{key}",
+        found=f"{asked:g} m/s",
+        allowed=f"about {share * asked:.3g} m/s at most, along the best joint path that was found",
+        hint=f"Lower boundary.{key}, or raise the limits of the joints",
+    )
+    return TooFast(share, error)
+
+
+def _falling_short(problem: Problem, motion: JointMotion, how: str) -> TooFast | None:
+    """Tell where a motion, whose places ascend, falls short of a least speed most; None where it does not."""
+    worst: tuple[float, Limit, int, np.ndarray, np.ndarray] | None = None
+    for limit in problem.limits:
+        if not limit.least_speed:
+            continue
+        begin, end = (limit.breaks[0], limit.breaks[-1]) if len(limit.breaks) else (0.0, 1.0)
+        inside = (motion.s >= begin) & (motion.s <= end)
+        values = limit.values(motion)
+        beyond = np.where(inside[:, None], limit.violation(values), -np.inf)
+        column = int(np.argmax(beyond.max(axis=0)))
+        if worst is None or beyond[:, column].max() > worst[0]:
+            worst = float(beyond[:, column].max()), limit, column, values[:, column], beyond[:, column]
+    if worst is None or worst[0] <= 0.0:
+        return None
+    share, limit, column, values, beyond = 1.0 - worst[0], *worst[1:]
+    label, place = limit.labels[column], int(np.argmax(beyond))
+    found, allowed = in_figures(limit, column, float(values[place]))
+    lower = math.floor(float(found) * 10 ** (scale := _DIGITS - 1 - math.floor(math.log10(max(float(found), 1e-9)))))
+    what, hints = _where_reached(motion.s[np.isfinite(beyond)], beyond[np.isfinite(beyond)] <= 0.0)
+    hints = [f"Lower it to {lower / 10**scale:g} {label.unit}", *hints, "raise the limits that hold the motion back"]
+    error = PlanningError(
+        f"no motion has the {label.kind} that is asked for: {what}",
+        where=f"{label.key or limit.name} ({label.subject})",
+        found=f"at most {found} {label.unit} at s = {motion.s[place]:.3g}, {how}",
+        allowed=f"{allowed} {label.unit}",
+        hint=", or ".join([", ".join(hints[:-1]), hints[-1]]),
+    )
+    return TooFast(share, error)
+
+
+def _where_reached(s: np.ndarray, reached: np.ndarray) -> tuple[str, list[str]]:
+    """Say where of the places, (P,), a speed is reached, (P,) bool, and how the part could be cut to them."""
+    if not reached.any():
+        return "it is reached nowhere on that part", []
+    first, last = s[reached][[0, -1]]
+    if not reached[(s >= first) & (s <= last)].all():
+        return f"it cannot be held all the way from s = {first:.3g} to {last:.3g}", []
+    before, behind = not reached[0], not reached[-1]
+    cuts = [f"let the part begin at s = {math.ceil(100 * first) / 100:g}"] if before else []
+    cuts += [f"let the part end at s = {math.floor(100 * last) / 100:g}"] if behind else []
+    ways = [f"before s = {s[0]:.3g}"] * before + [f"behind s = {s[-1]:.3g}"] * behind
+    return f"the path {' and '.join(ways)} is too short for the way to it", cuts
