@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from brachis.errors import InputError, StartError, UnknownNameError
+from brachis.errors import InputError, PathError, StartError, UnknownNameError
 from brachis.ik import Match
 from brachis.limits import Limit, Moments
 from brachis.path import Path, check_on_path
 from brachis.plausibility import position_hint
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joint_space import complement, difference
+from brachis.robot.task_map import JointSpace
 from brachis.task import SplineSettings
 
 _RANGE_SLACK = 1e-9
 _SAME_POSTURE = 1e-5
 _REGULAR = 1e-6
 """Least singular value of the Jacobian, in m and rad, below which a posture is a singularity of the arm."""
+_STATIONS = 401
 _TRIED = 20
 """Postures by which it is told whether the arm lacks a direction everywhere."""
 
@@ -47,6 +50,8 @@ def check_postures(
     if start is not None:
         _check_range(task_map.robot, start, "start")
         _check_at_rest(limits, start, "start")
+    if isinstance(task_map, JointSpace):
+        _check_range_along(task_map.robot, path)
     if end is not None:
         _check_range(task_map.robot, end, "end")
         _check_at_rest(limits, end, "end")
@@ -54,19 +59,40 @@ def check_postures(
 
 
 def _check_range(robot: Robot, posture: np.ndarray, name: str) -> None:
+    beyond = _beyond_range(robot, posture[None])
+    if beyond is not None:
+        _, joint, facts = beyond
+        facts["hint"] = facts["hint"] or f"Change the posture, or the range with robot.limits.position.{joint}"
+        raise StartError(f"joint {joint!r} is out of its range", where=f"{name}.joints", **facts)
+
+
+def _check_range_along(robot: Robot, path: Path) -> None:
+    """Refuse a path of joints that leaves a joint's range."""
+    s = np.linspace(0.0, 1.0, _STATIONS)
+    beyond = _beyond_range(robot, path.sample(s).target)
+    if beyond is not None:
+        station, joint, facts = beyond
+        facts["found"] = f"{facts['found']} at s = {s[station]:.3g}"
+        facts["hint"] = facts["hint"] or f"Lead the path elsewhere, or raise robot.limits.position.{joint}"
+        raise PathError(f"joint {joint!r} is out of its range", where="path", **facts)
+
+
+def _beyond_range(robot: Robot, postures: np.ndarray) -> tuple[int, str, dict[str, Any]] | None:
+    """Find the first joint that is out of its range in postures, (K, n): where most, its name, and what is told."""
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
-    for joint, value, low, high, unit in zip(
-        robot.joint_names, posture, lower, upper, robot.position_units, strict=True
-    ):
-        if not low - _RANGE_SLACK <= value <= high + _RANGE_SLACK:
-            raise StartError(
-                f"joint {joint!r} is out of its range",
-                where=f"{name}.joints",
-                found=f"{value:.6g} {unit}",
-                allowed=f"{low:.6g} {unit} to {high:.6g} {unit}",
-                hint=position_hint(value, low, high, unit)
-                or f"Change the posture, or the range with robot.limits.position.{joint}",
-            )
+    beyond = np.maximum(lower - postures, postures - upper) - _RANGE_SLACK
+    joints = np.flatnonzero(beyond.max(axis=0) > 0.0)
+    if not len(joints):
+        return None
+    i = int(joints[0])
+    k = int(np.argmax(beyond[:, i]))
+    value, unit, low, high = float(postures[k, i]), robot.position_units[i], float(lower[i]), float(upper[i])
+    facts: dict[str, Any] = {
+        "found": f"{value:.6g} {unit}",
+        "allowed": f"{low:.6g} {unit} to {high:.6g} {unit}",
+        "hint": position_hint(value, low, high, unit),
+    }
+    return k, robot.joint_names[i], facts
 
 
 def beyond_at_rest(limit: Limit, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -122,7 +148,8 @@ def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
         return f"{abs(value) * first.figure:.4g}", f"{first.figure:.4g}"
     level = limit.lower[column] if first.end == "lower" else limit.upper[column]
     ends = {bound.end: f"{bound.figure:.4g}" for bound in bounds}
-    allowed = " to ".join(ends.get(end, "any") for end in ("lower", "upper"))
+    words = {"lower": "at least ", "upper": "at most "} if len(ends) == 1 else {}
+    allowed = " to ".join(f"{words.get(end, '')}{ends[end]}" for end in ("lower", "upper") if end in ends)
     return f"{first.figure + (value - level) / first.per_unit:.4g}", allowed
 
 

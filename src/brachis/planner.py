@@ -165,7 +165,7 @@ def _plan(
     remarks = plausibility.of_robot(robot) + plausibility.of_task(task)
     remarks = plausibility.tell(remarks, strict=strict, stacklevel=4)
     problem = Problem.of(robot, task, own_limits)
-    places = plausibility.of_places(problem.task_map, problem.start, problem.end, task.path_start)
+    places = plausibility.of_places(problem.task_map, problem.path, problem.start, problem.end, task.path_start)
     remarks += plausibility.tell(places, strict=strict, stacklevel=4)
     decompositions = decompositions_of(problem, families)
     first = None if known is None else _first(problem, decompositions, known)

@@ -10,6 +10,7 @@ import numpy as np
 from brachis.errors import PathError
 from brachis.path.septic import SepticCurve, septic
 from brachis.path.site import stands_still
+from brachis.plausibility import position_hint
 
 if TYPE_CHECKING:
     from brachis.path.joins import Join
@@ -64,7 +65,8 @@ def check_neighbours(first: Curve, second: Curve, size: float, join: Join, *, st
         problem = "the blend is longer than half of a neighbouring segment"
         # Rounded down, to whole nanometres, so that the blend that the message names is accepted.
         allowed = f"at most {floor(longest * 1e9) / 1e9:.10g} {join.unit}"
-        raise PathError(problem, s_interval=at, found=f"{size:g} {join.unit}", allowed=allowed, where=where)
+        looks = position_hint(size, 0.0, longest, join.unit)
+        raise PathError(problem, s_interval=at, found=f"{size:g} {join.unit}", allowed=allowed, where=where, hint=looks)
 
 
 def ends(first: Curve, second: Curve, size: float, positions: int) -> tuple[Array, Array, float]:

@@ -10,6 +10,7 @@ from brachis.errors import PathError
 from brachis.path.pose import POSITIONS, QuaternionPoseCurve
 from brachis.path.rotations import quaternions_of, rotation_of
 from brachis.path.spline import START_TOLERANCE, SplineCurve, starts_elsewhere
+from brachis.plausibility import place_hint
 
 if TYPE_CHECKING:
     from brachis.path.protocol import Array
@@ -67,10 +68,12 @@ def pose_bspline(shape: BSplineCurve, site: Site, rotation: Array) -> Quaternion
 
 
 def _check_start(off: Array, turned: Array, site: Site) -> None:
-    for away, unit in ((off, "m"), (turned, "rad")):
+    hints = place_hint(site.position, site.position - off, site.positions), None
+    for away, unit, hint in zip((off, turned), ("m", "rad"), hints, strict=True):
         distance = float(np.linalg.norm(away))
         if distance > START_TOLERANCE:
-            raise starts_elsewhere(f"{site.key}.control_points[0]", f"{site.describe()}, {distance:.4g} {unit} off")
+            where = f"{site.key}.control_points[0]"
+            raise starts_elsewhere(where, f"{site.describe()}, {distance:.4g} {unit} off", hint)
 
 
 def _curve(shape: BSplineCurve, points: Array) -> SplineCurve:

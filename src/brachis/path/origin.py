@@ -7,7 +7,7 @@ import numpy as np
 from brachis.errors import StartError
 from brachis.path.build import build_path
 from brachis.path.protocol import Path
-from brachis.plausibility import place_hint
+from brachis.plausibility import place_hint, turn_hint
 from brachis.robot import TaskMap
 from brachis.task import Task
 
@@ -59,6 +59,15 @@ def check_on_path(task_map: TaskMap, posture: np.ndarray, target: np.ndarray, na
             where=f"{name}.joints",
             found=f"{miss[worst]:.3g} {task_map.units[worst]} off in {task_map.rows[worst]}",
             allowed=f"at most {_ON_PATH:g} {task_map.units[worst]}",
-            hint=place_hint(task_map, place, target)
+            hint=_hint(task_map, place, target)
             or f"Choose a posture whose tool is at the path's {'beginning' if name == 'start' else 'end'}",
         )
+
+
+def _hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str | None:
+    """Say what stated coordinates, (c,), that are not the tool's, (c,), look like."""
+    axes = len(task_map.axes)
+    found = place_hint(place[:axes], target[:axes], task_map.rows)
+    if found is None and len(target) == axes + 9:
+        return turn_hint(place[axes:].reshape(3, 3), target[axes:].reshape(3, 3))
+    return found

@@ -14,6 +14,7 @@ from brachis.path.rotations import quaternions_of, rotation_from, rotation_of
 from brachis.path.sampling import smallest
 from brachis.path.spline import START_TOLERANCE, chord_knots, interpolate, starts_elsewhere, waypoints_of
 from brachis.path.turns import AMBIGUOUS, half_turn, turn_between
+from brachis.plausibility import turn_hint
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -74,7 +75,8 @@ def _rotations(shape: SplineThrough, attitudes: Sequence[Attitude], site: Site, 
         change = start if expected is None else start * expected.inv()
         given = [change * one for one in given]
     elif expected is not None and (angle := (start.inv() * expected).magnitude()) > START_TOLERANCE:
-        raise starts_elsewhere(f"{site.key}.starts_oriented", f"an orientation that is {angle:.4g} rad off")
+        hint = turn_hint(matrix, expected.as_matrix())
+        raise starts_elsewhere(f"{site.key}.starts_oriented", f"an orientation that is {angle:.4g} rad off", hint)
     return start.concatenate([start, *given])
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from brachis.errors import PathError
 from brachis.path.line import LineCurve
 from brachis.path.site import ZERO_LENGTH, Site
+from brachis.plausibility import place_hint
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -78,21 +79,22 @@ def waypoints_of(shape: SplineThrough, site: Site) -> Array:
         count = len(site.positions)
         distance = float(np.linalg.norm(off[:count]))
         if distance > START_TOLERANCE:
-            raise starts_elsewhere(f"{site.key}.starts_at", f"{site.describe()}, {distance:.4g} m off")
+            hint = place_hint(site.position, expected[:count], site.positions)
+            raise starts_elsewhere(f"{site.key}.starts_at", f"{site.describe()}, {distance:.4g} m off", hint)
         if np.any(np.abs(off[count:]) > START_TOLERANCE):
             raise starts_elsewhere(f"{site.key}.starts_at", f"{site.describe()}, {abs(off[-1]):.4g} rad off")
     return np.stack([site.start, *points])
 
 
-def starts_elsewhere(where: str, found: str) -> PathError:
-    """Return the error that a segment does not start where its waypoints expect."""
+def starts_elsewhere(where: str, found: str, hint: str | None = None) -> PathError:
+    """Return the error that a segment does not start where its waypoints expect; `hint` says what they look like."""
     problem = "the segment starts elsewhere than its waypoints expect"
     return PathError(
         problem,
         found=found,
         allowed=f"at most {START_TOLERANCE:g} m and rad off",
         where=where,
-        hint="Set relative: true to count from the segment's start, or begin the path there",
+        hint=hint or "Set relative: true to count from the segment's start, or begin the path there",
     )
 
 

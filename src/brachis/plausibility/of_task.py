@@ -4,59 +4,75 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.plausibility.figure import Figure, remarks
 from brachis.plausibility.remark import Remark
 from brachis.robot import TaskMap
+from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.rows import YAW
 from brachis.task import Task
 from brachis.task.tool_limits import SpeedTable
 
+if TYPE_CHECKING:
+    from brachis.path import Path
+
 _TURN = 2.0 * math.pi
-_FAR_POSTURE = 2.0 * _TURN
-_TOOL = (
-    ("speed", 50.0, "m/s", "mm/s"),
-    ("acceleration", 300.0, "m/s^2", "mm/s^2"),
-    ("angular_speed", 60.0, "rad/s", "degrees per second"),
-)
-"""Delta robots move at 10 m/s, and accelerate with 15 g."""
+_ROUNDED = 1e-3
+_STATIONS = 401
 _OPEN = 1e5
 """A limit beyond this is written for "no limit"."""
 
 
 def of_task(task: Task) -> tuple[Remark, ...]:
-    """Look at the limits of the tool, and at the points that the path was fitted to."""
-    return (*_tool(task), *_points(task))
+    """Look at speeds and accelerations of the tool, and at the points that the path was fitted to."""
+    return (*remarks(_tool(task)), *_points(task))
 
 
 def of_places(
     task_map: TaskMap,
+    path: Path,
     start: np.ndarray | None,
     end: np.ndarray | None,
     path_start: Sequence[float] | None,
 ) -> tuple[Remark, ...]:
-    """Look at what a task says about where the robot is.
+    """Look at what a task says about where the robot is, in postures or along a path of joints.
 
     Parameters
     ----------
     task_map : TaskMap
+    path : Path
     start, end : (n,) ndarray or None
         Postures, None where free.
     path_start : sequence of float or None
         As in the task.
     """
-    remarks, robot = [], task_map.robot
-    for key, posture in (("start.joints", start), ("end.joints", end)):
-        given = np.zeros(robot.n) if posture is None else posture
-        for name, unit, value in zip(robot.joint_names, robot.position_units, given, strict=True):
-            if unit == "rad" and abs(value) > _FAR_POSTURE:
-                found = f"{value:.6g} rad"
-                remarks.append(Remark(f"{key}.{name}", "the position looks like degrees", found, "within two turns"))
-    if path_start is not None and YAW in task_map.rows and abs(path_start[-1]) > _TURN:
-        found = f"{path_start[-1]:.6g} rad"
-        remarks.append(Remark("path_start", "yaw looks like degrees", found, "within one turn"))
-    return tuple(remarks)
+    return tuple(remarks(_places(task_map, path, start, end, path_start)))
+
+
+def _places(
+    task_map: TaskMap,
+    path: Path,
+    start: np.ndarray | None,
+    end: np.ndarray | None,
+    path_start: Sequence[float] | None,
+) -> Iterator[Figure]:
+    robot = task_map.robot
+    along = path.sample(np.linspace(0.0, 1.0, _STATIONS)).target if isinstance(task_map, JointSpace) else None
+    ranged = np.isfinite(robot.limits.position_lower) & np.isfinite(robot.limits.position_upper)
+    for key, postures in (("start.joints", start), ("path", along), ("end.joints", end)):
+        if postures is None:
+            continue
+        columns = zip(robot.joint_names, robot.revolute, postures.reshape(-1, robot.n).T, ranged, strict=True)
+        for name, turns, values, within in columns:
+            if turns:
+                usual, value = (2.0 if within else 1.0) * _TURN, float(values[np.argmax(np.abs(values))])
+                looks, shown = "the position looks like degrees", f"{value:.6g}"
+                yield Figure(f"{key}.{name}", looks, abs(value), usual + _ROUNDED, "rad", shown=shown)
+    if path_start is not None and YAW in task_map.rows:
+        yield Figure("path_start", "yaw looks like degrees", abs(path_start[-1]), _TURN, "rad")
 
 
 def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:
@@ -67,21 +83,24 @@ def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:
     return (Remark("t_end", message, f"{t_end:.6g} s", "more; see the units of limits, lengths and masses"),)
 
 
-def _tool(task: Task) -> Iterator[Remark]:
+def _tool(task: Task) -> Iterator[Figure]:
     """Look at the largest of every kind of limit; feed rates have units of their own."""
-    limits = task.tool_limits
-    speed = limits.speed.speed if isinstance(limits.speed, SpeedTable) else [limits.speed]
-    given = {
-        "speed": [*speed, *(part.speed for part in limits.process_speed)],
-        "acceleration": [limits.acceleration],
-        "angular_speed": [limits.angular_speed],
-    }
-    for kind, most, unit, meant in _TOOL:
-        largest = max((value for value in given[kind] if value is not None and value < _OPEN), default=0.0)
-        if largest > most:
-            key = kind if kind != "speed" or largest in speed else "process_speed"
-            usual = f"below {most:g} {unit}, or null for no limit"
-            yield Remark(f"tool_limits.{key}", f"the limit looks like {meant}", f"{largest:.6g} {unit}", usual)
+    limits, ends = task.tool_limits, task.boundary
+    speeds = limits.speed.speed if isinstance(limits.speed, SpeedTable) else [limits.speed]
+    processes = [part.speed for part in limits.process_speed]
+    # Delta robots move at 10 m/s, and accelerate with 15 g.
+    for where, values, most, unit, meant in (
+        ("tool_limits.speed", speeds, 50.0, "m/s", "mm/s"),
+        ("tool_limits.process_speed", processes, 50.0, "m/s", "mm/s"),
+        ("tool_limits.acceleration", [limits.acceleration], 300.0, "m/s^2", "mm/s^2"),
+        ("tool_limits.angular_speed", [limits.angular_speed], 60.0, "rad/s", "degrees per second"),
+        ("boundary.start_speed", [ends.start_speed], 50.0, "m/s", "mm/s"),
+        ("boundary.end_speed", [ends.end_speed], 50.0, "m/s", "mm/s"),
+    ):
+        largest = max((value for value in values if value is not None and value < _OPEN), default=0.0)
+        limit = where.startswith("tool_limits")
+        what, aside = ("limit", ", or null for no limit") if limit else ("speed", "")
+        yield Figure(where, f"the {what} looks like {meant}", largest, most, unit, aside)
 
 
 def _points(task: Task) -> Iterator[Remark]:

@@ -10,7 +10,6 @@ import numpy as np
 from brachis.errors import BrachisError, PathError
 from brachis.kinematics import ClosedFormMap
 from brachis.limits import Limit, Moments
-from brachis.plausibility import path_hint
 from brachis.robot.joint_space import in_turn_of
 
 _RANGE_SLACK = 1e-9
@@ -53,8 +52,7 @@ def reason_out_of_reach(
         (
             found.exists.any(axis=(1, 2, 3)) | anywhere.exists.any(axis=(1, 2, 3)),
             "the path is out of reach from s = {first:.3g} on (no posture was found)",
-            path_hint(joint_map.task_map, joint_map.path.sample(s).target)
-            or "Shorten or move the path, or choose another start posture",
+            "Shorten or move the path, or choose another start posture",
         ),
         (
             within,

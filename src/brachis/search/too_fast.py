@@ -1,9 +1,9 @@
 """Speeds that are asked for and out of reach: which, where, how far, and what would do.
 
 In the phase plane the fastest motion along a joint path has at every place the largest speed that any motion along that
-joint path has there. So where a limit that asks for a least speed is left out and falls short of in that motion, it does
-so in every one; and what the motion has there is what could be asked for. A redundant robot may have better joint paths
-than those that are known: only what is far from possible is refused before a plan is tried.
+joint path has there. So where that motion, made without the limits that ask for a least speed, falls short of one, every
+motion does; and what it has there is what could be asked for. A redundant robot may have better joint paths than those
+that are known: only what is far from possible is refused before a plan is tried.
 
 Limits on the jerk are unknown to the phase plane. What they leave is told by the plan without the least speed.
 """
@@ -107,7 +107,7 @@ def _others(problem: Problem) -> Iterator[Limit]:
 
 
 def _in_phase_plane(start: Start) -> TooFast | None:
-    """Tell which speed no motion along the start's joint path has; None where all are possible, or none is asked for."""
+    """Tell which speed no motion along the start's joint path has; None where all are possible, or none is asked."""
     problem, rates = start.problem, start.problem.end_rates
     asked = any(limit.least_speed for limit in problem.limits)
     if problem.task.boundary.periodic or not (asked or any(rates)):
@@ -179,12 +179,13 @@ def _falling_short(problem: Problem, motion: JointMotion, how: str) -> TooFast |
     label, place = limit.labels[column], int(np.argmax(beyond))
     found, allowed = in_figures(limit, column, float(values[place]))
     lower = math.floor(float(found) * 10 ** (scale := _DIGITS - 1 - math.floor(math.log10(max(float(found), 1e-9)))))
-    what, hints = _where_reached(motion.s[np.isfinite(beyond)], beyond[np.isfinite(beyond)] <= 0.0)
+    inside = np.isfinite(beyond)
+    what, hints = _where_reached(motion.s[inside], beyond[inside] <= 0.0)
     hints = [f"Lower it to {lower / 10**scale:g} {label.unit}", *hints, "raise the limits that hold the motion back"]
     error = PlanningError(
-        f"no motion has the {label.kind} that is asked for: {what}",
+        f"no motion was found with the {label.kind} that is asked for: {what}",
         where=f"{label.key or limit.name} ({label.subject})",
-        found=f"at most {found} {label.unit} at s = {motion.s[place]:.3g}, {how}",
+        found=f"at most {found} {label.unit} at s = {motion.s[place]:.2g}, {how}",
         allowed=f"{allowed} {label.unit}",
         hint=", or ".join([", ".join(hints[:-1]), hints[-1]]),
     )
@@ -201,5 +202,5 @@ def _where_reached(s: np.ndarray, reached: np.ndarray) -> tuple[str, list[str]]:
     before, behind = not reached[0], not reached[-1]
     cuts = [f"let the part begin at s = {math.ceil(100 * first) / 100:g}"] if before else []
     cuts += [f"let the part end at s = {math.floor(100 * last) / 100:g}"] if behind else []
-    ways = [f"before s = {s[0]:.3g}"] * before + [f"behind s = {s[-1]:.3g}"] * behind
+    ways = [f"before s = {s[0]:.2g}"] * before + [f"behind s = {s[-1]:.2g}"] * behind
     return f"the path {' and '.join(ways)} is too short for the way to it", cuts

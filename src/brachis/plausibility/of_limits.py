@@ -1,0 +1,163 @@
+"""Limits of the joints beside what the URDF says of the robot: its limits, its ranges, its weight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.plausibility.figure import Figure
+from brachis.plausibility.size import link_lengths
+from brachis.robot import Robot
+from brachis.robot.limits import STATED
+from brachis.robot.units import UNITS
+
+_G = 9.81
+_HOLDS = 50.0
+"""Arms hold a tenth to five times their own weight at full reach."""
+_WIDEST = {"rad": 120.0, "m": 50.0}
+"""Joints with cables make two turns either way, others may be given a dozen turns; in degrees, few ranges are narrower
+than 120. Few rails are longer than 30 m."""
+_WIDER, _AT_LEAST_WIDE = 5.0, {"rad": 4.0 * math.pi, "m": 5.0}
+"""So much wider than the URDF's, and than these, is no range of the same joint."""
+_OPEN_END = {"rad": 800.0, "m": 1e5}
+"""A range end beyond this is written for "no limit": in degrees, ranges end at two turns, 720."""
+_UNKNOWN = 1.0
+"""Written in URDFs for a limit that nobody knows."""
+_MILLI = 1e3
+_NO_LOAD = 5.0
+"""Motors without load turn at up to twice the rated speed; rpm are 9.5 times rad/s, and a gear makes it more."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What is usual of the limits of one kind.
+
+    Attributes
+    ----------
+    looks : dict of str to str
+        What unit larger ones look like, by the unit of the joint's position.
+    most : dict of str to float
+        Largest usual limit, whatever the robot.
+    stated : str
+        Kind of limit that the URDF states and that it is compared with; empty where there is none.
+    times : float
+        So many times the URDF's are usual.
+    least : float
+        But whatever the URDF states, this is.
+    weighed : bool
+        Whether a torque is compared with the arm's weight.
+    """
+
+    looks: dict[str, str]
+    most: dict[str, float]
+    stated: str = ""
+    times: float = math.inf
+    least: float = 0.0
+    weighed: bool = False
+
+
+FASTEST = {"rad": 60.0, "m": 50.0}
+"""The quickest axes of small SCARA and delta robots turn at 50 rad/s; rails move at 10 m/s. In degrees and mm: more."""
+_ANY = {"rad": math.inf, "m": math.inf}
+_TORQUE = Rule({"rad": "mNm", "m": "mN"}, _ANY, "torque", 100.0, weighed=True)
+_VELOCITY = Rule({"rad": "degrees per second", "m": "mm per second"}, FASTEST, "velocity", 10.0, 10.0)
+RULES = {
+    "torque": _TORQUE,
+    "rms_torque": _TORQUE,
+    "velocity": _VELOCITY,
+    "acceleration": Rule({"rad": "degrees per second^2", "m": "mm/s^2"}, {"rad": 500.0, "m": 300.0}),
+}
+"""By kind of limit; wrists of small robots accelerate with 200 rad/s^2, delta robots with 150 m/s^2."""
+
+
+def limit_figures(robot: Robot) -> Iterator[Figure]:
+    """Yield all figures of the limits of a robot without payload."""
+    for look in (_magnitudes, _ranges, _curves):
+        yield from look(robot)
+
+
+def _magnitudes(robot: Robot) -> Iterator[Figure]:
+    for kind, rule in RULES.items():
+        values = np.abs(robot.limits.both_ways(kind)).max(axis=0) / getattr(robot.settings.limits.scale, kind)
+        if kind == "velocity":
+            values = values / robot.settings.speed_override
+        usual = _usual(robot, rule)
+        for i, (name, unit, value) in enumerate(zip(robot.joint_names, robot.position_units, values, strict=True)):
+            # The torque of a curve is its own.
+            if kind == "torque" and robot.limits.torque_speed[i]:
+                continue
+            if not _placeholder(value, rule, usual(i), _stated(robot, rule, i)):
+                message = f"the {kind.replace('_', ' ')} limit looks like {rule.looks[unit]}"
+                yield Figure(f"robot.limits.{kind}.{name}", message, float(value), usual(i), UNITS[kind][unit])
+
+
+def _placeholder(value: float, rule: Rule, usual: float, stated: float | None) -> bool:
+    """Tell whether a limit is written for "no limit": a power of ten, of torques one that no figure in mNm can be."""
+    if not 0.0 < value < math.inf:
+        return True
+    if not round(math.log10(value), 9).is_integer():
+        return False
+    return not rule.weighed or value == stated or value > _MILLI * usual
+
+
+def _stated(robot: Robot, rule: Rule, joint: int) -> float | None:
+    """Return the URDF's limit that a joint's is compared with."""
+    known = robot.stated_limits[joint] if joint < len(robot.stated_limits) else None
+    found: float | None = getattr(known, STATED.get(rule.stated, ""), None)
+    return found
+
+
+def _usual(robot: Robot, rule: Rule) -> Callable[[int], float]:
+    """Return what gives the largest usual limit of a joint."""
+    weight = sum(inertia.mass for inertia in list(robot.model.inertias)[1:]) * _G * sum(link_lengths(robot))
+
+    def of_joint(joint: int) -> float:
+        unit, stated = robot.position_units[joint], _stated(robot, rule, joint)
+        most = [rule.most[unit]]
+        if rule.weighed and unit == "rad" and weight > 0.0:
+            most.append(_HOLDS * weight)
+        if stated and stated != _UNKNOWN:
+            most.append(max(rule.times * stated, rule.least))
+        return float(min(most))
+
+    return of_joint
+
+
+def _ranges(robot: Robot) -> Iterator[Figure]:
+    limits, stated = robot.limits, {"rad": "degrees", "m": "mm"}
+    columns = zip(
+        robot.joint_names,
+        robot.position_units,
+        limits.position_lower,
+        limits.position_upper,
+        [*robot.stated_limits, *[None] * (robot.n - len(robot.stated_limits))],
+        strict=True,
+    )
+    for name, unit, lower, upper, known in columns:
+        usual = _WIDEST[unit]
+        if known is not None and known.lower is not None and known.upper is not None and known.upper > known.lower:
+            usual = min(usual, max(_WIDER * (known.upper - known.lower), _AT_LEAST_WIDE[unit]))
+        if max(abs(lower), abs(upper)) <= _OPEN_END[unit]:
+            message, shown = f"the position range looks like {stated[unit]}", f"[{lower:.6g}, {upper:.6g}]"
+            key = f"robot.limits.position.{name}"
+            yield Figure(key, message, upper - lower, usual, unit, " wide, or open (null)", shown)
+
+
+def _curves(robot: Robot) -> Iterator[Figure]:
+    """Look at the torques and the speeds of torque-speed curves."""
+    scale = robot.settings.limits.scale.torque
+    torque = _usual(robot, _TORQUE)
+    velocity = _usual(robot, Rule({}, FASTEST, "velocity", _NO_LOAD, _NO_LOAD))
+    rows = zip(robot.joint_names, robot.position_units, robot.limits.torque_speed, strict=True)
+    for i, (name, unit, curve) in enumerate(rows):
+        if not curve:
+            continue
+        key, meant = f"robot.limits.torque_speed.{name}", {"rad": "rpm", "m": "mm per second"}[unit]
+        said = "the last speed of the curve looks like"
+        aside = "; at the joint, behind its gear"
+        yield Figure(key, f"{said} {meant}", curve[-1][0], velocity(i), UNITS["velocity"][unit], aside)
+        said = f"the torque of the curve looks like {_TORQUE.looks[unit]}"
+        yield Figure(key, said, curve[0][1] / scale, torque(i), UNITS["torque"][unit])
