@@ -126,7 +126,7 @@ def test_calmest_motion_auto_intervals_and_free_knots(spline):
 
 
 def test_paths_beyond_a_limit_at_rest_are_refused_with_their_place():
-    with pytest.raises(brachis.BrachisError, match=r"position limit of 'joint_2' .* found 3 rad at s = 1"):
+    with pytest.raises(brachis.BrachisError, match=r"'joint_2' is out of its range; found 3 rad at s = 1"):
         brachis.plan(task([{"line": {"to": [0, 3.0, 0, 0, 0, 0, 0]}}]))
     weak = {"torque": {"joint_2": 40.0}}
     with pytest.raises(brachis.BrachisError, match=r"torque limit of 'joint_2' .* Nm at s = .*40 N"):

@@ -92,8 +92,8 @@ def test_velocities_and_ranges_in_degrees():
         robot,
         limits=replace(
             limits,
-            position_lower=np.array([-180.0, 0.2, -50.0]),
-            position_upper=np.array([180.0, 1e4, 50.0]),
+            position_lower=np.array([-180.0, 0.2, -12.0]),
+            position_upper=np.array([180.0, 1e4, 12.0]),
         ),
     )
     assert told(wide) == [("robot.limits.position.j1", "the position range looks like degrees")]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,6 +49,10 @@ class Rule:
         But whatever the URDF states, this is.
     weighed : bool
         Whether a torque is compared with the arm's weight.
+    overridden : bool
+        Whether the speed override takes its share.
+    by_curve : bool
+        Whether a torque-speed curve takes its place.
     """
 
     looks: dict[str, str]
@@ -57,15 +61,17 @@ class Rule:
     times: float = math.inf
     least: float = 0.0
     weighed: bool = False
+    overridden: bool = False
+    by_curve: bool = False
 
 
 FASTEST = {"rad": 60.0, "m": 50.0}
 """The quickest axes of small SCARA and delta robots turn at 50 rad/s; rails move at 10 m/s. In degrees and mm: more."""
 _ANY = {"rad": math.inf, "m": math.inf}
 _TORQUE = Rule({"rad": "mNm", "m": "mN"}, _ANY, "torque", 100.0, weighed=True)
-_VELOCITY = Rule({"rad": "degrees per second", "m": "mm per second"}, FASTEST, "velocity", 10.0, 10.0)
+_VELOCITY = Rule({"rad": "degrees per second", "m": "mm per second"}, FASTEST, "velocity", 10.0, 10.0, overridden=True)
 RULES = {
-    "torque": _TORQUE,
+    "torque": replace(_TORQUE, by_curve=True),
     "rms_torque": _TORQUE,
     "velocity": _VELOCITY,
     "acceleration": Rule({"rad": "degrees per second^2", "m": "mm/s^2"}, {"rad": 500.0, "m": 300.0}),
@@ -82,14 +88,12 @@ def limit_figures(robot: Robot) -> Iterator[Figure]:
 def _magnitudes(robot: Robot) -> Iterator[Figure]:
     for kind, rule in RULES.items():
         values = np.abs(robot.limits.both_ways(kind)).max(axis=0) / getattr(robot.settings.limits.scale, kind)
-        if kind == "velocity":
+        if rule.overridden:
             values = values / robot.settings.speed_override
         usual = _usual(robot, rule)
         for i, (name, unit, value) in enumerate(zip(robot.joint_names, robot.position_units, values, strict=True)):
-            # The torque of a curve is its own.
-            if kind == "torque" and robot.limits.torque_speed[i]:
-                continue
-            if not _placeholder(value, rule, usual(i), _stated(robot, rule, i)):
+            curved = rule.by_curve and robot.limits.torque_speed[i]
+            if not curved and not _placeholder(value, rule, usual(i), _stated(robot, rule, i)):
                 message = f"the {kind.replace('_', ' ')} limit looks like {rule.looks[unit]}"
                 yield Figure(f"robot.limits.{kind}.{name}", message, float(value), usual(i), UNITS[kind][unit])
 

@@ -1,7 +1,7 @@
 """Speeds that are asked for and out of reach: which, where, how far, and what would do.
 
 In the phase plane the fastest motion along a joint path has at every place the largest speed that any motion along that
-joint path has there. So where that motion, made without the limits that ask for a least speed, falls short of one, every
+joint path has there. So where that motion, made without limits that ask for a least speed, falls short of one, every
 motion does; and what it has there is what could be asked for. A redundant robot may have better joint paths than those
 that are known: only what is far from possible is refused before a plan is tried.
 
