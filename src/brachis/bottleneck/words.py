@@ -66,7 +66,9 @@ def _saving(entry: Sensitivity, t_end: float) -> str:
     saved = -entry.change(_FRACTION)
     label, end = entry.label, entry.bound.end
     amount = f"{_FRACTION * entry.bound.whole:.3g} {label.unit}"
-    if end is None:
+    if label.room:
+        more = f"{amount} more {label.room}"
+    elif end is None:
         more = f"{100.0 * _FRACTION:.0f} % more {label.kind} at {label.subject} ({amount})"
     else:
         more = f"{amount} more room at the {end} end of {label}"
@@ -122,7 +124,8 @@ def active_in_words(found: tuple[Saturation, ...]) -> list[str]:
         if entry.share >= _MOMENT:
             times = "once" if len(entry.active) == 1 else f"in {len(entry.active)} stretches"
             share = f"{100.0 * entry.share:.1f} % of the time"
-            lines.append(f"{entry.label.subject} is at its {entry.label.kind} limit for {share}, {times}")
+            reached = entry.label.reached or f"{entry.label.subject} is at its {entry.label.kind} limit"
+            lines.append(f"{reached} for {share}, {times}")
     if not lines:
         lines = ["nothing stays at a limit"]
     return [

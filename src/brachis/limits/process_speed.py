@@ -59,9 +59,17 @@ class _ProcessSpeedLimit(Limit):
         self._width = np.minimum(2.0 * self._ramp, np.sqrt(_COST * self._ramp * np.diff(self._part, axis=0)))
         self.breaks = self._part.ravel()
         what = "process speed" if self._side > 0.0 else "least process speed"
-        subjects = ["tool"] if len(parts) == 1 else [f"tool, s = {part.s[0]:g} to {part.s[1]:g}" for part in parts]
-        self.labels = tuple(Label(subject, what, "m/s", "tool_limits.process_speed") for subject in subjects)
+        places = [""] if len(parts) == 1 else [f", s = {part.s[0]:g} to {part.s[1]:g}" for part in parts]
+        self.labels = tuple(self._label(what, place) for place in places)
         self.lower, self.upper = np.full(len(parts), -np.inf), np.full(len(parts), np.inf)
+
+    def _label(self, what: str, place: str) -> Label:
+        """Name the speed of a part, whose place is told where there are several."""
+        end, side = ("upper", "above") if self._side > 0.0 else ("lower", "below")
+        within = f"{place}," if place else ""
+        reached = f"tool is at the {end} end of its process speed{within}"
+        room = f"tolerance {side} the process speed{within}"
+        return Label(f"tool{place}", what, "m/s", "tool_limits.process_speed", reached, room)
 
     @property
     def bounds(self) -> tuple[Bound, ...]:

@@ -100,12 +100,17 @@ class Label:
         Of the limit that the user gives.
     key : str
         Key of the task that sets it; empty where there is none.
+    reached, room : str
+        A clause that says that it is at its bound, and what there is more of where the bound gives way; both are made
+        of subject and kind where they are empty.
     """
 
     subject: str
     kind: str
     unit: str
     key: str = ""
+    reached: str = ""
+    room: str = ""
 
     def __str__(self) -> str:
         """Return subject and kind."""

@@ -41,11 +41,14 @@ class TorqueSpeedLimit(Limit):
 
     def _label(self, joint: int, sign: float) -> Label:
         name, unit = self._robot.joint_names[joint], self._robot.position_units[joint]
+        side, torque = "positive" if sign > 0.0 else "negative", in_words("torque", unit)
         return Label(
-            f"{name} {'positive' if sign > 0.0 else 'negative'}",
+            f"{name} {side}",
             in_words("torque at speed", unit),
             self._robot.torque_units[joint],
             f"robot.limits.torque_speed.{name}",
+            f"{name} is on its {torque}-speed curve with {side} {torque}",
+            f"{side} {torque} all along the curve of {name}",
         )
 
     @property

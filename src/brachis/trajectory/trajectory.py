@@ -243,11 +243,12 @@ class Trajectory(Summary):
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown."""
+        in_chart = self.chart_rows.size > 0
         return {
             "end time": f"{self.t_end:.4f} s",
             "robot": f"{Path(self.robot.source).parent.name}/{Path(self.robot.source).name}",
             "joints": ", ".join(self.joint_names),
-            "redundant joints": ", ".join(self.redundant_joints) or "none",
+            "redundant joints": ", ".join(self.redundant_joints) or ("none by name: a chart" if in_chart else "none"),
             "branch": self.branch or "none",
             "start posture": self.robot.in_words(self.q[0]),
             "end posture": self.robot.in_words(self.q[-1]),
