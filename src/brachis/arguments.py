@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Sequence
 from functools import wraps
+from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 import numpy as np
@@ -16,8 +18,10 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 
-def named(function: Callable[_P, _R]) -> Callable[_P, _R]:
+def named(function: Callable[_P, _R], where: str | None = None) -> Callable[_P, _R]:
     """Let a function refuse keywords that it does not have by naming those that it has.
+
+    `where` is what the user calls the function; None: as it is named.
 
     Raises
     ------
@@ -26,7 +30,7 @@ def named(function: Callable[_P, _R]) -> Callable[_P, _R]:
     InputError
         One that is needed is missing, or there are too many without a name.
     """
-    signature, name = inspect.signature(function), function.__name__
+    signature, name = inspect.signature(function), where or function.__name__
     parameters = {each: own for each, own in signature.parameters.items() if each != "self"}
 
     @wraps(function)
@@ -48,6 +52,41 @@ def _in_words(parameter: inspect.Parameter) -> str:
     """Say how an argument is given."""
     needed = " (needed)" if parameter.default is parameter.empty else ""
     return f"{parameter.name}{'=' if parameter.kind is parameter.KEYWORD_ONLY else ''}{needed}"
+
+
+def file_name(value: object, where: str) -> Path:
+    """Return the name of a file as a path.
+
+    Raises
+    ------
+    InputError
+        It is something else.
+    """
+    if not isinstance(value, str | os.PathLike):
+        raise InputError("wrong type", where=where, found=repr(value), allowed="the name of a file")
+    return Path(value)
+
+
+def check_callable(value: object, where: str) -> None:
+    """Refuse what is neither a function nor None.
+
+    Raises
+    ------
+    InputError
+    """
+    if value is not None and not callable(value):
+        raise InputError("wrong type", where=where, found=repr(value), allowed="a function, or None")
+
+
+def check_list(value: object, where: str, of: str) -> None:
+    """Refuse what is no list or tuple, `of` certain things.
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(value, Sequence) or isinstance(value, str):
+        raise InputError("is no list", where=where, found=repr(value), allowed=f"a list of {of}: {where}=[...]")
 
 
 def numbers(value: ArrayLike, where: str, unit: str) -> np.ndarray:

@@ -12,7 +12,7 @@ from brachis.errors import BrachisError, InputError
 from brachis.planner import Given, plan
 from brachis.result import Result
 from brachis.search.processes import each, processes
-from brachis.task import Source, TaskKeywords
+from brachis.task import Source, TaskKeywords, check_keywords
 
 Outcome = Result | BrachisError
 OnProgress = Callable[[int, int, Outcome], None]
@@ -48,7 +48,7 @@ def plan_many(
     Raises
     ------
     InputError
-        One task is given in place of several, or `jobs` is no number of processes.
+        One task is given in place of several, `jobs` is no number of processes, or there is no such keyword.
     KeyboardInterrupt
         Ctrl-C ends all.
 
@@ -71,6 +71,9 @@ def plan_many(
     """
     if isinstance(tasks, str | os.PathLike | Mapping):
         raise InputError("is one task", where="tasks", found=type(tasks).__name__, allowed="a list of tasks")
+    if not isinstance(tasks, Iterable):
+        raise InputError("wrong type", where="tasks", found=repr(tasks), allowed="a list of tasks")
+    check_keywords(keywords, "plan_many")
     given, jobs = list(tasks), processes(count(jobs, "jobs"))
     outcomes: list[Outcome] = []
     work = _outcome, given, keywords

@@ -17,6 +17,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from brachis import ik, plausibility
+from brachis.arguments import check_callable, check_list
 from brachis.attempt import Attempt, Start
 from brachis.completion import completed
 from brachis.custom_limits import LimitModel
@@ -133,8 +134,10 @@ def plan(
     # Batches are small: a second BLAS thread costs up to twenty times what it gives where cores are busy.
     with ThreadpoolController().limit(limits=1, user_api="blas"):
         began = time.perf_counter()
+        check_callable(listener, "listener")
+        check_list(families, "families", "closed forms")
         robot, asked = _read(robot_or_task, task, keywords)
-        known = None if start_from is None else motion_of(start_from)
+        known = None if start_from is None else motion_of(start_from, "start_from")
         return _plan(robot, asked, families, own_limits, known, listener or (lambda _text: None), began, strict=strict)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 
-from brachis.arguments import named
+from brachis.arguments import check_callable, file_name, named
 from brachis.comparison.comparison import Comparison
 from brachis.errors import PathError, PlanningError
 from brachis.planner import plan
@@ -73,9 +73,16 @@ def compare(
     >>> found.result.verified, found.saved > -1e-3
     (True, True)
     """
+    check_callable(listener, "listener")
     if not isinstance(today, Trajectory):
         today = import_motion(
-            today, robot, task=task, task_space=task_space, units=units, tolerance=tolerance, noise=noise
+            file_name(today, "today"),
+            robot,
+            task=task,
+            task_space=task_space,
+            units=units,
+            tolerance=tolerance,
+            noise=noise,
         )
     verification = verify_trajectory(today)
     best: Result | None = None

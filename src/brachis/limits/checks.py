@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from brachis.arguments import check_list
 from brachis.custom_limits import LimitModel
 from brachis.errors import InputError
 from brachis.limits.protocol import Label, Limit, Moments, Partials
@@ -33,8 +34,7 @@ def bound_limits(models: Sequence[LimitModel], robot: Robot, others: Sequence[Li
         A model cannot be bound, or its limit is none; its parts do not fit together; a label is taken; its values or
         partials have the wrong shape or are not finite.
     """
-    if not isinstance(models, Sequence):
-        raise InputError("is no list", where=where, found=models, allowed="a list of limits: own_limits=[...]")
+    check_list(models, where, "limits")
     found: list[Limit] = []
     for number, model in enumerate(models):
         here = f"{where}[{number}]"

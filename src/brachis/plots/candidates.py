@@ -47,8 +47,11 @@ def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
     Raises
     ------
     InputError
-        There are no candidates.
+        There are no candidates, or they are something else.
     """
+    if not isinstance(candidates, Sequence) or not all(isinstance(each, Attempt) for each in candidates):
+        allowed = "the candidates of a result: result.candidates"
+        raise InputError("wrong type", where="candidates", found=type(candidates).__name__, allowed=allowed)
     if not candidates:
         raise InputError("there is nothing to draw", where="candidates", found="none", allowed="at least one")
     candidates = [candidates[0], *(each for each in candidates[1:] if each.status != SAME_MOTION)]

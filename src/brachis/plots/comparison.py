@@ -21,6 +21,9 @@ _HEADROOM = 1.27
 Case = float | str
 """What is planned: a number that is varied, or a name."""
 
+_ROW = 3
+"""Case, choice, end time."""
+
 
 def plot_comparison(rows: Sequence[tuple[Case, str, float]], xlabel: str = "", unit: str = "") -> Figure:
     """Plot the end times of cases, one bar for each choice.
@@ -75,11 +78,18 @@ def plot_comparison(rows: Sequence[tuple[Case, str, float]], xlabel: str = "", u
 
 def _cells(rows: Sequence[tuple[Case, str, float]]) -> dict[tuple[Case, str], float]:
     """Check the rows and key them by case and choice."""
+    if not isinstance(rows, Sequence):
+        raise InputError(
+            "wrong type", where="rows", found=repr(rows), allowed="a list of (case, choice, end time in s)"
+        )
     if not rows:
         raise InputError("there is nothing to compare", where="rows", found="no rows", allowed="at least one")
     cells: dict[tuple[Case, str], float] = {}
-    for number, (case, choice, t_end) in enumerate(rows):
+    for number, row in enumerate(rows):
         where = f"rows[{number}]"
+        if not isinstance(row, Sequence) or len(row) != _ROW or isinstance(row, str):
+            raise InputError("wrong type", where=where, found=repr(row), allowed="(case, choice, end time in s)")
+        case, choice, t_end = row
         if not isinstance(case, str) and not math.isfinite(case):
             raise InputError("is not a case", where=where, found=f"{case}", allowed="a finite number, or a name")
         if not (math.isnan(t_end) or 0.0 < t_end < math.inf):

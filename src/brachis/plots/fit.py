@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.plots import style
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Trajectory, of_motion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,12 +19,13 @@ _HEIGHT = 45.0
 _ROOM = 1.15
 
 
+@of_motion
 def plot_fit(trajectory: Trajectory) -> Figure:
     """Plot the largest distances, and angles where the tool turns, of the points from the path, and the tolerances.
 
     Parameters
     ----------
-    trajectory : Trajectory
+    trajectory : Trajectory, Result or path
 
     Returns
     -------

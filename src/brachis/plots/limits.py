@@ -11,7 +11,7 @@ from brachis.bottleneck.ratios import LimitRatios, limit_ratios
 from brachis.limits import Limit
 from brachis.plots import style
 from brachis.plots.curves import knot_times
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Trajectory, of_motion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,12 +22,13 @@ _FRAME_MM = 24.0
 _RANGE = 1.15
 
 
+@of_motion
 def plot_limits(trajectory: Trajectory, limits: Sequence[Limit] | None = None) -> Figure:
     """Plot the ratios to all limits, whatever kinds there are.
 
     Parameters
     ----------
-    trajectory : Trajectory
+    trajectory : Trajectory, Result or path
         Any one, a saved one for example.
     limits : sequence of Limit, optional
         Those of the trajectory's task if left out.

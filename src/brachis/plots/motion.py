@@ -10,7 +10,7 @@ import numpy as np
 from brachis.plots import style
 from brachis.plots.curves import dense_samples, knot_times
 from brachis.plots.quantities import Quantity, quantities
-from brachis.trajectory import Samples, Trajectory
+from brachis.trajectory import Samples, Trajectory, of_motion
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -24,12 +24,13 @@ _FEW_JOINTS = 2
 _LOW = 0.6
 
 
+@of_motion
 def plot_motion(trajectory: Trajectory) -> Figure:
     """Plot q, dq/dt, s and ds/dt in panels over one time axis; joints in rad and joints in m have panels of their own.
 
     Parameters
     ----------
-    trajectory : Trajectory
+    trajectory : Trajectory, Result or path
 
     Returns
     -------

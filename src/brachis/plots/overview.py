@@ -17,7 +17,7 @@ from brachis.plots.motion import (
 from brachis.plots.postures import add_posture_axes, draw_postures, legend_postures
 from brachis.plots.quantities import quantities
 from brachis.plots.torques import draw_torques, shown_torques
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Trajectory, of_motion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,12 +26,13 @@ _POSTURES, _JOINTS, _PROGRESS, _FRAME = 74.0, 46.0, 34.0, 11.0
 """Heights of the rows, and of what is around them, mm."""
 
 
+@of_motion
 def plot_overview(trajectory: Trajectory) -> Figure:
     """Plot postures, torques, joint positions and velocities, and progress on two columns' width.
 
     Parameters
     ----------
-    trajectory : Trajectory
+    trajectory : Trajectory, Result or path
 
     Returns
     -------

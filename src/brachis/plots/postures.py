@@ -11,7 +11,7 @@ from brachis.plots import style
 from brachis.plots.curves import dense_samples
 from brachis.plots.skeleton import drawing_plane, skeleton
 from brachis.robot import task_map_of
-from brachis.trajectory import Samples, Trajectory
+from brachis.trajectory import Samples, Trajectory, of_motion
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -32,12 +32,13 @@ _VIEWS = tuple(itertools.product((15.0, 22.0, 30.0), (-75.0, -65.0, -55.0, -45.0
 """Elevations and azimuths from which axes in space may be seen, degrees."""
 
 
+@of_motion
 def plot_postures(trajectory: Trajectory) -> Figure:
     """Plot the robot as a stick figure at equidistant times, and the path of its tool (Fig. 1 of the paper).
 
     Parameters
     ----------
-    trajectory : Trajectory
+    trajectory : Trajectory, Result or path
 
     Returns
     -------

@@ -12,7 +12,7 @@ from brachis.bottleneck.saturation import RIPPLE, THRESHOLD, Saturation, saturat
 from brachis.limits import Label, Limit
 from brachis.plots import style
 from brachis.plots.curves import knot_times
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Trajectory, of_motion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,12 +27,13 @@ _FRAME_MM = 26.0
 _THICK = 0.84
 
 
+@of_motion
 def plot_timeline(trajectory: Trajectory, limits: Sequence[Limit] | None = None) -> Figure:
     """Plot how near the motion is to each limit over time.
 
     Parameters
     ----------
-    trajectory : Trajectory
+    trajectory : Trajectory, Result or path
         Any one, a saved one for example.
     limits : sequence of Limit, optional
         Those of the trajectory's task if left out.

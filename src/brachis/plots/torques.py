@@ -11,7 +11,7 @@ from brachis.plots import style
 from brachis.plots.curves import dense_samples, knot_times
 from brachis.plots.motion import draw_joints, draw_quantity, label_time_once, legend_joints
 from brachis.plots.quantities import Quantity, quantities
-from brachis.trajectory import Samples, Trajectory
+from brachis.trajectory import Samples, Trajectory, of_motion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,12 +21,13 @@ _RANGE = 1.15
 _WHAT = "torque"
 
 
+@of_motion
 def plot_torques(trajectory: Trajectory) -> Figure:
     """Plot the normalised joint torques, and forces, with the band of what is allowed (Fig. 2 of the paper).
 
     Parameters
     ----------
-    trajectory : Trajectory
+    trajectory : Trajectory, Result or path
 
     Returns
     -------

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from brachis import ik
-from brachis.arguments import named, numbers
+from brachis.arguments import file_name, named, numbers
 from brachis.errors import InputError, PathError
 from brachis.kinds import Kind, kind_of
 from brachis.recording.columns import Units
@@ -94,6 +94,7 @@ def import_motion(
     >>> today.recovered.tolerance, round(today.t_end - result.t_end, 9)
     (1e-06, 0.0)
     """
+    path = file_name(path, "path")
     if tolerance is not None:
         tolerance = check_tolerance(tolerance)
     if task is None and _is_task(robot):
@@ -152,7 +153,7 @@ def _units(given: Mapping[str, str] | None) -> Units:
     if given is not None and not isinstance(given, Mapping):
         allowed = '{"angle": "deg", "length": "mm", "time": "ms"}, or some of them'
         raise InputError("wrong type", where="units", found=repr(given), allowed=allowed)
-    return named(Units)(**dict(given or {}))
+    return named(Units, "units")(**dict(given or {}))
 
 
 def _deviation(recording: Recording, noise: float | Sequence[float] | None) -> np.ndarray:

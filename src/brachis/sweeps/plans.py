@@ -13,6 +13,7 @@ from typing import Any
 from pydantic import ValidationError
 
 import brachis
+from brachis.arguments import file_name
 from brachis.errors import BrachisError, TaskError, UnknownNameError
 from brachis.kinds import Kind, check_kind
 from brachis.problem import Problem
@@ -104,7 +105,7 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
     content: object = source
     name, folder = "sweep", Path.cwd()
     if not isinstance(source, Mapping):
-        path = Path(source)
+        path = file_name(source, "source")
         check_kind(path, Kind.SWEEP, TaskError)
         content, name, folder = _yaml(path, Path.cwd()), str(path), path.absolute().parent
     if not isinstance(content, Mapping):

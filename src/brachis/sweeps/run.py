@@ -11,6 +11,7 @@ from typing import Any
 
 import brachis
 from brachis import interrupts
+from brachis.arguments import check_callable
 from brachis.sweeps.plans import Plan, SweepPlan, load_sweep
 from brachis.sweeps.pools import pool_for
 from brachis.sweeps.result import SweepResult
@@ -84,6 +85,7 @@ def sweep(
     >>> found.table.column("status").to_pylist()
     ['verified', 'verified']
     """
+    check_callable(listener, "listener")
     listener = listener or (lambda _text: None)
     listener("checking the sweep")
     planned = load_sweep(source)

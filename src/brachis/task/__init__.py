@@ -4,7 +4,7 @@ from brachis.task.arrays import fit_path
 from brachis.task.boundary import BoundarySettings
 from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.keys import read_assignment, set_key, with_keys
-from brachis.task.keywords import TaskKeywords, task_with
+from brachis.task.keywords import TaskKeywords, check_keywords, task_with
 from brachis.task.limit_models import FROM_URDF, LimitKeywords, LimitScale, LimitSpec
 from brachis.task.limits_file import LimitsFile, read_limits
 from brachis.task.load import Source, check_robot_settings, load_task
@@ -104,6 +104,7 @@ __all__ = [
     "ToolLimits",
     "TurnSegment",
     "TurnTo",
+    "check_keywords",
     "check_robot_settings",
     "fit_path",
     "json_schema",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, TypedDict, Unpack
 
 from brachis.errors import UnknownNameError
@@ -113,20 +113,30 @@ def task_with(source: Source | None = None, /, **keywords: Unpack[TaskKeywords])
     """
     if source is not None and not keywords:
         return load_task(source)
+    check_keywords(keywords)
     content = {"brachis": 1} if source is None else load_task(source).model_dump(exclude_unset=True)
     for key, value in keywords.items():
-        if key not in TaskKeywords.__annotations__:
-            raise _no_keyword(key)
         whole = {_SECTION_OF[key]: {key: value}} if key in _SECTION_OF else {key: _in_full(key, value)}
         content = _merged(content, whole)
     return load_task(content)
 
 
-def _no_keyword(name: str) -> UnknownNameError:
-    """Say where a key that is no keyword belongs, or which is meant."""
+def check_keywords(keywords: Iterable[str], where: str = "plan") -> None:
+    """Refuse names that are no keywords, and say where keys of these names belong, or which is meant.
+
+    Raises
+    ------
+    UnknownNameError
+    """
+    for name in keywords:
+        if name not in TaskKeywords.__annotations__:
+            raise _no_keyword(name, where)
+
+
+def _no_keyword(name: str, where: str) -> UnknownNameError:
     hint = " or ".join(_as_keyword(path.split(".")) for path in key_paths(name, Task))
     valid = sorted(TaskKeywords.__annotations__)
-    return UnknownNameError("keyword", name, valid, where="plan", hint=hint and f"It is a key of others: {hint}")
+    return UnknownNameError("keyword", name, valid, where=where, hint=hint and f"It is a key of others: {hint}")
 
 
 def _as_keyword(parts: Sequence[str]) -> str:

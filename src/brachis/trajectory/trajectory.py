@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from brachis.arguments import number, numbers
+from brachis.arguments import file_name, number, numbers
 from brachis.arrays import freeze
 from brachis.errors import InputError, UnknownNameError
 from brachis.robot import Robot, dynamics
@@ -327,7 +327,7 @@ class Trajectory(Summary):
         ResultFileError
             The file is missing, broken or of another schema version, or its parts do not fit each other.
         """
-        content = read_result(Path(path))
+        content = read_result(file_name(path, "path"))
         return cls(
             task=content.task,
             urdf=content.urdf,
