@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import brachis
 from brachis import LimitSpec
@@ -296,3 +297,122 @@ def test_errors_stay_errors_of_ours():
     assert issubclass(PlausibilityError, brachis.InputError)
     assert not issubclass(PlausibilityError, UrdfError)
     assert issubclass(brachis.PlausibilityWarning, UserWarning)
+
+
+@pytest.mark.parametrize(
+    ("limits", "told_of", "sound"),
+    [
+        ({"torque": 320000.0}, "torque.joint_1: the torque limit looks like mNm", {"torque": 320.0}),
+        ({"torque": 10000.0}, "torque.joint_6: the torque limit looks like mNm", {"torque": 1000.0}),
+        ({"velocity": 50.0}, "velocity.joint_1: the velocity limit looks like degrees", {"velocity": 10.0}),
+        ({"acceleration": 573.0}, "acceleration.joint_1: the acceleration limit looks like", {"acceleration": 50.0}),
+        (
+            {"position": {"joint_1": [-45.0, 45.0]}},
+            "position.joint_1: the position range looks like degrees",
+            {"position": {"joint_1": [-6.0, 6.0]}},
+        ),
+        (
+            {"torque_speed": {"joint_1": [[0, 320], [10, 320], [20, 0]]}},
+            "torque_speed.joint_1: the last speed of the curve looks like rpm; found 20 rad/s; usual: below 7.42 rad/s",
+            {"torque_speed": {"joint_1": [[0, 320], [1, 320], [2, 0]]}},
+        ),
+        (
+            {"torque_speed": {"joint_1": [[0, 320000], [2, 0]]}},
+            "torque_speed.joint_1: the torque of the curve looks like mNm",
+            {"torque_speed": {"joint_1": [[0, 600], [2, 0]]}},
+        ),
+    ],
+)
+def test_limits_beside_those_of_the_urdf(limits, told_of, sound):
+    robot = brachis.robots.iiwa14
+    assert any(str(remark).startswith(f"robot.limits.{told_of}") for remark in of_robot(robot.with_limits(**limits)))
+    assert of_robot(robot.with_limits(**sound)) == ()
+
+
+@pytest.mark.parametrize("file", [*OWN, *FOREIGN], ids=lambda file: f"{file.parent.name}/{file.name}")
+def test_torques_that_urdfs_state_are_plausible(file):
+    try:
+        limb = first_limb(read_file(file), file.name)
+        robot = Robot.from_urdf(file, tool_frame=limb.tool, base_frame=limb.base, limits=UNLIMITED)
+    except BrachisError:
+        return
+    stated = np.array([limit.effort or np.inf for limit in robot.stated_limits])
+    assert of_robot(replace(robot, limits=robot.limits.with_magnitudes(torque=stated))) == ()
+
+
+@pytest.mark.parametrize(("name", "mass"), [("scara3", 300.0), ("iiwa14", 100.0), ("tx90l_rail", 300.0)])
+def test_a_payload_in_g_that_an_arm_of_this_size_could_carry(name, mass):
+    robot = getattr(brachis.robots, name)
+    assert told(robot.with_payload(mass)) == [("robot.payload.mass", "the mass looks like g")]
+    assert told(robot.with_payload(15.0)) == []
+
+
+def test_the_tool_offset_and_the_mounting_in_mm():
+    made = Robot.from_urdf(RAIL, tool_offset={"xyz": [0, 0, 120.0]}, mounting={"xyz": [0, 0, 3000.0]})
+    assert [where for where, _ in told(made)] == ["robot.tool_offset.xyz", "robot.mounting.xyz"]
+
+
+def test_speeds_of_the_ends_in_mm():
+    (found,) = of_task(brachis.load_task(task(boundary={"end_speed": 100.0})))
+    assert str(found).startswith("boundary.end_speed: the speed looks like mm/s; found 100 m/s")
+
+
+WAYPOINTS = {
+    "robot": {"urdf": str(ROOT / "robots/iiwa14/robot.urdf")},
+    "start": {"joints": [0.0, 0.3, 0.0, -1.2, 0.0, 0.8, 0.0]},
+    "task_space": "joints",
+    "path": [{"spline": {"through": [[35.0, 28.0, -17.0, -50.0, 23.0, 35.0, 28.0]]}}],
+    "redundant_joints": "auto",
+}
+
+
+def test_waypoints_in_degrees_leave_the_range_and_the_hint_says_why():
+    with pytest.raises(PathError, match="joint 'joint_1' is out of its range; found 35 rad at s = 1") as caught:
+        brachis.plan(task(**WAYPOINTS))
+    assert caught.value.hint == "It looks like degrees: 35 deg are 0.610865 rad"
+
+
+def test_waypoints_in_degrees_of_joints_without_a_range():
+    content = task(task_space="joints", redundant_joints="auto", path=[{"spline": {"through": [[90.0, -60.0, 45.0]]}}])
+    with pytest.raises(PlausibilityError) as caught:
+        brachis.plan(content, strict=True)
+    assert [remark.split(":")[0] for remark in caught.value.remarks] == [f"path.j{i}" for i in (1, 2, 3)]
+
+
+def test_lengths_of_a_gantry_in_mm():
+    content = {
+        "brachis": 1,
+        "robot": {"urdf": str(ROOT / "robots/gantry2/robot.urdf")},
+        "start": {"joints": [0.0, 0.0]},
+        "task_space": ["x", "y"],
+    }
+    with pytest.raises(PathError, match=r"out of reach from s = .* at most 1\.6 m") as caught:
+        brachis.plan({**content, "path": [{"line": {"by": [500.0, 200.0]}}]})
+    assert caught.value.hint == "The path looks like mm: divided by 1000 it is 0.539 m away"
+    corner = [{"line": {"by": [0.5, 0.0]}, "blend": 50.0}, {"line": {"by": [0.0, 0.3]}}]
+    with pytest.raises(PathError, match="longer than half") as caught:
+        brachis.plan({**content, "path": corner})
+    assert caught.value.hint == "It looks like mm: 50 mm are 0.05 m"
+
+
+def test_points_in_mm_or_in_another_order_do_not_start_where_the_tool_is():
+    points = np.array([[1.7320508, 0.0], [1.7, 0.2], [1.6, 0.4], [1.4, 0.6]])
+    for given, hint in (
+        (1000.0 * points, "The path looks like mm: divided by 1000 it is where the tool is"),
+        (points[:, ::-1], "It looks like the order y, x: the tool is there if they are read so"),
+    ):
+        content = brachis.load_task(task(path=brachis.fit_path(given)))
+        with warnings.catch_warnings(action="ignore"), pytest.raises(PathError, match="starts elsewhere") as caught:
+            brachis.plan(content)
+        assert caught.value.hint == hint
+
+
+def test_a_quaternion_with_its_scalar_last():
+    robot = brachis.robots.iiwa14
+    posture = WAYPOINTS["start"]["joints"]
+    placed = robot.tool_placement(np.array(posture))
+    w, x, y, z = Rotation.from_matrix(placed.rotation).as_quat(scalar_first=True)
+    ways = {"start": posture, "task_space": "pose", "path": brachis.Line(by=[0.0, 0.1, 0.0])}
+    with pytest.raises(StartError, match="off the path") as caught:
+        brachis.plan(robot, path_start=[*placed.translation, x, y, z, w], **ways)
+    assert caught.value.hint == "The quaternion looks like x, y, z, w: w comes first"

@@ -1,0 +1,86 @@
+"""Speeds that no motion has are refused with their place, and with what would do."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+
+GANTRY = Path(__file__).parents[2] / "robots/gantry2/robot.urdf"
+RAIL = Path(__file__).parents[2] / "robots/tx90l_rail/robot.urdf"
+LENGTH = 0.5
+
+
+def slide(speed: float, part: tuple[float, float], **changes: object) -> dict:
+    """A slide of 0.5 m along x with an acceleration of at most 1 m/s^2."""
+    limits = {"acceleration": 1.0, "velocity": None, **changes.pop("limits", {})}
+    return {
+        "brachis": 1,
+        "robot": {"urdf": str(GANTRY), "gravity": [0, 0, 0], "limits": limits},
+        "start": {"joints": [0.0, 0.0]},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"by": [LENGTH, 0.0]}}],
+        "spline": {"intervals": 20},
+        "tool_limits": {"process_speed": {"speed": speed, "s": part, "tolerance": 0.02}},
+        **changes,
+    }
+
+
+def test_a_run_up_that_is_too_short_is_told_with_what_would_do(monkeypatch):
+    """Over the way d the acceleration a leads to sqrt(2 a d)."""
+    monkeypatch.setattr("brachis.planner.solved", lambda *_: pytest.fail("a plan was tried"))
+    with pytest.raises(
+        brachis.PlanningError, match=r"the path before s = 0\.1 is too short for the way to it"
+    ) as caught:
+        brachis.plan(slide(0.5, (0.1, 0.6)))
+    possible = np.sqrt(2.0 * 0.1 * LENGTH)
+    assert float(re.search(r"at most ([\d.]+) m/s at s = 0.1", str(caught.value.found))[1]) == pytest.approx(
+        possible, rel=0.02
+    )
+    assert caught.value.allowed == "at least 0.49 m/s"
+    assert caught.value.where == "tool_limits.process_speed (tool)"
+    begin = float(re.search(r"let the part begin at s = ([\d.]+)", caught.value.hint)[1])
+    assert begin == pytest.approx(0.49**2 / 2.0 / LENGTH, abs=0.011)
+
+
+@pytest.mark.parametrize("change", [(0.31, (0.1, 0.6)), (0.5, (0.26, 0.6))])
+def test_what_is_advised_can_be_planned(change):
+    assert brachis.plan(slide(*change)).verified
+
+
+def test_a_speed_that_joint_velocities_forbid():
+    with pytest.raises(brachis.PlanningError, match=r"it is reached nowhere on that part; found at most 0\.3 m/s"):
+        brachis.plan(slide(0.5, (0.3, 0.6), limits={"velocity": 0.3}))
+
+
+def test_a_jerk_that_leaves_too_short_a_run_up():
+    """The phase plane knows no jerk; the plan without the process speed does: sqrt(j d^2) ** (2 / 3) and less."""
+    with pytest.raises(brachis.PlanningError, match="in the fastest motion without it") as caught:
+        brachis.plan(slide(0.4, (0.2, 0.6), limits={"jerk": 2.0}))
+    assert "the path before s = 0.2" in str(caught.value)
+
+
+def test_speeds_far_out_of_reach_of_a_redundant_arm_are_refused_before_a_plan_is_tried(monkeypatch):
+    monkeypatch.setattr("brachis.search.screening.screened", lambda *_: pytest.fail("a plan was tried"))
+    content = {
+        "brachis": 1,
+        "robot": {"urdf": str(RAIL)},
+        "start": {"joints": [0, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1]},
+        "task_space": "pose",
+        "path": [{"line": {"by": [0, 0.8, 0]}}],
+        "search": {"effort": "single"},
+    }
+    with pytest.raises(brachis.PlanningError, match=r"reached nowhere .* along the best joint path that was found"):
+        brachis.plan({**content, "tool_limits": {"process_speed": {"speed": 20.0, "s": [0.3, 0.7]}}})
+    with pytest.raises(brachis.PlanningError, match=r"boundary.start_speed: .* so high a speed at the path's start"):
+        brachis.plan({**content, "boundary": {"start_speed": 20.0}})
+
+
+def test_a_speed_at_the_end_that_the_velocity_limit_forbids():
+    with pytest.raises(brachis.PlanningError, match=r"found 0.9 m/s; allowed: about 0.30\d* m/s at most") as caught:
+        brachis.plan(slide(0.2, (0.3, 0.6), limits={"velocity": 0.3}, boundary={"end_speed": 0.9}))
+    assert caught.value.where == "boundary.end_speed"
