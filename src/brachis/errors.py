@@ -71,7 +71,7 @@ class BrachisError(Exception):
             text += f"; found {self.found}"
         if self.allowed is not None:
             text += f"; allowed: {self.allowed}"
-        if self.hint is not None:
+        if self.hint:
             text += f". {self.hint}"
         return text
 
@@ -275,7 +275,11 @@ class PlanningError(BrachisError):
 
 def nearest(name: str, valid: Iterable[str], likeness: float = 0.5) -> str | None:
     """Return the valid name most like `name`, or None where none is; names with a likeness of 1 are the same."""
-    near = difflib.get_close_matches(name, list(valid), n=1, cutoff=likeness)
+    valid = list(valid)
+    begun = [one for one in valid if name.startswith(f"{one}_")]
+    if begun:
+        return max(begun, key=len)
+    near = difflib.get_close_matches(name, valid, n=1, cutoff=likeness)
     return near[0] if near else None
 
 

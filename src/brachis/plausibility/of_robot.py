@@ -28,6 +28,7 @@ _LONGEST_OFFSET = 2.0
 """Times the arm's own length."""
 _FARTHEST_BASE = 200.0
 """m; halls are smaller."""
+_MOST_GRAVITY = 100.0
 _OF_SIZE = " for an arm of this size"
 
 
@@ -72,6 +73,8 @@ def _lengths(robot: Robot) -> Iterator[Figure]:
     size = _LONGEST_OFFSET * max(1.0, sum(links))
     yield Figure("robot.tool_offset.xyz", "the distance looks like mm", offset, size, "m", _OF_SIZE)
     yield Figure("robot.mounting.xyz", "the distance looks like mm", mounted, _FARTHEST_BASE, "m")
+    pull = math.hypot(*robot.settings.gravity)
+    yield Figure("robot.gravity", "the acceleration looks like mm/s^2", pull, _MOST_GRAVITY, "m/s^2")
 
 
 def _payload(robot: Robot, bare: Robot) -> Iterator[Figure]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,13 +23,15 @@ if TYPE_CHECKING:
 _TURN = 2.0 * math.pi
 _ROUNDED = 1e-3
 _STATIONS = 401
+_EIGHTHS, _LARGEST_ROUNDING = 16, 2.0
+"""Angles in rad up to two turns are looked for, to three digits."""
 _OPEN = 1e5
 """A limit beyond this is written for "no limit"."""
 
 
 def of_task(task: Task) -> tuple[Remark, ...]:
     """Look at speeds and accelerations of the tool, and at the points that the path was fitted to."""
-    return (*remarks(_tool(task)), *_points(task))
+    return (*remarks(_tool(task)), *_angles(task), *_points(task))
 
 
 def of_places(
@@ -71,8 +74,11 @@ def _places(
                 usual, value = (2.0 if within else 1.0) * _TURN, float(values[np.argmax(np.abs(values))])
                 looks, shown = "the position looks like degrees", f"{value:.6g}"
                 yield Figure(f"{key}.{name}", looks, abs(value), usual + _ROUNDED, "rad", shown=shown)
-    if path_start is not None and YAW in task_map.rows:
-        yield Figure("path_start", "yaw looks like degrees", abs(path_start[-1]), _TURN, "rad")
+    if YAW in task_map.rows:
+        yaw = path.sample(np.linspace(0.0, 1.0, _STATIONS)).target[:, -1]
+        begins = 0.0 if path_start is None else abs(path_start[-1])
+        yield Figure("path_start", "yaw looks like degrees", begins, _TURN, "rad")
+        yield Figure("path", "the turn of yaw looks like degrees", float(np.ptp(yaw)), 2.0 * _TURN, "rad")
 
 
 def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:
@@ -101,6 +107,29 @@ def _tool(task: Task) -> Iterator[Figure]:
         limit = where.startswith("tool_limits")
         what, aside = ("limit", ", or null for no limit") if limit else ("speed", "")
         yield Figure(where, f"the {what} looks like {meant}", largest, most, unit, aside)
+
+
+def _angles(task: Task) -> Iterator[Remark]:
+    """Look for eighths of a turn in rad where degrees belong."""
+    robot = {key: getattr(task.robot, key).model_dump() for key in ("mounting", "tool_offset")}
+    path = [segment.model_dump(exclude={"bspline", "spline"}) for segment in task.path]
+    for key, degrees in _in_degrees("", {"robot": robot, "path": path}):
+        eighths = degrees / (0.125 * _TURN)
+        if 1 <= round(abs(eighths)) <= _EIGHTHS and abs(eighths - round(eighths)) < _ROUNDED * _LARGEST_ROUNDING:
+            usual = f"{math.degrees(degrees):.4g} deg for that angle"
+            yield Remark(key, "the angle looks like rad", f"{degrees:.6g} deg", usual)
+
+
+def _in_degrees(key: str, content: object) -> Iterator[tuple[str, float]]:
+    """Yield all numbers below keys that end in ``_deg``, with their dotted keys."""
+    if isinstance(content, Mapping):
+        for name, value in content.items():
+            yield from _in_degrees(f"{key}.{name}" if key else name, value)
+    elif isinstance(content, list | tuple):
+        for number, value in enumerate(content):
+            yield from _in_degrees(f"{key}[{number}]", value)
+    elif isinstance(content, float) and re.search(r"_deg(\[\d\])?$", key):
+        yield key, content
 
 
 def _points(task: Task) -> Iterator[Remark]:

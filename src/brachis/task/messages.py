@@ -230,6 +230,7 @@ _DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Complaint]
     "finite_number": _plain("not a finite number", "a finite number"),
     "greater_than": _plain("out of range", "> {gt:g}"),
     "greater_than_equal": _plain("out of range", ">= {ge:g}"),
+    "less_than": _plain("out of range", "< {lt:g}"),
     "less_than_equal": _plain("out of range", "<= {le:g}"),
     "literal_error": _plain("not one of the allowed values", "{expected}"),
     "too_short": _plain("too few items", "at least {min_length}"),
