@@ -167,7 +167,8 @@ class LimitSpec:
         dict[Name, TorqueCurve | None] | None,
         Field(
             description="Torque limits that fall with speed, by joint name: points [speed, torque] from speed 0 on, "
-            "joined by a line that never rises; the last slope goes on to zero torque. Absent or null: none."
+            "rad/s and N m at the joint (m/s, N), joined by a line that never rises; the last slope goes on to zero "
+            "torque. The same both ways, driving and braking. Absent or null: none."
         ),
     ] = None
     jerk: Annotated[OwnLimit, Field(description="Largest jerk, rad/s^3 (m/s^3). Absent or null: none.")] = None

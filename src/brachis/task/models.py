@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, JsonValue, Tag, field_validator, mod
 
 from brachis.task.boundary import BoundarySettings
 from brachis.task.bspline_curve import BSplineCurve
-from brachis.task.fields import Model, Name, Number, by_form, refuse
+from brachis.task.fields import Model, Name, Number, by_form, plain, refuse
 from brachis.task.planning_models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings
 from brachis.task.point_data import FitReport
 from brachis.task.robot_models import RobotSettings
@@ -151,6 +151,13 @@ class Task(Model):
     @field_validator("path", mode="before")
     @classmethod
     def _one_segment_is_a_path(cls, path: object) -> object:
+        rows = plain(path)
+        if isinstance(rows, list) and rows and all(isinstance(row, list) for row in rows):
+            found, allowed = (
+                f"{len(rows)} lists",
+                "segments; points go through csv, spline, or brachis.fit_path(points)",
+            )
+            raise refuse("points are no segments", found=found, allowed=allowed)
         return (path,) if isinstance(path, SegmentModel) else path
 
     @field_validator("path")

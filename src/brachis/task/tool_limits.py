@@ -103,7 +103,9 @@ class ToolLimits(Model):
         description="Largest speed at which the tool turns, rad/s; its free roll does not count. Null: none.",
     )
     process_speed: Annotated[tuple[ProcessSpeed, ...], BeforeValidator(_as_sequence)] = Field(
-        default=(), description="Parts of the path with a constant speed: {speed, s, tolerance}, or a list of such."
+        default=(),
+        description="Parts of the path with a constant speed: {speed, s, tolerance}, or a list of such, in order and "
+        "with a gap in between in which the speed may change.",
     )
 
     @field_validator("process_speed")
@@ -112,7 +114,9 @@ class ToolLimits(Model):
         for number in range(1, len(parts)):
             if parts[number].s[0] <= parts[number - 1].s[1]:
                 problem = "the parts of the path overlap, meet or are out of order"
-                allowed = f"a begin above {parts[number - 1].s[1]:g}, the end of the part before"
+                allowed = (
+                    f"a begin above {parts[number - 1].s[1]:g}; the part before ends there, and speeds change in a gap"
+                )
                 raise refuse(problem, key=f"[{number}].s", found=list(parts[number].s), allowed=allowed)
         return parts
 
