@@ -91,8 +91,8 @@ shows it without planning.
 robot stands for the `urdf` key, and what contradicts it is refused with its key.
 
 A `torque_speed` curve is that of the joint, not of its motor, and the same for driving and braking (a drive that brakes
-with more is planned too cautiously). A data sheet that states 3000 rpm at 1.27 N m, 4500 rpm without load, and a gear of
-1:50 with an efficiency of 0.8 is, with speed = rpm * 2 pi / 60 / ratio and torque = torque * ratio * efficiency,
+with more is planned too cautiously). A data sheet that states 3000 rpm at 1.27 N m, 4500 rpm without load, and a gear
+of 1:50 with an efficiency of 0.8 is, with speed = rpm * 2 pi / 60 / ratio and torque = torque * ratio * efficiency,
 
 ```yaml
 robot:
@@ -101,8 +101,8 @@ robot:
       j1: [[0, 50.8], [6.28, 50.8], [9.42, 0]]   # rad/s, N m: 3000 and 4500 rpm behind 1:50
 ```
 
-Figures that are allowed and hardly meant (degrees for rad, mm for m, g for kg, mNm for N m, rpm, factors above 10, an end time at the
-planner's least) are warned of on standard error and listed as `warnings` in the JSON and as `result.warnings`; with
+Figures that are allowed and hardly meant (degrees for rad, mm for m, g for kg, mNm for N m, rpm for rad/s, factors
+above 10, an end time at the planner's least) are warned of on standard error and listed as `warnings` in the JSON and as `result.warnings`; with
 `--strict`, or `brachis.plan(..., strict=True)`, they are errors.
 """
 
