@@ -102,8 +102,8 @@ robot:
 ```
 
 Figures that are allowed and hardly meant (degrees for rad, mm for m, g for kg, mNm for N m, rpm for rad/s, factors
-above 10, an end time at the planner's least) are warned of on standard error and listed as `warnings` in the JSON and as `result.warnings`; with
-`--strict`, or `brachis.plan(..., strict=True)`, they are errors.
+above 10, an end time at the planner's least) are warned of on standard error and listed as `warnings` in the JSON and
+as `result.warnings`; with `--strict`, or `brachis.plan(..., strict=True)`, they are errors.
 """
 
 LIMITS_FILE = """
