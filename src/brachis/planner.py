@@ -171,6 +171,7 @@ def _plan(
     places = plausibility.of_places(problem.task_map, problem.path, problem.start, problem.end, task.path_start)
     remarks += plausibility.tell(places, strict=strict, stacklevel=4)
     decompositions = decompositions_of(problem, families)
+    plausibility.check_within_reach(problem.task_map, problem.path)
     first = None if known is None else _first(problem, decompositions, known)
     warm = first if isinstance(first, Start) else None
     found = find_fastest(problem, decompositions, Stages(solved, finished), deadline, listener, warm)

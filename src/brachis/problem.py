@@ -25,7 +25,6 @@ from brachis.limits.process_ramps import with_ramps
 from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Boundary, FixedGrid, Grid, Phase, Program
 from brachis.path import Path, check_closed, path_of, path_speed, with_feed_rates
-from brachis.plausibility import check_within_reach
 from brachis.robot import ROLL_JOINT, Robot, TaskMap, bind
 from brachis.robot.task_map import JointSpace
 from brachis.summary import Summary
@@ -92,8 +91,6 @@ class Problem(Summary):
         limits = limits_of(robot, task, further)
         check_smoothness(limits, task.spline)
         check_postures(task_map, limits, start, end, path)
-        if not isinstance(task_map, JointSpace):
-            check_within_reach(task_map, path)
         if end is not None and not task.boundary.periodic:
             end = _on_path(task_map, end, path)
         return cls(task, robot, task_map, path, start, end, limits, tuple(further))

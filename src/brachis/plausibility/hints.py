@@ -38,12 +38,14 @@ def position_hint(value: float, lower: float, upper: float, unit: str) -> str | 
 
 
 def check_within_reach(task_map: TaskMap, path: Path) -> None:
-    """Refuse a path that is farther away than the arm's links and slides together can reach.
+    """Refuse a path of the tool that is farther away than the arm's links and slides together can reach.
 
     Raises
     ------
     PathError
     """
+    if not task_map.axes:  # of joints
+        return
     s = np.linspace(0.0, 1.0, _STATIONS)
     robot, axes = task_map.robot, list(task_map.axes)
     base = np.array(robot.model.jointPlacements[1].translation)[axes]
