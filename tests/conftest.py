@@ -76,6 +76,22 @@ def wall_clock(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(f"{module}.time", time)
 
 
+@pytest.fixture
+def rough_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures of few pixels and with no layout, which take a third of the time; tests of plots have the real ones."""
+    from brachis.plots import style  # noqa: PLC0415
+
+    honest = style.new_figure
+
+    def rough(width: float, height: float) -> Any:
+        figure = honest(width, height)
+        figure.set_layout_engine("none")
+        return figure
+
+    monkeypatch.setattr(style, "new_figure", rough)
+    monkeypatch.setattr("brachis.plots.save._DPI", 30)
+
+
 @pytest.fixture(scope="session")
 def scara_urdf() -> Path:
     """URDF of the planar arm that comes with brachis."""
