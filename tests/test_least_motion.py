@@ -46,7 +46,6 @@ def seven_joints() -> brachis.Task:
         "start": {"joints": [0.3, 0.6, 0.2, -1.3, 0.4, 0.9, 0.1]},
         "task_space": "position",
         "path": [{"line": {"by": [-0.1, 0.35, 0.2]}}],
-        "spline": {"intervals": 12},
         "search": {"effort": "single"},
     }
     return brachis.load_task(task)

@@ -147,7 +147,7 @@ def test_a_speed_table_is_a_staircase_of_cruises(slide):
 def arm():
     """The planar arm's task without any of these limits, and its motion."""
     task = brachis.load_task(ROOT / "examples/01_scara_line.yaml").to_dict()
-    task = {**task, "spline": {**task["spline"], "intervals": 12}, "search": QUICK}
+    task = {**task, "search": QUICK}
     return task, brachis.plan(task)
 
 
