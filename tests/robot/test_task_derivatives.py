@@ -66,6 +66,7 @@ def check_derivatives(task_map, q, qdot, qddot):
 
     exact = task_map.derivatives(task_map.twists(q), qdot, qddot)
     np.testing.assert_allclose(exact.velocity_q, by_joint(velocity, q), atol=1e-8)
+    np.testing.assert_allclose(task_map.velocity_slopes(task_map.twists(q), qdot), exact.velocity_q, atol=1e-14)
     np.testing.assert_allclose(exact.acceleration_q, by_joint(lambda p: acceleration(p, qdot), q), atol=1e-7)
     np.testing.assert_allclose(exact.acceleration_qdot, by_joint(lambda v: acceleration(q, v), qdot), atol=1e-7)
     assert min(np.abs(part).max() for part in (exact.velocity_q, exact.acceleration_q, exact.acceleration_qdot)) > 0.1

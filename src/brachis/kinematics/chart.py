@@ -258,7 +258,7 @@ class ChartMap:
         v = state.singular
         u = state.least[:, None] * np.einsum("kji,kj->ki", state.inverse, v)
         m = self.task_map.m
-        moved = self.task_map.derivatives(state.twists, v, np.zeros_like(v)).velocity_q
+        moved = self.task_map.velocity_slopes(state.twists, v)
         by_s = np.einsum("ki,kij,kj->k", u[:, m:], state.rows[1], v)
         by_q = np.einsum("ki,kij->kj", u[:, :m], moved)
         return by_q[:, None] / self._typical, by_s[:, None] / self._typical

@@ -47,5 +47,5 @@ class ToolSpeed:
         twists = self._tool.twists(motion.q)
         jacobian = self._tool.jacobian(twists)
         speed, along = direction(np.einsum("kij,kj->ki", jacobian, motion.qdot))
-        by_q = self._tool.derivatives(twists, motion.qdot, motion.qddot).velocity_q
+        by_q = self._tool.velocity_slopes(twists, motion.qdot)
         return speed, *(np.einsum("ki,kij->kj", along, part) for part in (by_q, jacobian))

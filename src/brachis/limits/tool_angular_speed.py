@@ -58,7 +58,7 @@ class ToolAngularSpeedLimit(Limit):
         twists, qdot = self._tool.twists(motion.q), motion.qdot * self._turning
         jacobian = self._jacobian(twists)
         _, along = direction(np.einsum("kij,kj->ki", jacobian, qdot))
-        by_q = self._tool.derivatives(twists, qdot, motion.qddot).velocity_q[:, _ANGULAR] / self._figure
+        by_q = self._tool.velocity_slopes(twists, qdot)[:, _ANGULAR] / self._figure
         return Partials(*(np.einsum("ki,kij->kj", along, part)[:, None] for part in (by_q, jacobian)))
 
     def lines(self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002

@@ -46,6 +46,10 @@ class JointSpace(TaskMap):
         """See `TaskMap.bias`."""
         return np.zeros_like(qdot)
 
+    def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:  # noqa: ARG002
+        """See `TaskMap.velocity_slopes`."""
+        return np.zeros((len(qdot), self.m, self.m))
+
     def derivatives(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:  # noqa: ARG002
         """See `TaskMap.derivatives`."""
         zeros = np.zeros((len(qdot), self.m, self.m))

@@ -12,7 +12,7 @@ import pinocchio as pin
 from brachis.errors import InputError
 from brachis.robot.task_map.protocol import TaskDerivatives, TaskMap
 from brachis.robot.task_map.rows import AXES, POSE_ROWS
-from brachis.robot.task_map.twists import tool_bias, tool_motion
+from brachis.robot.task_map.twists import tool_bias, tool_motion, velocity_slopes
 
 _POSITIONS = 3
 _UNIT = 1e-2
@@ -67,6 +67,10 @@ class Pose(TaskMap):
     def bias(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
         """See `TaskMap.bias`."""
         return tool_bias(twists, qdot)[1].T
+
+    def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
+        """See `TaskMap.velocity_slopes`."""
+        return self.jacobian(velocity_slopes(twists, qdot)[1])
 
     def derivatives(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:
         """See `TaskMap.derivatives`."""

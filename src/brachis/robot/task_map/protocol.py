@@ -144,5 +144,9 @@ class TaskMap(Summary, ABC):
         """Velocity-dependent task acceleration Jdot qdot, (K, m), from the `twists` at K postures."""
 
     @abstractmethod
+    def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
+        """V_q alone, (K, m, n), of K states from the `twists` at their postures."""
+
+    @abstractmethod
     def derivatives(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:
         """V_q, A_q and A_v of K states from the `twists` at their postures; see `twists`."""

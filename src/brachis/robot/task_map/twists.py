@@ -54,6 +54,12 @@ def tool_motion(twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> Tool
     return ToolMotion(velocity, acceleration, velocity_q, acceleration_q, acceleration_qdot)
 
 
+def velocity_slopes(twists: np.ndarray, qdot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """V, (6, K, 1), and dV/dq, (6, K, n), from the `twists` (6, K, n) at K postures and speeds (K, n)."""
+    before, velocity = _sums(twists * qdot)
+    return velocity, _bracket(before, twists)
+
+
 def tool_bias(twists: np.ndarray, qdot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """V and Jdot qdot, both (6, K), from the `twists` (6, K, n) at K postures."""
     before, velocity = _sums(twists * qdot)

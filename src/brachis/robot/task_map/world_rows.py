@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from brachis.arrays import cross
 from brachis.robot.task_map.protocol import TaskDerivatives, TaskMap
-from brachis.robot.task_map.twists import tool_bias, tool_motion, turned
+from brachis.robot.task_map.twists import tool_bias, tool_motion, turned, velocity_slopes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,6 +41,11 @@ class WorldRows(TaskMap):
         velocity, acceleration = tool_bias(twists, qdot)
         acceleration[:3] += cross(velocity[3:], velocity[:3])
         return self.rates(acceleration).T
+
+    def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
+        """See `TaskMap.velocity_slopes`."""
+        velocity, slopes = velocity_slopes(twists, qdot)
+        return self.jacobian(slopes + turned(twists[3:], velocity))
 
     def derivatives(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:
         """See `TaskMap.derivatives`."""
