@@ -136,7 +136,7 @@ def test_its_tolerance_costs_what_is_said(result):
     assert entry.sensitivity.bound.end == "upper"
     assert entry.re_solved == pytest.approx(entry.predicted, rel=0.05)
     assert entry.re_solved < -2e-5
-    assert "more room at the upper end of tool process speed" in str(report)
+    assert "more tolerance above the process speed" in str(report)
 
 
 def test_a_part_soon_after_the_start_is_reached_over_few_knots():

@@ -124,7 +124,7 @@ class _Search:
         listener: Listener,
     ) -> None:
         self._decompositions, self._stages, self._deadline, self._listener = decompositions, stages, deadline, listener
-        self._problem, self._task = problem, problem.task
+        self._task = problem.task
         self._jobs = processes(self._task.search.jobs)
         self.record = Record(refined=self._task.refinement.max_rounds > 0)
 
@@ -156,7 +156,7 @@ class _Search:
         limit = self._deadline.part(_COARSE_SHARE).within(_LEAST_SHARE)
         record = self.record
         record.too_fast = out_of_reach(record.attempts, lambda start: self._stages.solve(start, limit, self._listener))
-        if record.too_fast is not None and unlikely(record.too_fast, self._problem):
+        if record.too_fast is not None and unlikely(record.too_fast):
             raise record.too_fast.error
 
     def _solve(self, batch: Batch) -> list[Numbered]:

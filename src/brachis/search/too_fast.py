@@ -96,10 +96,9 @@ def out_of_reach(attempts: Sequence[Attempt], solve: Callable[[Start], Attempt])
     return _falling_short(start.problem, moments, "in the fastest motion without it")
 
 
-def unlikely(found: TooFast | None, problem: Problem) -> bool:
-    """Tell whether what a plan falls short of is so much that no other joint path will make up for it."""
-    redundant = problem.robot.n > problem.task_map.m
-    return found is not None and found.share < (_UNLIKELY if redundant else _EXACT)
+def unlikely(found: TooFast | None) -> bool:
+    """Tell whether a plan falls short by so much that no other joint path, and no more knots, will make up for it."""
+    return found is not None and found.share < _UNLIKELY
 
 
 def _others(problem: Problem) -> Iterator[Limit]:
