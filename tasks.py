@@ -39,7 +39,7 @@ COMMANDS = {
     "types": [["mypy"]],
     "bench": [["python", "-m", "pytest", "benchmarks", "-p", "no:xdist"], ["python", "benchmarks/growth.py"]],
     "docs": [
-        ["python", "-m", "sphinx", "-q", "-E", "-W", "--keep-going", "docs", "out/site"],
+        ["python", "-m", "sphinx", "-q", "-j", "auto", "-E", "-W", "--keep-going", "docs", "out/site"],
         ["python", "docs/check_links.py", "out/site"],
     ],
 }

@@ -46,5 +46,6 @@ def _isolated_clone(folder: Path) -> None:
     os.environ["IPYTHONDIR"] = str(folder / ".ipython")
 
 
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else every page would compile the package
 _CLONE = tempfile.TemporaryDirectory(prefix="brachis-docs-")  # until Sphinx ends
 _isolated_clone(Path(_CLONE.name))

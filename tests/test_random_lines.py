@@ -13,7 +13,7 @@ import pytest
 import brachis
 
 ROOT = Path(__file__).parents[1]
-COUNT, PARTS = 12, 4
+COUNT, PARTS = 8, 4
 
 
 @pytest.mark.parametrize("part", range(PARTS))

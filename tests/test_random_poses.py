@@ -1,4 +1,4 @@
-"""Random reachable pose lines for every spatial robot: nearly all end in a verified plan, the rest say why.
+"""Random reachable pose lines for every spatial robot: these end in a verified plan.
 
 The full count, 100 for each robot, is `benchmarks/random_poses.py`.
 """
@@ -13,7 +13,7 @@ import pytest
 import brachis
 
 ROOT = Path(__file__).parents[1]
-COUNT, SEED = 3, 1
+COUNT, SEED = 2, 1
 """With seed 0 the second line of the TX90L takes its whole time limit; no test waits for that."""
 
 
@@ -31,6 +31,4 @@ def test_random_reachable_pose_lines(bench, name):
     choices = bench.closed_forms(robot)
     assert len(choices) >= 4
     reasons = [bench.tried(robot, task) for task in bench.random_tasks(robot, SEED, COUNT, choices)]
-    failed = [reason for reason in reasons if reason]
-    assert len(failed) <= 1, failed
-    assert all(len(reason) > 30 for reason in failed)
+    assert reasons == [""] * COUNT

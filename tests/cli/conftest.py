@@ -31,7 +31,7 @@ class Outcome:
 
 
 @pytest.fixture(autouse=True)
-def own_interrupts() -> Iterator[None]:
+def own_interrupts(rough_figures: None) -> Iterator[None]:  # noqa: ARG001
     with interrupts_kept():
         yield
 
@@ -69,8 +69,8 @@ def quick_task() -> dict:
 
 @pytest.fixture
 def task() -> dict:
-    """The first example as a mapping, with an absolute URDF path, planned from one start: it has one optimum."""
-    return quick_task()
+    """The first example with few intervals as a mapping, with an absolute URDF path, planned from its one start."""
+    return quick_task() | {"spline": {"intervals": 8}}
 
 
 @dataclass(frozen=True)

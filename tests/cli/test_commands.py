@@ -55,6 +55,7 @@ def test_plan_writes_what_it_says(planned):
 
 
 def test_plan_for_people(run, task, write):
+    task["spline"]["intervals"] = 20
     outcome = run("plan", write(task))
     assert outcome.code == 0
     for part in ("end time t_E", "2.47", "verification: passed", "torque ratio", "torque jump"):

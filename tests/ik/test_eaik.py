@@ -42,7 +42,7 @@ PER_SIGN = 8
 class Bench:
     """Random postures of a robot, their poses, and the solver for some redundant joints."""
 
-    def __init__(self, robot, redundant, postures=2000, seed=5):
+    def __init__(self, robot, redundant, postures=600, seed=5):
         self.robot, self.redundant = robot, list(redundant)
         self.space = task_map_of(robot, "pose")
         self.rest = [i for i in range(robot.n) if i not in redundant]
@@ -178,7 +178,7 @@ def test_margins_vanish_where_answers_merge(robot, redundant, elbow):
 
 @pytest.mark.parametrize(("robot", "redundant"), [(ur, ()), (iiwa, (1,)), (panda_lengths, (3,)), (rail_arm, (0,))])
 def test_continuity_follows_a_posture_among_answers_of_its_label(robot, redundant):
-    bench = Bench(robot(), redundant, 300)
+    bench = Bench(robot(), redundant, 150)
     t = np.linspace(0.0, 1.0, 301)[:, None]
     followed = 0
     for start in bench.q:

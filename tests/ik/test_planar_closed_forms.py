@@ -20,7 +20,7 @@ ROWS = {
     "xz": (["x", "z"], ["x", "z", "yaw"], ["z"]),
     "tilted": (["x", "y"], ["z", "y"], ["z"]),
 }
-POSTURES = {"xy": 400, "xz": 500, "tilted": 200}
+POSTURES = {"xy": 150, "xz": 150, "tilted": 100}
 CASES = [
     pytest.param(pattern, plane, rows, id=f"{pattern}-{plane}-{'+'.join(rows)}")
     for plane, choices in ROWS.items()

@@ -68,7 +68,7 @@ def test_every_answer_is_right_and_none_is_left_out(name):
     # Every pose has as many answers of one sign as of the other.
     finite = np.isfinite(solved).all(axis=2)
     balanced = finite[:, :6].sum(axis=1) == finite[:, 6:].sum(axis=1)
-    assert np.count_nonzero(~balanced) <= 2
+    assert np.count_nonzero(~balanced) <= 1
     assert set(np.unique(finite.sum(axis=1)[balanced])) >= {2, 4, 6}
     bench.check_gradient()
 
@@ -129,8 +129,8 @@ def test_postures_with_right_angles(name, noise):
     q = np.where(rng.random(bench.q.shape) < 0.5, special, bench.q) + noise * rng.normal(size=bench.q.shape)
     nearest, margin = own_class(bench, bench.answers(q), q)
     regular = margin > 1e-3
-    assert np.count_nonzero(regular) > 1000
-    assert np.count_nonzero(nearest[regular] > 1e-6) <= 2  # yet more answers coincide there
+    assert np.mean(regular) > 0.5
+    assert np.count_nonzero(nearest[regular] > 1e-6) <= 1  # yet more answers coincide there
 
 
 def test_resultant_is_of_degree_six_and_vanishes_at_the_posture():

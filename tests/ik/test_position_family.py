@@ -26,7 +26,7 @@ X, Y, Z = np.eye(3)
 ROBOTS = Path(__file__).parents[2] / "robots"
 
 
-def bench(robot, redundant, postures=2000, rows="position"):
+def bench(robot, redundant, postures=800, rows="position"):
     return Bench(robot, redundant, postures, family=positioning, rows=rows)
 
 

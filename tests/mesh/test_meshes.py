@@ -44,7 +44,7 @@ def solve(program, x):
     return solver_named("uno")[0].solve(program, x, SolverOptions(), None)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def solved():
     """Problem of 10 even intervals, and its solve."""
     program, _ = brachis.transcribe(robot(), task(intervals=10))

@@ -9,7 +9,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from brachis.errors import InputError
-from brachis.plots import PLOTS, SUFFIXES, plot_comparison, plot_torques, save_figure, style
+from brachis.plots import PLOTS, SUFFIXES, plot_torques, save_figure, style
 
 MAGIC = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
 
@@ -49,11 +49,14 @@ def test_a_missing_folder_is_named(tmp_path):
 @pytest.mark.parametrize(
     ("name", "width"), [("torques", 89.0), ("postures", 89.0), ("motion", 89.0), ("overview", 183.0)]
 )
-def test_figures_have_the_width_of_journal_columns(line_trajectory, tmp_path, name, width):
-    path = tmp_path / "figure.png"
-    save_figure(PLOTS[name](line_trajectory), path)
-    pixels = struct.unpack(">I", path.read_bytes()[16:20])[0]
-    assert pixels == pytest.approx(width / 25.4 * 300.0, abs=1.0)
+def test_figures_have_the_width_of_journal_columns(line_trajectory, name, width):
+    assert PLOTS[name](line_trajectory).get_figwidth() == pytest.approx(width / 25.4)  # inches
+
+
+def test_pixels_are_those_of_300_dpi(line_trajectory, tmp_path):
+    save_figure(plot_torques(line_trajectory), tmp_path / "figure.png")
+    pixels = struct.unpack(">I", (tmp_path / "figure.png").read_bytes()[16:20])[0]
+    assert pixels == pytest.approx(89.0 / 25.4 * 300.0, abs=1.0)
 
 
 @pytest.mark.parametrize("name", sorted(PLOTS))
@@ -83,14 +86,6 @@ def test_pdf_fonts_are_truetype_and_svg_text_is_text(line_trajectory, tmp_path):
     assert re.search(r"<text[^>]*>j1</text>", (tmp_path / "figure.svg").read_text(encoding="utf-8"))
 
 
-def test_matplotlib_settings_are_left_alone(line_trajectory, tmp_path):
-    before = dict(mpl.rcParams)
-    for name, plot in PLOTS.items():
-        save_figure(plot(line_trajectory), tmp_path / f"{name}.svg")
-    save_figure(plot_comparison([(0.0, "j1", 1.0)]), tmp_path / "comparison.pdf")
-    assert dict(mpl.rcParams) == before
-
-
 def test_joints_are_told_apart():
     looks = {(look["color"], look["linestyle"]) for look in map(style.joint_style, range(21))}
     assert len(looks) == 21
@@ -110,18 +105,22 @@ LAZY = """
 import sys
 import brachis.plots, brachis.export
 assert "matplotlib" not in sys.modules, "imported with the package"
+import matplotlib
+before = dict(dict.items(matplotlib.rcParams))  # whose own items would choose a backend
 from brachis.trajectory import Trajectory
-from brachis.plots import PLOTS, plot_comparison, save_figure
+from brachis.plots import PLOTS, plot_comparison, save, save_figure
+save._DPI = 30
 trajectory = Trajectory.load(sys.argv[1])
 for name, plot in PLOTS.items():
     save_figure(plot(trajectory), f"{sys.argv[2]}/{name}.png")
 save_figure(plot_comparison([(0.0, "j1", 1.0)]), f"{sys.argv[2]}/comparison.pdf")
+assert dict(dict.items(matplotlib.rcParams)) == before, "settings of Matplotlib were changed"
 assert "matplotlib.figure" in sys.modules
 assert "matplotlib.pyplot" not in sys.modules, "pyplot was imported"
 """
 
 
-def test_matplotlib_is_imported_late_and_pyplot_never(line_trajectory, tmp_path):
+def test_matplotlib_is_imported_late_and_left_as_it_is_and_pyplot_never(line_trajectory, tmp_path):
     line_trajectory.save(tmp_path / "result.npz")
     arguments = [sys.executable, "-W", "error", "-c", LAZY, str(tmp_path / "result.npz"), str(tmp_path)]
     run = subprocess.run(arguments, capture_output=True, text=True, check=False)

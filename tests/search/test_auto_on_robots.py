@@ -68,7 +68,7 @@ def test_closed_forms_are_left_for_the_last_and_thorough_looks_at_polynomials_to
     assert names["thorough"] == names["fast"] | {"joint_4", "joint_5", "joint_6"}
 
 
-@pytest.mark.parametrize(("name", "count"), [("scara3", 6), ("tx90l_rail", 2), ("ur10_rail", 2), ("iiwa14", 2)])
+@pytest.mark.parametrize(("name", "count"), [("scara3", 3), ("tx90l_rail", 1), ("ur10_rail", 1), ("iiwa14", 1)])
 def test_random_postures_and_lines_with_everything_left_open(bench, name, count):
     robot = {"scara3": bench.planar_arm()}.get(name) or brachis.Robot.from_urdf(ROOT / f"robots/{name}/robot.urdf")
     tasks = list(bench.tasks(name, robot, seed=1, count=count))

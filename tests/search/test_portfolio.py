@@ -53,6 +53,18 @@ def task(**changes: Any) -> dict[str, Any]:
     } | changes
 
 
+@pytest.fixture(scope="module")
+def usual(robot) -> brachis.Result:
+    """Of the task as it is."""
+    return brachis.plan(robot, task())
+
+
+@pytest.fixture(scope="module")
+def from_anywhere(robot) -> brachis.Result:
+    """Of a free start."""
+    return brachis.plan(robot, task(start="free", path_start=HERE))
+
+
 def to_nine_digits(result: brachis.Result) -> list[dict[str, Any]]:
     """Candidates with their times to nine digits; the last ones differ from process to process."""
     rows = [candidate.to_dict() for candidate in result.candidates]
@@ -63,8 +75,8 @@ def to_nine_digits(result: brachis.Result) -> list[dict[str, Any]]:
     ("asked", "choices"),
     [({}, {()}), (EVERY_CHOICE, {("j1",), ("j2",), ("j3",)}), ({"redundant_joints": ["j1"]}, {("j1",)})],
 )
-def test_every_candidate_is_listed_the_fastest_first(robot, asked, choices):
-    result = brachis.plan(robot, task(**asked))
+def test_every_candidate_is_listed_the_fastest_first(robot, usual, asked, choices):
+    result = brachis.plan(robot, task(**asked)) if asked else usual
     first = result.candidates[0]
     assert first.verified
     assert first.t_end == result.t_end
@@ -86,16 +98,16 @@ def test_every_candidate_is_listed_the_fastest_first(robot, asked, choices):
 
 @pytest.mark.usefixtures("wall_clock")
 @pytest.mark.parametrize("asked", [{}, BRANCH])
-def test_the_same_candidates_whatever_the_number_of_processes(robot, asked):
-    one = brachis.plan(robot, task(search={"jobs": 1}, **asked))
+def test_the_same_candidates_whatever_the_number_of_processes(robot, usual, asked):
+    one = brachis.plan(robot, task(search={"jobs": 1}, **asked)) if asked else usual
     two = brachis.plan(robot, task(search={"jobs": 2}, **asked))
     assert one.t_end == pytest.approx(two.t_end, rel=1e-9)
     assert to_nine_digits(one) == to_nine_digits(two)
     np.testing.assert_allclose(one.trajectory.control_points, two.trajectory.control_points, atol=1e-7)
 
 
-def test_more_effort_is_never_slower(robot):
-    fast = brachis.plan(robot, task())
+def test_more_effort_is_never_slower(robot, usual):
+    fast = usual
     single = brachis.plan(robot, task(search={"effort": "single"}))
     thorough = brachis.plan(robot, task(search={"effort": "thorough"}))
     assert len(single.candidates) == 1
@@ -103,11 +115,10 @@ def test_more_effort_is_never_slower(robot):
     assert thorough.t_end <= fast.t_end * (1.0 + 2e-4) <= single.t_end * (1.0 + 4e-4)
 
 
-def test_a_free_start_is_faster_and_on_the_path(robot):
-    given = brachis.plan(robot, task())
-    free = brachis.plan(robot, task(start="free", path_start=HERE))
+def test_a_free_start_is_faster_and_on_the_path(robot, usual, from_anywhere):
+    free = from_anywhere
     assert free.verified
-    assert free.t_end < 0.9 * given.t_end
+    assert free.t_end < 0.9 * usual.t_end
     begun = robot.tool_placement(free.trajectory.position(0.0)).translation[:2]
     np.testing.assert_allclose(begun, HERE, atol=1e-9)
     assert {candidate.branch for candidate in free.candidates} == {CHART}
@@ -138,8 +149,8 @@ def test_a_free_start_needs_a_place_and_no_numeric_guess(robot):
         brachis.plan(robot, task(start="free", path_start=HERE, search={"guesses": "numeric"}))
 
 
-def test_an_end_posture_with_a_free_start(robot):
-    free = brachis.plan(robot, task(start="free", path_start=HERE))
+def test_an_end_posture_with_a_free_start(robot, from_anywhere):
+    free = from_anywhere
     end = free.trajectory.position(free.t_end)
     result = brachis.plan(robot, task(start="free", path_start=HERE, end={"joints": list(end)}))
     assert result.verified
@@ -301,13 +312,13 @@ def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(robot, c
     assert len(calls) == 5
 
 
-def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(robot, clock):
+def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(robot, usual, clock):
     clock.jump(PostureLattice, "_first_layer", at=2)
     result = brachis.plan(robot, task(search={"effort": "thorough"}))
     assert result.verified
     assert result.interrupted
     assert "the lattice of all postures was not searched to its end" in result.undone
-    assert len(result.candidates) == len(brachis.plan(robot, task(search={"time_limit": 600.0})).candidates)
+    assert len(result.candidates) == len(usual.candidates)
 
 
 def test_a_time_limit_that_is_too_short_says_what_was_left_undone(robot, clock):
@@ -380,8 +391,8 @@ def test_more_processes_than_processors_are_not_made(robot, monkeypatch):
     assert brachis.plan(robot, task(search={"jobs": 100_000}, redundant_joints=["j1"])).verified
 
 
-def test_the_rule_that_leaves_plans_unfinished_loses_nothing(robot, monkeypatch):
-    ruled = brachis.plan(robot, task())
+def test_the_rule_that_leaves_plans_unfinished_loses_nothing(robot, usual, monkeypatch):
+    ruled = usual
     (fast,) = SEARCH_LEVELS["fast"]
     monkeypatch.setitem(SEARCH_LEVELS, "fast", (dataclasses.replace(fast, refined=100),))
     monkeypatch.setattr(record, "_WORTH_IT", -100.0)

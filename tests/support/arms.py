@@ -159,7 +159,7 @@ def zero_crossing(function: Callable[[np.ndarray], np.ndarray], q: np.ndarray) -
 class PoseBench:
     """Random postures of a robot, their poses, and a family's solver for some redundant joints."""
 
-    def __init__(self, family: Family, robot: Robot, redundant: Sequence[int], postures: int = 2000, seed: int = 5):
+    def __init__(self, family: Family, robot: Robot, redundant: Sequence[int], postures: int = 800, seed: int = 5):
         self.robot, self.redundant = robot, list(redundant)
         self.space = task_map_of(robot, "pose")
         self.geometry = ChainGeometry.of(robot)

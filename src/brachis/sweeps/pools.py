@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Future
 from typing import Any
 
@@ -21,7 +21,7 @@ from brachis.sweeps.completed import AHEAD, HEARTBEAT, as_completed
 from brachis.sweeps.plans import Plan
 from brachis.sweeps.worker import Outcome, planned
 
-Pool = Callable[[Iterable[Plan]], Iterator[tuple[Plan, Outcome]]]
+Pool = Callable[[Sequence[Plan]], Iterator[tuple[Plan, Outcome]]]
 
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS"), "1"
@@ -50,7 +50,7 @@ def pool_for(jobs: int | None, scheduler: str | None, listener: Callable[[str], 
     if scheduler is None:
         wanted = None if jobs is None else count(jobs, "jobs")
         processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        return lambda plans: in_processes(plans, min(wanted or processors, processors))
+        return lambda plans: in_processes(plans, min(wanted or processors, processors, max(len(plans), 1)))
     if jobs is not None:
         raise InputError(
             "a cluster has as many processes as it has workers", where="jobs", found=jobs, allowed="jobs or scheduler"

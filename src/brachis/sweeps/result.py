@@ -54,6 +54,7 @@ class SweepResult(Summary):
     ...         "grid": {"spline.intervals": [6, 7]},
     ...     },
     ...     tempfile.mkdtemp(),
+    ...     jobs=1,
     ... )
     >>> [row["spline.intervals"] for row in found.ranked()]
     [7, 6]

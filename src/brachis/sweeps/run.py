@@ -80,6 +80,7 @@ def sweep(
     ...         "grid": {"path.0.line.angle_deg": [90, 270]},
     ...     },
     ...     tempfile.mkdtemp(),
+    ...     jobs=1,
     ... )
     >>> found.table.column("status").to_pylist()
     ['verified', 'verified']
