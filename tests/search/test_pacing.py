@@ -1,4 +1,4 @@
-"""Knots where a motion with a least speed changes its speed, and evenly where it does not."""
+"""First guesses, and knots where a motion with a least speed changes its speed, and evenly where it does not."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from brachis import transcribe
+from brachis.examples import scara_line
+from brachis.nlp import guess
 from brachis.search import pacing
 from brachis.task import load_task
 
@@ -40,3 +43,16 @@ def test_knots_are_closer_where_the_speed_changes(monkeypatch):
     assert np.abs(np.diff(np.log(lengths[1:-1]))).max() < np.log(5.0), "and not too different from their neighbours"
     assert found[0] == 0.0
     assert found[-1] == 1.0
+
+
+@pytest.mark.parametrize(("estimate", "expected"), [(0.5, 0.5), (50.0, None), (np.inf, None)])
+def test_a_first_guess_takes_no_longer_than_the_least_time(estimate, expected):
+    program, _ = transcribe(scara_line, redundant_joints=["j1"])
+    postures = np.column_stack([np.linspace(0.0, 1.0, 50), np.zeros(50)])
+    start = SimpleNamespace(
+        problem=SimpleNamespace(limits=(), end_rates=(0.0, 0.0)), timed=False, joint_path=postures, estimate=estimate
+    )
+    x = pacing.first_point(program, start)
+    within = guess.starting_point(program, [postures])
+    assert program.end_time(x) == pytest.approx(expected or program.end_time(within))
+    np.testing.assert_array_equal(x[1:], within[1:])

@@ -46,8 +46,6 @@ _PLACES = 33
 """Places along the reference at which its typical least singular value is taken."""
 _SINGULAR = 1e-9
 """A reference with a smaller least singular value is singular all along; its chart has no margin anywhere."""
-_SUBSTEPS = 6
-"""Steps in which sigma is led away from the reference where one does not find a posture."""
 
 
 @dataclass(frozen=True)
@@ -169,14 +167,7 @@ class ChartMap:
         reference, sigma, null_motion = self._between(s)
         aside = np.einsum("kij,kj->ki", null_motion, y[:, 1:] - sigma)
         near_enough = np.abs(aside).max(axis=1, initial=0.0) < _NEAR
-        q = self._newton.solve(targets, np.where(near_enough[:, None], reference + aside, reference), rows, wanted)
-        lost = np.flatnonzero(np.isnan(q).any(axis=1))
-        if len(lost):
-            begun, own = np.einsum("kij,kj->ki", rows[lost], reference[lost]), reference[lost]
-            for part in np.linspace(0.0, 1.0, _SUBSTEPS + 1):
-                own = self._newton.solve(targets[lost], own, rows[lost], begun + part * (wanted[lost] - begun))
-            q[lost] = own
-        return q
+        return self._newton.solve(targets, np.where(near_enough[:, None], reference + aside, reference), rows, wanted)
 
     def state(
         self,
