@@ -21,7 +21,7 @@ from brachis.feasibility import (
 )
 from brachis.kinematics import ChartMap, ClosedFormMap, JointMap, Newton
 from brachis.limits import Limit, limits_of
-from brachis.limits.process_ramps import with_ramps
+from brachis.limits.process_ramps import approach_of
 from brachis.mesh import COARSE_INTERVALS
 from brachis.nlp import Boundary, FixedGrid, Grid, Phase, Program
 from brachis.path import Path, check_closed, path_of, path_speed, with_feed_rates
@@ -87,8 +87,8 @@ class Problem(Summary):
         if task.boundary.periodic:
             check_closed(task_map, path)
             end = start
-        task = with_ramps(task, robot, task_map, path, end if start is None else start)
-        limits = limits_of(robot, task, further)
+        approach = approach_of(task, robot, task_map, path, end if start is None else start)
+        limits = limits_of(robot, task, further, approach)
         check_smoothness(limits, task.spline)
         check_postures(task_map, limits, start, end, path)
         if end is not None and not task.boundary.periodic:

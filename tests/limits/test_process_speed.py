@@ -75,7 +75,7 @@ def test_the_speed_is_constant_within_its_tolerance_and_reached_and_left_fast(re
     assert fastest <= result.t_end < 1.1 * fastest
 
 
-@pytest.mark.parametrize("speed", [1.0, 0.3])
+@pytest.mark.parametrize("speed", [1.0, 0.3, 0.1])
 def test_with_enough_knots_it_is_the_optimum(speed):
     fastest = leg(BEGIN * LENGTH, 1.01 * speed) + leg((1.0 - END) * LENGTH, 1.01 * speed)
     fastest += (END - BEGIN) * LENGTH / (1.01 * speed)

@@ -39,10 +39,20 @@ def test_knots_are_closer_where_the_speed_changes(monkeypatch):
     lengths, place = np.diff(found), 0.2  # at s = 0.5 in normalised time
     near = np.abs(0.5 * (found[1:] + found[:-1]) - place) < 0.02
     assert np.abs(found - place).min() < 0.01
-    assert lengths[near].min() < 0.1 * lengths[~near].min()
+    assert lengths[near].max() < 0.1 * lengths.max()
     assert np.abs(np.diff(np.log(lengths[1:-1]))).max() < np.log(5.0), "and not too different from their neighbours"
     assert found[0] == 0.0
     assert found[-1] == 1.0
+
+
+def test_intervals_grow_by_half_with_their_distance_from_a_switch():
+    found = pacing._graded(np.array([0.0, 0.3, 1.0]), 24)
+    lengths, middle = np.diff(found), 0.5 * (found[1:] + found[:-1])
+    away = np.abs(middle[:, None] - [0.0, 0.3, 1.0]).min(axis=1)
+    assert len(lengths) == 24
+    assert (lengths > 0.0).all()
+    grown = np.polyfit(away, lengths, 1)[0]
+    assert grown == pytest.approx(0.5, rel=0.1)
 
 
 @pytest.mark.parametrize(("estimate", "expected"), [(0.5, 0.5), (50.0, None), (np.inf, None)])

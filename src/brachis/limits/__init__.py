@@ -33,6 +33,7 @@ from brachis.limits import (
 )
 from brachis.limits.checks import bound_limits
 from brachis.limits.protocol import (
+    Approach,
     Bound,
     JointMotion,
     Label,
@@ -67,7 +68,9 @@ TABLE: dict[str, Build] = {
 }
 
 
-def limits_of(robot: Robot, task: Task, further: Sequence[LimitModel] = ()) -> tuple[Limit, ...]:
+def limits_of(
+    robot: Robot, task: Task, further: Sequence[LimitModel] = (), approach: Approach | None = None
+) -> tuple[Limit, ...]:
     """List the limits of a task on a robot.
 
     Parameters
@@ -76,6 +79,8 @@ def limits_of(robot: Robot, task: Task, further: Sequence[LimitModel] = ()) -> t
     task : Task
     further : sequence of LimitModel, optional
         A user's own, beside those of the table and of the task's ``custom_limits``.
+    approach : Approach, optional
+        How speeds are reached along the path; bounds of parts of the path set in at once where it is left out.
 
     Returns
     -------
@@ -88,12 +93,15 @@ def limits_of(robot: Robot, task: Task, further: Sequence[LimitModel] = ()) -> t
         A limit of the user's own does not fit the robot, or is none (see `bound_limits`).
     """
     built = tuple(limit for build in TABLE.values() if (limit := build(robot, task)) is not None)
+    if approach is not None:
+        built = tuple(limit.along(approach) for limit in built)
     named = bound_limits(custom_limits(task), robot, built, "custom_limits")
     return (*built, *named, *bound_limits(further, robot, (*built, *named), "own_limits"))
 
 
 __all__ = [
     "TABLE",
+    "Approach",
     "Bound",
     "JointMotion",
     "Label",

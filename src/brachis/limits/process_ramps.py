@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from brachis.errors import InputError
@@ -17,8 +19,29 @@ _PLANE = 2
 """Rows of the position from which on the path alone says how fast the tool is."""
 
 
-def with_ramps(task: Task, robot: Robot, task_map: TaskMap, path: Path, posture: np.ndarray | None) -> Task:
-    """Return the task with the ways, in s, on which its process speeds are reached from rest.
+@dataclass(frozen=True)
+class FromRest:
+    """How a robot comes to a speed along its path: an `Approach`.
+
+    Attributes
+    ----------
+    task_map : TaskMap
+    path : Path
+    acceleration : float
+        The tool's largest one from rest, m/s^2.
+    """
+
+    task_map: TaskMap
+    path: Path
+    acceleration: float
+
+    def way(self, speed: float, s: float) -> float:
+        """See `Approach.way`."""
+        return 0.5 * speed**2 / self.acceleration / max(_tool_path_speed(self.task_map, self.path, s), _STILL)
+
+
+def approach_of(task: Task, robot: Robot, task_map: TaskMap, path: Path, posture: np.ndarray | None) -> FromRest | None:
+    """Find out how process speeds are reached; None where the task has none.
 
     Parameters
     ----------
@@ -37,16 +60,11 @@ def with_ramps(task: Task, robot: Robot, task_map: TaskMap, path: Path, posture:
     """
     tool = task.tool_limits
     if not tool.process_speed:
-        return task
-    q = _middle(robot) if posture is None else posture
-    largest = min(largest_acceleration(robot, q), tool.acceleration or np.inf)
-    parts = []
-    for number, part in enumerate(tool.process_speed):
-        lengths = [_tool_path_speed(task_map, path, s) for s in part.s]
+        return None
+    for number in range(len(tool.process_speed)):
         _check_ends(task, task_map, path, number)
-        ramps = tuple(0.5 * part.speed**2 / largest / max(length, _STILL) for length in lengths)
-        parts.append(part.model_copy(update={"ramps": ramps}))
-    return task.model_copy(update={"tool_limits": tool.model_copy(update={"process_speed": tuple(parts)})})
+    largest = largest_acceleration(robot, _middle(robot) if posture is None else posture)
+    return FromRest(task_map, path, min(largest, tool.acceleration or np.inf))
 
 
 def largest_acceleration(robot: Robot, posture: np.ndarray) -> float:

@@ -14,11 +14,13 @@ the corner alone holds back, over the way w, by about 0.06 w^2 / l v of time.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 
-from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials, PhaseLines, Role
+from brachis.limits.protocol import Approach, Bound, JointMotion, Label, Limit, Partials, PhaseLines, Role
 from brachis.limits.tool import ToolSpeed
 from brachis.robot import Robot
 from brachis.task import ProcessSpeed, Task
@@ -27,10 +29,8 @@ _STEEPNESS = 2.0
 """So many times as steep as the largest acceleration the bounds give way beside a part."""
 _COST = 2e-3
 """The square of the corner's width is this share of l times the part, 4 l^2 at most."""
-_RAMP = 3e-3
-"""Way to the speed in s, where robot and path have not been asked for it."""
 _SHORTEST = 1e-6
-"""Least way to the speed, in s."""
+"""Least way to the speed, in s; and that where robot and path have not been asked for it."""
 _FARTHEST = 1e3
 """Largest g: beyond it nothing is left of the bounds."""
 
@@ -52,11 +52,7 @@ class _ProcessSpeedLimit(Limit):
         self._tool = ToolSpeed(robot)
         self._speeds, self._tolerances = (np.array([getattr(part, name) for part in parts]) for name in _FIGURES)
         self._part = np.array([part.s for part in parts]).T
-        # Also where the robot accelerates faster than estimated, the path before a part is way enough.
-        beside = np.array([self._part[0], 1.0 - self._part[1]])
-        ramps = np.array([part.ramps or (_RAMP, _RAMP) for part in parts]).T
-        self._ramp = np.maximum(np.minimum(ramps, beside), _SHORTEST)
-        self._width = np.minimum(2.0 * self._ramp, np.sqrt(_COST * self._ramp * np.diff(self._part, axis=0)))
+        self._lay_ways(np.zeros((2, len(parts))))
         self.breaks = self._part.ravel()
         what = "process speed" if self._side > 0.0 else "least process speed"
         places = [""] if len(parts) == 1 else [f", s = {part.s[0]:g} to {part.s[1]:g}" for part in parts]
@@ -70,6 +66,20 @@ class _ProcessSpeedLimit(Limit):
         reached = f"tool is at the {end} end of its process speed{within}"
         room = f"tolerance {side} the process speed{within}"
         return Label(f"tool{place}", what, "m/s", "tool_limits.process_speed", reached, room)
+
+    def _lay_ways(self, ways: np.ndarray) -> None:
+        """Set the ways to the speeds before and behind the parts, (2, c), in s, and the widths of their corners."""
+        # Also where the robot accelerates faster than estimated, the path before a part is way enough.
+        beside = np.array([self._part[0], 1.0 - self._part[1]])
+        self._ramp = np.maximum(np.minimum(ways, beside), _SHORTEST)
+        self._width = np.minimum(2.0 * self._ramp, np.sqrt(_COST * self._ramp * np.diff(self._part, axis=0)))
+
+    def along(self, approach: Approach) -> Self:
+        """See `Limit.along`."""
+        other = copy.copy(self)
+        pairs = [zip(self._speeds.tolist(), places.tolist(), strict=True) for places in self._part]
+        other._lay_ways(np.array([[approach.way(*pair) for pair in rows] for rows in pairs]))  # noqa: SLF001  (its own class)
+        return other
 
     @property
     def bounds(self) -> tuple[Bound, ...]:

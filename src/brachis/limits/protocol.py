@@ -26,6 +26,14 @@ Where = Literal["points", "whole"]
 """Where the rows of a limit are: its values at every moment, or their mean over the whole motion."""
 
 
+class Approach(Protocol):
+    """How speeds are reached along a path."""
+
+    def way(self, speed: float, s: float) -> float:
+        """Return the way, in s, on which the tool reaches a speed, m/s, from rest at a place of the path."""
+        ...
+
+
 class JointMotion(Protocol):
     """Joint motion at K moments; states of the optimiser and samples of a trajectory are such.
 
@@ -272,6 +280,10 @@ class Limit(ABC):
         where the limit does not ask for them. The lattice measures steps between postures by them.
         """
         return None, None
+
+    def along(self, approach: Approach) -> Self:  # noqa: ARG002
+        """Return the limit for a path: where its bounds set in depends on how speeds are reached there."""
+        return self
 
     def relaxed(self, bound: Bound, amount: float) -> Self:
         """Return the limit with one figure giving way by `amount`, in its unit."""

@@ -6,11 +6,12 @@ The end time is scaled until all limits hold, which gives the solver a feasible 
 from __future__ import annotations
 
 import contextlib
+import itertools
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from brachis.bspline import basis_matrix
+from brachis.bspline import basis_matrix, spread
 from brachis.errors import UnreachableError
 from brachis.nlp.motion import Motion
 from brachis.nlp.phase import Phase
@@ -20,13 +21,15 @@ _STRETCH = 1.1
 _SHRINKAGE = 0.8
 _SHORTEST_TIME, _LONGEST_TIME = 0.01, 200.0
 _FIT_DENSITY = 4
+_MISSED = 0.1
+"""Part of a least speed that a fit may miss."""
 
 TimeLaw = Callable[[np.ndarray], np.ndarray]
 """Which part of a joint path is passed at normalised times."""
 
 
 def starting_point(
-    program: Program, joint_paths: Sequence[np.ndarray], duration: float | None = None
+    program: Program, joint_paths: Sequence[np.ndarray], duration: float | None = None, *, keep: bool = False
 ) -> np.ndarray | None:
     """Fit splines to a joint path of every phase, and scale the time until the limits hold.
 
@@ -40,6 +43,9 @@ def starting_point(
         For each phase, successive values of its curves: along a path of s and the redundant joints.
     duration : float, optional
         Of the motions whose values at even times these are, s; otherwise they get smooth ones from end to end.
+    keep : bool, optional
+        Whether the duration stays, whatever other limits say, where the fit is fast enough for least speeds: a longer
+        one would miss them. Splines of few intervals may be too slow anyway.
 
     Returns
     -------
@@ -47,11 +53,27 @@ def starting_point(
         None where the fit is out of reach at a collocation point.
     """
     pairs = list(zip(program.phases, joint_paths, strict=True))
-    for fit in (_smoothed, _followed):
+    for paced, fit in itertools.product((True, False) if keep else (False,), (_smoothed, _followed)):
         with contextlib.suppress(UnreachableError):
             parts = [fit(phase, _closed(phase, joint_path), duration) for phase, joint_path in pairs]
-            return shortest_time(program, np.concatenate(parts))
+            x = np.concatenate(parts)
+            if not paced:
+                return shortest_time(program, x)
+            if _fast_enough(program, x):
+                return x
     return None
+
+
+def _fast_enough(program: Program, x: np.ndarray) -> bool:
+    """Tell whether no least speed is missed by much."""
+    of_phases = ((phase, phase.state(part)) for phase, part in program.split(x))
+    missed = [
+        limit.violation(limit.values(state)).max()
+        for phase, state in of_phases
+        for limit in phase.limits
+        if limit.least_speed
+    ]
+    return max(missed, default=0.0) <= _MISSED
 
 
 def _smoothed(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
@@ -60,7 +82,7 @@ def _smoothed(phase: Phase, joint_path: np.ndarray, duration: float | None) -> n
 
 
 def _followed(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
-    t_norm = np.linspace(0.0, 1.0, _FIT_DENSITY * len(phase.knots))
+    t_norm = spread(phase.breaks, _FIT_DENSITY)
     return fitted(phase, _first_duration(phase, duration), t_norm, _values(joint_path, _law(phase, duration)(t_norm)))
 
 
@@ -72,9 +94,9 @@ def _rates(phase: Phase) -> tuple[float, float]:
 
 
 def _first_duration(phase: Phase, duration: float | None) -> float:
-    """Duration with which ends in motion are fitted, s: as given, or that of a constant acceleration between them."""
+    """Duration of a fit, s: as given, or that of a constant acceleration between moving ends; 1 from rest to rest."""
     total = sum(_rates(phase))
-    return (duration or 2.0 / total) if total else 1.0
+    return duration or (2.0 / total if total else 1.0)
 
 
 def _law(phase: Phase, duration: float | None) -> TimeLaw:

@@ -5,8 +5,8 @@ to the least time along the joint path where that is shorter: a solver takes man
 and few from a motion that is a little too fast.
 
 No scaling meets a least speed over a part of the path. Where there is one, the joint path is therefore followed in the
-times of the phase plane, and knots are closer together where that motion changes its speed: a part of the path at a
-constant speed may be long, and the way to it short.
+times of the phase plane, and knots are ever closer towards the ends and the times at which its acceleration jumps: a
+part of the path at a constant speed may be long, and the way to it short.
 
 Between ends in motion the first guess lies half-way between a constant acceleration and the phase plane. The former
 alone may need no force at all, where no limit's change with the end time tells a solver where to go.
@@ -26,16 +26,20 @@ from brachis.problem import breaks_of
 from brachis.search.phase_plane import least_times
 
 _STATIONS = 401
+_TIMES = 64 * _STATIONS
+"""Even times at which the motion is taken from the stations: a short way to a speed is passed in milliseconds."""
 _HALVINGS = 12
 """How often the way to an abrupt change is halved by stations."""
-_STEADY = 1e-6
-"""Changes of the speed below this part of it are rounding."""
-_GRADING = 0.3
-"""Largest change of the length of knot intervals over their own length: short ones beside abrupt changes of speed."""
-_FIRST_INTERVALS = 40
+_SWITCH = 0.1
+"""A change of the acceleration between stations by this part of its range is a switch from one limit to another."""
+_GRADING = 0.5
+"""Length that knot intervals gain with their distance from a switch, as a part of it."""
+_FIRST_INTERVALS = 60
 """Of a mesh that is refined."""
-_SPREAD = 0.2
-"""Part of the knots that is spread evenly over the time; the others are over the change of speed."""
+_STEADY = 1e-2
+"""Changes of the acceleration below this, in paths per square of the duration, are rounding."""
+_LEAST, _BISECTIONS = (1e-9, 1.0), 60
+"""Between which lengths, in normalised time, that of intervals at a switch is sought, and how."""
 
 
 def first_breaks(start: Start) -> np.ndarray:
@@ -43,19 +47,38 @@ def first_breaks(start: Start) -> np.ndarray:
     breaks, paced = breaks_of(start.problem.task), _paced(start)
     if paced is None:
         return breaks
-    curves, times = paced
-    t_norm, speed = 0.5 * (times[1:] + times[:-1]) / times[-1], np.diff(curves[:, 0]) / np.diff(times)
-    change = np.abs(np.gradient(speed, t_norm))
-    total = np.trapezoid(change, t_norm)
-    if total <= _STEADY * speed.max():
+    switches = _switches(*paced)
+    if not len(switches):
         return breaks
-    if start.problem.task.spline.intervals == "auto":
-        breaks = np.linspace(0.0, 1.0, _FIRST_INTERVALS + 1)
-    length = 1.0 / (len(breaks) - 1) / (_SPREAD + (1.0 - _SPREAD) * change / total)
-    length = (length + _GRADING * np.abs(t_norm[:, None] - t_norm)).min(axis=1)
-    count = np.append(0.0, np.cumsum(0.5 * (1.0 / length[1:] + 1.0 / length[:-1]) * np.diff(t_norm)))
-    t_norm[[0, -1]] = 0.0, 1.0
-    return np.asarray(np.interp(breaks, count / count[-1], t_norm))
+    count = _FIRST_INTERVALS if start.problem.task.spline.intervals == "auto" else len(breaks) - 1
+    return _graded(np.union1d([0.0, 1.0], switches), count)
+
+
+def _switches(curves: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """List the normalised times at which the acceleration along the path jumps, but for the ends."""
+    t_norm = times / times[-1]
+    middle = 0.5 * (t_norm[1:] + t_norm[:-1])
+    acceleration = np.diff(np.diff(curves[:, 0]) / np.diff(t_norm)) / np.diff(middle)
+    jumps = np.abs(np.diff(acceleration)) > max(_SWITCH * np.ptp(acceleration), _STEADY)
+    return np.asarray(middle[1:-1][jumps])
+
+
+def _graded(switches: np.ndarray, count: int) -> np.ndarray:
+    """Find the ends, (count + 1,), of so many intervals, m + g d long at distances d from the nearest switch."""
+    halves = np.repeat(0.5 * np.diff(switches), 2)
+    low, high = _LEAST
+    for _ in range(_BISECTIONS):
+        least = np.sqrt(low * high)
+        numbers = np.log1p(_GRADING * halves / least) / _GRADING  # of the intervals in every half
+        low, high = (least, high) if numbers.sum() > count else (low, least)
+    behind = np.append(0.0, np.cumsum(numbers))
+    wanted = np.linspace(0.0, behind[-1], count + 1)
+    half = np.clip(np.searchsorted(behind, wanted, side="right") - 1, 0, len(halves) - 1)
+    first = half % 2 == 0  # the switch is before it
+    away = np.where(first, wanted - behind[half], behind[half + 1] - wanted)
+    way = least / _GRADING * np.expm1(_GRADING * away)
+    breaks = np.where(first, switches[half // 2] + way, switches[half // 2 + 1] - way)
+    return np.concatenate([[0.0], breaks[1:-1], [1.0]])
 
 
 def first_point(program: Program, start: Start) -> np.ndarray | None:
@@ -70,13 +93,13 @@ def first_point(program: Program, start: Start) -> np.ndarray | None:
     -------
     (v,) ndarray or None
     """
-    for followed in (_paced(start), _between_speeds(start)):
+    for followed, keep in ((_paced(start), True), (_between_speeds(start), False)):
         if followed is None:
             continue
         curves, times = followed
-        at = np.linspace(0.0, times[-1], 4 * _STATIONS)
+        at = np.linspace(0.0, times[-1], _TIMES)
         motion = np.column_stack([np.interp(at, times, column) for column in curves.T])
-        x = starting_point(program, [motion], times[-1])
+        x = starting_point(program, [motion], times[-1], keep=keep)
         if x is not None:
             return x
     if start.timed:

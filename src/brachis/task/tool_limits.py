@@ -74,11 +74,6 @@ class ProcessSpeed(Model):
     tolerance: Annotated[Share, Field(ge=_LEAST_TOLERANCE, le=0.5)] = Field(
         default=0.01, description="Largest deviation either way, as a share of the speed: 1 %, or 0.01."
     )
-    ramps: tuple[Positive, Positive] | None = Field(
-        default=None,
-        description="Ways before and behind the part, in s, on which the tool could reach the speed from rest, beside "
-        "which the bounds give way; written by brachis from robot and path, whatever stands here.",
-    )
 
 
 class ToolLimits(Model):
