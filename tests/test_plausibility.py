@@ -416,3 +416,14 @@ def test_a_quaternion_with_its_scalar_last():
     with pytest.raises(StartError, match="off the path") as caught:
         brachis.plan(robot, path_start=[*placed.translation, x, y, z, w], **ways)
     assert caught.value.hint == "The quaternion looks like x, y, z, w: w comes first"
+
+
+@pytest.mark.parametrize("angle", [1.57, 3.14, -0.785, np.pi])
+def test_an_angle_in_rad_where_degrees_belong(angle):
+    (found,) = of_task(brachis.load_task(task(path=[{"line": {"length": 0.5, "angle_deg": angle}}])))
+    assert str(found).startswith("path[0].line.angle_deg: the angle looks like rad")
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5, 5.5, 11.0, 45.0])
+def test_small_angles_in_degrees_are_plausible(angle):
+    assert not of_task(brachis.load_task(task(path=[{"line": {"length": 0.5, "angle_deg": angle}}])))

@@ -20,12 +20,17 @@ def slide(speed: float, part: tuple[float, float], **changes: object) -> dict:
     limits = {"acceleration": 1.0, "velocity": None, **changes.pop("limits", {})}
     return {
         "brachis": 1,
-        "robot": {"urdf": str(GANTRY), "gravity": [0, 0, 0], "limits": limits},
+        "robot": {
+            "urdf": str(GANTRY),
+            "gravity": [0, 0, 0],
+            "limits": limits,
+            "friction": changes.pop("friction", {}),
+        },
         "start": {"joints": [0.0, 0.0]},
         "task_space": ["x", "y"],
         "path": [{"line": {"by": [LENGTH, 0.0]}}],
         "spline": {"intervals": 20},
-        "tool_limits": {"process_speed": {"speed": speed, "s": part, "tolerance": 0.02}},
+        "tool_limits": {"process_speed": [{"speed": speed, "s": part, "tolerance": 0.02}, *changes.pop("parts", [])]},
         **changes,
     }
 
@@ -50,6 +55,32 @@ def test_a_run_up_that_is_too_short_is_told_with_what_would_do(monkeypatch):
 @pytest.mark.parametrize("change", [(0.31, (0.1, 0.6)), (0.5, (0.26, 0.6))])
 def test_what_is_advised_can_be_planned(change):
     assert brachis.plan(slide(*change)).verified
+
+
+class Tried(Exception):
+    """A plan was tried."""
+
+
+def test_friction_that_helps_to_brake_is_no_reason_to_refuse(monkeypatch):
+    """25 N brake 25 kg from 0.32 m/s in 0.05 m, and with 10 N of friction from 0.37 m/s."""
+
+    def solved(*_):
+        raise Tried
+
+    monkeypatch.setattr("brachis.planner.solved", solved)
+    limits = {"acceleration": None, "torque": 25.0}
+    with pytest.raises(Tried):
+        brachis.plan(slide(0.36, (0.5, 0.9), limits=limits, friction={"coulomb": 10.0}))
+    with pytest.raises(brachis.PlanningError, match=r"the path behind s = 0\.9 is too short for the way to it"):
+        brachis.plan(slide(0.36, (0.5, 0.9), limits=limits))
+
+
+def test_of_several_parts_the_one_is_told_that_is_too_fast():
+    with pytest.raises(
+        brachis.PlanningError, match=r"the path behind s = 0\.9 is too short for the way to it"
+    ) as caught:
+        brachis.plan(slide(0.2, (0.1, 0.3), parts=[{"speed": 0.5, "s": [0.6, 0.9], "tolerance": 0.02}]))
+    assert "let the part end at s = 0.75" in caught.value.hint
 
 
 def test_a_speed_that_joint_velocities_forbid():
@@ -84,3 +115,10 @@ def test_a_speed_at_the_end_that_the_velocity_limit_forbids():
     with pytest.raises(brachis.PlanningError, match=r"found 0.9 m/s; allowed: about 0.30\d* m/s at most") as caught:
         brachis.plan(slide(0.2, (0.3, 0.6), limits={"velocity": 0.3}, boundary={"end_speed": 0.9}))
     assert caught.value.where == "boundary.end_speed"
+
+
+def test_an_end_speed_that_another_one_at_the_start_makes_possible():
+    """The velocity limit allows 0.3 m/s at both ends; from rest the way is long enough for 0.1 m/s alone."""
+    both = {"start_speed": 0.9, "end_speed": 0.9}
+    with pytest.raises(brachis.PlanningError, match=r"allowed: about 0\.3\d* m/s at most"):
+        brachis.plan(slide(0.3, (0.3, 0.6), limits={"velocity": 0.3, "acceleration": 0.01}, boundary=both))

@@ -265,3 +265,24 @@ def test_uno_begins_anew_where_a_run_loses_its_way(monkeypatch):
     assert len(starts) == 2
     np.testing.assert_allclose(starts[1], [1.2, 1.0])
     np.testing.assert_allclose(report.x, [1.0, 1.0], atol=1e-5)
+
+
+def test_uno_keeps_an_answer_slower_than_its_start_where_no_run_finds_another(monkeypatch):
+    honest, starts = uno._run, []
+
+    def failing(watch, x, units, radius, terminate):
+        starts.append(x)
+        result = honest(watch, x, units, radius, terminate)
+        return SimpleNamespace(
+            primal_solution=result.primal_solution if len(starts) == 1 else np.array([9.0, 9.0]) / units,
+            optimization_status=result.optimization_status,
+            solution_status=result.solution_status if len(starts) == 1 else SimpleNamespace(name="NOT_OPTIMAL"),
+            constraint_dual_solution=result.constraint_dual_solution,
+        )
+
+    monkeypatch.setattr(uno, "_run", failing)
+    monkeypatch.setattr(uno, "_lost", lambda *_: True)
+    report = solve("uno", disc(), [1.2, 1.0])
+    assert len(starts) == len(uno._RUNS)
+    assert report.status is SolveStatus.OPTIMAL
+    np.testing.assert_allclose(report.x, [1.0, 1.0], atol=1e-5)

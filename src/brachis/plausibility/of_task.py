@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 _TURN = 2.0 * math.pi
 _ROUNDED = 1e-3
 _STATIONS = 401
-_EIGHTHS, _LARGEST_ROUNDING = 16, 2.0
-"""Angles in rad up to two turns are looked for, to three digits."""
+_EIGHTHS, _ROUNDING = 16, 2e-3
+"""Angles in rad up to two turns are looked for, within so many rad: 3.14 is half a turn, 5.5 is not seven eighths."""
 _OPEN = 1e5
 """A limit beyond this is written for "no limit"."""
 
@@ -114,8 +114,8 @@ def _angles(task: Task) -> Iterator[Remark]:
     robot = {key: getattr(task.robot, key).model_dump() for key in ("mounting", "tool_offset")}
     path = [segment.model_dump(exclude={"bspline", "spline"}) for segment in task.path]
     for key, degrees in _in_degrees("", {"robot": robot, "path": path}):
-        eighths = degrees / (0.125 * _TURN)
-        if 1 <= round(abs(eighths)) <= _EIGHTHS and abs(eighths - round(eighths)) < _ROUNDED * _LARGEST_ROUNDING:
+        eighths = round(degrees / (0.125 * _TURN))
+        if 1 <= abs(eighths) <= _EIGHTHS and abs(degrees - 0.125 * _TURN * eighths) < _ROUNDING:
             usual = f"{math.degrees(degrees):.4g} deg for that angle"
             yield Remark(key, "the angle looks like rad", f"{degrees:.6g} deg", usual)
 

@@ -5,7 +5,8 @@ joint path has there. So where that motion, made without limits that ask for a l
 motion does; and what it has there is what could be asked for. A redundant robot may have better joint paths than those
 that are known: only what is far from possible is refused before a plan is tried.
 
-Limits on the jerk are unknown to the phase plane. What they leave is told by the plan without the least speed.
+Limits on the jerk are unknown to the phase plane. What they leave is told by the plan without the least speed. Friction
+is unknown to it too: it helps to brake, so that with friction a part near the path's end may be passed faster.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ from brachis.search.pacing import along, graded
 from brachis.search.phase_plane import fastest
 
 _EXACT, _HOPELESS, _UNLIKELY = 0.97, 0.5, 0.8
-"""Share of a speed above which it may be possible yet: without redundancy, before plans are tried, and after."""
-_STATIONS, _BISECTIONS, _SAMPLES = 401, 20, 400
+"""Share of a speed above which it may be possible yet: where the phase plane is exact, where not, and after plans."""
+_STATIONS, _BISECTIONS, _SAMPLES = 401, 10, 400
 _DIGITS = 2
 _AT_REST = (0.0, 0.0)
 
@@ -60,8 +61,15 @@ def refuse_hopeless_speeds(starts: Sequence[Start]) -> None:
         if possible is None:
             return
         found = possible if found is None or possible.share > found.share else found
-    if found is not None and found.share < (_HOPELESS if starts[0].joint_map.r else _EXACT):
+    if found is not None and found.share < (_EXACT if _is_bound(starts[0]) else _HOPELESS):
         raise found.error
+
+
+def _is_bound(start: Start) -> bool:
+    """Tell whether the phase plane bounds the speed: there is no other joint path, and no friction that helps to brake."""
+    robot = start.problem.robot
+    rubs = (robot.friction.viscous + robot.friction.coulomb > 0.0) & np.isfinite(robot.limits.torque_upper)
+    return not start.joint_map.r and not rubs.any()
 
 
 def out_of_reach(attempts: Sequence[Attempt], solve: Callable[[Start], Attempt]) -> TooFast | None:
@@ -96,9 +104,9 @@ def out_of_reach(attempts: Sequence[Attempt], solve: Callable[[Start], Attempt])
     return _falling_short(start.problem, moments, "in the fastest motion without it")
 
 
-def unlikely(found: TooFast | None) -> bool:
+def unlikely(found: TooFast) -> bool:
     """Tell whether a plan falls short by so much that no other joint path, and no more knots, will make up for it."""
-    return found is not None and found.share < _UNLIKELY
+    return found.share < _UNLIKELY
 
 
 def _others(problem: Problem) -> Iterator[Limit]:
@@ -130,20 +138,21 @@ def _in_phase_plane(start: Start) -> TooFast | None:
 
 
 def _ends_too_fast(problem: Problem, s: np.ndarray, q: np.ndarray, stations: np.ndarray) -> TooFast | None:
-    """Tell at which end the path cannot be passed as fast as asked for, whatever the other end's speed is."""
+    """Tell at which end the path cannot be passed as fast as asked for, with the other end at rest or as much slower."""
     others = list(_others(problem))
     if fastest(others, s, q, _AT_REST, stations) is None:
         return None
     found: list[tuple[float, str]] = []
     for end, key in enumerate(("start_speed", "end_speed")):
-        rates = np.where(np.arange(2) == end, problem.end_rates, 0.0)
+        alone = np.where(np.arange(2) == end, problem.end_rates, 0.0)
         low, high = 0.0, 1.0
-        for _ in range(_BISECTIONS if rates.any() else 0):
+        for _ in range(_BISECTIONS if alone.any() else 0):
             middle = 0.5 * (low + high)
-            first, last = (middle * rates).tolist()
-            possible = fastest(others, s, q, (first, last), stations) is not None
+            # On a short path a speed may ask for one at the other end.
+            both = (middle * alone, middle * np.array(problem.end_rates))
+            possible = any(fastest(others, s, q, (rates[0], rates[1]), stations) is not None for rates in both)
             low, high = (middle, high) if possible else (low, middle)
-        if rates.any():
+        if alone.any():
             found.append((low, key))
     share, key = min(found, default=(1.0, ""))
     if share >= _EXACT:
@@ -165,10 +174,8 @@ def _falling_short(problem: Problem, motion: JointMotion, how: str) -> TooFast |
     for limit in problem.limits:
         if not limit.least_speed:
             continue
-        begin, end = (limit.breaks[0], limit.breaks[-1]) if len(limit.breaks) else (0.0, 1.0)
-        inside = (motion.s >= begin) & (motion.s <= end)
         values = limit.values(motion)
-        beyond = np.where(inside[:, None], limit.violation(values), -np.inf)
+        beyond = np.where(_within(limit, motion.s).any(axis=1)[:, None], limit.violation(values), -np.inf)
         column = int(np.argmax(beyond.max(axis=0)))
         if worst is None or beyond[:, column].max() > worst[0]:
             worst = float(beyond[:, column].max()), limit, column, values[:, column], beyond[:, column]
@@ -178,7 +185,8 @@ def _falling_short(problem: Problem, motion: JointMotion, how: str) -> TooFast |
     label, place = limit.labels[column], int(np.argmax(beyond))
     found, allowed = in_figures(limit, column, float(values[place]))
     lower = math.floor(float(found) * 10 ** (scale := _DIGITS - 1 - math.floor(math.log10(max(float(found), 1e-9)))))
-    inside = np.isfinite(beyond)
+    parts = _within(limit, motion.s)
+    inside = parts[:, int(np.argmax(parts[place]))]
     what, hints = _where_reached(motion.s[inside], beyond[inside] <= 0.0)
     hints = [f"Lower it to {lower / 10**scale:g} {label.unit}", *hints, "raise the limits that hold the motion back"]
     error = PlanningError(
@@ -191,6 +199,13 @@ def _falling_short(problem: Problem, motion: JointMotion, how: str) -> TooFast |
     return TooFast(share, error)
 
 
+def _within(limit: Limit, s: np.ndarray) -> np.ndarray:
+    """Tell which places, (P,), are within which parts between breaks of a limit, (P, p) bool; breaks come in pairs."""
+    breaks = np.sort(limit.breaks)
+    ends = breaks.reshape(-1, 2) if len(breaks) and len(breaks) % 2 == 0 else np.array([[0.0, 1.0]])
+    return np.asarray((s[:, None] >= ends[:, 0]) & (s[:, None] <= ends[:, 1]))
+
+
 def _where_reached(s: np.ndarray, reached: np.ndarray) -> tuple[str, list[str]]:
     """Say where of the places, (P,), a speed is reached, (P,) bool, and how the part could be cut to them."""
     if not reached.any():
@@ -199,7 +214,8 @@ def _where_reached(s: np.ndarray, reached: np.ndarray) -> tuple[str, list[str]]:
     if not reached[(s >= first) & (s <= last)].all():
         return f"it cannot be held all the way from s = {first:.3g} to {last:.3g}", []
     before, behind = not reached[0], not reached[-1]
-    cuts = [f"let the part begin at s = {math.ceil(100 * first) / 100:g}"] if before else []
-    cuts += [f"let the part end at s = {math.floor(100 * last) / 100:g}"] if behind else []
+    begin, end = math.ceil(100 * first) / 100, math.floor(100 * last) / 100
+    cuts = [f"let the part begin at s = {begin:g}"] * before + [f"let the part end at s = {end:g}"] * behind
+    cuts = cuts if begin < end else []
     ways = [f"before s = {s[0]:.2g}"] * before + [f"behind s = {s[-1]:.2g}"] * behind
     return f"the path {' and '.join(ways)} is too short for the way to it", cuts

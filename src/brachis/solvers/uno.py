@@ -52,6 +52,7 @@ _STOPPED = {
 @apart_if_large
 def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
     """See `brachis.solvers.protocol.Solver`."""
+    kept = None
     with Watch(problem, options, progress) as watch:
         for radius, power in _RUNS:
             units = _units(problem, x, power) if power else np.ones(len(x))
@@ -61,20 +62,27 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
             ending, found = result.optimization_status.name, result.solution_status.name
             if ending == "USER_INTERRUPTION":  # Uno has a SIGINT handler of its own
                 watch.interrupt = KeyboardInterrupt()
+            status = _status(ending, found, stall)
             early = ending in ("ALGORITHMIC_ERROR", "ITERATION_LIMIT") or found == "FEASIBLE_SMALL_STEP"
             over = watch.must_stop() or watch.iterations >= options.max_iterations
             if over or not (stall.seen or early or _lost(problem, x, answer)):
                 break
+            if status.usable and not early:
+                kept = status, answer, result
             x = _better(problem, x, answer)
-    status = _STOPPED.get(ending) or _STATUS.get(found, SolveStatus.FAILED)
-    if stall.seen:
-        status = SolveStatus.STALLED
-    elif ending == "USER_TERMINATION":
-        status = SolveStatus.ITERATION_LIMIT
-    message = f"{ending.lower()}, {found.lower()}"
     if not (status.usable or watch.stagnated or watch.interrupt):
-        answer = _better(problem, x, answer)
+        # An answer slower than its start is one all the same, where no other run finds any.
+        status, answer, result = kept or (status, _better(problem, x, answer), result)
+    message = f"{result.optimization_status.name.lower()}, {result.solution_status.name.lower()}"
     return watch.report(name, status, answer, np.array(result.constraint_dual_solution), message)
+
+
+def _status(ending: str, found: str, stall: _Stall) -> SolveStatus:
+    if stall.seen:
+        return SolveStatus.STALLED
+    if ending == "USER_TERMINATION":
+        return SolveStatus.ITERATION_LIMIT
+    return _STOPPED.get(ending) or _STATUS.get(found, SolveStatus.FAILED)
 
 
 def _better(problem: Problem, start: np.ndarray, answer: np.ndarray) -> np.ndarray:
