@@ -274,7 +274,10 @@ class PlanningError(BrachisError):
 
 
 def nearest(name: str, valid: Iterable[str], likeness: float = 0.5) -> str | None:
-    """Return the valid name most like `name`, or None where none is; names with a likeness of 1 are the same."""
+    """Return the valid name with which `name` begins, or that is most like it; None where none is.
+
+    Names with a likeness of 1 are the same.
+    """
     valid = list(valid)
     begun = [one for one in valid if name.startswith(f"{one}_")]
     if begun:

@@ -57,7 +57,7 @@ def test_what_is_advised_can_be_planned(change):
     assert brachis.plan(slide(*change)).verified
 
 
-class Tried(Exception):
+class TriedError(Exception):
     """A plan was tried."""
 
 
@@ -65,11 +65,11 @@ def test_friction_that_helps_to_brake_is_no_reason_to_refuse(monkeypatch):
     """25 N brake 25 kg from 0.32 m/s in 0.05 m, and with 10 N of friction from 0.37 m/s."""
 
     def solved(*_):
-        raise Tried
+        raise TriedError
 
     monkeypatch.setattr("brachis.planner.solved", solved)
     limits = {"acceleration": None, "torque": 25.0}
-    with pytest.raises(Tried):
+    with pytest.raises(TriedError):
         brachis.plan(slide(0.36, (0.5, 0.9), limits=limits, friction={"coulomb": 10.0}))
     with pytest.raises(brachis.PlanningError, match=r"the path behind s = 0\.9 is too short for the way to it"):
         brachis.plan(slide(0.36, (0.5, 0.9), limits=limits))

@@ -66,7 +66,7 @@ def refuse_hopeless_speeds(starts: Sequence[Start]) -> None:
 
 
 def _is_bound(start: Start) -> bool:
-    """Tell whether the phase plane bounds the speed: there is no other joint path, and no friction that helps to brake."""
+    """Tell whether the phase plane bounds the speed: no other joint path is there, and no friction helps to brake."""
     robot = start.problem.robot
     rubs = (robot.friction.viscous + robot.friction.coulomb > 0.0) & np.isfinite(robot.limits.torque_upper)
     return not start.joint_map.r and not rubs.any()
@@ -138,7 +138,7 @@ def _in_phase_plane(start: Start) -> TooFast | None:
 
 
 def _ends_too_fast(problem: Problem, s: np.ndarray, q: np.ndarray, stations: np.ndarray) -> TooFast | None:
-    """Tell at which end the path cannot be passed as fast as asked for, with the other end at rest or as much slower."""
+    """Tell at which end the path cannot be passed as fast as asked for; the other is at rest, or slower likewise."""
     others = list(_others(problem))
     if fastest(others, s, q, _AT_REST, stations) is None:
         return None
