@@ -55,6 +55,12 @@ def test_intervals_grow_by_half_with_their_distance_from_a_switch():
     assert grown == pytest.approx(0.5, rel=0.1)
 
 
+def test_more_intervals_than_switches_need_are_spread_over_the_whole_time():
+    lengths = np.diff(pacing._graded(np.array([0.0, 0.3, 1.0]), 400))
+    assert lengths.min() > 1e-6
+    assert lengths.max() < 0.04
+
+
 @pytest.mark.parametrize(("estimate", "expected"), [(0.5, 0.5), (50.0, None), (np.inf, None)])
 def test_a_first_guess_takes_no_longer_than_the_least_time(estimate, expected):
     program, _ = transcribe(scara_line, redundant_joints=["j1"])

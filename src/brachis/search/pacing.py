@@ -38,8 +38,9 @@ _FIRST_INTERVALS = 60
 """Of a mesh that is refined."""
 _STEADY = 1e-2
 """Changes of the acceleration below this, in paths per square of the duration, are rounding."""
-_LEAST, _BISECTIONS = (1e-9, 1.0), 60
-"""Between which lengths, in normalised time, that of intervals at a switch is sought, and how."""
+_LEAST, _BISECTIONS = (1e-5, 1.0), 60
+"""Between which lengths, in normalised time, that of intervals at a switch is sought, and how; with more intervals than
+are needed for the least one all of them become shorter, as slopes over 1e-9 of the time would say nothing."""
 
 
 def first_breaks(start: Start) -> np.ndarray:

@@ -121,8 +121,8 @@ def _in_closed_forms(
                 ]
             else:
                 starts = _from_lattices(batch, level, deadline, listener, note)
-        refuse_hopeless_speeds(starts)
         known += starts
+        refuse_hopeless_speeds(known)
         for first in range(0, len(starts), _SIZE):
             yield Batch(
                 tuple(start.with_solver(solvers[0]) for start in starts[first : first + _SIZE]),

@@ -58,10 +58,10 @@ def refuse_hopeless_speeds(starts: Sequence[Start]) -> None:
     found = None
     for start in starts:
         possible = _in_phase_plane(start)
-        if possible is None:
+        if possible is None or possible.share >= (_EXACT if _is_bound(start) else _HOPELESS):
             return
         found = possible if found is None or possible.share > found.share else found
-    if found is not None and found.share < (_EXACT if _is_bound(starts[0]) else _HOPELESS):
+    if found is not None:
         raise found.error
 
 
@@ -175,7 +175,7 @@ def _falling_short(problem: Problem, motion: JointMotion, how: str) -> TooFast |
         if not limit.least_speed:
             continue
         values = limit.values(motion)
-        beyond = np.where(_within(limit, motion.s).any(axis=1)[:, None], limit.violation(values), -np.inf)
+        beyond = np.where(_within(limit, motion.s).any(axis=1, keepdims=True), limit.violation(values), -np.inf)
         column = int(np.argmax(beyond.max(axis=0)))
         if worst is None or beyond[:, column].max() > worst[0]:
             worst = float(beyond[:, column].max()), limit, column, values[:, column], beyond[:, column]
