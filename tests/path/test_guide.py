@@ -10,15 +10,25 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
+import brachis
 from support.poses import pose_path
 from support.seams import wave
 
 PAGE = Path(__file__).parents[2] / "docs" / "task_files.md"
-EXAMPLES = re.findall(r"^```yaml\n(.*?)^```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+SNIPPETS = re.findall(r"^```yaml\n(.*?)^```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+EXAMPLES = [text for text in SNIPPETS if "path" in yaml.safe_load(text)]
 
 
 def test_there_are_examples() -> None:
     assert len(EXAMPLES) == 3
+
+
+def test_the_curve_of_a_data_sheet_is_taken() -> None:
+    (curve,) = (yaml.safe_load(text) for text in SNIPPETS if "torque_speed" in text)
+    robot = brachis.robots.scara3.with_limits(**curve["robot"]["limits"])
+    to_joint, torque = 2.0 * np.pi / 60.0 / 50.0, 1.27 * 50 * 0.8
+    expected = [[0.0, torque], [3000 * to_joint, torque], [4500 * to_joint, 0.0]]
+    np.testing.assert_allclose(robot.limits.torque_speed[0], expected, rtol=1e-3)
 
 
 @pytest.mark.parametrize("example", EXAMPLES)

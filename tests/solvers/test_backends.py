@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from brachis.errors import UnknownNameError, UnreachableError
-from brachis.solvers import AUTO_ORDER, NAMES, SolverOptions, SolveStatus, residual, solver_named, uno
+from brachis.solvers import AUTO_ORDER, NAMES, SolverOptions, SolveStatus, residual, solver_named
 from brachis.solvers.registry import TABLE
 from brachis.solvers.watch import Watch
 from support.programs import bounded, corner, curved, disc, impossible
@@ -243,46 +242,3 @@ def test_rows_that_are_not_finite_at_the_start(name, bad):
 def test_bounds_that_are_not_numbers(name):
     report = solve(name, dataclasses.replace(disc(), upper=np.array([np.nan])), [4.0, 0.5])
     assert report.status is SolveStatus.EVALUATION_ERROR
-
-
-def test_uno_begins_anew_where_a_run_loses_its_way(monkeypatch):
-    honest, starts = uno._run, []
-
-    def astray(watch, x, units, radius, terminate):
-        starts.append(x)
-        result = honest(watch, x, units, radius, terminate)
-        if len(starts) > 1:
-            return result
-        return SimpleNamespace(
-            primal_solution=np.array([9.0, 9.0]),
-            optimization_status=result.optimization_status,
-            solution_status=result.solution_status,
-            constraint_dual_solution=result.constraint_dual_solution,
-        )
-
-    monkeypatch.setattr(uno, "_run", astray)
-    report = solve("uno", disc(), [1.2, 1.0])
-    assert len(starts) == 2
-    np.testing.assert_allclose(starts[1], [1.2, 1.0])
-    np.testing.assert_allclose(report.x, [1.0, 1.0], atol=1e-5)
-
-
-def test_uno_keeps_an_answer_slower_than_its_start_where_no_run_finds_another(monkeypatch):
-    honest, starts = uno._run, []
-
-    def failing(watch, x, units, radius, terminate):
-        starts.append(x)
-        result = honest(watch, x, units, radius, terminate)
-        return SimpleNamespace(
-            primal_solution=result.primal_solution if len(starts) == 1 else np.array([9.0, 9.0]) / units,
-            optimization_status=result.optimization_status,
-            solution_status=result.solution_status if len(starts) == 1 else SimpleNamespace(name="NOT_OPTIMAL"),
-            constraint_dual_solution=result.constraint_dual_solution,
-        )
-
-    monkeypatch.setattr(uno, "_run", failing)
-    monkeypatch.setattr(uno, "_lost", lambda *_: True)
-    report = solve("uno", disc(), [1.2, 1.0])
-    assert len(starts) == len(uno._RUNS)
-    assert report.status is SolveStatus.OPTIMAL
-    np.testing.assert_allclose(report.x, [1.0, 1.0], atol=1e-5)

@@ -14,11 +14,16 @@ def link_lengths(robot: Robot) -> list[float]:
 
 
 def reach(robot: Robot) -> float:
-    """How far the tool frame can be from the first joint at most, m."""
-    limits = robot.limits
+    """How far the tool frame can be from the first joint at most, m, in the ranges of slides that the URDF states."""
     slides = [
-        max(abs(lower), abs(upper))
-        for lower, upper, unit in zip(limits.position_lower, limits.position_upper, robot.position_units, strict=True)
+        max(abs(end) for end in (lower, upper, stated.lower, stated.upper) if end is not None)
+        for lower, upper, stated, unit in zip(
+            robot.limits.position_lower,
+            robot.limits.position_upper,
+            robot.stated_limits,
+            robot.position_units,
+            strict=True,
+        )
         if unit == "m"
     ]
     return sum(link_lengths(robot)) + sum(slides)

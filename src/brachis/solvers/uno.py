@@ -14,22 +14,15 @@ import numpy as np
 from brachis.solvers.apart import apart_if_large
 from brachis.solvers.one_at_a_time import one_at_a_time
 from brachis.solvers.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
-from brachis.solvers.watch import Watch, from_finite_numbers, objective_at, residual
+from brachis.solvers.watch import Watch, from_finite_numbers, objective_at
 
 name = "uno"
 
-_RUNS = ((1.0, 0.0), (1.0, 0.5), (1.0, 1.0), (0.2, 0.5))
-"""First trust region radius, and how far the variables are scaled: at first, and after a run that ended too early.
+_RESTARTS = ((1.0, False), (1.0, True), (0.2, True))
+"""First trust region radius, and whether the variables are scaled: at first, and after a stall or a breakdown.
 
-Uno's own radius of 10 stalls on 1 of 8 random lines. Variables that are scaled wholly take up to five times the
-iterations where nothing fails, but stay near a start that is near its answer.
+Uno's own radius of 10 stalls on 1 of 8 random lines. Scaled variables are slower by a tenth where nothing fails.
 """
-_RUN = 0.4
-"""Part of the iterations that one run may take: most need a tenth; what does not end then has lost its way."""
-_LEAST_RUN = 50
-"""Iterations that a run may take in any case."""
-_SLOWER = 0.01
-"""Least part by which a motion that is worse than the start is slower."""
 _STALL_ITERATIONS = 7
 _STALL_PROGRESS = 1e-3
 _STALL_STATIONARITY = 0.1
@@ -52,66 +45,35 @@ _STOPPED = {
 @apart_if_large
 def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
     """See `brachis.solvers.protocol.Solver`."""
-    kept = None
     with Watch(problem, options, progress) as watch:
-        for radius, power in _RUNS:
-            units = _units(problem, x, power) if power else np.ones(len(x))
+        for radius, scaled in _RESTARTS:
+            units = _units(problem, x) if scaled else np.ones(len(x))
             stall = _Stall(watch, units)
             result = _run(watch, x, units, radius, stall)
-            answer = units * np.array(result.primal_solution)
+            x = units * np.array(result.primal_solution)
             ending, found = result.optimization_status.name, result.solution_status.name
             if ending == "USER_INTERRUPTION":  # Uno has a SIGINT handler of its own
                 watch.interrupt = KeyboardInterrupt()
-            status = _status(ending, found, stall)
-            early = ending in ("ALGORITHMIC_ERROR", "ITERATION_LIMIT") or found == "FEASIBLE_SMALL_STEP"
-            over = watch.must_stop() or watch.iterations >= options.max_iterations
-            if over or not (stall.seen or early or _lost(problem, x, answer)):
+            broken_down = ending == "ALGORITHMIC_ERROR" or found == "FEASIBLE_SMALL_STEP"
+            if not (stall.seen or broken_down) or watch.must_stop():
                 break
-            if status.usable and not early:
-                kept = status, answer, result
-            x = _better(problem, x, answer)
-    if not (status.usable or watch.stagnated or watch.interrupt):
-        # An answer slower than its start is one all the same, where no other run finds any.
-        status, answer, result = kept or (status, _better(problem, x, answer), result)
-    message = f"{result.optimization_status.name.lower()}, {result.solution_status.name.lower()}"
-    return watch.report(name, status, answer, np.array(result.constraint_dual_solution), message)
-
-
-def _status(ending: str, found: str, stall: _Stall) -> SolveStatus:
+    status = _STOPPED.get(ending) or _STATUS.get(found, SolveStatus.FAILED)
     if stall.seen:
-        return SolveStatus.STALLED
-    if ending == "USER_TERMINATION":
-        return SolveStatus.ITERATION_LIMIT
-    return _STOPPED.get(ending) or _STATUS.get(found, SolveStatus.FAILED)
+        status = SolveStatus.STALLED
+    elif ending == "USER_TERMINATION":
+        status = SolveStatus.ITERATION_LIMIT
+    message = f"{ending.lower()}, {found.lower()}"
+    return watch.report(name, status, x, np.array(result.constraint_dual_solution), message)
 
 
-def _better(problem: Problem, start: np.ndarray, answer: np.ndarray) -> np.ndarray:
-    """Choose where to go on: where a run ended, if that is about feasible and not slower, or at its start."""
-    feasible = residual(problem, answer) <= _STALL_PROGRESS
-    return answer if feasible and _slowdown(problem, start, answer) <= _SLOWER else start
-
-
-def _lost(problem: Problem, start: np.ndarray, answer: np.ndarray) -> bool:
-    """Tell whether a solve ended at a motion far slower than its start, which all but holds the limits already."""
-    return _slowdown(problem, start, answer) > max(residual(problem, start), _SLOWER)
-
-
-def _slowdown(problem: Problem, start: np.ndarray, answer: np.ndarray) -> float:
-    """By which part of a positive objective, such as the end time, it is larger; 0 where it is none."""
-    before = objective_at(problem, start)
-    return objective_at(problem, answer) / before - 1.0 if 0.0 < before < np.inf else 0.0
-
-
-def _units(problem: Problem, x: np.ndarray, power: float) -> np.ndarray:
-    """Units of the variables, (v,): the largest slopes of rows at x become what they are to the power 1 - `power`.
+def _units(problem: Problem, x: np.ndarray) -> np.ndarray:
+    """Units of the variables, (v,), in which the largest slopes of rows at x are the square roots of what they are.
 
     Uno's subproblem solver breaks down where slopes differ by four orders of magnitude: 100 intervals, a short time.
-    With a power of 1, a step of the trust region's radius changes no row by much more than the width of its bounds,
-    which keeps a solve that begins near its answer from leaving for a motion that is far slower.
     """
     slopes = np.ones(len(x))
     np.maximum.at(slopes, problem.jacobian_columns, np.abs(problem.jacobian(x)))
-    return np.asarray(slopes**-power)
+    return np.asarray(1.0 / np.sqrt(slopes))
 
 
 class _Stall:
@@ -191,7 +153,7 @@ def _run(watch: Watch, x: np.ndarray, units: np.ndarray, radius: float, terminat
         "primal_tolerance": options.tolerance,
         "dual_tolerance": options.tolerance,
         "TR_radius": radius,
-        "max_iterations": min(max(int(_RUN * options.max_iterations), _LEAST_RUN), options.max_iterations),
+        "max_iterations": options.max_iterations,
         "time_limit": float(options.time_limit),
     }
     for key, value in settings.items():
