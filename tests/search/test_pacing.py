@@ -7,9 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from brachis import transcribe
-from brachis.examples import scara_line
-from brachis.nlp import guess
 from brachis.search import pacing
 from brachis.task import load_task
 
@@ -59,16 +56,3 @@ def test_more_intervals_than_switches_need_are_spread_over_the_whole_time():
     lengths = np.diff(pacing._graded(np.array([0.0, 0.3, 1.0]), 400))
     assert lengths.min() > 1e-6
     assert lengths.max() < 0.04
-
-
-@pytest.mark.parametrize(("estimate", "expected"), [(0.5, 0.5), (50.0, None), (np.inf, None)])
-def test_a_first_guess_takes_no_longer_than_the_least_time(estimate, expected):
-    program, _ = transcribe(scara_line, redundant_joints=["j1"])
-    postures = np.column_stack([np.linspace(0.0, 1.0, 50), np.zeros(50)])
-    start = SimpleNamespace(
-        problem=SimpleNamespace(limits=(), end_rates=(0.0, 0.0)), timed=False, joint_path=postures, estimate=estimate
-    )
-    x = pacing.first_point(program, start)
-    within = guess.starting_point(program, [postures])
-    assert program.end_time(x) == pytest.approx(expected or program.end_time(within))
-    np.testing.assert_array_equal(x[1:], within[1:])

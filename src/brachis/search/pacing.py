@@ -1,12 +1,9 @@
 """Starts that are fast enough where a limit asks for a least speed, and splines that can follow them.
 
-The first guess follows its joint path smoothly from rest to rest, and its time is scaled until nothing is too fast, or
-to the least time along the joint path where that is shorter: a solver takes many steps from a long time to a short one,
-and few from a motion that is a little too fast.
-
-No scaling meets a least speed over a part of the path. Where there is one, the joint path is therefore followed in the
-times of the phase plane, and knots are ever closer towards the ends and the times at which its acceleration jumps: a
-part of the path at a constant speed may be long, and the way to it short.
+The first guess follows its joint path smoothly from rest to rest, and its time is scaled until nothing is too fast. No
+such scaling meets a least speed over a part of the path. Where there is one, the joint path is therefore followed in
+the times of the phase plane, and knots are ever closer towards the ends and the times at which its acceleration jumps:
+a part of the path at a constant speed may be long, and the way to it short.
 
 Between ends in motion the first guess lies half-way between a constant acceleration and the phase plane. The former
 alone may need no force at all, where no limit's change with the end time tells a solver where to go.
@@ -103,12 +100,7 @@ def first_point(program: Program, start: Start) -> np.ndarray | None:
         x = starting_point(program, [motion], times[-1], keep=keep)
         if x is not None:
             return x
-    if start.timed:
-        return starting_point(program, [start.joint_path], start.estimate)
-    x = starting_point(program, [start.joint_path])
-    if x is None or not start.estimate < program.end_time(x):
-        return x
-    return program.time_scaled(x, start.estimate / program.end_time(x))
+    return starting_point(program, [start.joint_path], start.estimate if start.timed else None)
 
 
 def _paced(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
