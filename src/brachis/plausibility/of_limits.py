@@ -109,8 +109,7 @@ def _placeholder(value: float, rule: Rule, usual: float, stated: float | None) -
 
 def _stated(robot: Robot, rule: Rule, joint: int) -> float | None:
     """Return the URDF's limit that a joint's is compared with."""
-    known = robot.stated_limits[joint] if joint < len(robot.stated_limits) else None
-    found: float | None = getattr(known, STATED.get(rule.stated, ""), None)
+    found: float | None = getattr(robot.stated_limits[joint], STATED.get(rule.stated, ""), None)
     return found
 
 
@@ -137,12 +136,12 @@ def _ranges(robot: Robot) -> Iterator[Figure]:
         robot.position_units,
         limits.position_lower,
         limits.position_upper,
-        [*robot.stated_limits, *[None] * (robot.n - len(robot.stated_limits))],
+        robot.stated_limits,
         strict=True,
     )
     for name, unit, lower, upper, known in columns:
         usual = _WIDEST[unit]
-        if known is not None and known.lower is not None and known.upper is not None and known.upper > known.lower:
+        if known.lower is not None and known.upper is not None and known.upper > known.lower:
             usual = min(usual, max(_WIDER * (known.upper - known.lower), _AT_LEAST_WIDE[unit]))
         if max(abs(lower), abs(upper)) <= _OPEN_END[unit]:
             message, shown = f"the position range looks like {stated[unit]}", f"[{lower:.6g}, {upper:.6g}]"
