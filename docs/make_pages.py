@@ -31,8 +31,18 @@ GALLERY_HEAD = """\
 
 # Gallery
 
-Every example of the repository, with what it gives: pictures and end times are made by `python docs/make_figures.py`,
-and every motion shown is verified. Run one by `brachis plan examples/NAME.yaml` or `python examples/NAME.py`.
+Every example of the repository. Click a picture to see the example's source. To run one, use
+`brachis plan examples/NAME.yaml` or `python examples/NAME.py`. `python docs/make_figures.py` makes the pictures and the
+end times. Every motion shown is verified.
+"""
+CARD = """\
+:::{{grid-item-card}} {stem}
+:img-top: figures/{picture}
+:class-img-top: thumbnail
+:link: example-{name}
+:link-type: ref
+{times}
+:::
 """
 BENCHMARKS_HEAD = """\
 <!-- Made by docs/make_pages.py from benchmarks/results/. -->
@@ -52,22 +62,39 @@ processor times on the machine that the file names, unless a table says otherwis
 
 
 def gallery() -> str:
-    """Return the gallery: title, picture, end times and source of every example."""
-    ended = json.loads(GALLERY.read_text())
-    return "\n".join(
-        [GALLERY_HEAD, *(_example(name, PICTURES[name], ended[name]) for name in PICTURES if name in ended)]
-    )
+    """Return the gallery: a thumbnail of every example, then title, picture, end times and source of each."""
+    recorded = json.loads(GALLERY.read_text())
+    names = [name for name in PICTURES if name in recorded]
+    cards = "\n".join(_card(name, recorded[name]) for name in names)
+    grid = f"::::{{grid}} 1 2 3 3\n:gutter: 2\n\n{cards}::::\n"
+    return "\n".join([GALLERY_HEAD, grid, *(_example(name, recorded[name]) for name in names)])
 
 
-def _example(name: str, picture: str, t_end: dict[str, float]) -> str:
-    files = sorted(
-        path
-        for pattern in (f"{name}_*.yaml", f"{name}_*.py", f"{name}/*.yaml", f"{name}/src/*/*.py")
-        for path in (ROOT / "examples").glob(pattern)
-    )
-    stem = files[0].stem if name[0].isdigit() else name
+def _card(name: str, t_end: dict[str, float]) -> str:
+    values = [f"{value:.3f}" for value in t_end.values()]
+    times = f"{values[0]} s" if len(values) == 1 else f"{min(values)} to {max(values)} s"
+    return CARD.format(stem=_stem(name), picture=PICTURES[name], name=name, times=times)
+
+
+def _files(name: str) -> list[Path]:
+    patterns = (f"{name}_*.yaml", f"{name}_*.py", f"{name}/*.yaml", f"{name}/src/*/*.py")
+    return sorted(path for pattern in patterns for path in (ROOT / "examples").glob(pattern))
+
+
+def _stem(name: str) -> str:
+    return _files(name)[0].stem if name[0].isdigit() else name
+
+
+def _example(name: str, t_end: dict[str, float]) -> str:
+    files = _files(name)
+    stem = _stem(name)
     times = ", ".join(f"{value:.4f} s ({key})" for key, value in t_end.items())
-    parts = [f"## {stem}\n", f"{_about(files)}\n", f"![{stem}](figures/{picture})\n", f"End time: {times}.\n"]
+    parts = [
+        f"(example-{name})=\n## {stem}\n",
+        f"{_about(files)}\n",
+        f"![{stem}](figures/{PICTURES[name]})\n",
+        f"End time: {times}.\n",
+    ]
     for path in files:
         parts.append(f":::{{dropdown}} {path.relative_to(ROOT)}")
         parts.append(f"```{{literalinclude}} ../{path.relative_to(ROOT)}\n```\n:::\n")
