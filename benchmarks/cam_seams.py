@@ -89,6 +89,7 @@ def run(seed: int, folder: Path, corner: float) -> tuple[bool, tuple[str, ...]]:
         "start": "free",
         "task_space": "pose",
         "path": [{"csv": {"file": str(folder / "seam.csv"), "tolerance": tolerance}}],
+        "spline": {"intervals": 20},
         "search": {"time_limit": 300.0},
     }
     start = time.process_time()
