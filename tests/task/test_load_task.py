@@ -252,7 +252,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ({"spline": {"degree": 8}}, ["spline.degree: out of range; found 8; allowed: <= 7"]),
     ({"spline": {"intervals": 20.5}}, ["spline.intervals: wrong type; found 20.5; allowed: a whole number"]),
     *(
-        ({"spline": spline}, ["spline.intervals: knots: free needs a number of intervals", "such as 12, or knots: uniform"])
+        ({"spline": spline}, ["spline.intervals: knots: free needs a number of intervals", "12, or knots: uniform"])
         for spline in ({"knots": "free"}, {"intervals": "auto", "knots": "free"})
     ),
     ({"spline": {"intervals": 3}}, ["spline.intervals: out of range; found 3; allowed: >= 4"]),

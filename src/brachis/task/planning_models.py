@@ -23,8 +23,8 @@ class SplineSettings(Model):
     )
     intervals: Intervals = Field(
         default="auto",
-        description="Number of knot intervals; auto halves them where it pays until halving all of them gains less than "
-        "the tolerance. A number plans sooner, and gives a slower motion; knots: free needs one.",
+        description="Number of knot intervals; auto halves them where it pays until halving all of them gains less "
+        "than the tolerance. A number plans sooner, and gives a slower motion; knots: free needs one.",
     )
     tolerance: Positive = Field(
         default=1.0e-3, le=0.1, description="With intervals: auto, the gain, as a fraction of t_E, that ends it."
@@ -68,7 +68,7 @@ class SplineSettings(Model):
     def _free_knots_are_counted(self) -> SplineSettings:
         if self.knots == "free" and self.intervals == "auto":
             problem = "knots: free needs a number of intervals; auto is the default"
-            raise refuse(problem, key=".intervals", found="auto", allowed="a whole number, such as 12, or knots: uniform")
+            raise refuse(problem, key=".intervals", found="auto", allowed="a number such as 12, or knots: uniform")
         return self
 
 
