@@ -66,7 +66,7 @@ def test_end_time_is_that_of_toppra(bench, example, seed):
     pytest.importorskip("toppra")
     result = brachis.plan(bench.case(seed, intervals=150))
     assert result.verified
-    least = example.by_toppra(result.trajectory.robot, result.task)
+    least = example.by_toppra(result.trajectory.robot, *example.joint_points(result.trajectory.robot, result.task))
     assert result.t_end == pytest.approx(least, rel=3e-3)
 
 
