@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +22,7 @@ from scipy.spatial.transform import Rotation
 import brachis
 from brachis.path import path_of
 from brachis.robot import bind
-from committed import save
+from committed import processor_time, save
 
 ROOT = Path(__file__).parents[1]
 ROBOT = ROOT / "robots/tx90l_rail/robot.urdf"
@@ -89,18 +88,19 @@ def run(seed: int, folder: Path, corner: float) -> tuple[bool, tuple[str, ...]]:
         "start": "free",
         "task_space": "pose",
         "path": [{"csv": {"file": str(folder / "seam.csv"), "tolerance": tolerance}}],
+        "spline": {"intervals": 20},
         "search": {"time_limit": 300.0},
     }
-    start = time.process_time()
+    start = processor_time()
     cells = [f"{seed}", f"{len(position)}", f"{scatter:.4f} mm", f"{allowed:.4f} mm"]
     try:
         task = brachis.load_task(content)
-        loaded = time.process_time() - start
+        loaded = processor_time() - start
         result = brachis.plan(task)
     except brachis.BrachisError as error:
         print(*cells, error, sep=" | ", flush=True)
         return False, (*cells, *["-"] * (len(COLUMNS) - 5), "no motion")
-    seconds, fit = time.process_time() - start, task.fits[0]
+    seconds, fit = processor_time() - start, task.fits[0]
     off, at_corners = farthest(task, position)
     good = result.verified and off <= allowed and at_corners <= max(corner, allowed) and seconds < ALLOWED_S
     cells += [f"{off:.4f} mm", f"{at_corners:.4f} mm", f"{fit.intervals}", f"{len(fit.corners)}", f"{loaded:.2f} s"]
@@ -117,9 +117,9 @@ def many(folder: Path, count: int = 100_000) -> bool:
     rotations = (Rotation.from_rotvec(0.3 * np.column_stack([t, t**2, 0.0 * t])) * DOWN).as_rotvec(degrees=True)
     write(folder / "many.csv", position + np.random.default_rng(0).normal(size=position.shape) * 0.02, rotations)
     segment = {"csv": {"file": str(folder / "many.csv"), "tolerance": {"position": "0.15 mm"}}}
-    start = time.process_time()
+    start = processor_time()
     task = brachis.load_task({"brachis": 1, "start": "free", "task_space": "pose", "path": [segment]})
-    seconds = time.process_time() - start
+    seconds = processor_time() - start
     print(f"read, fitted and checked in {seconds:.1f} s of processor time: {task.fits[0]}", flush=True)
     return seconds < ALLOWED_LOAD_S
 

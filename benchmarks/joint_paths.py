@@ -1,17 +1,16 @@
 """Seeded paths of a seven-joint arm, timed by brachis and by toppra under the same limits, side by side.
 
-Usage: python benchmarks/joint_paths.py [--count 100] [--first 0] [--intervals 150] [--save]
+Usage: python benchmarks/joint_paths.py [--count 100] [--first 0] [--save]
 
 Natural quintic splines through random waypoints of the KUKA iiwa 14, with limits on velocity, acceleration and torque.
 brachis plans cubic splines s(t) (continuous torque), from rest to rest, and its motion is refined and verified; toppra
-takes the very same path on a fine grid, on which limits hold at grid points alone.
+gets what its users give it, a `SplineInterpolator` through points of the same path (401 of them).
 """
 
 from __future__ import annotations
 
 import argparse
 import importlib.util
-import time
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -22,15 +21,19 @@ import pinocchio as pin
 import brachis
 from brachis.path import path_of
 from brachis.robot import bind
-from committed import save
+from committed import processor_time, save
 
 ROOT = Path(__file__).parents[1]
 URDF = ROOT / "robots/iiwa14/robot.urdf"
+OURS = ("auto", 150)
+"""Values of spline.intervals."""
+THEIRS = (1000, 2000)
+"""Intervals of toppra's grid."""
 ACTIVE, HELD = 0.999, 0.9
 """Parts of a limit: from the first one on it is active; gravity alone takes at most the second one of torques."""
 
 
-def case(seed: int, intervals: int) -> brachis.Task:
+def case(seed: int, intervals: int | str) -> brachis.Task:
     """Return the task with this number: the first drawn path that stays in range and can be held up at rest."""
     rng = np.random.default_rng(seed)
     while True:
@@ -45,7 +48,7 @@ def case(seed: int, intervals: int) -> brachis.Task:
             return task
 
 
-def _drawn(rng: np.random.Generator, intervals: int) -> dict[str, Any]:
+def _drawn(rng: np.random.Generator, intervals: int | str) -> dict[str, Any]:
     """Draw waypoints and limits."""
     limits = brachis.Robot.from_urdf(URDF).limits
     count = len(limits.torque)
@@ -72,59 +75,57 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--intervals", type=int, default=150)
     parser.add_argument("--save", action="store_true", help="into benchmarks/results")
     given = parser.parse_args()
     spec = importlib.util.spec_from_file_location("example", ROOT / "examples/11_from_toppra.py")
     example = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(example)
-    rows, active = [], Counter[str]()
-    print("case   brachis t_E   toppra t_E   difference   brachis   toppra (processor time)")
+    example.by_toppra(*_points(example, case(0, 20)), intervals=100)  # imports toppra
+    active = Counter[str]()
+    cases = []
+    print("end times, s, and processor times, s")
     for seed in range(given.first, given.first + given.count):
-        task = case(seed, given.intervals)
-        robot, began = brachis.Robot.from_urdf(URDF, limits=task.robot.limits), time.process_time()
-        least = example.by_toppra(robot, task)
-        theirs = time.process_time() - began
-        began = time.process_time()
-        try:
-            result = brachis.plan(task)
-            t_end = result.t_end if result.verified else np.inf
-            used = {check.name: check.value for check in result.verification.checks if check.of_limit}
-            active.update(name for name, ratio in used.items() if ratio > ACTIVE)
-        except brachis.BrachisError as error:
-            print(error)
-            t_end = np.inf
-        ours = time.process_time() - began
-        rows.append((t_end / least - 1.0, ours, theirs))
-        print(f"{seed:4d} {t_end:11.4f} s {least:10.4f} s {100.0 * rows[-1][0]:10.3f} % {ours:7.2f} s {theirs:6.2f} s")
-    summarise(np.array(rows), active)
+        row = {}
+        for intervals in OURS:
+            began = processor_time()
+            result = brachis.plan(case(seed, intervals))
+            row[f"brachis, {intervals}"] = (result.t_end if result.verified else np.inf, processor_time() - began)
+        active.update(c.name for c in result.verification.checks if c.of_limit and c.value > ACTIVE)
+        robot, *points = _points(example, result.task)
+        for intervals in THEIRS:
+            began = processor_time()
+            t_end = example.by_toppra(robot, *points, intervals=intervals)
+            row[f"toppra, {intervals}"] = (t_end, processor_time() - began)
+        cases.append(list(row.values()))
+        cells = (f"{name}: {t_end:.4f} in {took:.3f}" for name, (t_end, took) in row.items())
+        print(f"{seed:4d}", *cells, sep="   ", flush=True)
+    summarise(tuple(row), np.array(cases), active)
 
 
-def summarise(rows: np.ndarray, active: Counter[str]) -> None:
-    """Print, and keep if asked, what came of all cases: rows of relative difference and both processor times, s."""
-    gaps, ours_all, theirs_all = rows.T
-    print(
-        f"{len(rows)} cases, {int(np.isinf(gaps).sum())} failed; difference {100.0 * gaps.min():.3f} to "
-        f"{100.0 * gaps.max():.3f} %, median {100.0 * np.median(gaps):.3f} %; processor time, median: brachis "
-        f"{np.median(ours_all):.2f} s (refined and verified), toppra {np.median(theirs_all):.2f} s (2000 intervals)"
-    )
+def _points(example: Any, task: brachis.Task) -> tuple[brachis.Robot, np.ndarray, np.ndarray]:
+    """Return what toppra's users have: the robot with its limits, and points of the joint path."""
+    robot = brachis.Robot.from_urdf(URDF, limits=task.robot.limits)
+    return robot, *example.joint_points(robot, task)
+
+
+def summarise(names: tuple[str, ...], cases: np.ndarray, active: Counter[str]) -> None:
+    """Print, and keep if asked, what came of all cases: end times and processor times, (cases, names, 2), s."""
+    gaps = cases[:, :, 0] / cases[:, -1:, 0] - 1.0
+    rows = []
+    for name, gap, seconds in zip(names, gaps.T, cases[:, :, 1].T, strict=True):
+        held = gap[np.isfinite(gap)]
+        span = f"{100.0 * held.min():+.3f} % to {100.0 * held.max():+.3f} %, median {100.0 * np.median(held):+.3f} %"
+        rows.append((name, f"{len(held)}", span, f"{1e3 * np.median(seconds):.0f} ms"))
+    columns = ("", "planned", "end time beside toppra's on 2000 intervals", "processor time, median")
+    for row in (columns, *rows):
+        print(" | ".join(row))
     limits = ", ".join(f"{name.removesuffix(' ratio')} limit active in {count}" for name, count in active.items())
-    print(limits)
-    about = f"Paths of the KUKA iiwa 14 through three to seven random waypoints; {limits}."
-    cells = [
-        ("planned and verified", str(len(rows) - int(np.isinf(gaps).sum())), str(len(rows))),
-        (
-            "end time beside toppra's",
-            f"{100.0 * gaps.min():+.3f} % to {100.0 * gaps.max():+.3f} %, median {100.0 * np.median(gaps):+.3f} %",
-            "grid of 2000 intervals",
-        ),
-        (
-            "processor time, median",
-            f"{np.median(ours_all):.2f} s, refined and verified",
-            f"{np.median(theirs_all):.2f} s",
-        ),
-    ]
-    save("Paths of joints, beside toppra", (f"{len(rows)} paths", "brachis", "toppra"), cells, about)
+    about = (
+        f"{len(cases)} paths of the KUKA iiwa 14 through three to seven random waypoints; {limits}. The plans of "
+        "brachis are refined and verified; toppra's limits hold at its grid points."
+    )
+    print(about)
+    save("Paths of joints, beside toppra", columns, rows, about)
 
 
 if __name__ == "__main__":

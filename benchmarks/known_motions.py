@@ -6,11 +6,11 @@ is planned has the changes that the rows name.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
 import brachis
+from committed import processor_time
 
 ROOT = Path(__file__).parents[1]
 TASKS = {"planar arm": "01_scara_line.yaml", "TX90L on its rail": "03_tx90l_rail_line.yaml"}
@@ -22,8 +22,8 @@ CHANGES: dict[str, dict[str, Any]] = {
 
 
 def timed(task: brachis.Task, **keywords: Any) -> tuple[brachis.Result, float]:
-    began = time.process_time()
-    return brachis.plan(task, **keywords), time.process_time() - began
+    began = processor_time()
+    return brachis.plan(task, **keywords), processor_time() - began
 
 
 def main() -> None:

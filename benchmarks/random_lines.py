@@ -36,6 +36,7 @@ def random_tasks(robot: Robot, seed: int, count: int) -> Iterator[dict[str, obje
             "task_space": ["x", "y"],
             "path": [{"line": {"to": list(end)}}],
             "redundant_joints": [f"j{number % 3 + 1}"],
+            "spline": {"intervals": 20},
         }
 
 

@@ -89,6 +89,7 @@ def random_tasks(
                 }
             ],
             "redundant_joints": list(choice.redundant_joints),
+            "spline": {"intervals": 20},
         }
 
 

@@ -7,13 +7,12 @@ understate the larger jerk at their ends, as a part of the limit: on average, an
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
 
 import brachis
-from committed import save
+from committed import processor_time, save
 
 ROOT = Path(__file__).parents[1]
 JERK, TORQUE_RATE = 12.0, 20.0
@@ -25,8 +24,8 @@ def planned(angle_deg: float, **limits: float) -> tuple[brachis.Result, float]:
     task = brachis.load_task(ROOT / "examples/01_scara_line.yaml").to_dict()
     task["path"], task["redundant_joints"] = [{"line": {"length": 1.0, "angle_deg": angle_deg}}], "auto"
     task["robot"]["limits"] |= limits
-    began = time.process_time()
-    return brachis.plan(task), time.process_time() - began
+    began = processor_time()
+    return brachis.plan(task), processor_time() - began
 
 
 def understated(result: brachis.Result) -> np.ndarray:

@@ -17,28 +17,41 @@ from brachis.robot import bind
 TASK = Path(__file__).with_suffix(".yaml")
 
 
-def by_toppra(robot: brachis.Robot, task: brachis.Task, intervals: int = 2000) -> float:
-    """Time a task's path with toppra; return the end time, s."""
+POINTS = 401
+"""Points of the joint path through which toppra's spline runs."""
+
+
+def joint_points(robot: brachis.Robot, task: brachis.Task) -> tuple[np.ndarray, np.ndarray]:
+    """Return dense points of a task's path of joints: s (POINTS,) and q (POINTS, n), rad."""
+    s = np.linspace(0.0, 1.0, POINTS)
+    robot, task_map = bind(robot, task.task_space)
+    return s, path_of(task_map, task).sample(s).target
+
+
+def by_toppra(
+    robot: brachis.Robot, s: np.ndarray, q: np.ndarray, *, intervals: int = 2000, speeds: tuple[float, float] = (0, 0)
+) -> float:
+    """Time a path of joints with toppra; return the end time, s.
+
+    Parameters
+    ----------
+    robot : Robot
+    s, q : (S,) ndarray and (S, n) ndarray
+        Points of the path.
+    intervals : int, optional
+        Of toppra's grid.
+    speeds : tuple of float, optional
+        Norms of the joint velocities at both ends, rad/s.
+    """
     import toppra  # noqa: PLC0415  (not everyone has it)
 
-    robot, task_map = bind(robot, task.task_space)
-    path, data = path_of(task_map, task), robot.model.createData()
-
-    class Geometry(toppra.interpolator.AbstractGeometricPath):
-        """The very path of the task, for toppra."""
-
-        dof, waypoints, path_interval = robot.n, None, np.array([0.0, 1.0])
-
-        def __call__(self, s: np.ndarray | float, order: int = 0) -> np.ndarray:
-            """Positions, or their first or second derivative."""
-            sample = path.sample(np.atleast_1d(s))
-            values = (sample.target, sample.xi, sample.xi_ds)[order]
-            return values if np.ndim(s) else values[0]
+    data = robot.model.createData()
 
     def inverse_dynamics(q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
-        return np.asarray(pin.rnea(robot.model, data, q, qdot, qddot))
+        return pin.rnea(robot.model, data, q, qdot, qddot)
 
     both_ways = np.array([-1.0, 1.0])
+    path = toppra.SplineInterpolator(s, q)
     constraints = [
         toppra.constraint.JointVelocityConstraint(robot.limits.velocity[:, None] * both_ways),
         toppra.constraint.JointAccelerationConstraint(robot.limits.acceleration[:, None] * both_ways),
@@ -47,10 +60,10 @@ def by_toppra(robot: brachis.Robot, task: brachis.Task, intervals: int = 2000) -
         ),
     ]
     grid = np.linspace(0.0, 1.0, intervals + 1)
-    solver = toppra.algorithm.TOPPRA(constraints, Geometry(), gridpoints=grid, solver_wrapper="seidel")
-    ends = np.array([task.boundary.start_speed, task.boundary.end_speed])
-    _, speed, _ = solver.compute_parameterization(*(ends / np.linalg.norm(path.sample([0.0, 1.0]).xi, axis=1)))
-    return float(np.sum(2.0 * np.diff(grid) / (speed[1:] + speed[:-1])))
+    solver = toppra.algorithm.TOPPRA(constraints, path, gridpoints=grid, solver_wrapper="seidel")
+    rates = speeds / np.linalg.norm(path(np.array([0.0, 1.0]), 1), axis=1)
+    _, rate, _ = solver.compute_parameterization(*rates)
+    return float(np.sum(2.0 * np.diff(grid) / (rate[1:] + rate[:-1])))
 
 
 def main() -> tuple[brachis.Result, float | None]:
@@ -58,7 +71,10 @@ def main() -> tuple[brachis.Result, float | None]:
     result = brachis.plan(TASK)
     print(f"brachis: {result.t_end:.4f} s, verified: {result.verified}")
     try:
-        least = by_toppra(result.trajectory.robot, result.task)
+        robot = result.trajectory.robot
+        ends = result.task.boundary
+        points = joint_points(robot, result.task)
+        least = by_toppra(robot, *points, speeds=(ends.start_speed, ends.end_speed))
     except ImportError:
         print("toppra is not installed: pip install toppra")
         return result, None

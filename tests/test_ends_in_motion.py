@@ -175,7 +175,9 @@ def toppra_time(result):
     spec = importlib.util.spec_from_file_location("from_toppra", ROOT / "examples/11_from_toppra.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module.by_toppra(result.trajectory.robot, result.task)
+    robot = result.trajectory.robot
+    ends = result.task.boundary
+    return module.by_toppra(robot, *module.joint_points(robot, result.task), speeds=(ends.start_speed, ends.end_speed))
 
 
 REFUSED = [

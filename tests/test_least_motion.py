@@ -46,6 +46,7 @@ def seven_joints() -> brachis.Task:
         "start": {"joints": [0.3, 0.6, 0.2, -1.3, 0.4, 0.9, 0.1]},
         "task_space": "position",
         "path": [{"line": {"by": [-0.1, 0.35, 0.2]}}],
+        "spline": {"intervals": 20},
         "search": {"effort": "single"},
     }
     return brachis.load_task(task)
@@ -63,6 +64,7 @@ def scara(**search) -> dict:
         "task_space": ["x", "y"],
         "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
         "redundant_joints": ["j3"],
+        "spline": {"intervals": 20},
         "search": {"effort": "single", **search},
     }
 

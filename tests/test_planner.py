@@ -30,6 +30,7 @@ def task(**changes) -> dict:
         "task_space": ["x", "y"],
         "path": [{"line": {"length": 1.0, "angle_deg": 90}}],
         "redundant_joints": ["j3"],
+        "spline": {"intervals": 20},
         "search": QUICK,
     }
     return {**base, **changes}
@@ -184,6 +185,7 @@ def test_a_blend_of_millimetres_is_not_stepped_over(scara_urdf, size):
         "task_space": ["x", "y"],
         "path": corner,
         "redundant_joints": ["j1"],
+        "spline": {"intervals": 20},
         "search": QUICK,
     }
     result = brachis.plan(scara_urdf, task)

@@ -317,6 +317,8 @@ def transcribe(
     Returns
     -------
     program : Program
+        Over as many equal knot intervals as the task says; with ``intervals: auto`` over the 10 of the first mesh,
+        which `plan` refines.
     family : str
         Family of the closed form.
 

@@ -109,6 +109,7 @@ def test_rows_that_leave_a_direction_free_count_the_whole_speed(rows):
         "task_space": rows,
         "path": [{"line": {"by": [-0.5, 0.3][: len(rows)]}}],
         "tool_limits": {"speed": 0.4},
+        "spline": {"intervals": 20},
         "search": QUICK,
     }
     result = brachis.plan(task)

@@ -233,11 +233,13 @@ def test_many_intervals_are_planned_from_few():
 def test_settings_choose_what_is_done(solved):
     program, report = solved
     options = RefinementOptions()
-    assert adapt_mesh(program, (report,), solve, SplineSettings(), options) == (program, (report,), "")
+    given = SplineSettings(intervals=10)
+    assert adapt_mesh(program, (report,), solve, given, options) == (program, (report,), "")
     unusable = (report, failing(program, report.x))
-    assert adapt_mesh(program, unusable, solve, SplineSettings(knots="free"), options) == (program, unusable, "")
+    freed = SplineSettings(knots="free", intervals=10)
+    assert adapt_mesh(program, unusable, solve, freed, options) == (program, unusable, "")
     before = dataclasses.replace(report)
-    free, reports, _ = adapt_mesh(program, (before, report), solve, SplineSettings(knots="free", intervals=10), options)
+    free, reports, _ = adapt_mesh(program, (before, report), solve, freed, options)
     assert reports[0] is before
     assert free.intervals == program.intervals
     auto = SplineSettings(intervals="auto", tolerance=0.1)

@@ -52,6 +52,7 @@ def test_a_range_of_a_micrometre(scara_urdf, half):
         "task_space": ["x", "y"],
         "path": [{"line": {"by": [0.5, 0.0]}}],
         "redundant_joints": [],
+        "spline": {"intervals": 20},
     }
     assert brachis.plan(task).verified
 

@@ -90,7 +90,7 @@ def test_defaults() -> None:
     assert task.end == "free"
     assert (task.spline.degree, task.spline.intervals, task.spline.rest, task.spline.points_per_interval) == (
         3,
-        20,
+        "auto",
         "full",
         3,
     )
@@ -251,9 +251,9 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ({"spline": {"degree": 2}}, ["spline.degree: rest: full", "found 2", "allowed: >= 3, or rest: velocity"]),
     ({"spline": {"degree": 8}}, ["spline.degree: out of range; found 8; allowed: <= 7"]),
     ({"spline": {"intervals": 20.5}}, ["spline.intervals: wrong type; found 20.5; allowed: a whole number"]),
-    (
-        {"spline": {"intervals": "auto", "knots": "free"}},
-        ["spline.intervals: free knots move; how many there are must be given; found 'auto'", "or knots: uniform"],
+    *(
+        ({"spline": spline}, ["spline.intervals: knots: free needs a number of intervals", "12, or knots: uniform"])
+        for spline in ({"knots": "free"}, {"intervals": "auto", "knots": "free"})
     ),
     ({"spline": {"intervals": 3}}, ["spline.intervals: out of range; found 3; allowed: >= 4"]),
     ({"spline": {"rest": "none"}}, ["spline.rest: not one of the allowed values", "'full' or 'jerk'"]),

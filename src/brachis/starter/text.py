@@ -39,7 +39,7 @@ path:    # segments from the start posture's tool on, in the world frame
 
 redundant_joints: auto    # or a list of joints; brachis inspect shows which have a closed form
 search: {{effort: fast}}    # single, fast, thorough or exhaustive
-spline: {{degree: 3, intervals: 20}}    # more intervals, or auto: faster motions, longer plans
+# spline: {{intervals: 20}}    # plans sooner; the default, auto, gives faster motions
 # boundary: {{start_speed: 0.1}}    # m/s along the path; without it the motion begins and ends at rest
 # tool_limits: {{speed: 0.5}}    # m/s
 """

@@ -22,9 +22,9 @@ class SplineSettings(Model):
         default=3, ge=2, le=7, description="Degree; 3 gives continuous torque, 4 continuous torque rate."
     )
     intervals: Intervals = Field(
-        default=20,
-        description="Number of knot intervals; auto doubles them where it pays until another doubling gains less than "
-        "the tolerance. Free knots need a number.",
+        default="auto",
+        description="Number of knot intervals; auto halves them where it pays until halving all of them gains less "
+        "than the tolerance. A number plans sooner, and gives a slower motion; knots: free needs one.",
     )
     tolerance: Positive = Field(
         default=1.0e-3, le=0.1, description="With intervals: auto, the gain, as a fraction of t_E, that ends it."
@@ -67,8 +67,8 @@ class SplineSettings(Model):
     @model_validator(mode="after")
     def _free_knots_are_counted(self) -> SplineSettings:
         if self.knots == "free" and self.intervals == "auto":
-            problem = "free knots move; how many there are must be given"
-            raise refuse(problem, key=".intervals", found="auto", allowed="a whole number, or knots: uniform")
+            problem = "knots: free needs a number of intervals; auto is the default"
+            raise refuse(problem, key=".intervals", found="auto", allowed="a number such as 12, or knots: uniform")
         return self
 
 
