@@ -105,7 +105,7 @@ def test_a_saved_motion_is_loaded_and_verified(result, saved):
     np.testing.assert_array_equal(loaded.chart_rows, result.trajectory.chart_rows)
     np.testing.assert_array_equal(loaded.chart_knots, result.trajectory.chart_knots)
     t = np.linspace(0.0, loaded.t_end, 50)
-    np.testing.assert_array_equal(loaded.position(t), result.trajectory.position(t))
+    np.testing.assert_allclose(loaded.position(t), result.trajectory.position(t), atol=1e-14)
     assert verify_trajectory(loaded).passed
     # The curves of the chart describe the motion: sigma = C q - p.
     rows = ChartRows.of_arrays(loaded.chart_rows, loaded.chart_knots)

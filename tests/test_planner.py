@@ -53,12 +53,12 @@ def test_saved_result_keeps_the_robot_that_was_planned_for(tmp_path):
         again = brachis.Trajectory.load(tmp_path / "result.npz")
         np.testing.assert_array_equal(again.robot.limits.torque, torque)
         assert np.isinf(again.robot.limits.velocity).all()
-        assert brachis.verify_trajectory(again).worst_ratio == result.verification.worst_ratio
+        assert brachis.verify_trajectory(again).worst_ratio == pytest.approx(result.verification.worst_ratio, rel=1e-9)
 
 
 def test_task_of_the_result_repeats_the_plan():
     result = brachis.plan(robot(12.0), task())
-    assert brachis.plan(result.task).t_end == pytest.approx(result.t_end, rel=1e-9)
+    assert brachis.plan(result.task).t_end == pytest.approx(result.t_end, rel=1e-6)
 
 
 def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_refined_one_does_not():

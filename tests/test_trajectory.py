@@ -78,7 +78,7 @@ def test_numbers_and_arrays_of_times(trajectory):
     for curve in (trajectory.position, trajectory.velocity, trajectory.acceleration, trajectory.torque):
         assert curve(t).shape == (7, 3)
         assert curve(float(t[3])).shape == (3,)
-        np.testing.assert_array_equal(curve(t)[3], curve(float(t[3])))
+        np.testing.assert_allclose(curve(t)[3], curve(float(t[3])), rtol=1e-12, atol=1e-12)
     assert trajectory.path_coordinate(t).shape == (7,)
 
 
@@ -87,7 +87,7 @@ def test_samples(trajectory):
     assert samples.t[-1] == trajectory.t_end
     np.testing.assert_array_equal(samples.t[:-1], 0.01 * np.arange(len(samples.t) - 1))
     np.testing.assert_array_equal(samples.q, trajectory.position(samples.t))
-    np.testing.assert_array_equal(samples.tau, trajectory.torque(samples.t))
+    np.testing.assert_allclose(samples.tau, trajectory.torque(samples.t), rtol=1e-12, atol=1e-12)
     assert samples.s[0] == 0.0
     assert samples.s[-1] == pytest.approx(1.0, abs=1e-12)
     assert np.abs(samples.tau).max() == pytest.approx(10.0, rel=1e-3)
@@ -108,9 +108,10 @@ def test_the_end_posture_is_held_at_the_first_period_that_is_not_before_the_end(
     np.testing.assert_array_equal(held.t, dt * np.arange(len(held.t)))
     assert held.t[-1] >= trajectory.t_end * (1.0 - 1e-12)
     for field in fields(held):
-        np.testing.assert_array_equal(getattr(held, field.name)[:-1], getattr(exact, field.name)[:-1])
+        before, same = getattr(held, field.name)[:-1], getattr(exact, field.name)[:-1]
+        np.testing.assert_allclose(before, same, rtol=1e-12, atol=1e-12)
     assert held.s[-1] == 1.0
-    np.testing.assert_array_equal(held.q[-1], trajectory.position(trajectory.t_end))
+    np.testing.assert_allclose(held.q[-1], trajectory.position(trajectory.t_end), atol=1e-14)
     assert not held.qdot[-1].any()
     assert not held.qddot[-1].any()
 
@@ -120,7 +121,7 @@ def test_the_torque_that_holds_the_end_posture_is_the_static_one(trajectory):
     held = heavy.sample(0.3, last="hold")
     lever = dynamics.rigid_torque(heavy.robot, held.q[-1:], np.zeros((1, 3)), np.zeros((1, 3)))[0]
     assert np.abs(lever).max() > 10.0
-    np.testing.assert_array_equal(held.tau[-1], lever)
+    np.testing.assert_allclose(held.tau[-1], lever, rtol=1e-12)
 
 
 def test_unknown_ending(trajectory):
@@ -183,7 +184,7 @@ def test_round_trip(trajectory, tmp_path):
             assert one == other, field.name
     assert again.joint_names == trajectory.joint_names
     t = np.linspace(0.0, trajectory.t_end, 50)
-    np.testing.assert_array_equal(trajectory.at(t).tau, again.at(t).tau)
+    np.testing.assert_allclose(trajectory.at(t).tau, again.at(t).tau, rtol=1e-12, atol=1e-12)
 
 
 def test_file_does_not_need_the_urdf_file(trajectory, tmp_path):

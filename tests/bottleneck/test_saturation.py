@@ -124,6 +124,7 @@ def test_a_saved_motion_will_do(scara, tmp_path):
     trajectory = scara("j1").trajectory
     trajectory.save(tmp_path / "motion.npz")
     found = saturations(type(trajectory).load(tmp_path / "motion.npz"))
-    assert found == saturations(trajectory)
+    shares = {str(each.label): each.share for each in saturations(trajectory)}
+    assert {str(each.label): each.share for each in found} == pytest.approx(shares, abs=1e-3)
     assert 0.05 < found[0].share < 1.0
     assert [entry.share for entry in found] == sorted((entry.share for entry in found), reverse=True)

@@ -53,7 +53,7 @@ def test_units_of_the_task():
 
 def test_quaternions_get_like_signs():
     (points, _), _ = read("x,y,z,qw,qx,qy,qz\n0,0,0,1,0,0,0\n1,0,0,-1,0,0,0\n2,0,0,1,0,0,0\n")
-    np.testing.assert_array_equal(points.turning, [[1.0, 0.0, 0.0, 0.0]] * 3)
+    np.testing.assert_allclose(points.turning, [[1.0, 0.0, 0.0, 0.0]] * 3, atol=1e-15)
 
 
 MISTAKES = [

@@ -143,7 +143,7 @@ def test_the_last_row(end, run, saved, tmp_path):
         rows = [[float(cell) for cell in row] for row in list(csv.reader(stream))[1:]]
     assert len(rows) == 9
     assert rows[-1][0] == (trajectory.t_end if end == "exact" else 8 * dt)
-    np.testing.assert_array_equal(rows[-1][1:4], trajectory.position(trajectory.t_end))
+    np.testing.assert_allclose(rows[-1][1:4], trajectory.position(trajectory.t_end), atol=1e-14)
     if end == "hold":
         np.testing.assert_array_equal(rows[-1][4:], np.zeros(9))  # no gravity: nothing holds the posture
     outcome = run("export", saved / "result.npz", "--out", table, "--last", "held")

@@ -243,7 +243,7 @@ def test_what_cannot_be_solved_is_nan_and_disturbs_nothing(robot, redundant):
     answers = bench.solver.solve(targets, q_r)
     assert np.isnan(answers[spoilt]).all()
     others = np.setdiff1d(np.arange(30), spoilt)
-    np.testing.assert_array_equal(answers[others], clean[others])
+    np.testing.assert_allclose(answers[others], clean[others], atol=1e-12)
     assert bench.solver.solve(targets[:0], q_r[:0]).shape == (0, 2, PER_SIGN, 6)
     assert np.isnan(bench.solver.solve(targets[[3]], q_r[[3]])).all()
 
@@ -256,7 +256,7 @@ def test_values_that_recur_and_values_that_are_dropped_give_the_same_answers(mon
     assert bench.own_gap(q, first).max() < 1e-6
     monkeypatch.setattr("brachis.ik.eaik_answers._KEPT", 5)
     for _ in range(2):
-        np.testing.assert_array_equal(bench.solve(q[::-1]), first[::-1])
+        np.testing.assert_allclose(bench.solve(q[::-1]), first[::-1], atol=1e-12)
     one_by_one = np.concatenate([bench.solve(posture[None]) for posture in q])
     np.testing.assert_allclose(one_by_one, first, atol=1e-12)
 
@@ -266,8 +266,8 @@ def test_solvers_can_be_pickled_after_use(robot, redundant):
     bench = Bench(robot(), redundant, 100)
     answers = bench.solve(bench.q)
     bench.solver = pickle.loads(pickle.dumps(bench.solver))  # noqa: S301  (our own)
-    np.testing.assert_array_equal(bench.solve(bench.q), answers)
-    np.testing.assert_array_equal(bench.margin(bench.q), eaik_margin(robot(), redundant, bench.q))
+    np.testing.assert_allclose(bench.solve(bench.q), answers, atol=1e-12)
+    np.testing.assert_allclose(bench.margin(bench.q), eaik_margin(robot(), redundant, bench.q), atol=1e-12)
 
 
 def eaik_margin(robot, redundant, q):

@@ -194,7 +194,7 @@ def test_solvers_can_be_sent_to_other_processes():
     checked = bench(rail_arm(), (0, 4, 5, 6), 5)
     solver = pickle.loads(pickle.dumps(checked.solver))  # noqa: S301
     targets, q_r = checked.targets(checked.q), checked.q[:, [0, 4, 5, 6]]
-    np.testing.assert_array_equal(solver.solve(targets, q_r), checked.solver.solve(targets, q_r))
+    np.testing.assert_allclose(solver.solve(targets, q_r), checked.solver.solve(targets, q_r), atol=1e-12)
 
 
 def test_no_targets_have_no_answers():

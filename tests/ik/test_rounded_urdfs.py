@@ -151,7 +151,7 @@ def test_solvers_can_be_pickled_and_answer_in_the_branch_that_is_asked_for(name)
         targets, q_r = bench.poses(bench.q), bench.q[:, bench.redundant]
         solved = bench.solver.solve(targets, q_r)
         again = pickle.loads(pickle.dumps(bench.solver))  # noqa: S301  (our own)
-        np.testing.assert_array_equal(again.solve(targets, q_r), solved)
+        np.testing.assert_allclose(again.solve(targets, q_r), solved, atol=1e-12)
         for branch in range(len(bench.solver.branches)):
             own = bench.solver.solve_branch(targets, q_r, branch)
             np.testing.assert_allclose(own, solved[:, branch], atol=1e-13)
@@ -197,7 +197,7 @@ def test_small_offsets_of_a_measured_arm_count_as_rounding():
 
 
 @pytest.mark.parametrize(
-    ("name", "joint"), [("iiwa", 6), ("UR10", 2), ("UR10", 3), ("UR10 on a rail", 6), ("TX90L on a rail", 6)]
+    ("name", "joint"), [("iiwa", 6), ("UR10", 2), ("UR10", 3), ("UR10 on a rail", 3), ("TX90L on a rail", 6)]
 )
 def test_what_is_farther_off_is_refused_and_the_reason_named(name, joint):
     near, far = (by_angles(ARMS[name], EXACT, bent=bent, bent_joint=joint) for bent in (5e-5, 1e-3))

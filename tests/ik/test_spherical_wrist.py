@@ -202,7 +202,7 @@ def test_solvers_can_be_sent_to_other_processes():
     bench = Bench(rail_arm(), (2,), postures=5)
     solver = pickle.loads(pickle.dumps(bench.solver))  # noqa: S301
     targets, q_r = bench.targets(bench.q), bench.q[:, [2]]
-    np.testing.assert_array_equal(solver.solve(targets, q_r), bench.solver.solve(targets, q_r))
+    np.testing.assert_allclose(solver.solve(targets, q_r), bench.solver.solve(targets, q_r), atol=1e-12)
 
 
 def test_no_targets_have_no_answers():

@@ -109,7 +109,7 @@ def test_rows_come_back_from_their_arrays(once_around):
     for rows in (chart_around(task_map, path, s, q).rows, ChartRows.constant(np.array([[0.1, 0.2, 0.3]]))):
         again = ChartRows.of_arrays(*rows.arrays())
         for first, second in zip(rows.orders(s, q), again.orders(s, q), strict=True):
-            np.testing.assert_array_equal(first, second)
+            np.testing.assert_allclose(first, second, atol=1e-12)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, 1.2, np.pi / 2])

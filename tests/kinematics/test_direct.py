@@ -16,7 +16,7 @@ def test_every_joint_is_a_curve():
     state = free.state(y, ydot, yddot, ydddot, t=np.linspace(0.0, 1.0, 5), near=y + 7.0)
     pairs = (state.q, y), (state.qdot, ydot), (state.qddot, yddot), (state.qdddot, ydddot), (free.postures(y), y)
     for mine, given in pairs:
-        np.testing.assert_array_equal(mine, given)
+        np.testing.assert_allclose(mine, given, atol=1e-14)
     np.testing.assert_array_equal(state.gradient, [np.eye(3)] * 5)
     exact = free.derivatives(state)
     for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot, state.qdddot_y):

@@ -45,7 +45,7 @@ def test_the_motion_is_that_of_the_path(along, states):
             ydddot,
         ).qddot
 
-    np.testing.assert_array_equal(state.q, along.postures(y))
+    np.testing.assert_allclose(state.q, along.postures(y), atol=1e-12)
     np.testing.assert_allclose(state.qdot, (moved(H) - moved(-H)) / (2.0 * H), atol=1e-8)
     np.testing.assert_allclose(state.qddot, (moved(1e-3) - 2.0 * moved(0) + moved(-1e-3)) / 1e-6, atol=1e-4)
     jerk = (accelerated(H) - accelerated(-H)) / (2.0 * H)

@@ -74,7 +74,7 @@ def test_every_value_has_a_label_and_a_figure(limit):
 def test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit):
     for bound in limit.bounds:
         other = limit.relaxed(bound, 0.1 * bound.whole)
-        np.testing.assert_array_equal(other.values(STATES), limit.values(STATES))
+        np.testing.assert_allclose(other.values(STATES), limit.values(STATES), rtol=1e-12, atol=1e-12)
         with np.errstate(invalid="ignore"):  # inf - inf
             low, high = np.nan_to_num(limit.lower - other.lower), np.nan_to_num(other.upper - limit.upper)
         for moves, end in ((low, "upper"), (high, "lower")):
@@ -209,4 +209,5 @@ def test_torques_of_a_motion_are_computed_once(monkeypatch):
         limit.values(motion)
         limit.partials(motion)
     assert sorted(calls) == ["torque", "torque_derivatives"]
-    np.testing.assert_array_equal(motion.torque(robot), dynamics.torque(robot, STATES.q, STATES.qdot, STATES.qddot))
+    again = dynamics.torque(robot, STATES.q, STATES.qdot, STATES.qddot)
+    np.testing.assert_allclose(motion.torque(robot), again, rtol=1e-12, atol=1e-12)

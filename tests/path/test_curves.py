@@ -40,7 +40,8 @@ def assert_derivatives(curve: Curve, step: float = 1e-5) -> None:
     scale = 1 + np.abs(exact[1:]).max(axis=(1, 2), keepdims=True)
     assert np.abs((difference - exact[1:]) / scale).max() < 1e-6
     for order in range(4):
-        np.testing.assert_array_equal(curve.derivatives(sigma, order), exact[: order + 1])
+        fewer = exact[: order + 1]
+        np.testing.assert_allclose(curve.derivatives(sigma, order), fewer, rtol=1e-9, atol=1e-12 * np.abs(fewer).max())
 
 
 XY, XYZ, XYW = ["x", "y"], ["x", "y", "z"], ["x", "z", "yaw"]

@@ -99,7 +99,7 @@ def test_a_corner_names_place_angle_and_key() -> None:
         "path[0] to path[1], at s = 0.5, x = 1, y = 0: the path must be smooth to the third derivative; found a corner "
         "of 90 degrees; allowed: segments that continue each other, or a blend. Set path[0].blend (m) to round it"
     )
-    assert error.s_interval == (0.5, 0.5)
+    assert error.s_interval == pytest.approx((0.5, 0.5))
 
 
 def test_all_corners_are_named() -> None:

@@ -26,7 +26,7 @@ def test_a_panel_for_every_kind_and_a_line_for_every_value(line_trajectory):
     assert set(drawn) == {(label.subject, label.kind) for label in ratios.labels}
     assert ("tool", "speed") in drawn
     for label, column in zip(ratios.labels, ratios.values.T, strict=True):
-        np.testing.assert_array_equal(drawn[label.subject, label.kind].get_ydata(), column)
+        np.testing.assert_allclose(drawn[label.subject, label.kind].get_ydata(), column, atol=1e-9)
 
 
 def test_a_joint_has_one_colour_in_all_panels(line_trajectory):

@@ -131,7 +131,8 @@ def test_the_overview_has_every_curve(line_trajectory):
         curves = labelled(found[label])
         assert list(curves) == list(line_trajectory.joint_names)
         t = curves["j1"].get_xdata()
-        assert np.array_equal(np.column_stack([line.get_ydata() for line in curves.values()]), function(t))
+        drawn = np.column_stack([line.get_ydata() for line in curves.values()])
+        np.testing.assert_allclose(drawn, function(t), atol=1e-9)
     assert {"$s$", r"$\dot{s}$ (1/s)"} < set(found)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == list(line_trajectory.joint_names)
 

@@ -21,7 +21,7 @@ def test_lines_are_the_torques_over_their_limits(line_trajectory, with_limits):
     assert list(drawn) == ["j1", "j2", "j3"]
     for joint, line in enumerate(drawn.values()):
         t, ratio = line.get_data()
-        assert np.array_equal(ratio, trajectory.torque(t)[:, joint] / limits[joint])
+        np.testing.assert_allclose(ratio, trajectory.torque(t)[:, joint] / limits[joint], atol=1e-9)
 
 
 def test_lines_cover_the_motion_and_miss_no_knot(line_trajectory):
@@ -71,7 +71,7 @@ def test_joints_without_torque_limit_are_left_out(line_trajectory, with_limits):
 def test_without_any_torque_limit_the_torques_themselves_are_drawn(line_trajectory, with_limits):
     ax = plot_torques(with_limits(line_trajectory, torque=np.full(3, INF))).axes[0]
     t, tau = lines(ax)["j2"].get_data()
-    assert np.array_equal(tau, line_trajectory.torque(t)[:, 1])
+    np.testing.assert_allclose(tau, line_trajectory.torque(t)[:, 1], atol=1e-9)
     assert levels(ax) == []
     assert ax.get_ylabel() == r"$\tau$ (Nm)"
 

@@ -44,7 +44,7 @@ def test_what_is_known_of_it_is_saved(imported, tmp_path):
     imported.save(tmp_path / "today.npz")
     again = Trajectory.load(tmp_path / "today.npz")
     assert again.recovered == imported.recovered
-    assert verify_trajectory(again) == verify_trajectory(imported)
+    assert verify_trajectory(again).worst_ratio == pytest.approx(verify_trajectory(imported).worst_ratio, rel=1e-9)
     export.write(again, tmp_path / "again.csv", dt=0.01)
     (ax, *_) = plots.plot_motion(again).axes
     assert ax.lines[0].get_xdata()[-1] == again.t_end

@@ -65,10 +65,12 @@ def from_anywhere(robot) -> brachis.Result:
     return brachis.plan(robot, task(start="free", path_start=HERE))
 
 
-def to_nine_digits(result: brachis.Result) -> list[dict[str, Any]]:
-    """Candidates with their times to nine digits; the last ones differ from process to process."""
+def without_times(result: brachis.Result) -> tuple[list[dict[str, Any]], np.ndarray]:
+    """Candidates, and their times, (K, 3); the order of equally fast ones differs from process to process."""
     rows = [candidate.to_dict() for candidate in result.candidates]
-    return [row | {name: float(f"{row[name]:.9g}") for name in TIMES} for row in rows]
+    rows.sort(key=lambda row: (row["redundant_joints"], row["branch"], row["origin"]))
+    times = np.array([[row.pop(name) for name in TIMES] for row in rows])
+    return rows, times
 
 
 @pytest.mark.parametrize(
@@ -101,9 +103,11 @@ def test_every_candidate_is_listed_the_fastest_first(robot, usual, asked, choice
 def test_the_same_candidates_whatever_the_number_of_processes(robot, usual, asked):
     one = brachis.plan(robot, task(search={"jobs": 1}, **asked)) if asked else usual
     two = brachis.plan(robot, task(search={"jobs": 2}, **asked))
-    assert one.t_end == pytest.approx(two.t_end, rel=1e-9)
-    assert to_nine_digits(one) == to_nine_digits(two)
-    np.testing.assert_allclose(one.trajectory.control_points, two.trajectory.control_points, atol=1e-7)
+    assert one.t_end == pytest.approx(two.t_end, rel=1e-6)
+    (first, times), (second, others) = without_times(one), without_times(two)
+    assert first == second
+    np.testing.assert_allclose(others, times, rtol=1e-6)
+    np.testing.assert_allclose(one.trajectory.control_points, two.trajectory.control_points, atol=1e-5)
 
 
 def test_more_effort_is_never_slower(robot, usual):

@@ -41,10 +41,15 @@ def test_the_answer_and_the_progress_are_those_of_a_solve_here(name, monkeypatch
     far = solve(progress=lambda *call: calls["apart"].append(call), name=name)
     monkeypatch.setattr(apart, "ENTRIES", 10)
     near = solve(progress=lambda *call: calls["here"].append(call), name=name)
-    assert calls["apart"] == calls["here"] != []
+    assert calls["here"]
+    np.testing.assert_allclose(calls["apart"], calls["here"], atol=1e-6)  # another process may have other BLAS threads
     for entry in dataclasses.fields(far):
         if entry.name != "wall_time":
-            np.testing.assert_array_equal(getattr(far, entry.name), getattr(near, entry.name))
+            there, here = getattr(far, entry.name), getattr(near, entry.name)
+            if np.asarray(here).dtype.kind == "f":
+                np.testing.assert_allclose(there, here, atol=1e-6)
+            else:
+                assert there == here
 
 
 def test_a_solver_that_does_not_come_back_is_ended(monkeypatch):

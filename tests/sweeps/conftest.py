@@ -50,6 +50,6 @@ def same_as_undisturbed(undisturbed):
     def same(table) -> bool:
         ours, theirs = (each.drop(ROUNDED) for each in (table, undisturbed.table))
         ends, others = (np.array(each.column("t_end_s").to_pylist(), float) for each in (table, undisturbed.table))
-        return ours.equals(theirs) and ends == pytest.approx(others, rel=1e-9, nan_ok=True)
+        return ours.equals(theirs) and ends == pytest.approx(others, rel=1e-6, nan_ok=True)
 
     return same

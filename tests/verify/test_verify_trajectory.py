@@ -179,7 +179,11 @@ def test_tolerances_are_options(planned):
 
 def test_saved_and_loaded_trajectory_has_the_same_verification(planned, tmp_path):
     planned.save(tmp_path / "result.npz")
-    assert verify_trajectory(Trajectory.load(tmp_path / "result.npz")) == verify_trajectory(planned)
+    again, first = verify_trajectory(Trajectory.load(tmp_path / "result.npz")), verify_trajectory(planned)
+    assert [check.name for check in again.checks] == [check.name for check in first.checks]
+    assert again.worst_ratio == pytest.approx(first.worst_ratio, rel=1e-9)
+    for one, other in zip(again.checks, first.checks, strict=True):
+        assert one.value == pytest.approx(other.value, rel=1e-6, abs=1e-9)
 
 
 def test_another_robot_of_the_same_joints(planned, tmp_path):

@@ -124,7 +124,7 @@ class Rail:
         centre = np.array(self.mount_xyz) + 0.5 * height * down
         beam = (centre + height * down + 0.5 * (low + high) * np.array(self.axis)).round(12)
         length = high - low + max(self.carriage_size[:2])
-        heading = (0.0, -math.asin(self.axis[2]), math.atan2(self.axis[1], self.axis[0]))
+        heading = (0.0, -math.atan2(self.axis[2], math.hypot(*self.axis[:2])), math.atan2(self.axis[1], self.axis[0]))
         limit = {"lower": low, "upper": high, "velocity": self.velocity, "effort": self.force}
         colour = (f"{self.name}_grey", elements.GREY)  # a name of its own: the arm may have another grey
         inertia = elements.box_inertia(self.mass, self.carriage_size)

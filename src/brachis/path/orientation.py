@@ -13,6 +13,7 @@ from brachis.path.helix import HelixCurve
 from brachis.path.leibniz import product, unit
 from brachis.path.rotations import hat
 from brachis.path.sampling import smallest
+from brachis.path.site import place
 from brachis.path.turns import turn_of
 from brachis.task import AlongTangent, Rotate, TurnTo
 
@@ -133,4 +134,4 @@ def _with_tangent(curve: Curve, up: Array, start: Array, key: str) -> WithTangen
 
 def _place(curve: Curve, sigma: float) -> str:
     point = curve.derivatives(np.array([sigma]), 0)[0, 0]
-    return ", ".join(f"{row} = {value:.6g}" for row, value in zip("xyz", point, strict=True))
+    return place("xyz", point)

@@ -110,8 +110,8 @@ class Site:
 
 
 def place(rows: Sequence[str], point: Array) -> str:
-    """Return coordinates in words; of a pose its position."""
-    return ", ".join(f"{row} = {value:.6g}" for row, value in zip(rows, point, strict=False))
+    """Return coordinates in words, to the nanometre; of a pose its position."""
+    return ", ".join(f"{row} = {round(value, 9) + 0.0:.6g}" for row, value in zip(rows, point, strict=False))
 
 
 def stands_still(curve: Curve, positions: int) -> bool:
