@@ -70,7 +70,7 @@ def chart_starts(
         found = lattice.joint_paths(SCREENED * level.in_charts)
         if not isinstance(found, DeadEnd):
             break
-    if isinstance(found, DeadEnd):
+    if isinstance(found, DeadEnd) or not found:
         return found
     newton = Newton(problem.task_map)
     named = [(_origin(number, joint_path), joint_path) for number, joint_path in enumerate(found, 1)]
