@@ -68,10 +68,13 @@ def tasks(folder: Path) -> Iterator[tuple[str, Any]]:
     yield "gen3_rails free start", line("gen3_rails", start="free", path_start=[0.8, 0.5, 0.7, 0.0, 1.0, 0.0, 0.0])
     yield "arm8 joints", line("arm8", task_space="joints", path=[{"spline": {"through": [[0.5] * 8, [0.1] * 8]}}])
     yield "tx90l_rail 300 intervals", line("tx90l_rail", spline={"intervals": 300})
-    yield "tx90l_rail, rail locked", line(
-        "tx90l_rail",
-        robot={"urdf": str(ROOT / "robots/tx90l_rail/robot.urdf"), "locked_joints": {"rail": 0.0}},
-        start={"joints": POSTURES["tx90l_rail"][1:]},
+    yield (
+        "tx90l_rail, rail locked",
+        line(
+            "tx90l_rail",
+            robot={"urdf": str(ROOT / "robots/tx90l_rail/robot.urdf"), "locked_joints": {"rail": 0.0}},
+            start={"joints": POSTURES["tx90l_rail"][1:]},
+        ),
     )
     for number in ("01_scara_line", "04_ur10_rail_weld", "06_free_roll", "09_payload_friction_jerk"):
         yield number, ROOT / f"examples/{number}.yaml"
@@ -79,7 +82,13 @@ def tasks(folder: Path) -> Iterator[tuple[str, Any]]:
     seam = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(seam)
     seam.write(folder / "seam.csv")
-    csv = {"csv": {"file": str(folder / "seam.csv"), "corner": "blend", "tolerance": {"corner": "5 mm"}}}
+    csv = {
+        "csv": {
+            "file": str(folder / "seam.csv"),
+            "corner": "blend",
+            "tolerance": {"position": "0.15 mm", "orientation": "0.1 deg", "corner": "5 mm"},
+        }
+    }
     yield "seam", line("tx90l_rail", start="free", path=[csv])
     yield "joints, 150 intervals", joint_paths.case(0, 150)
 

@@ -113,8 +113,9 @@ def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
     tried = []
     if "iteration limit" in statuses and task.solver.max_iterations < few["max_iterations"].default:
         tried.append(f"raise solver.max_iterations, which is {task.solver.max_iterations}")
-    if "time limit" in statuses and task.solver.time_limit < few["time_limit"].default:
-        tried.append(f"raise solver.time_limit, which is {task.solver.time_limit:g} s")
+    if "time limit" in statuses:
+        name = "solver" if task.solver.time_limit < few["time_limit"].default else "search"
+        tried.append(f"raise {name}.time_limit, which is {getattr(task, name).time_limit:g} s")
     for key in ("start_speed", "end_speed"):
         speed = getattr(task.boundary, key)
         if speed:

@@ -107,7 +107,8 @@ def find_fastest(
         return record
     if record.too_fast is not None:
         raise record.too_fast.error
-    if record.interrupted:
+    if record.interrupted or record.cut_short(problem.task.solver.time_limit):
+        record.interrupted = True
         raise out_of_time(problem.task, record.undone())
     raise no_motion(problem, decompositions, record.attempts, record.dead_ends, deadline)
 

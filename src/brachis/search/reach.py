@@ -121,12 +121,12 @@ class _Answers:
         return np.asarray(self.exists & self.inside.all(axis=4))
 
 
-def _answers_along(
-    joint_map: ClosedFormMap, s: np.ndarray, deadline: Deadline, *, opened: bool
-) -> _Answers | None:
+def _answers_along(joint_map: ClosedFormMap, s: np.ndarray, deadline: Deadline, *, opened: bool) -> _Answers | None:
     """Postures that reach stations s, (S,), with random redundant joints, angles turned into their ranges.
 
-    None where the time is up. `opened` takes the ranges of the redundant joints for open ones; otherwise the start posture's are tried as well.
+    None where the time is up.
+
+    `opened` takes the ranges of the redundant joints for open ones; otherwise the start posture's are tried as well.
     """
     robot, redundant, rest = joint_map.robot, joint_map.redundant, joint_map.nonredundant
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
