@@ -6,8 +6,6 @@ import math
 import time
 from dataclasses import dataclass
 
-_LEAST_TIME = 0.1
-
 
 @dataclass(frozen=True)
 class Deadline:
@@ -30,11 +28,6 @@ class Deadline:
     def left(self) -> float:
         """Time until then, s; not negative."""
         return max(self.at - time.monotonic(), 0.0)
-
-    @property
-    def for_a_solve(self) -> float:
-        """Time for a solve that is begun, s: what is left, but a tenth of a second at least."""
-        return max(self.left, _LEAST_TIME)
 
     @property
     def passed(self) -> bool:

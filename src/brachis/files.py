@@ -38,6 +38,30 @@ _KINDS = {
 }
 
 
+def status_of(path: str | os.PathLike[str]) -> os.stat_result | None:
+    """Return the status of what a name stands for, links followed; None where there is nothing of this name.
+
+    Raises
+    ------
+    OSError
+        The system refuses the name: it is too long, ends in a circle of links, or passes what is not a folder.
+    """
+    try:
+        return Path(path).stat()
+    except FileNotFoundError:
+        return None
+
+
+def is_file(path: str | os.PathLike[str]) -> bool:
+    """Tell whether there is a regular file; False for a name that the system refuses, where `Path.is_file` raises."""
+    return os.path.isfile(path)  # noqa: PTH113
+
+
+def is_folder(path: str | os.PathLike[str]) -> bool:
+    """Tell whether there is a folder; see `is_file`."""
+    return os.path.isdir(path)  # noqa: PTH112
+
+
 def open_file(path: str | os.PathLike[str], largest: int) -> BinaryIO:
     """Open a regular file of at most `largest` bytes; what would never end is refused at once.
 
@@ -153,8 +177,8 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         `OSError` among them.
     """
     with writing_errors(path):
-        target = Path(path)
-        in_place = target.exists() and not target.is_file()
+        target, status = Path(path), status_of(path)
+        in_place = status is not None and not stat.S_ISREG(status.st_mode)
         target = target if in_place else target.resolve()
         temporary = target if in_place else temporary_in(target.parent)
         file = _File(temporary, "w" if in_place else "x")  # unlike tempfile's, with the permissions of a new file
@@ -177,15 +201,15 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
 @contextmanager
 def writing_errors(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Turn an `OSError` of the block into an `InputError` that names `path`; for blocks that only write."""
+    """Turn an `OSError` of the block, or a name that holds a zero, into an `InputError`; for blocks that only write."""
     try:
         yield
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise _cannot_be_written(path, error) from error
 
 
-def _cannot_be_written(path: str | os.PathLike[str], error: OSError) -> InputError:
-    return InputError("cannot be written", where=str(path), found=error.strerror or str(error))
+def _cannot_be_written(path: str | os.PathLike[str], error: OSError | ValueError) -> InputError:
+    return InputError("cannot be written", where=str(path), found=getattr(error, "strerror", None) or str(error))
 
 
 class _File(io.FileIO):

@@ -178,7 +178,7 @@ def _solver(name: str, deadline: Deadline, listener: Listener, patience: int) ->
         listener(f"least motion: iteration {iteration}, joint accelerations (rms) {100.0 * objective**0.5:.1f} %")
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.for_a_solve, _PROGRESS, patience, anywhere=True)
+        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.left, _PROGRESS, patience, anywhere=True)
         report = backend.solve(program, x, options, progress)
         return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if report.feasible else report
 

@@ -164,7 +164,8 @@ def _plan(
     strict: bool,
 ) -> Result:
     """Run the pipeline stage by stage."""
-    loaded, deadline = time.perf_counter(), Deadline.after(task.search.time_limit)
+    loaded = time.perf_counter()
+    deadline = Deadline.after(task.search.time_limit - (loaded - began))
     remarks = plausibility.of_robot(robot) + plausibility.of_task(task)
     remarks = plausibility.tell(remarks, strict=strict, stacklevel=4)
     problem = Problem.of(robot, task, own_limits)

@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 
 from brachis.errors import UnknownNameError, nearest, no_attribute
-from brachis.files import shipped
+from brachis.files import is_file, shipped
 from brachis.robot import Robot
 
 _MISSPELT = 0.75
@@ -64,7 +64,7 @@ def _is_name(given: str | os.PathLike[str]) -> bool:
     if given in names():
         return True
     path = Path(given)
-    bare = not path.suffix and len(path.parts) == 1 and not path.exists()
+    bare = not path.suffix and len(path.parts) == 1 and not is_file(path)
     begun = any(name.startswith(str(given)) for name in names())
     return bare and (begun or nearest(str(given), names(), _MISSPELT) is not None)
 

@@ -12,6 +12,7 @@ from brachis import interrupts
 from brachis.cli.examples import EXAMPLES, EXIT_CODES
 from brachis.cli.verbosity import Verbosity, choose
 from brachis.errors import BrachisError
+from brachis.files import is_file
 from brachis.interrupts import INTERRUPTED
 
 _OF_ALL = ("quiet", "verbose")
@@ -46,7 +47,7 @@ class _Commands(TyperGroup):
 
     def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override]  # noqa: ANN401
         """Find the command that is named; a file is none."""
-        if self.get_command(ctx, args[0]) is None and Path(args[0]).is_file():
+        if self.get_command(ctx, args[0]) is None and is_file(args[0]):
             command = "inspect" if Path(args[0]).suffix == ".urdf" else "plan"
             ctx.fail(f"A command comes before a file: brachis {command} {args[0]}")
         return super().resolve_command(ctx, args)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import signal
+import stat
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ from pathlib import Path
 from types import FrameType
 
 from brachis.errors import InputError
-from brachis.files import atomic_write, temporary_in, writing_errors
+from brachis.files import atomic_write, is_folder, status_of, temporary_in, writing_errors
 
 Writer = Callable[[Path], object]
 """Writes one file to a path."""
@@ -71,8 +72,9 @@ def check_output(out: Path, suffixes: Iterable[str], inputs: Iterable[Path | Non
     InputError
     """
     with writing_errors(out):
-        if not out.is_file():
-            return
+        status = status_of(out)
+    if status is None or not stat.S_ISREG(status.st_mode):
+        return
     for path in inputs:
         if path is not None and _same(out, path):
             raise InputError(
@@ -149,7 +151,7 @@ def write_files(
         A result cannot be written.
     """
     for name in (*results, *figures):
-        if (out / name).is_dir():
+        if is_folder(out / name):
             raise InputError("cannot be written", where=str(out / name), found="a folder of this name")
     with ended_cleanly():
         _write_results(out, results, (*stale, *figures))

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 from rich.console import Console
+from rich.text import Text
 
 from brachis import interrupts
 from brachis.cli.tables import Column, print_table
@@ -35,7 +36,7 @@ _NO_FIGURE = 3
 def print_error(message: str) -> None:
     """One message on standard error, where that can be written."""
     with suppress(OSError):
-        Console(stderr=True, soft_wrap=True, highlight=False, markup=False).print(f"brachis: {message}")
+        Console(stderr=True, soft_wrap=True, highlight=False, markup=False, emoji=False).print(f"brachis: {message}")
 
 
 def json_text(data: Mapping[str, object]) -> str:
@@ -164,7 +165,7 @@ def _plain(value: object) -> object:
 def result_console() -> Console:
     """Console for results."""
     quiet = chosen() is Verbosity.QUIET
-    return Console(highlight=False, markup=False, soft_wrap=not sys.stdout.isatty(), quiet=quiet)
+    return Console(highlight=False, markup=False, emoji=False, soft_wrap=not sys.stdout.isatty(), quiet=quiet)
 
 
 @contextmanager
@@ -204,7 +205,7 @@ def progress() -> Iterator[Callable[[str], None]]:
 
         def show(text: str) -> None:
             interrupts.check()
-            status.update(text, spinner=None)
+            status.update(Text(text))  # a name may hold brackets
 
         yield show
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from brachis import robots
 from brachis.errors import ResultFileError, TaskError, UnknownNameError
+from brachis.files import is_file, is_folder
 from brachis.robot.task_map.rows import AXES, YAW
 from brachis.task import Task, load_task, read_assignment
 
@@ -22,10 +23,10 @@ def motion_file(result: Path) -> Path:
     ResultFileError
         There is none in the folder.
     """
-    if not result.is_dir():
+    if not is_folder(result):
         return result
     for name in _MOTIONS:
-        if (result / name).is_file():
+        if is_file(result / name):
             return result / name
     problem, hint = "is a folder in which there is no motion", "Run brachis plan --out"
     raise ResultFileError(problem, where=str(result), allowed=" or ".join(_MOTIONS), hint=hint)
@@ -60,7 +61,7 @@ def urdf_of(given: Path) -> Path:
     UnknownNameError
         It is neither a file nor such a name.
     """
-    if given.exists() or given.suffix or len(given.parts) > 1:
+    if is_file(given) or is_folder(given) or given.suffix or len(given.parts) > 1:
         return given
     if str(given) not in robots.names():
         raise UnknownNameError("URDF file, and no robot,", str(given), robots.names())

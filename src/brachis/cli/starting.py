@@ -10,12 +10,15 @@ from brachis.cli.output import print_json, progress, result_console, shown_warni
 from brachis.cli.settings import urdf_of
 from brachis.cli.tables import Column, print_table
 from brachis.errors import InputError
+from brachis.files import status_of, writing_errors
 from brachis.starter import starter_task
 
 
 def new_command(urdf: Path, out: Path, *, tool_frame: str | None, base_frame: str | None, as_json: bool) -> None:
     """Write a first task, which was planned and verified, and say what is next."""
-    if out.exists():
+    with writing_errors(out):
+        exists = status_of(out) is not None
+    if exists:
         raise InputError(
             "the file exists; it may be somebody's work", where=str(out), allowed="a new file", hint="Name one by --out"
         )

@@ -15,7 +15,7 @@ from brachis.compose import checks, elements
 from brachis.compose.arm import Arm, check_composed, drop_meshes, read_arm, relocate_meshes, rename_link
 from brachis.compose.elements import Element
 from brachis.errors import InputError
-from brachis.files import atomic_write
+from brachis.files import atomic_write, status_of, writing_errors
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,7 +189,9 @@ def on_rail(
     """
     source, target = Path(arm_urdf), None if output is None else Path(output)
     arm = read_arm(source)
-    if target is not None and target.exists() and target.samefile(source):
+    with writing_errors(target or ""):
+        known = None if target is None else status_of(target)
+    if known is not None and os.path.samestat(known, source.stat()):
         raise InputError("is the arm's own file", where=f"output {target}", allowed="another file")
     text = rail.mount(arm, target, meshes=meshes)
     check_composed(text, rail.name, str(source))

@@ -72,6 +72,8 @@ def chart_starts(
             break
     if isinstance(found, DeadEnd):
         return found
+    if not found:
+        return []
     newton = Newton(problem.task_map)
     named = [(_origin(number, joint_path), joint_path) for number, joint_path in enumerate(found, 1)]
     if problem.robot.n - problem.task_map.m > 1 and level.in_charts > 1:

@@ -9,6 +9,7 @@ import numpy as np
 
 from brachis import ik
 from brachis.attempt import Attempt
+from brachis.deadline import Deadline
 from brachis.errors import BrachisError, PathError, PlanningError
 from brachis.problem import Decomposition, Problem
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
@@ -20,7 +21,9 @@ _LOOKED_AT = 2
 _MOST_EFFORT = "exhaustive"
 
 
-def refuse_what_is_out_of_reach(decompositions: Sequence[Decomposition], candidates: Sequence[Attempt]) -> None:
+def refuse_what_is_out_of_reach(
+    decompositions: Sequence[Decomposition], candidates: Sequence[Attempt], deadline: Deadline
+) -> None:
     """Raise the reason where the path is out of reach, so that further attempts would be in vain.
 
     Where no lattice has a joint path, any part of it counts; where no lattice was looked at, a good part.
@@ -30,6 +33,8 @@ def refuse_what_is_out_of_reach(decompositions: Sequence[Decomposition], candida
     decompositions : sequence of Decomposition
     candidates : sequence of Attempt
         So far.
+    deadline : Deadline
+        Nothing is refused for a reason that is not found by then.
 
     Raises
     ------
@@ -37,7 +42,7 @@ def refuse_what_is_out_of_reach(decompositions: Sequence[Decomposition], candida
     """
     if not decompositions or _some_joint_path(candidates):
         return
-    reasons = [_reason(decomposition) for decomposition in decompositions[:_LOOKED_AT]]
+    reasons = [_reason(decomposition, deadline) for decomposition in decompositions[:_LOOKED_AT]]
     clear = [
         (reason.s_interval, reason)
         for reason in reasons
@@ -54,6 +59,7 @@ def no_motion(
     decompositions: Sequence[Decomposition],
     candidates: Sequence[Attempt],
     dead_ends: Mapping[str, DeadEnd],
+    deadline: Deadline,
 ) -> BrachisError:
     """Return the error that says why no motion was found.
 
@@ -64,6 +70,8 @@ def no_motion(
     candidates : sequence of Attempt
     dead_ends : mapping of str to DeadEnd
         Where the lattices end, by the names of the redundant joints.
+    deadline : Deadline
+        When the search for the reason ends.
 
     Returns
     -------
@@ -71,7 +79,7 @@ def no_motion(
     """
     joint_path = _some_joint_path(candidates)
     search = bool(decompositions) and not joint_path
-    reason = _reason(decompositions[0]) if search else _advice(problem.task, candidates)
+    reason = _reason(decompositions[0], deadline) if search else _advice(problem.task, candidates)
     if isinstance(reason, BrachisError):
         return reason
     if dead_ends and not joint_path:
@@ -105,8 +113,9 @@ def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
     tried = []
     if "iteration limit" in statuses and task.solver.max_iterations < few["max_iterations"].default:
         tried.append(f"raise solver.max_iterations, which is {task.solver.max_iterations}")
-    if "time limit" in statuses and task.solver.time_limit < few["time_limit"].default:
-        tried.append(f"raise solver.time_limit, which is {task.solver.time_limit:g} s")
+    if "time limit" in statuses:
+        name = "solver" if task.solver.time_limit < few["time_limit"].default else "search"
+        tried.append(f"raise {name}.time_limit, which is {getattr(task, name).time_limit:g} s")
     for key in ("start_speed", "end_speed"):
         speed = getattr(task.boundary, key)
         if speed:
@@ -135,7 +144,7 @@ def _some_joint_path(candidates: Sequence[Attempt]) -> bool:
     return any(candidate.branch for candidate in _lattices(candidates))
 
 
-def _reason(decomposition: Decomposition) -> BrachisError | str:
+def _reason(decomposition: Decomposition, deadline: Deadline) -> BrachisError | str:
     problem = decomposition.problem
     given = problem.end if problem.start is None else problem.start
     posture = np.zeros(problem.robot.n) if given is None else given
@@ -144,4 +153,5 @@ def _reason(decomposition: Decomposition) -> BrachisError | str:
         problem.limits,
         any_branch=given is None,
         given="end" if problem.start is None else "start",
+        deadline=deadline,
     )

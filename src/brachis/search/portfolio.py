@@ -107,9 +107,10 @@ def find_fastest(
         return record
     if record.too_fast is not None:
         raise record.too_fast.error
-    if record.interrupted:
+    if record.interrupted or record.cut_short(problem.task.solver.time_limit):
+        record.interrupted = True
         raise out_of_time(problem.task, record.undone())
-    raise no_motion(problem, decompositions, record.attempts, record.dead_ends)
+    raise no_motion(problem, decompositions, record.attempts, record.dead_ends, deadline)
 
 
 class _Search:
@@ -144,7 +145,7 @@ class _Search:
                 self.record.interrupted = True
                 break
             if batch.last_resort and not refused:
-                refuse_what_is_out_of_reach(self._decompositions, self.record.attempts)
+                refuse_what_is_out_of_reach(self._decompositions, self.record.attempts, self._deadline)
                 self._refuse_what_is_too_fast()
                 refused = True
             self._finish(self._solve(batch), batch.refined)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.deadline import NEVER, Deadline
 from brachis.errors import BrachisError, PathError
 from brachis.kinematics import ClosedFormMap
 from brachis.limits import Limit, Moments
@@ -15,12 +16,20 @@ from brachis.robot.joint_space import in_turn_of
 _RANGE_SLACK = 1e-9
 _SEARCHED = 400
 _STATIONS = 101
+_TOGETHER = 20_000
+"""Postures that are looked for at once; the time is asked for in between."""
 _HELD_CHECKS = 60
 _FAR = 10.0  # m
+_NO_TIME = "There was no time to find out why: raise search.time_limit"
 
 
 def reason_out_of_reach(
-    joint_map: ClosedFormMap, limits: Sequence[Limit], *, any_branch: bool = False, given: str = "start"
+    joint_map: ClosedFormMap,
+    limits: Sequence[Limit],
+    *,
+    any_branch: bool = False,
+    given: str = "start",
+    deadline: Deadline = NEVER,
 ) -> BrachisError | str:
     """Why no motion was found: an error where the path is out of reach or too heavy to hold, else advice.
 
@@ -35,17 +44,24 @@ def reason_out_of_reach(
         Whether a motion may be on any branch, not the decomposition's alone.
     given : {"start", "end"}, optional
         Whose posture the decomposition's branch is of.
+    deadline : Deadline, optional
+        When the search for the reason ends; the advice then says so.
 
     Returns
     -------
     BrachisError or str
     """
     s = np.linspace(0.0, 1.0, _STATIONS)
-    found = _answers_along(joint_map, s, opened=False)
+    found = _answers_along(joint_map, s, deadline, opened=False)
+    if found is None:
+        return _NO_TIME
     branches = slice(None) if any_branch else slice(joint_map.branch, joint_map.branch + 1)
     own = _Answers(*(part[:, :, branches] for part in (found.q, found.exists, found.inside)))
     # Where the redundant joints' ranges leave no answer, wider ones tell whether the ranges or the arm are to blame.
-    anywhere = found if found.exists.any(axis=(1, 2, 3)).all() else _answers_along(joint_map, s, opened=True)
+    reached = found.exists.any(axis=(1, 2, 3)).all()
+    anywhere = found if reached else _answers_along(joint_map, s, deadline, opened=True)
+    if anywhere is None:
+        return _NO_TIME
     within = np.asarray(found.within.any(axis=(1, 2, 3)))
     label = joint_map.branch_label
     reasons = (
@@ -105,8 +121,10 @@ class _Answers:
         return np.asarray(self.exists & self.inside.all(axis=4))
 
 
-def _answers_along(joint_map: ClosedFormMap, s: np.ndarray, *, opened: bool) -> _Answers:
+def _answers_along(joint_map: ClosedFormMap, s: np.ndarray, deadline: Deadline, *, opened: bool) -> _Answers | None:
     """Postures that reach stations s, (S,), with random redundant joints, angles turned into their ranges.
+
+    None where the time is up.
 
     `opened` takes the ranges of the redundant joints for open ones; otherwise the start posture's are tried as well.
     """
@@ -123,14 +141,17 @@ def _answers_along(joint_map: ClosedFormMap, s: np.ndarray, *, opened: bool) -> 
     q_r = np.random.default_rng(0).uniform(low[redundant], high[redundant], (tries, len(redundant)))
     if not opened:
         q_r[0] = np.clip(joint_map.start, low, high)[redundant]
-    targets = joint_map.path.sample(s).target
-    answers = joint_map.solver.solve(np.repeat(targets, tries, axis=0), np.tile(q_r, (len(s), 1)))
-    answers = answers.reshape(len(s), tries, *answers.shape[1:])
-    postures = np.empty((*answers.shape[:-1], robot.n))
-    postures[..., redundant] = q_r[:, None, None]
-    postures[..., rest] = answers
-    middle = 0.5 * (low + high)
-    turned = in_turn_of(postures, middle, turning)
+    parts = []
+    for targets in np.array_split(joint_map.path.sample(s).target, min(len(s), -(-len(s) * tries // _TOGETHER))):
+        if deadline.passed:
+            return None
+        answers = joint_map.solver.solve(np.repeat(targets, tries, axis=0), np.tile(q_r, (len(targets), 1)))
+        answers = answers.reshape(len(targets), tries, *answers.shape[1:])
+        postures = np.empty((*answers.shape[:-1], robot.n))
+        postures[..., redundant] = q_r[:, None, None]
+        postures[..., rest] = answers
+        parts.append(in_turn_of(postures, 0.5 * (low + high), turning))
+    turned = np.concatenate(parts)
     inside = (turned >= lower - _RANGE_SLACK) & (turned <= upper + _RANGE_SLACK)
     return _Answers(turned, np.asarray(np.isfinite(turned).all(axis=4)), inside)
 

@@ -12,6 +12,7 @@ from brachis.errors import UnreachableError
 from brachis.problem import Decomposition
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.too_fast import TooFast
+from brachis.solvers import SolveStatus
 
 NOT_TRIED = "not tried: the time was up"
 """Status of an attempt for which there was no time."""
@@ -124,6 +125,12 @@ class Record:
             self._gain = min(self._gain, (1.0 - _GAIN_SLACK) * attempt.t_end / attempt.coarse)
         if self.best is None or self._merit(attempt) < self._merit(self.best):
             self.best = attempt
+
+    def cut_short(self, time_limit: float) -> bool:
+        """Tell whether the time for the search ended every solve, of which each may take so long by itself, s."""
+        last = [attempt.reports[-1] for attempt in self.attempts if attempt.reports]
+        cut = [each.status is SolveStatus.TIME_LIMIT and each.wall_time < time_limit for each in last]
+        return bool(cut) and all(cut)
 
     def best_in_words(self) -> str:
         """Say how far the best motion is from a plan; empty where there is none."""

@@ -125,7 +125,7 @@ def _solver(start: Start, deadline: Deadline) -> Solve:
     backend = solver_named(start.problem.task.solver.name, curved=curved)[0]
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.for_a_solve, _PROGRESS, _PATIENCE)
+        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.left, _PROGRESS, _PATIENCE)
         report = backend.solve(program, x, options, None)
         nearly = report.violation < _NEARLY and not report.status.usable
         return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if nearly else report

@@ -147,7 +147,7 @@ def solve_with(
         listener(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s")
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        remaining = deadline.within(settings.time_limit).for_a_solve
+        remaining = deadline.within(settings.time_limit).left
         options = SolverOptions(settings.tolerance, most, remaining, *stagnation)
         return solver.solve(program, x, options, progress)
 

@@ -71,7 +71,7 @@ class SolverOptions:
         On constraint violation and optimality, dimensionless.
     max_iterations : int
     time_limit : float
-        s.
+        s; no solve is begun where it is 0.
     progress : float
         Relative change of the objective over the last feasible iterates below which a solve has stagnated.
     patience : int

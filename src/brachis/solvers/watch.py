@@ -213,14 +213,19 @@ def ended(
 
 
 def from_finite_numbers(solve: Solve) -> Solve:
-    """Refuse a start or bounds that are not numbers, which a backend could not be trusted with (decorator)."""
+    """Refuse a start or bounds that are not numbers, which a backend could not be trusted with (decorator).
+
+    Where no time is left no solve is begun.
+    """
 
     @functools.wraps(solve)
     def checked(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
         bounds = (problem.lower, problem.upper, problem.x_lower, problem.x_upper)
+        name = solve.__module__.rpartition(".")[2]
+        if options.time_limit <= 0.0:
+            return ended(name, problem, x, SolveStatus.TIME_LIMIT, "no time was left")
         if _usable(x) and not any(np.isnan(bound).any() for bound in bounds):
             return solve(problem, x, options, progress)
-        name = solve.__module__.rpartition(".")[2]
         return ended(name, problem, x, SolveStatus.EVALUATION_ERROR, "the start or a bound is not a finite number")
 
     return checked

@@ -6,11 +6,11 @@ import itertools
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 from brachis import interrupts
 from brachis.errors import ClusterError, InputError, NotInstalledError
+from brachis.files import is_file
 from brachis.sweeps.completed import AHEAD, as_completed
 from brachis.sweeps.plans import Plan
 from brachis.sweeps.worker import Outcome, planned
@@ -44,7 +44,7 @@ def on_dask(plans: Iterable[Plan], address: str, listener: Callable[[str], None]
         from dask.distributed import Client, KilledWorker  # noqa: PLC0415  (an extra)
     except ImportError as error:
         raise NotInstalledError("a Dask cluster", "dask", "cluster") from error
-    where: dict[str, Any] = {"scheduler_file": address} if Path(address).is_file() else {"address": address}
+    where: dict[str, Any] = {"scheduler_file": address} if is_file(address) else {"address": address}
     try:
         client: Any = Client(**where, timeout=_CONNECTING, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:

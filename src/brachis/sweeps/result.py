@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from brachis.errors import InputError, UnknownNameError
+from brachis.files import is_folder
 from brachis.summary import Summary
 from brachis.sweeps.settings import SweepSettings
 from brachis.sweeps.store import TABLES, Store
@@ -76,7 +77,7 @@ class SweepResult(Summary):
             It holds none, or none that was finished.
         """
         path = Path(folder)
-        if not path.is_dir():
+        if not is_folder(path):
             raise InputError("there is no such folder", where=str(path))
         store = Store(path)
         settings = SweepSettings.model_validate(store.about()["settings"])

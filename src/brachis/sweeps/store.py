@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from brachis.errors import InputError, NotInstalledError
-from brachis.files import atomic_write, read_file, writing_errors
+from brachis.files import atomic_write, is_file, read_file, writing_errors
 from brachis.sweeps.worker import Outcome
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ class Store:
             (facts,) = table.to_pylist()
         except (OSError, ValueError, self._arrow.ArrowException):
             return None
-        whole = set(facts) == set(COLUMNS) and (not facts["motion"] or (self.folder / facts["motion"]).is_file())
+        whole = set(facts) == set(COLUMNS) and (not facts["motion"] or is_file(self.folder / facts["motion"]))
         return facts if whole else None
 
     def table(self, keys: Sequence[str], rows: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> pa.Table:

@@ -196,6 +196,15 @@ class Task(Model):
         return self
 
     @model_validator(mode="after")
+    def _splines_are_free_between_their_ends(self) -> Task:
+        spline = self.spline
+        least = 2 * spline.vanishing + 3 - spline.degree  # both ends fix a value and the derivatives that vanish
+        if not self.boundary.periodic and spline.intervals != "auto" and spline.intervals < least:
+            problem = f"rest: {spline.rest} leaves splines of degree {spline.degree} no freedom with so few intervals"
+            raise refuse(problem, key="spline.intervals", found=spline.intervals, allowed=f">= {least}, or auto")
+        return self
+
+    @model_validator(mode="after")
     def _a_path_of_joints_leaves_no_choice(self) -> Task:
         if self.task_space == "joints":
             for key, given, default in (

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Iterator
+import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from lxml import etree
 
+from brachis.errors import InputError
+from brachis.files import is_file
 from brachis.robot.urdf_tree import Element, read_tree
 
 if TYPE_CHECKING:
@@ -21,18 +24,12 @@ _PRIMITIVE = 2000
 """Faces of a shape that is few enough to be given sharp edges."""
 _SHARP = 0.6
 """Angle between faces from which on an edge is sharp, rad."""
-_UNREADABLE = (
-    OSError,
-    ValueError,
-    TypeError,
-    KeyError,
-    IndexError,
-    AttributeError,
-    ImportError,  # a reader of the mesh's format that is not installed
-    NotImplementedError,
-    RuntimeError,
-)
-"""What reading a shape may raise, whose file may be anything."""
+_LARGEST = 200_000_000
+"""Bytes of all mesh files of a robot together, unpacked; readers take several times as much memory."""
+_PACKED = (".gz", ".bz2")
+"""Suffixes of packed files, whose size nobody knows before they are unpacked."""
+_LONGEST = 500
+"""Letters of a reason."""
 
 
 def link_shapes(urdf: str, folder: Path) -> tuple[dict[str, list[trimesh.Trimesh]], list[str]]:
@@ -53,17 +50,18 @@ def link_shapes(urdf: str, folder: Path) -> tuple[dict[str, list[trimesh.Trimesh
         Of the shapes that cannot be shown, the link and the reason.
     """
     tree, shapes, unread = read_tree(urdf, "URDF"), {}, []
+    room = _LARGEST
     materials = [each for each in tree.robot if each.tag == "material"]
     for name, link in tree.links.items():
         found: list[trimesh.Trimesh] = []
         for visual in link.findall("visual"):
-            missing = _find_mesh(visual, folder)
             try:
-                found += [] if missing else _meshes(name, visual, materials)
-            except _UNREADABLE as error:
-                missing = f"{type(error).__name__}: {error}"
-            if missing:
-                unread.append(f"{name}: {missing}")
+                room -= _find_mesh(visual, folder, room)
+                found += _meshes(name, visual, materials)
+            except InputError as error:
+                unread.append(f"{name}: {error}"[:_LONGEST])
+            except Exception as error:  # noqa: BLE001  (a file may be anything, and so may what its reader raises)
+                unread.append(f"{name}: {type(error).__name__}: {error}"[:_LONGEST])
         if found:
             shapes[name] = found
     return shapes, unread
@@ -77,27 +75,54 @@ def mesh_file(name: str, folder: Path) -> Path | None:
     from yourdfpy import filename_handler_magic  # noqa: PLC0415  (imports trimesh)
 
     found = Path(filename_handler_magic(fname=name, dir=str(folder)))
-    if found.is_file():
+    if is_file(found):
         return found
     places = [Path(place) for place in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if place]
     places += [Path(place) / "share" for place in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if place]
     within = name.partition("://")[2]
-    return next((place / within for place in places if within and (place / within).is_file()), None)
+    return next((place / within for place in places if within and is_file(place / within)), None)
 
 
-def _find_mesh(visual: Element, folder: Path) -> str:
-    """Put the path of a visual's mesh file in the place of its name; say what is missing."""
+def _find_mesh(visual: Element, folder: Path, room: int) -> int:
+    """Put the path of a visual's mesh file in the place of its name, and return its size, bytes.
+
+    Raises
+    ------
+    InputError
+        There is no such file, or it is larger than `room`, bytes.
+    """
+    size = 0
     for mesh in visual.iter("mesh"):
         name = str(mesh.get("filename"))
         path = mesh_file(name, folder)
         if path is None:
-            return f"no file {name}"
+            raise InputError(f"no file {name}")
         mesh.set("filename", str(path))
-    return ""
+        if path.suffix in _PACKED:
+            raise InputError("packed meshes are not read", where=name, hint="Unpack it")
+        size += _size(path)
+    if size > room:
+        found, allowed = f"{size / 1e6:.0f} MB", f"{_LARGEST / 1e6:.0f} MB for all meshes of the robot"
+        raise InputError("the mesh is too large to be shown", where=name, found=found, allowed=allowed)
+    return size
 
 
-def _meshes(name: str, visual: Element, materials: list[Element]) -> Iterator[trimesh.Trimesh]:
-    """Have yourdfpy read one visual, as the only one of a robot of one link."""
+def _size(path: Path) -> int:
+    """Size of a file, of an archive that of what is in it, bytes."""
+    if not zipfile.is_zipfile(path):
+        return path.stat().st_size
+    with zipfile.ZipFile(path) as archive:
+        return sum(each.file_size for each in archive.infolist())
+
+
+def _meshes(name: str, visual: Element, materials: list[Element]) -> list[trimesh.Trimesh]:
+    """Have yourdfpy read one visual, as the only one of a robot of one link.
+
+    Raises
+    ------
+    InputError
+        There is nothing in it, or numbers that are not finite.
+    """
     import trimesh  # noqa: PLC0415  (one second)
     import yourdfpy  # noqa: PLC0415
 
@@ -110,11 +135,16 @@ def _meshes(name: str, visual: Element, materials: list[Element]) -> Iterator[tr
         build_scene_graph=True,
         filename_handler=yourdfpy.filename_handler_null,
     )
+    found = []
     for node in read.scene.graph.nodes_geometry:
         placement, geometry = read.scene.graph.get(node)
         mesh = read.scene.geometry[geometry]
-        if isinstance(mesh, trimesh.Trimesh):
-            yield _placed(trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual), placement)
+        if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
+            found.append(_placed(trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual), placement))
+    if not found or not all(np.isfinite(mesh.vertices).all() for mesh in found):
+        file = next((mesh.get("filename") for mesh in visual.iter("mesh")), None)
+        raise InputError("the mesh has no faces, or corners that are not finite", where=file)
+    return found
 
 
 def _copied(element: Element) -> Element:
