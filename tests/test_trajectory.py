@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from scipy.interpolate import BPoly
 
 from brachis.errors import InputError, ResultFileError
 from brachis.planner import plan
 from brachis.robot import Robot, dynamics
 from brachis.trajectory import Trajectory
-from brachis.trajectory.pieces import one_sided_derivatives, relative_coefficients
+from brachis.trajectory.pieces import jerk_coefficients, relative_coefficients
 from support.effort import QUICK
 
 ROOT = Path(__file__).parents[1]
@@ -52,16 +53,38 @@ def test_derivatives_against_differences(order, trajectory):
     np.testing.assert_allclose(difference, curves[order + 1](t), rtol=0.0, atol=2e-8 * np.abs(trajectory.qddot).max())
 
 
-def test_accelerations_of_a_very_short_motion_are_precise():
-    # Position 2 rad, pieces of 1e-5 s: coefficients that held 2 rad would give accelerations to 1e-4 only.
-    times = np.linspace(0.0, 1e-3, 101)
+@pytest.mark.parametrize("length", [1e-3, 1e-5])
+def test_derivatives_of_a_very_short_motion_are_precise(length):
+    # Position 2 rad, pieces of 1e-5 or 1e-7 s: coefficients that held 2 rad would give accelerations to 1e-4 only, and
+    # the rounding of positions alone would be a jerk of 30 or 3e7 rad/s^3.
+    times = np.linspace(0.0, length, 101)
     q = (2.0 + 0.5 * 3.0 * times**2)[:, None]
-    qdot, qddot = (3.0 * times)[:, None], np.full((101, 1), 3.0)
-    c, lengths = relative_coefficients(times, q, qdot, qddot, qddot), np.diff(times)
-    for at_end in (False, True):
-        np.testing.assert_allclose(one_sided_derivatives(c, lengths, 2, at_end=at_end), 3.0, rtol=1e-11)
-    np.testing.assert_allclose(one_sided_derivatives(c, lengths, 1, at_end=True), qdot[1:], rtol=1e-11)
-    np.testing.assert_allclose(q[:-1] + one_sided_derivatives(c, lengths, 0, at_end=True), q[1:], rtol=1e-15)
+    nodes = times, q, (3.0 * times)[:, None], np.full((101, 1), 3.0), np.full((101, 1), 3.0)
+    pieces = BPoly(relative_coefficients(*nodes), times)
+    inside = 0.5 * (times[1:] + times[:-1])
+    np.testing.assert_allclose(pieces(inside, nu=2), 3.0, rtol=1e-10)
+    np.testing.assert_allclose(pieces(inside, nu=1)[:, 0], 3.0 * inside, rtol=1e-10)
+    np.testing.assert_allclose(q[:-1, 0] + pieces.c[-1, :, 0], q[1:, 0], rtol=5e-16)
+    assert np.abs(jerk_coefficients(*nodes)).max() < 1e-4 * 3.0 / length
+
+
+def test_the_jerk_is_the_third_derivative_of_the_positions(trajectory):
+    t = np.random.default_rng(3).uniform(0.0, trajectory.t_end, 300)
+    jerk = trajectory.jerk(t)
+    np.testing.assert_allclose(trajectory.pieces(t, nu=3), jerk, rtol=0.0, atol=1e-8 * np.abs(jerk).max())
+
+
+@pytest.mark.parametrize("length", [1e-6, 1e-5, 1e-4])
+def test_positions_say_what_they_can_and_no_more(length):
+    """An ulp between two nodes is rounding; ten are a jerk."""
+    times, still = np.array([0.0, length]), np.zeros((2, 1))
+
+    def jerk(ulps):
+        q = np.array([[1.5], [1.5 + ulps * np.spacing(1.5)]])
+        return np.abs(jerk_coefficients(times, q, still, still, still)).max()
+
+    assert jerk(1) == 0.0
+    assert jerk(10) > 5.0 * 60.0 * np.spacing(1.5) / length**3
 
 
 @pytest.mark.parametrize("length", [1e-3, 1e-4])

@@ -69,6 +69,22 @@ def nodes_close_together(trajectory, gap, by, joint):
     return with_node(trajectory, trajectory.times[MIDDLE] + gap, q=by * np.eye(3)[joint])
 
 
+@pytest.mark.parametrize("joint", range(3))
+@pytest.mark.parametrize(("gap", "by"), [(1e-6, 1e-14), (2e-5, 3e-11), (1e-4, 1e-11), (1e-3, 2e-8)])
+def test_a_jerk_between_nodes_close_together(planned, gap, by, joint):
+    """Third derivatives of short pieces are read exactly, and not by their mean."""
+    jerk = 1.01 * np.abs(planned.jerk_pieces.c).max()
+    limits = {"jerk": np.full(3, jerk), "torque_rate": np.full(3, 20.0 * jerk)}
+    limited = with_limits(planned, **limits)
+    assert not {"jerk ratio", "torque rate ratio"} & failed(limited)
+    middle = 0.5 * (planned.times[MIDDLE] + planned.times[MIDDLE + 1])
+    first = with_node(limited, middle)
+    spiked = with_node(first, middle + gap, q=by * np.eye(3)[joint])
+    assert "jerk ratio" in failed(spiked)
+    assert ratio(spiked, "jerk").value == pytest.approx(60.0 * by / gap**3 / jerk, rel=0.1)
+    assert ratio(spiked, "torque rate").value > 1.5 * ratio(limited, "torque rate").value
+
+
 def true_worst_torque(trajectory, pieces=slice(None), places=100):
     """Largest ratio that the trajectory's own evaluation finds at so many places in every piece."""
     lengths = np.diff(trajectory.times)[pieces, None]

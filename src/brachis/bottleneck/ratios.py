@@ -12,7 +12,6 @@ from brachis.limits import Label, Limit, Moments, limits_of
 from brachis.robot import bind
 from brachis.summary import Summary
 from brachis.trajectory import Trajectory
-from brachis.trajectory.pieces import one_sided_derivatives
 
 _POINTS_PER_INTERVAL = 40
 
@@ -74,6 +73,5 @@ def limit_ratios(trajectory: Trajectory, limits: Sequence[Limit] | None = None) 
 
 def _just_before(trajectory: Trajectory) -> tuple[np.ndarray, ...]:
     """Return times, positions, three derivatives and path coordinates just before every node but the first."""
-    jerk = one_sided_derivatives(trajectory.pieces.c, np.diff(trajectory.times), 3, at_end=True)
     nodes = (trajectory.times, trajectory.q, trajectory.qdot, trajectory.qddot_before)
-    return *(part[1:] for part in nodes), jerk, trajectory.path_spline(trajectory.times[1:])
+    return *(part[1:] for part in nodes), trajectory.jerk_pieces.c[-1], trajectory.path_spline(trajectory.times[1:])

@@ -1,7 +1,6 @@
 """The trajectory: immutable, evaluated at any time, saved and loaded with all that is needed to verify it again."""
 
 from brachis.trajectory.given import Motion, motion_of, of_motion
-from brachis.trajectory.pieces import one_sided_derivatives
 from brachis.trajectory.recovered import Recovered, check_tolerance
 from brachis.trajectory.result_file import SCHEMA
 from brachis.trajectory.samples import Samples
@@ -17,5 +16,4 @@ __all__ = [
     "check_tolerance",
     "motion_of",
     "of_motion",
-    "one_sided_derivatives",
 ]

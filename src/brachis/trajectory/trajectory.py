@@ -19,7 +19,7 @@ from brachis.errors import InputError, UnknownNameError
 from brachis.robot import Robot, dynamics
 from brachis.summary import Summary
 from brachis.task import Task
-from brachis.trajectory.pieces import relative_coefficients
+from brachis.trajectory.pieces import jerk_coefficients, relative_coefficients
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
 from brachis.trajectory.samples import Samples
@@ -125,6 +125,16 @@ class Trajectory(Summary):
         return pieces
 
     @cached_property
+    def jerk_pieces(self) -> BPoly:
+        """Joint jerks as SciPy's piecewise polynomial over time: the third derivative of `pieces`, to rounding."""
+        from scipy.interpolate import BPoly  # noqa: PLC0415
+
+        coefficients = jerk_coefficients(self.times, self.q, self.qdot, self.qddot, self.qddot_before)
+        pieces = BPoly(coefficients, self.times)
+        pieces.c.setflags(write=False)
+        return pieces
+
+    @cached_property
     def path_spline(self) -> BSpline:
         """s(t) as SciPy's B-spline over time in seconds."""
         from scipy.interpolate import BSpline  # noqa: PLC0415
@@ -164,7 +174,7 @@ class Trajectory(Summary):
 
     def jerk(self, t: ArrayLike) -> np.ndarray:
         """Joint jerks, as `position`; rad/s^3 or m/s^3. At a node the value behind it."""
-        return np.asarray(self.pieces(self._checked(t), nu=3))
+        return np.asarray(self.jerk_pieces(self._checked(t)))
 
     def torque(self, t: ArrayLike) -> np.ndarray:
         """Joint torques, as `position`; Nm or N."""

@@ -12,10 +12,6 @@ from brachis.verify.mechanics import torques
 from brachis.verify.polynomials import values_of
 
 _SAME_PLACE = 1e-9
-_ROUNDING = 120.0 * np.finfo(float).eps
-"""Jerk of a piece of 1 s that comes of the rounding of positions of 1 rad at both ends."""
-_SHOWS = 1e-5
-"""Part of a joint's largest jerk."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +31,6 @@ class Pieces:
     velocity : (5, L, n) ndarray
     acceleration : (4, L, n) ndarray
     jerk : (3, L, n) ndarray
-        Of pieces so short that the rounding of positions shows in their third derivative, the mean one.
     """
 
     times: np.ndarray
@@ -52,10 +47,7 @@ class Pieces:
         position, lengths = trajectory.pieces.c, np.diff(trajectory.times)
         velocity = 5.0 * np.diff(position, axis=0) / lengths[:, None]
         acceleration = 4.0 * np.diff(velocity, axis=0) / lengths[:, None]
-        jerk = 3.0 * np.diff(acceleration, axis=0) / lengths[:, None]
-        mean = (acceleration[-1] - acceleration[0]) / lengths[:, None]
-        rounding = _ROUNDING * np.abs(trajectory.q).max(axis=0) / lengths[:, None] ** 3
-        jerk = np.where(rounding > _SHOWS * np.abs(mean).max(axis=0), mean, jerk)
+        jerk = trajectory.jerk_pieces.c
         return cls(trajectory.times, lengths, trajectory.q[:-1], position, velocity, acceleration, jerk)
 
     def time(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
