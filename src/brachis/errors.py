@@ -15,6 +15,37 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Self
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """A number of the task whose change may help.
+
+    Attributes
+    ----------
+    key : str
+        Dotted key, for example ``boundary.end_speed``.
+    asked : float
+        The number in the task.
+    guess : float
+        A number that may be enough.
+    unit : str
+    is_refined : bool
+        Whether to look for the smallest change that is enough.
+    """
+
+    key: str
+    asked: float
+    guess: float
+    unit: str = ""
+    is_refined: bool = True
+
+    @property
+    def verb(self) -> str:
+        """Say what to do with the number."""
+        return "lower" if self.guess < self.asked else "raise"
 
 
 class BrachisError(Exception):
@@ -33,6 +64,11 @@ class BrachisError(Exception):
     hint : str, optional
         What to try.
 
+    Attributes
+    ----------
+    remedies : tuple of Remedy
+        Numbers of the task to change. `brachis.plan` tries them, and names in the hint those that lead to a plan.
+
     Examples
     --------
     >>> import brachis
@@ -44,6 +80,7 @@ class BrachisError(Exception):
     """
 
     exit_code = 1
+    remedies: tuple[Remedy, ...] = ()
 
     def __init__(
         self,
@@ -64,6 +101,16 @@ class BrachisError(Exception):
     def __reduce__(self) -> tuple[object, ...]:
         """Be sent to other processes with all data, whatever a subclass takes to be made."""
         return _restored, (type(self), self.args, self.__dict__)
+
+    def with_remedies(self, *remedies: Remedy) -> Self:
+        """Return the error with numbers of the task that may be changed."""
+        self.remedies = remedies
+        return self
+
+    def put_advice(self, advice: str) -> None:
+        """Put advice before the hint."""
+        self.hint = f"{advice}, or {self.hint[:1].lower()}{self.hint[1:]}" if self.hint else advice
+        self.args = (self._message(),)
 
     def _message(self) -> str:
         text = f"{self.where}: {self.problem}" if self.where else self.problem

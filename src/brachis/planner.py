@@ -22,6 +22,7 @@ from brachis.attempt import Attempt, Start
 from brachis.completion import completed
 from brachis.custom_limits import LimitModel
 from brachis.deadline import Deadline
+from brachis.errors import BrachisError
 from brachis.least_motion import calmest
 from brachis.mesh import adapt_mesh, coarsest
 from brachis.nlp import Program
@@ -31,6 +32,7 @@ from brachis.refine import RefinementOptions, Solve
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.combine import robot_for
+from brachis.robot.from_task import robot_from_settings
 from brachis.robots import is_robot, located
 from brachis.search import (
     GIVEN,
@@ -45,8 +47,10 @@ from brachis.search import (
     first_map,
     first_point,
     given_start,
+    is_planned,
     solve_with,
     solved_in_chart,
+    try_remedies,
 )
 from brachis.solvers import SolveStatus, solver_named
 from brachis.task import Source, Task, TaskKeywords, task_with
@@ -138,7 +142,18 @@ def plan(
         check_list(families, "families", "closed forms")
         robot, asked = _read(robot_or_task, task, keywords)
         known = None if start_from is None else motion_of(start_from, "start_from")
-        return _plan(robot, asked, families, own_limits, known, listener or (lambda _text: None), began, strict=strict)
+        loaded = time.perf_counter()
+        deadline = Deadline.after(asked.search.time_limit - (loaded - began))
+
+        def is_task_planned(changed: Task, limit: Deadline) -> bool:
+            return _is_planned(robot, asked, changed, families, own_limits, limit)
+
+        try:
+            hear = listener or (lambda _text: None)
+            return _plan(robot, asked, families, own_limits, known, hear, (began, loaded), deadline, strict=strict)
+        except BrachisError as error:
+            try_remedies(error, asked, robot.joint_names, is_task_planned, deadline)
+            raise
 
 
 def _read(first: Given, task: Source | None, keywords: TaskKeywords) -> tuple[Robot, Task]:
@@ -159,13 +174,13 @@ def _plan(
     own_limits: Sequence[LimitModel],
     known: Trajectory | None,
     listener: Listener,
-    began: float,
+    times: tuple[float, float],
+    deadline: Deadline,
     *,
     strict: bool,
 ) -> Result:
-    """Run the pipeline stage by stage."""
-    loaded = time.perf_counter()
-    deadline = Deadline.after(task.search.time_limit - (loaded - began))
+    """Run the pipeline stage by stage; `times` are those when it began and when the task was read, s."""
+    began, loaded = times
     remarks = plausibility.of_robot(robot) + plausibility.of_task(task)
     remarks = plausibility.tell(remarks, strict=strict, stacklevel=4)
     problem = Problem.of(robot, task, own_limits)
@@ -203,6 +218,21 @@ def _plan(
         undone=(*_not_used(first, best), *found.undone()),
         warnings=remarks,
     )
+
+
+def _is_planned(
+    robot: Robot,
+    task: Task,
+    changed: Task,
+    families: Sequence[ik.Family],
+    own_limits: Sequence[LimitModel],
+    deadline: Deadline,
+) -> bool:
+    """Tell whether a single plan of a task that was changed is verified."""
+    changed = task_with(changed, effort="single")
+    same = changed.robot == task.robot
+    problem = Problem.of(robot if same else robot_from_settings(changed.robot, urdf_text=robot.urdf), changed, own_limits)
+    return is_planned(problem, decompositions_of(problem, families), Stages(solved, finished), deadline)
 
 
 def _first(problem: Problem, decompositions: Sequence[Decomposition], known: Trajectory) -> Start | str:

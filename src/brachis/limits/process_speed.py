@@ -56,16 +56,16 @@ class _ProcessSpeedLimit(Limit):
         self.breaks = self._part.ravel()
         what = "process speed" if self._side > 0.0 else "least process speed"
         places = [""] if len(parts) == 1 else [f", s = {part.s[0]:g} to {part.s[1]:g}" for part in parts]
-        self.labels = tuple(self._label(what, place) for place in places)
+        self.labels = tuple(self._label(number, what, place) for number, place in enumerate(places))
         self.lower, self.upper = np.full(len(parts), -np.inf), np.full(len(parts), np.inf)
 
-    def _label(self, what: str, place: str) -> Label:
+    def _label(self, number: int, what: str, place: str) -> Label:
         """Name the speed of a part, whose place is told where there are several."""
         end, side = ("upper", "above") if self._side > 0.0 else ("lower", "below")
         within = f"{place}," if place else ""
         reached = f"tool is at the {end} end of its process speed{within}"
         room = f"tolerance {side} the process speed{within}"
-        return Label(f"tool{place}", what, "m/s", "tool_limits.process_speed", reached, room)
+        return Label(f"tool{place}", what, "m/s", f"tool_limits.process_speed[{number}].speed", reached, room)
 
     def _lay_ways(self, ways: np.ndarray) -> None:
         """Set the ways to the speeds before and behind the parts, (2, c), in s, and the widths of their corners."""

@@ -3,9 +3,10 @@
 from brachis.search.chart_starts import first_map
 from brachis.search.given_motion import GIVEN, given_start
 from brachis.search.pacing import first_breaks, first_point
-from brachis.search.portfolio import Stages, find_fastest
+from brachis.search.portfolio import Stages, find_fastest, is_planned
 from brachis.search.recentring import best_of_joints, solved_in_chart
 from brachis.search.record import Record
+from brachis.search.remedies import try_remedies
 from brachis.search.solving import MARGINS, Listener, continued, eased, solve_with
 
 __all__ = [
@@ -22,6 +23,8 @@ __all__ = [
     "first_map",
     "first_point",
     "given_start",
+    "is_planned",
     "solve_with",
     "solved_in_chart",
+    "try_remedies",
 ]

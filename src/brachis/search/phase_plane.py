@@ -23,6 +23,8 @@ from brachis.limits import Limit
 _SLOWEST = 1e-9
 _STANDING = 1e-3
 _AT_REST = (0.0, 0.0)
+_ROUNDING = 1e-6
+"""Part of a bound by which a speed at the end may be beyond it."""
 
 
 def least_time(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray) -> float:
@@ -153,6 +155,8 @@ def _controllable(lines: _Lines, steps: np.ndarray, last: float) -> tuple[np.nda
     """Go backwards: the intervals of x, (S,), from which the end can be reached with x = `last`; None where empty."""
     slope, offset = lines.slope, lines.offset
     count = len(lines.ceiling)
+    if not lines.floor[-1] * (1.0 - _ROUNDING) <= last <= lines.ceiling[-1] * (1.0 + _ROUNDING):
+        return None
     low, high = np.full(count, last), np.full(count, last)
     for i in range(count - 2, -1, -1):
         step = steps[i]

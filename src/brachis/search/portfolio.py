@@ -113,6 +113,27 @@ def find_fastest(
     raise no_motion(problem, decompositions, record.attempts, record.dead_ends, deadline)
 
 
+def is_planned(
+    problem: Problem, decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline
+) -> bool:
+    """Tell whether the first starts of the search lead to a verified motion.
+
+    Parameters
+    ----------
+    problem, decompositions, stages, deadline
+        See `find_fastest`.
+    """
+
+    def listener(_text: str) -> None:
+        """Hear nothing."""
+
+    search = _Search(problem, decompositions, stages, deadline, listener)
+    first = next(batches(problem, decompositions, deadline, listener, search.record.note_lattice), None)
+    search.run([first] if first else [])
+    best = search.record.best
+    return best is not None and best.verified
+
+
 class _Search:
     """A search on its way."""
 

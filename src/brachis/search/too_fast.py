@@ -1,9 +1,12 @@
-"""Speeds that are asked for and out of reach: which, where, how far, and what would do.
+"""Speeds that are asked for and out of reach: which, where, how far, and which numbers to change.
 
 In the phase plane the fastest motion along a joint path has at every place the largest speed that any motion along that
 joint path has there. So where that motion, made without limits that ask for a least speed, falls short of one, every
 motion does; and what it has there is what could be asked for. A redundant robot may have better joint paths than those
 that are known: only what is far from possible is refused before a plan is tried.
+
+A tool speed v along a path with the slope z = |dx/ds| asks for ds/dt = v / z and d2s/dt2 = -(dz/ds / z) (ds/dt)^2. A
+limit a u + b x + c (`Limit.lines`) then bounds v^2 at every place: which one does, and where, is named.
 
 Limits on the jerk are unknown to the phase plane. What they leave is told by the plan without the least speed. Friction
 is unknown to it too: it helps to brake, so that with friction a part near the path's end may be passed faster.
@@ -19,9 +22,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.attempt import Attempt, Start
-from brachis.errors import PlanningError, UnreachableError
+from brachis.errors import PlanningError, Remedy, UnreachableError
 from brachis.feasibility import in_figures
 from brachis.limits import JointMotion, Limit, Moments
+from brachis.limits.tool import ToolSpeed
 from brachis.problem import Problem
 from brachis.search.pacing import along, graded
 from brachis.search.phase_plane import fastest
@@ -29,8 +33,11 @@ from brachis.search.phase_plane import fastest
 _EXACT, _HOPELESS, _UNLIKELY = 0.97, 0.5, 0.8
 """Share of a speed above which it may be possible yet: where the phase plane is exact, where not, and after plans."""
 _STATIONS, _BISECTIONS, _SAMPLES = 401, 10, 400
-_DIGITS = 2
 _AT_REST = (0.0, 0.0)
+_ROOM = 0.01
+"""Part of the path by which a part with a speed begins behind, or ends before, the way to the speed."""
+_STILL = 1e-9
+"""m per unit s, below which the tool stands still along the path."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +108,9 @@ def out_of_reach(attempts: Sequence[Attempt], solve: Callable[[Start], Attempt])
         moments = phase.joint_map.state(*motion.at(t), t=t)
     except UnreachableError:
         return None
-    return _falling_short(start.problem, moments, "in the fastest motion without it")
+    s = np.linspace(0.0, 1.0, _STATIONS)
+    q = np.column_stack([np.interp(s, moments.s, joint) for joint in moments.q.T])
+    return _falling_short(start, moments, "in the fastest motion without it", s, q)
 
 
 def unlikely(found: TooFast) -> bool:
@@ -133,8 +142,8 @@ def _in_phase_plane(start: Start) -> TooFast | None:
     places, slopes = (np.column_stack([np.interp(stations, s, joint) for joint in part.T]) for part in (q, q_ds))
     still = np.zeros_like(places)
     moments = Moments(places, slopes * rate[:, None], still, still, stations)
-    best = "along the best joint path that was found" if start.joint_map.r else "as the phase plane tells"
-    return _falling_short(problem, moments, best)
+    best = "along the best joint path that was found" if start.joint_map.r else "in the fastest motion"
+    return _falling_short(start, moments, best, s, q)
 
 
 def _ends_too_fast(problem: Problem, s: np.ndarray, q: np.ndarray, stations: np.ndarray) -> TooFast | None:
@@ -162,14 +171,24 @@ def _ends_too_fast(problem: Problem, s: np.ndarray, q: np.ndarray, stations: np.
         f"the limits do not allow so high a speed at the path's {key.removesuffix('_speed')}",
         where=f"boundary.{key}",
         found=f"{asked:g} m/s",
-        allowed=f"about {share * asked:.3g} m/s at most, along the best joint path that was found",
-        hint=f"Lower boundary.{key}, or raise the limits of the joints",
+        allowed=f"about {share * asked:.3g} m/s along the best joint path that was found (an estimate)",
+        hint="Raise the limits that hold the motion back",
     )
-    return TooFast(share, error)
+    given = problem.task.boundary
+    remedies = [
+        Remedy(f"boundary.{name}", getattr(given, name), part * getattr(given, name), "m/s")
+        for part, name in found
+        if part < _EXACT
+    ]
+    return TooFast(share, error.with_remedies(*remedies))
 
 
-def _falling_short(problem: Problem, motion: JointMotion, how: str) -> TooFast | None:
-    """Tell where a motion, whose places ascend, falls short of a least speed most; None where it does not."""
+def _falling_short(start: Start, motion: JointMotion, how: str, s: np.ndarray, q: np.ndarray) -> TooFast | None:
+    """Tell where a motion, whose places ascend, falls short of a least speed most; None where it does not.
+
+    Its joint path is q, (S, n), at s, (S,).
+    """
+    problem = start.problem
     worst: tuple[float, Limit, int, np.ndarray, np.ndarray] | None = None
     for limit in problem.limits:
         if not limit.least_speed:
@@ -184,19 +203,71 @@ def _falling_short(problem: Problem, motion: JointMotion, how: str) -> TooFast |
     share, limit, column, values, beyond = 1.0 - worst[0], *worst[1:]
     label, place = limit.labels[column], int(np.argmax(beyond))
     found, allowed = in_figures(limit, column, float(values[place]))
-    lower = math.floor(float(found) * 10 ** (scale := _DIGITS - 1 - math.floor(math.log10(max(float(found), 1e-9)))))
     parts = _within(limit, motion.s)
-    inside = parts[:, int(np.argmax(parts[place]))]
-    what, hints = _where_reached(motion.s[inside], beyond[inside] <= 0.0)
-    hints = [f"Lower it to {lower / 10**scale:g} {label.unit}", *hints, "raise the limits that hold the motion back"]
+    inside = np.flatnonzero(parts[:, int(np.argmax(parts[place]))])
+    best = inside[int(np.argmin(beyond[inside]))]
+    most, _ = in_figures(limit, column, float(values[best]))
+    what, cuts = _where_reached(motion.s[inside], beyond[inside] <= 0.0)
+    figure = next(bound.figure for bound in limit.bounds if bound.column == column)
+    possible = float(found)
+    remedies: list[Remedy] = []
+    for number, part in enumerate(problem.task.tool_limits.process_speed):
+        key = f"tool_limits.process_speed[{number}]"
+        if not label.key.startswith(key):
+            continue
+        held = _largest_held(problem, s, q, part.s)
+        possible = min(possible, held.speed)
+        if held.speed < figure:
+            there = f"{held.speed:.3g} m/s at s = {held.s:.3g}{' on that joint path' if start.joint_map.r else ''}"
+            what = f"the {held.limit} limit lets the tool keep no more than {there}"
+            cuts = {}
+        remedies.append(Remedy(f"{key}.speed", part.speed, part.speed * possible / figure, "m/s"))
+        remedies += [Remedy(f"{key}.s[{end}]", part.s[end], cut, is_refined=False) for end, cut in cuts.items()]
     error = PlanningError(
         f"no motion was found with the {label.kind} that is asked for: {what}",
         where=f"{label.key or limit.name} ({label.subject})",
-        found=f"at most {found} {label.unit} at s = {motion.s[place]:.2g}, {how}",
+        found=f"{found} to {most} {label.unit} on that part, the least at s = {motion.s[place]:.2g}, {how}",
         allowed=f"{allowed} {label.unit}",
-        hint=", or ".join([", ".join(hints[:-1]), hints[-1]]),
+        hint="Raise the limits that hold the motion back",
     )
-    return TooFast(share, error)
+    return TooFast(share, error.with_remedies(*remedies))
+
+
+@dataclass(frozen=True)
+class _Held:
+    """Largest speed of the tool, m/s, that a limit allows it to keep, and the s at which it allows no more."""
+
+    speed: float
+    s: float = 0.0
+    limit: str = ""
+
+
+def _largest_held(problem: Problem, s: np.ndarray, q: np.ndarray, part: tuple[float, float]) -> _Held:
+    """Find the largest speed that the tool can keep on a part of a joint path, q, (S, n), at s, (S,)."""
+    q_ds = np.gradient(q, s, axis=0, edge_order=2)
+    slope = ToolSpeed(problem.robot).slope(q, q_ds)
+    inside = (s >= part[0]) & (s <= part[1]) & (slope > _STILL)
+    if not inside.any():
+        return _Held(math.inf)
+    q_dds = np.gradient(q_ds, s, axis=0, edge_order=2)
+    bend = -np.gradient(slope, s) / np.maximum(slope, _STILL)
+    worst = _Held(math.inf)
+    for limit in _others(problem):
+        lines = limit.lines(s[inside], q[inside], q_ds[inside], q_dds[inside])
+        if lines is None:
+            continue
+        slant, lower = lines.x, -np.inf
+        if lines.u is not None:
+            slant, lower = lines.x + lines.u * bend[inside, None], -1.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            level = np.where(slant > 0.0, 1.0 - lines.constant, lower - lines.constant) / slant
+        squares = np.where(slant == 0.0, np.inf, np.maximum(level, 0.0)) * slope[inside, None] ** 2
+        row, column = np.unravel_index(int(np.argmin(squares)), squares.shape)
+        speed = math.sqrt(squares[row, column])
+        if speed < worst.speed:
+            label = limit.labels[column if squares.shape[1] == len(limit.labels) else 0]
+            worst = _Held(speed, float(s[inside][row]), str(label))
+    return worst
 
 
 def _within(limit: Limit, s: np.ndarray) -> np.ndarray:
@@ -206,16 +277,15 @@ def _within(limit: Limit, s: np.ndarray) -> np.ndarray:
     return np.asarray((s[:, None] >= ends[:, 0]) & (s[:, None] <= ends[:, 1]))
 
 
-def _where_reached(s: np.ndarray, reached: np.ndarray) -> tuple[str, list[str]]:
-    """Say where of the places, (P,), a speed is reached, (P,) bool, and how the part could be cut to them."""
+def _where_reached(s: np.ndarray, reached: np.ndarray) -> tuple[str, dict[int, float]]:
+    """Say where of the places, (P,), a speed is reached, (P,) bool, and to which s ends of the part could be moved."""
     if not reached.any():
-        return "it is reached nowhere on that part", []
+        return "it is reached nowhere on that part", {}
     first, last = s[reached][[0, -1]]
     if not reached[(s >= first) & (s <= last)].all():
-        return f"it cannot be held all the way from s = {first:.3g} to {last:.3g}", []
+        return f"it cannot be held all the way from s = {first:.3g} to {last:.3g}", {}
     before, behind = not reached[0], not reached[-1]
-    begin, end = math.ceil(100 * first) / 100, math.floor(100 * last) / 100
-    cuts = [f"let the part begin at s = {begin:g}"] * before + [f"let the part end at s = {end:g}"] * behind
-    cuts = cuts if begin < end else []
     ways = [f"before s = {s[0]:.2g}"] * before + [f"behind s = {s[-1]:.2g}"] * behind
+    # One end alone: a number is tried by itself.
+    cuts = {} if before and behind else {0: float(first) + _ROOM} if before else {1: float(last) - _ROOM}
     return f"the path {' and '.join(ways)} is too short for the way to it", cuts
