@@ -87,7 +87,7 @@ class Problem(Summary):
         if task.boundary.periodic:
             check_closed(task_map, path)
             end = start
-        approach = approach_of(task, robot, task_map, path, end if start is None else start)
+        approach = approach_of(task, robot, task_map, path, end if start is None else start, own=bool(further))
         limits = limits_of(robot, task, further, approach)
         check_smoothness(limits, task.spline)
         limits = check_postures(task_map, limits, start, end, path, task.refinement.tolerance)

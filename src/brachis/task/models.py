@@ -250,6 +250,11 @@ class Task(Model):
         return None if place is None or (poses and len(place) != _POSE_NUMBERS) else place
 
     @property
+    def speed_unit(self) -> str:
+        """Unit of a speed along the path; of joints it is the norm of their velocities."""
+        return "rad/s (m/s)" if self.task_space == "joints" else "m/s"
+
+    @property
     def fits(self) -> tuple[FitReport, ...]:
         """Where the path comes from points, one for each file or array: what they were, and how near it is to them."""
         shapes = (getattr(segment, segment.kind) for segment in self.path)
