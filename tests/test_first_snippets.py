@@ -220,3 +220,12 @@ def test_every_key_of_a_task_is_a_keyword():
     assert keys - set(TaskKeywords.__annotations__) == left, "in whole sections alone"
     assert set(TaskKeywords.__annotations__) <= keys
     assert set(LimitKeywords.__annotations__) == {each.name for each in fields(LimitSpec)}
+
+
+def test_a_misspelt_robot_is_told_from_a_missing_file():
+    for name in ("iiwa", "gen3_rail", "scara4"):
+        with pytest.raises(UnknownNameError, match="there is no robot"):
+            brachis.plan(name, **LINE)
+    for name in ("gantry2_result", "task"):
+        with pytest.raises(TaskError, match="there is no such file"):
+            brachis.plan(name)

@@ -14,8 +14,9 @@ import pytest
 
 import brachis
 from brachis.bottleneck import check_sensitivities, solved_again
+from brachis.errors import PathError, StartError
 from brachis.robot import dynamics
-from brachis.task import LimitSpec
+from brachis.task import LimitSpec, task_with
 from brachis.verify import verify_trajectory
 from support.chains import planar_robot
 
@@ -179,3 +180,68 @@ def test_plain_data(planned):
     data = json.loads(json.dumps(planned.to_dict()))
     assert data["t_end"] == planned.t_end
     assert data["verified"] is True
+
+
+@pytest.mark.parametrize(("row", "excess"), [(0, 1e-8), (1, 5e-5), (2, 1e-8)])
+def test_a_path_of_joints_may_leave_a_range_within_the_tolerance(row, excess):
+    robot = brachis.robots.iiwa14
+    waypoints = np.array([0.0, 0.3, 0.0, -1.2, 0.0, 0.6, 0.0]) * np.ones((3, 1))
+    waypoints[:, 0] = robot.limits.position_upper[0] + excess - 0.4 * np.abs(np.arange(3) - row)
+    result = brachis.plan(robot, path=waypoints, task_space="joints", intervals=8, effort="single", least_motion=False)
+    assert result.verified
+    assert result.trajectory.q[:, 0].max() == pytest.approx(robot.limits.position_upper[0] + excess, abs=1e-7)
+
+
+@pytest.mark.parametrize("excess", [1.01e-4, 2e-4, 0.1])
+def test_beyond_the_tolerance_the_message_tells_the_numbers_apart(excess):
+    robot = brachis.robots.iiwa14
+    waypoints = np.array([0.0, 0.3, 0.0, -1.2, 0.0, 0.6, 0.0]) * np.ones((2, 1))
+    waypoints[1, 0] = robot.limits.position_upper[0] + excess
+    with pytest.raises(PathError, match="joint_1.*out of its range") as caught:
+        brachis.plan(robot, path=waypoints, task_space="joints")
+    assert float(caught.value.found.split()[0]) > float(caught.value.allowed.split()[-2])
+    with pytest.raises(StartError, match="joint_1") as caught:
+        brachis.plan(robot, path=waypoints[::-1], task_space="joints")
+    assert float(caught.value.found.split()[0]) > float(caught.value.allowed.split()[-2])
+
+
+def test_a_start_posture_may_leave_its_range_and_exceed_its_torque_within_the_tolerance():
+    robot, start = brachis.robots.gen3, np.array([0.0, 1.2, 0.0, 1.2, 0.0, 0.6, 0.0])
+    need = abs(dynamics.torque(robot, start[None], 0 * start[None], 0 * start[None])[0, 1])
+    line = {"path": brachis.Line(by=[-0.02, 0.0, 0.05]), "task_space": "position", "intervals": 8, "effort": "single"}
+    within = {"torque": {"joint_2": need * (1 - 5e-5)}, "position": {"joint_4": [-2.0, 1.2 - 5e-5]}}
+    assert brachis.plan(robot, limits=within, start=start, **line, least_motion=False).verified
+    with pytest.raises(StartError, match="cannot hold the arm"):
+        brachis.plan(robot, limits={"torque": {"joint_2": need * (1 - 2e-4)}}, start=start, **line)
+
+
+def test_the_first_waypoint_may_be_the_start(tmp_path):
+    line = {"task_space": "joints", "intervals": 8, "effort": "single", "least_motion": False}
+    rest = brachis.Spline(through=WAYPOINTS[1:])
+    asked = brachis.plan("iiwa14", path=rest, start=WAYPOINTS[0], **line)
+    for path in (WAYPOINTS, WAYPOINTS.tolist(), brachis.Spline(through=WAYPOINTS)):
+        for start in ({}, {"start": WAYPOINTS[0]}, {"start": WAYPOINTS[0].round(5)}):
+            task = task_with(path=path, **start, **line)
+            assert np.allclose(task.start.joints, WAYPOINTS[0], rtol=0, atol=1e-5)
+    given = brachis.plan("iiwa14", path=WAYPOINTS, **line)
+    assert given.t_end == pytest.approx(asked.t_end, rel=1e-9)
+    content = {"brachis": 1, "robot": {"urdf": str(IIWA)}, "task_space": "joints", "path": WAYPOINTS.tolist()}
+    (tmp_path / "task.yaml").write_text(json.dumps(content))
+    task = brachis.load_task(tmp_path / "task.yaml")
+    assert task.start.joints == tuple(WAYPOINTS[0])
+    assert brachis.load_task(task.to_dict()) == task
+
+
+def test_a_table_of_joints_in_any_order_has_its_start(tmp_path):
+    names = brachis.robots.iiwa14.joint_names
+    order = [1, 0, 2, 3, 4, 5, 6]
+    rows = [",".join(names[i] for i in order), *(",".join(map(str, row)) for row in WAYPOINTS[:, order].tolist())]
+    (tmp_path / "joints.csv").write_text("\n".join(rows))
+    for start in ({}, {"start": "free"}):
+        task = task_with(path={"csv": {"file": str(tmp_path / "joints.csv")}}, task_space="joints", **start)
+        assert task.start.joints == dict(zip(np.array(names)[order], WAYPOINTS[0, order], strict=True))
+
+
+def test_waypoints_that_begin_elsewhere_are_refused():
+    with pytest.raises(PathError, match=r"starts elsewhere.*rad or m off"):
+        brachis.plan("iiwa14", path=WAYPOINTS[1:], start=WAYPOINTS[0], task_space="joints")

@@ -228,7 +228,8 @@ def test_a_posture_in_degrees_where_joints_turn_without_end():
     # 30, -120 and 120 rad are reached all the same: joints of this arm have no range.
     with pytest.raises(PlausibilityError) as caught:
         brachis.plan(task(start={"joints": [30.0, -120.0, 120.0]}), strict=True)
-    assert [remark.split(":")[0] for remark in caught.value.remarks] == [f"start.joints.j{i}" for i in (1, 2, 3)]
+    (remark,) = caught.value.remarks
+    assert remark.startswith("start.joints: the position looks like degrees; found j1 30 rad, j2 -120 rad, j3 120 rad;")
 
 
 def test_yaw_of_the_path_start_in_degrees():
@@ -376,7 +377,16 @@ def test_waypoints_in_degrees_of_joints_without_a_range():
     content = task(task_space="joints", redundant_joints="auto", path=[{"spline": {"through": [[90.0, -60.0, 45.0]]}}])
     with pytest.raises(PlausibilityError) as caught:
         brachis.plan(content, strict=True)
-    assert [remark.split(":")[0] for remark in caught.value.remarks] == [f"path.j{i}" for i in (1, 2, 3)]
+    (remark,) = caught.value.remarks
+    assert remark.startswith("path: the position looks like degrees; found j1 90 rad, j2 -60 rad, j3 45 rad;")
+
+
+def test_a_path_of_joints_may_wind_and_its_end_speeds_are_in_rad(recwarn):
+    wind = {"task_space": "joints", "redundant_joints": "auto", "path": [{"line": {"by": [4.0 * np.pi, 1.0, 0.5]}}]}
+    assert brachis.plan(task(**wind)).warnings == ()
+    assert not recwarn.list
+    with pytest.raises(PlausibilityError, match=r"end_speed: .* degrees per second; found 90 rad/s \(m/s\)"):
+        brachis.plan(task(**wind, boundary={"end_speed": 90.0}), strict=True)
 
 
 def test_lengths_of_a_gantry_in_mm():

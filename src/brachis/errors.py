@@ -333,6 +333,15 @@ def nearest(name: str, valid: Iterable[str], likeness: float = 0.5) -> str | Non
     return near[0] if near else None
 
 
+def write_apart(value: float, *others: float, digits: int = 4) -> tuple[str, ...]:
+    """Write a number and others with as many significant digits as tell it from them, at least `digits`."""
+    for count in range(digits, 18):
+        text, *texts = (f"{each:.{count}g}" for each in (value, *others))
+        if all(text != other or value == each for other, each in zip(texts, others, strict=True)):
+            break
+    return (text, *texts)
+
+
 def no_attribute(module: str, kind: str, name: str, valid: Sequence[str]) -> AttributeError:
     """Return what a module raises that has things of one kind, such as robots, by their names."""
     near = nearest(name, valid)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from brachis.errors import InputError, PathError, StartError, UnknownNameError
+from brachis.errors import InputError, PathError, StartError, UnknownNameError, write_apart
 from brachis.ik import Match
 from brachis.limits import Limit, Moments
+from brachis.limits.position import PositionLimit, position_measure
 from brachis.path import Path, check_on_path
 from brachis.plausibility import position_hint
 from brachis.robot import Robot, TaskMap
@@ -17,7 +19,6 @@ from brachis.robot.joint_space import complement, difference
 from brachis.robot.task_map import JointSpace
 from brachis.task import SplineSettings
 
-_RANGE_SLACK = 1e-9
 _SAME_POSTURE = 1e-5
 _REGULAR = 1e-6
 """Least singular value of the Jacobian, in m and rad, below which a posture is a singularity of the arm."""
@@ -32,7 +33,8 @@ def check_postures(
     start: np.ndarray | None,
     end: np.ndarray | None,
     path: Path,
-) -> None:
+    tolerance: float,
+) -> tuple[Limit, ...]:
     """Refuse start and end postures out of range, beyond a limit that holds at rest, or off the path.
 
     Parameters
@@ -42,71 +44,100 @@ def check_postures(
     start, end : (n,) ndarray or None
         None where free.
     path : Path
+    tolerance : float
+        By which limits may be exceeded anywhere: ``refinement.tolerance``.
+
+    Returns
+    -------
+    tuple of Limit
+        Widened where such a posture, or a path of joints, exceeds them within the tolerance.
 
     Raises
     ------
     StartError
     """
-    if start is not None:
-        _check_range(task_map.robot, start, "start")
-        _check_at_rest(limits, start, "start")
-    if isinstance(task_map, JointSpace):
-        _check_range_along(task_map.robot, path)
+    robot = task_map.robot
+    for name, posture in (("start", start), ("end", end)):
+        if posture is not None:
+            _check_range(robot, posture, name, tolerance)
+            _check_at_rest(limits, posture, name, tolerance)
+            limits = [_widen(limit, posture[None], tolerance) for limit in limits]
     if end is not None:
-        _check_range(task_map.robot, end, "end")
-        _check_at_rest(limits, end, "end")
         check_on_path(task_map, end, path.sample(np.array([1.0])).target[0], "end")
+    if isinstance(task_map, JointSpace):
+        along = path.sample(np.linspace(0.0, 1.0, _STATIONS)).target
+        _check_range_along(robot, along, tolerance)
+        ranges = [limit for limit in limits if isinstance(limit, PositionLimit)]
+        limits = [_widen(limit, along, tolerance) if limit in ranges else limit for limit in limits]
+    return tuple(limits)
 
 
-def _check_range(robot: Robot, posture: np.ndarray, name: str) -> None:
-    beyond = _beyond_range(robot, posture[None])
+def _widen(limit: Limit, postures: np.ndarray, tolerance: float) -> Limit:
+    """Let a limit hold at rest in postures, (K, n), that exceed it within the tolerance."""
+    if not limit.static:
+        return limit
+    values = limit.values(Moments.at_rest(postures))
+    excess = limit.violation(values).max(axis=0)
+    near = (excess > 0.0) & (excess <= tolerance)
+    if not near.any():
+        return limit
+    wider = copy.copy(limit)
+    wider.lower = np.where(near, np.minimum(limit.lower, values.min(axis=0)), limit.lower)
+    wider.upper = np.where(near, np.maximum(limit.upper, values.max(axis=0)), limit.upper)
+    return wider
+
+
+def _check_range(robot: Robot, posture: np.ndarray, name: str, tolerance: float) -> None:
+    beyond = _beyond_range(robot, posture[None], tolerance)
     if beyond is not None:
         _, joint, facts = beyond
         facts["hint"] = facts["hint"] or f"Change the posture, or the range with robot.limits.position.{joint}"
         raise StartError(f"joint {joint!r} is out of its range", where=f"{name}.joints", **facts)
 
 
-def _check_range_along(robot: Robot, path: Path) -> None:
-    """Refuse a path of joints that leaves a joint's range."""
-    s = np.linspace(0.0, 1.0, _STATIONS)
-    beyond = _beyond_range(robot, path.sample(s).target)
+def _check_range_along(robot: Robot, along: np.ndarray, tolerance: float) -> None:
+    """Refuse a path of joints, postures (K, n), that leaves a joint's range."""
+    beyond = _beyond_range(robot, along, tolerance)
     if beyond is not None:
         station, joint, facts = beyond
-        facts["found"] = f"{facts['found']} at s = {s[station]:.3g}"
+        facts["found"] = f"{facts['found']} at s = {station / (len(along) - 1):.3g}"
         facts["hint"] = facts["hint"] or f"Lead the path elsewhere, or raise robot.limits.position.{joint}"
         raise PathError(f"joint {joint!r} is out of its range", where="path", **facts)
 
 
-def _beyond_range(robot: Robot, postures: np.ndarray) -> tuple[int, str, dict[str, Any]] | None:
+def _beyond_range(
+    robot: Robot, postures: np.ndarray, tolerance: float
+) -> tuple[int, str, dict[str, Any]] | None:
     """Find the first joint that is out of its range in postures, (K, n): where most, its name, and what is told."""
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
-    beyond = np.maximum(lower - postures, postures - upper) - _RANGE_SLACK
+    beyond = np.maximum(lower - postures, postures - upper) - tolerance * position_measure(lower, upper)
     joints = np.flatnonzero(beyond.max(axis=0) > 0.0)
     if not len(joints):
         return None
     i = int(joints[0])
     k = int(np.argmax(beyond[:, i]))
     value, unit, low, high = float(postures[k, i]), robot.position_units[i], float(lower[i]), float(upper[i])
+    found, first, last = write_apart(value, low, high, digits=6)
     facts: dict[str, Any] = {
-        "found": f"{value:.6g} {unit}",
-        "allowed": f"{low:.6g} {unit} to {high:.6g} {unit}",
+        "found": f"{found} {unit}",
+        "allowed": f"{first} {unit} to {last} {unit}",
         "hint": position_hint(value, low, high, unit),
     }
     return k, robot.joint_names[i], facts
 
 
-def beyond_at_rest(limit: Limit, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values of a limit in postures (K, n) at rest, (K, c), and how far beyond it they are; negative inside."""
+def beyond_at_rest(limit: Limit, q: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Values of a limit in postures (K, n) at rest, (K, c), and how far beyond its tolerance they are, if positive."""
     values = limit.values(Moments.at_rest(q))
-    return values, limit.violation(values) - _RANGE_SLACK * np.maximum(limit.violation_scale, 1.0)
+    return values, limit.violation(values) - tolerance
 
 
-def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str) -> None:
+def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str, tolerance: float) -> None:
     """Refuse a posture in which a limit is exceeded although the arm stands still."""
     for limit in limits:
         if not limit.static:
             continue
-        (values,), (beyond,) = beyond_at_rest(limit, posture[None])
+        (values,), (beyond,) = beyond_at_rest(limit, posture[None], tolerance)
         worst = int(np.argmax(beyond))
         if beyond[worst] > 0.0:
             label = limit.labels[worst]
@@ -142,15 +173,18 @@ def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
     """Write a value and its bounds in the unit of the value's label, which is left out."""
     bounds = [bound for bound in limit.bounds if bound.column == column]
     if not bounds:
-        return f"{value:.4g}", f"{limit.lower[column]:.4g} to {limit.upper[column]:.4g}"
+        found, low, high = write_apart(value, limit.lower[column], limit.upper[column])
+        return found, f"{low} to {high}"
     first = bounds[0]
     if first.end is None:  # the value is a ratio to one figure
-        return f"{abs(value) * first.figure:.4g}", f"{first.figure:.4g}"
+        found, allowed = write_apart(abs(value) * first.figure, first.figure)
+        return found, allowed
     level = limit.lower[column] if first.end == "lower" else limit.upper[column]
-    ends = {bound.end: f"{bound.figure:.4g}" for bound in bounds}
+    found, *figures = write_apart(first.figure + (value - level) / first.per_unit, *(bound.figure for bound in bounds))
+    ends = dict(zip((bound.end for bound in bounds), figures, strict=True))
     words = {"lower": "at least ", "upper": "at most "} if len(ends) == 1 else {}
     allowed = " to ".join(f"{words.get(end, '')}{ends[end]}" for end in ("lower", "upper") if end in ends)
-    return f"{first.figure + (value - level) / first.per_unit:.4g}", allowed
+    return found, allowed
 
 
 def check_regular(task_map: TaskMap, start: np.ndarray | None, end: np.ndarray | None) -> None:

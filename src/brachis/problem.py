@@ -87,10 +87,10 @@ class Problem(Summary):
         if task.boundary.periodic:
             check_closed(task_map, path)
             end = start
-        approach = approach_of(task, robot, task_map, path, end if start is None else start)
+        approach = approach_of(task, robot, task_map, path, end if start is None else start, own=bool(further))
         limits = limits_of(robot, task, further, approach)
         check_smoothness(limits, task.spline)
-        check_postures(task_map, limits, start, end, path)
+        limits = check_postures(task_map, limits, start, end, path, task.refinement.tolerance)
         if end is not None and not task.boundary.periodic:
             end = _on_path(task_map, end, path)
         return cls(task, robot, task_map, path, start, end, limits, tuple(further))

@@ -11,11 +11,12 @@ Examples
 
 from __future__ import annotations
 
+import difflib
 import os
 from functools import cache
 from pathlib import Path
 
-from brachis.errors import UnknownNameError, nearest, no_attribute
+from brachis.errors import UnknownNameError, no_attribute
 from brachis.files import is_file, shipped
 from brachis.robot import Robot
 
@@ -66,7 +67,7 @@ def _is_name(given: str | os.PathLike[str]) -> bool:
     path = Path(given)
     bare = not path.suffix and len(path.parts) == 1 and not is_file(path)
     begun = any(name.startswith(str(given)) for name in names())
-    return bare and (begun or nearest(str(given), names(), _MISSPELT) is not None)
+    return bare and (begun or bool(difflib.get_close_matches(str(given), names(), cutoff=_MISSPELT)))
 
 
 @cache

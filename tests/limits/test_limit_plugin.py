@@ -212,3 +212,20 @@ def test_two_processes_take_it_as_well():
     command = [sys.executable, "-c", code, LINE]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["True", "True"]
+
+
+def test_a_limit_of_ones_own_knows_how_speeds_are_reached(plugin):
+    ways = []
+
+    class Bound(plugin.BoundRange):
+        def along(self, approach):
+            ways.append((approach.way(0.1, 0.5), approach.way(0.2, 0.5)))
+            return self
+
+    class Model(plugin.CoupledRange):
+        def bind(self, robot):
+            return Bound(self, robot)
+
+    brachis.transcribe(brachis.examples.scara_line, own_limits=[Model(("j2", "j3"), -0.5, UPPER)])
+    assert ways[0][1] == pytest.approx(4.0 * ways[0][0])
+    assert ways[0][0] > 0.0

@@ -57,8 +57,8 @@ def test_bsplines_are_taken_as_they_are():
 
 
 REFUSED = [
-    ({"circle": {"center": [0, 0, 0]}}, "no kind of segment for a path of joints"),
-    ({"turn": {"rotate": {"axis": [0, 0, 1], "angle_deg": 3}}}, "no kind of segment for a path of joints"),
+    ({"circle": {"center": [0, 0, 0]}}, "a path of joints cannot have this segment"),
+    ({"turn": {"rotate": {"axis": [0, 0, 1], "angle_deg": 3}}}, "a path of joints cannot have this segment"),
     ({"line": {"length": 1, "angle_deg": 3}}, "needs 2 position rows"),
     ({"line": {"by": [1, 2]}}, r"found 2: .*joint a, joint b, joint x"),
     ({"spline": {"through": [[1, 1, 1]], "joints": ["a", "b", "c"]}}, r"spline\.joints.*'c'.*a, b, x"),

@@ -56,7 +56,7 @@ SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
     ({"arc": {"via": [1, 2], "to": [2, 2, 2]}}, XYW, ["path[0].arc.to: wrong number of coordinates", "2: [x, y]"]),
     ({"spline": {"through": [[1, 1], [1]]}}, XY, ["path[0].spline.through[1]: wrong number", "2: [x, y]"]),
     ({"spline": {"through": [[1, 1], [1, 1]]}}, XY, ["spline.through[1]: a waypoint repeats its predecessor"]),
-    ({"spline": {"through": [[0, 0], [1, 1]]}}, XY, ["spline.through[0]: the first waypoint is the segment's start"]),
+    ({"spline": {"through": [[0, 0], [1, 1], [1, 1]]}}, XY, ["spline.through[2]: a waypoint repeats its predecessor"]),
     ({"spline": {"through": [[0, 0]]}}, XY, ["path[0].spline.through: the segment has zero length"]),
     ({"spline": {"through": [[1, 0, 0], [1, 0, 2]]}}, XYW, ["spline.through[1]: a waypoint repeats"]),
     (

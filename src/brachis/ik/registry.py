@@ -122,8 +122,11 @@ def find(robot: Robot, task_map: TaskMap, redundant_joints: Sequence[str], *, fa
         raise DecompositionError(
             "wrong number of redundant joints" if r >= 0 else "the robot has fewer joints than the task space has rows",
             redundant_joints=names,
-            found=f"{len(names)} ({', '.join(names) or 'none'})",
-            allowed=f"{r}: {robot.n} joints less {task_map.m} rows ({', '.join(task_map.rows)})" if r >= 0 else None,
+            found=f"{len(names)} ({', '.join(names) or 'none'})" if r >= 0 else f"{robot.n} for {task_map.m} rows",
+            allowed=f"{r}: {robot.n} joints less {task_map.m} rows ({', '.join(task_map.rows)})"
+            if r >= 0
+            else f"at most {robot.n} rows; or task_space: joints, with a path of the joints such as "
+            f"line: {{by: [{', '.join(['0.5'] * robot.n)}]}}",
         )
     candidate = _try(robot, task_map, names, families, _ideals(robot, task_map))
     if not isinstance(candidate, Match):

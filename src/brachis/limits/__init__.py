@@ -93,10 +93,9 @@ def limits_of(
         A limit of the user's own does not fit the robot, or is none (see `bound_limits`).
     """
     built = tuple(limit for build in TABLE.values() if (limit := build(robot, task)) is not None)
-    if approach is not None:
-        built = tuple(limit.along(approach) for limit in built)
     named = bound_limits(custom_limits(task), robot, built, "custom_limits")
-    return (*built, *named, *bound_limits(further, robot, (*built, *named), "own_limits"))
+    limits = (*built, *named, *bound_limits(further, robot, (*built, *named), "own_limits"))
+    return limits if approach is None else tuple(limit.along(approach) for limit in limits)
 
 
 __all__ = [

@@ -14,6 +14,11 @@ _LEAST_HALF, _LARGEST_HALF = 1e-5, 1.0
 """A violation of 1 is half the range, but between these, rad or m, so that each end is judged by itself."""
 
 
+def position_measure(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Return what counts as a violation of 1 beyond ranges, rad or m: half of each, but no more than 1."""
+    return np.clip(0.5 * upper - 0.5 * lower, _LEAST_HALF, _LARGEST_HALF)
+
+
 class PositionLimit(Limit):
     """Joint positions within their ranges.
 
@@ -43,7 +48,7 @@ class PositionLimit(Limit):
             for i, name in ((i, robot.joint_names[i]) for i in joints)
         )
         self.lower, self.upper = (low - self._middle) * self._scale, (high - self._middle) * self._scale
-        self._violation_scale = per_row / np.clip(half, _LEAST_HALF, _LARGEST_HALF)
+        self._violation_scale = per_row / position_measure(low, high)
         whole = np.where(np.isfinite(half), 2.0 * half, 1.0)
         self._bounds = tuple(
             Bound(column, float(ends[column]), float(whole[column]), float(self._scale[column]), end)

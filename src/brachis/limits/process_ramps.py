@@ -40,8 +40,10 @@ class FromRest:
         return 0.5 * speed**2 / self.acceleration / max(_tool_path_speed(self.task_map, self.path, s), _STILL)
 
 
-def approach_of(task: Task, robot: Robot, task_map: TaskMap, path: Path, posture: np.ndarray | None) -> FromRest | None:
-    """Find out how process speeds are reached; None where the task has none.
+def approach_of(
+    task: Task, robot: Robot, task_map: TaskMap, path: Path, posture: np.ndarray | None, *, own: bool = False
+) -> FromRest | None:
+    """Find out how speeds along the path are reached; None where no limit asks for it.
 
     Parameters
     ----------
@@ -52,6 +54,8 @@ def approach_of(task: Task, robot: Robot, task_map: TaskMap, path: Path, posture
     posture : (n,) ndarray or None
         In which the tool's largest acceleration is taken, of which no more than the size matters; None: that in the
         middle of the joint ranges.
+    own : bool, optional
+        Whether there are limits of the user's own, which may ask for it as process speeds do.
 
     Raises
     ------
@@ -59,7 +63,7 @@ def approach_of(task: Task, robot: Robot, task_map: TaskMap, path: Path, posture
         A part of the path with a process speed begins or ends with the path, where that is passed at another speed.
     """
     tool = task.tool_limits
-    if not tool.process_speed:
+    if not (tool.process_speed or task.custom_limits or own):
         return None
     for number in range(len(tool.process_speed)):
         _check_ends(task, task_map, path, number)

@@ -26,9 +26,14 @@ class JointCoordinates(RowCoordinates):
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
         """See `Coordinates.curve`."""
         if not isinstance(segment, LineSegment | SplineSegment | BSplineSegment):
-            problem = "no kind of segment for a path of joints"
-            allowed = "line: {to: ...}, line: {by: ...}, spline, bspline, csv"
-            raise PathError(problem, found=segment.kind, allowed=allowed, where=f"path[{index}]")
+            by = ", ".join(["1.5708", *["0"] * (len(self.rows) - 1)])
+            raise PathError(
+                "a path of joints cannot have this segment",
+                found=segment.kind,
+                allowed="line: {to: ...}, line: {by: ...}, spline, bspline, csv",
+                where=f"path[{index}]",
+                hint=f"A turn of one joint by 90 degrees is line: {{by: [{by}]}}",
+            )
         shape = segment.shape
         names = shape.joints if isinstance(shape, SplineThrough | BSplineCurve) else None
         if names is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.errors import StartError
+from brachis.errors import StartError, write_apart
 from brachis.path.build import build_path
 from brachis.path.protocol import Path
 from brachis.plausibility import place_hint, turn_hint
@@ -54,11 +54,12 @@ def check_on_path(task_map: TaskMap, posture: np.ndarray, target: np.ndarray, na
     miss = np.abs(task_map.difference(place, target))
     worst = int(np.argmax(miss))
     if miss[worst] > _ON_PATH:
+        found, allowed = write_apart(miss[worst], _ON_PATH, digits=3)
         raise StartError(
             f"the {name} posture is off the path",
             where=f"{name}.joints",
-            found=f"{miss[worst]:.3g} {task_map.units[worst]} off in {task_map.rows[worst]}",
-            allowed=f"at most {_ON_PATH:g} {task_map.units[worst]}",
+            found=f"{found} {task_map.units[worst]} off in {task_map.rows[worst]}",
+            allowed=f"at most {allowed} {task_map.units[worst]}",
             hint=_hint(task_map, place, target)
             or f"Choose a posture whose tool is at the path's {'beginning' if name == 'start' else 'end'}",
         )

@@ -12,7 +12,7 @@ from brachis.path.line import LineCurve
 from brachis.path.pose import LEAST_QUALITY, PoseCurve, QuaternionPoseCurve
 from brachis.path.rotations import quaternions_of, rotation_from, rotation_of
 from brachis.path.sampling import smallest
-from brachis.path.spline import START_TOLERANCE, chord_knots, interpolate, starts_elsewhere, waypoints_of
+from brachis.path.spline import START_TOLERANCE, chord_knots, interpolate, repeats_start, starts_elsewhere, waypoints_of
 from brachis.path.turns import AMBIGUOUS, half_turn, turn_between
 from brachis.plausibility import turn_hint
 
@@ -53,18 +53,27 @@ def pose_spline(
     """
     points = waypoints_of(shape, site)
     turned = _rotations(shape, attitudes, site, rotation)
-    angles = np.asarray((turned[:-1].inv() * turned[1:]).magnitude())
+    chords, angles = np.linalg.norm(np.diff(points, axis=0), axis=1), _angles(turned)
+    if repeats_start(np.hypot(chords, angles)):
+        kept = np.delete(np.arange(len(points)), 1)
+        points, turned = points[kept], turned[kept]
+        chords, angles = np.linalg.norm(np.diff(points, axis=0), axis=1), _angles(turned)
     for i in np.flatnonzero(angles > np.pi - AMBIGUOUS):
-        raise half_turn(f"{site.key}.orientations[{i}]")
-    knots = chord_knots(np.linalg.norm(np.diff(points, axis=0), axis=1), angles, shape, site)
+        raise half_turn(f"{site.key}.orientations[{i + len(attitudes) - len(angles)}]")
+    knots = chord_knots(chords, angles, shape, site)
     if len(points) == 2:  # noqa: PLR2004 - the start and one waypoint
-        turn = turn_between(rotation, turned[1], f"{site.key}.orientations[0]")
+        turn = turn_between(rotation, turned[1], f"{site.key}.orientations[{len(attitudes) - 1}]")
         position = LineCurve(points[0], (points[1] - points[0]) / knots[1], float(knots[1]))
         return PoseCurve(position, turn.over(position.length))
     quaternions = with_like_signs(quaternions_of(turned))
     curve = QuaternionPoseCurve(interpolate(knots, np.concatenate([points, quaternions], axis=1)))
     _check_quaternions(curve, site)
     return curve
+
+
+def _angles(turned: Rotation) -> Array:
+    """Return the angles, (n - 1,), rad, between n successive rotations."""
+    return np.asarray((turned[:-1].inv() * turned[1:]).magnitude())
 
 
 def _rotations(shape: SplineThrough, attitudes: Sequence[Attitude], site: Site, matrix: Array) -> Rotation:

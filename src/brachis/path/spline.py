@@ -11,6 +11,7 @@ from brachis.errors import PathError
 from brachis.path.line import LineCurve
 from brachis.path.site import ZERO_LENGTH, Site
 from brachis.plausibility import place_hint
+from brachis.robot.task_map.rows import joints_of
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 START_TOLERANCE = 1e-4
 """How far a segment may start from where its waypoints expect, m and rad."""
+_OF_NEXT = 0.01
+"""Share of the distance to the next waypoint up to which a first waypoint is taken for the segment's start."""
 _DEGREE = 5
 _FEWEST_WAYPOINTS = 3
 
@@ -57,6 +60,8 @@ def spline_through(shape: SplineThrough, site: Site) -> SplineCurve | LineCurve:
         where = f"{site.key}.orientations"
         raise PathError(problem, found=f"task_space [{', '.join(site.rows)}]", where=where, hint="Set task_space: pose")
     waypoints = waypoints_of(shape, site)
+    if repeats_start(np.linalg.norm(np.diff(waypoints, axis=0), axis=1)):
+        waypoints = np.delete(waypoints, 1, axis=0)
     steps = np.diff(waypoints, axis=0)
     chords = np.linalg.norm(steps[:, : len(site.positions)], axis=1)
     return interpolate(chord_knots(chords, np.linalg.norm(steps, axis=1), shape, site), waypoints)
@@ -80,10 +85,16 @@ def waypoints_of(shape: SplineThrough, site: Site) -> Array:
         distance = float(np.linalg.norm(off[:count]))
         if distance > START_TOLERANCE:
             hint = place_hint(site.position, expected[:count], site.positions)
-            raise starts_elsewhere(f"{site.key}.starts_at", f"{site.describe()}, {distance:.4g} m off", hint)
+            unit = "rad or m" if joints_of(site.rows) else "m"
+            raise starts_elsewhere(f"{site.key}.starts_at", f"{site.describe()}, {distance:.4g} {unit} off", hint)
         if np.any(np.abs(off[count:]) > START_TOLERANCE):
             raise starts_elsewhere(f"{site.key}.starts_at", f"{site.describe()}, {abs(off[-1]):.4g} rad off")
     return np.stack([site.start, *points])
+
+
+def repeats_start(steps: Array) -> bool:
+    """Tell whether the first waypoint is the segment's start, from the steps, (n - 1,), between n waypoints (m, rad)."""
+    return len(steps) > 1 and bool(steps[0] < START_TOLERANCE and steps[0] <= _OF_NEXT * steps[1])
 
 
 def starts_elsewhere(where: str, found: str, hint: str | None = None) -> PathError:
@@ -122,12 +133,9 @@ def chord_knots(chords: Array, otherwise: Array, shape: SplineThrough, site: Sit
     if np.all(chords < ZERO_LENGTH):
         raise site.zero_length(key=".through", found=[list(point) for point in shape.through])
     if np.any(chords < ZERO_LENGTH):
-        repeated = int(np.argmax(chords < ZERO_LENGTH))
-        problem = "a waypoint repeats its predecessor"
-        if repeated == 0:
-            problem = "the first waypoint is the segment's start, which is implied"
+        repeated = int(np.argmax(chords < ZERO_LENGTH)) + len(shape.through) - len(chords)
         raise PathError(
-            problem,
+            "a waypoint repeats its predecessor",
             found=list(shape.through[repeated]),
             allowed="waypoints that differ from their predecessors in the position rows",
             where=f"{site.key}.through[{repeated}]",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from brachis.errors import PathError
+from brachis.errors import PathError, write_apart
 from brachis.plausibility.size import reach
 from brachis.robot import TaskMap
 from brachis.robot.task_map.rows import AXES
@@ -55,12 +55,13 @@ def check_within_reach(task_map: TaskMap, path: Path) -> None:
         return
     beyond = s[away > far]
     furthest = float(away.max())
+    found, most = write_apart(furthest, far)
     looks = furthest > _HARDLY * far and furthest / _THOUSAND < _HARDLY * far
     raise PathError(
         f"the path is out of reach from s = {beyond[0]:.3g} on",
         s_interval=(float(beyond[0]), float(beyond[-1])),
-        found=f"{furthest:.4g} m away from the robot's first joint at s = {s[int(np.argmax(away))]:.3g}",
-        allowed=f"at most {far:.4g} m, which is all links and slides in one line",
+        found=f"{found} m away from the robot's first joint at s = {s[int(np.argmax(away))]:.3g}",
+        allowed=f"at most {most} m, which is all links and slides in one line",
         hint=f"The path looks like mm: divided by 1000 it is {furthest / _THOUSAND:.3g} m away"
         if looks
         else "Shorten or move the path, or the robot's mounting",

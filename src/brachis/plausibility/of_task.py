@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from brachis.path import Path
 
 _TURN = 2.0 * math.pi
+_WINDING = 5.0
+"""Turns of a joint without a range that a path of joints may ask for: in degrees, 30 are nearly as many."""
 _ROUNDED = 1e-3
 _STATIONS = 401
 _EIGHTHS, _ROUNDING = 16, 2e-3
@@ -71,7 +73,8 @@ def _places(
         columns = zip(robot.joint_names, robot.revolute, postures.reshape(-1, robot.n).T, ranged, strict=True)
         for name, turns, values, within in columns:
             if turns:
-                usual, value = (2.0 if within else 1.0) * _TURN, float(values[np.argmax(np.abs(values))])
+                most = 2.0 if within else (1.0 if along is None else _WINDING)
+                usual, value = most * _TURN, float(values[np.argmax(np.abs(values))])
                 looks, shown = "the position looks like degrees", f"{value:.6g}"
                 yield Figure(f"{key}.{name}", looks, abs(value), usual + _ROUNDED, "rad", shown=shown)
     if YAW in task_map.rows:
@@ -91,7 +94,8 @@ def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:
 
 def _tool(task: Task) -> Iterator[Figure]:
     """Look at the largest of every kind of limit; feed rates have units of their own."""
-    limits, ends = task.tool_limits, task.boundary
+    limits, ends, unit = task.tool_limits, task.boundary, task.speed_unit
+    turning = "degrees per second" if task.task_space == "joints" else "mm/s"
     speeds = limits.speed.speed if isinstance(limits.speed, SpeedTable) else [limits.speed]
     processes = [part.speed for part in limits.process_speed]
     # Delta robots move at 10 m/s, and accelerate with 15 g.
@@ -100,8 +104,8 @@ def _tool(task: Task) -> Iterator[Figure]:
         ("tool_limits.process_speed", processes, 50.0, "m/s", "mm/s"),
         ("tool_limits.acceleration", [limits.acceleration], 300.0, "m/s^2", "mm/s^2"),
         ("tool_limits.angular_speed", [limits.angular_speed], 60.0, "rad/s", "degrees per second"),
-        ("boundary.start_speed", [ends.start_speed], 50.0, "m/s", "mm/s"),
-        ("boundary.end_speed", [ends.end_speed], 50.0, "m/s", "mm/s"),
+        ("boundary.start_speed", [ends.start_speed], 50.0, unit, turning),
+        ("boundary.end_speed", [ends.end_speed], 50.0, unit, turning),
     ):
         largest = max((value for value in values if value is not None and value < _OPEN), default=0.0)
         limit = where.startswith("tool_limits")

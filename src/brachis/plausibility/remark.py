@@ -54,8 +54,22 @@ class Remark:
         return asdict(self)
 
 
+def _together(remarks: tuple[Remark, ...]) -> tuple[Remark, ...]:
+    """Make one remark of those that say the same of several joints."""
+    groups: dict[tuple[str, str], list[Remark]] = {}
+    for remark in remarks:
+        groups.setdefault((remark.where.rpartition(".")[0], remark.message), []).append(remark)
+    return tuple(group[0] if len(group) == 1 else _of_all(stem, group) for (stem, _), group in groups.items())
+
+
+def _of_all(stem: str, group: list[Remark]) -> Remark:
+    """Make one remark of several below a key."""
+    found = ", ".join(f"{remark.where.removeprefix(f'{stem}.')} {remark.found}" for remark in group)
+    return Remark(stem, group[0].message, found, "; ".join(dict.fromkeys(remark.usual for remark in group)))
+
+
 def tell(remarks: tuple[Remark, ...], *, strict: bool, stacklevel: int = 2) -> tuple[Remark, ...]:
-    """Warn of every remark, or refuse them all; return them.
+    """Warn of every remark, or refuse them all; return them, those that say the same of several joints as one.
 
     Parameters
     ----------
@@ -69,6 +83,7 @@ def tell(remarks: tuple[Remark, ...], *, strict: bool, stacklevel: int = 2) -> t
     ------
     PlausibilityError
     """
+    remarks = _together(remarks)
     if strict and remarks:
         raise PlausibilityError([str(remark) for remark in remarks])
     for remark in remarks:

@@ -119,7 +119,7 @@ def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
     for key in ("start_speed", "end_speed"):
         speed = getattr(task.boundary, key)
         if speed:
-            tried.append(f"lower boundary.{key}, which is {speed:g} m/s")
+            tried.append(f"lower boundary.{key}, which is {speed:g} {task.speed_unit}")
     if not tried and task.search.effort != _MOST_EFFORT:
         tried.append(f"raise search.effort, which is {task.search.effort}")
     if not tried:

@@ -39,7 +39,7 @@ def joint_space_start(problem: Problem) -> Start:
     for limit in problem.limits:
         # In motion an arm may pass postures that it cannot hold.
         if limit.static and (times is None or not limit.time_scaling):
-            _refuse_beyond(limit, s, q)
+            _refuse_beyond(limit, s, q, problem.task.refinement.tolerance)
     joint_map = JointSpaceMap(problem.robot, problem.path)
     if times is None:
         return Start(problem, joint_map, s[:, None], np.inf, FAMILY, FAMILY)
@@ -48,9 +48,9 @@ def joint_space_start(problem: Problem) -> Start:
     return Start(problem, joint_map, timed, estimate, FAMILY, FAMILY, timed=True)
 
 
-def _refuse_beyond(limit: Limit, s: np.ndarray, q: np.ndarray) -> None:
+def _refuse_beyond(limit: Limit, s: np.ndarray, q: np.ndarray, tolerance: float) -> None:
     """Refuse a path along which the arm at rest is beyond a limit."""
-    values, beyond = beyond_at_rest(limit, q)
+    values, beyond = beyond_at_rest(limit, q, tolerance)
     station, column = (int(place) for place in np.unravel_index(np.argmax(beyond), beyond.shape))
     if beyond[station, column] <= 0.0:
         return

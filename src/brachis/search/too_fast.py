@@ -167,16 +167,17 @@ def _ends_too_fast(problem: Problem, s: np.ndarray, q: np.ndarray, stations: np.
     if share >= _EXACT:
         return None
     asked = getattr(problem.task.boundary, key)
+    unit = problem.task.speed_unit
     error = PlanningError(
         f"the limits do not allow so high a speed at the path's {key.removesuffix('_speed')}",
         where=f"boundary.{key}",
-        found=f"{asked:g} m/s",
-        allowed=f"about {share * asked:.3g} m/s along the best joint path that was found (an estimate)",
+        found=f"{asked:g} {unit}",
+        allowed=f"about {share * asked:.3g} {unit} along the best joint path that was found (an estimate)",
         hint="Raise the limits that hold the motion back",
     )
     given = problem.task.boundary
     remedies = [
-        Remedy(f"boundary.{name}", getattr(given, name), part * getattr(given, name), "m/s")
+        Remedy(f"boundary.{name}", getattr(given, name), part * getattr(given, name), unit)
         for part, name in found
         if part < _EXACT
     ]

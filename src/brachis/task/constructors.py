@@ -218,7 +218,7 @@ def Spline(  # noqa: N802
     Parameters
     ----------
     through : (n, m) or (n, 4, 4) array_like, or sequence of SE3
-        All rows of the task space each, m, yaw in rad; or poses. The segment's start is not among them.
+        All rows of the task space each, m, yaw in rad; or poses. The segment's start may be the first of them.
     orientations : (n, 4) or (n, 3, 3) array_like, or SciPy's Rotation, optional
         Of the tool in the world frame, beside positions: quaternions w, x, y, z, or matrices.
     relative : bool, optional

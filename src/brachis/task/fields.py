@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Strict, WithJsonSchema
@@ -127,6 +127,16 @@ def refuse(
     return PydanticCustomError(
         REFUSED, "{problem}", {"problem": problem, "key": key, "found": found, "allowed": allowed, "absent": absent}
     )
+
+
+def or_form(form: dict[str, Any]) -> Callable[[dict[str, Any]], None]:
+    """Return what adds a form of a field's value to its JSON schema, and of a list one item; for json_schema_extra."""
+
+    def add(schema: dict[str, Any]) -> None:
+        kept = {key: schema.pop(key) for key in ("$ref", "type", "items", "minItems") if key in schema}
+        schema["anyOf"] = [kept, *([kept["items"]] if "items" in kept else []), form]
+
+    return add
 
 
 class _Chooser(Discriminator):

@@ -25,10 +25,11 @@ Settings = Mapping[str, Any]
 class TaskKeywords(TypedDict, total=False):
     """Keys of a task; those of its sections ``robot``, ``boundary``, ``spline`` and ``search`` stand for themselves.
 
-    A posture may be an array, a list or a mapping by joint name; a path one segment.
+    A posture may be an array, a list or a mapping by joint name; a path one segment, or an array of points (n, m), of
+    which the first one is where the path begins.
     """
 
-    path: SegmentModel | Sequence[SegmentModel | Mapping[str, Any]]
+    path: SegmentModel | Mapping[str, Any] | Sequence[SegmentModel | Mapping[str, Any] | Sequence[float]] | Array
     start: Posture
     end: Posture
     path_start: Array | Sequence[float] | None
@@ -69,7 +70,7 @@ class TaskKeywords(TypedDict, total=False):
     boundary: BoundarySettings | Settings
     spline: SplineSettings | Settings
     search: SearchSettings | Settings
-    solver: SolverSettings | Settings
+    solver: str | SolverSettings | Settings
     refinement: RefinementSettings | Settings
 
 
@@ -150,7 +151,9 @@ def _as_keyword(parts: Sequence[str]) -> str:
 
 
 def _in_full(key: str, value: object) -> object:
-    """Write a posture as a task file does."""
+    """Write a posture, and a solver's name, as mappings, which are merged key by key."""
+    if key == "solver" and isinstance(value, str):
+        return {"name": value}
     if key not in {"start", "end"} or isinstance(value, str | Model):
         return value
     return value if isinstance(value, Mapping) and set(value) == {"joints"} else {"joints": plain(value)}

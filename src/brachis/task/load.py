@@ -138,7 +138,7 @@ def task_from(content: object, source: str, folder: Path, changes: Mapping[str, 
 
 
 def _with_start(task: Task, source: str) -> Task:
-    """Fill in where the path begins, if its first segment says so and the task does not.
+    """Fill in where the path begins, if its first segment says so and the task does not: of joints the start posture.
 
     Raises
     ------
@@ -147,7 +147,11 @@ def _with_start(task: Task, source: str) -> Task:
     """
     if task.start != "free" or task.path_start is not None:
         return task
+    begins, changes = task.begins, {"path_start": task.begins}
+    if task.task_space == "joints" and begins is not None:
+        names = getattr(task.path[0].shape, "joints", None)
+        changes = {"start": {"joints": dict(zip(names, begins, strict=True)) if names else begins}}
     try:
-        return Task.model_validate(task.model_copy(update={"path_start": task.begins}))
+        return Task.model_validate(task.model_copy(update=changes))
     except ValidationError as error:
         raise task_error(error, source, Task) from None

@@ -6,13 +6,14 @@ and answers mistakes with a `brachis.errors.TaskError` that names the key.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, Field, JsonValue, Tag, field_validator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, JsonValue, Tag, field_validator, model_validator
 
 from brachis.task.boundary import BoundarySettings
 from brachis.task.bspline_curve import BSplineCurve
-from brachis.task.fields import Model, Name, Number, by_form, plain, refuse
+from brachis.task.fields import Model, Name, Number, by_form, or_form, plain, refuse
 from brachis.task.planning_models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings
 from brachis.task.point_data import FitReport
 from brachis.task.robot_models import RobotSettings
@@ -82,6 +83,15 @@ RedundantJoints = Annotated[
 ]
 
 
+def _with_name(solver: object) -> object:
+    """Read ``solver: ipopt`` as the solver's name."""
+    return {"name": solver} if isinstance(solver, str) else solver
+
+
+def _is_matrix(row: object) -> bool:
+    return isinstance(row, list) and any(isinstance(each, list) for each in row)
+
+
 class Task(Model):
     """A task: a robot, a path for its tool, and how to plan.
 
@@ -98,13 +108,14 @@ class Task(Model):
     brachis: Literal[1] = Field(description="Version of the task format.")
     robot: RobotSettings = Field(default_factory=RobotSettings, description="The robot.")
     start: FreePosture = Field(
-        description="Configuration at the start of the path: {joints: ...}, or free, which needs path_start."
+        description="Configuration at the start of the path: {joints: ...}, or free, which needs path_start. A path of "
+        "joints that begins with a waypoint needs none."
     )
     path_start: tuple[Number, ...] | None = Field(
         default=None,
         description="Where the path begins: all rows of the task space (m, yaw in rad); of a pose the position and a "
         "quaternion w, x, y, z. Null: where the start posture's tool is; otherwise a start posture whose tool is "
-        "elsewhere is refused. With start: free it must be given, unless a file's first row says it.",
+        "elsewhere is refused. With start: free it must be given, unless the path begins with a waypoint.",
     )
     end: FreePosture = Field(
         default="free",
@@ -116,7 +127,13 @@ class Task(Model):
         "of x, y, z); pose; pose_free_roll, a pose that may roll about the tool frame's z axis; or joints: the path is "
         "one of all joints, in the order of the chain (rad, m), and only its timing is planned."
     )
-    path: Annotated[tuple[Segment, ...], Field(min_length=1)] = Field(description="Segments of the path, in order.")
+    path: Annotated[tuple[Segment, ...], Field(min_length=1)] = Field(
+        description="Segments of the path, in order; a list of points, all rows of the task space each, is the spline "
+        "through them that begins at the first one. For a file of points: [{csv: {file: ...}}].",
+        json_schema_extra=or_form(
+            {"type": "array", "minItems": 2, "items": {"type": "array", "items": {"type": "number"}}}
+        ),
+    )
     boundary: BoundarySettings = Field(
         default_factory=BoundarySettings, description="Speeds at both ends, or a motion that goes round for ever."
     )
@@ -136,7 +153,11 @@ class Task(Model):
     )
     search: SearchSettings = Field(default_factory=SearchSettings, description="Search.")
     spline: SplineSettings = Field(default_factory=SplineSettings, description="B-splines.")
-    solver: SolverSettings = Field(default_factory=SolverSettings, description="Solver.")
+    solver: Annotated[SolverSettings, BeforeValidator(_with_name)] = Field(
+        default_factory=SolverSettings,
+        description="Solver: its name, or a mapping.",
+        json_schema_extra=or_form({"type": "string"}),
+    )
     refinement: RefinementSettings = Field(default_factory=RefinementSettings, description="Refinement.")
 
     @field_validator("brachis", mode="before")
@@ -148,17 +169,31 @@ class Task(Model):
             raise refuse(problem, found=version, allowed="1")
         return version
 
+    @model_validator(mode="before")
+    @classmethod
+    def _a_path_of_joints_has_its_start(cls, content: object) -> object:
+        if isinstance(content, Mapping) and content.get("task_space") == "joints":
+            return {"start": "free", **content}
+        return content
+
     @field_validator("path", mode="before")
     @classmethod
-    def _one_segment_is_a_path(cls, path: object) -> object:
+    def _points_and_one_segment_are_paths(cls, path: object) -> object:
+        if isinstance(path, SegmentModel | Mapping):
+            return (path,)
+        if callable(path):
+            problem = "a curve is not a segment"
+            allowed = "brachis.bspline_segment(curve, (first, last)), or the curve's points as an array"
+            raise refuse(problem, found=path, allowed=allowed)
         rows = plain(path)
-        if isinstance(rows, list) and rows and all(isinstance(row, list) for row in rows):
-            found, allowed = (
-                f"{len(rows)} lists",
-                "segments; points go through csv, spline, or brachis.fit_path(points)",
-            )
-            raise refuse("points are no segments", found=found, allowed=allowed)
-        return (path,) if isinstance(path, SegmentModel) else path
+        if not isinstance(rows, list) or any(isinstance(row, SegmentModel | Mapping) for row in rows):
+            return path
+        if any(hasattr(row, "homogeneous") or _is_matrix(row) for row in rows):
+            allowed = "brachis.Spline(through=poses), or brachis.fit_path(poses)"
+            raise refuse("poses are not segments", found=rows, allowed=allowed)
+        if len(rows) > 1 and all(isinstance(row, list) for row in rows):
+            return ({"spline": {"starts_at": rows[0], "through": rows[1:]}},)
+        return path
 
     @field_validator("path")
     @classmethod
@@ -222,6 +257,11 @@ class Task(Model):
         """Where the first segment says that the path begins, as `path_start`; None where it leaves that open."""
         place, poses = self.path[0].begins, isinstance(self.task_space, str) and self.task_space != "joints"
         return None if place is None or (poses and len(place) != _POSE_NUMBERS) else place
+
+    @property
+    def speed_unit(self) -> str:
+        """Unit of a speed along the path; of joints it is the norm of their velocities."""
+        return "rad/s (m/s)" if self.task_space == "joints" else "m/s"
 
     @property
     def fits(self) -> tuple[FitReport, ...]:

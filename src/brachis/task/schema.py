@@ -19,5 +19,6 @@ def json_schema() -> dict[str, Any]:
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "urn:brachis:task:1",
         **schema,
+        "required": [key for key in schema["required"] if key != "start"],  # a path of joints may begin without it
         "title": "brachis task",
     }

@@ -49,7 +49,10 @@ class SegmentModel(Model):
 
     @property
     def begins(self) -> tuple[float, ...] | None:
-        """Where the segment says that it begins: the rows of the task space; of poses position and quaternion."""
+        """Where the segment says that it begins: the rows of the task space; of poses position and quaternion.
+
+        Without relative waypoints and another word on it, that is the first waypoint.
+        """
         return None
 
     @property
@@ -106,9 +109,12 @@ class SplineSegment(MovingSegment):
     @property
     def begins(self) -> tuple[float, ...] | None:
         """See `SegmentModel.begins`."""
-        place, oriented = self.spline.starts_at, self.spline.starts_oriented
-        if self.spline.relative or place is None:
+        spline = self.spline
+        if spline.relative:
             return None
+        place, oriented = spline.starts_at, spline.starts_oriented
+        if place is None:
+            place, oriented = spline.through[0], spline.orientations[0] if spline.orientations else None
         return (*place, *oriented.quaternion) if isinstance(oriented, Quaternion) else place
 
     @model_validator(mode="after")

@@ -91,7 +91,7 @@ class Helix(Model):
 
 
 class SplineThrough(Model):
-    """A smooth curve through waypoints; the segment's start is the first one, and not repeated here."""
+    """A smooth curve from the segment's start through waypoints; a first one that equals the start is the start."""
 
     through: Annotated[tuple[Vector, ...], Field(min_length=1)] = Field(
         description="Waypoints: all rows of the task space each (m, yaw in rad)."

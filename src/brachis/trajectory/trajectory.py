@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from brachis.arguments import file_name, number, numbers
 from brachis.arrays import freeze
-from brachis.errors import InputError, UnknownNameError
+from brachis.errors import InputError, UnknownNameError, write_apart
 from brachis.robot import Robot, dynamics
 from brachis.summary import Summary
 from brachis.task import Task
@@ -354,9 +354,7 @@ class Trajectory(Summary):
         times = numbers(t, "t", "s")
         slack = 1e-9 * self.t_end
         if times.size and not (times.min() >= -slack and times.max() <= self.t_end + slack):
-            raise InputError(
-                "time outside the trajectory",
-                found=f"{times.min():g} s to {times.max():g} s",
-                allowed=f"0 s to {self.t_end:.6g} s",
-            )
+            last, t_end = write_apart(times.max(), self.t_end, digits=6)
+            found, allowed = f"{times.min():g} s to {last} s", f"0 s to {t_end} s"
+            raise InputError("time outside the trajectory", found=found, allowed=allowed)
         return np.clip(times, 0.0, self.t_end)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from brachis.errors import write_apart
 from brachis.summary import Summary
 
 
@@ -54,8 +55,9 @@ class Check:
         """Say what was found, and what is allowed."""
         unit = "" if self.unit == "-" else f" {self.unit}"
         blame = f", {self.subject}" if self.subject else ""
-        allowed = f"{'<=' if self.passed else 'FAILED, allowed'} {self.allowed:.4g}{unit}"
-        return f"{self.value:.4g}{unit} {allowed}{blame}" + (f" at {self.time:.4g} s" if self.time is not None else "")
+        found, most = write_apart(self.value, self.allowed)
+        allowed = f"{'<=' if self.passed else 'FAILED, allowed'} {most}{unit}"
+        return f"{found}{unit} {allowed}{blame}" + (f" at {self.time:.4g} s" if self.time is not None else "")
 
 
 @dataclass(frozen=True, repr=False)
