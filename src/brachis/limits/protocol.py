@@ -112,6 +112,8 @@ class Label:
     reached, room : str
         A clause that says that it is at its bound, and what there is more of where the bound gives way; both are made
         of subject and kind where they are empty.
+    share : str
+        What the ratio to the bound is, as the title of an axis; ``torque / limit`` for example where it is empty.
     """
 
     subject: str
@@ -120,6 +122,12 @@ class Label:
     key: str = ""
     reached: str = ""
     room: str = ""
+    share: str = ""
+
+    @property
+    def axis(self) -> str:
+        """Title of an axis over which ratios are drawn."""
+        return self.share or f"{self.kind} / limit"
 
     def __str__(self) -> str:
         """Return subject and kind."""

@@ -10,6 +10,8 @@ from brachis.verify.limits.protocol import Given, Worst
 _LEAST_HALF, _LARGEST_HALF = 1e-5, 1.0
 """A position ratio of 2 is beyond the end by half the range, but by no less and no more than this, rad or m."""
 
+_REMARK = "0: the middle of the range, 1: an end"
+
 
 def worst(given: Given) -> Worst | None:
     """Find the position that is nearest to an end of its range, or furthest beyond, anywhere.
@@ -25,7 +27,7 @@ def worst(given: Given) -> Worst | None:
     if beyond.ratio > 1.0:
         return beyond
     inside = _worst(given, np.where(np.isfinite(half), np.maximum(half, _LEAST_HALF), 1.0))
-    return inside._replace(ratio=max(inside.ratio, 0.0))
+    return inside._replace(ratio=max(inside.ratio, 0.0), remark=_REMARK)
 
 
 def _worst(given: Given, scale: np.ndarray) -> Worst:
