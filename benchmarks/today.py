@@ -168,7 +168,7 @@ def main() -> None:
         return
     rows = []
     print("                                                                largest ratio of today's")
-    print("seed  robot      today    planned     saved   path off        itself   found   planned  compared in")
+    print("seed  robot      today    planned     saved   path off        itself    rows   planned  compared in")
     for seed in range(given.first, given.first + given.count):
         today = case(seed)
         with tempfile.TemporaryDirectory() as folder:
@@ -180,7 +180,7 @@ def main() -> None:
         took = processor_time() - began
         miss = today.miss(found.today, given.dt)
         rows.append((found.saved, miss, found.result.verified))
-        ratios = found.verification.worst_ratio, found.result.verification.worst_ratio
+        ratios = max(use.today for use in found.uses), found.result.verification.worst_ratio
         name = "scara3" if seed % 2 == 0 else "iiwa14"
         print(
             f"{seed:4d}  {name} {found.today.t_end:8.4f} s {found.result.t_end:8.4f} s {100 * found.saved:7.2f} % "

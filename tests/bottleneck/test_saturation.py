@@ -97,17 +97,17 @@ def test_a_motion_near_its_limit_that_never_reaches_it_does_not_count(made):
     assert of(saturations(made(times, forces, forces)), "j1", "force").active == ()
 
 
-def test_positions_are_measured_by_their_distance_from_an_end(made):
+def test_positions_are_measured_by_their_place_in_the_range(made):
     trajectory = made([0.0, T], [1.0, 1.0], [1.0, 1.0])  # from 0 to 2 m
     limits = dataclasses.replace(
-        trajectory.robot.limits, position_lower=np.array([-2.0, -np.inf]), position_upper=np.array([2.0, 0.25])
+        trajectory.robot.limits, position_lower=np.array([-4.0, -np.inf]), position_upper=np.array([2.0, 0.25])
     )
     trajectory = dataclasses.replace(trajectory, robot=dataclasses.replace(trajectory.robot, limits=limits))
     ratios = limit_ratios(trajectory)
     column = dict(zip(map(str, ratios.labels), ratios.values.T, strict=True))
     q = 0.5 * ratios.t**2
-    np.testing.assert_allclose(column["j1 position"], np.maximum(q - 1.0, 0.0), atol=1e-12)  # 1 m from the end: 0
-    np.testing.assert_allclose(column["j2 position"], 0.75)
+    np.testing.assert_allclose(column["j1 position"], (q + 1.0) / 3.0, atol=1e-12)  # 0 in the middle, at -1 m
+    np.testing.assert_allclose(column["j2 position"], 0.75)  # one end: 0.25 m away
 
 
 def test_unlimited_joints_are_left_out(made):

@@ -182,6 +182,10 @@ def test_pairs_of_limits_are_the_bounds_of_what_is_limited(kind):
     np.testing.assert_allclose(limit.values(STATES)[:, column], (quantity - middle) / half)
     beyond = np.maximum(quantity - first[2], first[1] - quantity) / min(first[2], -first[1])
     np.testing.assert_allclose(limit.violation(limit.values(STATES))[:, column], beyond)
+    share = quantity / np.where(quantity > 0.0, first[2], -first[1])
+    inside = beyond <= 0.0
+    assert inside.sum() > 0
+    np.testing.assert_allclose(limit.ratio(limit.values(STATES))[inside, column], share[inside], atol=1e-12)
 
 
 def test_pairs_of_limits_bound_the_phase_plane_by_the_direction_of_motion():

@@ -1,8 +1,11 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
 from brachis.plots import plot_motion, plot_overview
 from brachis.plots.style import limit_dashes
+from brachis.task import SpeedTable, ToolLimits
 
 INF = float("inf")
 
@@ -28,14 +31,23 @@ def test_panels_show_the_trajectory(line_trajectory):
         assert np.array_equal(qdot, line_trajectory.velocity(t)[:, joint])
     t, s = progress.get_lines()[0].get_data()
     assert np.array_equal(s, line_trajectory.path_coordinate(t))
-    t, s_dt = speed.get_lines()[0].get_data()
-    middle = (t > 1e-3) & (t < line_trajectory.t_end - 1e-3)
-    h = 1e-6
-    slope = (line_trajectory.path_coordinate(t[middle] + h) - line_trajectory.path_coordinate(t[middle] - h)) / (
-        2.0 * h
-    )
-    np.testing.assert_allclose(s_dt[middle], slope, atol=1e-7)
-    assert s_dt.max() > 0.5
+    t, tool = speed.get_lines()[0].get_data()
+    places = np.array([line_trajectory.robot.tool_placement(q).translation for q in line_trajectory.position(t)])
+    way = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    assert np.trapezoid(tool, t) == pytest.approx(way, rel=1e-3)
+
+
+def test_what_the_task_allows_the_tool_is_drawn_where_it_comes_near(line_trajectory):
+    fastest = line_trajectory.sample(0.001).tool_speed.max()
+    for allowed, drawn in ((1.1 * fastest, 1), (2.0 * fastest, 0)):
+        task = line_trajectory.task.model_copy(update={"tool_limits": ToolLimits(speed=allowed)})
+        *_, speed = plot_motion(dataclasses.replace(line_trajectory, task=task)).axes
+        assert levels(speed) == [allowed] * drawn
+    table = SpeedTable(s=[0.0, 0.5, 0.5, 1.0], speed=[fastest, fastest, 0.5 * fastest, 0.5 * fastest])
+    task = line_trajectory.task.model_copy(update={"tool_limits": ToolLimits(speed=table)})
+    *_, speed = plot_motion(dataclasses.replace(line_trajectory, task=task)).axes
+    (limit,) = drawn_limits(speed)
+    assert (limit.get_ydata()[0], limit.get_ydata()[-1]) == pytest.approx((fastest, 0.5 * fastest))
 
 
 def test_panels_share_the_time_axis(line_trajectory):
@@ -47,7 +59,7 @@ def test_panels_share_the_time_axis(line_trajectory):
 
 def test_units_of_revolute_and_of_mixed_chains(line_trajectory, spatial_trajectory):
     labels = [ax.get_ylabel() for ax in plot_motion(line_trajectory).axes]
-    assert labels == ["$q$ (rad)", r"$\dot{q}$ (rad/s)", "$s$", r"$\dot{s}$ (1/s)"]
+    assert labels == ["$q$ (rad)", r"$\dot{q}$ (rad/s)", "$s$", "tool speed (m/s)"]
     labels = [ax.get_ylabel() for ax in plot_motion(spatial_trajectory).axes]
     assert labels[:4] == ["$q$ (rad)", "$q$ (m)", r"$\dot{q}$ (rad/s)", r"$\dot{q}$ (m/s)"]
 
@@ -133,8 +145,20 @@ def test_the_overview_has_every_curve(line_trajectory):
         t = curves["j1"].get_xdata()
         drawn = np.column_stack([line.get_ydata() for line in curves.values()])
         np.testing.assert_allclose(drawn, function(t), atol=1e-9)
-    assert {"$s$", r"$\dot{s}$ (1/s)"} < set(found)
+    assert {"$s$", "tool speed (m/s)"} < set(found)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == list(line_trajectory.joint_names)
+
+
+def test_the_overview_shows_what_holds_the_motion(line_trajectory, with_limits):
+    """Not the torques, where these are far from their limits."""
+    held = with_limits(line_trajectory, torque=np.full(3, 1e3), acceleration=np.abs(line_trajectory.qddot).max(axis=0))
+    task = held.task.model_copy(update={"tool_limits": ToolLimits(speed=held.sample(0.001).tool_speed.max())})
+    figure = plot_overview(dataclasses.replace(held, task=task))
+    titles = [ax.get_ylabel() for ax in figure.axes]
+    assert {"acceleration / limit", "tool speed / limit"} < set(titles)
+    assert not [title for title in titles if "tau" in title]
+    (ax,) = (ax for ax in figure.axes if ax.get_ylabel() == "acceleration / limit")
+    assert max(np.abs(line.get_ydata()).max() for line in labelled(ax).values()) == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize("name", ["line_trajectory", "spatial_trajectory"])

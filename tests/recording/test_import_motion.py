@@ -43,7 +43,7 @@ def test_what_is_known_of_it_is_saved(imported, tmp_path):
     assert any(line.startswith("not known: ") for line in imported.recovered.told)
     imported.save(tmp_path / "today.npz")
     again = Trajectory.load(tmp_path / "today.npz")
-    assert again.recovered == imported.recovered
+    assert again.recovered.to_file() == imported.recovered.to_file()
     assert verify_trajectory(again).worst_ratio == pytest.approx(verify_trajectory(imported).worst_ratio, rel=1e-9)
     export.write(again, tmp_path / "again.csv", dt=0.01)
     (ax, *_) = plots.plot_motion(again).axes
@@ -53,10 +53,19 @@ def test_what_is_known_of_it_is_saved(imported, tmp_path):
 def test_a_file_may_not_allow_itself_any_path(imported, tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"no tolerance of a path; found 0.1; allowed: 2e-07 to 0.001"):
         replace(imported.recovered, tolerance=0.1)
-    monkeypatch.setattr(Recovered, "to_dict", lambda self: {"source": self.source, "tolerance": 0.1, "told": []})
-    imported.save(tmp_path / "today.npz")
-    with pytest.raises(ResultFileError, match="no tolerance of a path"):
-        Trajectory.load(tmp_path / "today.npz")
+    own = imported.recovered.to_file()
+    wrong = {
+        "no tolerance of a path": {"tolerance": 0.1},
+        "not the rows of a file; found rows ": {"rows": [[0.0, 1.0, 2.0, 3.0]]},
+        "error .4,.; allowed: rows .K, 4. with ascending times": {"error": [0.0] * 4},
+        "rows: wrong type": {"rows": "none"},
+        "not the rows": {"rows": [[0.0, 1.0, 2.0, 3.0], [1.0, 1.0, 2.0, float("nan")]]},
+    }
+    for message, change in wrong.items():
+        monkeypatch.setattr(Recovered, "to_file", lambda _, change=change: {**own, **change})
+        imported.save(tmp_path / "today.npz")
+        with pytest.raises(ResultFileError, match=message):
+            Trajectory.load(tmp_path / "today.npz")
 
 
 def test_a_motion_that_leaves_its_recovered_path_fails(imported):

@@ -162,6 +162,17 @@ def test_position_limit(side, one_sided, planned):
     assert check.value == pytest.approx(1.0 + beyond, abs=1e-6)  # in rad, though the range is several rad wide
 
 
+def test_positions_are_told_by_their_place_in_the_range(planned):
+    q = planned.sample(planned.t_end / 5000).q
+    middle, half = q[0], 1.25 * np.abs(q - q[0]).max(axis=0)
+    verification = verify_trajectory(with_limits(planned, position_lower=middle - half, position_upper=middle + half))
+    check = next(check for check in verification.checks if check.name == "position ratio")
+    assert check.passed
+    assert check.value == pytest.approx(0.8, abs=1e-4)
+    far = verify_trajectory(with_limits(planned, position_lower=np.full(3, -np.inf), position_upper=np.full(3, 50.0)))
+    assert next(check.value for check in far.checks if check.name == "position ratio") == 0.0
+
+
 def test_nothing_passes_that_is_no_number(planned):
     verification = verify_trajectory(shifted(planned, "control_points", (0, 8), np.nan))
     assert "ds/dt below zero" in failed(verification)

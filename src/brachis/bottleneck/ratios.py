@@ -27,8 +27,8 @@ class LimitRatios(Summary):
     labels : tuple of Label
         What every column is.
     values : (K, c) ndarray
-        1 at the upper limit, -1 at the lower one. Positions count by their distance from an end, so that 0.9 is
-        0.1 rad or m away; in half ranges where these are shorter than that, and 0 where both ends are further away.
+        1 at the upper limit, -1 at the lower one. Of a position it is the place in its range: 0 in the middle. Of
+        a range with one end it is 1 minus the distance from it, rad or m, and 0 farther away.
     """
 
     t: np.ndarray

@@ -86,6 +86,10 @@ def import_command(recorded: Recorded, *, out: Path, as_json: bool) -> None:
     for line in trajectory.recovered.told:
         console.print(line)
     print_verification(console, verification)
+    console.print("these ratios are of the motion that was made of the rows; the rows alone prove:")
+    for proven in comparison.proven_ratios(trajectory):
+        ratio, subject, time = proven.worst
+        console.print(f"{proven.limit} ratio {ratio:.4f}, {subject} at {time:.4f} s")
     console.print(f"wrote {out}")
 
 
@@ -128,20 +132,22 @@ def _show(found: comparison.Comparison, files: tuple[str, ...]) -> None:
     console = result_console()
     assert found.today.recovered is not None  # noqa: S101
     console.print(found.verdict)
-    exceeded = f"{len(found.exceeded)} exceeded" if found.exceeded else "kept"
+    exceeded = f"{len(found.exceeded)} exceeded" if found.exceeded else "kept, as far as rows tell"
     rows = [
-        ("end time t_E", f"{found.today.t_end:.4f} s", f"{found.result.t_end:.4f} s"),
+        ("end time t_E", f"{found.today.t_end:.4f} s", "", f"{found.result.t_end:.4f} s"),
         *(
             (
                 f"{use.limit}, used",
                 f"{100 * use.today:.2f} % {use.today_at}",
+                f"{100 * use.today_up_to:.2f} %",
                 f"{100 * use.planned:.2f} % {use.planned_at}",
             )
             for use in found.uses
         ),
-        ("limits", exceeded, "kept and verified" if found.result.verified else "NOT verified"),
+        ("limits", exceeded, "", "kept and verified" if found.result.verified else "NOT verified"),
     ]
-    print_table(console, "", ("", Column("today", number=True), Column("planned", number=True)), rows)
+    columns = ("today", "between its rows up to", "planned")
+    print_table(console, "", ("", *(Column(name, number=True) for name in columns)), rows)
     for line in (*found.remarks, *found.today.recovered.told):
         console.print(line)
     for name in files:

@@ -3,5 +3,6 @@
 from brachis.comparison.comparison import Comparison, Use
 from brachis.comparison.figure import plot_today
 from brachis.comparison.planned import compare
+from brachis.comparison.rows import Proven, proven_ratios
 
-__all__ = ["Comparison", "Use", "compare", "plot_today"]
+__all__ = ["Comparison", "Proven", "Use", "compare", "plot_today", "proven_ratios"]

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from brachis.comparison.rows import Proven
 from brachis.result import Result
 from brachis.summary import Summary
 from brachis.trajectory import Trajectory
-from brachis.verify import Check, Verification
+from brachis.verify import Verification
 
 
 @dataclass(frozen=True)
@@ -19,17 +20,33 @@ class Use:
     ----------
     limit : str
         Its kind.
-    today, planned : float
-        Largest ratio to it; 1 is all of it.
-    today_at, planned_at : str
+    today : float
+        Largest ratio that the rows of today's motion prove; 1 is all of it. See `brachis.comparison.Proven`.
+    today_at : str
         What comes nearest to it: a joint, or the tool.
+    today_time : float
+        When, s.
+    today_up_to : float
+        Largest ratio of the motion that was made of the rows. What lies between the rows is not known.
+    planned : float
+        Largest ratio of the plan.
+    planned_at : str
     """
 
     limit: str
     today: float
     today_at: str
+    today_time: float
+    today_up_to: float
     planned: float
     planned_at: str
+
+    @property
+    def today_in_words(self) -> str:
+        """Say how much today's motion uses for certain, and how much it may."""
+        proven = f"{100.0 * self.today:.1f} %"
+        possible = f"{100.0 * self.today_up_to:.1f} %"
+        return proven if proven == possible else f"{proven}, between the rows up to {possible}"
 
 
 @dataclass(frozen=True, repr=False)
@@ -41,7 +58,9 @@ class Comparison(Summary):
     today : Trajectory
         With the path recovered from it.
     verification : Verification
-        Of today's motion.
+        Of today's motion, as it was made of its rows.
+    proven : tuple of Proven
+        What its rows alone prove, limit by limit.
     result : Result
         Of the plan along the same path, within the same limits.
 
@@ -59,6 +78,7 @@ class Comparison(Summary):
 
     today: Trajectory
     verification: Verification
+    proven: tuple[Proven, ...]
     result: Result
 
     @property
@@ -69,23 +89,21 @@ class Comparison(Summary):
     @property
     def uses(self) -> tuple[Use, ...]:
         """How much of every limit both motions use."""
-        planned = {check.name: check for check in self.result.verification.checks}
-        return tuple(
-            Use(
-                check.name.removesuffix(" ratio"),
-                check.value,
-                check.subject or "",
-                planned[check.name].value,
-                planned[check.name].subject or "",
-            )
-            for check in self.verification.checks
-            if check.of_limit and check.name in planned
-        )
+        today = {proven.limit: proven.worst for proven in self.proven}
+        found = {check.name: check for check in self.verification.checks}
+        uses = []
+        for check in self.result.verification.checks:
+            limit = check.name.removesuffix(" ratio")
+            if check.of_limit and limit in today and check.name in found:
+                up_to = max(today[limit][0], found[check.name].value)
+                uses.append(Use(limit, *today[limit], up_to, check.value, check.subject or ""))
+        return tuple(uses)
 
     @property
-    def exceeded(self) -> tuple[Check, ...]:
-        """Limits that today's motion exceeds, beyond the task's tolerance."""
-        return tuple(check for check in self.verification.checks if check.of_limit and not check.passed)
+    def exceeded(self) -> tuple[Use, ...]:
+        """Limits that today's motion exceeds for certain, beyond the task's tolerance."""
+        tolerance = self.today.task.refinement.tolerance
+        return tuple(use for use in self.uses if use.today > 1.0 + tolerance)
 
     @property
     def verdict(self) -> str:
@@ -100,24 +118,23 @@ class Comparison(Summary):
         """Say what of today's motion has to be known beside the times."""
         jumps = "today's rows begin or end with an acceleration, so the plan may do so as well (rest: velocity)"
         exceeded = (
-            f"today's motion exceeds the {check.name.removesuffix(' ratio')} limit of {check.subject or 'the robot'} "
-            f"by {100.0 * (check.value - 1.0):.2g} % at {check.time or 0.0:.4f} s, as far as its rows tell"
-            for check in self.exceeded
+            f"today's motion exceeds the {use.limit} limit of {use.today_at} by {100.0 * (use.today - 1.0):.2g} % at "
+            f"{use.today_time:.4f} s, as its rows prove; between them it may be by up to "
+            f"{100.0 * (use.today_up_to - 1.0):.2g} %"
+            for use in self.exceeded
         )
         return (*exceeded, *([jumps] if self.today.task.spline.rest != "full" else []))
 
     def summary(self) -> dict[str, object]:
         """Return what is shown."""
-        uses = (
-            f"{use.limit} {100.0 * use.today:.1f} % today, {100.0 * use.planned:.1f} % planned" for use in self.uses
-        )
+        uses = (f"{use.limit} {use.today_in_words} today, {100.0 * use.planned:.1f} % planned" for use in self.uses)
         return {"verdict": self.verdict, "limits used": "; ".join(uses), "remarks": "; ".join(self.remarks) or "none"}
 
     def __str__(self) -> str:
         """Say all in plain words."""
         lines = [self.verdict, *self.remarks]
         lines += [
-            f"{use.limit}: {100.0 * use.today:.1f} % used today ({use.today_at}), "
+            f"{use.limit}: {use.today_in_words} used today ({use.today_at}), "
             f"{100.0 * use.planned:.1f} % in the plan ({use.planned_at})"
             for use in self.uses
         ]

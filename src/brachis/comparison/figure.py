@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 def plot_today(comparison: Comparison) -> Figure:
     """Plot path coordinate, tool speed, and the largest ratio to any limit over time, of both motions.
 
+    Of today's motion the line is what its rows prove; the band above it is what the motion that was made of them does
+    between the rows.
+
     Parameters
     ----------
     comparison : Comparison
@@ -36,12 +39,22 @@ def plot_today(comparison: Comparison) -> Figure:
         label = f"{name}: {motion.t_end:.4f} s"
         panels[0].plot(samples.t, samples.s, label=label, **look)
         panels[1].plot(samples.t, samples.tool_speed, **look)
-        panels[2].plot(ratios.t, np.abs(ratios.values).max(axis=1, initial=0.0), **look)
+        t, largest = ratios.t, np.abs(ratios.values).max(axis=1, initial=0.0)
+        if motion is comparison.today:
+            proven = np.max([each.ratios.max(axis=1) for each in comparison.proven], axis=0)
+            least = np.interp(t, comparison.proven[0].t, proven)
+            label = "today, between its rows: up to"
+            panels[2].fill_between(
+                t, least, np.maximum(least, largest), color=colour, alpha=0.25, linewidth=0.0, label=label
+            )
+            t, largest = comparison.proven[0].t, proven
+        panels[2].plot(t, largest, **look)
     panels[2].axhline(1.0, color=style.GREY, linewidth=0.8)
     for ax, ylabel in zip(panels, ("$s$", "tool speed (m/s)", "largest ratio to a limit"), strict=True):
         style.dress(ax, r"$t$ (s)" if ax is panels[-1] else "", ylabel)
         ax.set_ylim(bottom=0.0)
     panels[0].set_xlim(0.0, max(motion.t_end for motion in motions.values()))
+    style.legend_above(panels[2], style.COLUMN_WIDTH - 15.0)
     style.legend_above(panels[0], style.COLUMN_WIDTH - 15.0)
     panels[0].set_title(comparison.verdict, fontsize=style.LABEL_SIZE, pad=16.0)
     return figure

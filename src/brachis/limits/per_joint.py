@@ -59,6 +59,11 @@ class JointRatioLimit(Limit):
         return self._violation_scale
 
     @property
+    def centre(self) -> np.ndarray:
+        """See `Limit`: where the quantity is zero."""
+        return np.asarray(-self._middle * self._scale)
+
+    @property
     def bounds(self) -> tuple[Bound, ...]:
         """See `Limit`."""
         return self._bounds

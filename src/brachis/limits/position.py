@@ -44,7 +44,9 @@ class PositionLimit(Limit):
         self._scale = 1.0 / per_row
         self._selection = np.eye(robot.n)[joints] * self._scale[:, None]
         self.labels = tuple(
-            Label(name, "position", robot.position_units[i], f"robot.limits.position.{name}")
+            Label(
+                name, "position", robot.position_units[i], f"robot.limits.position.{name}", share="position in its range"
+            )
             for i, name in ((i, robot.joint_names[i]) for i in joints)
         )
         self.lower, self.upper = (low - self._middle) * self._scale, (high - self._middle) * self._scale

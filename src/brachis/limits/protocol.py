@@ -2,11 +2,12 @@
 
 A limit has c values at every moment of the motion, held between `lower` and `upper`. Most are ratios to a figure, so
 that their bounds are -1 and 1. How far a value v is beyond its bounds is its *violation*, and how near it is its
-*ratio*, 1 at the upper bound, -1 at the lower one, with the limit's own `violation_scale` k:
+*ratio*, 1 at the upper bound, -1 at the lower one, with the limit's own `violation_scale` k and `centre` c:
 
     violation = max(k (v - upper), k (lower - v))
-    ratio     = max(1 + k (v - upper), 0)     where the upper bound is the nearer one
-              = -max(1 + k (lower - v), 0)    where it is the lower one
+    ratio     = (v - c) / (upper - c)         between c and the upper bound; towards the lower one likewise, down to -1
+              = 1 + violation                 beyond the upper bound; beyond the lower one -(1 + violation)
+              = max(1 + violation, 0)         where the only bound is the upper one; negative for a lower one
 """
 
 from __future__ import annotations
@@ -111,6 +112,8 @@ class Label:
     reached, room : str
         A clause that says that it is at its bound, and what there is more of where the bound gives way; both are made
         of subject and kind where they are empty.
+    share : str
+        What the ratio to the bound is, as the title of an axis; ``torque / limit`` for example where it is empty.
     """
 
     subject: str
@@ -119,6 +122,12 @@ class Label:
     key: str = ""
     reached: str = ""
     room: str = ""
+    share: str = ""
+
+    @property
+    def axis(self) -> str:
+        """Title of an axis over which ratios are drawn."""
+        return self.share or f"{self.kind} / limit"
 
     def __str__(self) -> str:
         """Return subject and kind."""
@@ -211,6 +220,8 @@ class Limit(ABC):
         must be at least as high.
     violation_scale : (c,) ndarray
         Violation of a value that is beyond its bound by 1; 1 unless values are measured otherwise (see the module).
+    centre : (c,) ndarray
+        Value that uses nothing of the limit, where it has bounds on both sides; the ratio is 0 there.
     bounds : tuple of Bound
         The figures that the user could change.
     refusal : str
@@ -248,6 +259,12 @@ class Limit(ABC):
     def violation_scale(self) -> np.ndarray:
         """See the attributes."""
         return np.ones(len(self.lower))
+
+    @property
+    def centre(self) -> np.ndarray:
+        """See the attributes; by default the middle between two finite bounds."""
+        with np.errstate(invalid="ignore"):  # -inf + inf
+            return np.asarray(0.5 * self.lower + 0.5 * self.upper)
 
     @property
     def bounds(self) -> tuple[Bound, ...]:
@@ -302,8 +319,14 @@ class Limit(ABC):
 
     def ratio(self, values: np.ndarray) -> np.ndarray:
         """How near values, (K, c), are to their bounds; see the module."""
-        above, below = (values - self.upper) * self.violation_scale, (self.lower - values) * self.violation_scale
-        return np.where(above >= below, np.maximum(1.0 + above, 0.0), -np.maximum(1.0 + below, 0.0))
+        above = (values - self.upper) * self.violation_scale
+        below = (self.lower - values) * self.violation_scale
+        near = np.where(above >= below, np.maximum(1.0 + above, 0.0), -np.maximum(1.0 + below, 0.0))
+        with np.errstate(invalid="ignore"):  # inf - inf
+            away = values - self.centre
+            room = np.where(away > 0.0, self.upper - self.centre, self.centre - self.lower)
+        inside = np.isfinite(room) & (above <= 0.0) & (below <= 0.0)
+        return np.where(inside, np.divide(away, room, out=np.zeros_like(away), where=inside), near)
 
     def ratios(self, motion: JointMotion, t: np.ndarray) -> np.ndarray:
         """How near a whole motion is to the bounds at times t, (K,), dense and ascending, s: (K, c).

@@ -40,25 +40,25 @@ class ToolSpeedLimit(Limit):
         figures = [table.largest for table in self._tables]
         return tuple(Bound(column, figure, figure, 1.0 / figure) for column, figure in enumerate(figures))
 
-    def _at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def largest_at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Largest speeds, (K, c), m/s, at path coordinates s, (K,), and their derivatives by s."""
         largest, slopes = zip(*(table.at(s) for table in self._tables), strict=True)
         return np.column_stack(largest), np.column_stack(slopes)
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        return np.asarray(self._tool.speed(motion)[:, None] / self._at(motion.s)[0])
+        return np.asarray(self._tool.speed(motion)[:, None] / self.largest_at(motion.s)[0])
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
-        largest, slope = self._at(motion.s)
+        largest, slope = self.largest_at(motion.s)
         speed, by_q, by_qdot = self._tool.derivatives(motion)
         q, qdot = (part[:, None] / largest[:, :, None] for part in (by_q, by_qdot))
         return Partials(q=q, qdot=qdot, s=-speed[:, None] * slope / largest**2)
 
     def lines(self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
         """See `Limit.lines`: the square of the ratio."""
-        squares = (self._tool.slope(q, q_ds)[:, None] / self._at(s)[0]) ** 2
+        squares = (self._tool.slope(q, q_ds)[:, None] / self.largest_at(s)[0]) ** 2
         return PhaseLines(None, squares, np.zeros_like(squares))
 
 
@@ -69,7 +69,7 @@ def build(robot: Robot, task: Task) -> ToolSpeedLimit | None:
     if speed is not None:
         given = (speed.s, speed.speed) if isinstance(speed, SpeedTableModel) else ((0.0,), (speed,))
         tables.append(SpeedTable(*given))
-        labels.append(Label("tool", "speed", "m/s", "tool_limits.speed"))
+        labels.append(Label("tool", "speed", "m/s", "tool_limits.speed", share="tool speed / limit"))
     for part in feed:
         tables.append(SpeedTable(part.s, part.speed, whole=False))
         labels.append(Label(f"tool, s = {part.s[0]:g} to {part.s[-1]:g},", "feed rate", "m/s", "tool_limits.feed"))

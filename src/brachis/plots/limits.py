@@ -24,7 +24,7 @@ _RANGE = 1.15
 
 @of_motion
 def plot_limits(trajectory: Trajectory, limits: Sequence[Limit] | None = None) -> Figure:
-    """Plot the ratios to all limits, whatever kinds there are.
+    """Plot the ratios to all limits, whatever kinds there are; of positions the places in their ranges.
 
     Parameters
     ----------
@@ -46,15 +46,10 @@ def plot_limits(trajectory: Trajectory, limits: Sequence[Limit] | None = None) -
     >>> save_figure(plot_limits(Trajectory.load("out/result.npz")), "limits.pdf")  # doctest: +SKIP
     """
     ratios = limit_ratios(trajectory, limits)
-    kinds = list(dict.fromkeys(label.kind for label in ratios.labels))
-    subjects = list(dict.fromkeys((*trajectory.joint_names, *(label.subject for label in ratios.labels))))
-    figure = style.new_figure(style.COLUMN_WIDTH, _FRAME_MM + _PANEL_MM * len(kinds))
-    panels = [figure.add_subplot(len(kinds), 1, row + 1) for row in range(len(kinds))]
-    for ax, kind in zip(panels, kinds, strict=True):
-        _draw(ax, ratios, kind, subjects)
-        style.dress(ax, r"$t$ (s)" if ax is panels[-1] else "", f"{kind} / limit")
-        style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
-        ax.tick_params(labelbottom=ax is panels[-1])
+    shown = list(dict.fromkeys(label.axis for label in ratios.labels))
+    figure = style.new_figure(style.COLUMN_WIDTH, _FRAME_MM + _PANEL_MM * len(shown))
+    panels = [figure.add_subplot(len(shown), 1, row + 1) for row in range(len(shown))]
+    draw_ratios(panels, trajectory, ratios, shown)
     handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     style.legend_below(figure, style.COLUMN_WIDTH - 10.0, list(handles.values()), list(handles))
     style.mark_end(panels[-1], trajectory.t_end)
@@ -62,15 +57,21 @@ def plot_limits(trajectory: Trajectory, limits: Sequence[Limit] | None = None) -
     return figure
 
 
-def _draw(ax: Axes, ratios: LimitRatios, kind: str, subjects: Sequence[str]) -> None:
-    """Draw one kind; a subject looks the same in every panel."""
-    columns = [column for column, label in enumerate(ratios.labels) if label.kind == kind]
-    for column in columns:
-        subject = ratios.labels[column].subject
-        look = style.joint_style(subjects.index(subject))
-        ax.plot(ratios.t, ratios.values[:, column], label=style.plain(subject), **look)
-    values = ratios.values[:, columns]
-    top = _RANGE * max(1.0, float(np.abs(values).max()))
-    for level in (-1.0, 1.0) if values.min() < 0.0 else (1.0,):
-        ax.axhline(level, color=style.GREY, **style.LIMIT)
-    ax.set_ylim(-top if values.min() < 0.0 else -0.05 * top, top)
+def draw_ratios(panels: Sequence[Axes], trajectory: Trajectory, ratios: LimitRatios, shown: Sequence[str]) -> None:
+    """Draw what is limited, by the titles of its labels, a panel each; a subject looks the same in every panel."""
+    subjects = list(dict.fromkeys((*trajectory.joint_names, *(label.subject for label in ratios.labels))))
+    for ax, title in zip(panels, shown, strict=True):
+        columns = [column for column, label in enumerate(ratios.labels) if label.axis == title]
+        for column in columns:
+            subject = ratios.labels[column].subject
+            look = style.joint_style(subjects.index(subject))
+            ax.plot(ratios.t, ratios.values[:, column], label=style.plain(subject), **look)
+        values = ratios.values[:, columns]
+        top = _RANGE * max(1.0, float(np.abs(values).max()))
+        for level in (-1.0, 1.0) if values.min() < 0.0 else (1.0,):
+            ax.axhline(level, color=style.GREY, **style.LIMIT)
+            ax.axhspan(level, np.sign(level) * top, facecolor=style.FORBIDDEN, edgecolor="none", zorder=0.0)
+        ax.set_ylim(-top if values.min() < 0.0 else -0.05 * top, top)
+        style.dress(ax, r"$t$ (s)" if ax is panels[-1] else "", title)
+        style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
+        ax.tick_params(labelbottom=ax is panels[-1])

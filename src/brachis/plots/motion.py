@@ -1,4 +1,4 @@
-"""Joint positions, joint velocities and progress along the path over time."""
+"""Joint positions, joint velocities, progress along the path and the tool's speed over time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from brachis.plots import style
 from brachis.plots.curves import dense_samples, knot_times
-from brachis.plots.quantities import Quantity, quantities
+from brachis.plots.quantities import Quantity, allowed_tool_speeds, quantities
 from brachis.trajectory import Samples, Trajectory, of_motion
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ _LOW = 0.6
 
 @of_motion
 def plot_motion(trajectory: Trajectory) -> Figure:
-    """Plot q, dq/dt, s and ds/dt in panels over one time axis; joints in rad and joints in m have panels of their own.
+    """Plot q, dq/dt, s and the tool's speed in panels over one time axis; joints in rad and in m are apart.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def plot_motion(trajectory: Trajectory) -> Figure:
     for ax, part in zip(panels, found, strict=False):
         draw_quantity(ax, trajectory, part)
     draw_progress(panels[-2], trajectory, samples)
-    draw_path_speed(panels[-1], trajectory, samples)
+    draw_tool_speed(panels[-1], trajectory, samples)
     for ax in panels[:-1]:
         ax.sharex(panels[-1])
     label_time_once(panels)
@@ -102,10 +102,16 @@ def draw_progress(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
     ax.set_ylim(-0.04, 1.04)
 
 
-def draw_path_speed(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
-    """Draw the rate of the path coordinate."""
-    ax.plot(samples.t, trajectory.path_spline(samples.t, nu=1), color="black", linewidth=style.LINE_WIDTH)
-    _dress(ax, trajectory, r"$\dot{s}$ (1/s)")
+def draw_tool_speed(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
+    """Draw the tool's speed, and what the task allows where the motion comes near it."""
+    look = {"color": "black", "linewidth": style.LINE_WIDTH}
+    ax.plot(samples.t, samples.tool_speed, label="tool", **look)
+    reach = (1.0 + _REACH) * max(float(samples.tool_speed.max()), _LEAST_RANGE)
+    for allowed in allowed_tool_speeds(trajectory, samples):
+        near = np.where(allowed < reach, allowed, np.nan)
+        if np.isfinite(near).any():
+            ax.plot(samples.t, near, color=style.GREY, **style.LIMIT)
+    _dress(ax, trajectory, "tool speed (m/s)")
     ax.set_ylim(bottom=0.0)
 
 

@@ -23,6 +23,7 @@ _POSTURES = 7
 _FIRST, _LAST = np.array([0.72, 0.83, 0.91]), np.array([0.03, 0.23, 0.39])
 _PATH_COLOUR = "#D55E00"
 _REDUNDANT_COLOUR = "#E69F00"
+_SHADOW_COLOUR = "#C8C8C8"
 _GROUND = ((0.0, 0.0), (-0.7, -1.0), (0.7, -1.0))
 _WORLD = "xyz"
 _ROOM = 0.78
@@ -77,7 +78,7 @@ def draw_postures(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
     ax.plot(*figures.bones[0, :1][:, view].T, marker=_GROUND, color=style.GREY, markersize=12.0, zorder=0.5)
     style.dress(ax, f"${_WORLD[view[0]]}$ (m)", f"${_WORLD[view[1]]}$ (m)")
     if plane is None:
-        _dress_space(ax, figures.bones.reshape(-1, 3))
+        _dress_space(ax, figures.bones.reshape(-1, 3), tool)
     else:
         ax.set_aspect("equal", adjustable="datalim")
         ax.margins(0.06)
@@ -140,8 +141,13 @@ def _draw_joints(ax: Axes, trajectory: Trajectory, joints: np.ndarray, shade: tu
         )
 
 
-def _dress_space(ax: Any, points: np.ndarray) -> None:  # noqa: ANN401  (3-D axes have methods that Axes lacks)
-    """Labels, equal scales and quiet panes of axes in space, seen from where points, (p, 3), fill the frame best."""
+def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:  # noqa: ANN401  (3-D axes have methods that Axes lacks)
+    """Labels, equal scales and a floor of axes in space, seen from where points, (p, 3), fill the frame best.
+
+    The tool's path, (K, 3), has its shadow on the floor.
+    """
+    floor = min(0.0, float(points[:, 2].min()))
+    ax.plot(*tool[:, :2].T, np.full(len(tool), floor), color=_SHADOW_COLOUR, linewidth=1.4, zorder=1.0, gid="shadow")
     ax.set_zlabel("$z$ (m)", fontsize=style.LABEL_SIZE, labelpad=-4.0)
     ax.xaxis.labelpad = ax.yaxis.labelpad = -4.0
     ax.tick_params(pad=-2.0)
@@ -154,6 +160,20 @@ def _dress_space(ax: Any, points: np.ndarray) -> None:  # noqa: ANN401  (3-D axe
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis.set_major_locator(_few_ticks())
+    ax.grid(visible=False)
+    _draw_floor(ax, floor)
+
+
+def _draw_floor(ax: Any, z: float) -> None:  # noqa: ANN401
+    """Draw a grid of the ticks on the floor, up to the edges of the axes."""
+    x, y = ax.get_xlim(), ax.get_ylim()
+    inner = [[tick for tick in ticks if low < tick < high] for ticks, (low, high) in ((ax.get_xticks(), x), (ax.get_yticks(), y))]
+    look = {"color": style.FAINT, "linewidth": 0.6, "zorder": 0.1, "gid": "floor"}
+    for at in (*x, *inner[0]):
+        ax.plot([at, at], y, z, **look)
+    for at in (*y, *inner[1]):
+        ax.plot(x, [at, at], z, **look)
+    ax.set(xlim=x, ylim=y)
 
 
 def _filled(ax: Any, points: np.ndarray, elevation: float, azimuth: float) -> float:  # noqa: ANN401

@@ -1,12 +1,15 @@
-"""Joint quantities over time with their limits: what a panel shows, joints in rad and joints in m apart."""
+"""Joint quantities over time with their limits: what plots, report and viewer show, joints in rad and in m apart."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from brachis.robot import Robot
+from brachis.limits import tool_speed
+from brachis.robot.limits import Limits
+from brachis.robot.units import UNITS, shown_unit
 from brachis.trajectory import Samples, Trajectory
 
 
@@ -21,6 +24,7 @@ class Quantity:
     symbol : str
         In Matplotlib's mathematics, without dollars.
     unit : str
+        As it is written.
     t : (K,) ndarray
         s.
     joints : (j,) int ndarray
@@ -28,8 +32,12 @@ class Quantity:
     values : (K, j) ndarray
     lower, upper : (j,) ndarray
         Limits; infinite where there is none.
-    around_zero : bool
-        Whether the limits lie around zero, so that ratios to them say how near they are.
+    centre : (j,) ndarray
+        Value that uses nothing of the limits: zero, or the middle of a range of positions.
+    share : str
+        What the ratios are, for example ``torque / limit``.
+    of : str
+        What they are parts of: ``its limit``.
     """
 
     name: str
@@ -40,41 +48,72 @@ class Quantity:
     values: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
-    around_zero: bool
+    centre: np.ndarray
+    share: str
+    of: str
 
     @property
     def ratios(self) -> np.ndarray:
-        """Values over the limits of their directions, (K, j)."""
-        return self.values / np.where(self.values > 0.0, self.upper, -self.lower)
+        """Values over the limits of their directions, both from the centre, (K, j); NaN where there is no limit."""
+        away = self.values - self.centre
+        room = np.where(away > 0.0, self.upper - self.centre, self.centre - self.lower)
+        return np.where(self.is_limited, away / room, np.nan)
+
+    @property
+    def is_limited(self) -> np.ndarray:
+        """Whether joints have limits in both directions, (j,)."""
+        return np.isfinite(self.lower) & np.isfinite(self.upper)
+
+    def of_joints(self, kept: np.ndarray) -> Quantity | None:
+        """Return the same of some of its joints, (j,) bool; None where there is none."""
+        parts = {name: getattr(self, name)[kept] for name in ("joints", "lower", "upper", "centre")}
+        return replace(self, values=self.values[:, kept], **parts) if kept.any() else None
 
     def limited(self) -> Quantity | None:
         """Return the same of the joints with limits in both directions; None where there is no such joint."""
-        kept = np.isfinite(self.lower) & np.isfinite(self.upper)
-        parts = {"joints": self.joints[kept], "values": self.values[:, kept]}
-        return replace(self, **parts, lower=self.lower[kept], upper=self.upper[kept]) if kept.any() else None
+        return self.of_joints(self.is_limited)
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """How one kind of quantity is called where joints turn and where they slide."""
+    """A kind of quantity: how it is called where joints turn and where they slide, and what its ratios are."""
 
-    names: tuple[str, str]
     symbols: tuple[str, str]
-    units: tuple[str, str]
-    samples: str
-    around_zero: bool = True
+    values: Callable[[Trajectory, Samples], np.ndarray]
+    names: tuple[str, str] | None = None
+    share: str = ""
+    of: str = "its limit"
+    in_range: bool = False
+    """Whether the limits are a range, from whose middle ratios count."""
+    if_limited: bool = False
+    """Whether it is of interest only where there is a limit."""
 
 
 KINDS = {
-    "position": _Kind(("position",) * 2, ("q",) * 2, ("rad", "m"), "q", around_zero=False),
-    "velocity": _Kind(("velocity",) * 2, (r"\dot{q}",) * 2, ("rad/s", "m/s"), "qdot"),
-    "acceleration": _Kind(("acceleration",) * 2, (r"\ddot{q}",) * 2, ("rad/s²", "m/s²"), "qddot"),
-    "torque": _Kind(("torque", "force"), (r"\tau", "F"), ("Nm", "N"), "tau"),
+    "position": _Kind(
+        ("q", "q"),
+        lambda _, samples: samples.q,
+        share="position in its range",
+        of="the way from the middle of its range to an end",
+        in_range=True,
+    ),
+    "velocity": _Kind((r"\dot{q}", r"\dot{q}"), lambda _, samples: samples.qdot),
+    "acceleration": _Kind((r"\ddot{q}", r"\ddot{q}"), lambda _, samples: samples.qddot),
+    "jerk": _Kind(
+        (r"\dddot{q}", r"\dddot{q}"), lambda trajectory, samples: trajectory.jerk(samples.t), if_limited=True
+    ),
+    "torque": _Kind((r"\tau", "F"), lambda _, samples: samples.tau, names=("torque", "force")),
 }
 """Kinds of joint quantities by the name that their limits have."""
 
 
-def quantities(trajectory: Trajectory, samples: Samples, kind: str) -> tuple[Quantity, ...]:
+def kinds_of(trajectory: Trajectory) -> tuple[str, ...]:
+    """Return the kinds that are of interest for a motion."""
+    limits = trajectory.robot.limits
+    return tuple(kind for kind, own in KINDS.items() if not own.if_limited or np.isfinite(limits_of(limits, kind)).any())
+
+
+def quantities(trajectory: Trajectory, samples: Samples, kind: str, *, degrees: bool = False) -> tuple[Quantity, ...]:
     """Split one kind of quantity by unit: that of revolute joints first, then that of prismatic ones.
 
     Parameters
@@ -84,32 +123,52 @@ def quantities(trajectory: Trajectory, samples: Samples, kind: str) -> tuple[Qua
         Of the trajectory.
     kind : str
         One of `KINDS`.
+    degrees : bool, optional
+        Whether angles are in degrees.
 
     Returns
     -------
     tuple of Quantity
         One or two.
     """
-    robot, words = trajectory.robot, KINDS[kind]
-    lower, upper = limits_of_joints(robot, kind)
-    values = getattr(samples, words.samples)
-    return tuple(
-        Quantity(
-            name, symbol, unit, samples.t, joints, values[:, joints], lower[joints], upper[joints], words.around_zero
+    robot, own = trajectory.robot, KINDS[kind]
+    lower, upper = limits_of(robot.limits, kind)
+    values = own.values(trajectory, samples)
+    found = []
+    for place, (base, of_kind) in enumerate((("rad", robot.revolute), ("m", ~robot.revolute))):
+        joints = np.flatnonzero(of_kind)
+        if not len(joints):
+            continue
+        unit, factor = shown_unit(UNITS[kind][base], degrees=degrees)
+        low, high = factor * lower[joints], factor * upper[joints]
+        ended = np.isfinite(low) & np.isfinite(high) & own.in_range
+        centre = 0.5 * np.where(ended, low, 0.0) + 0.5 * np.where(ended, high, 0.0)
+        name = own.names[place] if own.names else kind
+        found.append(
+            Quantity(
+                name=name,
+                symbol=own.symbols[place],
+                unit=unit.replace("^2", "²").replace("^3", "³"),
+                t=samples.t,
+                joints=joints,
+                values=factor * values[:, joints],
+                lower=low,
+                upper=high,
+                centre=centre,
+                share=own.share or f"{name} / limit",
+                of=own.of,
+            )
         )
-        for name, symbol, unit, joints in zip(
-            words.names,
-            words.symbols,
-            words.units,
-            (np.flatnonzero(robot.revolute), np.flatnonzero(~robot.revolute)),
-            strict=True,
-        )
-        if len(joints)
-    )
+    return tuple(found)
 
 
-def limits_of_joints(robot: Robot, kind: str) -> np.ndarray:
+def limits_of(limits: Limits, kind: str) -> np.ndarray:
     """Lower and upper limits of one of `KINDS`, (2, n)."""
-    limits = robot.limits
     ranges = {"position": np.array([limits.position_lower, limits.position_upper])}
     return ranges[kind] if kind in ranges else limits.both_ways(kind)
+
+
+def allowed_tool_speeds(trajectory: Trajectory, samples: Samples) -> np.ndarray:
+    """Largest speeds of the tool that the task allows, (c, K), m/s; infinite where there is no limit."""
+    limit = tool_speed.build(trajectory.robot, trajectory.task)
+    return np.empty((0, len(samples.t))) if limit is None else limit.largest_at(samples.s)[0].T

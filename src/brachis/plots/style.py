@@ -45,6 +45,8 @@ LIMIT: dict[str, Any] = {"linewidth": 0.7, "linestyle": (0, (4.0, 2.0)), "zorder
 """Line properties of limits."""
 GREY = "#666666"
 FAINT = "#CFCFCF"
+FORBIDDEN = "#EFEFEF"
+"""What is beyond limits."""
 
 _MM_PER_INCH = 25.4
 _MM_PER_CHARACTER = 1.45  # of TICK_SIZE, with some reserve

@@ -82,6 +82,6 @@ def _draw_band(ax: Axes, largest: float) -> None:
     top = _RANGE * max(1.0, largest)
     for sign in (-1.0, 1.0):
         ax.axhline(sign, **style.LIMIT, color=style.GREY)
-        ax.axhspan(sign, sign * top, facecolor="#EFEFEF", edgecolor="none", zorder=0.0)
+        ax.axhspan(sign, sign * top, facecolor=style.FORBIDDEN, edgecolor="none", zorder=0.0)
     ax.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
     ax.set_ylim(-top, top)

@@ -27,7 +27,7 @@ from brachis.trajectory import Recovered, Trajectory
 from brachis.trajectory.recovered import LARGEST, check_tolerance
 
 _TOLERANCE, _DIGITS = 1e-6, 3.0
-"""Of a recovered path, m and rad; and how many times what positions' errors move the tool at most."""
+"""Of a recovered path, m and rad; and how many standard deviations measured positions are off at most."""
 _BETWEEN = 4
 """Places at which every piece of the motion is looked at."""
 
@@ -107,6 +107,7 @@ def import_motion(
     space = task_space or (settings.task_space if settings else ik.natural_space(made))
     recording = read_recording(path, made, _units(units))
     bound, task_map = bind(made, space)
+    rolling = bound.n - made.n
     deviation = _deviation(recording, noise)
     nodes = _with_roll(nodes_of(recording, deviation), bound.n)
     t, q, qdot = _densely(nodes)
@@ -118,7 +119,14 @@ def import_motion(
         found, allowed = f"{followed.miss:.3g} m or rad off", f"{tolerance:.3g}"
         hint = "Raise the tolerance"
         raise PathError("the recovered path misses the motion", found=found, allowed=allowed, where="path", hint=hint)
-    recovered = Recovered(recording.source, tolerance, _told(recording, nodes, followed, tolerance))
+    error = recording.rounding if noise is None else _DIGITS * deviation
+    recovered = Recovered(
+        recording.source,
+        tolerance,
+        _told(recording, nodes, followed, tolerance),
+        np.column_stack([recording.t, recording.q, np.zeros((len(recording.t), rolling))]),
+        np.append(error, np.zeros(rolling)),
+    )
     wanted = _task_of(settings, bound, task_map, nodes, followed, space)
     return _trajectory(wanted, bound, nodes, coordinate_spline(t, followed.s, at_rest=nodes.at_rest[0]), recovered)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 UNITS: Final[dict[str, dict[str, str]]] = {
@@ -18,3 +19,13 @@ UNITS: Final[dict[str, dict[str, str]]] = {
     "armature": {"rad": "kg m^2", "m": "kg"},
 }
 """The keys are those of limits and friction in the task."""
+
+
+def shown_unit(unit: str, *, degrees: bool) -> tuple[str, float]:
+    """Return the unit in which a person sees figures of an SI unit, and the factor that brings them there.
+
+    With `degrees`, what is an angle over powers of time is shown in deg, deg/s, ...; all else stays as it is.
+    """
+    if degrees and unit.partition("/")[0] == "rad":
+        return f"deg{unit.removeprefix('rad')}", 180.0 / math.pi
+    return unit, 1.0

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-from brachis.arguments import number
+import numpy as np
+
+from brachis.arguments import number, numbers
+from brachis.arrays import freeze
 from brachis.errors import InputError
 
 SMALLEST, LARGEST = 2e-7, 1e-3
@@ -27,7 +30,7 @@ def check_tolerance(tolerance: float) -> float:
     return tolerance
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recovered:
     """Where a motion comes from that was not planned, and how its path was found.
 
@@ -39,28 +42,39 @@ class Recovered:
         How far the tool may be from the recovered path, m and rad.
     told : tuple of str
         What is known, and what is not, in plain words.
+    rows : (K, 1 + n) ndarray
+        Times, s, and joint positions, rad or m, as the file has them. Read-only.
+    error : (n,) ndarray
+        How far these positions may be off, rad or m. Read-only.
     """
 
     source: str
     tolerance: float
     told: tuple[str, ...]
+    rows: np.ndarray = field(repr=False)
+    error: np.ndarray = field(repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse tolerances that say nothing.
+        """Refuse tolerances that say nothing; take copies of the arrays that nobody can write to.
 
         Raises
         ------
         InputError
         """
         check_tolerance(self.tolerance)
+        freeze(self, "rows", "error")
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
-        return {**asdict(self), "told": list(self.told)}
+        """Return what is known as plain data for JSON, without the rows."""
+        return {"source": self.source, "tolerance": self.tolerance, "told": list(self.told)}
+
+    def to_file(self) -> dict[str, Any]:
+        """Return all as plain data for JSON."""
+        return {**self.to_dict(), "rows": self.rows.tolist(), "error": self.error.tolist()}
 
     @classmethod
-    def of_dict(cls, data: object) -> Recovered | None:
-        """Read what `to_dict` wrote; None for None.
+    def of_file(cls, data: object, n: int) -> Recovered | None:
+        """Read what `to_file` wrote of a motion of `n` joints; None for None.
 
         Raises
         ------
@@ -73,5 +87,16 @@ class Recovered:
         source, tolerance, told = (parts.get(name) for name in ("source", "tolerance", "told"))
         listed = isinstance(told, list) and all(isinstance(line, str) for line in told)
         if not isinstance(source, str) or type(tolerance) is not float or not listed:
-            raise InputError("wrong type", where="recovered", found=data, allowed="source, tolerance, told; or null")
-        return cls(source, tolerance, tuple(told or ()))
+            allowed = "source, tolerance, told, rows, error; or null"
+            raise InputError(
+                "wrong type", where="recovered", found=", ".join(parts) or type(data).__name__, allowed=allowed
+            )
+        rows = numbers(parts.get("rows", ()), "recovered.rows", "s, then rad or m")
+        error = numbers(parts.get("error", ()), "recovered.error", "rad or m")
+        fits = rows.shape == (len(np.atleast_1d(rows)), 1 + n) and len(rows) > 1 and error.shape == (n,)
+        finite = np.isfinite(rows).all() and np.isfinite(error).all()
+        if not fits or not finite or not (np.diff(rows[:, 0]) > 0.0).all():
+            found = f"rows {rows.shape}, error {error.shape}"
+            allowed = f"rows (K, {1 + n}) with ascending times, error ({n},); finite numbers"
+            raise InputError("not the rows of a file", where="recovered", found=found, allowed=allowed)
+        return cls(source, tolerance, tuple(told or ()), rows, error)

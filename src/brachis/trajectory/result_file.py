@@ -164,7 +164,7 @@ def _content(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Content:
             raise InputError("not all are finite numbers", where=name)
     r = _redundancy(arrays, robot.n, len(redundant))
     _check_arrays(arrays, robot.n, r, meta["degree"])
-    recovered = Recovered.of_dict(meta.get("recovered"))
+    recovered = Recovered.of_file(meta.get("recovered"), robot.n)
     return Content(task, meta["urdf"], robot, tuple(redundant), meta["branch"], meta["degree"], recovered, arrays)
 
 

@@ -324,7 +324,7 @@ class Trajectory(Summary):
             "branch": self.branch,
             "degree": self.degree,
             "joint_names": list(self.joint_names),
-            "recovered": None if self.recovered is None else self.recovered.to_dict(),
+            "recovered": None if self.recovered is None else self.recovered.to_file(),
         }
         write_result(path, meta, {name: getattr(self, name) for name in ARRAYS})
 

@@ -1,0 +1,128 @@
+"""What the rows of a recorded motion prove of its limits, whatever it does between them.
+
+A joint that moves by dq within a period h has a velocity of dq / h at some time of it, and an acceleration equal to the
+second difference over h^2 within two periods, a jerk equal to the third over h^3 within three (mean value theorem of
+divided differences). So a limit on one of these is exceeded for certain where the differences exceed it. A limit on
+another quantity (a torque, the tool's speed) is compared with the quantity's value for these means, at the posture in
+the middle of the periods: what is left out is how posture and velocity change within them. What the errors of the rows
+may add to a ratio is subtracted. It is less over more periods, so that some are taken together, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import factorial
+
+import numpy as np
+
+from brachis.limits import Limit, Moments, Role, limits_of
+from brachis.robot import bind
+from brachis.trajectory import Trajectory
+
+_STRIDES = (1, 2, 4)
+"""Periods that are taken as one, for limits of joints; those of the tool may change along the path."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proven:
+    """What rows prove of one limit.
+
+    Attributes
+    ----------
+    limit : str
+        Its kind in words.
+    subjects : tuple of str
+        Of its c values: joints, or the tool.
+    t : (K,) ndarray
+        Times of the rows, s.
+    ratios : (K, c) ndarray
+        Sizes of the ratios that are reached for certain; 0 where nothing is proven.
+    """
+
+    limit: str
+    subjects: tuple[str, ...]
+    t: np.ndarray
+    ratios: np.ndarray
+
+    @property
+    def worst(self) -> tuple[float, str, float]:
+        """Largest ratio, of what, and when, s."""
+        row, column = np.unravel_index(np.argmax(self.ratios), self.ratios.shape)
+        return float(self.ratios[row, column]), self.subjects[column], float(self.t[row])
+
+
+def proven_ratios(trajectory: Trajectory) -> tuple[Proven, ...]:
+    """Compare the rows of an imported motion with every limit of its task."""
+    assert trajectory.recovered is not None  # noqa: S101  (it was imported)
+    robot, _ = bind(trajectory.robot, trajectory.task.task_space)
+    t = trajectory.recovered.rows[:, 0]
+    return tuple(
+        Proven(limit.name, tuple(label.subject for label in limit.labels), t, _proven(trajectory, limit))
+        for limit in limits_of(robot, trajectory.task)
+    )
+
+
+def _proven(trajectory: Trajectory, limit: Limit) -> np.ndarray:
+    """Return the sizes of the ratios to one limit, (K, c)."""
+    assert trajectory.recovered is not None  # noqa: S101
+    t = trajectory.recovered.rows[:, 0]
+    count = len(t)
+    found = np.zeros((count, len(limit.labels)))
+    order = _order(limit, _means(trajectory, np.arange(1)[:, None])[0])
+    towards = np.where(np.isfinite(limit.centre), limit.centre, np.where(np.isfinite(limit.upper), -np.inf, np.inf))
+    alone = limit.role is not Role.ROBOT or limit.where == "whole"
+    for stride in _STRIDES[:1] if alone else _STRIDES:
+        windows = np.arange(max(count - order * stride, 0))[:, None] + stride * np.arange(order + 1)
+        windows = windows[~_across(trajectory, windows, limit.breaks)]
+        if not len(windows):
+            continue
+        moments, errors = _means(trajectory, windows)
+        partials = limit.partials(moments)
+        slopes = (partials.q, partials.qdot, partials.qddot, partials.qdddot)
+        products = [np.abs(slope) @ error for slope, error in zip(slopes, errors, strict=True) if slope is not None]
+        off = np.sum(products, axis=0)[:, :, 0]
+        values = limit.values(moments)
+        values = values - np.clip(values - towards, -off, off)
+        if limit.where == "whole":
+            return np.abs(limit.ratio(np.trapezoid(values, t[windows[:, order // 2]], axis=0) / t[-1]))[None] + found
+        np.maximum.at(found, windows[:, order // 2], np.abs(limit.ratio(values)))
+    return found
+
+
+def _order(limit: Limit, moments: Moments) -> int:
+    """Return the highest time derivative of the joints' positions that a limit asks for."""
+    partials = limit.partials(moments)
+    asked = (partials.q, partials.qdot, partials.qddot, partials.qdddot)
+    return max(order for order, part in enumerate(asked) if part is not None)
+
+
+def _across(trajectory: Trajectory, windows: np.ndarray, breaks: np.ndarray) -> np.ndarray:
+    """Tell for windows of rows, (W, m + 1), whether the limit changes abruptly within them, (W,)."""
+    t = trajectory.recovered.rows[:, 0]  # type: ignore[union-attr]
+    first, last = (trajectory.path_spline(t[windows[:, end]])[:, None] for end in (0, -1))
+    return np.asarray(((first < breaks) & (breaks < last)).any(axis=1))
+
+
+def _means(trajectory: Trajectory, windows: np.ndarray) -> tuple[Moments, list[np.ndarray]]:
+    """Differentiate the polynomials through m + 1 rows each, in the middle of windows of rows, (W, m + 1).
+
+    Returns
+    -------
+    Moments
+        The m-th derivative is m! times the divided difference; higher ones are 0.
+    list of (W, n, 1) ndarray
+        What the errors of the rows add to q and each derivative at most.
+    """
+    recovered = trajectory.recovered
+    assert recovered is not None  # noqa: S101
+    t, q = recovered.rows[windows, 0], recovered.rows[windows, 1:]
+    order = windows.shape[1] - 1
+    middle = 0.5 * (t[:, order // 2] + t[:, (order + 1) // 2])
+    unit = np.max(t[:, -1] - t[:, 0], initial=0.0) or 1.0
+    powers = ((t - middle[:, None]) / unit)[:, :, None] ** np.arange(order + 1)
+    weights = np.linalg.inv(powers) * [[factorial(power) / unit**power] for power in range(order + 1)]
+    weights = np.concatenate([weights, np.zeros((len(windows), 3 - order, order + 1))], axis=1)
+    errors = np.abs(weights).sum(axis=2)[:, :, None] * recovered.error
+    found, qdot, qddot, qdddot = np.moveaxis(weights @ q, 1, 0)
+    moments = Moments(found, qdot, qddot, qdddot, trajectory.path_spline(middle))
+    return moments, [error[:, :, None] for error in np.moveaxis(errors, 1, 0)]

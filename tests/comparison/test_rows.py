@@ -1,0 +1,83 @@
+"""What the rows of a recorded motion prove of its limits."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.comparison import proven_ratios
+from brachis.robot import dynamics
+from brachis.verify import verify_trajectory
+
+ROOT = Path(__file__).parents[2]
+SCARA = ROOT / "robots/scara3/robot.urdf"
+SHARES = np.array([1.0, -0.5, 0.02])
+"""Of the largest velocity, acceleration and jerk, joint by joint."""
+
+
+def imported(folder, digits, dt, kind, share):
+    """A motion that uses this share of a limit of the first joint, at every `dt` s: full speed up, full speed down."""
+    t = np.arange(0.0, 2.0 + 0.5 * dt, dt)
+    if kind == "jerk":
+        edges = np.array([0.0, 0.5, 1.5, 2.0])  # jerk 1, -1, 1
+        way = sum(
+            jump * np.clip(t - edge, 0.0, None) ** 3 / 6.0 for jump, edge in zip((1, -2, 2, -1), edges, strict=True)
+        )
+    else:
+        way = np.where(t < 1.0, 0.5 * t**2, 1.0 - 0.5 * (2.0 - t) ** 2)
+    file = folder / "today.csv"
+    np.savetxt(
+        file, np.column_stack([t, np.outer(way, SHARES)]), delimiter=",", header="t,j1,j2,j3", fmt=f"%.{digits}f"
+    )
+    file.write_text(file.read_text().removeprefix("# "))
+    limits = {"torque": 1e3, "velocity": None, kind: 1.0 / share}
+    task = {
+        "brachis": 1,
+        "robot": {"urdf": str(SCARA), "gravity": [0, 0, 0], "limits": limits},
+        "start": {"joints": [0.0] * 3},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"by": [1.0, 0.0]}}],
+    }
+    return brachis.import_motion(file, task=task)
+
+
+def worst(trajectory, kind):
+    return next(proven.worst for proven in proven_ratios(trajectory) if proven.limit == kind)
+
+
+def check(trajectory, kind):
+    return next(check for check in verify_trajectory(trajectory).checks if check.name == f"{kind} ratio")
+
+
+@pytest.mark.parametrize(("digits", "dt"), [(4, 0.008), (5, 0.004), (4, 0.02), (12, 0.004)])
+def test_rows_of_a_motion_at_its_limit_prove_no_more(digits, dt, tmp_path):
+    """The spline through rounded rows overshoots, and fails its verification; that proves nothing."""
+    trajectory = imported(tmp_path, digits, dt, "acceleration", 1.0)
+    ratio, subject, _ = worst(trajectory, "acceleration")
+    assert 0.8 < ratio <= 1.0 + 1e-9
+    assert subject == "j1"
+    if digits < 6:
+        assert check(trajectory, "acceleration").value > 1.05
+
+
+@pytest.mark.parametrize(("digits", "dt"), [(4, 0.02), (6, 0.008), (12, 0.004)])
+def test_rows_of_a_motion_beyond_its_limit_prove_it(digits, dt, tmp_path):
+    trajectory = imported(tmp_path, digits, dt, "acceleration", 1.4)
+    assert 1.2 < worst(trajectory, "acceleration")[0] <= 1.4 + 1e-9
+
+
+@pytest.mark.parametrize("kind", ["velocity", "jerk"])
+def test_velocity_is_a_mean_over_a_period_and_jerk_one_over_three(kind, tmp_path):
+    trajectory = imported(tmp_path, 15, 1.0 / 30.0, kind, 1.0)
+    largest = {"velocity": 1.0 - 0.5 / 30.0, "jerk": 1.0}[kind]  # the velocity has its peak at a row
+    assert worst(trajectory, kind)[0] == pytest.approx(largest, abs=1e-9)
+
+
+def test_torques_are_those_of_the_mean_motion(tmp_path):
+    trajectory = imported(tmp_path, 15, 0.008, "acceleration", 1.0)
+    t = np.linspace(0.0, 1.0, 1001)
+    q, qdot, qddot = (np.outer(part, SHARES) for part in (0.5 * t**2, t, np.ones_like(t)))
+    speeding = np.abs(dynamics.torque(trajectory.robot, q, qdot, qddot)).max()
+    braking = np.abs(dynamics.torque(trajectory.robot, SHARES - q, qdot, -qddot)).max()
+    assert worst(trajectory, "torque")[0] == pytest.approx(max(speeding, braking) / 1e3, rel=0.01)
