@@ -30,7 +30,11 @@ ALONG: dict[str, Any] = {"line": {"by": [0.6, 0, 0.3]}}
 SPLINE: dict[str, Any] = {"spline": {"through": [[0.6, 0.3, 0.2], [0.9, 0.4, 0.4], [1.1, 0.8, 0.3]]}}
 CIRCLE: dict[str, Any] = {"circle": {"center": [0.2, 0.1, 0.3], "normal": [0, 1, 1], "turns": -1.25}}
 VIA: dict[str, Any] = {"arc": {"via": [0.7, 0.3, 0.3], "to": [0.9, 0.2, 0.5]}}
-ATTITUDES = [{"rpy_deg": [20, 40, 60]}, {"rotation_vector": [0.2, 0.9, 1.5]}, {"quaternion": [-0.5, 0.5, -0.5, -0.5]}]
+ATTITUDES = [
+    {"rpy_deg": [20, 40, 60]},
+    {"rotation_vector": [0.2, 0.9, 1.5]},
+    {"quaternion_wxyz": [-0.5, 0.5, -0.5, -0.5]},
+]
 
 SEGMENTS: dict[str, list[dict[str, Any]]] = {
     "fixed": [ALONG],

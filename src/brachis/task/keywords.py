@@ -7,12 +7,14 @@ from typing import Any, Literal, TypedDict, Unpack
 
 from brachis.errors import UnknownNameError
 from brachis.task.boundary import BoundarySettings
+from brachis.task.constructors import Transform, poses_of
 from brachis.task.fields import Model, plain
 from brachis.task.limit_models import Array, LimitKeywords, LimitSpec
 from brachis.task.load import Source, load_task
 from brachis.task.messages import key_paths
 from brachis.task.models import Task
 from brachis.task.mounting_models import Payload, Placement
+from brachis.task.orientation import ToolPose
 from brachis.task.planning_models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings
 from brachis.task.robot_models import RobotSettings
 from brachis.task.segments import SegmentModel
@@ -31,7 +33,7 @@ class TaskKeywords(TypedDict, total=False):
     path: SegmentModel | Sequence[SegmentModel | Mapping[str, Any]]
     start: Posture
     end: Posture
-    path_start: Array | Sequence[float] | None
+    path_start: Array | Sequence[float] | Mapping[str, Any] | ToolPose | Transform | None
     task_space: str | Sequence[str]
     redundant_joints: Sequence[str] | Literal["auto"]
     branch: str
@@ -150,7 +152,10 @@ def _as_keyword(parts: Sequence[str]) -> str:
 
 
 def _in_full(key: str, value: object) -> object:
-    """Write a posture as a task file does."""
+    """Write a posture, and a transform that is given for the start of the path, as a task file does."""
+    if key == "path_start" and hasattr(value, "homogeneous"):
+        ((place, turn),) = poses_of([value], key)
+        return {"position": place, **turn}
     if key not in {"start", "end"} or isinstance(value, str | Model):
         return value
     return value if isinstance(value, Mapping) and set(value) == {"joints"} else {"joints": plain(value)}
