@@ -125,6 +125,23 @@ need a `blend`.
 Coordinates are those of the rows of the task space, m, and rad for yaw. In task spaces of poses (`pose`,
 `pose_free_roll`) they are x, y, z, and `orientation` says how the tool turns.
 
+They are in the world frame, or in the frame that `path_frame` names, such as that of a workpiece. Segments, splines,
+files of points, directions, orientations and `path_start` are all in it. A workpiece that stands elsewhere is then one
+changed key; a sweep over `frames.workpiece.xyz` finds its best place. In task spaces of fewer rows than x, y, z the
+frame may only turn within these rows. Results, plots and exports are in the world frame.
+
+```yaml
+frames:
+  workpiece: {xyz: [0.6, 0.1, 0.4], rpy_deg: [0, 0, 30]}
+path_frame: workpiece
+start: free
+task_space: pose
+path_start: {position: [0, 0, 0.02], rpy_deg: [180, 0, 0]}   # 20 mm above the workpiece, the tool pointing down
+path:
+  - line: {by: [0.2, 0, 0]}                                  # along the workpiece
+    orientation: {rotate: {axis: [0, 0, 1], angle_deg: 20}}
+```
+
 With `task_space: joints` they are the positions of all joints, rad (m), in the order of the chain, and the segments
 are `line: {to: ...}`, `line: {by: ...}`, `spline`, `bspline` and `csv`; lengths along the path, those of blends too,
 are in rad (m). `docs/from_toppra.md` has an example.
@@ -139,15 +156,15 @@ moves.
 ORIENTATION = """## `orientation`
 
 In task spaces of poses every segment but `turn` may say how the tool turns along it. The tool's orientation at the
-start of a segment is the one at the end of its predecessor. Orientations are those of the tool frame in the world
-frame.
+start of a segment is the one at the end of its predecessor. Orientations are those of the tool frame in the frame of
+the path: the world, or `path_frame`.
 
 ```yaml
 task_space: pose
 path:
   - line: {by: [0.3, 0, 0]}               # the tool keeps its orientation
     blend: 0.05
-  - line: {by: [0, 0.4, 0]}               # turns by 90 degrees about the world's z axis, at rest at both ends
+  - line: {by: [0, 0.4, 0]}               # turns by 90 degrees about the path frame's z axis, at rest at both ends
     orientation: {rotate: {axis: [0, 0, 1], angle_deg: 90, profile: smooth}}
   - line: {by: [0, 0.3, 0]}               # turns, the shortest way, to an orientation
     orientation: {to: {rpy_deg: [0, 0, 45], profile: smooth}}
@@ -178,7 +195,7 @@ The orientation at the segment's start is not listed. Successive orientations mu
 task_space: pose
 path:
   - spline:
-      relative: true                      # displacements along the world axes, rotations in the tool frame
+      relative: true                      # displacements in the path's frame, rotations in the tool frame
       through: [[0.1, 0, 0], [0.2, 0.1, 0], [0.2, 0.2, 0.1]]
       orientations: [{rpy_deg: [0, 0, 20]}, {rpy_deg: [0, 10, 60]}, {quaternion_xyzw: [0, 0, 0.707, 0.707]}]
 ```
@@ -213,8 +230,8 @@ told.
 
 The first row is where the segment starts, and where the path begins with `start: free` if the task has no `path_start`.
 A segment that starts elsewhere, by more than 1e-4 m or rad, is refused; with `relative: true` the rows are moved so
-that the first one is at the segment's start: displacements keep their direction in the world, rotations are those in
-the tool frame.
+that the first one is at the segment's start: displacements keep their direction in the path's frame, rotations are
+those in the tool frame.
 
 **Without a tolerance** the path passes all rows. Where successive rows have the same position, the curve would have to
 stop, and the file is refused, unless the position stands still in the whole file. Rows that are rounded or scatter so

@@ -20,7 +20,7 @@ EXAMPLES = [text for text in SNIPPETS if "path" in yaml.safe_load(text)]
 
 
 def test_there_are_examples() -> None:
-    assert len(EXAMPLES) == 3
+    assert len(EXAMPLES) == 4
 
 
 def test_the_curve_of_a_data_sheet_is_taken() -> None:

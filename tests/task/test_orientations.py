@@ -90,7 +90,7 @@ def test_a_task_may_be_made_of_models() -> None:
 def test_defaults() -> None:
     assert task(LINE).path[0] == LineSegment(line={"to": (1, 0, 0)}, orientation=None)  # type: ignore[arg-type]
     rotation = Rotation(axis=(0, 0, 1), angle_deg=1)
-    assert (rotation.frame, rotation.profile) == ("world", "uniform")
+    assert (rotation.frame, rotation.profile) == ("path", "uniform")
     assert TurnTo(to=Target(rpy_deg=(0, 0, 1))).to.profile == "uniform"
     assert [segment.kind for segment in task(LINE | {"orientation": "fixed"}, {"turn": ROTATE}).path] == [
         "line",
@@ -121,7 +121,7 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     (LINE | {"orientation": {"rotate": {"axis": [1, 0], "angle_deg": 9}}}, ["rotate.axis[2]: the list is too short"]),
     (
         LINE | {"orientation": {"rotate": ROTATE["rotate"] | {"frame": "base"}}},
-        ["path[0].orientation.rotate.frame: not one of the allowed values; found 'base'", "'world' or 'tool'"],
+        ["path[0].orientation.rotate.frame: not one of the allowed values; found 'base'", "'path' or 'tool'"],
     ),
     (
         LINE | {"orientation": {"rotate": ROTATE["rotate"] | {"profile": "linear"}}},

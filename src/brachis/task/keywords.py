@@ -33,6 +33,8 @@ class TaskKeywords(TypedDict, total=False):
     path: SegmentModel | Sequence[SegmentModel | Mapping[str, Any]]
     start: Posture
     end: Posture
+    frames: Mapping[str, Placement | Settings | Transform]
+    path_frame: str | None
     path_start: Array | Sequence[float] | Mapping[str, Any] | ToolPose | Transform | None
     task_space: str | Sequence[str]
     redundant_joints: Sequence[str] | Literal["auto"]
@@ -41,9 +43,9 @@ class TaskKeywords(TypedDict, total=False):
     custom_limits: Mapping[str, Settings]
     # robot
     tool_frame: str | None
-    tool_offset: Placement | Settings
+    tool_offset: Placement | Settings | Transform
     base_frame: str | None
-    mounting: Placement | Settings | Literal["floor", "wall", "ceiling"]
+    mounting: Placement | Settings | Transform | Literal["floor", "wall", "ceiling"]
     gravity: Array | Sequence[float]
     locked_joints: Mapping[str, float]
     payload: Payload | Settings | None

@@ -6,6 +6,7 @@ and answers mistakes with a `brachis.errors.TaskError` that names the key.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, JsonValue, Tag, field_validator, model_validator
@@ -14,6 +15,7 @@ from brachis.cam.conventions import choices
 from brachis.task.boundary import BoundarySettings
 from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.fields import Model, Name, Number, by_form, plain, refuse
+from brachis.task.mounting_models import Placement
 from brachis.task.orientation import ToolPose
 from brachis.task.planning_models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings
 from brachis.task.point_data import FitReport
@@ -125,6 +127,15 @@ class Task(Model):
         "one of all joints, in the order of the chain (rad, m), and only its timing is planned."
     )
     path: Annotated[tuple[Segment, ...], Field(min_length=1)] = Field(description="Segments of the path, in order.")
+    frames: dict[Name, Placement] = Field(
+        default={},
+        description="Where frames such as those of workpieces are in the world: by name, {xyz: ..., rpy_deg: ...}.",
+    )
+    path_frame: Name | None = Field(
+        default=None,
+        description="The one of the frames in which path and path_start are given: points, directions, orientations. "
+        "Null: the world.",
+    )
     boundary: BoundarySettings = Field(
         default_factory=BoundarySettings, description="Speeds at both ends, or a motion that goes round for ever."
     )
@@ -166,6 +177,9 @@ class Task(Model):
                 "segments; points go through csv, spline, or brachis.fit_path(points)",
             )
             raise refuse("points are no segments", found=found, allowed=allowed)
+        if isinstance(rows, Mapping) and "frame" in rows:
+            problem = "a path is a list of segments; the frame in which it is given is a key of its own"
+            raise refuse(problem, found=rows, allowed=f"path: [...] and beside it path_frame: {rows['frame']}")
         return (path,) if isinstance(path, SegmentModel) else path
 
     @field_validator("path")
@@ -189,6 +203,23 @@ class Task(Model):
             problem = "numeric inverse kinematics needs a posture to begin with, and start is free"
             raise refuse(problem, key="search.guesses", found="numeric", allowed="lattice")
         return self
+
+    @model_validator(mode="after")
+    def _path_frame_is_known(self) -> Task:
+        if self.path_frame is not None and self.path_frame not in self.frames:
+            problem = "there is no frame of this name"
+            missing = f"frames: {{{self.path_frame}: {{xyz: [...], rpy_deg: [...]}}}} beside it"
+            allowed = ", ".join(self.frames) or missing
+            raise refuse(problem, key="path_frame", found=self.path_frame, allowed=allowed)
+        if self.path_frame is not None and self.task_space == "joints":
+            problem = "a path of joints is in no frame"
+            raise refuse(problem, key="path_frame", found=self.path_frame, allowed="null, with task_space: joints")
+        return self
+
+    @property
+    def path_placement(self) -> Placement | None:
+        """Where the frame of the path is in the world; None where it is the world."""
+        return None if self.path_frame is None else self.frames[self.path_frame]
 
     @property
     def _start_forms(self) -> str:

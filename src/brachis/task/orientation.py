@@ -1,8 +1,8 @@
 """How the tool is oriented along a segment, as the task file writes it; for task spaces of poses.
 
 ``orientation: fixed`` stands beside the segment's kind, or ``{rotate: ...}``, ``{to: ...}``, ``tangent``. A given
-orientation is that of the tool frame in the world frame, or in the path's frame, in one of the conventions of
-`brachis.cam.conventions`. Angles are in degrees where the key ends with ``_deg``, otherwise in radians.
+orientation is that of the tool frame in the frame of the path, the world unless it is another, in one of the
+conventions of `brachis.cam.conventions`. Angles are in degrees where the key ends with ``_deg``, otherwise in radians.
 """
 
 from __future__ import annotations
@@ -128,7 +128,10 @@ class Rotation(Model):
 
     axis: Direction = Field(description="Axis of the rotation, right-hand rule; any length but zero.")
     angle_deg: Number = Field(description="Angle of the rotation, degrees, signed; it may exceed a turn.")
-    frame: Literal["world", "tool"] = Field(default="world", description="Frame in which the axis is given.")
+    frame: Literal["path", "tool"] = Field(
+        default="path",
+        description="Frame in which the axis is given: that of the path (the world, or path_frame), or the tool's.",
+    )
     profile: Profile = "uniform"
 
 
@@ -137,8 +140,8 @@ class Tangent(Model):
 
     up: Direction | None = Field(
         default=None,
-        description="World direction that the tool keeps its attitude to; not along the tangent. Null: the axis of an "
-        "arc or circle, z for other segments.",
+        description="Direction, in the path's frame, that the tool keeps its attitude to; not along the tangent. Null: "
+        "the axis of an arc or circle, z for other segments.",
     )
 
 
@@ -151,7 +154,7 @@ class Rotate(Model):
 class TurnTo(Model):
     """The tool turns to an orientation, the shortest way."""
 
-    to: Target = Field(description="Orientation at the segment's end, world frame.")
+    to: Target = Field(description="Orientation at the segment's end.")
 
 
 class AlongTangent(Model):

@@ -84,7 +84,7 @@ class PointFile(Model):
     relative: Flag = Field(
         default=False,
         description="Whether the rows count from the first one, so that the path may start anywhere: displacements "
-        "along the world axes, rotations in the tool frame.",
+        "along the axes of the path's frame, rotations in the tool frame.",
     )
     orientation: OrientationWord | None = Field(
         default=None,
