@@ -87,7 +87,7 @@ def run(seed: int, folder: Path, corner: float) -> tuple[bool, tuple[str, ...]]:
         "robot": {"urdf": str(ROBOT)},
         "start": "free",
         "task_space": "pose",
-        "path": [{"csv": {"file": str(folder / "seam.csv"), "tolerance": tolerance}}],
+        "path": [{"csv": {"file": str(folder / "seam.csv"), "orientation": "rotation_vector", "tolerance": tolerance}}],
         "spline": {"intervals": 20},
         "search": {"time_limit": 300.0},
     }
@@ -116,7 +116,8 @@ def many(folder: Path, count: int = 100_000) -> bool:
     position[:, 0] += 300.0 * np.abs(t - 0.5)
     rotations = (Rotation.from_rotvec(0.3 * np.column_stack([t, t**2, 0.0 * t])) * DOWN).as_rotvec(degrees=True)
     write(folder / "many.csv", position + np.random.default_rng(0).normal(size=position.shape) * 0.02, rotations)
-    segment = {"csv": {"file": str(folder / "many.csv"), "tolerance": {"position": "0.15 mm"}}}
+    file = {"file": str(folder / "many.csv"), "orientation": "rotation_vector"}
+    segment = {"csv": {**file, "tolerance": {"position": "0.15 mm"}}}
     start = processor_time()
     task = brachis.load_task({"brachis": 1, "start": "free", "task_space": "pose", "path": [segment]})
     seconds = processor_time() - start

@@ -24,7 +24,7 @@ from brachis.path import path_of
 from brachis.robot import Robot, TaskMap, bind, dynamics
 from brachis.robot.combine import robot_for
 from brachis.task import Task, load_task
-from mixed_paths import CLOSED, SHAPES, coordinates_of, random_path
+from mixed_paths import CLOSED, SHAPES, place_of, random_path
 from mixed_robots import ROBOTS, SPATIAL, TOOLS, urdf_of
 
 STEPS = 200
@@ -111,7 +111,7 @@ def _drawn(
     if joint_path is None:
         return None
     if free_start:
-        task |= {"start": "free", "path_start": coordinates_of(task_map, motion[:1])[0].tolist()}
+        task |= {"start": "free", "path_start": place_of(task_map, motion[0])}
     if given_end:
         task["end"] = {"joints": joint_path[-1].tolist()}
     return task, joint_path

@@ -26,7 +26,7 @@ def random_path(
         chosen = np.linspace(0, last, int(rng.integers(4, 8))).astype(int)[1:]
         spline: dict[str, object] = {"through": rows[chosen].tolist()}
         if quaternions is not None:
-            spline["orientations"] = [{"quaternion": quaternions[k].tolist()} for k in chosen]
+            spline["orientations"] = [{"quaternion_wxyz": quaternions[k].tolist()} for k in chosen]
         return [{"spline": spline}]
     if shape == "csv":
         chosen = np.linspace(0, last, int(rng.integers(6, 20))).astype(int)
@@ -62,9 +62,15 @@ def coordinates_of(task_map: TaskMap, motion: np.ndarray) -> np.ndarray:
     return values
 
 
+def place_of(task_map: TaskMap, q: np.ndarray) -> object:
+    """Where the tool is in a posture, (n,), as ``path_start`` of a task."""
+    stated = coordinates_of(task_map, q[None])[0].tolist()
+    return {"position": stated[:3], "quaternion_wxyz": stated[3:]} if len(stated) == 7 else stated
+
+
 def _to(rng: np.random.Generator, quaternion: np.ndarray) -> dict[str, object]:
     """Turn to an orientation along a segment."""
-    return {"to": {"quaternion": quaternion.tolist(), "profile": str(rng.choice(["uniform", "smooth"]))}}
+    return {"to": {"quaternion_wxyz": quaternion.tolist(), "profile": str(rng.choice(["uniform", "smooth"]))}}
 
 
 def _circle(rng: np.random.Generator, start: np.ndarray, *, turning: bool) -> dict[str, object]:

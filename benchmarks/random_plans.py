@@ -345,7 +345,8 @@ def _random_path(rng: np.random.Generator, robot: Robot, joint_path: np.ndarray,
         return [{"line": {"to": corner.tolist()}, "blend": radius}, last]
     if kind == "spline":
         chosen = [16, 33, 49]
-        turned = {"orientations": [{"quaternion": quaternions[k].tolist()} for k in chosen]} if space == "pose" else {}
+        turns = [{"quaternion_wxyz": quaternions[k].tolist()} for k in chosen]
+        turned = {"orientations": turns} if space == "pose" else {}
         return [{"spline": {"through": points[chosen].tolist(), **turned}}]
     if kind == "csv":
         table = np.hstack([points, quaternions]) if space == "pose" else points
@@ -371,12 +372,13 @@ def _redundant(rng: np.random.Generator, name: str, joint_path: np.ndarray, spac
     return list(forms[int(rng.integers(0, min(2, len(forms))))].redundant_joints)
 
 
-def _coordinates(robot: Robot, q: np.ndarray, space: object) -> list[float]:
+def _coordinates(robot: Robot, q: np.ndarray, space: object) -> object:
     """Where the tool is, as a task writes it."""
     placement = robot.tool_placement(q)
     if space != "pose":
         return placement.translation[:2].tolist()
-    return [*placement.translation.tolist(), *pin.Quaternion(placement.rotation).coeffs()[[3, 0, 1, 2]].tolist()]
+    turn = pin.Quaternion(placement.rotation).coeffs().tolist()
+    return {"position": placement.translation.tolist(), "quaternion_xyzw": turn}
 
 
 def planned(

@@ -30,7 +30,7 @@ from brachis.task import (
     ToolLimits,
 )
 from brachis.task.bspline_curve import BSplineCurve
-from brachis.task.orientation import Quaternion, RollPitchYaw, Rotation, RotationVector, Tangent, ToQuaternion
+from brachis.task.orientation import Attitude, Rotation, Tangent, Target
 from brachis.task.point_data import FileUnits, FitTolerance, PointFile
 from brachis.task.segments import MovingSegment
 from brachis.task.shapes import ArcCenter, ArcVia, Circle, Helix, LineBy, LineHeading, LineTo, SplineThrough
@@ -125,6 +125,23 @@ need a `blend`.
 Coordinates are those of the rows of the task space, m, and rad for yaw. In task spaces of poses (`pose`,
 `pose_free_roll`) they are x, y, z, and `orientation` says how the tool turns.
 
+They are in the world frame, or in the frame that `path_frame` names, such as that of a workpiece. Segments, splines,
+files of points, directions, orientations and `path_start` are all in it. A workpiece that stands elsewhere is then one
+changed key; a sweep over `frames.workpiece.xyz` finds its best place. In task spaces of fewer rows than x, y, z the
+frame may only turn within these rows. Results, plots and exports are in the world frame.
+
+```yaml
+frames:
+  workpiece: {xyz: [0.6, 0.1, 0.4], rpy_deg: [0, 0, 30]}
+path_frame: workpiece
+start: free
+task_space: pose
+path_start: {position: [0, 0, 0.02], rpy_deg: [180, 0, 0]}   # 20 mm above the workpiece, the tool pointing down
+path:
+  - line: {by: [0.2, 0, 0]}                                  # along the workpiece
+    orientation: {rotate: {axis: [0, 0, 1], angle_deg: 20}}
+```
+
 With `task_space: joints` they are the positions of all joints, rad (m), in the order of the chain, and the segments
 are `line: {to: ...}`, `line: {by: ...}`, `spline`, `bspline` and `csv`; lengths along the path, those of blends too,
 are in rad (m). `docs/from_toppra.md` has an example.
@@ -139,15 +156,15 @@ moves.
 ORIENTATION = """## `orientation`
 
 In task spaces of poses every segment but `turn` may say how the tool turns along it. The tool's orientation at the
-start of a segment is the one at the end of its predecessor. Orientations are those of the tool frame in the world
-frame.
+start of a segment is the one at the end of its predecessor. Orientations are those of the tool frame in the frame of
+the path: the world, or `path_frame`.
 
 ```yaml
 task_space: pose
 path:
   - line: {by: [0.3, 0, 0]}               # the tool keeps its orientation
     blend: 0.05
-  - line: {by: [0, 0.4, 0]}               # turns by 90 degrees about the world's z axis, at rest at both ends
+  - line: {by: [0, 0.4, 0]}               # turns by 90 degrees about the path frame's z axis, at rest at both ends
     orientation: {rotate: {axis: [0, 0, 1], angle_deg: 90, profile: smooth}}
   - line: {by: [0, 0.3, 0]}               # turns, the shortest way, to an orientation
     orientation: {to: {rpy_deg: [0, 0, 45], profile: smooth}}
@@ -178,12 +195,14 @@ The orientation at the segment's start is not listed. Successive orientations mu
 task_space: pose
 path:
   - spline:
-      relative: true                      # displacements along the world axes, rotations in the tool frame
+      relative: true                      # displacements in the path's frame, rotations in the tool frame
       through: [[0.1, 0, 0], [0.2, 0.1, 0], [0.2, 0.2, 0.1]]
-      orientations: [{rpy_deg: [0, 0, 20]}, {rpy_deg: [0, 10, 60]}, {quaternion: [0.707, 0, 0, 0.707]}]
+      orientations: [{rpy_deg: [0, 0, 20]}, {rpy_deg: [0, 10, 60]}, {quaternion_xyzw: [0, 0, 0.707, 0.707]}]
 ```
 
-An orientation is written in one of three forms:
+An orientation is written in exactly one of these conventions. None is guessed: quaternions state the order of their
+numbers, and so do the angles of robots' makers, which differ. The keys hold wherever an orientation stands, in
+`path_start` too; in files of points the same words, without `_deg`, are values of `csv.orientation`.
 
 | key | meaning |
 |---|---|
@@ -198,17 +217,21 @@ are
 
 - `x,y,z`: positions; the segment's `orientation` says how the tool turns;
 - `x,y,z,qw,qx,qy,qz`: positions and unit quaternions;
-- `x,y,z,rx,ry,rz`: positions and rotation vectors.
+- `x,y,z,roll,pitch,yaw`, or `x,y,z,w,p,r` (Fanuc): positions and angles;
+- `x,y,z,rx,ry,rz`, `x,y,z,a,b,c` or `x,y,z,q1,q2,q3,q4`: positions and orientations whose meaning differs from maker to
+  maker, so that `orientation` must state it: `rotation_vector`, `rpy`, `staubli_xyz` or `fanuc_wpr` for `rx,ry,rz`;
+  `kuka_abc` or `rpy` (Mitsubishi) for `a,b,c`; `quaternion_wxyz` (ABB) or `quaternion_xyzw` for `q1` to `q4`.
 
 A column `feed` (or `f`, `speed`, `v`) may stand beside them: the speed of the tool on the way to each row. Columns are
 separated by commas, semicolons, tabs or spaces; with all but commas, decimal commas are understood. Units follow names
-(`x_mm`, `X [mm]`, `rx (deg)`, `feed_mm/min`) or are stated by `units`; lengths without a unit are in metres, angles in
-radians, and the unit of speeds must be stated. What was found out about the file is told.
+(`x_mm`, `X [mm]`, `rx (deg)`, `feed_mm/min`) or are stated by `units`; lengths without a unit are in metres, yaw and
+rotation vectors in radians; the unit of other angles and of speeds must be stated. What was found out about the file is
+told.
 
 The first row is where the segment starts, and where the path begins with `start: free` if the task has no `path_start`.
 A segment that starts elsewhere, by more than 1e-4 m or rad, is refused; with `relative: true` the rows are moved so
-that the first one is at the segment's start: displacements keep their direction in the world, rotations are those in
-the tool frame.
+that the first one is at the segment's start: displacements keep their direction in the path's frame, rotations are
+those in the tool frame.
 
 **Without a tolerance** the path passes all rows. Where successive rows have the same position, the curve would have to
 stop, and the file is refused, unless the position stands still in the whole file. Rows that are rounded or scatter so
@@ -226,7 +249,8 @@ start: free
 task_space: pose
 path:
   - csv:
-      file: seam.csv
+      file: seam.csv                      # columns x, y, z, a, b, c
+      orientation: kuka_abc
       units: {length: mm, angle: deg}
       tolerance: {position: 0.05 mm, orientation: 0.1 deg, corner: 0.5 mm}
       corner: blend
@@ -241,7 +265,7 @@ stand beside those of `tool_limits`.
 
 The file is read with the task, and becomes a `spline` or one `bspline` for every stretch between corners: a saved task
 does not need it any more. Arrays take the same way: `brachis.fit_path(points, tolerance=...)` returns the segments of a
-path along positions, 4x4 matrices, SE3 or positions with quaternions, the first one included.
+path along positions, 4x4 matrices, SE3 or positions with SciPy's rotations, the first one included.
 """
 
 
@@ -278,11 +302,10 @@ def page() -> str:
             keys = ", ".join(f"{name}: ..." for name, field in shape.model_fields.items() if field.is_required())
             parts += [f"\n### `{kind}: {{{keys}}}`\n", *rows(shape)]
     parts += [TURN, ORIENTATION.rstrip()]
-    for form in (Quaternion, RotationVector, RollPitchYaw):
-        parts += [f"| `{name}` | {field.description} |" for name, field in form.model_fields.items()]
+    parts += [f"| `{name}` | {field.description} |" for name, field in Attitude.model_fields.items()]
     parts += ["\n### `rotate: {axis: ..., angle_deg: ...}`\n", *rows(Rotation)]
-    profile = ToQuaternion.model_fields["profile"]
-    parts += ["\n### `to: {...}`\n", "One of the three forms of an orientation, and\n", *TABLE_HEAD]
+    profile = Target.model_fields["profile"]
+    parts += ["\n### `to: {...}`\n", "An orientation as above, and\n", *TABLE_HEAD]
     parts += [_row("profile", profile), "\n### `tangent: {...}`\n", *rows(Tangent), CSV.rstrip()]
     for key, model in FILES.items():
         parts += [f"\n### `csv.{key}`\n", *rows(model)]

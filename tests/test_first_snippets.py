@@ -86,14 +86,14 @@ def test_segments_are_those_of_the_task_file():
         "start": {"joints": [0.0]},
         "task_space": "pose",
         "path": [
-            {"line": {"to": [0.5, 0.0, 0.3]}, "orientation": {"to": {"quaternion": [1, 0, 0, 0]}}, "blend": 0.01},
+            {"line": {"to": [0.5, 0.0, 0.3]}, "orientation": {"to": {"quaternion_wxyz": [1, 0, 0, 0]}}, "blend": 0.01},
             {"arc": {"center": [0.4, 0.0, 0.3], "angle_deg": 90, "normal": [0, 0, 1]}},
             {"circle": {"center": [0.4, 0.0, 0.3], "turns": 2, "normal": [0, 0, 1]}},
             {"helix": {"center": [0.4, 0.0, 0.3], "pitch": 0.01, "normal": [0, 0, 1]}},
             {
                 "spline": {
                     "through": [[0.1, 0.2, 0.3], [0.2, 0.2, 0.3]],
-                    "orientations": [{"quaternion": [1, 0, 0, 0]}] * 2,
+                    "orientations": [{"quaternion_wxyz": [1, 0, 0, 0]}] * 2,
                 }
             },
         ],

@@ -421,11 +421,12 @@ def test_a_quaternion_with_its_scalar_last():
     robot = brachis.robots.iiwa14
     posture = WAYPOINTS["start"]["joints"]
     placed = robot.tool_placement(np.array(posture))
-    w, x, y, z = Rotation.from_matrix(placed.rotation).as_quat(scalar_first=True)
+    turn = Rotation.from_matrix(placed.rotation).as_quat()
+    place = {"position": placed.translation, "quaternion_wxyz": turn}
     ways = {"start": posture, "task_space": "pose", "path": brachis.Line(by=[0.0, 0.1, 0.0])}
     with pytest.raises(StartError, match="off the path") as caught:
-        brachis.plan(robot, path_start=[*placed.translation, x, y, z, w], **ways)
-    assert caught.value.hint == "The quaternion looks like x, y, z, w: w comes first"
+        brachis.plan(robot, path_start=place, **ways)
+    assert caught.value.hint == "If it is a quaternion x, y, z, w: write quaternion_xyzw"
 
 
 @pytest.mark.parametrize("angle", [1.57, 3.14, -0.785, np.pi])

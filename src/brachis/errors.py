@@ -130,6 +130,10 @@ def _restored(kind: type[BrachisError], args: tuple[object, ...], data: dict[str
     return error
 
 
+class BrachisWarning(UserWarning):
+    """Something that is allowed, and that the user should know."""
+
+
 class InputError(BrachisError):
     """The input is wrong: a file, a key, a value.
 

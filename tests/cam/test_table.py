@@ -13,9 +13,10 @@ from brachis.cam.units import Units
 from brachis.errors import TaskError
 
 
-def read(text, rows="pose", units=None):
-    table = read_table(text, "a.csv", allowed_columns(rows), lambda header, where: understood(header, where, rows))
-    return points_of(table, rows, units or Units(), "a.csv"), table.told
+def read(text, rows="pose", units=None, orientation=None):
+    allowed = allowed_columns(rows)
+    table = read_table(text, "a.csv", allowed, lambda header, where: understood(header, where, rows, orientation))
+    return points_of(table, rows, units or Units(), "a.csv", orientation), table.told
 
 
 @pytest.mark.parametrize(
@@ -43,11 +44,11 @@ def test_units_in_the_header(header):
 
 def test_units_of_the_task():
     text = "x,y,z,rx,ry,rz,f\n1,2,3,0,0,90,600\n4,5,6,0,0,45,1200\n"
-    (points, told), _ = read(text, units=Units("mm", "deg", "mm/min"))
+    (points, told), _ = read(text, units=Units("mm", "deg", "mm/min"), orientation="rotation_vector")
     np.testing.assert_allclose(points.position[1], [4e-3, 5e-3, 6e-3])
     np.testing.assert_allclose(points.turning[0], [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], atol=1e-15)
     np.testing.assert_allclose(points.speed, [0.01, 0.02])
-    assert told == ()
+    assert told == ("orientations: axis times angle",)
     assert points.rows.tolist() == [2, 3]
 
 
@@ -86,7 +87,7 @@ def test_the_example_is_read_as_it_is_written(tmp_path):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     module.write(tmp_path / "seam.csv")
-    (points, _), told = read((tmp_path / "seam.csv").read_text(encoding="utf-8"))
+    (points, _), told = read((tmp_path / "seam.csv").read_text(encoding="utf-8"), orientation="rotation_vector")
     rows = module.seam()
     np.testing.assert_allclose(points.position, rows[:, :3] / 1e3, atol=5.1e-8)
     np.testing.assert_allclose(points.speed, rows[:, 6] / 6e4)

@@ -35,7 +35,12 @@ def test_the_suffix_says_the_format_unless_it_is_named(run, saved, tmp_path):
 
 def test_some_joints(run, saved, tmp_path):
     assert run("export", saved, "--out", tmp_path / "motion.csv", "--dt", 0.5, "--joints", "j3, j1").code == 0
-    assert (tmp_path / "motion.csv").read_text().startswith("t,q_j3,q_j1,qd_j3")
+    first, header = (tmp_path / "motion.csv").read_text().splitlines()[:2]
+    assert header.startswith("t,q_j3,q_j1,qd_j3")
+    assert first.startswith("# brachis: joint j2 moves by ")
+    outcome = run("export", saved, "--out", tmp_path / "motion.csv", "--dt", 0.5, "--joints", "j3, j1")
+    assert outcome.code == 0  # over a file of its own
+    assert "brachis: warning: joint j2 moves by " in outcome.err
     outcome = run("export", saved, "--out", tmp_path / "motion.csv", "--joints", "j4")
     assert outcome.code == 2
     assert "there is no joint named 'j4'" in outcome.err

@@ -151,7 +151,7 @@ def test_free_roll_and_unknown_words(run):
 def test_where_the_tool_is(run):
     urdf = ROOT / "robots/tx90l_rail/robot.urdf"
     remark = json.loads(run("inspect", urdf, "--posture", "0, 0, 0, 0, 0, 0, 0", "--json").out)["remarks"][-1]
-    assert remark == "tool at [0.05, 0.05, 1.628] m, quaternion w, x, y, z [1, 0, 0, 0]"
+    assert remark == "the tool is at {position: [0.05, 0.05, 1.628], quaternion_wxyz: [1, 0, 0, 0]}, m"
     assert run("inspect", urdf, "--posture", "0 0").code == 2
     assert "--posture" in run("inspect", urdf, "--posture", "a").err
 

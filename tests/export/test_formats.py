@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import jsonschema
 import numpy as np
@@ -16,7 +17,7 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_typestore
 
 from brachis import export
-from brachis.errors import InputError, UnknownNameError
+from brachis.errors import BrachisWarning, InputError, UnknownNameError
 from brachis.export.frames import frame_times, frames
 from brachis.robot import Robot
 from brachis.trajectory import Trajectory
@@ -53,7 +54,7 @@ def test_parquet(line_trajectory, written):
     parts = (np.column_stack([frame[f"{kind}_{name}"] for name in NAMES]) for kind in ("q", "qd", "qdd"))
     equals_the_motion(line_trajectory, frame["t"], *parts)
     about = json.loads(table.schema.metadata[b"brachis"])
-    assert about == {"joints": dict.fromkeys(NAMES, "rad"), "t_end_s": line_trajectory.t_end}
+    assert about == {"joints": dict.fromkeys(NAMES, "rad"), "t_end_s": line_trajectory.t_end, "left_out": []}
 
 
 def test_json_names_its_schema_and_fulfils_it(line_trajectory, written):
@@ -132,7 +133,7 @@ def ur10(line_trajectory):
     from pathlib import Path  # noqa: PLC0415
 
     robot = Robot.from_urdf(Path(__file__).parents[2] / "robots/ur10_rail/robot.urdf")
-    times, q = np.array([0.0, 1.0]), np.array([np.zeros(7), np.linspace(0.1, 0.7, 7)])
+    times, q = np.array([0.0, 1.0]), np.array([np.zeros(7), np.linspace(0.6, 0.7, 7)])
     rest = np.zeros((2, 7))
     parts = {name: getattr(line_trajectory, name) for name in ("task", "knots", "degree", "control_points")}
     parts |= {"urdf": robot.urdf, "robot": robot, "redundant_joints": (), "branch": "", "times": times, "q": q}
@@ -144,7 +145,8 @@ def test_urscript(ur10, tmp_path):
     path, joints = tmp_path / "motion.script", ur10.joint_names[1:]
     with pytest.raises(InputError, match=r"six joints; found rail \(m\), .*Name the arm's six"):
         export.write(ur10, path)
-    export.write(ur10, path, joints=joints, dt=0.008)
+    with pytest.warns(BrachisWarning, match="rail"):
+        export.write(ur10, path, joints=joints, dt=0.008)
     text = path.read_text()
     postures = [json.loads(found) for found in re.findall(r"servoj\((\[.*?\])", text)]
     times = [float(found) for found in re.findall(r"servoj\(\[.*?\], 0, 0, ([0-9.e-]+),", text)]
@@ -153,6 +155,45 @@ def test_urscript(ur10, tmp_path):
     (start,) = re.findall(r"start = (\[.*\])", text)
     np.testing.assert_array_equal(json.loads(start), ur10.q[0, 1:])
     assert [line.split()[0] for line in text.splitlines()].count("end") == 3  # of def, while and if
+
+
+SENTENCE = "joint rail moves by 0.6 m (0 to 0.6 m) and is not in this file"
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".json", ".yaml", ".script"])
+def test_a_rail_that_moves_and_is_left_out_is_warned_of_and_named_in_the_file(ur10, tmp_path, suffix):
+    path = tmp_path / f"motion{suffix}"
+    with pytest.warns(BrachisWarning) as caught:
+        export.write(ur10, path, joints=ur10.joint_names[1:], dt=0.1)
+    (warning,) = caught
+    assert str(warning.message).startswith(f"{SENTENCE}. Move it by its own controller")
+    text = path.read_text()
+    if suffix == ".json":
+        content = json.loads(text)
+        assert content["warnings"] == [SENTENCE]
+        jsonschema.validate(content, export.samples_schema())
+    else:
+        (line,) = [line for line in text.splitlines() if SENTENCE in line]
+        assert line.lstrip().startswith("# ")
+
+
+def test_metadata_name_a_rail_that_is_left_out(ur10, tmp_path):
+    from mcap.reader import make_reader  # noqa: PLC0415
+
+    for suffix in (".parquet", ".mcap"):
+        with pytest.warns(BrachisWarning):
+            export.write(ur10, tmp_path / f"motion{suffix}", joints=ur10.joint_names[1:], dt=0.1)
+    table = pyarrow.parquet.read_table(tmp_path / "motion.parquet")
+    assert json.loads(table.schema.metadata[b"brachis"])["left_out"] == [SENTENCE]
+    with (tmp_path / "motion.mcap").open("rb") as stream:
+        (record,) = make_reader(stream).iter_metadata()
+    assert (record.name, record.metadata) == ("brachis", {"left_out": SENTENCE})
+
+
+def test_a_joint_that_stands_still_may_be_left_out_without_a_word(ur10, tmp_path):
+    still = replace(ur10, q=np.where(np.arange(7) == 0, 0.3, ur10.q))
+    export.write(still, tmp_path / "motion.csv", joints=still.joint_names[1:], dt=0.1)
+    assert (tmp_path / "motion.csv").read_text().startswith("t,q_shoulder_pan_joint")
 
 
 def test_gif(line_trajectory, written):
@@ -209,8 +250,9 @@ def test_without_its_library_a_format_is_refused(line_trajectory, tmp_path, monk
 
 
 def test_some_joints_in_an_order_of_ones_own(line_trajectory, tmp_path):
-    export.write(line_trajectory, tmp_path / "motion.csv", joints=["j3", "j1"], dt=0.5)
-    header, first, *_ = (tmp_path / "motion.csv").read_text().splitlines()
+    with pytest.warns(BrachisWarning, match="joint j2 moves by"):
+        export.write(line_trajectory, tmp_path / "motion.csv", joints=["j3", "j1"], dt=0.5)
+    _, header, first, *_ = (tmp_path / "motion.csv").read_text().splitlines()
     assert header == "t,q_j3,q_j1,qd_j3,qd_j1,qdd_j3,qdd_j1,tau_j3,tau_j1"
     assert [float(cell) for cell in first.split(",")[1:3]] == line_trajectory.q[0, [2, 0]].tolist()
     with pytest.raises(UnknownNameError, match="there is no joint named 'j4'"):

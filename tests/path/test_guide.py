@@ -20,7 +20,7 @@ EXAMPLES = [text for text in SNIPPETS if "path" in yaml.safe_load(text)]
 
 
 def test_there_are_examples() -> None:
-    assert len(EXAMPLES) == 3
+    assert len(EXAMPLES) == 4
 
 
 def test_the_curve_of_a_data_sheet_is_taken() -> None:
@@ -37,9 +37,9 @@ def test_examples_are_paths(example: str, tmp_path: Path, monkeypatch: pytest.Mo
     content = yaml.safe_load(example)
     start = np.zeros(3)
     if "csv" in content["path"][0]:
-        degrees = np.linspace(0.0, 20.0, 200)[:, None] * [0.0, 0.0, 1.0]
+        degrees = np.linspace(0.0, 20.0, 200)[:, None] * [1.0, 0.0, 0.0]
         rows, start = np.hstack([1e3 * wave(200), degrees]), wave(200)[0]
-        np.savetxt("seam.csv", rows, header="x,y,z,rx,ry,rz", delimiter=",", comments="")
+        np.savetxt("seam.csv", rows, header="x,y,z,a,b,c", delimiter=",", comments="")
     assert content["task_space"] == "pose"
     path = pose_path(content["path"], start, Rotation.identity())
     assert np.abs(path.sample([0.0, 0.5, 1.0]).xi[:, 3:]).max() > 0.1

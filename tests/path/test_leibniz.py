@@ -18,7 +18,7 @@ from brachis.path.rotations import (
     rotation_of,
 )
 from brachis.path.sampling import smallest
-from brachis.task import Quaternion, RollPitchYaw, RotationVector
+from brachis.task import Attitude
 
 ORDER = 4
 SIGMA = np.linspace(-1, 1, 7)
@@ -91,10 +91,10 @@ def test_orientations_of_a_task():
     expected = expected * Rotation.from_rotvec([np.deg2rad(10), 0, 0])
     quaternion = quaternions_of(expected)
     for attitude, tolerance in (
-        (RollPitchYaw(rpy_deg=(10, 20, 30)), 1e-15),
-        (RotationVector(rotation_vector=tuple(expected.as_rotvec())), 1e-15),
-        (Quaternion(quaternion=tuple(quaternion)), 1e-15),
-        (Quaternion(quaternion=tuple(np.round(quaternion, 3))), 2e-3),
+        (Attitude(rpy_deg=(10, 20, 30)), 1e-15),
+        (Attitude(rotation_vector=tuple(expected.as_rotvec())), 1e-15),
+        (Attitude(quaternion_wxyz=tuple(quaternion)), 1e-15),
+        (Attitude(quaternion_wxyz=tuple(np.round(quaternion, 3))), 2e-3),
     ):
         assert (rotation_from(attitude).inv() * expected).magnitude() < tolerance
         assert np.linalg.norm(quaternions_of(rotation_from(attitude))) == pytest.approx(1.0, abs=1e-15)

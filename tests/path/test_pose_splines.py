@@ -22,7 +22,7 @@ for one_step in STEPS:
 def written(attitude: Rotation, form: int = 0) -> dict[str, Any]:
     """An orientation in one of the forms of a task."""
     if form == 0:
-        return {"quaternion": -np.roll(attitude.as_quat(), 1)}
+        return {"quaternion_wxyz": -np.roll(attitude.as_quat(), 1)}
     return (
         {"rotation_vector": attitude.as_rotvec()} if form == 1 else {"rpy_deg": attitude.as_euler("xyz", degrees=True)}
     )

@@ -30,7 +30,11 @@ ALONG: dict[str, Any] = {"line": {"by": [0.6, 0, 0.3]}}
 SPLINE: dict[str, Any] = {"spline": {"through": [[0.6, 0.3, 0.2], [0.9, 0.4, 0.4], [1.1, 0.8, 0.3]]}}
 CIRCLE: dict[str, Any] = {"circle": {"center": [0.2, 0.1, 0.3], "normal": [0, 1, 1], "turns": -1.25}}
 VIA: dict[str, Any] = {"arc": {"via": [0.7, 0.3, 0.3], "to": [0.9, 0.2, 0.5]}}
-ATTITUDES = [{"rpy_deg": [20, 40, 60]}, {"rotation_vector": [0.2, 0.9, 1.5]}, {"quaternion": [-0.5, 0.5, -0.5, -0.5]}]
+ATTITUDES = [
+    {"rpy_deg": [20, 40, 60]},
+    {"rotation_vector": [0.2, 0.9, 1.5]},
+    {"quaternion_wxyz": [-0.5, 0.5, -0.5, -0.5]},
+]
 
 SEGMENTS: dict[str, list[dict[str, Any]]] = {
     "fixed": [ALONG],
@@ -152,15 +156,15 @@ def test_a_fixed_orientation_has_no_turning() -> None:
     np.testing.assert_allclose(sample.xi_ds, 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("frame", ["world", "tool"])
+@pytest.mark.parametrize("frame", ["path", "tool"])
 def test_a_rotation_has_a_constant_angular_velocity(frame: str) -> None:
     axis = np.array([1.0, 2.0, -2.0]) / 3
     orientation = {"rotate": {"axis": 5 * axis, "angle_deg": -400, "frame": frame}}
     sample = pose_path([ALONG | {"orientation": orientation}]).sample(np.linspace(0, 1, 30))
-    in_tool = TURNED.inv().apply(axis) if frame == "world" else axis
+    in_tool = TURNED.inv().apply(axis) if frame == "path" else axis
     np.testing.assert_allclose(sample.xi[:, 3:], np.broadcast_to(-np.deg2rad(400) * in_tool, (30, 3)), atol=1e-12)
     turned = Rotation.from_rotvec(-np.deg2rad(400) * axis)
-    expected = turned * TURNED if frame == "world" else TURNED * turned
+    expected = turned * TURNED if frame == "path" else TURNED * turned
     np.testing.assert_allclose(sample.target[-1, 3:], expected.as_matrix().ravel(), atol=1e-12)
 
 

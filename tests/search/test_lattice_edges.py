@@ -64,7 +64,7 @@ def test_a_free_start_on_a_long_rail(reach):
     task = rail_task(start="free", redundant_joints=["rail"])
     placement = robot.tool_placement(robot.posture([0, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1], "start"))
     x, y, z = placement.translation
-    task["path_start"] = [x, y + 20.0, z, *_quaternion(placement.rotation)]
+    task["path_start"] = {"position": [x, y + 20.0, z], "quaternion_wxyz": _quaternion(placement.rotation)}
     task["path"] = [{"line": {"by": [0.0, 0.8, 0.0]}}]
     task["robot"]["limits"]["position"] = {"rail": reach}
     given = Problem.of(robot_from_settings(brachis.load_task(task).robot), brachis.load_task(task))
@@ -132,7 +132,10 @@ def back_from(end: np.ndarray, robot: brachis.Robot, by: list[float]) -> dict[st
     placement = robot.tool_placement(end)
     return {
         "start": "free",
-        "path_start": [*(placement.translation - by), *_quaternion(placement.rotation)],
+        "path_start": {
+            "position": (placement.translation - by).tolist(),
+            "quaternion_wxyz": _quaternion(placement.rotation),
+        },
         "end": {"joints": end.tolist()},
         "path": [{"line": {"by": by}}],
         "redundant_joints": "auto",

@@ -157,12 +157,12 @@ def test_a_free_start_of_seven_joints_is_as_good_as_the_best_branch():
     assert len({tuple(np.sign(joint_path.q[0, [1, 3, 5]])) for joint_path in found}) > 1
 
 
-def pose_of(robot: brachis.Robot, q: Any) -> list[float]:
+def pose_of(robot: brachis.Robot, q: Any) -> dict[str, list[float]]:
     from scipy.spatial.transform import Rotation  # noqa: PLC0415
 
     placement = robot.tool_placement(np.array(q, dtype=float))
-    x, y, z, w = Rotation.from_matrix(placement.rotation).as_quat()
-    return [*placement.translation, w, x, y, z]
+    turn = Rotation.from_matrix(placement.rotation).as_quat()
+    return {"position": placement.translation.tolist(), "quaternion_xyzw": turn.tolist()}
 
 
 CIRCLE = [{"circle": {"center": [0.0, 0.0], "turns": 1}}]
@@ -225,8 +225,9 @@ def test_back_from_a_given_end_in_its_own_turns(turned):
     for joint, turns in turned.items():
         end[robot.joint_names.index(joint)] += TURN * turns
     by = np.array([0.0, 0.4, 0.0])
-    x, y, z, *quaternion = pose_of(robot, end)
-    path = {"start": "free", "path_start": [*(np.array([x, y, z]) - by), *quaternion], "path": [{"line": {"by": by}}]}
+    place = pose_of(robot, end)
+    place["position"] = (np.array(place["position"]) - by).tolist()
+    path = {"start": "free", "path_start": place, "path": [{"line": {"by": by}}]}
     task |= path | {"end": {"joints": end.tolist()}, "redundant_joints": "auto", "branch": "auto"}
     joint_paths = lengthened(Problem.of(robot, brachis.load_task(task)))
     assert joint_paths

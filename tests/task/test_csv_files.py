@@ -14,7 +14,7 @@ from brachis.errors import PathError, TaskError
 from brachis.path import Path as TaskPath
 from brachis.path import build_path
 from brachis.robot.task_map.rows import POSE_ROWS
-from brachis.task import CsvSegment, Quaternion, SplineSegment, SplineThrough, Task, load_task
+from brachis.task import CsvSegment, SplineSegment, SplineThrough, Task, load_task
 from support.poses import pose
 
 TURNS = Rotation.from_rotvec([[0.1, 0.2, 0.3], [0.2, 0.2, 0.9], [0.5, 0.1, 1.2], [0.9, 0, 1.2]])
@@ -52,27 +52,27 @@ def test_quaternions() -> None:
     write("x,y,z,qw,qx,qy,qz", np.hstack([POINTS, QUATERNIONS]))
     spline = spline_of(task())
     assert spline.through == tuple(map(tuple, POINTS[1:].tolist()))
-    given = [one.quaternion for one in spline.orientations or () if isinstance(one, Quaternion)]
+    given = [one.quaternion_wxyz for one in spline.orientations or ()]
     np.testing.assert_allclose(given, QUATERNIONS[1:], atol=1e-15)
     assert spline.starts_at == tuple(POINTS[0].tolist())
-    assert isinstance(spline.starts_oriented, Quaternion)
-    np.testing.assert_allclose(spline.starts_oriented.quaternion, QUATERNIONS[0], atol=1e-15)
+    assert spline.starts_oriented is not None
+    np.testing.assert_allclose(spline.starts_oriented.quaternion_wxyz, QUATERNIONS[0], atol=1e-15)
     assert not spline.relative
 
 
 def test_rotation_vectors_in_any_order_of_columns() -> None:
     write("rz,ry,rx,z,y,x", np.hstack([POINTS, TURNS.as_rotvec()])[:, ::-1])
-    spline = spline_of(task("pose_free_roll"))
+    spline = spline_of(task("pose_free_roll", orientation="rotation_vector"))
     assert spline.through == tuple(map(tuple, POINTS[1:].tolist()))
-    assert isinstance(spline.starts_oriented, Quaternion)
-    np.testing.assert_allclose(spline.starts_oriented.quaternion, QUATERNIONS[0], atol=1e-15)
+    assert spline.starts_oriented is not None
+    np.testing.assert_allclose(spline.starts_oriented.quaternion_wxyz, QUATERNIONS[0], atol=1e-15)
 
 
 def test_both_forms_give_the_same_path() -> None:
     write("x,y,z,qw,qx,qy,qz", np.hstack([POINTS, -QUATERNIONS]))
     one = path_of(task(), POINTS[0], TURNS[0])
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
-    other = path_of(task(), POINTS[0], TURNS[0])
+    other = path_of(task(orientation="rotation_vector"), POINTS[0], TURNS[0])
     np.testing.assert_allclose(one.sample(S).target, other.sample(S).target, atol=1e-12)
     np.testing.assert_allclose(one.sample([1.0]).target[0], pose(POINTS[-1], TURNS[-1]), atol=1e-12)
 
@@ -102,9 +102,10 @@ def test_rows(rows: Any) -> None:
 
 def test_relative_rows_start_anywhere() -> None:
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
-    recorded = path_of(task(), POINTS[0], TURNS[0]).sample(S).target
+    vectors = {"orientation": "rotation_vector"}
+    recorded = path_of(task(**vectors), POINTS[0], TURNS[0]).sample(S).target
     start, turn = np.array([3.0, 2.0, 1.0]), Rotation.from_rotvec([1.0, -0.4, 0.2])
-    moved = path_of(task(relative=True), start, turn).sample(S).target
+    moved = path_of(task(relative=True, **vectors), start, turn).sample(S).target
     np.testing.assert_allclose(moved[:, :3], recorded[:, :3] - POINTS[0] + start, atol=1e-12)
     change = turn * TURNS[0].inv()
     expected = change.as_matrix() @ recorded[:, 3:].reshape(-1, 3, 3)
@@ -114,9 +115,9 @@ def test_relative_rows_start_anywhere() -> None:
 def test_a_start_elsewhere_is_told_by_how_much() -> None:
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
     with pytest.raises(PathError, match=r"starts_at: .*0.02 m off; allowed: at most 0.0001 m .*relative: true"):
-        path_of(task(), POINTS[0] + [0, 0.02, 0], TURNS[0])
+        path_of(task(orientation="rotation_vector"), POINTS[0] + [0, 0.02, 0], TURNS[0])
     with pytest.raises(PathError, match=r"starts_oriented: .* 0.3 rad off"):
-        path_of(task(), POINTS[0], TURNS[0] * Rotation.from_rotvec([0, 0.3, 0]))
+        path_of(task(orientation="rotation_vector"), POINTS[0], TURNS[0] * Rotation.from_rotvec([0, 0.3, 0]))
 
 
 @pytest.mark.parametrize("relative", [True, False])
@@ -150,7 +151,7 @@ def test_what_spreadsheets_write_is_read() -> None:
 
 def test_poses_on_the_spot() -> None:
     write("x,y,z,rx,ry,rz", np.hstack([POINTS[[0, 0, 0, 0]], TURNS.as_rotvec()]))
-    sample = path_of(task(), POINTS[0], TURNS[0]).sample([0.0, 1.0])
+    sample = path_of(task(orientation="rotation_vector"), POINTS[0], TURNS[0]).sample([0.0, 1.0])
     np.testing.assert_allclose(sample.target[1], pose(POINTS[0], TURNS[-1]), atol=1e-12)
 
 
@@ -162,7 +163,7 @@ def test_a_task_that_is_not_loaded_keeps_the_file() -> None:
 
 
 MISTAKES: list[tuple[str, list[str]]] = [
-    ("", ["poses.csv: the file is empty; allowed: x,y,z | x,y,z,qw,qx,qy,qz | x,y,z,rx,ry,rz"]),
+    ("", ["poses.csv: the file is empty; allowed: x,y,z | x,y,z,qw,qx,qy,qz | x,y,z,q1,q2,q3,q4 | x,y,z,rx,ry,rz"]),
     ("# nothing\n\n", ["poses.csv: the file is empty"]),
     ("x,y\n0,0\n1,1", ["poses.csv: line 1: wrong columns; found x, y; allowed: x,y,z | x,y,z,qw"]),
     ("t,x,y,z\n0,0,0,0", ["line 1: wrong columns; found t, x, y, z", "The first line names the columns"]),
@@ -191,8 +192,9 @@ MISTAKES: list[tuple[str, list[str]]] = [
 @pytest.mark.parametrize(("content", "expected"), MISTAKES, ids=[content[:40] for content, _ in MISTAKES])
 def test_wrong_files(content: str, expected: list[str]) -> None:
     Path("poses.csv").write_text(content, encoding="utf-8")
+    vectors = {"orientation": "rotation_vector"} if "rx" in content else {}
     with pytest.raises(TaskError) as caught:
-        task()
+        task(**vectors)
     assert str(caught.value).startswith(str(Path("poses.csv").absolute()))
     for text in expected:
         assert text in str(caught.value)
@@ -218,6 +220,64 @@ def test_unreadable_files() -> None:
 
 def test_one_word_on_the_orientation() -> None:
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
-    segment = {"csv": {"file": "poses.csv"}, "orientation": "fixed"}
+    segment = {"csv": {"file": "poses.csv", "orientation": "rotation_vector"}, "orientation": "fixed"}
     with pytest.raises(TaskError, match=r"path\[0\].orientation: the points' orientations say already"):
         load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": "pose", "path": [segment]})
+
+
+EULER = {
+    "kuka_abc": ("a,b,c", "ZYX"),
+    "staubli_xyz": ("rx,ry,rz", "XYZ"),
+    "fanuc_wpr": ("w,p,r", "xyz"),
+    "rpy": ("rx,ry,rz", "xyz"),
+}
+
+
+@pytest.mark.parametrize("convention", EULER)
+def test_angles_of_the_makers_are_read(convention: str) -> None:
+    columns, axes = EULER[convention]
+    header = "x,y,z," + ",".join(f"{name}_deg" for name in columns.split(","))
+    write(header, np.hstack([POINTS, TURNS.as_euler(axes, degrees=True)]))
+    spline = spline_of(task(orientation=convention))
+    turns = [one.quaternion_wxyz for one in (spline.starts_oriented, *(spline.orientations or ())) if one is not None]
+    np.testing.assert_allclose(turns, QUATERNIONS, atol=1e-12)
+
+
+def test_quaternions_of_numbered_columns() -> None:
+    write("x,y,z,q1,q2,q3,q4", np.hstack([POINTS, QUATERNIONS]))
+    with pytest.raises(TaskError, match=r"q1, q2, q3, q4 do not say .* quaternion_wxyz \(quaternion, w first: ABB"):
+        task()
+    given = spline_of(task(orientation="quaternion_wxyz")).starts_oriented
+    write("x,y,z,q1,q2,q3,q4", np.hstack([POINTS, TURNS.as_quat()]))
+    assert given == spline_of(task(orientation="quaternion_xyzw")).starts_oriented
+    assert given is not None
+    np.testing.assert_allclose(given.quaternion_wxyz, QUATERNIONS[0], atol=1e-15)
+
+
+AMBIGUOUS = [
+    (
+        "x,y,z,rx,ry,rz",
+        {},
+        ["line 1: the columns rx, ry, rz do not say how", "rotation_vector (axis times angle: Universal"],
+    ),
+    ("x,y,z,rx_deg,ry_deg,rz_deg", {}, ["staubli_xyz (Rx about x", "orientation: rotation_vector}"]),
+    ("x,y,z,a,b,c", {}, ["kuka_abc (A about z, B about the new y", "rpy (roll, pitch, yaw about the fixed x"]),
+    ("x,y,z,a,b,c", {"orientation": "kuka_abc"}, ["the unit of a is not stated", "Write a_deg in the header"]),
+    ("x,y,z,rx,ry,rz", {"orientation": "kuka_abc"}, ["csv.orientation is kuka_abc", "columns a, b, c for kuka_abc"]),
+    ("x,y,z,w,p,r", {"orientation": "rpy"}, ["columns rx, ry, rz | a, b, c | roll, pitch, yaw for rpy"]),
+    ("x,y,z", {"orientation": "rpy"}, ["csv.orientation is rpy, which the columns", "Leave csv.orientation away"]),
+    (
+        "x,y,z",
+        {"orientation": "kuka"},
+        ["csv.orientation: this convention of an orientation is not known", "kuka_abc (A"],
+    ),
+]
+
+
+@pytest.mark.parametrize(("header", "keys", "expected"), AMBIGUOUS, ids=str)
+def test_orientations_that_are_left_open(header: str, keys: dict[str, str], expected: list[str]) -> None:
+    write(header, np.arange(2.0 * len(header.split(","))).reshape(2, -1))
+    with pytest.raises(TaskError) as caught:
+        task(**keys)
+    for text in expected:
+        assert text in str(caught.value)

@@ -6,28 +6,32 @@ import json
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
+from scipy.spatial.transform import Rotation as SciPyRotation
 
+import brachis
 from brachis.errors import TaskError
 from brachis.task import (
     AlongTangent,
+    Attitude,
     LineSegment,
-    Quaternion,
     Rotate,
     Rotation,
     SplineSegment,
     Tangent,
+    Target,
     Task,
-    ToRollPitchYaw,
     TurnSegment,
     TurnTo,
     json_schema,
     load_task,
+    task_with,
 )
 
 LINE: dict[str, Any] = {"line": {"to": [1, 0, 0]}}
 ROTATE: dict[str, Any] = {"rotate": {"axis": [0, 0, 2], "angle_deg": 90}}
-QUATERNION: dict[str, Any] = {"quaternion": [0.6, 0, 0, -0.8]}
+QUATERNION: dict[str, Any] = {"quaternion_wxyz": [0.6, 0, 0, -0.8]}
 SPLINE: dict[str, Any] = {"through": [[1, 0, 0], [1, 1, 0]], "orientations": [QUATERNION, {"rpy_deg": [1, 2, 3]}]}
 
 
@@ -80,14 +84,14 @@ def test_a_task_may_be_made_of_models() -> None:
     spline = task({"spline": SPLINE}).path[0]
     assert isinstance(spline, SplineSegment)
     assert spline.spline.orientations is not None
-    assert spline.spline.orientations[0] == Quaternion(quaternion=(0.6, 0, 0, -0.8))
+    assert spline.spline.orientations[0] == Attitude(quaternion_wxyz=(0.6, 0, 0, -0.8))
 
 
 def test_defaults() -> None:
     assert task(LINE).path[0] == LineSegment(line={"to": (1, 0, 0)}, orientation=None)  # type: ignore[arg-type]
     rotation = Rotation(axis=(0, 0, 1), angle_deg=1)
-    assert (rotation.frame, rotation.profile) == ("world", "uniform")
-    assert TurnTo(to=ToRollPitchYaw(rpy_deg=(0, 0, 1))).to.profile == "uniform"
+    assert (rotation.frame, rotation.profile) == ("path", "uniform")
+    assert TurnTo(to=Target(rpy_deg=(0, 0, 1))).to.profile == "uniform"
     assert [segment.kind for segment in task(LINE | {"orientation": "fixed"}, {"turn": ROTATE}).path] == [
         "line",
         "turn",
@@ -117,21 +121,35 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     (LINE | {"orientation": {"rotate": {"axis": [1, 0], "angle_deg": 9}}}, ["rotate.axis[2]: the list is too short"]),
     (
         LINE | {"orientation": {"rotate": ROTATE["rotate"] | {"frame": "base"}}},
-        ["path[0].orientation.rotate.frame: not one of the allowed values; found 'base'", "'world' or 'tool'"],
+        ["path[0].orientation.rotate.frame: not one of the allowed values; found 'base'", "'path' or 'tool'"],
     ),
     (
         LINE | {"orientation": {"rotate": ROTATE["rotate"] | {"profile": "linear"}}},
         ["path[0].orientation.rotate.profile: ", "'uniform' or 'smooth'"],
     ),
-    (LINE | {"orientation": {"to": {"rpy": [0, 0, 0]}}}, ["path[0].orientation.to: ", "Did you mean 'rpy_deg'?"]),
+    (
+        LINE | {"orientation": {"to": {"rpy": [0, 0, 0]}}},
+        ["path[0].orientation.to: ", "the keys rpy; allowed: ", "rpy_deg (roll"],
+    ),
+    (
+        LINE | {"orientation": {"to": {"quaternion": [1, 0, 0, 0]}}},
+        [
+            "path[0].orientation.to: an orientation needs exactly one convention",
+            "quaternion_xyzw (quaternion, w last: ROS",
+        ],
+    ),
+    (
+        LINE | {"orientation": {"to": QUATERNION | {"rpy_deg": [0, 0, 0]}}},
+        ["orientation.to: an orientation needs exactly one convention", "the keys quaternion_wxyz, rpy_deg"],
+    ),
     (
         LINE | {"orientation": {"to": [0, 0, 0]}},
         ["path[0].orientation.to: an orientation needs exactly one", "(a list)"],
     ),
-    (LINE | {"orientation": {"to": {"quaternion": [1, 0, 0]}}}, ["to.quaternion[3]: the list is too short"]),
+    (LINE | {"orientation": {"to": {"quaternion_xyzw": [1, 0, 0]}}}, ["to.quaternion_xyzw[3]: the list is too short"]),
     (
-        LINE | {"orientation": {"to": {"quaternion": [1, 0, 0, 1]}}},
-        ["path[0].orientation.to.quaternion: the quaternion's length is 1.41421; found [1.0, 0.0, 0.0, 1.0]"],
+        LINE | {"orientation": {"to": {"quaternion_wxyz": [1, 0, 0, 1]}}},
+        ["path[0].orientation.to.quaternion_wxyz: the quaternion's length is 1.41421; found [1.0, 0.0, 0.0, 1.0]"],
     ),
     (LINE | {"orientation": {"to": QUATERNION | {"frame": "tool"}}}, ["orientation.to.frame: unknown key", "profile"]),
     (LINE | {"orientation": {"tangent": {"up": [0, 0, 0]}}}, ["orientation.tangent.up: a direction cannot have zero"]),
@@ -144,8 +162,8 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
         ["path[0].spline.orientations: a spline needs an orientation for each", "found 1; allowed: 2"],
     ),
     (
-        {"spline": SPLINE | {"orientations": [QUATERNION, {"quaternion": [2, 0, 0, 0]}]}},
-        ["path[0].spline.orientations[1].quaternion: the quaternion's length is 2"],
+        {"spline": SPLINE | {"orientations": [QUATERNION, {"quaternion_wxyz": [2, 0, 0, 0]}]}},
+        ["path[0].spline.orientations[1].quaternion_wxyz: the quaternion's length is 2"],
     ),
     (
         {"spline": {"through": [[1, 0, 0]], "starts_oriented": QUATERNION}},
@@ -167,3 +185,57 @@ def test_every_mistake_is_named(segment: dict[str, Any], expected: list[str]) ->
     assert "mistakes" not in message, "one mistake, one complaint"
     for text in expected:
         assert text in message
+
+
+def free(path_start: Any, space: Any = "pose") -> Task:
+    return load_task(written(LINE, space=space) | {"start": "free", "path_start": path_start})
+
+
+def test_a_path_may_start_at_a_pose_in_any_convention() -> None:
+    turn = SciPyRotation.from_euler("xyz", [20, -35, 110], degrees=True)
+    forms = {
+        "quaternion_wxyz": np.roll(turn.as_quat(), 1),
+        "quaternion_xyzw": turn.as_quat(),
+        "rotation_vector": turn.as_rotvec(),
+        "rpy_deg": [20, -35, 110],
+        "kuka_abc_deg": turn.as_euler("ZYX", degrees=True),
+        "staubli_xyz_deg": turn.as_euler("XYZ", degrees=True),
+        "fanuc_wpr_deg": [20, -35, 110],
+    }
+    space = brachis.task_map_of(brachis.robots.iiwa14, "pose")
+    for key, values in forms.items():
+        task = free({"position": [1, 2, 3], key: values})
+        assert load_task(json.loads(json.dumps(task.to_dict()))) == task
+        assert task.path_start is not None
+        found = space.read(task.path_start, "path_start")
+        np.testing.assert_allclose(found, [1, 2, 3, *turn.as_matrix().ravel()], atol=1e-14)
+
+
+def test_a_program_gives_the_start_of_a_path_as_a_transform() -> None:
+    placement = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.array([1.0, 2.0, 3.0]))
+    task = task_with(path=brachis.Line(by=[0, 0.1, 0]), start="free", path_start=placement, task_space="pose")
+    assert task.path_start is not None
+    found = brachis.task_map_of(brachis.robots.iiwa14, "pose").read(task.path_start, "path_start")
+    np.testing.assert_allclose(found, [1, 2, 3, *placement.rotation.ravel()], atol=1e-14)
+
+
+WRONG_STARTS: list[tuple[Any, Any, list[str]]] = [
+    (
+        [1, 2, 3, 1, 0, 0, 0],
+        "pose",
+        ["path_start: a list does not say what", "quaternion_xyzw (quaternion, w last: ROS"],
+    ),
+    ({"position": [1, 2, 3]}, "pose", ["path_start: an orientation needs exactly one convention", "kuka_abc_deg (A"]),
+    ({"rpy_deg": [1, 2, 3]}, "pose_free_roll", ["path_start.position: this key is required"]),
+    ({"position": [1, 2, 3], "rpy_deg": [1, 2, 3]}, "position", ["path_start: a position with an orientation is for"]),
+    (7, "pose", ["path_start: wrong form; found 7", "{position: [x, y, z], rpy_deg: [...]}"]),
+    (None, "pose", ["path_start: a free start posture leaves open", "allowed: {position: [x, y, z], ...} with one of"]),
+]
+
+
+@pytest.mark.parametrize(("path_start", "space", "expected"), WRONG_STARTS, ids=str)
+def test_wrong_starts_of_a_path(path_start: Any, space: Any, expected: list[str]) -> None:
+    with pytest.raises(TaskError) as caught:
+        free(path_start, space)
+    for text in expected:
+        assert text in str(caught.value)

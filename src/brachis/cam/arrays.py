@@ -24,8 +24,8 @@ def points_from(points: Any, orientations: Any, speed: Any, units: Units, source
     ----------
     points : array_like, (n, p) or (n, 4, 4), or sequence of transforms
         Positions; or homogeneous matrices, or objects that have one.
-    orientations : array_like, (n, 4), (n, 3, 3) or (n,), or object with quaternions; or None
-        Quaternions w, x, y, z; rotation matrices; SciPy's rotations; yaw.
+    orientations : Rotation, array_like, (n, 3, 3) or (n,), or None
+        SciPy's rotations; rotation matrices; yaw.
     speed : array_like, (n,), or None
         NaN where none is prescribed.
     units : Units
@@ -87,12 +87,11 @@ def _turning(orientations: Any, units: Units, source: str) -> Array:  # noqa: AN
         off = np.abs(values @ np.swapaxes(values, 1, 2) - np.eye(3)).max(axis=(1, 2))
         _refuse_first((off > _ROTATION) | (np.linalg.det(values) < 0.0), "no rotation matrix", values, source)
         return with_like_signs(np.roll(Rotation.from_matrix(values).as_quat(), 1, axis=1))
-    if values.shape[1:] != (QUATERNION,):
-        allowed = "(n, 4) quaternions w, x, y, z; (n, 3, 3) matrices; (n,) yaw"
-        raise TaskError("orientations of the wrong shape", found=values.shape, allowed=allowed, where=where)
-    off = np.abs(np.linalg.norm(values, axis=1) - 1.0)
-    _refuse_first(off > 100.0 * _ROTATION, "the quaternion's length is not 1", values, source)
-    return with_like_signs(values)
+    problem = "orientations of the wrong shape"
+    if values.shape[1:] == (QUATERNION,):
+        problem = "an array of quaternions does not say whether w is first or last"
+    allowed = "SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w); (n, 3, 3) matrices; (n,) yaw"
+    raise TaskError(problem, found=values.shape, allowed=allowed, where=where)
 
 
 def _array(values: Any, where: str, source: str) -> Array:  # noqa: ANN401

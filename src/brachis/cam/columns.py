@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from brachis.arrays import with_like_signs
+from brachis.cam.conventions import CONVENTIONS, choices, rotation_by
 from brachis.cam.points import Array, Points
 from brachis.cam.table import Table
 from brachis.cam.units import ANGLES, LENGTHS, SPEEDS, Units
@@ -15,10 +16,18 @@ from brachis.errors import TaskError
 
 POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
-_ROTATION_VECTOR: Final = ("rx", "ry", "rz")
+_ORIENTATIONS: Final = {
+    _QUATERNION: ("quaternion_wxyz",),
+    ("q1", "q2", "q3", "q4"): ("quaternion_wxyz", "quaternion_xyzw"),
+    ("rx", "ry", "rz"): ("rotation_vector", "rpy", "staubli_xyz", "fanuc_wpr"),
+    ("a", "b", "c"): ("kuka_abc", "rpy"),
+    ("w", "p", "r"): ("fanuc_wpr",),
+    ("roll", "pitch", "yaw"): ("rpy",),
+}
+"""Columns of orientations, and the conventions that each may be in: the numbers of a convention are in this order."""
 _SPEED: Final = "feed"
 _SPEED_NAMES: Final = ("feed", "feedrate", "f", "speed", "v")
-_HEADING = re.compile(r"^([a-z]+?)(?:\s*[_ ]\s*([a-z/_]+)|\s*[\[(]\s*([a-z/]+)\s*[\])])?$")
+_HEADING = re.compile(r"^([a-z]+?|q[1-4])(?:\s*[_ ]\s*([a-z/_]+)|\s*[\[(]\s*([a-z/]+)\s*[\])])?$")
 _UNIT_LENGTH = 0.01
 _DEFAULTS = Units(length="m", angle="rad")
 
@@ -29,14 +38,33 @@ def allowed_columns(rows: tuple[str, ...] | str) -> str:
 
 
 def understood(
-    header: tuple[str, ...], where: str, rows: tuple[str, ...] | str
-) -> tuple[dict[str, tuple[int, str | None]], tuple[str, ...]]:
-    """Return index and unit of every column by its name, and the names that belong to positions and orientations.
+    header: tuple[str, ...], where: str, rows: tuple[str, ...] | str, stated: str | None = None
+) -> tuple[dict[str, tuple[int, str | None]], tuple[str, ...], str | None]:
+    """Return what the columns of a table are.
+
+    Parameters
+    ----------
+    header : tuple of str
+    where : str
+        Its place, for messages.
+    rows : tuple of str or str
+        Rows of the task space, or the word for one of poses.
+    stated : str, optional
+        Convention of the orientations, as the task states it.
+
+    Returns
+    -------
+    headings : dict of str to (int, str or None)
+        Index and unit of every column by its name.
+    names : tuple of str
+        Those that belong to positions and orientations.
+    convention : str or None
+        That of the orientations, where there are any.
 
     Raises
     ------
     TaskError
-        Columns are missing or unknown.
+        Columns are missing or unknown, or the convention of their orientations is not known.
     """
     headings = {name: (column, unit) for column, name, unit in map(_heading, range(len(header)), header)}
     names = sorted(name for name in headings if name != _SPEED)
@@ -46,10 +74,31 @@ def understood(
         hint = "The first line names the columns, separated by commas, semicolons, tabs or spaces; units may follow "
         hint += "(x_mm); a column feed may stand beside them"
         raise TaskError(problem, found=", ".join(header), allowed=allowed_columns(rows), where=where, hint=hint)
-    return headings, choice
+    return headings, choice, _convention(choice, stated, where)
 
 
-def points_of(table: Table, rows: tuple[str, ...] | str, units: Units, source: str) -> tuple[Points, tuple[str, ...]]:
+def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str | None:
+    """Return the convention of the orientations: the only one that the columns leave, or the one that is stated."""
+    columns = names[len(POSITION) :]
+    possible = _ORIENTATIONS.get(columns, ())
+    if stated is None and len(possible) < 2:  # noqa: PLR2004
+        return possible[0] if possible else None
+    if stated is None:
+        problem = f"the columns {', '.join(columns)} do not say how the orientation is meant"
+        hint = f"State it in the task, for example csv: {{file: ..., orientation: {possible[0]}}}"
+        raise TaskError(problem, allowed=f"csv.orientation: {choices(possible)}", where=where, hint=hint)
+    if stated not in possible:
+        usual = [", ".join(each) for each, conventions in _ORIENTATIONS.items() if stated in conventions]
+        problem = f"csv.orientation is {stated}, which the columns of the file do not have"
+        found, allowed = ", ".join(names), f"columns {' | '.join(usual)} for {stated}"
+        hint = f"Or csv.orientation: {choices(possible)}" if possible else "Leave csv.orientation away"
+        raise TaskError(problem, found=found, allowed=allowed, where=where, hint=hint)
+    return stated
+
+
+def points_of(
+    table: Table, rows: tuple[str, ...] | str, units: Units, source: str, stated: str | None = None
+) -> tuple[Points, tuple[str, ...]]:
     """Return the points of a table in SI units, and what was found out about the units.
 
     Parameters
@@ -61,38 +110,45 @@ def points_of(table: Table, rows: tuple[str, ...] | str, units: Units, source: s
         As the task states them.
     source : str
         The file, for messages.
+    stated : str, optional
+        Convention of the orientations, as the task states it; needed where the columns leave it open.
 
     Raises
     ------
     TaskError
-        Columns are missing or unknown, units contradict each other, or a quaternion has no unit length.
+        See `understood`; or units are missing or contradict each other, or a quaternion has no unit length.
     """
     where = f"{source}: line {table.header_line}"
-    headings, choice = understood(table.header, where, rows)
-    stated: dict[str, dict[str, None]] = {}
+    headings, choice, convention = understood(table.header, where, rows, stated)
+    in_header: dict[str, dict[str, None]] = {}
+    need_angle = convention is not None and bool(CONVENTIONS[convention].euler)
 
     def column(name: str, kind: str, factors: dict[str, float]) -> Array:
         index, unit = headings[name]
-        return table.values[:, index] * factors[_unit(name, unit, kind, factors, units, stated, where)]
+        default = None if kind == "angle" and need_angle else getattr(_DEFAULTS, kind)
+        return table.values[:, index] * factors[_unit(name, unit, kind, factors, units, default, in_header, where)]
 
     position = tuple(name for name in choice if name in POSITION)
     lengths = np.column_stack([column(name, "length", LENGTHS) for name in position])
     speed = column(_SPEED, "speed", SPEEDS) if _SPEED in headings else None
     others = choice[len(position) :]
-    if others == _QUATERNION:
+    if convention is not None and convention.startswith("quaternion"):
         turning = table.values[:, [headings[name][0] for name in others]]
     else:
         angles = [column(name, "angle", ANGLES) for name in others]
         turning = np.column_stack(angles) if angles else np.empty((len(lengths), 0))
-    points = Points(lengths, _turning(turning, others, table, source), speed, table.lines, source)
+    if convention is not None:
+        turning = _quaternions(turning, convention, table, source)
+    points = Points(lengths, turning, speed, table.lines, source)
     _check_speeds(points)
-    return points, tuple(f"{kind} in {' and '.join(units)}, as the header says" for kind, units in stated.items())
+    told = [f"{kind} in {' and '.join(units)}, as the header says" for kind, units in in_header.items()]
+    return points, (*told, *([f"orientations: {CONVENTIONS[convention].meaning}"] if convention else []))
 
 
 def _choices(rows: tuple[str, ...] | str) -> tuple[tuple[str, ...], ...]:
     if isinstance(rows, tuple):
         return (rows,)
-    return (POSITION, POSITION + _QUATERNION, POSITION + _ROTATION_VECTOR)
+    return (POSITION, *(POSITION + columns for columns in _ORIENTATIONS))
 
 
 def _heading(index: int, text: str) -> tuple[int, str, str | None]:
@@ -111,39 +167,36 @@ def _unit(
     kind: str,
     factors: dict[str, float],
     units: Units,
-    stated: dict[str, dict[str, None]],
+    default: str | None,
+    in_header: dict[str, dict[str, None]],
     where: str,
 ) -> str:
-    """Return the unit of a column: the heading's, else the task's, else m or rad."""
+    """Return the unit of a column: the heading's, else the task's, else the default."""
     asked, found = getattr(units, kind), f"{unit} for {name}"
     if unit is not None:
         if unit not in factors:
             raise TaskError(f"unknown unit of {kind}", found=found, allowed=", ".join(factors), where=where)
         if asked is not None and factors[asked] != factors[unit]:
             raise TaskError("the header contradicts the task's units", found=found, allowed=asked, where=where)
-        stated.setdefault(kind, {})[unit] = None
+        in_header.setdefault(kind, {})[unit] = None
         return unit
-    if asked is None and getattr(_DEFAULTS, kind) is None:
-        hint = "Write feed_mm/min in the header, or units: {speed: mm/min} in the task"
+    if asked is None and default is None:
+        usual = {"speed": "mm/min", "angle": "deg"}[kind]
+        hint = f"Write {name}_{usual} in the header, or units: {{{kind}: {usual}}} in the task"
         raise TaskError(f"the unit of {name} is not stated", allowed=", ".join(factors), where=where, hint=hint)
-    return str(asked or getattr(_DEFAULTS, kind))
+    return str(asked or default)
 
 
-def _turning(values: Array, names: tuple[str, ...], table: Table, source: str) -> Array:
-    """Return quaternions where the tool's orientation is given, or yaw, or nothing."""
-    if names == _ROTATION_VECTOR:
-        from scipy.spatial.transform import Rotation  # noqa: PLC0415  (imports in 0.2 s)
-
-        return with_like_signs(np.roll(Rotation.from_rotvec(values).as_quat(), 1, axis=1))
-    if names != _QUATERNION:
-        return values
+def _quaternions(values: Array, convention: str, table: Table, source: str) -> Array:
+    """Return quaternions w, x, y, z from orientations in a convention, angles in rad."""
+    quaternions = convention.startswith("quaternion")
     off = np.abs(np.linalg.norm(values, axis=1) - 1.0)
-    if np.any(off > _UNIT_LENGTH):
+    if quaternions and np.any(off > _UNIT_LENGTH):
         i = int(np.argmax(off > _UNIT_LENGTH))
         problem = f"the quaternion's length is {np.linalg.norm(values[i]):.6g}"
         where = f"{source}: line {table.lines[i]}"
-        raise TaskError(problem, found=values[i].tolist(), allowed="qw, qx, qy, qz of length 1", where=where)
-    return with_like_signs(values)
+        raise TaskError(problem, found=values[i].tolist(), allowed="a quaternion of length 1", where=where)
+    return with_like_signs(np.roll(rotation_by(convention, values).as_quat(), 1, axis=1))
 
 
 def _check_speeds(points: Points) -> None:

@@ -20,7 +20,7 @@ Writer = Callable[[Path], object]
 
 _SCHEMA = b'{\n  "$schema": "https://json-schema.org/draft/2020-12/schema",\n  "$id": "urn:brachis:'
 BEGINNINGS = {
-    ".csv": (b"t,q_",),
+    ".csv": (b"t,q_", b"# brachis: "),
     ".html": (b"<!doctype html>\n<!-- brachis report -->",),
     ".gif": (b"GIF8",),
     ".json": (b'{\n  "t_end"', b'{\n  "$schema": "urn:brachis:', _SCHEMA),

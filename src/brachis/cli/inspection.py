@@ -243,7 +243,7 @@ def _print_decompositions(console: Console, rows: list[dict[str, Any]]) -> None:
 
 
 def _tool_pose(robot: Robot, text: str) -> str:
-    """Say where the tool is at a posture given as numbers, as ``path_start`` of a task takes it."""
+    """Say where the tool is at a posture given as numbers, as ``path_start`` of a task of poses takes it."""
     try:
         values = [float(word) for word in text.replace(",", " ").split()]
     except ValueError as error:
@@ -251,4 +251,5 @@ def _tool_pose(robot: Robot, text: str) -> str:
     placement = robot.tool_placement(robot.posture(values, "--posture"))
     x, y, z, qx, qy, qz, qw = pin.SE3ToXYZQUAT(placement)
     position = ", ".join(f"{value:.9g}" for value in (x, y, z))
-    return f"tool at [{position}] m, quaternion w, x, y, z [{', '.join(f'{value:.9g}' for value in (qw, qx, qy, qz))}]"
+    turn = ", ".join(f"{value:.9g}" for value in (qw, qx, qy, qz))
+    return f"the tool is at {{position: [{position}], quaternion_wxyz: [{turn}]}}, m"

@@ -21,7 +21,7 @@ from rich.text import Text
 from brachis import interrupts
 from brachis.cli.tables import Column, print_table
 from brachis.cli.verbosity import Verbosity, chosen
-from brachis.errors import InputError
+from brachis.errors import BrachisWarning, InputError
 
 if TYPE_CHECKING:  # loads Pinocchio, which no error message and no help needs
     from brachis.verify import Verification
@@ -170,15 +170,13 @@ def result_console() -> Console:
 
 @contextmanager
 def shown_warnings() -> Iterator[None]:
-    """Print warnings of implausible figures as messages on standard error; a quiet command prints none."""
-    from brachis.plausibility import PlausibilityWarning  # noqa: PLC0415  (loads Pinocchio)
-
+    """Print warnings of brachis as messages on standard error; a quiet command prints none."""
     with warnings.catch_warnings():
-        warnings.simplefilter("always", PlausibilityWarning)
+        warnings.simplefilter("always", BrachisWarning)
         usual = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *where: Any) -> None:  # noqa: ANN401
-            if not issubclass(category, PlausibilityWarning):
+            if not issubclass(category, BrachisWarning):
                 usual(message, category, *where)
             elif chosen() is not Verbosity.QUIET:
                 print_error(f"warning: {message}")

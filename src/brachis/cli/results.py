@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from brachis.cli.folder import write_one, write_text
-from brachis.cli.output import json_text, print_error, print_json, print_verification, result_console
+from brachis.cli.output import json_text, print_error, print_json, print_verification, result_console, shown_warnings
 from brachis.cli.settings import motion_file
 from brachis.errors import UnknownNameError
 from brachis.robot.from_task import robot_from_settings
@@ -36,12 +36,13 @@ def export_command(
     result = motion_file(result)
     chosen, trajectory = export.format_of(out, form), Trajectory.load(result)
     names = None if joints is None else [name.strip() for name in joints.split(",")]
-    write_one(
-        out,
-        lambda path: export.write(trajectory, path, form=form, dt=dt, last=last, joints=names),
-        (chosen.suffix,),
-        _sources(result, trajectory),
-    )
+    with shown_warnings():
+        write_one(
+            out,
+            lambda path: export.write(trajectory, path, form=form, dt=dt, last=last, joints=names),
+            (chosen.suffix,),
+            _sources(result, trajectory),
+        )
     period = chosen.dt if dt is None else dt
     if period > trajectory.t_end:
         print_error(f"the period of {period:g} s is longer than the motion, which takes {trajectory.t_end:.6g} s")

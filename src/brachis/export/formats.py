@@ -126,7 +126,8 @@ def write(
         is not before t_end, with the end posture held at rest there. See `Trajectory.sample`. The format's unless
         given.
     joints : sequence of str, optional
-        Joints to write, in this order: a controller may drive but some. All of the robot unless given.
+        Joints to write, in this order: a controller may drive but some. All of the robot unless given. A joint that
+        moves and is left out is warned of, and named in the file.
 
     Raises
     ------

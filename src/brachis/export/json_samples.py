@@ -35,6 +35,7 @@ def samples_schema() -> dict[str, Any]:
         "position_units": {**units, "description": "Unit of every joint's position."},
         "t_end": {"type": "number", "exclusiveMinimum": 0, "description": "End time, s."},
         "dt": {"type": "number", "exclusiveMinimum": 0, "description": "Period of the samples, s."},
+        "warnings": {"type": "array", "items": {"type": "string"}, "description": "Joints that move and are left out."},
         "samples": {
             "type": "object",
             "properties": {name: {**shape, "description": text} for name, (text, shape) in said.items()},
@@ -69,6 +70,7 @@ def export_json(
         "position_units": rows.units,
         "t_end": trajectory.t_end,
         "dt": dt,
+        "warnings": rows.left_out,
         "samples": {name: getattr(rows, name).tolist() for name in ("t", "s", *COLUMNS.values())},
     }
     lines = (f"  {json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in content.items())

@@ -41,9 +41,14 @@ def export_mcap(
     last: str = "exact",
     joints: Sequence[str] | None = None,
 ) -> None:
-    """Write a bag with one message on `TOPIC`, at time zero; see `brachis.export.write` for the parameters."""
+    """Write a bag with one message on `TOPIC`, at time zero; see `brachis.export.write` for the parameters.
+
+    Its metadata ``brachis`` name joints that move and are left out.
+    """
     writers = needed("mcap_ros2.writer", "an MCAP bag")
-    message = message_of(rows_of(trajectory, dt, last, joints))
+    rows = rows_of(trajectory, dt, last, joints)
+    message = message_of(rows)
     with atomic_write(path) as stream, writers.Writer(stream) as writer:
         schema = writer.register_msgdef(MESSAGE, _DEFINITION)
         writer.write_message(TOPIC, schema, message, log_time=0, publish_time=0)
+        writer.add_metadata("brachis", {"left_out": "; ".join(rows.left_out)})

@@ -22,11 +22,13 @@ def export_parquet(
 ) -> None:
     """Write the table of `export_csv` as Parquet; see `brachis.export.write` for the parameters.
 
-    The file's metadata have a key ``brachis``: joints with their units, the end time in s.
+    The file's metadata have a key ``brachis``: joints with their units, the end time in s, and sentences about joints
+    that move and are left out.
     """
     pyarrow, parquet = needed("pyarrow", "a Parquet file"), needed("pyarrow.parquet", "a Parquet file")
     rows = rows_of(trajectory, dt, last, joints)
-    about = {"joints": dict(zip(rows.joints, rows.units, strict=True)), "t_end_s": trajectory.t_end}
+    units = dict(zip(rows.joints, rows.units, strict=True))
+    about = {"joints": units, "t_end_s": trajectory.t_end, "left_out": rows.left_out}
     table = pyarrow.table(dict(rows.columns())).replace_schema_metadata({"brachis": json.dumps(about)})
     with atomic_write(path) as stream:
         parquet.write_table(table, stream)

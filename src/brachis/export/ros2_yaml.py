@@ -22,9 +22,10 @@ def export_ros2_yaml(
     joints: Sequence[str] | None = None,
 ) -> None:
     """Write one message ``trajectory_msgs/msg/JointTrajectory``; see `brachis.export.write` for the parameters."""
-    message = message_of(rows_of(trajectory, dt, last, joints))
-    lines = [f"# {MESSAGE}", f"header: {_flow(message['header'])}", f"joint_names: {_flow(message['joint_names'])}"]
-    lines.append("points:")
+    rows = rows_of(trajectory, dt, last, joints)
+    message = message_of(rows)
+    lines = [f"# {MESSAGE}", *(f"# {sentence}" for sentence in rows.left_out)]
+    lines += [f"header: {_flow(message['header'])}", f"joint_names: {_flow(message['joint_names'])}", "points:"]
     for point in message["points"]:
         first, *others = (f"{name}: {_flow(value)}" for name, value in point.items())
         lines += [f"- {first}", *(f"  {other}" for other in others)]

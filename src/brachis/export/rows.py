@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.errors import UnknownNameError
+from brachis.errors import BrachisWarning, UnknownNameError
 from brachis.robot import ROLL_JOINT
 from brachis.trajectory import Trajectory
 from brachis.trajectory.samples import COLUMNS
+
+_STILL = 1e-9
+"""rad or m: a joint that moves less stands still."""
+
+
+class LeftOutWarning(BrachisWarning):
+    """A joint that moves is not written to the exported file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +31,8 @@ class JointRows:
         Names, in the order of the columns.
     units : tuple of str
         Of their positions, ``rad`` or ``m``.
+    left_out : tuple of str
+        A sentence for every joint that moves and is not among `joints`.
     t, s : (K,) ndarray
         s; path coordinate, dimensionless.
     q, qdot, qddot, tau : (K, joints) ndarray
@@ -31,6 +41,7 @@ class JointRows:
 
     joints: tuple[str, ...]
     units: tuple[str, ...]
+    left_out: tuple[str, ...]
     t: np.ndarray
     s: np.ndarray
     q: np.ndarray
@@ -64,6 +75,11 @@ def rows_of(trajectory: Trajectory, dt: float, last: str, joints: Sequence[str] 
         `dt` or `last` cannot be used.
     UnknownNameError
         There is no such joint.
+
+    Warns
+    -----
+    LeftOutWarning
+        A joint that moves is not among them.
     """
     names = trajectory.joint_names
     chosen = tuple(name for name in names if name != ROLL_JOINT) if joints is None else tuple(joints)
@@ -74,4 +90,19 @@ def rows_of(trajectory: Trajectory, dt: float, last: str, joints: Sequence[str] 
     samples = trajectory.sample(dt, last=last)
     parts = (getattr(samples, quantity)[:, index] for quantity in COLUMNS.values())
     units = tuple(trajectory.robot.position_units[each] for each in index)
-    return JointRows(chosen, units, samples.t, samples.s, *parts)
+    left_out = tuple(_left_out(trajectory, np.vstack([trajectory.q, samples.q]), chosen))
+    for sentence in left_out:
+        hint = "Move it by its own controller at the same time, or leave joints away to write it too"
+        warnings.warn(f"{sentence}. {hint}", LeftOutWarning, stacklevel=4)
+    return JointRows(chosen, units, left_out, samples.t, samples.s, *parts)
+
+
+def _left_out(trajectory: Trajectory, q: np.ndarray, chosen: Sequence[str]) -> Iterator[str]:
+    """Yield a sentence, with its travel over postures (K, n), for every joint that moves and is not written."""
+    lowest = q.min(axis=0)
+    highest = q.max(axis=0)
+    units = trajectory.robot.position_units
+    for joint, unit, low, high in zip(trajectory.joint_names, units, lowest, highest, strict=True):
+        if joint not in (*chosen, ROLL_JOINT) and high - low > _STILL:
+            travel = f"{high - low:.4g} {unit} ({low:.4g} to {high:.4g} {unit})"
+            yield f"joint {joint} moves by {travel} and is not in this file"

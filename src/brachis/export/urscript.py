@@ -61,6 +61,7 @@ def _lines(rows: JointRows, t_end: float) -> list[str]:
     return [
         "def brachis_motion():",
         f"  # {len(postures)} periods, {t_end:.6g} s; joints {', '.join(rows.joints)}, rad",
+        *(f"  # {sentence}" for sentence in rows.left_out),
         f"  start = {first}",
         "  now = get_actual_joint_positions()",
         "  i = 0",

@@ -3,6 +3,7 @@
 from brachis.path.build import build_path
 from brachis.path.ends import check_closed, path_speed
 from brachis.path.feed_table import with_feed_rates
+from brachis.path.frame import PathFrame
 from brachis.path.from_curve import bspline_segment
 from brachis.path.origin import check_on_path, path_of
 from brachis.path.pose import PosePath
@@ -13,6 +14,7 @@ __all__ = [
     "Array",
     "Curve",
     "Path",
+    "PathFrame",
     "PathSample",
     "PosePath",
     "SequencePath",

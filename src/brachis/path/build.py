@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,11 +17,17 @@ from brachis.robot.task_map.rows import POSE_ROWS, joints_of
 
 if TYPE_CHECKING:
     from brachis.path.coordinates import Coordinates
+    from brachis.path.frame import PathFrame
     from brachis.path.protocol import Array, Curve, Path
     from brachis.task import Segment
 
 
-def build_path(segments: Sequence[Segment], start: Sequence[float] | Array, task_space_rows: Sequence[str]) -> Path:
+def build_path(
+    segments: Sequence[Segment],
+    start: Sequence[float] | Array,
+    task_space_rows: Sequence[str],
+    frame: PathFrame | None = None,
+) -> Path:
     """Return the path that segments describe.
 
     Parameters
@@ -32,11 +39,14 @@ def build_path(segments: Sequence[Segment], start: Sequence[float] | Array, task
     task_space_rows : sequence of str
         Rows of the task space, out of x, y, z and yaw, where yaw comes last; x, y, z, rx, ry, rz for poses; or the rows
         of all joints (`brachis.robot.task_map.rows.joint_rows`).
+    frame : PathFrame, optional
+        Frame in which the segments are given; the world's unless given. The start is in the world either way.
 
     Returns
     -------
     Path
-        The path, three times continuously differentiable in s. For poses `PosePath`, whose samples have the body twist.
+        The path in the world, three times continuously differentiable in s. For poses `PosePath`, whose samples have
+        the body twist.
 
     Raises
     ------
@@ -56,6 +66,8 @@ def build_path(segments: Sequence[Segment], start: Sequence[float] | Array, task
     rows = tuple(task_space_rows)
     coordinates = _coordinates(rows)
     point = coordinates.checked(np.array(start, dtype=float))
+    if frame is not None:
+        point = frame.to_frame(point)
     if not segments:
         problem = "a path needs at least one segment"
         raise PathError(problem, where="path")
@@ -63,7 +75,8 @@ def build_path(segments: Sequence[Segment], start: Sequence[float] | Array, task
     for i, segment in enumerate(segments):
         curves.append(coordinates.curve(segment, i, point))
         point = curves[-1].derivatives(np.array([curves[-1].length]), 0)[0, 0]
-    return coordinates.path(join_curves(curves, [segment.blend for segment in segments], coordinates))
+    sequence = join_curves(curves, [segment.blend for segment in segments], coordinates)
+    return coordinates.path(replace(sequence, frame=frame))
 
 
 def _coordinates(rows: tuple[str, ...]) -> Coordinates:

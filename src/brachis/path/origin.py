@@ -6,6 +6,7 @@ import numpy as np
 
 from brachis.errors import StartError, write_apart
 from brachis.path.build import build_path
+from brachis.path.frame import PathFrame
 from brachis.path.protocol import Path
 from brachis.plausibility import place_hint, turn_hint
 from brachis.robot import TaskMap
@@ -33,14 +34,18 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     PathError, UnknownNameError, InputError
         See `build_path`; or ``path_start`` does not fit the task space.
     """
+    placement = task.path_placement
+    frame = None if placement is None else PathFrame.of(placement, task_map.rows)
     given = None if task.path_start is None else task_map.read(task.path_start, "path_start")
+    if given is not None and frame is not None:
+        given = frame.to_world(given)
     if task.start == "free":
         assert given is not None  # noqa: S101  (the task model sees to it)
-        return build_path(task.path, given, task_map.rows)
+        return build_path(task.path, given, task_map.rows, frame)
     start = task_map.robot.posture(task.start.joints, "start.joints")
     if given is not None:
         check_on_path(task_map, start, given, "start")
-    return build_path(task.path, task_map.value(start), task_map.rows)
+    return build_path(task.path, task_map.value(start), task_map.rows, frame)
 
 
 def check_on_path(task_map: TaskMap, posture: np.ndarray, target: np.ndarray, name: str) -> None:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.cam.conventions import rotation_by
 from brachis.path.leibniz import product
-from brachis.task import Quaternion, RotationVector
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -78,13 +78,8 @@ def quaternions_of(rotation: Rotation) -> Array:
 
 def rotation_from(attitude: Attitude) -> Rotation:
     """Return an orientation as a task gives it."""
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415
-
-    if isinstance(attitude, Quaternion):
-        return Rotation.from_quat(np.roll(attitude.quaternion, -1))
-    if isinstance(attitude, RotationVector):
-        return Rotation.from_rotvec(attitude.rotation_vector)
-    return Rotation.from_euler("xyz", attitude.rpy_deg, degrees=True)
+    convention, values = attitude.stated
+    return rotation_by(convention, np.array(values))
 
 
 def _turning(quaternion: Array, rate: Array) -> Array:

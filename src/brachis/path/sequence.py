@@ -12,6 +12,7 @@ from brachis.path.protocol import PathSample
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from brachis.path.frame import PathFrame
     from brachis.path.protocol import Array, Curve
 
 _QUADRATURE_POINTS = 16
@@ -55,11 +56,14 @@ class SequencePath:
         Values of s where pieces join, from 0 to 1.
     length : float
         Arc length of the position rows, m.
+    frame : PathFrame or None
+        In which the curves are; None: the world.
     """
 
     pieces: tuple[Piece, ...]
     breaks: Array
     length: float
+    frame: PathFrame | None = None
 
     @classmethod
     def of(cls, pieces: tuple[Piece, ...], positions: int) -> SequencePath:
@@ -83,7 +87,7 @@ class SequencePath:
         return PathSample(*self.derivatives(s))
 
     def derivatives(self, s: Sequence[float] | Array) -> Array:
-        """Return the coordinates and their derivatives by s up to the third, shape (4, K, m)."""
+        """Return the coordinates in the world and their derivatives by s up to the third, shape (4, K, m)."""
         values = np.atleast_1d(np.asarray(s, dtype=float))
         which = np.clip(np.searchsorted(self.breaks, values, side="right") - 1, 0, len(self.pieces) - 1)
         total = self.total
@@ -95,4 +99,7 @@ class SequencePath:
                 sigma = piece.first + (values[here] - self.breaks[i]) * total
                 result[:, here] = piece.curve.derivatives(sigma)
         result *= total ** np.arange(4)[:, None, None]
+        if self.frame is not None:
+            result = result @ self.frame.turn.T
+            result[0] += self.frame.origin
         return result

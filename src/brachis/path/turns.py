@@ -105,7 +105,7 @@ def turn_of(turning: Rotate | TurnTo, start: Array, key: str) -> Turn:
     if isinstance(turning, Rotate):
         rotate = turning.rotate
         axis = np.array(rotate.axis) / np.linalg.norm(rotate.axis)
-        if rotate.frame == "world":
+        if rotate.frame == "path":
             axis = start.T @ axis
         return Turn(start, axis, float(np.deg2rad(rotate.angle_deg)), rotate.profile == "smooth")
     return turn_between(start, rotation_from(turning.to), f"{key}.to", smooth=turning.to.profile == "smooth")

@@ -86,4 +86,4 @@ def turn_hint(here: np.ndarray, stated: np.ndarray) -> str | None:
     read = pin.Quaternion(stated)
     meant = pin.Quaternion(read.z, read.w, read.x, read.y).matrix()
     near = np.abs(meant - here).max() <= _ROUNDED < np.abs(stated - here).max()
-    return "The quaternion looks like x, y, z, w: w comes first" if near else None
+    return "If it is a quaternion x, y, z, w: write quaternion_xyzw" if near else None

@@ -14,7 +14,7 @@ from brachis.plausibility.remark import Remark
 from brachis.robot import TaskMap
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.rows import YAW
-from brachis.task import Task
+from brachis.task import Task, ToolPose
 from brachis.task.tool_limits import SpeedTable
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def of_places(
     path: Path,
     start: np.ndarray | None,
     end: np.ndarray | None,
-    path_start: Sequence[float] | None,
+    path_start: Sequence[float] | ToolPose | None,
 ) -> tuple[Remark, ...]:
     """Look at what a task says about where the robot is, in postures or along a path of joints.
 
@@ -51,7 +51,7 @@ def of_places(
     path : Path
     start, end : (n,) ndarray or None
         Postures, None where free.
-    path_start : sequence of float or None
+    path_start : sequence of float, ToolPose or None
         As in the task.
     """
     return tuple(remarks(_places(task_map, path, start, end, path_start)))
@@ -62,7 +62,7 @@ def _places(
     path: Path,
     start: np.ndarray | None,
     end: np.ndarray | None,
-    path_start: Sequence[float] | None,
+    path_start: Sequence[float] | ToolPose | None,
 ) -> Iterator[Figure]:
     robot = task_map.robot
     along = path.sample(np.linspace(0.0, 1.0, _STATIONS)).target if isinstance(task_map, JointSpace) else None
@@ -79,7 +79,7 @@ def _places(
                 yield Figure(f"{key}.{name}", looks, abs(value), usual + _ROUNDED, "rad", shown=shown)
     if YAW in task_map.rows:
         yaw = path.sample(np.linspace(0.0, 1.0, _STATIONS)).target[:, -1]
-        begins = 0.0 if path_start is None else abs(path_start[-1])
+        begins = abs(path_start[-1]) if isinstance(path_start, tuple) else 0.0
         yield Figure("path_start", "yaw looks like degrees", begins, _TURN, "rad")
         yield Figure("path", "the turn of yaw looks like degrees", float(np.ptp(yaw)), 2.0 * _TURN, "rad")
 

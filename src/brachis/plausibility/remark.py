@@ -5,10 +5,10 @@ from __future__ import annotations
 import warnings
 from dataclasses import asdict, dataclass
 
-from brachis.errors import PlausibilityError
+from brachis.errors import BrachisWarning, PlausibilityError
 
 
-class PlausibilityWarning(UserWarning):
+class PlausibilityWarning(BrachisWarning):
     """A figure of the robot, the task or the motion is hardly meant.
 
     Examples

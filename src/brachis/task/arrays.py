@@ -38,9 +38,9 @@ def fit_path(
         ``SE3``, or SciPy's ``RigidTransform``.
     tolerance : mapping or FitTolerance, optional
         ``{"position": "0.05 mm", "orientation": "0.1 deg"}`` as in a task file; without it the path passes all points.
-    orientations : array_like, (n, 4), (n, 3, 3) or (n,), or Rotation, optional
-        Of the tool in the world frame, beside positions: quaternions w, x, y, z; rotation matrices; SciPy's rotations;
-        yaw.
+    orientations : Rotation, or array_like, (n, 3, 3) or (n,), optional
+        Of the tool, beside positions: SciPy's rotations (``Rotation.from_quat(q)`` takes quaternions x, y, z, w);
+        rotation matrices; yaw.
     speed : array_like, (n,), optional
         Speed of the tool on the way to each point; NaN where none is prescribed. With a tolerance only.
     units : mapping or FileUnits, optional

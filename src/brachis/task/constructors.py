@@ -79,7 +79,7 @@ def Line(  # noqa: N802
     ['line', 'line']
     """
     if hasattr(to, "homogeneous"):
-        ((place, turn),) = _poses([to], "Line.to")
+        ((place, turn),) = poses_of([to], "Line.to")
         to, orientation = place, orientation or {"to": turn}
     return _segment(LineSegment, "line", blend, orientation, to=to, by=by, length=length, angle_deg=angle_deg)
 
@@ -219,8 +219,8 @@ def Spline(  # noqa: N802
     ----------
     through : (n, m) or (n, 4, 4) array_like, or sequence of SE3
         All rows of the task space each, m, yaw in rad; or poses. The segment's start may be the first of them.
-    orientations : (n, 4) or (n, 3, 3) array_like, or SciPy's Rotation, optional
-        Of the tool in the world frame, beside positions: quaternions w, x, y, z, or matrices.
+    orientations : SciPy's Rotation or (n, 3, 3) array_like, optional
+        Of the tool, beside positions; ``Rotation.from_quat(q)`` takes quaternions x, y, z, w.
     relative : bool, optional
         Whether the waypoints are relative to the segment's start.
     blend, orientation : optional
@@ -243,7 +243,7 @@ def Spline(  # noqa: N802
     if orientations is None and _are_positions(through):
         points = [_vector(point) for point in through]  # type: ignore[union-attr]
         return _segment(SplineSegment, "spline", blend, orientation, through=points, relative=relative)
-    poses = _poses(through, "Spline.through", orientations)
+    poses = poses_of(through, "Spline.through", orientations)
     shape = {"through": [place for place, _ in poses], "orientations": [turn for _, turn in poses]}
     return _segment(SplineSegment, "spline", blend, orientation, relative=relative, **shape)
 
@@ -255,13 +255,13 @@ def _are_positions(through: object) -> bool:
     return isinstance(first, int | float) or (isinstance(first, list) and not any(isinstance(c, list) for c in first))
 
 
-def _poses(transforms: Any, source: str, orientations: Any = None) -> list[tuple[list[float], dict[str, Any]]]:  # noqa: ANN401
+def poses_of(transforms: Any, source: str, orientations: Any = None) -> list[tuple[list[float], dict[str, Any]]]:  # noqa: ANN401
     """Positions, m, and orientations as a task file writes them."""
     from brachis.cam.arrays import points_from  # noqa: PLC0415  (NumPy, for those who need it)
     from brachis.cam.units import Units  # noqa: PLC0415
 
     points = points_from(transforms, orientations, None, Units(), source, least=1)
-    turns = [{"quaternion": turn} for turn in points.turning.tolist()]
+    turns = [{"quaternion_wxyz": turn} for turn in points.turning.tolist()]
     return list(zip(points.position.tolist(), turns, strict=True))
 
 

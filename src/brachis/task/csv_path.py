@@ -73,12 +73,16 @@ def _points_of(settings: PointFile, task: Task, where: str, folder: Path) -> tup
     path = folder / settings.file
     text = read_text(path, where=where, folder=folder, found=settings.file, largest=_LARGEST_FILE)
     if path.suffix.lower() in SUFFIXES:
+        if settings.orientation is not None:
+            problem = "G-code has no orientations"
+            raise TaskError(problem, found=settings.orientation, allowed="no csv.orientation", where=where)
         points, told = read_gcode(text, task.task_space, str(path))
     else:
         rows = task.task_space
-        check = partial(understood, rows=rows)
+        check = partial(understood, rows=rows, stated=settings.orientation)
         table = read_table(text, str(path), allowed_columns(rows), check)
-        points, of_units = points_of(table, task.task_space, Units(**settings.units.model_dump()), str(path))
+        units = Units(**settings.units.model_dump())
+        points, of_units = points_of(table, rows, units, str(path), settings.orientation)
         told = (*table.told, *of_units)
     _check_count(len(points), path)
     return points, told
@@ -91,7 +95,7 @@ def _along_joints(segment: CsvSegment, where: str, folder: Path) -> SplineSegmen
     from brachis.cam.table import read_table  # noqa: PLC0415
 
     settings, plain = segment.csv, PointFile(file=segment.csv.file)
-    for key in ("units", "tolerance", "corner"):
+    for key in ("orientation", "units", "tolerance", "corner"):
         if getattr(settings, key) != getattr(plain, key):
             problem = "a path of joints passes all rows, which are in rad and m"
             raise TaskError(problem, allowed=f"no {key}", where=f"{where}.csv.{key}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from brachis.errors import TaskError
 from brachis.task.bspline_curve import BSplineCurve
-from brachis.task.orientation import OrientationMode, Quaternion, Rotate, TurnTo
+from brachis.task.orientation import Attitude, OrientationMode, Rotate, TurnTo
 from brachis.task.point_data import FitReport, FitTolerance
 from brachis.task.segments import BSplineSegment, SplineSegment
 from brachis.task.shapes import SplineThrough
@@ -96,7 +96,7 @@ def _named(report: Report, wanted: Wanted) -> FitReport:
 def _spline_through(points: Points, report: FitReport, wanted: Wanted) -> SplineSegment:
     poses = points.turning.shape[1] == _QUATERNION
     places = [tuple(row) for row in (points.position if poses else points.columns).tolist()]
-    turned = [Quaternion(quaternion=(w, x, y, z)) for w, x, y, z in points.turning.tolist()] if poses else None
+    turned = [Attitude(quaternion_wxyz=turn) for turn in points.turning.tolist()] if poses else None
     spline = SplineThrough(
         through=tuple(places[1:]),
         orientations=tuple(turned[1:]) if turned else None,

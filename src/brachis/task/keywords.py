@@ -7,12 +7,14 @@ from typing import Any, Literal, TypedDict, Unpack
 
 from brachis.errors import UnknownNameError
 from brachis.task.boundary import BoundarySettings
+from brachis.task.constructors import Transform, poses_of
 from brachis.task.fields import Model, plain
 from brachis.task.limit_models import Array, LimitKeywords, LimitSpec
 from brachis.task.load import Source, load_task
 from brachis.task.messages import key_paths
 from brachis.task.models import Task
 from brachis.task.mounting_models import Payload, Placement
+from brachis.task.orientation import ToolPose
 from brachis.task.planning_models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings
 from brachis.task.robot_models import RobotSettings
 from brachis.task.segments import SegmentModel
@@ -32,7 +34,9 @@ class TaskKeywords(TypedDict, total=False):
     path: SegmentModel | Mapping[str, Any] | Sequence[SegmentModel | Mapping[str, Any] | Sequence[float]] | Array
     start: Posture
     end: Posture
-    path_start: Array | Sequence[float] | None
+    frames: Mapping[str, Placement | Settings | Transform]
+    path_frame: str | None
+    path_start: Array | Sequence[float] | Mapping[str, Any] | ToolPose | Transform | None
     task_space: str | Sequence[str]
     redundant_joints: Sequence[str] | Literal["auto"]
     branch: str
@@ -40,9 +44,9 @@ class TaskKeywords(TypedDict, total=False):
     custom_limits: Mapping[str, Settings]
     # robot
     tool_frame: str | None
-    tool_offset: Placement | Settings
+    tool_offset: Placement | Settings | Transform
     base_frame: str | None
-    mounting: Placement | Settings | Literal["floor", "wall", "ceiling"]
+    mounting: Placement | Settings | Transform | Literal["floor", "wall", "ceiling"]
     gravity: Array | Sequence[float]
     locked_joints: Mapping[str, float]
     payload: Payload | Settings | None
@@ -151,9 +155,12 @@ def _as_keyword(parts: Sequence[str]) -> str:
 
 
 def _in_full(key: str, value: object) -> object:
-    """Write a posture, and a solver's name, as mappings, which are merged key by key."""
+    """Write a posture, a solver's name, and a transform for the start of the path as a task file does."""
     if key == "solver" and isinstance(value, str):
         return {"name": value}
+    if key == "path_start" and hasattr(value, "homogeneous"):
+        ((place, turn),) = poses_of([value], key)
+        return {"position": place, **turn}
     if key not in {"start", "end"} or isinstance(value, str | Model):
         return value
     return value if isinstance(value, Mapping) and set(value) == {"joints"} else {"joints": plain(value)}

@@ -11,9 +11,12 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, JsonValue, Tag, field_validator, model_validator
 
+from brachis.cam.conventions import choices
 from brachis.task.boundary import BoundarySettings
 from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.fields import Model, Name, Number, by_form, or_form, plain, refuse
+from brachis.task.mounting_models import Placement
+from brachis.task.orientation import ToolPose
 from brachis.task.planning_models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings
 from brachis.task.point_data import FitReport
 from brachis.task.robot_models import RobotSettings
@@ -25,7 +28,6 @@ Row = Literal["x", "y", "z", "yaw"]
 _Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll", "joints"]
 POSITION_ROWS: Final[tuple[Row, ...]] = ("x", "y", "z")
 _SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll, joints"
-_POSE_NUMBERS = 7
 
 
 def _expand_position(space: _Space) -> _Space:
@@ -64,6 +66,12 @@ class Posture(Model):
     joints: JointValues = Field(description="Joint positions, rad (m): in the order of the chain, or by joint name.")
 
 
+PathStart = Annotated[
+    Annotated[tuple[Number, ...], Tag("<list>")]
+    | Annotated[ToolPose, Tag("<mapping>")]
+    | Annotated[None, Tag("<null>")],
+    by_form("a list of the rows of the task space, or of a pose a mapping {position: [x, y, z], rpy_deg: [...]}"),
+]
 FreePosture = Annotated[
     Annotated[Literal["free"], Tag("<word>")] | Annotated[Posture, Tag("<mapping>")],
     by_form("free, or a mapping {joints: [...]}", "free"),
@@ -111,11 +119,12 @@ class Task(Model):
         description="Configuration at the start of the path: {joints: ...}, or free, which needs path_start. A path of "
         "joints that begins with a waypoint needs none."
     )
-    path_start: tuple[Number, ...] | None = Field(
+    path_start: PathStart = Field(
         default=None,
-        description="Where the path begins: all rows of the task space (m, yaw in rad); of a pose the position and a "
-        "quaternion w, x, y, z. Null: where the start posture's tool is; otherwise a start posture whose tool is "
-        "elsewhere is refused. With start: free it must be given, unless the path begins with a waypoint.",
+        description="Where the path begins: a list of all rows of the task space (m, yaw in rad); of a pose {position: "
+        "[x, y, z], rpy_deg: [...]}, or another convention of an orientation. Null: where the start posture's tool is; "
+        "otherwise a start posture whose tool is elsewhere is refused. With start: free it must be given, unless the "
+        "path begins with a waypoint.",
     )
     end: FreePosture = Field(
         default="free",
@@ -133,6 +142,15 @@ class Task(Model):
         json_schema_extra=or_form(
             {"type": "array", "minItems": 2, "items": {"type": "array", "items": {"type": "number"}}}
         ),
+    )
+    frames: dict[Name, Placement] = Field(
+        default={},
+        description="Where frames such as those of workpieces are in the world: by name, {xyz: ..., rpy_deg: ...}.",
+    )
+    path_frame: Name | None = Field(
+        default=None,
+        description="The one of the frames in which path and path_start are given: points, directions, orientations. "
+        "Null: the world.",
     )
     boundary: BoundarySettings = Field(
         default_factory=BoundarySettings, description="Speeds at both ends, or a motion that goes round for ever."
@@ -211,13 +229,44 @@ class Task(Model):
         unread = isinstance(first, CsvSegment) and not first.csv.relative
         if self.start == "free" and self.path_start is None and not unread and self.begins is None:
             problem = "a free start posture leaves open where the path begins"
-            pose = isinstance(self.task_space, str)
-            rows = (*POSITION_ROWS, "qw", "qx", "qy", "qz") if pose else self.task_space
-            allowed = "the joints" if self.task_space == "joints" else f"[{', '.join(rows)}]"
-            raise refuse(problem, key="path_start", absent=True, allowed=allowed)
+            raise refuse(problem, key="path_start", absent=True, allowed=self._start_forms)
         if self.start == "free" and self.search.guesses == "numeric":
             problem = "numeric inverse kinematics needs a posture to begin with, and start is free"
             raise refuse(problem, key="search.guesses", found="numeric", allowed="lattice")
+        return self
+
+    @model_validator(mode="after")
+    def _path_frame_is_known(self) -> Task:
+        if self.path_frame is not None and self.path_frame not in self.frames:
+            problem = "there is no frame of this name"
+            missing = f"frames: {{{self.path_frame}: {{xyz: [...], rpy_deg: [...]}}}} beside it"
+            allowed = ", ".join(self.frames) or missing
+            raise refuse(problem, key="path_frame", found=self.path_frame, allowed=allowed)
+        if self.path_frame is not None and self.task_space == "joints":
+            problem = "a path of joints is in no frame"
+            raise refuse(problem, key="path_frame", found=self.path_frame, allowed="null, with task_space: joints")
+        return self
+
+    @property
+    def path_placement(self) -> Placement | None:
+        """Where the frame of the path is in the world; None where it is the world."""
+        return None if self.path_frame is None else self.frames[self.path_frame]
+
+    @property
+    def _start_forms(self) -> str:
+        """How ``path_start`` is written in this task space."""
+        if self.of_poses:
+            return f"{{position: [x, y, z], ...}} with one of {choices(suffix='_deg')}"
+        return f"[{', '.join(self.task_space)}]" if isinstance(self.task_space, tuple) else "a list of all joints"
+
+    @model_validator(mode="after")
+    def _path_start_fits(self) -> Task:
+        if self.path_start is not None and isinstance(self.path_start, ToolPose) != self.of_poses:
+            problem = "a list does not say what its numbers are, as the order of a quaternion"
+            if not self.of_poses:
+                problem = "a position with an orientation is for task spaces of poses"
+            found = self.path_start.model_dump() if isinstance(self.path_start, ToolPose) else list(self.path_start)
+            raise refuse(problem, key="path_start", found=found, allowed=self._start_forms)
         return self
 
     @model_validator(mode="after")
@@ -253,10 +302,15 @@ class Task(Model):
         return self
 
     @property
-    def begins(self) -> tuple[float, ...] | None:
+    def of_poses(self) -> bool:
+        """Whether the path prescribes the tool's orientation beside its position."""
+        return self.task_space in {"pose", "pose_free_roll"}
+
+    @property
+    def begins(self) -> tuple[float, ...] | ToolPose | None:
         """Where the first segment says that the path begins, as `path_start`; None where it leaves that open."""
-        place, poses = self.path[0].begins, isinstance(self.task_space, str) and self.task_space != "joints"
-        return None if place is None or (poses and len(place) != _POSE_NUMBERS) else place
+        place = self.path[0].begins
+        return place if isinstance(place, ToolPose) == self.of_poses else None
 
     @property
     def speed_unit(self) -> str:

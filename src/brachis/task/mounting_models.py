@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal
+import math
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
-from brachis.task.fields import Model, NonNegative, Number, Positive, refuse
+from brachis.task.fields import Model, NonNegative, Number, Positive, plain, refuse
 from brachis.task.orientation import Vector3
 
 
@@ -18,6 +19,22 @@ class Placement(Model):
         default=(0.0, 0.0, 0.0),
         description="Roll, pitch, yaw, degrees, as in a URDF: about the fixed x, then y, then z axis.",
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_transform(cls, given: object) -> object:
+        """Take a transform such as Pinocchio's SE3 too."""
+        matrix = getattr(given, "homogeneous", None)
+        if matrix is None:
+            return given
+        m: Any = plain(matrix)
+        yaw = math.atan2(m[1][0], m[0][0])
+        pitch = math.atan2(-m[2][0], math.hypot(m[0][0], m[1][0]))
+        sine = math.sin(yaw)
+        cosine = math.cos(yaw)
+        roll = math.atan2(sine * m[0][2] - cosine * m[1][2], cosine * m[1][1] - sine * m[0][1])
+        angles = [math.degrees(angle) for angle in (roll, pitch, yaw)]
+        return {"xyz": [row[3] for row in m[:3]], "rpy_deg": angles}
 
 
 class InertiaMatrix(Model):

@@ -1,17 +1,28 @@
 """How the tool is oriented along a segment, as the task file writes it; for task spaces of poses.
 
 ``orientation: fixed`` stands beside the segment's kind, or ``{rotate: ...}``, ``{to: ...}``, ``tangent``. A given
-orientation is that of the tool frame in the world frame, in one of three forms: a quaternion, a rotation vector, or
-roll, pitch and yaw as in a URDF. Angles are in degrees where the key ends with ``_deg``, otherwise in radians.
+orientation is that of the tool frame in the frame of the path, the world unless it is another, in one of the
+conventions of `brachis.cam.conventions`. Angles are in degrees where the key ends with ``_deg``, otherwise in radians.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, Tag, field_validator
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Field,
+    JsonValue,
+    SerializerFunctionWrapHandler,
+    Tag,
+    model_serializer,
+    model_validator,
+)
 
+from brachis.cam.conventions import CONVENTIONS, choices
 from brachis.task.fields import Model, Number, by_form, by_key, refuse
 
 _UNIT = 0.01
@@ -39,77 +50,77 @@ Profile = Annotated[
 ]
 
 
-class Quaternion(Model):
-    """An orientation as a unit quaternion."""
+def _unit_length(quaternion: tuple[float, ...] | None) -> tuple[float, ...] | None:
+    length = 1.0 if quaternion is None else math.hypot(*quaternion)
+    if abs(length - 1.0) > _UNIT:
+        problem = f"the quaternion's length is {length:.6g}"
+        raise refuse(problem, found=quaternion, allowed="a quaternion of length 1")
+    return quaternion
 
-    quaternion: tuple[Number, Number, Number, Number] = Field(
-        description="[w, x, y, z], the scalar first, of length 1 (to 1 %, the rest is rounding); q and -q are the same."
+
+_Quaternion = Annotated[tuple[Number, Number, Number, Number] | None, AfterValidator(_unit_length)]
+_DEGREES = "_deg"
+
+
+def _about(name: str) -> Any:  # noqa: ANN401  (what pydantic's Field returns)
+    """Return the field of a convention, with its meaning."""
+    convention = CONVENTIONS[name]
+    unit = ", degrees" if convention.euler else ", rad" if name == "rotation_vector" else " (length 1, to 1 %)"
+    return Field(
+        default=None,
+        description=f"{convention.meaning[0].upper()}{convention.meaning[1:]}{unit}. Used by {convention.makers}.",
     )
 
-    @field_validator("quaternion")
+
+class Attitude(Model):
+    """An orientation, in exactly one of these conventions."""
+
+    model_config = ConfigDict(json_schema_extra=lambda schema: schema.update(oneOf=_ONE_OF))
+
+    quaternion_wxyz: _Quaternion = _about("quaternion_wxyz")
+    quaternion_xyzw: _Quaternion = _about("quaternion_xyzw")
+    rotation_vector: Vector3 | None = _about("rotation_vector")
+    rpy_deg: Vector3 | None = _about("rpy")
+    kuka_abc_deg: Vector3 | None = _about("kuka_abc")
+    staubli_xyz_deg: Vector3 | None = _about("staubli_xyz")
+    fanuc_wpr_deg: Vector3 | None = _about("fanuc_wpr")
+
+    @model_validator(mode="before")
     @classmethod
-    def _has_unit_length(cls, quaternion: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-        length = math.hypot(*quaternion)
-        if abs(length - 1.0) > _UNIT:
-            problem = f"the quaternion's length is {length:.6g}"
-            raise refuse(problem, found=list(quaternion), allowed="[w, x, y, z] of length 1")
-        return quaternion
+    def _one_convention(cls, value: object) -> object:
+        given = value if isinstance(value, Mapping) else {}
+        stated = [key for key in Attitude.model_fields if given.get(key) is not None]
+        if not isinstance(value, Attitude) and len(stated) != 1:
+            problem = "an orientation needs exactly one convention"
+            raise refuse(problem, found=value, allowed=choices(suffix=_DEGREES))
+        return value
+
+    @model_serializer(mode="wrap")
+    def _without_the_others(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {key: value for key, value in dump(self).items() if value is not None}
+
+    @property
+    def stated(self) -> tuple[str, tuple[float, ...]]:
+        """Name of the convention in `brachis.cam.conventions`, and the numbers: quaternions, or angles in rad."""
+        key, values = next((key, value) for key in Attitude.model_fields if (value := getattr(self, key)) is not None)
+        if key.endswith(_DEGREES):
+            return key.removesuffix(_DEGREES), tuple(math.radians(angle) for angle in values)
+        return key, values
 
 
-class RotationVector(Model):
-    """An orientation as a rotation vector."""
-
-    rotation_vector: Vector3 = Field(description="Axis of the rotation times its angle, rad.")
+_ONE_OF: list[JsonValue] = [{"required": [key]} for key in Attitude.model_fields]
 
 
-class RollPitchYaw(Model):
-    """An orientation as roll, pitch and yaw."""
-
-    rpy_deg: Vector3 = Field(
-        description="Roll, pitch, yaw, degrees, as in a URDF: about the fixed x, then y, then z axis."
-    )
-
-
-_FORMS = "an orientation needs exactly one of its forms"
-
-Attitude = Annotated[
-    Annotated[Quaternion, Tag("<Quaternion>")]
-    | Annotated[RotationVector, Tag("<RotationVector>")]
-    | Annotated[RollPitchYaw, Tag("<RollPitchYaw>")],
-    by_key(
-        _FORMS,
-        {"Quaternion": ("quaternion",), "RotationVector": ("rotation_vector",), "RollPitchYaw": ("rpy_deg",)},
-    ),
-]
-
-
-class ToQuaternion(Quaternion):
-    """A turn to a unit quaternion."""
+class Target(Attitude):
+    """An orientation that a turn leads to."""
 
     profile: Profile = "uniform"
 
 
-class ToRotationVector(RotationVector):
-    """A turn to a rotation vector."""
+class ToolPose(Attitude):
+    """A place of the tool: its position, and its orientation in exactly one of these conventions."""
 
-    profile: Profile = "uniform"
-
-
-class ToRollPitchYaw(RollPitchYaw):
-    """A turn to roll, pitch and yaw."""
-
-    profile: Profile = "uniform"
-
-
-Target = Annotated[
-    Annotated[ToQuaternion, Tag("<ToQuaternion>")]
-    | Annotated[ToRotationVector, Tag("<ToRotationVector>")]
-    | Annotated[ToRollPitchYaw, Tag("<ToRollPitchYaw>")],
-    by_key(
-        _FORMS,
-        {"ToQuaternion": ("quaternion",), "ToRotationVector": ("rotation_vector",), "ToRollPitchYaw": ("rpy_deg",)},
-    ),
-]
+    position: Vector3 = Field(description="x, y, z, m.")
 
 
 class Rotation(Model):
@@ -117,7 +128,10 @@ class Rotation(Model):
 
     axis: Direction = Field(description="Axis of the rotation, right-hand rule; any length but zero.")
     angle_deg: Number = Field(description="Angle of the rotation, degrees, signed; it may exceed a turn.")
-    frame: Literal["world", "tool"] = Field(default="world", description="Frame in which the axis is given.")
+    frame: Literal["path", "tool"] = Field(
+        default="path",
+        description="Frame in which the axis is given: that of the path (the world, or path_frame), or the tool's.",
+    )
     profile: Profile = "uniform"
 
 
@@ -126,8 +140,8 @@ class Tangent(Model):
 
     up: Direction | None = Field(
         default=None,
-        description="World direction that the tool keeps its attitude to; not along the tangent. Null: the axis of an "
-        "arc or circle, z for other segments.",
+        description="Direction, in the path's frame, that the tool keeps its attitude to; not along the tangent. Null: "
+        "the axis of an arc or circle, z for other segments.",
     )
 
 
@@ -140,7 +154,7 @@ class Rotate(Model):
 class TurnTo(Model):
     """The tool turns to an orientation, the shortest way."""
 
-    to: Target = Field(description="Orientation at the segment's end, world frame.")
+    to: Target = Field(description="Orientation at the segment's end.")
 
 
 class AlongTangent(Model):

@@ -5,8 +5,9 @@ from __future__ import annotations
 from math import degrees
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, Strict, WithJsonSchema, field_validator
+from pydantic import AfterValidator, BeforeValidator, Field, Strict, WithJsonSchema, field_validator
 
+from brachis.cam.conventions import CONVENTIONS, choices
 from brachis.cam.units import ANGLES, LENGTHS, quantity
 from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, refuse
 
@@ -34,6 +35,15 @@ Length = Annotated[float, _quantity_of(LENGTHS, "0.05 mm"), Strict(), Field(ge=1
 Angle = Annotated[float, _quantity_of(ANGLES, "0.1 deg"), Strict(), Field(ge=1e-7, le=0.5), _QUANTITY_SCHEMA]
 
 
+def _known(word: str) -> str:
+    if word not in CONVENTIONS:
+        raise refuse("this convention of an orientation is not known", found=word, allowed=choices())
+    return word
+
+
+OrientationWord = Annotated[Name, AfterValidator(_known), WithJsonSchema({"enum": list(CONVENTIONS)})]
+
+
 class FileUnits(Model):
     """Units of the numbers in a file; a header such as ``x_mm`` states them too."""
 
@@ -41,7 +51,9 @@ class FileUnits(Model):
         default=None, description="Of positions. Null: as the header says, else m."
     )
     angle: Literal["rad", "mrad", "deg"] | None = Field(
-        default=None, description="Of yaw and rotation vectors. Null: as the header says, else rad."
+        default=None,
+        description="Of yaw and orientations. Null: as the header says; else rad, but for roll, pitch and yaw and the "
+        "angles of KUKA, Staubli and Fanuc, whose unit must be stated.",
     )
     speed: Literal["m/s", "mm/s", "m/min", "mm/min", "in/min", "inch/min"] | None = Field(
         default=None, description="Of a column of feed rates. Null: as the header says, which then must."
@@ -72,7 +84,12 @@ class PointFile(Model):
     relative: Flag = Field(
         default=False,
         description="Whether the rows count from the first one, so that the path may start anywhere: displacements "
-        "along the world axes, rotations in the tool frame.",
+        "along the axes of the path's frame, rotations in the tool frame.",
+    )
+    orientation: OrientationWord | None = Field(
+        default=None,
+        description="What the columns of the orientation mean (task spaces of poses), where their names do not say "
+        f"it: {', '.join(CONVENTIONS)}.",
     )
     units: FileUnits = Field(default_factory=FileUnits, description="Units of its numbers.")
     tolerance: FitTolerance | None = Field(

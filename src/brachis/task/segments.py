@@ -9,13 +9,14 @@ number fits the task space is for the path to say (`brachis.path.build_path`), w
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 from pydantic import Field, Tag, model_validator
 
 from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.fields import Model, Positive, by_key, refuse
-from brachis.task.orientation import OrientationMode, Quaternion, Turning
+from brachis.task.orientation import OrientationMode, ToolPose, Turning
 from brachis.task.point_data import PointFile
 from brachis.task.shapes import Arc, Circle, Helix, Line, Shape, SplineThrough
 
@@ -48,8 +49,8 @@ class SegmentModel(Model):
         return f"{type(self).__name__.removesuffix('Segment')}({given})"
 
     @property
-    def begins(self) -> tuple[float, ...] | None:
-        """Where the segment says that it begins: the rows of the task space; of poses position and quaternion.
+    def begins(self) -> tuple[float, ...] | ToolPose | None:
+        """Where the segment says that it begins, as ``path_start`` of a task; None where it leaves that open.
 
         Without relative waypoints and another word on it, that is the first waypoint.
         """
@@ -107,7 +108,7 @@ class SplineSegment(MovingSegment):
     spline: SplineThrough
 
     @property
-    def begins(self) -> tuple[float, ...] | None:
+    def begins(self) -> tuple[float, ...] | ToolPose | None:
         """See `SegmentModel.begins`."""
         spline = self.spline
         if spline.relative:
@@ -115,7 +116,9 @@ class SplineSegment(MovingSegment):
         place, oriented = spline.starts_at, spline.starts_oriented
         if place is None:
             place, oriented = spline.through[0], spline.orientations[0] if spline.orientations else None
-        return (*place, *oriented.quaternion) if isinstance(oriented, Quaternion) else place
+        if oriented is None:
+            return place
+        return ToolPose.model_validate({"position": place, **oriented.model_dump()})
 
     @model_validator(mode="after")
     def _one_word_on_orientation(self) -> SplineSegment:
@@ -137,9 +140,14 @@ class BSplineSegment(MovingSegment):
     bspline: BSplineCurve
 
     @property
-    def begins(self) -> tuple[float, ...] | None:
+    def begins(self) -> tuple[float, ...] | ToolPose | None:
         """See `SegmentModel.begins`."""
-        return None if self.bspline.relative else self.bspline.control_points[0]
+        first = self.bspline.control_points[0]
+        if self.bspline.relative or len(first) != _POSE_COLUMNS:
+            return None if self.bspline.relative else first
+        length = math.hypot(*first[3:])
+        turn = [number / length for number in first[3:]]
+        return ToolPose.model_validate({"position": first[:3], "quaternion_wxyz": turn})
 
     @model_validator(mode="after")
     def _one_word_on_orientation(self) -> BSplineSegment:

@@ -98,13 +98,13 @@ class SplineThrough(Model):
     )
     orientations: tuple[Attitude, ...] | None = Field(
         default=None,
-        description="Orientation of the tool at each waypoint, world frame (task spaces of poses). Null: the segment's "
+        description="Orientation of the tool at each waypoint (task spaces of poses). Null: the segment's "
         "`orientation` says how the tool turns.",
     )
     relative: Flag = Field(
         default=False,
-        description="Whether the waypoints are relative to the segment's start: displacements along the world axes, "
-        "rotations in the tool frame.",
+        description="Whether the waypoints are relative to the segment's start: displacements along the axes of the "
+        "path's frame, rotations in the tool frame.",
     )
     starts_at: Vector | None = Field(
         default=None,

@@ -9,13 +9,14 @@ from typing import ClassVar
 import numpy as np
 import pinocchio as pin
 
+from brachis.cam.conventions import rotation_by
 from brachis.errors import InputError
 from brachis.robot.task_map.protocol import TaskDerivatives, TaskMap
-from brachis.robot.task_map.rows import AXES, POSE_ROWS
+from brachis.robot.task_map.rows import POSE_ROWS
 from brachis.robot.task_map.twists import tool_bias, tool_motion, velocity_slopes
+from brachis.task import ToolPose
 
 _POSITIONS = 3
-_UNIT = 1e-2
 _NEARLY_HALF_A_TURN = 3.0  # rad
 
 
@@ -32,19 +33,14 @@ class Pose(TaskMap):
 
     rows: tuple[str, ...] = POSE_ROWS
 
-    @property
-    def stated(self) -> tuple[str, ...]:
-        """See `TaskMap.stated`: the position and a quaternion."""
-        return (*AXES, "qw", "qx", "qy", "qz")
-
-    def read(self, stated: Sequence[float], where: str) -> np.ndarray:
+    def read(self, stated: Sequence[float] | ToolPose, where: str) -> np.ndarray:
         """See `TaskMap.read`."""
-        values = super().read(stated, where)
-        size = float(np.linalg.norm(values[_POSITIONS:]))
-        if abs(size - 1.0) > _UNIT:
-            raise InputError("has no unit quaternion", where=where, found=f"a norm of {size:.6g}", allowed="1")
-        w, x, y, z = values[_POSITIONS:] / size
-        return np.concatenate([values[:_POSITIONS], pin.Quaternion(w, x, y, z).matrix().ravel()])
+        if not isinstance(stated, ToolPose):
+            allowed = "a position with an orientation (ToolPose)"
+            raise InputError("has no orientation", where=where, found=list(stated), allowed=allowed)
+        convention, values = stated.stated
+        rotation = rotation_by(convention, np.array(values))
+        return np.concatenate([stated.position, rotation.as_matrix().ravel()])
 
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """See `TaskMap.of_placements`."""

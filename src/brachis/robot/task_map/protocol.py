@@ -14,6 +14,7 @@ from brachis.errors import InputError
 from brachis.robot.robot import Robot
 from brachis.robot.task_map.rows import AXES
 from brachis.summary import Summary
+from brachis.task import ToolPose
 
 
 @dataclass(frozen=True)
@@ -80,26 +81,18 @@ class TaskMap(Summary, ABC):
         """Unit of every row."""
         return tuple("m" if row in AXES else "rad" for row in self.rows)
 
-    @property
-    def stated(self) -> tuple[str, ...]:
-        """Names of the coordinates as a task states them."""
-        return self.rows
-
-    def read(self, stated: Sequence[float], where: str) -> np.ndarray:
-        """Task coordinates, (c,), from what a task states.
+    def read(self, stated: Sequence[float] | ToolPose, where: str) -> np.ndarray:
+        """Task coordinates, (c,), from what a task states: its rows, or a pose.
 
         Raises
         ------
         InputError
-            They are not as many as `stated`, or do not make a pose.
+            They are not as many as the rows, or do not make a pose.
         """
-        if len(stated) != len(self.stated):
-            raise InputError(
-                "has the wrong number of coordinates",
-                where=where,
-                found=len(stated),
-                allowed=f"{len(self.stated)}: {', '.join(self.stated)}",
-            )
+        if isinstance(stated, ToolPose) or len(stated) != self.m:
+            found = "a pose" if isinstance(stated, ToolPose) else len(stated)
+            allowed = f"{self.m}: {', '.join(self.rows)}"
+            raise InputError("has the wrong number of coordinates", where=where, found=found, allowed=allowed)
         return np.array(stated, dtype=float)
 
     def value(self, q: np.ndarray) -> np.ndarray:

@@ -1,0 +1,69 @@
+"""How orientations are written down: by quaternions, rotation vectors, and the angles that the makers of robots use."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+    from brachis.cam.points import Array
+
+
+@dataclass(frozen=True)
+class Convention:
+    """Meaning of the numbers of an orientation.
+
+    Attributes
+    ----------
+    numbers : int
+    meaning : str
+        In words.
+    makers : str
+        Who uses it.
+    euler : str
+        SciPy's word for the axes of three angles: small letters are fixed axes, capitals turn with the tool; empty for
+        what is not made of angles.
+    """
+
+    numbers: int
+    meaning: str
+    makers: str
+    euler: str = ""
+
+
+CONVENTIONS: Final = {
+    "quaternion_wxyz": Convention(4, "quaternion, w first", "ABB, MuJoCo, Drake"),
+    "quaternion_xyzw": Convention(4, "quaternion, w last", "ROS, SciPy, Pinocchio's vectors"),
+    "rotation_vector": Convention(3, "axis times angle", "Universal Robots"),
+    "rpy": Convention(
+        3, "roll, pitch, yaw about the fixed x, then y, then z axis", "URDF, Yaskawa, Mitsubishi, UFACTORY", "xyz"
+    ),
+    "kuka_abc": Convention(3, "A about z, B about the new y, C about the new x axis", "KUKA", "ZYX"),
+    "staubli_xyz": Convention(
+        3, "Rx about x, Ry about the new y, Rz about the new z axis", "Staubli, Mecademic, RoboDK's targets", "XYZ"
+    ),
+    "fanuc_wpr": Convention(3, "W, P, R about the fixed x, then y, then z axis", "Fanuc", "xyz"),
+}
+"""Conventions by name."""
+
+
+def choices(names: tuple[str, ...] = tuple(CONVENTIONS), suffix: str = "") -> str:
+    """List conventions with their meaning and who uses them, for messages; `suffix` follows those of angles."""
+    listed = ((name, CONVENTIONS[name]) for name in names)
+    return "; ".join(f"{name}{suffix if c.euler else ''} ({c.meaning}: {c.makers})" for name, c in listed)
+
+
+def rotation_by(convention: str, values: Array) -> Rotation:
+    """Return the rotations of orientations, (..., 3) in rad or (..., 4), in one of the `CONVENTIONS`."""
+    import numpy as np  # noqa: PLC0415  (tasks without orientations need neither)
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415
+
+    if convention == "quaternion_xyzw":
+        return Rotation.from_quat(values)
+    if convention == "quaternion_wxyz":
+        return Rotation.from_quat(np.roll(values, -1, axis=-1))
+    if convention == "rotation_vector":
+        return Rotation.from_rotvec(values)
+    return Rotation.from_euler(CONVENTIONS[convention].euler, values)

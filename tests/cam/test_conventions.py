@@ -1,0 +1,54 @@
+"""Conventions of orientations, against matrices that are worked out by hand and against products about single axes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from brachis.cam.conventions import CONVENTIONS, rotation_by
+from brachis.path.rotations import rotation_from
+from brachis.task.orientation import Attitude
+
+X, Y, Z = (lambda angle, axis=axis: Rotation.from_rotvec(angle * axis) for axis in np.eye(3))
+ANGLES = np.radians([20.0, -35.0, 110.0])
+A, B, C = ANGLES
+EXPECTED = {
+    "rpy": Z(C) * Y(B) * X(A),
+    "kuka_abc": Z(A) * Y(B) * X(C),
+    "staubli_xyz": X(A) * Y(B) * Z(C),
+    "fanuc_wpr": Z(C) * Y(B) * X(A),
+}
+# First 90 degrees about one axis, then 90 degrees about another one: columns are where x, y and z of the tool point.
+QUARTERS = {
+    "rpy": ([90, 0, 90], [[0, 0, 1], [1, 0, 0], [0, 1, 0]]),  # x of the tool to y, its y to z
+    "fanuc_wpr": ([90, 0, 90], [[0, 0, 1], [1, 0, 0], [0, 1, 0]]),
+    "kuka_abc": ([90, 90, 0], [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]),  # x of the tool to -z, its y to -x
+    "staubli_xyz": ([90, 0, 90], [[0, -1, 0], [0, 0, -1], [1, 0, 0]]),  # x of the tool to z, its y to -x
+}
+
+
+@pytest.mark.parametrize("name", EXPECTED)
+def test_angles_are_turns_about_single_axes(name):
+    assert (rotation_by(name, ANGLES).inv() * EXPECTED[name]).magnitude() < 1e-15
+    attitude = Attitude.model_validate({f"{name}_deg": np.degrees(ANGLES).tolist()})
+    assert (rotation_from(attitude).inv() * EXPECTED[name]).magnitude() < 1e-14
+
+
+@pytest.mark.parametrize("name", QUARTERS)
+def test_quarters_by_hand(name):
+    angles, matrix = QUARTERS[name]
+    np.testing.assert_allclose(rotation_by(name, np.radians(angles)).as_matrix(), matrix, atol=1e-15)
+
+
+def test_quaternions_and_rotation_vectors():
+    quarter = [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]  # read with w first a quarter about z, with w last one about x
+    np.testing.assert_allclose(rotation_by("quaternion_wxyz", np.array(quarter)).as_rotvec(), [0, 0, np.pi / 2])
+    np.testing.assert_allclose(rotation_by("quaternion_xyzw", np.array(quarter)).as_rotvec(), [np.pi / 2, 0, 0])
+    np.testing.assert_allclose(
+        rotation_by("rotation_vector", np.array([0.0, 0.3, 0.0])).as_matrix(), Y(0.3).as_matrix()
+    )
+
+
+def test_every_convention_is_a_key_of_an_orientation():
+    assert [name + "_deg" * bool(each.euler) for name, each in CONVENTIONS.items()] == list(Attitude.model_fields)
