@@ -125,8 +125,9 @@ need a `blend`.
 Coordinates are those of the rows of the task space, m, and rad for yaw. In task spaces of poses (`pose`,
 `pose_free_roll`) they are x, y, z, and `orientation` says how the tool turns.
 
-They are in the world frame, or in the frame that `path_frame` names, such as that of a workpiece. Segments, splines,
-files of points, directions, orientations and `path_start` are all in it. A workpiece that stands elsewhere is then one
+They are in the world frame, or in a frame of `frames`, such as that of a workpiece: `path: {frame: workpiece, segments:
+[...]}`, or the key `path_frame` beside `path`. Segments, splines, files of points, directions, orientations and
+`path_start` are all in it. A workpiece that stands elsewhere is then one
 changed key; a sweep over `frames.workpiece.xyz` finds its best place. In task spaces of fewer rows than x, y, z the
 frame may only turn within these rows. Results, plots and exports are in the world frame.
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import hypothesis
 import pytest
 
 _TESTS = Path(__file__).resolve().parent
@@ -38,6 +39,10 @@ if str(_TESTS) not in sys.path:
 # The many processes that tests start would compile the package again and again, a third of their time.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# Properties hold on a busy machine too.
+hypothesis.settings.register_profile("brachis", deadline=None)
+hypothesis.settings.load_profile("brachis")
 
 # A shell that starts the tests in the background has Ctrl-C ignored; tests that press it want Python's usual handler.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -63,7 +63,7 @@ component = st.floats(-1.0, 1.0)
 vector = st.tuples(component, component, component)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(axis=vector.filter(lambda v: np.linalg.norm(v) > 1e-3), xyz=vector, rpy=vector)
 def test_tool_is_shifted_along_any_rail(tmp_path_factory, axis, xyz, rpy):
     path = tmp_path_factory.getbasetemp() / "any.urdf"

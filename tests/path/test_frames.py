@@ -151,6 +151,15 @@ def test_a_start_that_is_elsewhere_in_the_frame_is_refused() -> None:
         brachis.plan(brachis.robots.scara3, task, start=[0.5, -2.0, 2.0])
 
 
+def test_a_path_says_its_frame() -> None:
+    apart = written(SEGMENTS)
+    together = load_task(
+        {**apart.model_dump(mode="json", exclude={"path", "path_frame"}, exclude_defaults=True)}
+        | {"path": {"frame": "workpiece", "segments": SEGMENTS}}
+    )
+    assert together == apart
+
+
 def test_frames_that_do_not_fit() -> None:
     with pytest.raises(
         TaskError, match=r"path_frame: there is no frame of this name; found 'table' .*allowed: workpiece"
@@ -160,8 +169,8 @@ def test_frames_that_do_not_fit() -> None:
         written(SEGMENTS, frames={}, path_frame="table")
     with pytest.raises(TaskError, match="path_frame: a path of joints is in no frame"):
         written([{"line": {"by": [0.1]}}], task_space="joints")
-    with pytest.raises(TaskError, match=r"path: a path is a list of segments; .* beside it path_frame: workpiece"):
-        written({"frame": "workpiece", "segments": SEGMENTS})  # type: ignore[arg-type]
+    with pytest.raises(TaskError, match=r"path: a path in a frame is .*allowed: \{frame: NAME, segments"):
+        written({"frame": "workpiece", "path": SEGMENTS})  # type: ignore[arg-type]
     tilted = written([{"line": {"by": [0.1, 0.0]}}], task_space=["x", "y"])
     with pytest.raises(
         PathError, match=r"path_frame: .* turns it out of the rows .*\[20.0, -35.0, 110.0\] with .*\[x, y\]"

@@ -113,9 +113,7 @@ def find_fastest(
     raise no_motion(problem, decompositions, record.attempts, record.dead_ends, deadline)
 
 
-def is_planned(
-    problem: Problem, decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline
-) -> bool:
+def is_planned(problem: Problem, decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline) -> bool:
     """Tell whether the first starts of the search lead to a verified motion.
 
     Parameters

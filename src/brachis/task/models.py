@@ -138,9 +138,16 @@ class Task(Model):
     )
     path: Annotated[tuple[Segment, ...], Field(min_length=1)] = Field(
         description="Segments of the path, in order; a list of points, all rows of the task space each, is the spline "
-        "through them that begins at the first one. For a file of points: [{csv: {file: ...}}].",
+        "through them that begins at the first one. For a file of points: [{csv: {file: ...}}]. Segments in a frame "
+        "of their own: {frame: NAME, segments: [...]}.",
         json_schema_extra=or_form(
-            {"type": "array", "minItems": 2, "items": {"type": "array", "items": {"type": "number"}}}
+            {"type": "array", "minItems": 2, "items": {"type": "array", "items": {"type": "number"}}},
+            {
+                "type": "object",
+                "required": ["frame", "segments"],
+                "additionalProperties": False,
+                "properties": {"frame": {"type": "string"}, "segments": {"$ref": "#/properties/path/anyOf/0"}},
+            },
         ),
     )
     frames: dict[Name, Placement] = Field(
@@ -193,6 +200,17 @@ class Task(Model):
         if isinstance(content, Mapping) and content.get("task_space") == "joints":
             return {"start": "free", **content}
         return content
+
+    @model_validator(mode="before")
+    @classmethod
+    def _a_path_may_say_its_frame(cls, content: object) -> object:
+        path = content.get("path") if isinstance(content, Mapping) else None
+        if not isinstance(path, Mapping) or "frame" not in path or not isinstance(content, Mapping):
+            return content
+        if set(path) != {"frame", "segments"}:
+            problem = "a path in a frame is the frame's name and the segments"
+            raise refuse(problem, key="path", found=path, allowed="{frame: NAME, segments: [...]}")
+        return {**content, "path": path["segments"], "path_frame": path["frame"]}
 
     @field_validator("path", mode="before")
     @classmethod
