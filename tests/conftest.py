@@ -41,7 +41,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 # Properties hold on a busy machine too.
-hypothesis.settings.register_profile("brachis", deadline=None)
+hypothesis.settings.register_profile("brachis", deadline=None, derandomize=True)
 hypothesis.settings.load_profile("brachis")
 
 # A shell that starts the tests in the background has Ctrl-C ignored; tests that press it want Python's usual handler.

@@ -89,7 +89,7 @@ def test_two_links_reach_the_annulus_between_them_and_nothing_else():
     np.testing.assert_array_equal(finite, np.repeat(inside[:, None], 2, axis=1))
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(
     pattern=st.sampled_from(["RR", "RP", "PR", "PP", "RRP", "PRR", "RPR", "RRRR"]),
     far=st.tuples(st.floats(-4.0, 4.0), st.floats(-4.0, 4.0)),

@@ -113,7 +113,7 @@ def test_monotone_control_points_make_progress_monotone():
     assert ydot[:, 0].max() > 0.1
 
 
-@settings(max_examples=50, deadline=None, derandomize=True)
+@settings(max_examples=50)
 @given(
     degree=st.integers(2, 6),
     extra=st.integers(0, 6),

@@ -122,7 +122,7 @@ def test_monotone_rows_say_whether_progress_is_monotone(phase):
     assert 10 < sum(monotone) < len(monotone) - 10
 
 
-@settings(max_examples=50, deadline=None, derandomize=True)
+@settings(max_examples=50)
 @given(
     degree=st.integers(2, 6),
     derivatives=st.integers(1, 2),
@@ -148,7 +148,7 @@ def test_splines_between_rates(degree, derivatives, start, rate, duration, seed)
     assert spline.free == len(points) - 1 - given
 
 
-@settings(max_examples=50, deadline=None, derandomize=True)
+@settings(max_examples=50)
 @given(
     degree=st.integers(2, 6),
     start=st.just(np.nan) | st.floats(-3.0, 3.0),
