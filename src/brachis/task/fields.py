@@ -129,12 +129,12 @@ def refuse(
     )
 
 
-def or_form(*forms: dict[str, Any]) -> Callable[[dict[str, Any]], None]:
-    """Return what adds forms of a field's value to its JSON schema, and of a list one item; for json_schema_extra."""
+def or_form(form: dict[str, Any]) -> Callable[[dict[str, Any]], None]:
+    """Return what adds a form of a field's value to its JSON schema, and of a list one item; for json_schema_extra."""
 
     def add(schema: dict[str, Any]) -> None:
         kept = {key: schema.pop(key) for key in ("$ref", "type", "items", "minItems") if key in schema}
-        schema["anyOf"] = [kept, *([kept["items"]] if "items" in kept else []), *forms]
+        schema["anyOf"] = [kept, *([kept["items"]] if "items" in kept else []), form]
 
     return add
 

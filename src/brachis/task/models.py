@@ -100,6 +100,15 @@ def _is_matrix(row: object) -> bool:
     return isinstance(row, list) and any(isinstance(each, list) for each in row)
 
 
+def _add_forms_of_paths(schema: dict[str, Any]) -> None:
+    """Add to the JSON schema of a path that it may be points, or segments in a frame of their own."""
+    numbers = {"type": "array", "items": {"type": "number"}}
+    or_form({"type": "array", "minItems": 2, "items": numbers})(schema)
+    parts = {"frame": {"type": "string"}, "segments": schema["anyOf"][0]}
+    in_frame = {"type": "object", "required": list(parts), "additionalProperties": False, "properties": parts}
+    schema["anyOf"].append(in_frame)
+
+
 class Task(Model):
     """A task: a robot, a path for its tool, and how to plan.
 
@@ -140,15 +149,7 @@ class Task(Model):
         description="Segments of the path, in order; a list of points, all rows of the task space each, is the spline "
         "through them that begins at the first one. For a file of points: [{csv: {file: ...}}]. Segments in a frame "
         "of their own: {frame: NAME, segments: [...]}.",
-        json_schema_extra=or_form(
-            {"type": "array", "minItems": 2, "items": {"type": "array", "items": {"type": "number"}}},
-            {
-                "type": "object",
-                "required": ["frame", "segments"],
-                "additionalProperties": False,
-                "properties": {"frame": {"type": "string"}, "segments": {"$ref": "#/properties/path/anyOf/0"}},
-            },
-        ),
+        json_schema_extra=_add_forms_of_paths,
     )
     frames: dict[Name, Placement] = Field(
         default={},
