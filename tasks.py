@@ -25,7 +25,7 @@ ENVIRONMENT = ROOT / ".venv"
 BIN = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
 
 INSTALL = {
-    "demo": ".",
+    "demo": ".[all]",
     "test": ".[test]",
     "lint": ".[lint]",
     "types": ".[lint]",

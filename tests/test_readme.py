@@ -8,6 +8,7 @@ import shlex
 import signal
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -264,3 +265,36 @@ def test_robots_say_where_their_figures_come_from():
     for folder in folders:
         assert (folder / "robot.urdf").is_file()
         assert len((folder / "README.md").read_text()) > 200
+
+
+def test_the_quick_start_plans_the_task_of_its_file():
+    text = (ROOT / "docs/quick_start.md").read_text()
+    cell = re.findall(r"```{code-cell}\n(.*?)```", text, flags=re.DOTALL)[0]
+    assert "The same as a file is `examples/01_scara_line.yaml`" in text
+    names: dict[str, brachis.Result] = {}
+    exec(compile(cell, "quick_start.md", "exec"), names)  # noqa: S102
+    file = brachis.load_task(ROOT / "examples/01_scara_line.yaml").to_dict()
+    planned = names["result"].task.to_dict()
+    for task in (file, planned):
+        del task["robot"]["urdf"]
+    np.testing.assert_allclose(planned["start"].pop("joints"), file["start"].pop("joints"), rtol=1e-15)
+    assert planned == file
+
+
+def test_what_the_commands_need_is_installed_by_what_the_readme_says():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    (all_of_them,) = extras["all"]
+    named = set(re.search(r"\[(.*)\]", all_of_them).group(1).split(","))
+    asked = {
+        extra
+        for path in (ROOT / "src").rglob("*.py")
+        for extra in re.findall(
+            r'(?:NotInstalledError\(.*|_EXTRA = )"(\w+)"\)?(?: from .*)?$', path.read_text(), re.MULTILINE
+        )
+    }
+    assert asked >= {"export", "report", "sweep", "view"}
+    assert asked - named <= {"cluster", "pandas"}, "no command of the README needs these"
+    assert asked <= set(extras)
+    assert load(ROOT / "tasks.py").INSTALL["demo"] == ".[all]"
+    assert 'pip install ".[all]"' in README

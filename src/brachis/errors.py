@@ -306,7 +306,8 @@ class NotInstalledError(InputError):
     def __init__(self, user: str, library: str, extra: str) -> None:
         self.library = library
         self.extra = extra
-        super().__init__(f"{user} needs {library}, which is not installed", hint=f'pip install "brachis[{extra}]"')
+        hint = f'python -m pip install "brachis[{extra}]" in the environment of brachis, be that installed or a clone'
+        super().__init__(f"{user} needs {library}, which is not installed", hint=hint)
 
 
 class UnreachableError(BrachisError):

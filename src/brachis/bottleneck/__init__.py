@@ -9,6 +9,7 @@ Examples
 """
 
 from brachis.bottleneck.check import CheckedSensitivity, SensitivityCheck, check_sensitivities
+from brachis.bottleneck.knots import KnotCost, knot_cost
 from brachis.bottleneck.ratios import LimitRatios, limit_ratios
 from brachis.bottleneck.reference import Reference, find_reference
 from brachis.bottleneck.saturation import RIPPLE, THRESHOLD, Saturation, Stretch, saturations
@@ -22,6 +23,7 @@ __all__ = [
     "BottleneckReport",
     "BranchBoundary",
     "CheckedSensitivity",
+    "KnotCost",
     "LimitRatios",
     "Reference",
     "Saturation",
@@ -31,6 +33,7 @@ __all__ = [
     "Stretch",
     "check_sensitivities",
     "find_reference",
+    "knot_cost",
     "limit_ratios",
     "report",
     "saturations",

@@ -8,6 +8,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from brachis.bottleneck.check import SensitivityCheck, check_sensitivities
+from brachis.bottleneck.knots import KnotCost, knot_cost
 from brachis.bottleneck.reference import Reference, find_reference
 from brachis.bottleneck.saturation import THRESHOLD, Saturation, saturations
 from brachis.bottleneck.saved import solved_again
@@ -34,6 +35,8 @@ class BottleneckReport:
         What every limit costs; None of a motion that was not planned, and is no optimum whose multipliers tell.
     saturations : tuple of Saturation
         When every limit is active, those active longest first.
+    knots : KnotCost or None
+        What the knots cost; None where that is not known.
     check : SensitivityCheck or None
         The predictions beside solving again, where asked for.
     reference : Reference or None
@@ -52,6 +55,7 @@ class BottleneckReport:
     t_end: float
     sensitivities: Sensitivities | None
     saturations: tuple[Saturation, ...]
+    knots: KnotCost | None = None
     check: SensitivityCheck | None = None
     reference: Reference | None = None
     reference_sought: bool = False
@@ -76,6 +80,7 @@ class BottleneckReport:
             "sensitivities": None if self.sensitivities is None else self.sensitivities.to_dict(),
             "active_from_ratio": THRESHOLD,
             "saturations": [entry.to_dict() for entry in self.saturations],
+            "knots": None if self.knots is None else self.knots.to_dict(),
             "check": None if self.check is None else self.check.to_dict(),
             "reference": None if self.reference is None else self.reference.to_dict(),
         }
@@ -135,6 +140,7 @@ def report(
         t_end=trajectory.t_end,
         sensitivities=found,
         saturations=saturations(trajectory, limits),
+        knots=knot_cost(trajectory, limits, refined.t_end),
         check=check_sensitivities(refined, found) if check else None,
         reference=find_reference(refined, tolerance=tolerance) if reference else None,
         reference_sought=reference,
