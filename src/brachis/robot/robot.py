@@ -344,6 +344,15 @@ class Robot(Summary):
             positions[k], rotations[k] = placement.translation, placement.rotation
         return positions, rotations
 
+    def heights(self, q: np.ndarray) -> np.ndarray:
+        """Heights of the tool frame above the plane on which the robot stands, (K,) m, from postures (K, n).
+
+        The plane goes through the base frame; its normal is the z axis of the URDF's root link.
+        """
+        base = self.model.frames[self.model.getFrameId(self.base_frame, pin.FrameType.BODY)].placement
+        up = pin.rpy.rpyToMatrix(*np.radians(self.settings.mounting.rpy_deg))[:, 2]
+        return np.asarray((self.tool_placements(q)[0] - base.translation) @ up)
+
 
 def _with_roll(joints: object, n: int) -> object:
     """Add the virtual joint's position, zero, to a posture that leaves it out."""
