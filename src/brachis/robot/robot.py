@@ -159,7 +159,7 @@ class Robot(Summary):
         model, names = build_model(chain, vector, added, str(path)), chain.joint_names
         resolved = resolve_limits(spec, names, chain.limits, added.speed_override)
         terms = Friction.of(names, chain.stated.friction, **dict(friction or {}))
-        terms.check_against(names, resolved.torque)
+        terms.check_against(model, resolved.torque)
         return cls(
             model=model,
             joint_names=names,
@@ -209,7 +209,7 @@ class Robot(Summary):
         spec = LimitSpec(**{**vars(kept), **changes})
         resolved = resolve_limits(spec, own, self.stated_limits[: len(own)])
         resolved = resolved.with_free_joint() if self.rolls_freely else resolved
-        self.friction.check_against(self.joint_names, resolved.torque)
+        self.friction.check_against(self.model, resolved.torque)
         settings = self.settings.model_copy(update={"limits": spec, "speed_override": 1.0})
         return replace(self, limits=resolved, settings=settings)
 
