@@ -182,6 +182,18 @@ def test_friction_of_the_urdf_that_cannot_be():
         of(DAMPED.replace("friction='3'", "friction='70'"), tool_frame="tool")
 
 
+def test_a_gripper_that_its_friction_holds_is_left_out_as_the_message_says():
+    text = planar_urdf("RRP")
+    held = {"coulomb": {"j3": 1e4}}
+    with pytest.raises(InputError, match="holds joint 'j3'") as caught:
+        of(text, tool_frame="tool", friction=held)
+    link = re.search(r"end the chain at (\S+) by robot.tool_frame or --tool-frame", caught.value.hint)[1]
+    assert of(text, tool_frame=link).joint_names == ("j1", "j2")
+    with pytest.raises(InputError, match="holds joint 'j1'") as caught:
+        of(text, tool_frame="tool", friction={"coulomb": {"j1": 1e4}})
+    assert "tool_frame" not in caught.value.hint
+
+
 def test_speed_override_is_a_factor_on_all_velocity_limits_and_nothing_else():
     plain = planar_urdf("RRP")
     full, half = (of(plain, tool_frame="tool", speed_override=factor) for factor in (1.0, 0.5))

@@ -11,8 +11,10 @@ import yaml
 
 import brachis
 from brachis.errors import PlanningError, UrdfError
+from brachis.robot import bind
 from brachis.robot.limits import UrdfLimit
 from brachis.starter import Starter, starter_task
+from brachis.starter.choice import choices
 from brachis.starter.missing import placeholders
 from support.chains import Joint, chain_urdf
 
@@ -47,7 +49,29 @@ def two_joints(axis: tuple[float, ...] = (0.0, 0.0, 1.0), effort: float = 60.0) 
 
 @pytest.mark.parametrize("name", brachis.robots.names())
 def test_robots_that_come_along(name, tmp_path):
-    check(starter_task(brachis.robots.path_of(name), folder=tmp_path), tmp_path)
+    starter = starter_task(brachis.robots.path_of(name), folder=tmp_path)
+    check(starter, tmp_path)
+    motion = starter.result.trajectory
+    heights = starter.robot.heights(motion.position(np.linspace(0.0, motion.t_end, 20)))
+    assert heights.min() > (-1e-9 if name in ("scara3", "gantry2") else 0.05), "the tool is above the robot's base"
+
+
+@pytest.mark.parametrize(("name", "slides"), [("tx90l_rail", 1), ("ur10_rail", 1), ("gen3_rails", 2)])
+def test_an_arm_on_a_rail_begins_away_from_its_own_singularities(name, slides):
+    robot, space = bind(getattr(brachis.robots, name), "pose")
+    assert robot.revolute.argmax() == slides
+    first = next(choices(space))
+    arm = space.jacobian(space.twists(first.posture[None]))[0, :, slides:]
+    assert np.linalg.svd(arm, compute_uv=False)[-1] > 0.1  # 0.011 to 0.017 with the rail's help alone
+
+
+def test_heights_are_above_the_base_wherever_it_is():
+    limit = {"lower": -1.0, "upper": 1.0, "velocity": 1.0, "effort": 50.0}
+    text = chain_urdf([Joint("prismatic", limit=limit)], tool=(0.3, 0.0, 0.5))
+    q = np.array([[0.2], [-0.7]])
+    for mounting in ("floor", "wall", "ceiling", {"xyz": [1, 2, 3], "rpy_deg": [10, 20, 30]}):
+        robot = brachis.Robot.from_urdf("x", urdf_text=text, tool_frame="tool", mounting=mounting)
+        np.testing.assert_allclose(robot.heights(q), [0.7, -0.2], atol=1e-12)
 
 
 @pytest.mark.parametrize("file", FOREIGN)

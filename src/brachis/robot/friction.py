@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
+import pinocchio as pin
 
 from brachis.arrays import freeze
 from brachis.errors import InputError
@@ -87,21 +88,29 @@ class Friction(Summary):
             raise InputError("is not a usable speed", where=where, found=coulomb_velocity, allowed=allowed)
         return cls(**(terms | {"armature": terms["armature"] + geared}), v_eps=v_eps)
 
-    def check_against(self, joint_names: Sequence[str], limits: np.ndarray) -> None:
-        """Refuse Coulomb friction that the torque limits, (n,), cannot overcome: the joint could only creep.
+    def check_against(self, model: pin.Model, limits: np.ndarray) -> None:
+        """Refuse Coulomb friction of a chain that its torque limits, (n,), cannot overcome: a joint could only creep.
 
         Raises
         ------
         InputError
         """
-        for name, coulomb, limit in zip(joint_names, self.coulomb, limits, strict=True):
+        names = list(model.names)[1:]
+        for name, coulomb, limit in zip(names, self.coulomb, limits, strict=True):
             if coulomb >= limit:
+                carrier = model.frames[model.frames[model.getFrameId(name, pin.FrameType.JOINT)].parentFrame].name
+                first = name == names[0]
+                shorter = (
+                    ""
+                    if first
+                    else f". To leave the joint out, end the chain at {carrier} by robot.tool_frame or --tool-frame"
+                )
                 raise InputError(
                     f"Coulomb friction holds joint {name!r} against its largest torque",
                     where="robot.friction.coulomb",
                     found=f"{coulomb:g} Nm (N for a prismatic joint)",
                     allowed=f"less than the limit, {limit:g}",
-                    hint=f"Lower the friction, or raise robot.limits.torque.{name}",
+                    hint=f"Lower the friction, or raise robot.limits.torque.{name}{shorter}",
                 )
 
     def torque(self, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:

@@ -159,7 +159,7 @@ class Robot(Summary):
         model, names = build_model(chain, vector, added, str(path)), chain.joint_names
         resolved = resolve_limits(spec, names, chain.limits, added.speed_override)
         terms = Friction.of(names, chain.stated.friction, **dict(friction or {}))
-        terms.check_against(names, resolved.torque)
+        terms.check_against(model, resolved.torque)
         return cls(
             model=model,
             joint_names=names,
@@ -209,7 +209,7 @@ class Robot(Summary):
         spec = LimitSpec(**{**vars(kept), **changes})
         resolved = resolve_limits(spec, own, self.stated_limits[: len(own)])
         resolved = resolved.with_free_joint() if self.rolls_freely else resolved
-        self.friction.check_against(self.joint_names, resolved.torque)
+        self.friction.check_against(self.model, resolved.torque)
         settings = self.settings.model_copy(update={"limits": spec, "speed_override": 1.0})
         return replace(self, limits=resolved, settings=settings)
 
@@ -343,6 +343,15 @@ class Robot(Summary):
             placement = pin.updateFramePlacement(self.model, data, frame)
             positions[k], rotations[k] = placement.translation, placement.rotation
         return positions, rotations
+
+    def heights(self, q: np.ndarray) -> np.ndarray:
+        """Heights of the tool frame above the plane on which the robot stands, (K,) m, from postures (K, n).
+
+        The plane goes through the base frame; its normal is the z axis of the URDF's root link.
+        """
+        base = self.model.frames[self.model.getFrameId(self.base_frame, pin.FrameType.BODY)].placement
+        up = pin.rpy.rpyToMatrix(*np.radians(self.settings.mounting.rpy_deg))[:, 2]
+        return np.asarray((self.tool_placements(q)[0] - base.translation) @ up)
 
 
 def _with_roll(joints: object, n: int) -> object:

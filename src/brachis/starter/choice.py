@@ -32,6 +32,8 @@ _LENGTHS = (1.0, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01)
 _LEAST_DEXTERITY = 1e-3
 _KEPT = 0.4
 """Of the dexterity of the first posture, everywhere on the line."""
+_CLEARANCE = 0.1
+"""Of the tool above the robot's base, in lengths of the arm, where the arm can."""
 _STRONGEST = 0.7
 """Of a torque limit, that holding the arm may need."""
 
@@ -55,18 +57,20 @@ class Choice:
 def choices(task_map: TaskMap) -> Iterator[Choice]:
     """Find first motions one by one, the most promising first.
 
-    There are none where the robot cannot move its tool in all directions of the task space. The same robot gets the
-    same answer: what is drawn at random has a fixed seed.
+    Postures whose tool stays above the robot's base come first. There are no motions where the robot cannot move its
+    tool in all directions of the task space. The same robot gets the same answer: what is drawn at random has a fixed
+    seed.
     """
     robot = task_map.robot
     postures = _drawn(robot)
     reach = _reach(robot, postures)
-    quality = _quality(task_map, postures, reach)
-    best = [k for k in np.argsort(-quality)[:_BEST] if quality[k] > _LEAST_DEXTERITY]
-    for k in best:
-        line = _line(task_map, postures[k], float(quality[k]), reach)
-        if line is not None:
-            yield Choice(postures[k], line)
+    for lowest in (_CLEARANCE * reach, -np.inf):
+        quality = _quality(task_map, postures, reach, lowest)
+        best = [k for k in np.argsort(-quality)[:_BEST] if quality[k] > _LEAST_DEXTERITY]
+        for k in best:
+            line = _line(task_map, postures[k], float(quality[k]), reach, lowest)
+            if line is not None:
+                yield Choice(postures[k], line)
 
 
 def _drawn(robot: Robot) -> np.ndarray:
@@ -86,15 +90,21 @@ def _reach(robot: Robot, postures: np.ndarray) -> float:
     return float(np.linalg.norm(np.ptp(positions, axis=0))) / 2.0
 
 
-def _quality(task_map: TaskMap, postures: np.ndarray, reach: float) -> np.ndarray:
-    """Rate postures (K, n): least singular value of the task Jacobian without units; zero where holding takes much.
+def _quality(task_map: TaskMap, postures: np.ndarray, reach: float, lowest: float) -> np.ndarray:
+    """Rate postures (K, n): least singular value of the task Jacobian without units, with and without the rail.
 
-    Positions are divided by the arm's length, and so are prismatic joints.
+    Positions are divided by the arm's length, and so are prismatic joints. Postures count nothing where holding takes
+    much, or where the tool is lower than `lowest` above the base, m.
     """
+    robot = task_map.robot
     rows = np.where([unit == "m" for unit in task_map.units], 1.0 / reach, 1.0)
-    columns = np.where(task_map.robot.revolute, 1.0, reach)
+    columns = np.where(robot.revolute, 1.0, reach)
     jacobian = rows[:, None] * task_map.jacobian(task_map.twists(postures)) * columns
-    return np.linalg.svd(jacobian, compute_uv=False)[:, -1] * (_holding(task_map.robot, postures) < _STRONGEST)
+    dexterity = np.linalg.svd(jacobian, compute_uv=False)[:, -1]
+    rail = int(np.argmax(robot.revolute))  # slides before the first joint that turns
+    if 0 < rail <= robot.n - task_map.m:
+        dexterity = np.minimum(dexterity, np.linalg.svd(jacobian[:, :, rail:], compute_uv=False)[:, -1])
+    return dexterity * (_holding(robot, postures) < _STRONGEST) * (robot.heights(postures) >= lowest)
 
 
 def _holding(robot: Robot, postures: np.ndarray) -> np.ndarray:
@@ -106,7 +116,7 @@ def _holding(robot: Robot, postures: np.ndarray) -> np.ndarray:
     )
 
 
-def _line(task_map: TaskMap, posture: np.ndarray, quality: float, reach: float) -> np.ndarray | None:
+def _line(task_map: TaskMap, posture: np.ndarray, quality: float, reach: float, lowest: float) -> np.ndarray | None:
     """Find the longest line along an axis on which the arm stays about as dexterous; None where there is none."""
     for length in (each for each in _LENGTHS if each <= _SHARE * reach):
         rated = {}
@@ -116,7 +126,7 @@ def _line(task_map: TaskMap, posture: np.ndarray, quality: float, reach: float) 
                 displacement[row] = sign * length
                 followed = _followed(task_map, posture, displacement)
                 if followed is not None:
-                    rated[row, sign] = (float(_quality(task_map, followed, reach).min()), displacement)
+                    rated[row, sign] = (float(_quality(task_map, followed, reach, lowest).min()), displacement)
         worst, displacement = max(rated.values(), key=lambda each: each[0], default=(0.0, np.zeros(0)))
         if worst > _KEPT * quality:
             return displacement
