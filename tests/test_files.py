@@ -15,7 +15,7 @@ import pytest
 from brachis import files
 from brachis.cli.folder import write_files, write_text
 from brachis.errors import InputError
-from brachis.files import atomic_write, open_file, read_file
+from brachis.files import atomic_write, is_file, is_folder, open_file, read_file
 
 LARGE = 1_000_000_000_000
 
@@ -46,6 +46,17 @@ def endless(request, tmp_path):
     with path.open("wb") as stream:
         stream.truncate(LARGE)  # takes no room
     return path, r"it is 1000000.0 MB long, at most 16 MB are read"
+
+
+@pytest.mark.parametrize("name", ["circle", "circle/file", "file/file", "a" * 5000, "a\0b"])
+def test_what_the_system_refuses_is_not_written(name, tmp_path):
+    (tmp_path / "circle").symlink_to("circle")
+    (tmp_path / "file").write_text("old")
+    with pytest.raises(InputError, match="cannot be written"), atomic_write(tmp_path / name):
+        pytest.fail("nothing can be written there")
+    assert (tmp_path / "circle").is_symlink()
+    assert not is_file(tmp_path / name)
+    assert not is_folder(tmp_path / name)
 
 
 def test_what_would_not_end_is_refused(endless):

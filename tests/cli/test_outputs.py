@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 import brachis
+from brachis.cli.output import progress
 from support.effort import QUICK
 
 from .conftest import SCARA
@@ -171,6 +172,44 @@ def endless(request, tmp_path):
     else:
         path = Path(request.param)
     return path
+
+
+@pytest.mark.parametrize("name", ["circle", "circle/out", "result.npz/out", "a" * 5000])
+def test_outputs_that_the_system_refuses(name, run, saved, tmp_path):
+    (tmp_path / "circle").symlink_to("circle")
+    out = saved / name if name.startswith("result") else tmp_path / name
+    for command in (
+        ("export", saved / "result.npz", "--format", "csv"),
+        ("report", saved / "result.npz"),
+        ("compose", saved / "robot.urdf", *RAIL),
+        ("new", "scara3"),
+        ("schema",),
+        ("plan", saved / "task.yaml"),
+    ):
+        found = run(*command, "--out", out)
+        assert found.code == 2, command
+        assert "cannot be" in found.err or "no folder" in found.err, command
+        assert len(found.err.splitlines()) == 1, command
+
+
+@pytest.mark.parametrize("name", ["a" * 5000, "circle", "[/red]:x:[bold]", "result.npz/x"])
+def test_inputs_that_the_system_refuses(name, run, saved, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("circle").symlink_to("circle")
+    given = saved / name if name.startswith("result") else name
+    for command in ("plan", "inspect", "verify", "view", "report", "bottleneck", "new", "sweep"):
+        found = run(command, given)
+        assert found.code == 2, command
+        assert name in found.err, command
+        assert "internal" not in found.err, command
+
+
+def test_progress_takes_names_with_brackets(monkeypatch, capfd):
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    with progress() as listener:
+        listener("looking at [/red]:x:")
+    assert "[/red]:x:" in capfd.readouterr().err
 
 
 def test_endless_inputs_are_refused(endless, run, saved, tmp_path):

@@ -16,15 +16,19 @@ import pytest
 
 import brachis
 from brachis import planner
+from brachis.deadline import Deadline
 from brachis.errors import PlanningError, TaskError, UnknownNameError
 from brachis.kinematics import CHART
 from brachis.plots import plot_candidates
+from brachis.problem import Problem, decompositions_of
 from brachis.search import chart_starts, record, schedule, starts
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.joint_path import DeadEnd
 from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.posture_lattice import PostureLattice
+from brachis.search.reach import reason_out_of_reach
 from brachis.solvers import apart, uno
+from brachis.task import load_task
 
 ROOT = Path(__file__).parents[2]
 START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
@@ -314,6 +318,28 @@ def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(robot, c
     with pytest.raises(PlanningError, match=message):
         brachis.plan(robot, task())
     assert len(calls) == 5
+
+
+def test_a_time_limit_that_is_too_short_for_the_lattice_of_several_redundant_joints(robot, clock):
+    clock.jump(PostureLattice, "_next", at=1)
+    with pytest.raises(PlanningError, match="within the time limit of 60 s: the lattice of all postures"):
+        brachis.plan(robot, task(task_space=["x"], path=[{"line": {"by": [0.3]}}]))
+
+
+def test_no_solve_begins_without_time_and_the_time_limit_is_to_blame(robot, clock):
+    calls = clock.jump(planner, "first_point", at=1)
+    joints = {"task_space": "joints", "path": [{"spline": {"through": [[0.6, -2.0, 2.0]]}}], "solver": {"name": "uno"}}
+    with pytest.raises(PlanningError, match=r"within the time limit of 60 s: .* Raise search\.time_limit"):
+        brachis.plan(robot, task(**joints))
+    assert len(calls) == 1
+
+
+def test_the_search_for_a_reason_ends_with_the_time(robot):
+    problem = Problem.of(robot, load_task(task(path=[{"line": {"length": 3.0, "angle_deg": 0}}])))
+    decomposition = decompositions_of(problem, ())[0]
+    joint_map = decomposition.joint_map(problem.start, decomposition.branches[0])
+    assert "s = 0" in str(reason_out_of_reach(joint_map, problem.limits))
+    assert "raise search.time_limit" in reason_out_of_reach(joint_map, problem.limits, deadline=Deadline(0.0))
 
 
 def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(robot, usual, clock):

@@ -123,6 +123,12 @@ def test_time_limit(name):
     assert report.status.value == "time limit reached"
 
 
+def test_without_time_no_solve_begins(name):
+    report = solve(name, disc(), [40.0, -30.0], SolverOptions(time_limit=0.0))
+    assert report.status is SolveStatus.TIME_LIMIT
+    assert (report.iterations, report.x.tolist()) == (0, [40.0, -30.0])
+
+
 def test_interrupt_from_the_progress_callback(name):
     calls = []
 

@@ -28,7 +28,7 @@ def nothing_runs(monkeypatch):
     def pool_for(*_settings):
         def pool(plans):
             assert plans == []
-            return iter(())
+            yield from ()
 
         return pool
 
@@ -56,6 +56,26 @@ def test_every_plan_is_a_row_and_equal_ones_come_once(undisturbed):
     ]
     assert [row["status"] for row in rows] == ["verified", "failed", "failed"] * 2
     assert all(1.0 < row["t_end_s"] < 5.0 and row["worst_ratio"] < 1.001 for row in rows[::3])
+
+
+def test_workers_have_ended_when_an_outcome_cannot_be_stored(content, tmp_path, monkeypatch):
+    ended = []
+
+    def pool(plans):
+        try:
+            for plan in plans:
+                yield plan, planned(plan)
+        finally:
+            ended.append(True)
+
+    def full(*_arguments):
+        raise InputError("cannot be written", found="No space left on device")
+
+    monkeypatch.setattr(run, "pool_for", lambda *_settings: pool)
+    monkeypatch.setattr(run.Store, "write", full)
+    with pytest.raises(InputError, match="No space left") as caught:
+        brachis.sweep(content, tmp_path / "out")
+    assert ended, f"workers outlive {caught.value}"
 
 
 def test_failures_say_why(undisturbed):

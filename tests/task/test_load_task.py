@@ -261,6 +261,10 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
         {"spline": {"rest": "jerk"}},
         ["spline.degree: rest: jerk", "continuous jerk", "found 3", "allowed: >= 4, or rest: velocity or rest: full"],
     ),
+    (
+        {"spline": {"rest": "jerk", "degree": 4, "intervals": 4}},
+        ["spline.intervals: rest: jerk leaves splines of degree 4 no freedom", "found 4; allowed: >= 5, or auto"],
+    ),
     ({"robot": {"urdf": "a.urdf", "limits": {"jerk": -1}}}, ["robot.limits.jerk", "found -1"]),
     ({"robot": {"urdf": "a.urdf", "limits": {"torque_rate": "urdf"}}}, ["robot.limits.torque_rate", "'urdf'"]),
     ({"solver": {"name": ""}}, ["solver.name: the string is empty"]),

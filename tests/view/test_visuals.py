@@ -1,3 +1,7 @@
+import math
+import struct
+import zipfile
+
 import numpy as np
 import pytest
 import trimesh
@@ -62,6 +66,48 @@ def test_a_missing_mesh_is_named_and_the_other_links_are_read(tmp_path):
     shapes, unread = link_shapes(text, tmp_path)
     assert list(shapes) == ["b"]
     assert unread == ["a: no file package://none/a.dae"]
+
+
+BROKEN = {
+    "cut.dae": (b"<COLLADA><x", "DaeMalformedError"),
+    "cut.zip": (b"PK\3\4", "BadZipFile"),
+    "empty.stl": (b"", "no faces"),
+    "words.stl": (b"solid nonsense", "no faces"),
+    "nan.stl": (b"\0" * 80 + struct.pack("<I12fH", 1, *[math.nan] * 12, 0), "not finite"),
+    "packed.tar.gz": (b"\x1f\x8b", "packed meshes are not read"),
+    "a" * 5000 + ".stl": (None, "no file"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN, ids=lambda name: name[-12:])
+def test_a_broken_mesh_is_told(name, tmp_path):
+    if name.endswith("dae"):
+        pytest.importorskip("collada", reason="pycollada is not installed")
+    content, reason = BROKEN[name]
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    shapes, unread = link_shapes(LINK.format(f'<mesh filename="{name}"/>', ""), tmp_path)
+    assert shapes == {}
+    assert len(unread) == 1
+    assert reason in unread[0]
+    assert len(unread[0]) <= 500
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_meshes_that_are_too_large_are_told_and_not_read(packed, tmp_path):
+    name = "large.zip" if packed else "large.stl"
+    if packed:
+        with zipfile.ZipFile(tmp_path / name, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("large.stl", bytes(200_000_001))
+    else:
+        with (tmp_path / name).open("wb") as stream:
+            stream.truncate(4_000_000_000)  # takes no room
+    shapes, unread = link_shapes(LINK.format(f'<mesh filename="{name}"/>', ""), tmp_path)
+    found = "200 MB" if packed else "4000 MB"
+    assert shapes == {}
+    assert unread == [
+        f"a: {name}: the mesh is too large to be shown; found {found}; allowed: 200 MB for all meshes of the robot"
+    ]
 
 
 def test_a_broken_shape_is_told(tmp_path):

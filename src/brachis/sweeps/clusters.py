@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from typing import Any
@@ -19,7 +19,9 @@ _CONNECTING = 10.0
 """Seconds within which a scheduler answers."""
 
 
-def on_dask(plans: Iterable[Plan], address: str, listener: Callable[[str], None]) -> Iterator[tuple[Plan, Outcome]]:
+def on_dask(
+    plans: Iterable[Plan], address: str, listener: Callable[[str], None]
+) -> Generator[tuple[Plan, Outcome], None, None]:
     """Make plans on a Dask cluster; workers may come and go meanwhile.
 
     Parameters
@@ -74,7 +76,7 @@ def _answering(address: str) -> Iterator[None]:
         raise ClusterError("the Dask scheduler was lost", where=address, found=str(error), hint=hint) from error
 
 
-def on_ray(plans: Iterable[Plan], address: str | None) -> Iterator[tuple[Plan, Outcome]]:
+def on_ray(plans: Iterable[Plan], address: str | None) -> Generator[tuple[Plan, Outcome], None, None]:
     """Make plans through joblib's Ray backend, batch by batch.
 
     Parameters

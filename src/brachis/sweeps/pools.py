@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import BrokenExecutor, Future
 from typing import Any
 
@@ -21,7 +21,7 @@ from brachis.sweeps.completed import AHEAD, HEARTBEAT, as_completed
 from brachis.sweeps.plans import Plan
 from brachis.sweeps.worker import Outcome, planned
 
-Pool = Callable[[Sequence[Plan]], Iterator[tuple[Plan, Outcome]]]
+Pool = Callable[[Sequence[Plan]], Generator[tuple[Plan, Outcome], None, None]]
 
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS"), "1"
@@ -60,7 +60,7 @@ def pool_for(jobs: int | None, scheduler: str | None, listener: Callable[[str], 
     return lambda plans: on_dask(plans, scheduler, listener)
 
 
-def in_processes(plans: Iterable[Plan], jobs: int) -> Iterator[tuple[Plan, Outcome]]:
+def in_processes(plans: Iterable[Plan], jobs: int) -> Generator[tuple[Plan, Outcome], None, None]:
     """Make plans in processes of this machine.
 
     A plan that ends its process (memory, a crash) fails; those that were made beside it are made again, one at a time.

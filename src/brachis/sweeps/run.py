@@ -6,6 +6,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -100,9 +101,10 @@ def sweep(
         found = {digest: facts for digest, facts in found.items() if facts["status"] != FAILED}
     progress = _Progress(len(plans), found, listener)
     try:
-        for plan, outcome in pool([plan for digest, plan in plans.items() if digest not in found]):
-            found[plan.digest] = store.write(plan.digest, outcome)
-            progress.tell()
+        with closing(pool([plan for digest, plan in plans.items() if digest not in found])) as made:
+            for plan, outcome in made:  # workers end with the block, even where an outcome cannot be stored
+                found[plan.digest] = store.write(plan.digest, outcome)
+                progress.tell()
     except KeyboardInterrupt as interrupt:
         interrupts.forget()
         told = f"{len(found)} of {len(plans)} plans are stored in {store.folder}; the same sweep goes on from there"
