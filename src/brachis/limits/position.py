@@ -40,7 +40,11 @@ class PositionLimit(Limit):
         self._selection = np.eye(robot.n)[joints] * self._scale[:, None]
         self.labels = tuple(
             Label(
-                name, "position", robot.position_units[i], f"robot.limits.position.{name}", share="position in its range"
+                name,
+                "position",
+                robot.position_units[i],
+                f"robot.limits.position.{name}",
+                share="position in its range",
             )
             for i, name in ((i, robot.joint_names[i]) for i in joints)
         )

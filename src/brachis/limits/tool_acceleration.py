@@ -26,7 +26,9 @@ class ToolAccelerationLimit(Limit):
 
     def __init__(self, robot: Robot, figure: float) -> None:
         self._tool, self._figure = task_map_of(robot, "position"), figure
-        self.labels = (Label("tool", "acceleration", "m/s^2", "tool_limits.acceleration", share="tool acceleration / limit"),)
+        self.labels = (
+            Label("tool", "acceleration", "m/s^2", "tool_limits.acceleration", share="tool acceleration / limit"),
+        )
         self.lower, self.upper = np.full(1, -np.inf), np.ones(1)
 
     @property

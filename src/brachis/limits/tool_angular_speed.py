@@ -33,7 +33,9 @@ class ToolAngularSpeedLimit(Limit):
     def __init__(self, robot: Robot, figure: float) -> None:
         self._tool, self._figure = task_map_of(robot, "pose"), figure
         self._turning = np.array([not (robot.rolls_freely and name == ROLL_JOINT) for name in robot.joint_names])
-        self.labels = (Label("tool", "angular speed", "rad/s", "tool_limits.angular_speed", share="tool angular speed / limit"),)
+        self.labels = (
+            Label("tool", "angular speed", "rad/s", "tool_limits.angular_speed", share="tool angular speed / limit"),
+        )
         self.lower, self.upper = np.full(1, -np.inf), np.ones(1)
 
     @property

@@ -167,7 +167,10 @@ def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:  # noqa
 def _draw_floor(ax: Any, z: float) -> None:  # noqa: ANN401
     """Draw a grid of the ticks on the floor, up to the edges of the axes."""
     x, y = ax.get_xlim(), ax.get_ylim()
-    inner = [[tick for tick in ticks if low < tick < high] for ticks, (low, high) in ((ax.get_xticks(), x), (ax.get_yticks(), y))]
+    inner = [
+        [tick for tick in ticks if low < tick < high]
+        for ticks, (low, high) in ((ax.get_xticks(), x), (ax.get_yticks(), y))
+    ]
     look = {"color": style.FAINT, "linewidth": 0.6, "zorder": 0.1, "gid": "floor"}
     for at in (*x, *inner[0]):
         ax.plot([at, at], y, z, **look)

@@ -110,7 +110,9 @@ KINDS = {
 def kinds_of(trajectory: Trajectory) -> tuple[str, ...]:
     """Return the kinds that are of interest for a motion."""
     limits = trajectory.robot.limits
-    return tuple(kind for kind, own in KINDS.items() if not own.if_limited or np.isfinite(limits_of(limits, kind)).any())
+    return tuple(
+        kind for kind, own in KINDS.items() if not own.if_limited or np.isfinite(limits_of(limits, kind)).any()
+    )
 
 
 def quantities(trajectory: Trajectory, samples: Samples, kind: str, *, degrees: bool = False) -> tuple[Quantity, ...]:
