@@ -116,20 +116,22 @@ class Result(Summary):
             raise UnknownNameError("plot", kind, (*plots.PLOTS, CANDIDATES), where="kind")
         return plots.PLOTS[kind](self.trajectory)
 
-    def report(self, path: str | os.PathLike[str] | None = None) -> Report:
+    def report(self, path: str | os.PathLike[str] | None = None, *, degrees: bool = False) -> Report:
         """Make a page from which a person decides whether to run the motion; see `brachis.report.make_report`.
 
         Parameters
         ----------
         path : path, optional
             HTML file to write.
+        degrees : bool, optional
+            Whether angles are shown in degrees.
 
         Raises
         ------
         InputError
             The file cannot be written; or Jinja2 or Plotly is not installed (`NotInstalledError`).
         """
-        page = report.make_report(self)
+        page = report.make_report(self, degrees=degrees)
         if path is not None:
             page.save(path)
         return page
@@ -180,10 +182,19 @@ class Result(Summary):
         """Report of the solve that gave the trajectory."""
         return self.attempt.reports[-1]
 
-    def view(self, *, host: str = "127.0.0.1", port: int | None = None, block: bool | None = None) -> Viewer:
+    def view(
+        self,
+        *,
+        degrees: bool = False,
+        host: str = "127.0.0.1",
+        port: int | None = None,
+        block: bool | None = None,
+    ) -> Viewer:
         """Show the motion and the list of candidates in the browser; as `Trajectory.view`."""
         candidates = [candidate.to_dict() for candidate in self.candidates]
-        return self.trajectory.view(candidates, verified=self.verified, host=host, port=port, block=block)
+        return self.trajectory.view(
+            candidates, verified=self.verified, degrees=degrees, host=host, port=port, block=block
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures of the plan as plain data for JSON."""

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import html
 import re
 import sys
+from datetime import datetime
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,12 +16,19 @@ import pytest
 import brachis
 from brachis.errors import NotInstalledError
 from brachis.plausibility import Remark
-from brachis.report import make_report
+from brachis.report import make_report, tables
+from brachis.report.figures import motion_figure
+from brachis.report.motion import reported_motion
 from brachis.report.whole import _plotly
+from brachis.robot.from_task import robot_from_settings
 
 from .conftest import data_of, floats
 
 LARGEST = 3_500_000
+CARRIED = {
+    "payload": {"mass": 0.5, "com": [0.0, 0.0, 0.1]},
+    "mounting": {"xyz": [0.0, 0.0, 1.0], "rpy_deg": [0.0, 0.0, 30.0]},
+}
 
 
 def test_the_verdict_the_time_and_what_limits_are_said_first(planar, planar_page):
@@ -162,6 +173,75 @@ def test_a_result_writes_its_report_with_remarks_and_what_was_left_undone(planar
     assert "ended early" in aside
     assert len(repr(page)) < 80
     assert page._repr_html_().startswith("<iframe")
+
+
+def pairs_of(page):
+    """What the summary says."""
+    return {
+        name: html.unescape(value) for name, value in re.findall(r"<tr><th>(.*?)</th><td>(.*?)</td></tr>", page.html)
+    }
+
+
+def test_robot_path_and_what_it_carries_are_named(planar, planar_page):
+    said = pairs_of(planar_page)
+    assert said["robot"] == "scara3 (robot.urdf)"
+    assert said["path"] == "line (length 1, angle deg 90); the tool moves 1.000 m; prescribed: x, y"
+    assert (said["payload"], said["tool offset"]) == ("none", "none")
+    assert said["mounting"] == "at the world's origin, upright"
+    today = datetime.now().astimezone().strftime("%Y-")
+    assert said["report of"].startswith(today)
+    loaded = brachis.load_task({**planar.task.to_dict(), "robot": {**planar.task.robot.model_dump(), **CARRIED}})
+    moved = dataclasses.replace(planar.trajectory, robot=robot_from_settings(loaded.robot), task=loaded)
+    said = tables.identity(reported_motion(moved))
+    assert said["payload"] == "0.5 kg at [0, 0, 0.1] m in the tool frame, a point mass"
+    assert said["mounting"] == "at [0, 0, 1] m, roll, pitch, yaw [0, 0, 30] deg"
+
+
+def test_hashes_are_those_of_the_urdf_and_of_the_task_that_is_shown(planar, planar_page):
+    said = pairs_of(planar_page)
+    urdf = Path(planar.task.robot.urdf).read_bytes()
+    assert said["SHA-256 of the URDF"] == hashlib.sha256(urdf).hexdigest()
+    shown = html.unescape(re.search(r"<pre>(.*?)</pre>", planar_page.html, re.DOTALL)[1])
+    assert said["SHA-256 of the task as it stands below"] == hashlib.sha256(shown.encode()).hexdigest()
+
+
+def test_no_path_of_this_machine_is_in_it(planar, planar_page):
+    folder = Path(planar.task.robot.urdf).parent
+    assert folder.is_absolute()
+    assert str(folder) not in planar_page.html
+    assert "urdf: robot.urdf" in planar_page.html
+    task = planar.task.model_copy(update={"robot": planar.task.robot.model_copy(update={"urdf": r"C:\cells\arm.urdf"})})
+    assert "urdf: arm.urdf" in tables.task_text(task)
+
+
+def test_paths_of_many_segments_are_told_in_short():
+    points = [[0.01 * i, 0.02 * i] for i in range(1, 30)]
+    path = [{"line": {"by": [0.1, 0.0]}}, {"spline": {"through": points}}, *[{"line": {"by": [0.0, 0.1]}}] * 7]
+    task = brachis.load_task({"brachis": 1, "start": {"joints": [0.0]}, "task_space": ["x", "y"], "path": path})
+    said = tables.path_in_words(task)
+    assert said.startswith("line (by [0.1, 0]), then spline (through 29 entries), then line (by [0, 0.1])")
+    assert said.endswith(", and 3 more")
+
+
+def test_angles_may_be_in_degrees_and_lengths_stay(rail):
+    reported = reported_motion(rail.trajectory, degrees=True)
+    rows = {row.name: row for row in tables.joint_rows(reported)}
+    q = rail.trajectory.q
+    assert rows["rail"].start == f"{q[0, 0]:.4f} m"
+    assert rows["joint_1"].start == f"{np.rad2deg(q[0, 1]):.4f} deg"
+    assert [row.value.split()[1] for row in rows["joint_1"].peaks] == ["deg", "deg/s", "deg/s²", "Nm"]
+    in_rad = {row.name: row for row in tables.joint_rows(reported_motion(rail.trajectory))}
+    assert [row.share for row in rows["joint_1"].peaks] == [row.share for row in in_rad["joint_1"].peaks]
+    titles = [axis["title"]["text"] for name, axis in motion_figure(reported)["layout"].items() if name[:5] == "yaxis"]
+    assert {"position (deg)", "position (m)", "velocity (deg/s)", "acceleration (m/s²)", "force (N)"} < set(titles)
+
+
+def test_positions_are_told_by_their_place_in_the_range(rail):
+    limits, q = rail.trajectory.robot.limits, rail.sample(rail.t_end / 999).q[:, 1]
+    middle = 0.5 * (limits.position_lower[1] + limits.position_upper[1])
+    share = np.abs(q - middle).max() / (limits.position_upper[1] - middle)
+    (row,) = (row for row in tables.joint_rows(reported_motion(rail.trajectory)) if row.name == "joint_1")
+    assert row.peaks[0].share == f"{100 * share:.1f} %"
 
 
 def test_the_task_and_the_versions_are_in_it(planar_page):

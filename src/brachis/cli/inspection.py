@@ -46,6 +46,7 @@ def inspect_command(
     base_frame: str | None,
     lock: list[str],
     posture: str | None = None,
+    degrees: bool = False,
     as_json: bool,
 ) -> None:
     """Print a robot's joints and its decompositions."""
@@ -70,7 +71,7 @@ def inspect_command(
     if as_json:
         print_json(inspected.to_dict())
     else:
-        inspected.show(result_console())
+        inspected.show(result_console(), degrees=degrees)
 
 
 @dataclass(frozen=True)
@@ -100,9 +101,9 @@ class _Inspected:
             "fits": [fit.to_dict() for fit in self.task.fits] if self.task else [],
         }
 
-    def show(self, console: Console) -> None:
+    def show(self, console: Console, *, degrees: bool) -> None:
         """Print all for a person."""
-        robot, joints = self.robot, joint_rows(self.robot)
+        robot, joints = self.robot, joint_rows(self.robot, degrees=degrees)
         console.print(f"{self.source}: {robot.base_frame} -> {robot.tool_frame}, {robot.n} joints")
         for remark in self.remarks:
             console.print(remark)

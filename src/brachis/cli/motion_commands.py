@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from brachis import interrupts
-from brachis.cli.options import Changes, Strict
+from brachis.cli.options import Changes, Degrees, Strict
 from brachis.cli.output import Json
 
 ResultFile = Annotated[
@@ -140,13 +140,16 @@ def report(
     out: Annotated[
         Path | None, typer.Option(help="HTML file to write; default: beside the result, as result.html.")
     ] = None,
-    title: Annotated[str | None, typer.Option(help="Title of the page; default: the result's name.")] = None,
+    title: Annotated[
+        str | None, typer.Option(help="Title of the page; default: the robot's name and the file's.")
+    ] = None,
+    degrees: Degrees = False,
 ) -> None:
     """Write a saved motion as one HTML page to judge it by."""
     with interrupts.postponed():
         from brachis.cli import report as command  # noqa: PLC0415
 
-    raise typer.Exit(command.report_command(result, out=out, title=title))
+    raise typer.Exit(command.report_command(result, out=out, title=title, degrees=degrees))
 
 
 def view(
@@ -157,6 +160,7 @@ def view(
     host: Host = "127.0.0.1",
     port: Port = None,
     browser: Browser = True,
+    degrees: Degrees = False,
 ) -> None:
     """Show a saved motion in the browser.
 
@@ -165,4 +169,4 @@ def view(
     with interrupts.postponed():
         from brachis.cli import viewing  # noqa: PLC0415
 
-    viewing.view_command(result, host=host, port=port, browser=browser)
+    viewing.view_command(result, host=host, port=port, browser=browser, degrees=degrees)

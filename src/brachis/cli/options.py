@@ -19,3 +19,4 @@ Changes = Annotated[
         "Repeatable.",
     ),
 ]
+Degrees = Annotated[bool, typer.Option("--degrees", help="Show angles in degrees; files and JSON stay in rad.")]

@@ -13,13 +13,14 @@ from brachis.trajectory import Trajectory
 SUFFIX = ".html"
 
 
-def report_command(result: Path, *, out: Path | None, title: str | None) -> int:
+def report_command(result: Path, *, out: Path | None, title: str | None, degrees: bool) -> int:
     """Write the report of a saved motion beside it, or where asked; returns the exit code."""
     result = motion_file(result)
     out = result.with_suffix(SUFFIX) if out is None else out
     trajectory = Trajectory.load(result)
     urdf = trajectory.task.robot.urdf
-    page = make_report(trajectory, title=str(result) if title is None else title)
+    title = f"{trajectory.robot.name}, {result.name}" if title is None else title
+    page = make_report(trajectory, title=title, degrees=degrees)
     write_one(out, page.save, (SUFFIX,), [result, None if urdf is None else Path(urdf)])
     result_console().print(f"wrote {out} ({1e-6 * page.size:.1f} MB)")
     if not page.verified:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from brachis import interrupts
-from brachis.cli.options import Changes, Strict
+from brachis.cli.options import Changes, Degrees, Strict
 from brachis.cli.output import Json
 
 TaskFile = Annotated[Path, typer.Argument(help="Task file (YAML).", metavar="TASK")]
@@ -86,6 +86,7 @@ def inspect(
         str | None, typer.Option(help="Say where the tool is at these joint positions, for example '0, 0.3, 1.2'.")
     ] = None,
     lock: Annotated[list[str] | None, typer.Option(help="Joint held at a position: name=value, repeatable.")] = None,
+    degrees: Degrees = False,
     changes: Changes = None,
     json: Json = False,
 ) -> None:
@@ -104,6 +105,7 @@ def inspect(
         base_frame=base_frame,
         lock=lock or [],
         posture=posture,
+        degrees=degrees,
         as_json=json,
     )
 

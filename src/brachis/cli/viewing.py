@@ -24,12 +24,13 @@ _LARGEST = 64_000_000
 """Of result.json, bytes."""
 
 
-def view_command(result: Path, *, host: str, port: int | None, browser: bool) -> None:
+def view_command(result: Path, *, host: str, port: int | None, browser: bool, degrees: bool) -> None:
     """Show a saved motion until Ctrl-C."""
     path = motion_file(result)
     trajectory = Trajectory.load(path)
     verified = verify_trajectory(trajectory).passed
-    show(trajectory, _candidates_beside(path, trajectory), verified=verified, host=host, port=port, browser=browser)
+    candidates = _candidates_beside(path, trajectory)
+    show(trajectory, candidates, verified=verified, host=host, port=port, browser=browser, degrees=degrees)
 
 
 def show(
@@ -40,9 +41,11 @@ def show(
     host: str = LOOPBACK,
     port: int | None = None,
     browser: bool = True,
+    degrees: bool = False,
 ) -> None:
     """Show a motion until Ctrl-C; open the browser where there is a screen, and it is wanted."""
-    with Viewer(trajectory, candidates, verified=verified, host=host, port=port) as viewer, interrupts.expected():
+    viewer = Viewer(trajectory, candidates, verified=verified, degrees=degrees, host=host, port=port)
+    with viewer, interrupts.expected():
         if not viewer.local:
             print_error(f"warning: whoever reaches {host} can look, and move the slider; leave --host out to be alone")
         if chosen() is not Verbosity.QUIET:

@@ -104,8 +104,7 @@ def draw_progress(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
 
 def draw_tool_speed(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
     """Draw the tool's speed, and what the task allows where the motion comes near it."""
-    look = {"color": "black", "linewidth": style.LINE_WIDTH}
-    ax.plot(samples.t, samples.tool_speed, label="tool", **look)
+    ax.plot(samples.t, samples.tool_speed, label="tool", color="black", linewidth=style.LINE_WIDTH)
     reach = (1.0 + _REACH) * max(float(samples.tool_speed.max()), _LEAST_RANGE)
     for allowed in allowed_tool_speeds(trajectory, samples):
         near = np.where(allowed < reach, allowed, np.nan)

@@ -10,9 +10,9 @@ from brachis.plots import style
 from brachis.plots.curves import dense_samples
 from brachis.plots.limits import draw_ratios
 from brachis.plots.motion import (
-    draw_tool_speed,
     draw_progress,
     draw_quantity,
+    draw_tool_speed,
     height_of,
     joint_lines,
     label_time_once,
@@ -20,7 +20,7 @@ from brachis.plots.motion import (
 from brachis.plots.postures import add_posture_axes, draw_postures, legend_postures
 from brachis.plots.quantities import quantities
 from brachis.plots.torques import draw_torques, shown_torques
-from brachis.trajectory import Trajectory, of_motion
+from brachis.trajectory import Samples, Trajectory, of_motion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,7 +12,7 @@ import numpy as np
 from brachis.bottleneck import THRESHOLD
 from brachis.plots import style
 from brachis.plots.curves import knot_times
-from brachis.plots.quantities import KINDS, Quantity, quantities
+from brachis.plots.quantities import Quantity, allowed_tool_speeds, kinds_of, quantities
 from brachis.report.motion import ReportedMotion
 
 Figure = dict[str, Any]
@@ -36,12 +36,13 @@ def encoded(values: np.ndarray) -> dict[str, Any]:
 
 
 def motion_figure(motion: ReportedMotion) -> Figure:
-    """Positions, velocities, accelerations, torques and forces, and the tool's speed, with the limits of every joint.
+    """Positions and their derivatives, torques and forces, and the tool's speed, with their limits.
 
     Joints in rad and joints in m have panels of their own; a joint is hidden in all panels at once.
     """
     trajectory, samples = motion.trajectory, motion.samples
-    panels = [[part] for kind in KINDS for part in quantities(trajectory, samples, kind)]
+    kinds = kinds_of(trajectory)
+    panels = [[part] for kind in kinds for part in quantities(trajectory, samples, kind, degrees=motion.degrees)]
     panels += [parts] if (parts := _over_their_limits(quantities(trajectory, samples, "torque"))) else []
     heights = [_PANEL_PX if len(parts[0].joints) > _FEW_JOINTS else _SMALL_PX for parts in panels] + [_SMALL_PX]
     data, named, last = [], set(), len(heights)
@@ -58,6 +59,11 @@ def motion_figure(motion: ReportedMotion) -> Figure:
     look = {"line": {"color": style.COLOURS[-1], "width": 1.6}, "name": "tool", "showlegend": False}
     hover = {"hovertemplate": "%{y:.4g} m/s<extra>tool</extra>"}
     data.append({**_curve(samples.t, samples.tool_speed, last), **look, **hover})
+    for allowed in allowed_tool_speeds(trajectory, samples):
+        near = np.where(allowed < (1.0 + _REACH) * samples.tool_speed.max(), allowed, np.nan)
+        thin = {"color": style.GREY, "width": 1, "dash": "4px,4px"}
+        limit = {**_curve(samples.t, near, last), "line": thin, "name": "limit of the tool speed", "showlegend": False}
+        data += [{**limit, "hoverinfo": "skip", "meta": "limit"}] if np.isfinite(near).any() else []
     layout["xaxis"] |= {"anchor": f"y{last}", "title": {"text": "t (s)"}}
     layout["xaxis"]["minor"] = {"tickvals": knot_times(trajectory).tolist(), "ticks": "inside", "ticklen": 3}
     return {"data": data, "layout": layout}
@@ -80,9 +86,9 @@ def _joint_traces(part: Quantity, column: int, name: str, row: int, *, shown: bo
     line = {"color": joint["color"], "width": 1.8, "dash": _dash(joint["linestyle"]), "simplify": False}
     group = {"name": name, "legendgroup": name, "legendrank": int(part.joints[column])}
     hover, share = f"%{{y:.4g}} {part.unit}", {}
-    if part.around_zero and np.isfinite(levels).all():
+    if np.isfinite(levels).all():
         share = {"customdata": encoded(100.0 * np.abs(part.ratios[:, column]))}
-        hover += ", %{customdata:.1f} % of its limit"
+        hover += f", %{{customdata:.1f}} % of {part.of}"
     curve = {**_curve(part.t, values, row), **group, **share, "line": line, "showlegend": shown}
     traces = [{**curve, "hovertemplate": f"{hover}<extra>{_escaped(name)}</extra>"}]
     ends = part.t[[0, -1]]

@@ -45,6 +45,8 @@ class ReportedMotion:
         What the search looked at; none for a saved motion.
     planned : dict of str to str
         How the motion was planned, where that is known.
+    degrees : bool
+        Whether angles are shown in degrees.
     """
 
     trajectory: Trajectory
@@ -57,9 +59,10 @@ class ReportedMotion:
     left_undone: tuple[str, ...]
     candidates: tuple[Attempt, ...]
     planned: dict[str, str]
+    degrees: bool
 
 
-def reported_motion(motion: Result | Trajectory) -> ReportedMotion:
+def reported_motion(motion: Result | Trajectory, *, degrees: bool = False) -> ReportedMotion:
     """Gather what there is to say of a planned or a saved motion; a saved one is verified again."""
     if isinstance(motion, Trajectory):
         return _gathered(
@@ -68,6 +71,7 @@ def reported_motion(motion: Result | Trajectory) -> ReportedMotion:
             verify_trajectory(motion),
             limits=None,
             remarks=plausibility.of_robot(motion.robot) + plausibility.of_task(motion.task),
+            degrees=degrees,
         )
     refined = motion.attempt.refined
     limits = None if refined is None else [each for each in refined.program.limits if each.role is not Role.SAFEGUARD]
@@ -81,6 +85,7 @@ def reported_motion(motion: Result | Trajectory) -> ReportedMotion:
         left_undone=(*early, *motion.undone),
         candidates=motion.candidates,
         planned=_planned(motion),
+        degrees=degrees,
     )
 
 
@@ -91,6 +96,7 @@ def _gathered(
     *,
     limits: Sequence[Limit] | None,
     remarks: tuple[Remark, ...],
+    degrees: bool,
     left_undone: tuple[str, ...] = (),
     candidates: tuple[Attempt, ...] = (),
     planned: dict[str, str] | None = None,
@@ -108,6 +114,7 @@ def _gathered(
         left_undone=left_undone,
         candidates=candidates,
         planned=planned or {},
+        degrees=degrees,
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from brachis.bottleneck import THRESHOLD
 from brachis.plots.postures import plane_of
-from brachis.plots.quantities import KINDS, quantities
+from brachis.plots.quantities import kinds_of, quantities
 from brachis.plots.skeleton import skeleton
 from brachis.report.figures import encoded
 from brachis.report.motion import ReportedMotion
@@ -34,12 +34,12 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
         {"name": name, "redundant": name in trajectory.redundant_joints, "prismatic": unit == "m", "quantities": []}
         for name, unit in zip(robot.joint_names, robot.position_units, strict=True)
     ]
-    for kind in KINDS:
-        for part in quantities(trajectory, samples, kind):
-            limited = part.around_zero & np.isfinite(part.lower) & np.isfinite(part.upper)
+    kinds = kinds_of(trajectory)
+    for kind in kinds:
+        for part in quantities(trajectory, samples, kind, degrees=motion.degrees):
             for column, joint in enumerate(part.joints.tolist()):
                 entry = {"unit": part.unit, "values": encoded(part.values[:, column])}
-                if limited[column]:
+                if part.is_limited[column]:
                     entry["ratios"] = encoded(np.abs(part.ratios[:, column]))
                 joints[joint]["quantities"].append(entry)
     return {
@@ -49,6 +49,6 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
         "bones": encoded(skeleton(robot, samples.q).bones),
         "plane": plane_of(trajectory),
         "joints": joints,
-        "kinds": list(KINDS),
+        "kinds": kinds,
         "levels": {"near": NEAR, "at": THRESHOLD, "beyond": 1.0 + trajectory.task.refinement.tolerance},
     }

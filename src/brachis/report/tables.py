@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.metadata
 import platform
 from dataclasses import dataclass
+from datetime import datetime
+from pathlib import PurePosixPath, PureWindowsPath
+from typing import Any
 
 import numpy as np
+import yaml
 
 import brachis
 from brachis.attempt import coordinates
 from brachis.bottleneck import THRESHOLD
-from brachis.plots.quantities import KINDS, quantities
+from brachis.plots.quantities import Quantity, kinds_of, quantities
 from brachis.report.motion import ReportedMotion
+from brachis.robot import in_use
+from brachis.task import Task
 from brachis.verify import Check
 
 _LIBRARIES = ("pin", "numpy", "scipy", "plotly")
 NEAR = 0.9
 """Values that use more of a limit are marked as near it; 1 is the limit itself."""
-_SMALL = 1e-9
+_SMALL, _LARGE = 1e-9, 1e4
+_LISTED = 6
+"""Segments of a path, and numbers of one, that are named."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +58,12 @@ class JointRow:
     ----------
     name : str
     redundant : bool
-    start, end, range : str
+    start, end : str
         Positions with their unit.
     travel : str
         Lowest and highest position.
     peaks : tuple of Row
-        Of velocity, acceleration, and torque or force.
+        Of every kind of quantity, the position first.
     """
 
     name: str
@@ -62,7 +71,6 @@ class JointRow:
     start: str
     end: str
     travel: str
-    range: str
     peaks: tuple[Row, ...]
 
 
@@ -82,11 +90,84 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
         "largest tool speed": f"{samples.tool_speed[fastest]:.3f} m/s at {samples.t[fastest]:.3f} s",
         "worst ratio to a limit": f"{verification.worst_ratio:.5f} (1 is the limit)",
         "largest distance from the path": f"{verification.path_error:.1e} m or rad",
-        "robot": trajectory.robot.model.name,
         "redundant joints": coordinates(trajectory.redundant_joints, trajectory.branch),
         **({"branch": trajectory.branch} if named else {}),
         **motion.planned,
     }
+
+
+def identity(motion: ReportedMotion) -> dict[str, str]:
+    """Say what the motion is of: robot, path, payload and where the robot stands; and when the page was made."""
+    trajectory = motion.trajectory
+    urdf, recovered = trajectory.task.robot.urdf, trajectory.recovered
+    file = "" if urdf is None else f" ({_file_name(urdf)})"
+    way = float(np.linalg.norm(np.diff(motion.samples.tool_position, axis=0), axis=1).sum())
+    task_space = trajectory.task.task_space
+    rows = task_space if isinstance(task_space, str) else ", ".join(task_space)
+    return {
+        "robot": f"{trajectory.robot.name}{file}",
+        "path": f"{path_in_words(trajectory.task)}; the tool moves {way:.3f} m; prescribed: {rows}",
+        **({} if recovered is None else {"recovered from": _file_name(recovered.source)}),
+        "payload": "none",
+        "tool offset": "none",
+        "mounting": "at the world's origin, upright",
+        **in_use(trajectory.robot),
+        "report of": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
+        "SHA-256 of the URDF": hashlib.sha256(trajectory.urdf.encode()).hexdigest(),
+        "SHA-256 of the task as it stands below": hashlib.sha256(task_text(trajectory.task).encode()).hexdigest(),
+    }
+
+
+def path_in_words(task: Task) -> str:
+    """Name the segments of a path, each by its shape and what the task says of it."""
+    segments = [segment.model_dump(exclude_defaults=True) for segment in task.path]
+    said = [
+        f"{shape.replace('_', ' ')} ({', '.join(_entry(key, value) for key, value in given.items())})"
+        for segment in segments
+        for shape, given in segment.items()
+        if isinstance(given, dict)
+    ]
+    more = f", and {len(said) - _LISTED} more" if len(said) > _LISTED else ""
+    return ", then ".join(said[:_LISTED]) + more
+
+
+def _entry(key: str, value: object) -> str:
+    """Say what a task says of a segment: short lists as they are, long ones and mappings by their length."""
+    if (
+        isinstance(value, list | tuple)
+        and len(value) <= _LISTED
+        and not any(isinstance(each, list | tuple | dict) for each in value)
+    ):
+        shown = f"[{', '.join(f'{each:.4g}' if isinstance(each, float) else str(each) for each in value)}]"
+    elif isinstance(value, list | tuple | dict):
+        shown = f"{len(value)} entries"
+    elif isinstance(value, float):
+        shown = f"{value:.4g}"
+    else:
+        shown = _file_name(str(value))
+    return f"{key.replace('_', ' ')} {shown}"
+
+
+def task_text(task: Task) -> str:
+    """Write a task as YAML; of files without their folders, which say nothing to another reader."""
+    return str(yaml.safe_dump(_without_folders(task.to_dict()), sort_keys=False))
+
+
+def _without_folders(value: Any) -> Any:  # noqa: ANN401  (of a task)
+    """Replace absolute paths of files, wherever they are, by the files' names."""
+    if isinstance(value, dict):
+        return {key: _without_folders(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_folders(each) for each in value]
+    return _file_name(value) if isinstance(value, str) else value
+
+
+def _file_name(text: str) -> str:
+    """Return the name of the file of an absolute path; any other text as it is."""
+    for kind in (PurePosixPath, PureWindowsPath):
+        if kind(text).is_absolute():
+            return kind(text).name
+    return text
 
 
 def what_limits(motion: ReportedMotion) -> str:
@@ -100,18 +181,17 @@ def what_limits(motion: ReportedMotion) -> str:
 
 def joint_rows(motion: ReportedMotion) -> list[JointRow]:
     """List what every joint does, in chain order."""
-    trajectory, samples = motion.trajectory, motion.samples
-    robot, tolerance = trajectory.robot, trajectory.task.refinement.tolerance
-    peaks: dict[int, list[Row]] = {joint: [] for joint in range(robot.n)}
-    for kind in list(KINDS)[1:]:  # the position has columns of its own
-        for part in quantities(trajectory, samples, kind):
+    trajectory, tolerance = motion.trajectory, motion.trajectory.task.refinement.tolerance
+    peaks: dict[int, list[Row]] = {joint: [] for joint in range(trajectory.robot.n)}
+    positions: dict[int, tuple[np.ndarray, str]] = {}
+    for kind in kinds_of(trajectory):
+        for part in quantities(trajectory, motion.samples, kind, degrees=motion.degrees):
             for column, joint in enumerate(part.joints.tolist()):
-                levels = part.lower[column], part.upper[column]
-                peaks[joint].append(_peak(part.values[:, column], *levels, part.unit, tolerance))
+                positions.setdefault(joint, (part.values[:, column], part.unit))
+                peaks[joint].append(_peak(part, column, tolerance))
     rows = []
-    for joint, (name, unit) in enumerate(zip(robot.joint_names, robot.position_units, strict=True)):
-        q = samples.q[:, joint]
-        ends = robot.limits.position_lower[joint], robot.limits.position_upper[joint]
+    for joint, name in enumerate(trajectory.joint_names):
+        q, unit = positions[joint]
         rows.append(
             JointRow(
                 name=name,
@@ -119,27 +199,32 @@ def joint_rows(motion: ReportedMotion) -> list[JointRow]:
                 start=f"{q[0]:.4f} {unit}",
                 end=f"{q[-1]:.4f} {unit}",
                 travel=f"{q.min():.4f} to {q.max():.4f} {unit}",
-                range=" to ".join("open" if np.isinf(end) else f"{end:.4g}" for end in ends) + f" {unit}",
                 peaks=tuple(peaks[joint]),
             )
         )
     return rows
 
 
-def _peak(values: np.ndarray, lower: float, upper: float, unit: str, tolerance: float) -> Row:
-    """Find the value that is nearest to its limit, or the largest one where there is no limit."""
-    ratios = values / np.where(values > 0.0, upper, -lower)
-    limited = bool(np.isfinite([lower, upper]).all())
-    at = int(np.argmax(np.abs(ratios if limited else values)))
+def _peak(part: Quantity, column: int, tolerance: float) -> Row:
+    """Find the value of a joint that is nearest to its limit, or the largest one where there is no limit."""
+    values, lower, upper = part.values[:, column], part.lower[column], part.upper[column]
+    limited = bool(part.is_limited[column])
+    ratios = np.abs(part.ratios[:, column]) if limited else np.zeros(1)
+    at = int(np.argmax(ratios if limited else np.abs(values)))
     value = values[at] if abs(values[at]) > _SMALL else 0.0
-    share = abs(float(ratios[at]))
-    limit = f"{upper:.4g} {unit}" if upper == -lower else f"{lower:.4g} to {upper:.4g} {unit}"
+    low, high = _written(lower), _written(upper)
+    limit = f"{high} {part.unit}" if upper == -lower else f"{low} to {high} {part.unit}"
     return Row(
-        value=f"{value:.4g} {unit}",
+        value=f"{_written(value)} {part.unit}",
         limit=limit if limited else "",
-        share=f"{100.0 * share:.1f} %" if limited else "",
-        level=_level(share, tolerance) if limited else "",
+        share=f"{100.0 * ratios.max():.1f} %" if limited else "",
+        level=_level(float(ratios.max()), tolerance),
     )
+
+
+def _written(value: float) -> str:
+    """Write a number with four significant figures, large ones without an exponent."""
+    return f"{value:.0f}" if _LARGE <= abs(value) < np.inf else f"{value:.4g}"
 
 
 def _level(share: float, tolerance: float) -> str:

@@ -13,16 +13,14 @@ from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
 from brachis.errors import NotInstalledError
 from brachis.files import atomic_write, check_suffix
 from brachis.plots import as_html, plot_candidates, plot_fit, plot_overview
+from brachis.plots.quantities import kinds_of
 from brachis.report import tables
 from brachis.report.figures import motion_figure, timeline_figure
 from brachis.report.motion import ReportedMotion, reported_motion
 from brachis.report.scene import scene
-from brachis.robot import in_use
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -74,7 +72,7 @@ class Report:
         return f'<iframe {frame} srcdoc="{html.escape(self.html)}"></iframe>'
 
 
-def make_report(motion: Result | Trajectory, *, title: str = "") -> Report:
+def make_report(motion: Result | Trajectory, *, title: str = "", degrees: bool = False) -> Report:
     """Make a page from which a person decides whether to run a motion.
 
     Parameters
@@ -83,6 +81,8 @@ def make_report(motion: Result | Trajectory, *, title: str = "") -> Report:
         Of `brachis.plan`; or a trajectory, a loaded one for example, which is verified again.
     title : str, optional
         Of the page; the robot's name if left out.
+    degrees : bool, optional
+        Whether the tables and the interactive figures show angles in degrees; the pictures are in rad either way.
 
     Returns
     -------
@@ -101,10 +101,10 @@ def make_report(motion: Result | Trajectory, *, title: str = "") -> Report:
     >>> page.save("out/report.html")  # doctest: +SKIP
     """
     template, program = _template(), _plotly()
-    reported = reported_motion(motion)
+    reported = reported_motion(motion, degrees=degrees)
     checks = tables.check_rows(reported)
     page = template.render(
-        title=title or reported.trajectory.robot.model.name,
+        title=title or reported.trajectory.robot.name,
         verified=reported.verification.passed,
         points=reported.verification.points,
         failed=[check for check in checks if not check.passed],
@@ -115,9 +115,10 @@ def make_report(motion: Result | Trajectory, *, title: str = "") -> Report:
         held_back=reported.held_back,
         remarks=reported.remarks,
         left_undone=reported.left_undone,
-        in_use=in_use(reported.trajectory.robot),
+        identity=tables.identity(reported),
+        kinds=kinds_of(reported.trajectory),
         pictures=list(_pictures(reported)),
-        task=yaml.safe_dump(reported.trajectory.task.to_dict(), sort_keys=False),
+        task=tables.task_text(reported.trajectory.task),
         versions=tables.versions(),
         data=_json(
             {"motion": motion_figure(reported), "timeline": timeline_figure(reported), "scene": scene(reported)}

@@ -28,6 +28,7 @@ from brachis.robot.settings import kept_settings
 from brachis.robot.units import UNITS
 from brachis.robot.urdf import read_chain, read_file
 from brachis.robot.urdf_bodies import StatedChain
+from brachis.robot.urdf_tree import read_tree
 from brachis.summary import Summary
 from brachis.task import LimitKeywords, LimitSpec, Payload, Placement, RobotSettings, check_robot_settings
 
@@ -279,6 +280,11 @@ class Robot(Summary):
             return f"{', '.join(numbers)} {units[0]}"
         pairs = zip(numbers, units, strict=True)
         return ", ".join(number if number == "none" else f"{number} {unit}" for number, unit in pairs)
+
+    @property
+    def name(self) -> str:
+        """Name that the URDF gives the robot; empty where it gives none."""
+        return read_tree(self.urdf, self.source).robot.get("name") or ""
 
     @property
     def n(self) -> int:

@@ -271,6 +271,7 @@ class Trajectory(Summary):
         candidates: Sequence[Mapping[str, Any]] = (),
         *,
         verified: bool | None = None,
+        degrees: bool = False,
         host: str = "127.0.0.1",
         port: int | None = None,
         block: bool | None = None,
@@ -285,6 +286,8 @@ class Trajectory(Summary):
             What the search looked at, as `Result.to_dict` lists it.
         verified : bool, optional
             Whether the motion passed the verification, where that is known.
+        degrees : bool, optional
+            Whether angles are shown in degrees.
         host : str, optional
             Address that the viewer listens on; by default nobody but this machine reaches it.
         port : int, optional
@@ -305,7 +308,9 @@ class Trajectory(Summary):
             viser is not installed.
         """
         viewer = importlib.import_module("brachis.view")  # a later stage, which knows trajectories
-        return viewer.open_viewer(self, candidates, verified=verified, host=host, port=port, block=block)
+        return viewer.open_viewer(
+            self, candidates, verified=verified, degrees=degrees, host=host, port=port, block=block
+        )
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file with all that is needed to load and verify the trajectory.

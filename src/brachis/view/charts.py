@@ -23,7 +23,6 @@ _LABEL = 16
 _EDGE, _EDGES, _GAP = 9.5, 18.5, 12
 """What viser leaves to the left of a plot (less half the line), on both sides and below, pixels; a test measures it."""
 _FONT = "11px sans-serif"
-_DASHES: dict[str, tuple[float, ...]] = {"-": (), "--": (6.0, 4.0), ":": (2.0, 3.0)}
 _NOW = "#D00000"
 _LIMIT = "#666666"
 
@@ -92,7 +91,8 @@ def _line(part: float) -> str:
 def look(style: int) -> tuple[str, tuple[float, ...]]:
     """Colour and dashes of the curve with this number, as in the figures."""
     turn, colour = divmod(style, len(COLOURS))
-    return COLOURS[colour], _DASHES[LINE_STYLES[turn % len(LINE_STYLES)]]
+    dashes = LINE_STYLES[turn % len(LINE_STYLES)]
+    return COLOURS[colour], () if isinstance(dashes, str) else tuple(2.0 * length for length in dashes[1])
 
 
 def legend(names: Sequence[str], styles: Sequence[int]) -> str:

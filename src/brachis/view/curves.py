@@ -1,16 +1,22 @@
-"""The curves of the viewer's plots: torque, speed and position over their limits, and the use of all limits."""
+"""The curves of the viewer's plots: joint quantities over their limits, the tool's speed, the use of all limits."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from brachis.bottleneck.ratios import limit_ratios
+from brachis.plots.quantities import Quantity, allowed_tool_speeds, kinds_of, quantities
 from brachis.trajectory import Samples, Trajectory
 
 _TOP = 1.15
+_NEAR = 1.3
+"""Of the axis: limits of the tool's speed that are farther away are not shown."""
 _BINS = 400
+_SHOWN_FREE = ("position", "velocity", "torque")
+"""Kinds of quantities that are shown of joints without limits, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,65 +50,51 @@ class Curves:
     high: float
 
 
-def all_curves(trajectory: Trajectory, samples: Samples) -> list[Curves]:
-    """Return the curves of all plots of a motion."""
-    robot = trajectory.robot
-    units, limits, zero = robot.position_units, robot.limits, np.zeros(robot.n)
-    rates = tuple(f"{unit}/s" for unit in units)
-    ranges = np.array([limits.position_lower, limits.position_upper])
-    ended = np.isfinite(ranges).all(axis=0)
-    middle = np.where(ended, 0.5 * np.where(ended, ranges, 0.0).sum(axis=0), 0.0)
-    kinds = (
-        ("torque", "torque / limit", robot.torque_units, samples.tau, limits.both_ways("torque"), zero),
-        ("speed", "speed / limit", rates, samples.qdot, limits.both_ways("velocity"), zero),
-        ("position", "position in its range (ends at -1 and 1)", units, samples.q, ranges, middle),
-    )
-    plots = [plot for kind in kinds for plot in _plots_of(trajectory, samples.t, *kind)]
-    return [*plots, _largest_ratios(trajectory)]
-
-
-def _plots_of(
-    trajectory: Trajectory,
-    t: np.ndarray,
-    name: str,
-    title: str,
-    units: tuple[str, ...],
-    values: np.ndarray,
-    limits: np.ndarray,
-    centre: np.ndarray,
-) -> list[Curves]:
-    """Plot what has limits as a part of them, from a centre (n,) in either direction, and the rest in its units."""
-    limited = np.isfinite(limits).all(axis=0)
+def all_curves(trajectory: Trajectory, samples: Samples, *, degrees: bool = False) -> list[Curves]:
+    """Return the curves of all plots of a motion; `degrees` for angles of joints without limits."""
     plots = []
-    if limited.any():
-        away = (values - centre)[:, limited]
-        low, high = (limits - centre)[:, limited]
-        parts = away / np.where(away > 0.0, high, -low)
-        top = _TOP * max(1.0, float(np.abs(parts).max()))
-        plots.append(_of(title, trajectory, t, parts, limited, (-1.0, 1.0), -top, top))
-    for unit in dict.fromkeys(np.array(units)[~limited].tolist()):
-        free = ~limited & (np.array(units) == unit)
-        low, high = float(values[:, free].min()), float(values[:, free].max())
-        margin = 0.1 * (high - low) or 1.0
-        plots.append(
-            _of(f"{name} ({unit}), no limit", trajectory, t, values[:, free], free, (), low - margin, high + margin)
-        )
-    return plots
+    for kind in reversed(kinds_of(trajectory)):
+        parts = quantities(trajectory, samples, kind, degrees=degrees)
+        limited = [part for each in parts if (part := each.limited()) is not None]
+        free = [part for each in parts if (part := each.of_joints(~each.is_limited)) is not None]
+        if limited:
+            values = np.hstack([part.ratios for part in limited])
+            top = _TOP * max(1.0, float(np.abs(values).max()))
+            title = ", ".join(dict.fromkeys(part.share for part in limited))
+            plots.append(_of(trajectory, title, limited, values, (-1.0, 1.0), -top, top))
+        for part in free if kind in _SHOWN_FREE else ():
+            low, high = float(part.values.min()), float(part.values.max())
+            margin = 0.1 * (high - low) or 1.0
+            title = f"{part.name} ({part.unit}), no limit"
+            plots.append(_of(trajectory, title, [part], part.values, (), low - margin, high + margin))
+    return [*plots, _tool_speed(trajectory, samples), _largest_ratios(trajectory)]
 
 
 def _of(
-    title: str,
     trajectory: Trajectory,
-    t: np.ndarray,
+    title: str,
+    parts: Sequence[Quantity],
     values: np.ndarray,
-    chosen: np.ndarray,
     bounds: tuple[float, ...],
     low: float,
     high: float,
 ) -> Curves:
-    joints = np.flatnonzero(chosen).tolist()
-    names = tuple(trajectory.joint_names[joint] for joint in joints)
-    return Curves(title, names, tuple(joints), t, values, bounds, low, high)
+    """Plot values, (K, c), of the joints of some quantities, in chain order."""
+    joints = np.concatenate([part.joints for part in parts])
+    order = np.argsort(joints)
+    names = tuple(trajectory.joint_names[joint] for joint in joints[order])
+    return Curves(title, names, tuple(joints[order].tolist()), parts[0].t, values[:, order], bounds, low, high)
+
+
+def _tool_speed(trajectory: Trajectory, samples: Samples) -> Curves:
+    """Plot the tool's speed, and the largest one that the task allows where it is near and the same everywhere."""
+    speed = samples.tool_speed
+    top = _TOP * float(speed.max()) or 1.0
+    levels = [level for level in allowed_tool_speeds(trajectory, samples) if (level == level[0]).all()]
+    bounds = tuple(float(level[0]) for level in levels if level[0] < _NEAR * top)
+    top = max([top, *(1.05 * level for level in bounds)])
+    colour = len(trajectory.joint_names)
+    return Curves("tool speed (m/s)", ("tool",), (colour,), samples.t, speed[:, None], bounds, 0.0, top)
 
 
 def _largest_ratios(trajectory: Trajectory) -> Curves:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from brachis.errors import BrachisError
 from brachis.view import tables
 from brachis.view.charts import Chart
 from brachis.view.curves import all_curves
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 _STOPS = 9
 _SLIDER_STEPS = 200
-_CONTROLS_WIDTH, _PLOTS_WIDTH = 330, 350
+_CONTROLS_WIDTH, _PLOTS_WIDTH = 400, 350
 """Pixels."""
 
 
@@ -41,6 +42,8 @@ class Panel:
         What else the user should know.
     verified : bool or None
         None where it is not known.
+    degrees : bool
+        Whether angles are in degrees.
     """
 
     def __init__(
@@ -54,7 +57,9 @@ class Panel:
         notes: Sequence[str],
         *,
         verified: bool | None,
+        degrees: bool,
     ) -> None:
+        self._degrees = degrees
         self._gui, self._motion, self._playback, self._show = server.gui, motion, playback, show
         self._gui.configure_theme(show_logo=False, show_share_button=False)
         self._gui.add_html(tables.summary(motion.trajectory, notes, verified=verified))
@@ -71,7 +76,7 @@ class Panel:
         t = self._playback.time
         self.follow()
         now = self._motion.trajectory.at(np.array([t]))
-        self._state.content = tables.state_table(self._motion.trajectory, now)
+        self._state.content = tables.state_table(self._motion.trajectory, now, degrees=self._degrees)
         for chart in self._charts:
             chart.mark(t)
 
@@ -93,6 +98,8 @@ class Panel:
         self._rates = {f"{rate:g} x real time": rate for rate in RATES}
         current = next(name for name, rate in self._rates.items() if rate == self._playback.rate)
         self._gui.add_dropdown("speed", tuple(self._rates), initial_value=current).on_update(self._set_rate)
+        self._gui.add_checkbox("again and again", self._playback.repeats).on_update(self._set_repeats)
+        self._gui.add_button("Download the report", hint="The motion as one HTML page").on_click(self._send_report)
 
     def _drag(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
         """Show what the user chose with the slider, and stay there."""
@@ -107,6 +114,22 @@ class Panel:
     def _set_rate(self, event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
         self._playback.rate = self._rates[event.target.value]
 
+    def _set_repeats(self, event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
+        self._playback.repeats = event.target.value
+
+    def _send_report(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+        """Make the report for whoever asks, as a file that the browser keeps."""
+        from brachis.report import make_report  # noqa: PLC0415  (matplotlib takes 0.7 s)
+
+        if event.client is None:
+            return
+        try:
+            page = make_report(self._motion.trajectory, degrees=self._degrees)
+        except BrachisError as error:
+            event.client.add_notification("There is no report", str(error))
+            return
+        event.client.send_file_download("report.html", page.html.encode(), save_immediately=True)
+
     def _add_switches(self, scene: Scene) -> None:
         """Add a box to tick for every layer of the scene."""
         with self._gui.add_folder(f"show (a cell of the grid is {scene.cell:g} m)", expand_by_default=False):
@@ -119,7 +142,10 @@ class Panel:
         """Add a panel with the plots and the list of candidates."""
         motion, panel = self._motion, self._gui.add_panel()
         with panel.add_tab("limits"):
-            charts = [Chart(self._gui, curves) for curves in all_curves(motion.trajectory, motion.samples)]
+            charts = [
+                Chart(self._gui, curves)
+                for curves in all_curves(motion.trajectory, motion.samples, degrees=self._degrees)
+            ]
         with panel.add_tab(f"candidates ({len(candidates)})" if candidates else "candidates"):
             self._gui.add_html(tables.candidates_table(candidates))
         panel.dock_left()

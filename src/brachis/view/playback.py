@@ -30,6 +30,8 @@ class Playback:
         Speed, as a part of the real one.
     loops : bool
         Whether the motion goes on at its end without a pause.
+    repeats : bool
+        Whether it begins again at its end; otherwise it stays there.
     playing : bool
     time : float
         The instant that is shown, s.
@@ -38,6 +40,7 @@ class Playback:
     t_end: float
     rate: float
     loops: bool = False
+    repeats: bool = True
     playing: bool = True
     time: float = 0.0
     _waited: float = 0.0
@@ -48,6 +51,9 @@ class Playback:
             return self.time
         if self.time < self.t_end:
             self.time, self._waited = min(self.time + elapsed * self.rate, self.t_end), 0.0
+            return self.time
+        if not self.repeats:
+            self.playing = False
             return self.time
         self._waited += elapsed
         if self.loops or self._waited >= _PAUSE:

@@ -6,41 +6,39 @@ import html
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from brachis.plots.quantities import quantities
 from brachis.search.listing import STATUS, TIMES, WORDS, candidate_rows
 from brachis.trajectory import Samples, Trajectory
 
 _MANY = 60
 """Candidates that are listed."""
-_CELL = "padding:0 0.4em;white-space:nowrap"
+_CELL = "padding:0 0.35em;white-space:nowrap"
+_STATE = {"position": 3, "velocity": 3, "torque": 2}
+"""What is shown of joints, and the decimals."""
 
 
-def state_table(trajectory: Trajectory, now: Samples) -> str:
-    """Time, path coordinate, tool, and every joint's position, speed and torque at one instant, with units.
+def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) -> str:
+    """Time, path coordinate, tool, and every joint's position, velocity and torque at one instant, with units.
 
     Parameters
     ----------
     trajectory : Trajectory
     now : Samples
         At one time.
+    degrees : bool, optional
+        Whether angles are in degrees.
     """
     place = ", ".join(f"{value:.4f}" for value in now.tool_position[0])
     head = _paragraph(
         f"t = {now.t[0]:.4f} s of {trajectory.t_end:.4f} s, s = {now.s[0]:.4f}",
         f"tool at {place} m, {now.tool_speed[0]:.3f} m/s",
     )
-    rows = []
-    robot = trajectory.robot
-    columns = zip(trajectory.joint_names, robot.position_units, robot.torque_units, strict=True)
-    for joint, (name, unit, force) in enumerate(columns):
-        rows.append(
-            (
-                name,
-                f"{_rounded(now.q[0, joint], 3)} {unit}",
-                f"{_rounded(now.qdot[0, joint], 3)} {unit}/s",
-                f"{_rounded(now.tau[0, joint], 2)} {force}",
-            )
-        )
-    return head + _table(("joint", "position", "speed", "torque, force"), rows)
+    cells: dict[int, list[str]] = {joint: [name] for joint, name in enumerate(trajectory.joint_names)}
+    for kind, digits in _STATE.items():
+        for part in quantities(trajectory, now, kind, degrees=degrees):
+            for joint, value in zip(part.joints.tolist(), part.values[0].tolist(), strict=True):
+                cells[joint].append(f"{_rounded(value, digits)} {part.unit}")
+    return head + _table(("joint", "position", "velocity", "torque, force"), list(cells.values()))
 
 
 def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:

@@ -35,6 +35,8 @@ class Viewer:
         What the search looked at, as `Attempt.to_dict` gives it.
     verified : bool, optional
         Whether the motion passed the verification, where that is known.
+    degrees : bool, optional
+        Whether angles are shown in degrees.
     host : str, optional
         Address that the server listens on; by default nobody but this machine reaches it.
     port : int, optional
@@ -63,12 +65,13 @@ class Viewer:
         candidates: Sequence[Mapping[str, Any]] = (),
         *,
         verified: bool | None = None,
+        degrees: bool = False,
         host: str = LOOPBACK,
         port: int | None = None,
     ) -> None:
         self._server = start_server(host, port)
         try:
-            self._fill(trajectory, candidates, verified=verified)
+            self._fill(trajectory, candidates, verified=verified, degrees=degrees)
         except BaseException:
             self._server.stop()
             raise
@@ -79,7 +82,14 @@ class Viewer:
         self._thread = threading.Thread(target=self._run, name="brachis viewer", daemon=True)
         self._thread.start()
 
-    def _fill(self, trajectory: Trajectory, candidates: Sequence[Mapping[str, Any]], *, verified: bool | None) -> None:
+    def _fill(
+        self,
+        trajectory: Trajectory,
+        candidates: Sequence[Mapping[str, Any]],
+        *,
+        verified: bool | None,
+        degrees: bool,
+    ) -> None:
         motion, bodies = Motion.of(trajectory), bodies_of(trajectory)
         boundary = trajectory.task.boundary
         self.playback = Playback(trajectory.t_end, first_rate(trajectory.t_end), loops=boundary.periodic)
@@ -87,7 +97,15 @@ class Viewer:
         self._scene = Scene(self._server, motion, bodies)
         notes = [f"not shown: {reason}" for reason in bodies.unread]
         self._panel = Panel(
-            self._server, motion, self._scene, self.playback, self.show, candidates, notes, verified=verified
+            self._server,
+            motion,
+            self._scene,
+            self.playback,
+            self.show,
+            candidates,
+            notes,
+            verified=verified,
+            degrees=degrees,
         )
         self.show()
 
@@ -151,6 +169,7 @@ def open_viewer(
     candidates: Sequence[Mapping[str, Any]] = (),
     *,
     verified: bool | None = None,
+    degrees: bool = False,
     host: str = LOOPBACK,
     port: int | None = None,
     block: bool | None = None,
@@ -159,7 +178,7 @@ def open_viewer(
 
     Parameters
     ----------
-    trajectory, candidates, verified, host, port
+    trajectory, candidates, verified, degrees, host, port
         See `Viewer`.
     block : bool, optional
         Whether to wait until Ctrl-C. If left out, a script waits, and an interactive session or a notebook does not.
@@ -168,7 +187,7 @@ def open_viewer(
     -------
     Viewer
     """
-    viewer = Viewer(trajectory, candidates, verified=verified, host=host, port=port)
+    viewer = Viewer(trajectory, candidates, verified=verified, degrees=degrees, host=host, port=port)
     print(f"the motion is shown at {viewer.url}", file=sys.stderr)  # noqa: T201
     if block if block is not None else not hasattr(sys, "ps1"):
         viewer.wait()
