@@ -133,11 +133,11 @@ joint_limits:
     max_effort: 330.0              # N m
 ```
 
-`has_..._limits: false` switches a limit off, the URDF's too; what is not stated is the URDF's. Every joint that moves the
-tool needs an entry, there or in the task's `robot.limits`. `default_velocity_scaling_factor` and
+`has_..._limits: false` switches a limit off, the URDF's too; what is not stated is the URDF's. Every joint that moves
+the tool needs an entry, there or in the task's `robot.limits`. `default_velocity_scaling_factor` and
 `default_acceleration_scaling_factor`, 0.1 in files of MoveIt's Setup Assistant, count as `limits.scale`: with
-`robot.limits.scale: {velocity: 1, acceleration: 1}` the task uses the limits in full. The joints of Universal Robots may
-lack the `_joint` at the end of their names. A limits file of our own has these keys:
+`robot.limits.scale: {velocity: 1, acceleration: 1}` the task uses the limits in full. The joints of Universal Robots
+may lack the `_joint` at the end of their names. A limits file of our own has these keys:
 """
 PATH = """
 ## `path`
