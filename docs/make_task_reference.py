@@ -111,8 +111,33 @@ LIMITS_FILE = """
 
 `robot.limits_file` names a YAML file of joint limits, such as `robots/panda_limits.yaml`, which has the published
 figures of the Franka Emika Panda. Limits count in this order: what the task says in `robot.limits`, the file, the URDF;
-where the task names joints, joint by joint. Joints that the task locks are left out of the file. The file is read with
-the task: a saved task does not need it any more. In Python: `brachis.read_limits(path)` gives a `LimitSpec`.
+where the task names joints, joint by joint. Limits of joints that the URDF has and that stand still (locked, or off the
+chain to the tool) have no effect. The file is read with the task: a saved task does not need it any more. In Python:
+`brachis.read_limits(path)` gives a `LimitSpec`.
+
+**`joint_limits.yaml`** of MoveIt, of ros2_control and of Universal Robots is read as it is, with `!degrees` and
+`!radians`:
+
+```yaml
+joint_limits:
+  shoulder_pan_joint:
+    has_position_limits: true
+    min_position: !degrees -180
+    max_position: !degrees 180
+    has_velocity_limits: true
+    max_velocity: !degrees 120     # per second
+    has_acceleration_limits: true
+    max_acceleration: 5.0          # rad/s^2
+    has_jerk_limits: false
+    has_effort_limits: true
+    max_effort: 330.0              # N m
+```
+
+`has_..._limits: false` switches a limit off, the URDF's too; what is not stated is the URDF's. Every joint that moves
+the tool needs an entry, there or in the task's `robot.limits`. `default_velocity_scaling_factor` and
+`default_acceleration_scaling_factor`, 0.1 in files of MoveIt's Setup Assistant, count as `limits.scale`: with
+`robot.limits.scale: {velocity: 1, acceleration: 1}` the task uses the limits in full. The joints of Universal Robots
+may lack the `_joint` at the end of their names. A limits file of our own has these keys:
 """
 PATH = """
 ## `path`

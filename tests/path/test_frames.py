@@ -167,6 +167,8 @@ def test_frames_that_do_not_fit() -> None:
         written(SEGMENTS, path_frame="table")
     with pytest.raises(TaskError, match=r"allowed: frames: \{table: \{xyz: \[\.\.\.\], rpy_deg: \[\.\.\.\]\}\} beside"):
         written(SEGMENTS, frames={}, path_frame="table")
+    with pytest.raises(TaskError, match=r"frames\.workpiece\.xy: unknown key; found xy; allowed: xyz, rpy_deg"):
+        written(SEGMENTS, frames={"workpiece": {"xy": [0, 0]}})
     with pytest.raises(TaskError, match="path_frame: a path of joints is in no frame"):
         written([{"line": {"by": [0.1]}}], task_space="joints")
     with pytest.raises(TaskError, match=r"path: a path in a frame is .*allowed: \{frame: NAME, segments"):

@@ -12,6 +12,7 @@ import yaml
 import brachis
 from brachis.errors import InputError, TaskError, UnknownNameError
 from brachis.robot import Robot
+from brachis.robot.combine import robot_for
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import RobotSettings, load_task, read_limits
 
@@ -133,3 +134,124 @@ def test_a_file_states_torque_curves_and_the_power_of_all_joints_too(loaded):
     robot = robot_from_settings(loaded({"limits": {"total_power": 50}}, limits=limits).robot)
     assert robot.limits.total_power == 50.0
     np.testing.assert_array_equal(robot.limits.torque, [30.0, 20.0, 30.0])
+
+
+MOVEIT = """
+default_velocity_scaling_factor: 0.5
+joint_limits:
+  j1:
+    has_position_limits: true
+    min_position: !degrees -170
+    max_position: !radians 2.5
+    has_velocity_limits: true
+    max_velocity: 2
+    has_acceleration_limits: true
+    max_acceleration: 3.75
+    has_jerk_limits: true
+    max_jerk: 90.0
+  j2:
+    has_velocity_limits: false
+    max_velocity: 0
+    max_acceleration: 5.0
+  j3:
+    has_acceleration_limits: false
+    max_acceleration: 0
+    has_effort_limits: true
+    max_effort: 7.5
+"""
+UR = """
+joint_limits:
+  {0}: &limits
+    has_acceleration_limits: false
+    has_effort_limits: true
+    has_position_limits: true
+    has_velocity_limits: true
+    max_effort: 150.0
+    max_position: !degrees  360.0
+    max_velocity: !degrees  180.0
+    min_position: !degrees -360.0
+  {1}: *limits
+  {2}: {{<<: *limits, max_position: !degrees 180.0, min_position: !degrees -180.0}}
+  {3}: *limits
+  {4}: *limits
+  {5}: {{<<: *limits, max_effort: 28}}
+"""
+SHORT = ("shoulder_pan", "shoulder_lift", "elbow_joint", "wrist_1", "wrist_2", "wrist_3")
+
+
+def test_a_file_of_moveit_is_read(loaded, tmp_path):
+    (tmp_path / "joint_limits.yaml").write_text(MOVEIT, encoding="utf-8")
+    limits = loaded({"limits_file": "joint_limits.yaml"}).robot.limits
+    assert limits.position == {"j1": (np.radians(-170.0), 2.5)}
+    assert limits.velocity == {"j1": 2.0, "j2": None}
+    assert limits.acceleration == {"j1": 3.75, "j2": 5.0, "j3": None}
+    assert (limits.jerk, limits.torque) == ({"j1": 90.0}, {"j3": 7.5})
+    assert (limits.scale.velocity, limits.scale.acceleration) == (0.5, 1.0)
+    own = loaded({"limits_file": "joint_limits.yaml", "limits": {"scale": {"velocity": 1.0}, "velocity": {"j1": 1.0}}})
+    assert own.robot.limits.scale.velocity == 1.0
+    assert own.robot.limits.velocity == {"j1": 1.0, "j2": None}
+    robot = Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", limits=read_limits(tmp_path / "joint_limits.yaml"))
+    np.testing.assert_array_equal(robot.limits.velocity, [1.0, np.inf, robot.stated_limits[2].velocity * 0.5])
+    np.testing.assert_array_equal(robot.limits.acceleration, [3.75, 5.0, np.inf])
+
+
+@pytest.mark.parametrize("names", [SHORT, tuple(name.removesuffix("_joint") + "_joint" for name in SHORT)])
+def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
+    (tmp_path / "ur.yaml").write_text(UR.format(*names), encoding="utf-8")
+    ur = {"urdf": str(ROOT / "robots/ur10_rail/robot.urdf"), "limits_file": "ur.yaml"}
+    robot = robot_from_settings(loaded({**ur, "limits": {"velocity": {"rail": 0.7}}}).robot)
+    np.testing.assert_array_equal(robot.limits.velocity, [0.7, *[180.0 * (np.pi / 180.0)] * 6])
+    np.testing.assert_array_equal(robot.limits.torque[1:], [150.0] * 5 + [28.0])
+    np.testing.assert_array_equal(robot.limits.position_upper[[1, 3]], np.radians([360.0, 180.0]))
+    assert robot_from_settings(loaded({**ur, "locked_joints": {"rail": 0.0}}).robot).n == 6
+    with pytest.raises(TaskError, match=r"ur\.yaml: joint_limits: joint 'rail', which moves the tool, has no entry"):
+        loaded(ur)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            ("  j2:", "  j4:"),
+            ["joint_limits.yaml: joint_limits: there is no joint of the URDF named 'j4'", "j1, j2, j3"],
+        ),
+        (("  j2:", "  j1:"), ["line 14, column 3", "the key 'j1' occurs twice"]),
+        (
+            ("max_velocity: 2", "max_velocity: -2"),
+            ["joint_limits.j1.max_velocity: out of range; found -2", "> 0, or has"],
+        ),
+        (
+            ("    max_velocity: 2\n", ""),
+            ["joint_limits.j1.max_velocity: this figure is missing", "has_velocity_limits: f"],
+        ),
+        (("    min_position: !degrees -170\n", ""), ["joint_limits.j1.min_position: this figure is missing"]),
+        (("!degrees -170", "!degrees left"), ["!degrees stands before a number, and not before 'left'"]),
+        (("!degrees -170", "!degres -170"), ["could not determine a constructor for the tag '!degres'"]),
+        (("max_jerk", "max_jrk"), ["joint_limits.j1.max_jrk: unknown key", "Did you mean 'max_jerk'?"]),
+        (("factor: 0.5", "factor: 50"), ["default_velocity_scaling_factor: out of range; found 50"]),
+    ],
+    ids=str,
+)
+def test_a_wrong_file_of_moveit_is_refused_with_its_key(loaded, tmp_path, changes, words):
+    assert changes[0] in MOVEIT
+    (tmp_path / "joint_limits.yaml").write_text(MOVEIT.replace(*changes), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        loaded({"limits_file": "joint_limits.yaml"})
+    assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+def test_limits_of_joints_that_stand_still_have_no_effect():
+    urdf = ROOT / "robots/ur10_rail/robot.urdf"
+    limits = brachis.LimitSpec(velocity={"shoulder_pan_joint": 1.0, "wrist_3_joint": 0.5})
+    robot = Robot.from_urdf(urdf, tool_frame="wrist_2_link", limits=limits)
+    assert "wrist_3_joint" not in robot.joint_names
+    assert robot.limits.velocity[1] == 1.0
+    with pytest.raises(UnknownNameError, match="'wrist_4_joint'"):
+        Robot.from_urdf(urdf, limits=brachis.LimitSpec(velocity={"wrist_4_joint": 1.0}))
+
+
+def test_a_task_may_limit_joints_that_stand_still_of_a_robot_that_has_limits():
+    urdf = ROOT / "robots/ur10_rail/robot.urdf"
+    robot = Robot.from_urdf(urdf, tool_frame="wrist_2_link", limits=brachis.LimitSpec(velocity={"rail": 0.4}))
+    settings = RobotSettings(limits=brachis.LimitSpec(velocity={"shoulder_pan_joint": 1.0, "wrist_3_joint": 0.5}))
+    assert robot_for(robot, settings).limits.velocity[:2].tolist() == [0.4, 1.0]

@@ -223,7 +223,7 @@ WRONG_STARTS: list[tuple[Any, Any, list[str]]] = [
     (
         [1, 2, 3, 1, 0, 0, 0],
         "pose",
-        ["path_start: a list does not say what", "quaternion_xyzw (quaternion, w last: ROS"],
+        ["path_start: a list does not say how", "quaternion_xyzw (quaternion, w last: ROS"],
     ),
     ({"position": [1, 2, 3]}, "pose", ["path_start: an orientation needs exactly one convention", "kuka_abc_deg (A"]),
     ({"rpy_deg": [1, 2, 3]}, "pose_free_roll", ["path_start.position: this key is required"]),

@@ -91,9 +91,9 @@ def rows_of(trajectory: Trajectory, dt: float, last: str, joints: Sequence[str] 
     parts = (getattr(samples, quantity)[:, index] for quantity in COLUMNS.values())
     units = tuple(trajectory.robot.position_units[each] for each in index)
     left_out = tuple(_left_out(trajectory, np.vstack([trajectory.q, samples.q]), chosen))
-    for sentence in left_out:
-        hint = "Move it by its own controller at the same time, or leave joints away to write it too"
-        warnings.warn(f"{sentence}. {hint}", LeftOutWarning, stacklevel=4)
+    if left_out:
+        hint = "Move what is missing by its own controller at the same time, or write all joints"
+        warnings.warn(f"{'; '.join(left_out)}. {hint}", LeftOutWarning, stacklevel=4)
     return JointRows(chosen, units, left_out, samples.t, samples.s, *parts)
 
 

@@ -78,7 +78,7 @@ def quaternions_of(rotation: Rotation) -> Array:
 
 def rotation_from(attitude: Attitude) -> Rotation:
     """Return an orientation as a task gives it."""
-    convention, values = attitude.stated
+    convention, values = attitude.convention_and_numbers
     return rotation_by(convention, np.array(values))
 
 

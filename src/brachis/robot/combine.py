@@ -13,7 +13,14 @@ from brachis.errors import InputError, TaskError
 from brachis.robot.free_roll import with_free_roll
 from brachis.robot.friction import Friction
 from brachis.robot.from_task import robot_from_settings
-from brachis.robot.limits import MAGNITUDES, Limits, per_joint_values, resolve_limits, spelled_out
+from brachis.robot.limits import (
+    MAGNITUDES,
+    Limits,
+    per_joint_values,
+    resolve_limits,
+    spelled_out,
+    without_joints,
+)
 from brachis.robot.robot import ROLL_JOINT, Robot
 from brachis.robot.urdf import read_chain
 from brachis.task import FrictionSettings, LimitSpec, RobotSettings
@@ -115,9 +122,14 @@ def _combined(robot: Robot, given: RobotSettings, asked: RobotSettings) -> Robot
         return given
     frames = _merged("robot", _only(given, _FRAMES), _only(asked, _FRAMES), RobotSettings(), ())
     names = _own_joints(robot)
-    if frames != _only(given, _FRAMES):
+    limits = [getattr(asked.limits, each.name) for each in fields(asked.limits)]
+    limited = {name for limit in limits if isinstance(limit, Mapping) for name in limit}
+    if frames != _only(given, _FRAMES) or not limited <= set(names):
         chosen = {name: getattr(frames, name) for name in _FRAMES}
-        names = list(read_chain(robot.urdf, robot.source, **chosen).joint_names)
+        chain = read_chain(robot.urdf, robot.source, **chosen)
+        names = list(chain.joint_names)
+        if "limits" in asked.model_fields_set:
+            asked = asked.model_copy(update={"limits": without_joints(asked.limits, chain.locked)})
     combined: RobotSettings = _merged("robot", given, asked, defaults, names)
     return combined
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -189,6 +189,17 @@ def resolve_limits(
         values |= dict(zip((f"{kind}_lower", f"{kind}_upper"), scaled[kind], strict=True))
     values |= {"total_power": _total_power(spec), "torque_speed": curves}
     return Limits(position_lower=lower, position_upper=upper, **values)
+
+
+def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
+    """Leave out limits of joints that do not move: they are kept."""
+    changed: dict[str, Any] = {}
+    for each in fields(spec):
+        value = getattr(spec, each.name)
+        if isinstance(value, Mapping):
+            value = {name: limit for name, limit in value.items() if name not in joints}
+        changed[each.name] = value
+    return LimitSpec(**changed)
 
 
 def spelled_out(limits: Limits, names: Sequence[str]) -> LimitSpec:

@@ -22,6 +22,7 @@ from brachis.robot.limits import (
     per_joint_values,
     resolve_limits,
     spelled_out,
+    without_joints,
 )
 from brachis.robot.model import build_model
 from brachis.robot.settings import kept_settings
@@ -122,7 +123,8 @@ class Robot(Summary):
         locked_joints : mapping of str to float, optional
             Joints held at a position, rad or m.
         limits : LimitSpec, optional
-            Limits that override or complete the URDF's.
+            Limits that override or complete the URDF's; those of joints off the chain, which stand still, have no
+            effect.
         friction : mapping, optional
             Keyword arguments of `Friction.of`; what it leaves out is taken from the URDF.
         payload : mapping or Payload, optional
@@ -151,12 +153,12 @@ class Robot(Summary):
                 "speed_override": speed_override,
             }
         )
-        spec = limits or LimitSpec()
         vector = _vector(gravity)
         text = read_file(Path(path)) if urdf_text is None else urdf_text
         chain = read_chain(
             text, str(path), tool_frame=tool_frame, base_frame=base_frame, locked_joints=dict(locked_joints or {})
         )
+        spec = without_joints(limits or LimitSpec(), chain.locked)
         model, names = build_model(chain, vector, added, str(path)), chain.joint_names
         resolved = resolve_limits(spec, names, chain.limits, added.speed_override)
         terms = Friction.of(names, chain.stated.friction, **dict(friction or {}))

@@ -8,10 +8,10 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from brachis.errors import TaskError, UnknownNameError
-from brachis.task.fields import Model, Name, plain
+from brachis.task.fields import Flag, Model, Name, Number, Positive, plain, refuse
 from brachis.task.limit_models import LimitSpec
 from brachis.task.messages import show, task_error
 from brachis.task.text_file import read_text
@@ -32,6 +32,99 @@ class LimitsFile(Model):
     limits: LimitSpec = Field(
         description="As robot.limits, without scale; a list is in the order of joints, one number holds for all."
     )
+
+
+_ROS_KINDS = {
+    "position": ("position", ("min_position", "max_position")),
+    "velocity": ("velocity", ("max_velocity",)),
+    "acceleration": ("acceleration", ("max_acceleration",)),
+    "jerk": ("jerk", ("max_jerk",)),
+    "effort": ("torque", ("max_effort",)),
+}
+"""Kinds of limits in ROS's words: ours, and the keys with their values."""
+_UR_JOINTS = {"shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"}
+"""Joints in files of Universal Robots, which may leave out the ``_joint`` that the names in the URDF end with."""
+_SUFFIX = "_joint"
+
+
+def _has(kind: str) -> Any:  # noqa: ANN401  (what pydantic's Field returns)
+    """Return the field that switches a kind of limits."""
+    return Field(default=None, description=f"Whether there is a {kind} limit. Null: as there are figures.")
+
+
+class RosJointLimits(Model):
+    """Limits of one joint, as ROS writes them."""
+
+    has_position_limits: Flag | None = _has("position")
+    min_position: Number | None = Field(default=None, description="rad (m).")
+    max_position: Number | None = Field(default=None, description="rad (m).")
+    has_velocity_limits: Flag | None = _has("velocity")
+    max_velocity: Number | None = Field(default=None, description="rad/s (m/s).")
+    has_acceleration_limits: Flag | None = _has("acceleration")
+    max_acceleration: Number | None = Field(default=None, description="rad/s^2 (m/s^2).")
+    has_jerk_limits: Flag | None = _has("jerk")
+    max_jerk: Number | None = Field(default=None, description="rad/s^3 (m/s^3).")
+    has_effort_limits: Flag | None = _has("effort")
+    max_effort: Number | None = Field(default=None, description="N m (N).")
+    angle_wraparound: Flag = Field(default=False, description="Has no effect.")
+
+    @model_validator(mode="after")
+    def _figures_fit(self) -> RosJointLimits:
+        for kind, (_, keys) in _ROS_KINDS.items():
+            switch = f"has_{kind}_limits"
+            has = getattr(self, switch)
+            figures = {key: getattr(self, key) for key in keys}
+            if has is False or (has is None and set(figures.values()) == {None}):
+                continue
+            for key, value in figures.items():
+                if value is None:
+                    raise refuse("this figure is missing", key=f".{key}", absent=True, allowed=f"or {switch}: false")
+                if kind != "position" and value <= 0.0:
+                    raise refuse("out of range", key=f".{key}", found=value, allowed=f"> 0, or {switch}: false")
+        return self
+
+    def by_kind(self) -> dict[str, Any]:
+        """Return the limits by our kinds: None where one is switched off; without those that are not stated."""
+        stated: dict[str, Any] = {}
+        for kind, (name, keys) in _ROS_KINDS.items():
+            figures = tuple(getattr(self, key) for key in keys)
+            if getattr(self, f"has_{kind}_limits") is False:
+                stated[name] = None
+            elif None not in figures:
+                stated[name] = figures if kind == "position" else figures[0]
+        return stated
+
+
+class RosLimitsFile(Model):
+    """What a file ``joint_limits.yaml`` of MoveIt, of ros2_control or of Universal Robots says."""
+
+    joint_limits: Annotated[dict[Name, RosJointLimits], Field(min_length=1)] = Field(
+        description="Limits by joint: has_velocity_limits, max_velocity and so on."
+    )
+    default_velocity_scaling_factor: Annotated[Positive, Field(le=1)] = Field(
+        default=1.0, description="Counts as limits.scale.velocity, where the task does not give it."
+    )
+    default_acceleration_scaling_factor: Annotated[Positive, Field(le=1)] = Field(
+        default=1.0, description="Counts as limits.scale.acceleration, where the task does not give it."
+    )
+
+    @property
+    def joints(self) -> dict[str, RosJointLimits]:
+        """Limits by the names of the joints in the URDF."""
+        short = {name.removesuffix(_SUFFIX): limits for name, limits in self.joint_limits.items()}
+        if set(short) == _UR_JOINTS:
+            return {name + _SUFFIX: limits for name, limits in short.items()}
+        return self.joint_limits
+
+    def by_kind(self) -> dict[str, dict[str, Any]]:
+        """Return the limits by our kinds and joints, and the factors on them."""
+        stated: dict[str, dict[str, Any]] = {}
+        for name, limits in self.joints.items():
+            for kind, value in limits.by_kind().items():
+                stated.setdefault(kind, {})[name] = value
+        factors = {"velocity": self.default_velocity_scaling_factor}
+        factors["acceleration"] = self.default_acceleration_scaling_factor
+        return {**stated, "scale": factors} if set(factors.values()) != {1.0} else stated
 
 
 def read_limits(path: str | os.PathLike[str]) -> LimitSpec:
@@ -57,7 +150,7 @@ def read_limits(path: str | os.PathLike[str]) -> LimitSpec:
 def with_limits_of_file(content: Mapping[str, Any], source: str, folder: Path) -> Mapping[str, Any]:
     """Return a task as it is written with the limits of the file that it names in its ``robot.limits``.
 
-    What the task itself says counts, joint by joint where it names joints. Joints that the task locks are left out.
+    What the task itself says counts, joint by joint where it names joints.
 
     Parameters
     ----------
@@ -71,18 +164,13 @@ def with_limits_of_file(content: Mapping[str, Any], source: str, folder: Path) -
     robot = content.get("robot")
     if not isinstance(robot, Mapping) or not isinstance(robot.get("limits_file"), str | os.PathLike):
         return content
-    file, own, locked = Path(robot["limits_file"]), robot.get("limits") or {}, robot.get("locked_joints")
+    file = Path(robot["limits_file"])
+    own = robot.get("limits") or {}
     if isinstance(own, LimitSpec):
         own = {each.name: getattr(own, each.name) for each in fields(own) if getattr(own, each.name) != each.default}
     if not isinstance(own, Mapping):
         return content
-    stated = _by_joint(folder / file, f"{source}: robot.limits_file", folder, str(file))
-    merged = {
-        kind: {name: limit for name, limit in each.items() if name not in (locked or ())}
-        if isinstance(each, Mapping)
-        else each
-        for kind, each in stated.items()
-    }
+    merged = _by_joint(folder / file, f"{source}: robot.limits_file", folder, str(file), {**robot, "limits": own})
     for kind, value in own.items():
         both = isinstance(value, Mapping) and isinstance(merged.get(kind), Mapping)
         merged[kind] = {**merged[kind], **value} if both else value
@@ -90,17 +178,27 @@ def with_limits_of_file(content: Mapping[str, Any], source: str, folder: Path) -
     return {**content, "robot": {**rest, "limits": merged}}
 
 
-def _by_joint(path: Path, where: str, folder: Path, found: str | None) -> dict[str, Any]:
-    """Read and check a file; its limits by kind and joint, and the one of all joints together."""
+def _by_joint(
+    path: Path, where: str, folder: Path, found: str | None, robot: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Read and check a file, for the ``robot`` part of a task where there is one.
+
+    Return its limits by kind and joint, and the one of all joints together.
+    """
     text = read_text(path, where=where, folder=folder, found=found, largest=_LARGEST)
     content = read_yaml(text, str(path))
     if not isinstance(content, Mapping):
         allowed = ", ".join(LimitsFile.model_fields)
         raise TaskError("a limits file is a mapping", found=show(content), allowed=allowed, where=str(path))
+    model = RosLimitsFile if "joint_limits" in content else LimitsFile
     try:
-        file = LimitsFile.model_validate(plain(content))
+        file = model.model_validate(plain(content))
     except ValidationError as error:
-        raise task_error(error, str(path), LimitsFile) from None
+        raise task_error(error, str(path), model) from None
+    if isinstance(file, RosLimitsFile):
+        if robot is not None and isinstance(robot.get("urdf"), str | os.PathLike):
+            _check_joints(set(file.joints), robot, folder, str(path))
+        return file.by_kind()
     if file.limits.scale != LimitSpec().scale:
         raise TaskError(
             "factors on limits belong to the task",
@@ -116,6 +214,56 @@ def _by_joint(path: Path, where: str, folder: Path, found: str | None) -> dict[s
         for each in kinds
         if stated[each.name] != each.default
     }
+
+
+def _check_joints(limited: set[str], robot: Mapping[str, Any], folder: Path, where: str) -> None:
+    """Refuse joints that the URDF does not have, and joints that move the tool and have no entry.
+
+    Raises
+    ------
+    UnknownNameError, TaskError
+    """
+    names, moving = _joints_of(folder / robot["urdf"], robot.get("tool_frame"), robot.get("base_frame"))
+    for name in sorted(limited if names else ()):
+        if name not in names:
+            raise UnknownNameError("joint of the URDF", name, names, where=f"{where}: joint_limits")
+    own = robot["limits"]
+    own_names = {name for kind, each in own.items() if kind != "scale" and isinstance(each, Mapping) for name in each}
+    stated = {*limited, *(robot.get("locked_joints") or ()), *own_names}
+    for_all = any(kind != "scale" and isinstance(each, int | float | list | tuple) for kind, each in own.items())
+    missing = [] if for_all else [name for name in moving if name not in stated]
+    if missing:
+        hint = f"Add it there, or state its limits in the task: robot.limits: {{velocity: {{{missing[0]}: ...}}}}"
+        problem = f"joint {missing[0]!r}, which moves the tool, has no entry"
+        raise TaskError(problem, found=", ".join(sorted(limited)), where=f"{where}: joint_limits", hint=hint)
+
+
+def _joints_of(urdf: Path, tool: str | None, base: str | None) -> tuple[list[str], list[str]]:
+    """Return the joints of a URDF, and those that move the tool.
+
+    There are none of the latter where the tool is left open, and none at all where the URDF cannot be read: the robot
+    says so when it is made.
+    """
+    from lxml import etree  # noqa: PLC0415  (for those who need it)
+
+    try:
+        joints = etree.parse(str(urdf), etree.XMLParser(resolve_entities=False)).getroot().findall("joint")
+    except (OSError, etree.XMLSyntaxError):
+        return [], []
+    ends = [(joint, joint.find("parent"), joint.find("child")) for joint in joints]
+    above = {
+        child.get("link"): (joint, parent.get("link")) for joint, parent, child in ends if None not in (parent, child)
+    }
+    leaves = set(above) - {parent for _, parent in above.values()}
+    link = leaves.pop() if tool is None and len(leaves) == 1 else tool
+    moving: list[str] = []
+    for _ in above:
+        if link == base or link not in above:
+            break
+        joint, link = above[link]
+        if joint.get("type") != "fixed":
+            moving.append(joint.get("name"))
+    return [joint.get("name") for joint in joints], moving
 
 
 def _spread(value: object, joints: tuple[str, ...], where: str) -> dict[str, Any]:

@@ -113,7 +113,7 @@ def _keys_at(location: tuple[str | int, ...], model: type[Model]) -> list[str]:
         if _is_tag(part):
             chosen = [one for one in models if f"<{one.__name__}>" == part]
             models = chosen or models
-        elif isinstance(part, str):
+        elif isinstance(part, str) and any(part in _fields_of(one) for one in models):  # else a name in a mapping
             fields = [_fields_of(one).get(part) for one in models]
             models = [found for annotation in fields for found in _models_in(annotation)]
     return [name for one in models for name in _fields_of(one)]

@@ -281,7 +281,7 @@ class Task(Model):
     @model_validator(mode="after")
     def _path_start_fits(self) -> Task:
         if self.path_start is not None and isinstance(self.path_start, ToolPose) != self.of_poses:
-            problem = "a list does not say what its numbers are, as the order of a quaternion"
+            problem = "a list does not say how an orientation is meant, as whether w of a quaternion is first or last"
             if not self.of_poses:
                 problem = "a position with an orientation is for task spaces of poses"
             found = self.path_start.model_dump() if isinstance(self.path_start, ToolPose) else list(self.path_start)

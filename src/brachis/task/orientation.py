@@ -100,7 +100,7 @@ class Attitude(Model):
         return {key: value for key, value in dump(self).items() if value is not None}
 
     @property
-    def stated(self) -> tuple[str, tuple[float, ...]]:
+    def convention_and_numbers(self) -> tuple[str, tuple[float, ...]]:
         """Name of the convention in `brachis.cam.conventions`, and the numbers: quaternions, or angles in rad."""
         key, values = next((key, value) for key in Attitude.model_fields if (value := getattr(self, key)) is not None)
         if key.endswith(_DEGREES):

@@ -84,8 +84,8 @@ class RobotSettings(Model):
     payload: Payload | None = Field(default=None, description="Rigid body held to the tool frame. Null: none.")
     limits_file: Name | None = Field(
         default=None,
-        description="File of joint limits, relative to the task file's folder, such as a maker's. What limits says "
-        "itself counts, joint by joint where it names joints. Null: none.",
+        description="File of joint limits, relative to the task file's folder, such as a maker's, or MoveIt's "
+        "joint_limits.yaml. What limits says itself counts, joint by joint where it names joints. Null: none.",
     )
     limits: LimitSpec = Field(default_factory=LimitSpec, description="Joint limits.")
     speed_override: Annotated[Share, Field(gt=0.0)] = Field(

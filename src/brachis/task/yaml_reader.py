@@ -15,6 +15,15 @@ if TYPE_CHECKING:
 
 _LARGEST = 1_000_000
 """Of a document with all its aliases written out, nodes."""
+_UNITS = {
+    "!radians": 1.0,
+    "!degrees": math.pi / 180.0,
+    "!meters": 1.0,
+    "!millimeters": 1e-3,
+    "!foot": 0.3048,
+    "!inches": 0.0254,
+}
+"""Tags of units, as xacro knows them, and the factors to SI units."""
 _BROKEN = (
     yaml.YAMLError,
     ValueError,
@@ -64,6 +73,19 @@ def _size(node: yaml.Node, known: dict[int, float]) -> float:
         known[id(node)] = 1.0 + sum(_size(part, known) for part in parts)
     return known[id(node)]
 
+
+def _with_unit(_loader: _Loader, node: yaml.Node) -> float:
+    """Read a number with a unit, such as ``!degrees 90``, in SI units (ConstructorError)."""
+    text = node.value if isinstance(node, yaml.ScalarNode) else "something else"
+    try:
+        return float(text) * _UNITS[node.tag]
+    except ValueError:
+        problem = f"{node.tag} stands before a number, and not before {text!r}"
+        raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark) from None
+
+
+for _tag in _UNITS:
+    _Loader.add_constructor(_tag, _with_unit)
 
 # PyYAML reads YAML 1.1, where 1e-6, without a point or without the exponent's sign, is a string; everybody means the
 # number.

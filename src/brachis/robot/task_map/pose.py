@@ -38,7 +38,7 @@ class Pose(TaskMap):
         if not isinstance(stated, ToolPose):
             allowed = "a position with an orientation (ToolPose)"
             raise InputError("has no orientation", where=where, found=list(stated), allowed=allowed)
-        convention, values = stated.stated
+        convention, values = stated.convention_and_numbers
         rotation = rotation_by(convention, np.array(values))
         return np.concatenate([stated.position, rotation.as_matrix().ravel()])
 
