@@ -76,7 +76,7 @@ def read_file(path: str | os.PathLike[str], largest: int = LARGEST_TEXT) -> byte
         See `open_file`.
     """
     with open_file(path, largest) as stream:
-        content = stream.read(largest + 1)
+        content = stream.read(largest + 1) or b""  # None where the kernel has nothing to say yet
     if len(content) > largest:  # files that the kernel makes up as they are read have no size
         raise OSError(errno.EFBIG, f"it is longer than {largest / 1e6:g} MB", os.fspath(path))
     return content

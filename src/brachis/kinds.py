@@ -40,7 +40,7 @@ def kind_of(path: str | os.PathLike[str]) -> Kind | None:
     """Tell what a file is; None where it cannot be read, or is something else."""
     try:
         with open_file(path, 4 * LARGEST_TEXT) as stream:
-            beginning = stream.read(_LOOKED_AT).removeprefix(codecs.BOM_UTF8)
+            beginning = (stream.read(_LOOKED_AT) or b"").removeprefix(codecs.BOM_UTF8)  # None: nothing yet
     except OSError:
         return None
     if beginning.startswith(b"PK"):

@@ -25,6 +25,8 @@ _Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll", "joints
 POSITION_ROWS: Final[tuple[Row, ...]] = ("x", "y", "z")
 _SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll, joints"
 _POSE_NUMBERS = 7
+_MOST_SEGMENTS = 3000
+"""Segments of a path: with their blends about as many pieces as a motion can be verified on."""
 
 
 def _expand_position(space: _Space) -> _Space:
@@ -116,7 +118,7 @@ class Task(Model):
         "of x, y, z); pose; pose_free_roll, a pose that may roll about the tool frame's z axis; or joints: the path is "
         "one of all joints, in the order of the chain (rad, m), and only its timing is planned."
     )
-    path: Annotated[tuple[Segment, ...], Field(min_length=1)] = Field(description="Segments of the path, in order.")
+    path: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=_MOST_SEGMENTS)] = Field(description="Segments of the path, in order.")
     boundary: BoundarySettings = Field(
         default_factory=BoundarySettings, description="Speeds at both ends, or a motion that goes round for ever."
     )

@@ -93,8 +93,8 @@ class States:
         qdddot = values_of(pieces.jerk[:, piece], u)
         return cls(piece, u, pieces.time(piece, u), q, qdot, qddot, qdddot, torques(robot, q, qdot, qddot))
 
-    def only(self, chosen: np.ndarray) -> States:
-        """Return some of the states, in a new order."""
+    def only(self, chosen: np.ndarray | slice) -> States:
+        """Return some of the states, in the order that is chosen."""
         return States(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     def merged(self, other: States) -> tuple[States, np.ndarray]:
