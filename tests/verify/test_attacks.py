@@ -10,6 +10,7 @@ import yaml
 
 import brachis
 from brachis.bspline import insert_knots
+from brachis.errors import InputError
 from brachis.robot import dynamics
 from brachis.robot.limits import MAGNITUDES
 from brachis.verify import verify_trajectory
@@ -122,6 +123,17 @@ def test_a_coefficient_of_one_piece(planned, piece, row):
     coefficients[row, chosen, 1] += 20.0 * lengths[chosen] ** 2
     torn.pieces.c = coefficients
     assert {"torque ratio", "acceleration jump"} & failed(torn)
+
+
+def test_a_motion_of_one_piece(planned):
+    ends = {name: getattr(planned, name)[[0, -1]] for name in ("times", "q", "qdot", "qddot", "qddot_before")}
+    assert "path error" in failed(replace(planned, **ends))
+
+
+def test_a_motion_that_takes_too_long_to_look_at_is_refused(planned):
+    fast = replace(planned, q=1e6 * planned.q, qdot=1e6 * planned.qdot)
+    with pytest.raises(InputError, match=r"found \d+ instants to look at; allowed: 200000"):
+        verify_trajectory(fast)
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import zipfile
@@ -13,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from brachis.errors import InputError, ResultFileError
-from brachis.files import atomic_write, check_suffix, open_file
+from brachis.files import atomic_write, check_suffix, read_file
 from brachis.kinds import Kind, check_kind
 from brachis.robot import Robot, bind
 from brachis.robot.from_task import robot_from_settings
@@ -88,8 +89,7 @@ def read_result(path: Path) -> Content:
     """
     check_kind(path, Kind.RESULT, ResultFileError)
     try:
-        with open_file(path, LARGEST) as stream:
-            meta, arrays = _parts(stream)
+        meta, arrays = _parts(io.BytesIO(read_file(path, LARGEST)))
     except FileNotFoundError as error:
         raise ResultFileError("the result file does not exist", where=str(path)) from error
     except Exception as error:  # archives, headers of arrays and JSON fail in every way when they are broken

@@ -86,8 +86,9 @@ class States:
         """Evaluate pieces at places, in any order; each place once."""
         order = np.lexsort((u, piece))
         piece, u = piece[order], u[order]
-        again = np.append(False, (piece[1:] == piece[:-1]) & (u[1:] - u[:-1] <= _SAME_PLACE) & (u[1:] < 1.0))
-        piece, u = piece[~again], u[~again]
+        again = (piece[1:] == piece[:-1]) & (u[1:] - u[:-1] <= _SAME_PLACE) & (u[1:] < 1.0)
+        first = np.append(True, ~again)[: len(piece)]
+        piece, u = piece[first], u[first]
         q = pieces.nodes[piece] + values_of(pieces.position[:, piece], u)
         qdot, qddot = values_of(pieces.velocity[:, piece], u), values_of(pieces.acceleration[:, piece], u)
         qdddot = values_of(pieces.jerk[:, piece], u)
