@@ -3,9 +3,11 @@
     python benchmarks/fuzz.py                    # 5000 cases; exit code 1 where one ends otherwise
     python benchmarks/fuzz.py --first 0 --cases 300
     python benchmarks/fuzz.py --only 1234        # one case again, here, with its traceback; its files are kept
+    python benchmarks/fuzz.py --kinds result --cases 1000 --seconds 10 --memory 1000
 
-Every case runs in a worker process that may take 60 s and 2 GB of memory beyond what its libraries occupy. Another
-exception, a crash, a longer time or more memory is a fault and listed with the case's number.
+Every case runs in a worker process that may take 60 s of processor time and 2 GB of memory beyond what its libraries occupy. Another
+exception, a crash, a longer time or more memory is a fault and listed with the case's number. With --memory the
+largest memory of the whole process counts too, in MB. With --kinds a number means another case.
 """
 
 from __future__ import annotations
@@ -34,6 +36,8 @@ import fuzz_cases
 from brachis.cli.inspection import inspect_command
 
 _MEMORY = 2_000_000_000
+_BUSY, _MAKING = 8.0, 30.0
+"""Time per processor time on a busy machine, and time to make a case's files, s, before a worker is ended."""
 _BASES = (
     {"redundant_joints": ["j3"]},
     {"redundant_joints": ["j1"], "spline": {"degree": 2, "intervals": 6, "rest": "velocity"}},
@@ -80,7 +84,7 @@ def run(case: fuzz_cases.Case, folder: Path) -> str:
     return outcome
 
 
-def work() -> None:
+def work(kinds: tuple[str, ...]) -> None:
     """Answer numbers of cases on standard input with lines of JSON."""
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
@@ -93,36 +97,47 @@ def work() -> None:
     for line in sys.stdin:
         with tempfile.TemporaryDirectory() as folder:
             try:
-                case = fuzz_cases.case(int(line), saved)
+                case = fuzz_cases.case(int(line), saved, kinds)
+                began = time.process_time()
                 answer = {"kind": case.kind, "outcome": run(case, Path(folder)), "fault": None}
+                answer["seconds"] = time.process_time() - began
             except Exception as error:  # noqa: BLE001  (this is what is looked for)
                 place = traceback.extract_tb(error.__traceback__)[-1]
                 where = f"{Path(place.filename).name}:{place.lineno}"
                 answer = {"kind": case.kind, "outcome": "fault", "fault": f"{type(error).__name__} at {where}: {error}"}
+        answer["peak"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
         print(json.dumps(answer), file=answers)
 
 
 class Worker:
     """A process that runs cases, and is started again where one of them ends it."""
 
-    def __init__(self) -> None:
+    def __init__(self, kinds: tuple[str, ...], memory: float) -> None:
+        self._kinds, self._memory = kinds, memory
         self._start()
 
     def _start(self) -> None:
         self._errors = tempfile.TemporaryFile("w+")  # noqa: SIM115
-        command = [sys.executable, __file__, "--worker"]
+        command = [sys.executable, __file__, "--worker", "--kinds", *self._kinds]
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._errors, text=True)
         self._process.stdout.readline()
 
     def run(self, number: int, seconds: float) -> dict[str, str | None]:
         """Run a case; a crash and a hang are faults."""
-        kind = fuzz_cases.KINDS[number % len(fuzz_cases.KINDS)]
+        kind = self._kinds[number % len(self._kinds)]
         print(number, file=self._process.stdin, flush=True)
-        ready, _, _ = select.select([self._process.stdout], [], [], seconds)
+        ready, _, _ = select.select([self._process.stdout], [], [], _BUSY * seconds + _MAKING)
         line = self._process.stdout.readline() if ready else ""
         if line:
-            return json.loads(line)
+            answer = json.loads(line)
+            if answer["peak"] > self._memory:
+                answer["fault"] = answer["fault"] or f"{answer['peak'] / 1e6:.0f} MB"
+                self.end()
+                self._start()
+            if answer.get("seconds", 0.0) > seconds:
+                answer["fault"] = answer["fault"] or f"{answer['seconds']:.1f} s"
+            return answer
         if not ready:
             self._process.kill()
         code = self._process.wait()
@@ -130,7 +145,7 @@ class Worker:
         said = " ".join(self._errors.read().split())[-300:]
         self.end()
         self._start()
-        fault = f"crash with code {code}: {said}" if ready else f"no end within {seconds:g} s"
+        fault = f"crash with code {code}: {said}" if ready else f"no end within {_BUSY * seconds + _MAKING:g} s"
         return {"kind": kind, "outcome": "fault", "fault": fault}
 
     def end(self) -> None:
@@ -141,17 +156,19 @@ class Worker:
         self._process.wait()
 
 
-def search(first: int, cases: int, seconds: float) -> int:
+def search(numbers: range, seconds: float, kinds: tuple[str, ...], memory: float) -> int:
     """Run cases, print what came out; 1 where a fault was found."""
+    cases, first = len(numbers), numbers.start
     counts: Counter[tuple[str, str]] = Counter()
     faults = []
-    worker = Worker()
+    worker = Worker(kinds, memory)
     began = time.perf_counter()
     slowest = (0.0, first)
-    for number in range(first, first + cases):
-        start = time.perf_counter()
+    largest = 0.0
+    for number in numbers:
         answer = worker.run(number, seconds)
-        slowest = max(slowest, (time.perf_counter() - start, number))
+        slowest = max(slowest, (answer.get("seconds", 0.0), number))
+        largest = max(largest, answer.get("peak", 0.0))
         counts[answer["kind"], answer["outcome"]] += 1
         if answer["fault"] is not None:
             faults.append(number)
@@ -160,13 +177,14 @@ def search(first: int, cases: int, seconds: float) -> int:
     for (kind, outcome), count in sorted(counts.items()):
         print(f"{kind:13} {outcome:20} {count:5}")
     print(f"{cases} cases in {time.perf_counter() - began:.0f} s, slowest {slowest[0]:.1f} s (case {slowest[1]})")
+    print(f"largest process {largest / 1e6:.0f} MB")
     print(f"{len(faults)} faults" + (f": {' '.join(map(str, faults))}" if faults else ""))
     return 1 if faults else 0
 
 
-def again(number: int) -> None:
+def again(number: int, kinds: tuple[str, ...]) -> None:
     """Run one case in this process, without limits."""
-    case = fuzz_cases.case(number, results())
+    case = fuzz_cases.case(number, results(), kinds)
     folder = Path(tempfile.mkdtemp(prefix=f"fuzz-{number}-"))
     print(f"{case.kind}, files in {folder}", flush=True)
     print(run(case, folder))
@@ -177,15 +195,19 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=5000)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", type=int)
-    parser.add_argument("--seconds", type=float, default=60.0, help="of one case")
+    parser.add_argument("--seconds", type=float, default=60.0, help="of one case, of processor time")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--memory", type=float, default=float("inf"), help="largest memory of the process, MB")
+    parser.add_argument("--kinds", nargs="+", default=[""], help="what the names of kinds begin with")
     given = parser.parse_args()
+    kinds = tuple(kind for kind in fuzz_cases.KINDS if kind.startswith(tuple(given.kinds)))
     if given.worker:
-        work()
+        work(kinds)
     elif given.only is not None:
-        again(given.only)
+        again(given.only, kinds)
     else:
-        return search(given.first, given.cases, given.seconds)
+        numbers = range(given.first, given.first + given.cases)
+        return search(numbers, given.seconds, kinds, given.memory * 1e6)
     return 0
 
 

@@ -5,6 +5,7 @@ A case is its number: the same number gives the same files.
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import io
 import json
@@ -22,7 +23,7 @@ import numpy as np
 import yaml
 
 ROBOTS = Path(__file__).parents[1] / "robots"
-KINDS = ("task", "task bytes", "urdf", "urdf bytes", "csv", "csv bytes", "result", "result bytes")
+KINDS = ("task", "task bytes", "urdf", "urdf bytes", "csv", "csv bytes", "result", "result bytes", "result extreme")
 _DEEP = "@deep@"
 _SCARA = {"urdf": "robot.urdf", "tool_frame": "tool", "gravity": [0, 0, 0], "limits": {"torque": 10, "velocity": 8}}
 _START = {"joints": [0.5236, -2.0944, 2.0944]}
@@ -92,14 +93,14 @@ class Case:
     done: tuple[str, ...]
 
 
-def case(number: int, results: tuple[bytes, ...]) -> Case:
-    """Make the files of a case; `results` are valid result files."""
+def case(number: int, results: tuple[bytes, ...], kinds: tuple[str, ...] = KINDS) -> Case:
+    """Make the files of a case, of one of the kinds in turn; `results` are valid result files."""
     rng = random.Random(f"brachis {number}")  # noqa: S311  (not for secrets)
-    kind = KINDS[number % len(KINDS)]
+    kind = kinds[number % len(kinds)]
     what, _, how = kind.partition(" ")
     if what == "result":
-        saved = rng.choice(results)
-        broken = broken_bytes(saved, rng) if how else broken_result(saved, rng)
+        breaks_result = {"": broken_result, "bytes": broken_bytes, "extreme": extreme_result}
+        broken = breaks_result[how](rng.choice(results), rng)
         return Case(number, kind, {"result.npz": broken}, ("verify",))
     robot, task = _valid(rng, what)
     urdf = (ROBOTS / robot / "robot.urdf").read_text().encode()
@@ -298,6 +299,109 @@ def broken_result(data: bytes, rng: random.Random) -> bytes:
         if len(parts) < 3:
             break
     return _archive(parts, rng)
+
+
+_COUNTS = (2, 300, 3000, 20_000, 49_000, 60_000, 400_000)
+_LIMITS: tuple[dict[str, Any], ...] = (
+    {"torque": 10, "torque_rate": 80, "jerk": 50, "acceleration": 9, "velocity": 3},
+    {"torque": 10, "power": 5, "total_power": 9, "rms_torque": 4, "velocity": 2},
+    {"torque": 1e12, "velocity": 1e-6, "jerk": 1e-6},
+)
+_TOOL_LIMITS: tuple[dict[str, Any], ...] = (
+    {"speed": 0.4, "acceleration": 2.0, "angular_speed": 1.0},
+    {"process_speed": [{"s": [0.3, 0.6], "speed": 0.1}]},
+    {"process_speed": [{"s": [i / 1000, (i + 0.5) / 1000], "speed": 0.1} for i in range(1000)]},
+    {"speed": {"s": [i / 30_000 for i in range(30_001)], "speed": [0.1 + i % 2 for i in range(30_001)]}},
+)
+_PATHS: tuple[list[dict[str, Any]], ...] = (
+    [{"line": {"by": [0.0, 0.3 / 3000]}}] * 3000,
+    [{"line": {"by": [0.0, 0.3 / 30_000]}}] * 30_000,
+    [{"line": {"by": [0.0, 0.1]}, "blend": 1e-9}, {"line": {"by": [0.1, 0.0]}}] * 200,
+    [{"spline": {"through": [[0.0, 0.3 * i / 20_000] for i in range(1, 20_001)], "relative": True}}],
+    [{"arc": {"radius": 1e9, "angle_deg": 1e9}}],
+    [{"line": {"length": 1e12, "angle_deg": 90}}],
+)
+
+
+def extreme_result(data: bytes, rng: random.Random) -> bytes:
+    """Ask a result file for as much work and memory as it can, with figures of any size and arrays of any kind."""
+    with np.load(io.BytesIO(data)) as archive:
+        parts: dict[str, Any] = dict(archive)
+    moments = ("q", "qdot", "qddot", "qddot_before")
+    meta = json.loads(str(parts["meta"]))
+    retyped = rng.choice(list(parts)) if rng.random() < 0.1 else "meta"
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        action = rng.choice(("nodes", "knots", "far", "limits", "tool", "path", "value", "close", "time", "space"))
+        if action == "nodes":
+            old, count = parts["times"], rng.choice(_COUNTS)
+            parts["times"] = np.linspace(old[0], old[-1], count)
+            for name in moments:
+                parts[name] = np.column_stack([np.interp(parts["times"], old, column) for column in parts[name].T])
+        elif action == "knots":
+            count, degree = rng.choice(_COUNTS), meta["degree"]
+            ends = np.repeat([0.0, 1.0], degree)
+            parts["knots"] = np.concatenate([ends[:degree], np.linspace(0.0, 1.0, count), ends[degree:]])
+            places = np.linspace(0.0, 1.0, count + degree - 1)
+            old = np.linspace(0.0, 1.0, parts["control_points"].shape[1])
+            parts["control_points"] = np.array([np.interp(places, old, row) for row in parts["control_points"]])
+        elif action == "far":
+            for name in moments:
+                parts[name] = parts[name] * 10.0 ** rng.uniform(0.0, 12.0)
+        elif action == "limits":
+            meta["task"]["robot"]["limits"] = rng.choice(_LIMITS)
+        elif action == "tool":
+            meta["task"]["tool_limits"] = rng.choice(_TOOL_LIMITS)
+        elif action == "path":
+            meta["task"]["path"] = rng.choice(_PATHS)
+        elif action == "value":
+            name = rng.choice([name for name in parts if name != "meta" and parts[name].size])
+            weird = (math.nan, math.inf, -math.inf, 1e300, -1e300, 1e-300, 1e12, -1e12, 1e6)
+            changed = parts[name].copy().reshape(-1)
+            changed[rng.randrange(changed.size) if rng.random() < 0.5 else slice(None)] = rng.choice(weird)
+            parts[name] = changed.reshape(parts[name].shape)
+        elif action == "close":
+            k = rng.randrange(1, len(parts["times"]))
+            parts["times"] = parts["times"].copy()
+            parts["times"][k:] = parts["times"][k - 1] + 10.0 ** rng.uniform(-15.0, 0.0) * (
+                1.0 + parts["times"][k:] - parts["times"][k]
+            )
+        elif action == "time":
+            parts["times"] = parts["times"] * rng.choice((-1.0, 1e-300, 1e-9, 1e-3, 1e3, 1e9, 1e300))
+        else:
+            meta["task"]["task_space"] = rng.choice((["x", "y", "yaw"], ["x"], "pose", "joints"))
+    if retyped != "meta":
+        kind = rng.choice((np.longdouble, np.float16, np.uint8, "M8[s]", object, "S8", ">f8", "V8", bool))
+        with contextlib.suppress(ValueError, TypeError), np.errstate(all="ignore"):
+            parts[retyped] = parts[retyped].astype(kind)
+    parts["meta"] = np.array(json.dumps(meta))
+    stream = io.BytesIO()
+    with np.errstate(all="ignore"):
+        np.savez_compressed(stream, **parts)
+    content = stream.getvalue()
+    last = rng.choice(("", "", "", "", "", "", "header", "bomb", "many"))
+    return content if not last else _rezipped(content, last, rng)
+
+
+def _rezipped(data: bytes, how: str, rng: random.Random) -> bytes:
+    """Change the header of an array, or add members that are large or many."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    name = rng.choice(list(members))
+    if how == "header":
+        content = members[name]
+        header = content[10 : 10 + int.from_bytes(content[8:10], "little")]
+        shape = rng.choice((b"(10000000000,)", b"(-1,)", b"(1" + b"0" * 40 + b",)", b"()", b"(2.5,)", b"(" * 2000))
+        broken = rng.choice((header[: rng.randrange(len(header))], re.sub(rb"\(.*?\)", shape, header), header[::-1]))
+        members[name] = content[:8] + len(broken).to_bytes(2, "little") + broken + content[10 + len(header) :]
+    elif how == "bomb":
+        members[rng.choice((name, "extra.npy"))] = bytes(200_000_000)
+    else:
+        members |= {f"{i}.npy": b"" for i in range(50_000)}
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, member in members.items():
+            archive.writestr(name, member)
+    return stream.getvalue()
 
 
 def _archive(parts: dict[str, Any], rng: random.Random) -> bytes:

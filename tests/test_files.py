@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import signal
@@ -14,8 +15,9 @@ import pytest
 
 from brachis import files
 from brachis.cli.folder import write_files, write_text
-from brachis.errors import InputError
-from brachis.files import atomic_write, is_file, is_folder, open_file, read_file
+from brachis.errors import InputError, ResultFileError
+from brachis.files import atomic_write, is_file, is_folder, read_file
+from brachis.trajectory import Trajectory
 
 LARGE = 1_000_000_000_000
 
@@ -23,6 +25,20 @@ LARGE = 1_000_000_000_000
 def test_a_file_is_read(tmp_path):
     (tmp_path / "file").write_bytes(b"a\r\nb")
     assert read_file(tmp_path / "file") == b"a\r\nb"
+
+
+def test_a_file_of_the_kernel_that_has_nothing_to_say_yet_is_empty(tmp_path, monkeypatch):
+    """Such as /proc/kmsg: read without waiting it gives None, and not bytes."""
+
+    class Silent(io.BytesIO):
+        def read(self, size=-1):
+            return None
+
+    (tmp_path / "kmsg").touch()
+    monkeypatch.setattr(files.os, "fdopen", lambda descriptor, mode: os.close(descriptor) or Silent())
+    assert read_file(tmp_path / "kmsg") == b""
+    with pytest.raises(ResultFileError, match="the file is not a brachis result"):
+        Trajectory.load(tmp_path / "kmsg")
 
 
 @pytest.fixture(params=["pipe", "folder", "socket", "zeros", "long", "name"])
@@ -78,7 +94,7 @@ def test_nothing_stays_open_when_a_file_is_refused(tmp_path):
     os.close(before)
     for _ in range(3):
         with pytest.raises(OSError, match="folder"):
-            open_file(tmp_path, 100)
+            read_file(tmp_path, 100)
     after = os.dup(0)
     os.close(after)
     assert after == before

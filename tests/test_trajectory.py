@@ -96,6 +96,42 @@ def test_very_short_lines_are_verified(length):
     assert torque_jump.value < 1e-10
 
 
+def _with_header(path, change):
+    """Change the header of the array of times."""
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    content = members["times.npy"]
+    length = int.from_bytes(content[8:10], "little")
+    header = change(content[10 : 10 + length])
+    members["times.npy"] = content[:8] + len(header).to_bytes(2, "little") + header + content[10 + length :]
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, member in members.items():
+            archive.writestr(name, member)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda header: header[:40],
+        lambda header: header.replace(b"}", b" "),
+        lambda header: b"{'descr': '<f8', 1: 2}\n",
+        lambda header: b"{'descr': '<f8', 'fortran_order': False, 'shape': (100000000000000000000000,)}\n",
+        lambda header: b"{'descr': '<f8', 'fortran_order': False, 'shape': (-1,)}\n",
+        lambda header: b"(" * 3000 + b"\n",
+        lambda header: b"{'descr': '|O', 'fortran_order': False, 'shape': (1,)}\n",
+        lambda header: b"  x\n y\n",
+    ],
+)
+def test_headers_of_arrays_that_are_broken(change, trajectory, tmp_path):
+    path = tmp_path / "result.npz"
+    trajectory.save(path)
+    _with_header(path, lambda header: header)
+    Trajectory.load(path)
+    _with_header(path, change)
+    with pytest.raises(ResultFileError, match="not a brachis result"):
+        Trajectory.load(path)
+
+
 def test_numbers_and_arrays_of_times(trajectory):
     t = np.linspace(0.0, trajectory.t_end, 7)
     for curve in (trajectory.position, trajectory.velocity, trajectory.acceleration, trajectory.torque):
@@ -285,6 +321,10 @@ BROKEN = {
     "knots descending": ({"knots": lambda a: a[::-1]}, "knots: not the knots"),
     "knots infinite": ({"knots": put(5, np.inf)}, "knots: not all are finite"),
     "knots beyond one": ({"knots": lambda a: 2.0 * a}, "knots: not the knots"),
+    "times too close": ({"times": put(1, 1e-14)}, "times: not times"),
+    "knots too close": ({"knots": lambda a: np.sort(put(5, a[4] + 1e-14)(a))}, "knots: internal knots are repeated"),
+    "q too large": ({"q": put((3, 1), 1e300)}, "q: not all are finite numbers of a usable size"),
+    "too many times": ({"times": np.linspace(0.0, 1.0, 50_001)}, "times: the motion has too many nodes; found 50001"),
     "no knots": ({"knots": np.zeros(0)}, "knots: not the knots"),
     "q of fewer nodes": ({"q": lambda a: a[1:]}, "q: wrong shape"),
     "q of fewer joints": ({"qdot": lambda a: a[:, 1:]}, "qdot: wrong shape"),

@@ -62,8 +62,10 @@ def is_folder(path: str | os.PathLike[str]) -> bool:
     return os.path.isdir(path)  # noqa: PTH112
 
 
-def open_file(path: str | os.PathLike[str], largest: int) -> BinaryIO:
-    """Open a regular file of at most `largest` bytes; what would never end is refused at once.
+def read_file(
+    path: str | os.PathLike[str], largest: int = LARGEST_TEXT, *, beginning: int | None = None
+) -> bytes:
+    """Read a regular file of at most `largest` bytes, or its first bytes; what would never end is refused at once.
 
     Raises
     ------
@@ -78,7 +80,11 @@ def open_file(path: str | os.PathLike[str], largest: int) -> BinaryIO:
     if refusal is not None:
         os.close(descriptor)
         raise OSError(*refusal, os.fspath(path))
-    return os.fdopen(descriptor, "rb")
+    with os.fdopen(descriptor, "rb") as stream:
+        content = stream.read(largest + 1 if beginning is None else beginning) or b""  # None: the kernel says no more
+    if len(content) > largest:  # files that the kernel makes up as they are read have no size
+        raise OSError(errno.EFBIG, f"it is longer than {largest / 1e6:g} MB", os.fspath(path))
+    return content
 
 
 def _refusal(status: os.stat_result, largest: int) -> tuple[int, str] | None:
@@ -89,21 +95,6 @@ def _refusal(status: os.stat_result, largest: int) -> tuple[int, str] | None:
     if status.st_size > largest:
         return errno.EFBIG, f"it is {status.st_size / 1e6:.1f} MB long, at most {largest / 1e6:g} MB are read"
     return None
-
-
-def read_file(path: str | os.PathLike[str], largest: int = LARGEST_TEXT) -> bytes:
-    """Read a regular file of at most `largest` bytes.
-
-    Raises
-    ------
-    OSError
-        See `open_file`.
-    """
-    with open_file(path, largest) as stream:
-        content = stream.read(largest + 1)
-    if len(content) > largest:  # files that the kernel makes up as they are read have no size
-        raise OSError(errno.EFBIG, f"it is longer than {largest / 1e6:g} MB", os.fspath(path))
-    return content
 
 
 def temporary_in(folder: Path) -> Path:

@@ -8,7 +8,7 @@ import re
 from enum import Enum
 
 from brachis.errors import InputError
-from brachis.files import LARGEST_TEXT, open_file
+from brachis.files import LARGEST_TEXT, read_file
 
 _LOOKED_AT = 16_384
 """Bytes at the beginning of a file."""
@@ -39,8 +39,7 @@ _ADVICE = {
 def kind_of(path: str | os.PathLike[str]) -> Kind | None:
     """Tell what a file is; None where it cannot be read, or is something else."""
     try:
-        with open_file(path, 4 * LARGEST_TEXT) as stream:
-            beginning = stream.read(_LOOKED_AT).removeprefix(codecs.BOM_UTF8)
+        beginning = read_file(path, 4 * LARGEST_TEXT, beginning=_LOOKED_AT).removeprefix(codecs.BOM_UTF8)
     except OSError:
         return None
     if beginning.startswith(b"PK"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import pytest
 
@@ -196,3 +197,13 @@ def test_other_things_than_are_asked_for(run, tmp_path, monkeypatch, command, to
     outcome = run(*command)
     assert outcome.code == 2
     assert told in outcome.err
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="no such files of the kernel")
+@pytest.mark.parametrize("command", ["verify", "export", "plot", "report", "view"])
+@pytest.mark.parametrize("name", ["/proc/self/status", "/proc/self/mem", "/dev/zero"])
+def test_files_of_the_kernel_are_no_results(name, command, run, tmp_path):
+    out = {"export": ["--out", tmp_path / "a.csv"], "plot": ["--out", tmp_path / "a.png"]}.get(command, [])
+    ended = run(command, name, *out)
+    assert ended.code == 2
+    assert "the file is not a brachis result" in ended.err

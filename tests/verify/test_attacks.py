@@ -10,8 +10,11 @@ import yaml
 
 import brachis
 from brachis.bspline import insert_knots
+from brachis.errors import InputError
 from brachis.robot import dynamics
 from brachis.robot.limits import MAGNITUDES
+from brachis.task import ProcessSpeed
+from brachis.task.tool_limits import ToolLimits
 from brachis.verify import verify_trajectory
 from support.effort import QUICK
 
@@ -69,20 +72,88 @@ def nodes_close_together(trajectory, gap, by, joint):
     return with_node(trajectory, trajectory.times[MIDDLE] + gap, q=by * np.eye(3)[joint])
 
 
-@pytest.mark.parametrize("joint", range(3))
-@pytest.mark.parametrize(("gap", "by"), [(1e-6, 1e-14), (2e-5, 3e-11), (1e-4, 1e-11), (1e-3, 2e-8)])
-def test_a_jerk_between_nodes_close_together(planned, gap, by, joint):
-    """Third derivatives of short pieces are read exactly, and not by their mean."""
-    jerk = 1.01 * np.abs(planned.jerk_pieces.c).max()
-    limits = {"jerk": np.full(3, jerk), "torque_rate": np.full(3, 20.0 * jerk)}
-    limited = with_limits(planned, **limits)
-    assert not {"jerk ratio", "torque rate ratio"} & failed(limited)
-    middle = 0.5 * (planned.times[MIDDLE] + planned.times[MIDDLE + 1])
-    first = with_node(limited, middle)
-    spiked = with_node(first, middle + gap, q=by * np.eye(3)[joint])
-    assert "jerk ratio" in failed(spiked)
-    assert ratio(spiked, "jerk").value == pytest.approx(60.0 * by / gap**3 / jerk, rel=0.1)
-    assert ratio(spiked, "torque rate").value > 1.5 * ratio(limited, "torque rate").value
+ORDERS = {
+    "position": 0,
+    "velocity": 1,
+    "acceleration": 2,
+    "jerk": 3,
+    "torque": 2,
+    "torque rate": 3,
+    "tool speed": 1,
+    "tool acceleration": 2,
+    "tool angular speed": 1,
+    "process speed": 1,
+    "power": 1,
+    "total power": 1,
+}
+"""The derivative of the motion that a limit holds down, at the least."""
+GROWTH = (0.5, 1.8, 5.0, 50.0)
+"""What a position that is off by 1 after 1 s makes of each derivative in between, at the least."""
+
+
+def limited_to(trajectory, kind):
+    """The motion, limited by nothing but one kind, of which it uses two thirds."""
+    free = with_limits(
+        replace(trajectory, task=trajectory.task.model_copy(update={"tool_limits": ToolLimits()})),
+        **dict.fromkeys(MAGNITUDES, np.full(3, np.inf)),
+        position_lower=np.full(3, -np.inf),
+        position_upper=np.full(3, np.inf),
+    )
+    t = np.linspace(0.0, trajectory.t_end, 3000)
+    states = trajectory.at(t)
+    if kind == "position":
+        return with_limits(free, position_upper=states.q.max(axis=0) + 1e-3), 1.0
+    if kind == "process speed":
+        # Between 40 and 60 % of the path the speed is between the first and the last of these.
+        speed = states.tool_speed[(states.s > 0.4) & (states.s < 0.6)]
+        middle, off = 0.5 * (speed.max() + speed.min()), 0.5 * (speed.max() - speed.min())
+        part = ProcessSpeed(s=(0.4, 0.6), speed=middle, tolerance=min(1.5 * off / middle, 0.5))
+        return with_tool_limits(free, process_speed=(part,)), 3.0 * middle
+    if kind.startswith("tool"):
+        spin = np.abs(states.qdot.sum(axis=1)).max()
+        bend = np.linalg.norm(np.gradient(np.gradient(states.tool_position, t, axis=0), t, axis=0), axis=1)[5:-5].max()
+        limit = {"speed": states.tool_speed.max(), "angular_speed": spin, "acceleration": bend}
+        name = kind.removeprefix("tool ").replace(" ", "_")
+        return with_tool_limits(free, **{name: 1.5 * limit[name]}), 6.0 * limit[name]
+    rate = np.abs(np.gradient(states.tau, t, axis=0)).max()
+    limit = {
+        "velocity": np.abs(states.qdot).max(),
+        "acceleration": np.abs(states.qddot).max(),
+        "jerk": np.abs(trajectory.jerk_pieces.c).max(),
+        "torque": np.abs(states.tau).max(),
+        "torque rate": rate,
+        "power": np.abs(states.tau * states.qdot).max(),
+        "total power": np.abs(states.tau * states.qdot).sum(axis=1).max(),
+    }[kind]
+    whole = float(1.5 * limit) if kind == "total power" else np.full(3, 1.5 * limit)
+    return with_limits(free, **{kind.replace(" ", "_"): whole}), 30.0 * limit
+
+
+def with_tool_limits(trajectory, **limits):
+    return replace(trajectory, task=trajectory.task.model_copy(update={"tool_limits": ToolLimits(**limits)}))
+
+
+@pytest.mark.parametrize("gap", [1e-6, 2e-5, 1e-4, 1e-3])
+@pytest.mark.parametrize("kind", ORDERS)
+def test_a_limit_that_is_exceeded_between_nodes_close_together(planned, kind, gap):
+    limited, excess = limited_to(planned, kind)
+    middle = 0.503 * planned.t_end
+    order = ORDERS[kind]
+    by = max(excess * gap**order / GROWTH[order], 1e-14) * np.eye(3)[1]
+    divided = with_node(with_node(limited, middle), middle + gap)
+    assert f"{kind} ratio" not in failed(divided)
+    spiked = changed(divided, "q", int(np.searchsorted(divided.times, middle + gap)), 2.0 * by)
+    assert f"{kind} ratio" in failed(spiked)
+
+
+@pytest.mark.parametrize("gap", [1e-6, 2e-5, 1e-4, 1e-3])
+def test_a_path_that_is_left_between_nodes_close_together(planned, gap):
+    """Both nodes are on the path; their velocities bend the motion off it in between."""
+    middle = 0.503 * planned.t_end
+    divided = with_node(with_node(planned, middle), middle + gap)
+    assert "path error" not in failed(divided)
+    place = int(np.searchsorted(divided.times, middle))
+    assert "path error" in failed(changed(divided, "qdot", place, 1e-7 / gap * np.eye(3)[1]))
 
 
 def true_worst_torque(trajectory, pieces=slice(None), places=100):
@@ -122,6 +193,17 @@ def test_a_coefficient_of_one_piece(planned, piece, row):
     coefficients[row, chosen, 1] += 20.0 * lengths[chosen] ** 2
     torn.pieces.c = coefficients
     assert {"torque ratio", "acceleration jump"} & failed(torn)
+
+
+def test_a_motion_of_one_piece(planned):
+    ends = {name: getattr(planned, name)[[0, -1]] for name in ("times", "q", "qdot", "qddot", "qddot_before")}
+    assert "path error" in failed(replace(planned, **ends))
+
+
+def test_a_motion_that_takes_too_long_to_look_at_is_refused(planned):
+    fast = replace(planned, q=1e6 * planned.q, qdot=1e6 * planned.qdot)
+    with pytest.raises(InputError, match=r"found \d+ instants to look at; allowed: 200000"):
+        verify_trajectory(fast)
 
 
 @pytest.fixture(scope="module")

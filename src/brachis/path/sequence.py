@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from brachis.path.frame import PathFrame
     from brachis.path.protocol import Array, Curve
 
-_QUADRATURE_POINTS = 16
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +37,10 @@ class Piece:
         knots = self.curve.knots
         inner = knots[(knots > self.first) & (knots < self.last)]
         bounds = np.concatenate([[self.first], inner, [self.last]])
-        nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE_POINTS)
         half = np.diff(bounds)[:, None] / 2
-        sigma = bounds[:-1, None] + half * (nodes + 1)
+        sigma = bounds[:-1, None] + half * (_NODES + 1)
         slope = self.curve.derivatives(sigma.ravel(), 1)[1, :, :positions]
-        return float(np.linalg.norm(slope, axis=1) @ (half * weights).ravel())
+        return float(np.linalg.norm(slope, axis=1) @ (half * _WEIGHTS).ravel())
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +92,11 @@ class SequencePath:
         total = self.total
         rows = self.pieces[0].curve.derivatives(np.zeros(1), 0).shape[2]
         result = np.empty((4, values.size, rows))
-        for i, piece in enumerate(self.pieces):
-            here = which == i
-            if np.any(here):
-                sigma = piece.first + (values[here] - self.breaks[i]) * total
-                result[:, here] = piece.curve.derivatives(sigma)
+        order = np.argsort(which, kind="stable")
+        for here in np.split(order, np.flatnonzero(np.diff(which[order])) + 1) if len(order) else ():
+            i = int(which[here[0]])
+            sigma = self.pieces[i].first + (values[here] - self.breaks[i]) * total
+            result[:, here] = self.pieces[i].curve.derivatives(sigma)
         result *= total ** np.arange(4)[:, None, None]
         if self.frame is not None:
             result = result @ self.frame.turn.T

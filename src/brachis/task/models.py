@@ -28,6 +28,8 @@ Row = Literal["x", "y", "z", "yaw"]
 _Space = tuple[Row, ...] | Literal["position", "pose", "pose_free_roll", "joints"]
 POSITION_ROWS: Final[tuple[Row, ...]] = ("x", "y", "z")
 _SPACE_FORMS = "a list of rows out of x, y, z, yaw, or one of position, pose, pose_free_roll, joints"
+_MOST_SEGMENTS = 3000
+"""Segments of a path: with their blends about as many pieces as a motion can be verified on."""
 
 
 def _expand_position(space: _Space) -> _Space:
@@ -145,7 +147,7 @@ class Task(Model):
         "of x, y, z); pose; pose_free_roll, a pose that may roll about the tool frame's z axis; or joints: the path is "
         "one of all joints, in the order of the chain (rad, m), and only its timing is planned."
     )
-    path: Annotated[tuple[Segment, ...], Field(min_length=1)] = Field(
+    path: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=_MOST_SEGMENTS)] = Field(
         description="Segments of the path, in order; a list of points, all rows of the task space each, is the spline "
         "through them that begins at the first one. For a file of points: [{csv: {file: ...}}]. Segments in a frame "
         "of their own: {frame: NAME, segments: [...]}.",

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from brachis.errors import InputError, ResultFileError
-from brachis.files import atomic_write, check_suffix, open_file
+from brachis.files import atomic_write, check_suffix, read_file
 from brachis.kinds import Kind, check_kind
 from brachis.robot import Robot, bind
 from brachis.robot.from_task import robot_from_settings
@@ -26,22 +26,16 @@ ARRAYS = ("times", "q", "qdot", "qddot", "qddot_before", "knots", "control_point
 """Names of the arrays in the file; as in `Trajectory`."""
 CHART_DEGREE = 5
 """Of the splines of a chart's rows."""
-LARGEST = 64_000_000
+LARGEST = 32_000_000
 """Of a result file and of what it holds unpacked, bytes."""
-
-_UNREADABLE = (
-    OSError,
-    ValueError,  # among them those of JSON and of text encodings
-    KeyError,
-    EOFError,
-    RecursionError,
-    MemoryError,  # an array header that asks for more than there is
-    NotImplementedError,  # a compression that Python does not know
-    RuntimeError,  # an encrypted archive
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""What reading something else than an npz archive with these parts may raise."""
+MOST_NODES = 50_000
+"""Nodes of a motion, which bound what its verification takes."""
+_LARGEST_NUMBER = 1e12
+"""Of what an array holds: as in tasks."""
+_SHORTEST_PIECE, _SHORTEST_INTERVAL = 1e-12, 1e-12
+"""Of a motion, s, and of its splines, in normalised time: shorter ones are lost in rounding."""
+_HIGHEST_DEGREE = 7
+"""Of splines, as in tasks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +89,10 @@ def read_result(path: Path) -> Content:
     """
     check_kind(path, Kind.RESULT, ResultFileError)
     try:
-        with open_file(path, LARGEST) as stream:
-            meta, arrays = _parts(stream)
+        meta, arrays = _parts(io.BytesIO(read_file(path, LARGEST)))
     except FileNotFoundError as error:
         raise ResultFileError("the result file does not exist", where=str(path)) from error
-    except _UNREADABLE as error:
+    except Exception as error:  # archives, headers of arrays and JSON fail in every way when they are broken
         raise ResultFileError(
             "the file is not a brachis result",
             where=str(path),
@@ -160,8 +153,10 @@ def _content(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Content:
         allowed = f"some of {', '.join(robot.joint_names)}, in this order"
         raise InputError("unknown joints", where="redundant_joints", found=meta["redundant_joints"], allowed=allowed)
     for name, array in arrays.items():
-        if array.dtype.kind not in "fiu" or not np.isfinite(array).all():
-            raise InputError("not all are finite numbers", where=name)
+        if array.dtype.kind not in "fiu" or not (np.abs(array) <= _LARGEST_NUMBER).all():
+            allowed = f"numbers between -{_LARGEST_NUMBER:g} and {_LARGEST_NUMBER:g}"
+            raise InputError("not all are finite numbers of a usable size", where=name, allowed=allowed)
+    arrays = {name: array.astype(float) for name, array in arrays.items()}
     r = _redundancy(arrays, robot.n, len(redundant))
     _check_arrays(arrays, robot.n, r, meta["degree"])
     recovered = Recovered.of_file(meta.get("recovered"), robot.n)
@@ -189,7 +184,7 @@ def _redundancy(arrays: dict[str, np.ndarray], n: int, named: int) -> int:
 def _are_knots(knots: np.ndarray, degree: int) -> bool:
     """Tell whether these are the knots of splines of a degree over [0, 1]."""
     outer = degree + 1
-    long = degree >= 1 and knots.ndim == 1 and len(knots) >= 2 * outer
+    long = 1 <= degree <= _HIGHEST_DEGREE and knots.ndim == 1 and len(knots) >= 2 * outer
     ends = long and not knots[:outer].any() and bool((knots[-outer:] == 1.0).all())
     return ends and bool((np.diff(knots) >= 0.0).all())
 
@@ -197,15 +192,20 @@ def _are_knots(knots: np.ndarray, degree: int) -> bool:
 def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) -> None:
     """Check shapes and order."""
     times, knots = arrays["times"], arrays["knots"]
-    if times.ndim != 1 or len(times) < 2 or times[0] != 0.0 or not (np.diff(times) > 0.0).all():  # noqa: PLR2004
-        raise InputError("not times", where="times", found=_extent(times), allowed="ascending numbers from 0")
+    if times.size > MOST_NODES:
+        hint = "Import fewer rows, or a part of them"
+        raise InputError("the motion has too many nodes", where="times", found=times.size, allowed=MOST_NODES, hint=hint)
+    if times.ndim != 1 or len(times) < 2 or times[0] != 0.0 or not (np.diff(times) >= _SHORTEST_PIECE).all():  # noqa: PLR2004
+        allowed = f"ascending numbers from 0, at least {_SHORTEST_PIECE:g} s apart"
+        raise InputError("not times", where="times", found=_extent(times), allowed=allowed)
     if not _are_knots(knots, degree):
-        allowed = "ascending numbers from 0 to 1, either degree + 1 times"
+        allowed = f"ascending numbers from 0 to 1, either degree + 1 times; degrees up to {_HIGHEST_DEGREE}"
         raise InputError(
             f"not the knots of a spline of degree {degree}", where="knots", found=_extent(knots), allowed=allowed
         )
-    if not (np.diff(knots[degree : len(knots) - degree]) > 0.0).all():
-        raise InputError("internal knots are repeated", where="knots", allowed="every internal knot once")
+    if not (np.diff(knots[degree : len(knots) - degree]) >= _SHORTEST_INTERVAL).all():
+        allowed = f"every internal knot once, at least {_SHORTEST_INTERVAL:g} apart"
+        raise InputError("internal knots are repeated", where="knots", allowed=allowed)
     shapes = dict.fromkeys(("q", "qdot", "qddot", "qddot_before"), (len(times), n))
     shapes["control_points"] = (1 + r, len(knots) - degree - 1)
     for name, shape in shapes.items():

@@ -86,15 +86,16 @@ class States:
         """Evaluate pieces at places, in any order; each place once."""
         order = np.lexsort((u, piece))
         piece, u = piece[order], u[order]
-        again = np.append(False, (piece[1:] == piece[:-1]) & (u[1:] - u[:-1] <= _SAME_PLACE) & (u[1:] < 1.0))
-        piece, u = piece[~again], u[~again]
+        again = (piece[1:] == piece[:-1]) & (u[1:] - u[:-1] <= _SAME_PLACE) & (u[1:] < 1.0)
+        first = np.append(True, ~again)[: len(piece)]
+        piece, u = piece[first], u[first]
         q = pieces.nodes[piece] + values_of(pieces.position[:, piece], u)
         qdot, qddot = values_of(pieces.velocity[:, piece], u), values_of(pieces.acceleration[:, piece], u)
         qdddot = values_of(pieces.jerk[:, piece], u)
         return cls(piece, u, pieces.time(piece, u), q, qdot, qddot, qdddot, torques(robot, q, qdot, qddot))
 
-    def only(self, chosen: np.ndarray) -> States:
-        """Return some of the states, in a new order."""
+    def only(self, chosen: np.ndarray | slice) -> States:
+        """Return some of the states, in the order that is chosen."""
         return States(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     def merged(self, other: States) -> tuple[States, np.ndarray]:

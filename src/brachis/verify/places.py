@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.errors import InputError
 from brachis.robot import Robot
 from brachis.trajectory import Trajectory
 from brachis.verify.motion import Pieces
@@ -20,6 +21,8 @@ _LEAST_STEPS = 3
 _SPIKE = 0.01
 """Coefficients that leave the range between both ends of a piece by this part of the largest acceleration."""
 _MOST_STEPS = 10_000
+MOST_INSTANTS = 200_000
+"""Instants at which a motion is looked at before limits ask for more: some seconds' work, and 1 GB."""
 _TRAVEL = 0.05
 """A step moves no joint further, rad or m."""
 _ROUNDING = 1e-6
@@ -50,14 +53,34 @@ def spread_out(trajectory: Trajectory, pieces: Pieces, options: VerifyOptions) -
     wanted = np.nan_to_num(np.maximum(per_interval - _ROUNDING, travel))
     steps = np.ceil(np.clip(wanted, _LEAST_STEPS, _MOST_STEPS)).astype(int)
     count = steps + 1
+    check_instants(int(count.sum()))
     span = np.repeat(np.arange(len(steps)), count)
     number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     return first[span], low[span] + (high - low)[span] * number / steps[span]
 
 
+def check_instants(count: int) -> None:
+    """Refuse to look at a motion at more than `MOST_INSTANTS` instants.
+
+    Raises
+    ------
+    InputError
+    """
+    if count > MOST_INSTANTS:
+        raise InputError(
+            "the motion is too long, too fast or too finely divided to be verified",
+            where="trajectory",
+            found=f"{count} instants to look at",
+            allowed=f"{MOST_INSTANTS}: {_LEAST_STEPS + 1} in every piece between nodes, one for every {_TRAVEL:g} rad or "
+            "m that a joint travels, 32 in every knot interval and in every piece of the path",
+            hint="Split the motion into parts",
+        )
+
+
 def within_path_pieces(trajectory: Trajectory, pieces: Pieces, breaks: np.ndarray, options: VerifyOptions) -> Places:
     """Spread places over every piece of the path, however short: a small blend is not stepped over."""
     parts = np.linspace(0.0, 1.0, options.points_per_interval)
+    check_instants(len(breaks) * len(parts))
     wanted = (breaks[:-1, None] + np.diff(breaks)[:, None] * parts).ravel()
     low, high = np.zeros_like(wanted), np.full_like(wanted, trajectory.t_end)
     for _ in range(_BISECTIONS):  # s(t) does not decrease

@@ -22,7 +22,7 @@ from brachis.verify.limits import Given, limit_checks
 from brachis.verify.mechanics import tool_placements
 from brachis.verify.motion import Pieces, States
 from brachis.verify.options import VerifyOptions
-from brachis.verify.places import reversals, sharpest, spread_out, within_path_pieces
+from brachis.verify.places import check_instants, reversals, sharpest, spread_out, within_path_pieces
 from brachis.verify.report import Check, Verification
 
 
@@ -56,7 +56,8 @@ def verify_trajectory(
     ------
     InputError
         `robot` has other joints than the trajectory; or the trajectory's task does not fit the robot: its postures
-        (`InputError`, `StartError`), task space (`InputError`) or path (`PathError`).
+        (`InputError`, `StartError`), task space (`InputError`) or path (`PathError`); or the motion would have to be
+        looked at at more than 200,000 instants.
 
     Examples
     --------
@@ -82,7 +83,8 @@ def verify_trajectory(
         sharpest(pieces),
         reversals(pieces, robot),
     )
-    places = (np.concatenate(part) for part in zip(*parts, strict=True))
+    places = [np.concatenate(part) for part in zip(*parts, strict=True)]
+    check_instants(len(places[0]))
     states = States.at(pieces, robot, *places)
     path_check = _path_error(trajectory, path, task_map, states, options)
     ratios = limit_checks(Given(robot, trajectory, pieces, states), own_limits, options)

@@ -14,6 +14,8 @@ _SAFETY = 4.0
 _RESOLUTION = 5e-6
 """Ratios that could be exceeded by less are not searched any further."""
 _ROUNDS = 40
+_MOST_MORE = 100_000
+"""States that are added at most; what lies between them then counts with the most that it may be."""
 _SHORTEST = 1e-6
 """Steps in a piece, as parts of it, that are not halved any more."""
 
@@ -39,9 +41,14 @@ def worst_between(given: Given, ratio_at: Callable[[States], np.ndarray], subjec
     """
     states, ratio = given.states, ratio_at(given.states)
     for _ in range(_ROUNDS):
-        steps = np.flatnonzero(_may_hold_more(states, given.pieces.lengths, ratio))
+        steps, most = _may_hold_more(states, given.pieces.lengths, ratio)
         if not len(steps):
             break
+        if len(states.t) + len(steps) > len(given.states.t) + _MOST_MORE:
+            k = int(np.argmax(most))
+            column = int(np.argmax(ratio[steps[k]]))
+            remark = f"not searched to the end: {ratio.max():.6g} was found, and more than this is not possible"
+            return Worst(float(most[k]), subjects[column], float(states.t[steps[k]]), remark)
         u = states.u[steps]
         middle = u + 0.5 * (states.u[steps + 1] - u)
         new = States.at(given.pieces, given.robot, states.piece[steps], middle)
@@ -51,8 +58,8 @@ def worst_between(given: Given, ratio_at: Callable[[States], np.ndarray], subjec
     return Worst(float(ratio[k, column]), subjects[column], float(states.t[k]))
 
 
-def _may_hold_more(states: States, lengths: np.ndarray, ratio: np.ndarray) -> np.ndarray:
-    """Tell for every step whether the largest ratio of all may lie within it, (K - 1,)."""
+def _may_hold_more(states: States, lengths: np.ndarray, ratio: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """List the steps within which the largest ratio of all may lie, (S,), and the most that it may be there, (S,)."""
     inside = states.piece[1:] == states.piece[:-1]
     part = np.where(inside, np.diff(states.u), 1.0)
     length = (part * lengths[states.piece[:-1]])[:, None]
@@ -64,4 +71,5 @@ def _may_hold_more(states: States, lengths: np.ndarray, ratio: np.ndarray) -> np
     climb = np.maximum(bend * length - np.abs(slope), 0.0)
     rise = climb**2 / np.maximum(4.0 * bend, np.finfo(float).tiny)
     most = (np.maximum(ratio[1:], ratio[:-1]) + rise).max(axis=1)
-    return np.asarray(inside & (part > _SHORTEST) & (most > ratio.max() + _RESOLUTION))
+    steps = np.flatnonzero(inside & (part > _SHORTEST) & (most > ratio.max() + _RESOLUTION))
+    return steps, most[steps]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from brachis.task import ProcessSpeed
 from brachis.verify.limits.peaks import worst_between
 from brachis.verify.limits.protocol import Given, Worst
@@ -21,16 +23,16 @@ def worst_below(given: Given) -> Worst | None:
 def _worst(given: Given, side: float) -> Worst | None:
     """Find the worst part of the path."""
     parts = given.trajectory.task.tool_limits.process_speed
-    found = (_of_part(given, part, side, alone=len(parts) == 1) for part in parts)
+    within = given.within(np.array([part.s for part in parts])) if parts else []
+    found = (_of_part(inside, part, side, alone=len(parts) == 1) for inside, part in zip(within, parts, strict=True))
     return max(found, key=lambda worst: worst.ratio, default=None)
 
 
-def _of_part(given: Given, part: ProcessSpeed, side: float, *, alone: bool) -> Worst:
+def _of_part(inside: Given, part: ProcessSpeed, side: float, *, alone: bool) -> Worst:
     begin, end = part.s
-    inside = given.between(begin, end)
     subject = "tool" if alone else f"tool, s = {begin:g} to {end:g}"
     return worst_between(
         inside,
-        lambda states: 1.0 - part.tolerance + side * (speeds(given.robot, states) / part.speed - 1.0),
+        lambda states: 1.0 - part.tolerance + side * (speeds(inside.robot, states) / part.speed - 1.0),
         (subject,),
     )

@@ -56,13 +56,13 @@ class Given:
         apart = (np.diff(both.piece) > 0) | (np.diff(both.u) > _SAME_PLACE)
         return replace(self, states=both.only(np.append(True, apart)))
 
-    def between(self, begin: float, end: float) -> Given:
-        """Return the same, with no states but those from one path coordinate to another, both included."""
-        more = self.looking_at(np.array([begin, end]))
-        first, last = self.times_of(np.array([begin, end]))
-        slack = _SAME_PLACE * self.trajectory.t_end
-        inside = (more.states.t >= first - slack) & (more.states.t <= last + slack)
-        return replace(more, states=more.states.only(inside))
+    def within(self, parts: np.ndarray) -> list[Given]:
+        """Return the same for each part of the path, (P, 2), with no states but those in it, its ends included."""
+        more, slack = self.looking_at(parts.ravel()), _SAME_PLACE * self.trajectory.t_end
+        times = self.times_of(parts.ravel()).reshape(parts.shape)
+        first = np.searchsorted(more.states.t, times[:, 0] - slack)
+        last = np.searchsorted(more.states.t, times[:, 1] + slack, side="right")
+        return [replace(more, states=more.states.only(slice(a, b))) for a, b in zip(first, last, strict=True)]
 
 
 class Worst(NamedTuple):
