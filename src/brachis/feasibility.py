@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from brachis.errors import InputError, PathError, StartError, UnknownNameError
+from brachis.errors import InputError, PathError, Remedy, StartError, UnknownNameError
 from brachis.ik import Match
 from brachis.limits import Limit, Moments
 from brachis.path import Path, check_on_path
@@ -21,6 +21,8 @@ _RANGE_SLACK = 1e-9
 _SAME_POSTURE = 1e-5
 _REGULAR = 1e-6
 """Least singular value of the Jacobian, in m and rad, below which a posture is a singularity of the arm."""
+_ROOM = 1.05
+"""Limits are raised to so many times what holding the arm takes."""
 _STATIONS = 401
 _TRIED = 20
 """Postures by which it is told whether the arm lacks a direction everywhere."""
@@ -49,12 +51,12 @@ def check_postures(
     """
     if start is not None:
         _check_range(task_map.robot, start, "start")
-        _check_at_rest(limits, start, "start")
+        _check_at_rest(task_map.robot, limits, start, "start")
     if isinstance(task_map, JointSpace):
         _check_range_along(task_map.robot, path)
     if end is not None:
         _check_range(task_map.robot, end, "end")
-        _check_at_rest(limits, end, "end")
+        _check_at_rest(task_map.robot, limits, end, "end")
         check_on_path(task_map, end, path.sample(np.array([1.0])).target[0], "end")
 
 
@@ -101,7 +103,7 @@ def beyond_at_rest(limit: Limit, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return values, limit.violation(values) - _RANGE_SLACK * np.maximum(limit.violation_scale, 1.0)
 
 
-def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str) -> None:
+def _check_at_rest(robot: Robot, limits: Sequence[Limit], posture: np.ndarray, name: str) -> None:
     """Refuse a posture in which a limit is exceeded although the arm stands still."""
     for limit in limits:
         if not limit.static:
@@ -111,13 +113,31 @@ def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str) -> N
         if beyond[worst] > 0.0:
             label = limit.labels[worst]
             found, allowed = in_figures(limit, worst, float(values[worst]))
-            raise StartError(
+            others = [str(limit.labels[i].subject) for i in np.flatnonzero(beyond > 0.0) if i != worst]
+            more = f"; too low as well: {', '.join(others)}" if others else ""
+            keys = ", ".join(limit.labels[i].key for i in np.flatnonzero(beyond > 0.0) if limit.labels[i].key)
+            error = StartError(
                 f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
                 where=f"{name}.joints",
-                found=f"{found} {label.unit} needed at rest",
+                found=f"{found} {label.unit} needed at rest{more}",
                 allowed=f"{allowed} {label.unit}",
-                hint=f"Choose another posture{f', or raise {label.key}' if label.key else ''}",
+                hint=f"Choose another posture{f', or raise {keys}' if keys else ''}",
             )
+            remedies = load_remedies(robot, limit, worst, 1.0 + float(beyond[worst]))
+            # Where several joints are too weak, no number for one of them is enough.
+            raise error.with_remedies(*(one for one in remedies if not (others and one.key == label.key)))
+
+
+def load_remedies(robot: Robot, limit: Limit, column: int, ratio: float) -> list[Remedy]:
+    """List what may help where holding the arm takes so many times a limit: a larger limit, a smaller payload."""
+    label = limit.labels[column]
+    figures = [bound.figure for bound in limit.bounds if bound.column == column and bound.end is None]
+    scale = getattr(robot.settings.limits.scale, limit.kind, 1.0)
+    found = [Remedy(label.key, one / scale, _ROOM * ratio * one / scale, label.unit) for one in figures if label.key]
+    payload = robot.settings.payload
+    if payload is not None and payload.mass:
+        found.append(Remedy("robot.payload.mass", payload.mass, payload.mass / ratio, "kg"))
+    return found
 
 
 def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:

@@ -230,7 +230,9 @@ def _is_planned(
     """Tell whether a single plan of a task that was changed is verified."""
     changed = task_with(changed, effort="single")
     same = changed.robot == task.robot
-    problem = Problem.of(robot if same else robot_from_settings(changed.robot, urdf_text=robot.urdf), changed, own_limits)
+    problem = Problem.of(
+        robot if same else robot_from_settings(changed.robot, urdf_text=robot.urdf), changed, own_limits
+    )
     return is_planned(problem, decompositions_of(problem, families), Stages(solved, finished), deadline)
 
 

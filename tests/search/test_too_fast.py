@@ -109,7 +109,9 @@ def test_of_several_parts_the_one_is_told_that_is_too_fast():
 
 
 def test_a_speed_that_joint_velocities_forbid():
-    with pytest.raises(brachis.PlanningError, match=r"the x_axis velocity limit lets the tool keep no more than 0\.3 m/s"):
+    with pytest.raises(
+        brachis.PlanningError, match=r"the x_axis velocity limit lets the tool keep no more than 0\.3 m/s"
+    ):
         brachis.plan(slide(0.5, (0.3, 0.6), limits={"velocity": 0.3}))
 
 

@@ -21,6 +21,7 @@ from brachis.attempt import Attempt, Start
 from brachis.deadline import Deadline
 from brachis.problem import Decomposition, Problem
 from brachis.search.explain import no_motion, out_of_time, refuse_what_is_out_of_reach
+from brachis.search.holding import reason_in_holding
 from brachis.search.processes import each, processes
 from brachis.search.record import NOT_TRIED, Numbered, Record, rounded
 from brachis.search.schedule import Batch, batches
@@ -107,14 +108,15 @@ def find_fastest(
         return record
     if record.too_fast is not None:
         raise record.too_fast.error
+    heavy = reason_in_holding([attempt.start for attempt in record.attempts if attempt.start is not None])
+    if heavy is not None:
+        raise heavy
     if record.interrupted:
         raise out_of_time(problem.task, record.undone())
     raise no_motion(problem, decompositions, record.attempts, record.dead_ends)
 
 
-def is_planned(
-    problem: Problem, decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline
-) -> bool:
+def is_planned(problem: Problem, decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline) -> bool:
     """Tell whether the first starts of the search lead to a verified motion.
 
     Parameters
