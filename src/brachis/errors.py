@@ -29,8 +29,8 @@ class Remedy:
         Dotted key, for example ``boundary.end_speed``.
     asked : float
         The number in the task.
-    guess : float or None
-        A number that may be enough; None: the limit is left out to see whether it is the cause.
+    guess : float
+        A number that may be enough.
     unit : str
     is_refined : bool
         Whether to look for the smallest change that is enough.
@@ -38,14 +38,14 @@ class Remedy:
 
     key: str
     asked: float
-    guess: float | None
+    guess: float
     unit: str = ""
     is_refined: bool = True
 
     @property
     def verb(self) -> str:
         """Say what to do with the number."""
-        return "lower" if self.guess is not None and self.guess < self.asked else "raise"
+        return "lower" if self.guess < self.asked else "raise"
 
 
 class BrachisError(Exception):

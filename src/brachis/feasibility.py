@@ -113,19 +113,22 @@ def _check_at_rest(robot: Robot, limits: Sequence[Limit], posture: np.ndarray, n
         if beyond[worst] > 0.0:
             label = limit.labels[worst]
             found, allowed = in_figures(limit, worst, float(values[worst]))
-            others = [str(limit.labels[i].subject) for i in np.flatnonzero(beyond > 0.0) if i != worst]
-            more = f"; too low as well: {', '.join(others)}" if others else ""
-            keys = ", ".join(limit.labels[i].key for i in np.flatnonzero(beyond > 0.0) if limit.labels[i].key)
+            weak = [limit.labels[i] for i in np.flatnonzero(beyond > 0.0)]
+            remedies = load_remedies(robot, limit, worst, 1.0 + float(beyond[worst]))
+            more = ""
+            if len(weak) > 1:
+                # No number for one of several joints is enough.
+                more = f"; too low as well: {', '.join(str(one.subject) for one in weak if one is not label)}"
+                remedies = [remedy for remedy in remedies if remedy.key != label.key]
+            keys = {one.key: None for one in weak if one.key} if label.key not in {one.key for one in remedies} else {}
             error = StartError(
                 f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
                 where=f"{name}.joints",
                 found=f"{found} {label.unit} needed at rest{more}",
                 allowed=f"{allowed} {label.unit}",
-                hint=f"Choose another posture{f', or raise {keys}' if keys else ''}",
+                hint=f"Choose another posture{', or raise ' + ', '.join(keys) if keys else ''}",
             )
-            remedies = load_remedies(robot, limit, worst, 1.0 + float(beyond[worst]))
-            # Where several joints are too weak, no number for one of them is enough.
-            raise error.with_remedies(*(one for one in remedies if not (others and one.key == label.key)))
+            raise error.with_remedies(*remedies)
 
 
 def load_remedies(robot: Robot, limit: Limit, column: int, ratio: float) -> list[Remedy]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from operator import attrgetter
 
 import numpy as np
 
@@ -15,15 +14,12 @@ from brachis.problem import Decomposition, Problem
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.reach import reason_out_of_reach
 from brachis.task import SolverSettings, Task
-from brachis.task.limit_models import FROM_URDF
 
 _GOOD_PART = 0.1
 _LOOKED_AT = 2
 _MOST_EFFORT = "exhaustive"
 _SLOWER = 0.7
 """Part of a speed at an end that is tried first."""
-_OWN_LIMITS = ("jerk", "torque_rate", "rms_torque", "power", "total_power", "speed", "angular_speed", "acceleration")
-"""Limits that are left out one by one to see which is the cause; the first ones are the most likely."""
 
 
 def refuse_what_is_out_of_reach(decompositions: Sequence[Decomposition], candidates: Sequence[Attempt]) -> None:
@@ -92,22 +88,14 @@ def no_motion(
         )
     counts = Counter(candidate.status for candidate in candidates)
     outcomes = "; ".join(status if n == 1 else f"{status} ({n} times)" for status, n in counts.items())
+    along = " along any joint path" if joint_path else ""
     error = PlanningError(
-        f"no motion within the limits was found{' along any joint path' * joint_path}: {outcomes or 'no initial guess'}",
+        f"no motion within the limits was found{along}: {outcomes or 'no initial guess'}",
         hint=reason + _what_is_missing(problem),
     )
-    return error.with_remedies(*_suspects(problem.task)) if joint_path or not search else error
-
-
-def _suspects(task: Task) -> list[Remedy]:
-    """List what may hold every motion back: speeds at the ends, and limits that are not the robot's own."""
-    ends = {f"boundary.{key}": getattr(task.boundary, key) for key in ("start_speed", "end_speed")}
-    found = [Remedy(key, speed, _SLOWER * speed, "m/s") for key, speed in ends.items() if speed]
-    for key in ("robot.limits", "tool_limits"):
-        part = attrgetter(key)(task)
-        given = [name for name in _OWN_LIMITS if getattr(part, name, None) not in (None, FROM_URDF)]
-        found += [Remedy(f"{key}.{name}", np.nan, None) for name in given]
-    return found
+    ends = {f"boundary.{key}": getattr(problem.task.boundary, key) for key in ("start_speed", "end_speed")}
+    remedies = [Remedy(key, speed, _SLOWER * speed, "m/s") for key, speed in ends.items() if speed]
+    return error.with_remedies(*remedies)
 
 
 def out_of_time(task: Task, undone: Sequence[str]) -> PlanningError:

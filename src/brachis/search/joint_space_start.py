@@ -63,6 +63,6 @@ def _refuse_beyond(robot: Robot, limit: Limit, s: np.ndarray, q: np.ndarray) -> 
         where="path",
         found=f"{found} {label.unit} at s = {s[station]:.3g}",
         allowed=f"{allowed} {label.unit}",
-        hint=f"Lead the path elsewhere{f', or raise {label.key}' if label.key else ''}",
+        hint="Lead the path elsewhere",
     )
     raise error.with_remedies(*load_remedies(robot, limit, column, 1.0 + float(beyond[station, column])))

@@ -12,6 +12,7 @@ What comes out does not depend on the number of processes: work that one process
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from typing import NamedTuple
@@ -116,23 +117,33 @@ def find_fastest(
     raise no_motion(problem, decompositions, record.attempts, record.dead_ends)
 
 
-def is_planned(problem: Problem, decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline) -> bool:
-    """Tell whether the first starts of the search lead to a verified motion.
+def is_planned(
+    problem: Problem, decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline
+) -> bool | None:
+    """Tell whether a verified motion is found; of a redundant robot along the first joint paths alone.
 
     Parameters
     ----------
     problem, decompositions, stages, deadline
         See `find_fastest`.
+
+    Returns
+    -------
+    bool or None
+        None where there are other joint paths.
     """
 
     def listener(_text: str) -> None:
         """Hear nothing."""
 
     search = _Search(problem, decompositions, stages, deadline, listener)
-    first = next(batches(problem, decompositions, deadline, listener, search.record.note_lattice), None)
-    search.run([first] if first else [])
+    schedule = batches(problem, decompositions, deadline, listener, search.record.note_lattice)
+    redundant = problem.robot.n > problem.task_map.m
+    search.run(itertools.islice(schedule, 1 if redundant else None))
     best = search.record.best
-    return best is not None and best.verified
+    if best is not None and best.verified:
+        return True
+    return None if redundant else False
 
 
 class _Search:

@@ -74,7 +74,7 @@ def reason_out_of_reach(
             (
                 allowed,
                 f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}",
-                f"Raise the {limit.name} limit, or lead the path elsewhere",
+                "Lead the path elsewhere",
                 remedies,
             )
             for limit in limits
