@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from brachis.errors import InputError, PathError, StartError, UnknownNameError, write_apart
+from brachis.errors import InputError, PathError, Remedy, StartError, UnknownNameError, write_apart
 from brachis.ik import Match
 from brachis.limits import Limit, Moments
 from brachis.limits.position import PositionLimit, position_measure
@@ -22,6 +22,8 @@ from brachis.task import SplineSettings
 _SAME_POSTURE = 1e-5
 _REGULAR = 1e-6
 """Least singular value of the Jacobian, in m and rad, below which a posture is a singularity of the arm."""
+_ROOM = 1.05
+"""Limits are raised to so many times what holding the arm takes."""
 _STATIONS = 401
 _TRIED = 20
 """Postures by which it is told whether the arm lacks a direction everywhere."""
@@ -60,7 +62,7 @@ def check_postures(
     for name, posture in (("start", start), ("end", end)):
         if posture is not None:
             _check_range(robot, posture, name, tolerance)
-            _check_at_rest(limits, posture, name, tolerance)
+            _check_at_rest(robot, limits, posture, name, tolerance)
             limits = [_widen(limit, posture[None], tolerance) for limit in limits]
     if end is not None:
         check_on_path(task_map, end, path.sample(np.array([1.0])).target[0], "end")
@@ -130,7 +132,7 @@ def beyond_at_rest(limit: Limit, q: np.ndarray, tolerance: float) -> tuple[np.nd
     return values, limit.violation(values) - tolerance
 
 
-def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str, tolerance: float) -> None:
+def _check_at_rest(robot: Robot, limits: Sequence[Limit], posture: np.ndarray, name: str, tolerance: float) -> None:
     """Refuse a posture in which a limit is exceeded although the arm stands still."""
     for limit in limits:
         if not limit.static:
@@ -140,13 +142,34 @@ def _check_at_rest(limits: Sequence[Limit], posture: np.ndarray, name: str, tole
         if beyond[worst] > 0.0:
             label = limit.labels[worst]
             found, allowed = in_figures(limit, worst, float(values[worst]))
-            raise StartError(
+            weak = [limit.labels[i] for i in np.flatnonzero(beyond > 0.0)]
+            remedies = load_remedies(robot, limit, worst, 1.0 + float(beyond[worst]))
+            more = ""
+            if len(weak) > 1:
+                # No number for one of several joints is enough.
+                more = f"; too low as well: {', '.join(str(one.subject) for one in weak if one is not label)}"
+                remedies = [remedy for remedy in remedies if remedy.key != label.key]
+            keys = {one.key: None for one in weak if one.key} if label.key not in {one.key for one in remedies} else {}
+            error = StartError(
                 f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
                 where=f"{name}.joints",
-                found=f"{found} {label.unit} needed at rest",
+                found=f"{found} {label.unit} needed at rest{more}",
                 allowed=f"{allowed} {label.unit}",
-                hint=f"Choose another posture{f', or raise {label.key}' if label.key else ''}",
+                hint=f"Choose another posture{', or raise ' + ', '.join(keys) if keys else ''}",
             )
+            raise error.with_remedies(*remedies)
+
+
+def load_remedies(robot: Robot, limit: Limit, column: int, ratio: float) -> list[Remedy]:
+    """List what may help where holding the arm takes so many times a limit: a larger limit, a smaller payload."""
+    label = limit.labels[column]
+    figures = [bound.figure for bound in limit.bounds if bound.column == column and bound.end is None]
+    scale = getattr(robot.settings.limits.scale, limit.kind, 1.0)
+    found = [Remedy(label.key, one / scale, _ROOM * ratio * one / scale, label.unit) for one in figures if label.key]
+    payload = robot.settings.payload
+    if payload is not None and payload.mass:
+        found.append(Remedy("robot.payload.mass", payload.mass, payload.mass / ratio, "kg"))
+    return found
 
 
 def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:

@@ -145,7 +145,7 @@ def plan(
         loaded = time.perf_counter()
         deadline = Deadline.after(asked.search.time_limit - (loaded - began))
 
-        def is_task_planned(changed: Task, limit: Deadline) -> bool:
+        def is_task_planned(changed: Task, limit: Deadline) -> bool | None:
             return _is_planned(robot, asked, changed, families, own_limits, limit)
 
         try:
@@ -227,8 +227,8 @@ def _is_planned(
     families: Sequence[ik.Family],
     own_limits: Sequence[LimitModel],
     deadline: Deadline,
-) -> bool:
-    """Tell whether a single plan of a task that was changed is verified."""
+) -> bool | None:
+    """Tell whether a plan of a task that was changed is verified; see `brachis.search.is_planned`."""
     changed = task_with(changed, effort="single")
     same = changed.robot == task.robot
     problem = Problem.of(

@@ -10,7 +10,7 @@ import numpy as np
 from brachis import ik
 from brachis.attempt import Attempt
 from brachis.deadline import Deadline
-from brachis.errors import BrachisError, PathError, PlanningError
+from brachis.errors import BrachisError, PathError, PlanningError, Remedy
 from brachis.problem import Decomposition, Problem
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.reach import reason_out_of_reach
@@ -19,6 +19,8 @@ from brachis.task import SolverSettings, Task
 _GOOD_PART = 0.1
 _LOOKED_AT = 2
 _MOST_EFFORT = "exhaustive"
+_SLOWER = 0.7
+"""Part of a speed at an end that is tried first."""
 
 
 def refuse_what_is_out_of_reach(
@@ -94,10 +96,14 @@ def no_motion(
         )
     counts = Counter(candidate.status for candidate in candidates)
     outcomes = "; ".join(status if n == 1 else f"{status} ({n} times)" for status, n in counts.items())
-    return PlanningError(
-        f"no motion within the limits was found: {outcomes or 'no initial guess'}",
+    along = " along any joint path" if joint_path else ""
+    error = PlanningError(
+        f"no motion within the limits was found{along}: {outcomes or 'no initial guess'}",
         hint=reason + _what_is_missing(problem),
     )
+    ends = {f"boundary.{key}": getattr(problem.task.boundary, key) for key in ("start_speed", "end_speed")}
+    remedies = [Remedy(key, speed, _SLOWER * speed, task.speed_unit) for key, speed in ends.items() if speed]
+    return error.with_remedies(*remedies)
 
 
 def out_of_time(task: Task, undone: Sequence[str]) -> PlanningError:
@@ -116,15 +122,12 @@ def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
     if "time limit" in statuses:
         name = "solver" if task.solver.time_limit < few["time_limit"].default else "search"
         tried.append(f"raise {name}.time_limit, which is {getattr(task, name).time_limit:g} s")
-    for key in ("start_speed", "end_speed"):
-        speed = getattr(task.boundary, key)
-        if speed:
-            tried.append(f"lower boundary.{key}, which is {speed:g} {task.speed_unit}")
     if not tried and task.search.effort != _MOST_EFFORT:
         tried.append(f"raise search.effort, which is {task.search.effort}")
     if not tried:
         tried.append("raise the limits, or try another start posture")
-    return f"There is a joint path within reach, but no motion along it was found; {', or '.join(tried)}"
+    advice = ", or ".join(tried)
+    return advice[:1].upper() + advice[1:]
 
 
 def _what_is_missing(problem: Problem) -> str:

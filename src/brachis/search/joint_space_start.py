@@ -6,10 +6,11 @@ import numpy as np
 
 from brachis.attempt import Start
 from brachis.errors import PathError
-from brachis.feasibility import beyond_at_rest, in_figures
+from brachis.feasibility import beyond_at_rest, in_figures, load_remedies
 from brachis.kinematics import JointSpaceMap
 from brachis.limits import Limit
 from brachis.problem import Problem
+from brachis.robot import Robot
 from brachis.search.phase_plane import least_times
 
 FAMILY = "path of joints"
@@ -39,7 +40,7 @@ def joint_space_start(problem: Problem) -> Start:
     for limit in problem.limits:
         # In motion an arm may pass postures that it cannot hold.
         if limit.static and (times is None or not limit.time_scaling):
-            _refuse_beyond(limit, s, q, problem.task.refinement.tolerance)
+            _refuse_beyond(problem.robot, limit, s, q, problem.task.refinement.tolerance)
     joint_map = JointSpaceMap(problem.robot, problem.path)
     if times is None:
         return Start(problem, joint_map, s[:, None], np.inf, FAMILY, FAMILY)
@@ -48,7 +49,7 @@ def joint_space_start(problem: Problem) -> Start:
     return Start(problem, joint_map, timed, estimate, FAMILY, FAMILY, timed=True)
 
 
-def _refuse_beyond(limit: Limit, s: np.ndarray, q: np.ndarray, tolerance: float) -> None:
+def _refuse_beyond(robot: Robot, limit: Limit, s: np.ndarray, q: np.ndarray, tolerance: float) -> None:
     """Refuse a path along which the arm at rest is beyond a limit."""
     values, beyond = beyond_at_rest(limit, q, tolerance)
     station, column = (int(place) for place in np.unravel_index(np.argmax(beyond), beyond.shape))
@@ -56,11 +57,12 @@ def _refuse_beyond(limit: Limit, s: np.ndarray, q: np.ndarray, tolerance: float)
         return
     where, label = s[beyond[:, column] > 0.0], limit.labels[column]
     found, allowed = in_figures(limit, column, float(values[station, column]))
-    raise PathError(
+    error = PathError(
         f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
         s_interval=(float(where[0]), float(where[-1])),
         where="path",
         found=f"{found} {label.unit} at s = {s[station]:.3g}",
         allowed=f"{allowed} {label.unit}",
-        hint=f"Lead the path elsewhere{f', or raise {label.key}' if label.key else ''}",
+        hint="Lead the path elsewhere",
     )
+    raise error.with_remedies(*load_remedies(robot, limit, column, 1.0 + float(beyond[station, column])))

@@ -12,6 +12,7 @@ What comes out does not depend on the number of processes: work that one process
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from typing import NamedTuple
@@ -21,6 +22,7 @@ from brachis.attempt import Attempt, Start
 from brachis.deadline import Deadline
 from brachis.problem import Decomposition, Problem
 from brachis.search.explain import no_motion, out_of_time, refuse_what_is_out_of_reach
+from brachis.search.holding import reason_in_holding
 from brachis.search.processes import each, processes
 from brachis.search.record import NOT_TRIED, Numbered, Record, rounded
 from brachis.search.schedule import Batch, batches
@@ -107,29 +109,42 @@ def find_fastest(
         return record
     if record.too_fast is not None:
         raise record.too_fast.error
+    heavy = reason_in_holding([attempt.start for attempt in record.attempts if attempt.start is not None])
+    if heavy is not None:
+        raise heavy
     if record.interrupted or record.cut_short(problem.task.solver.time_limit):
         record.interrupted = True
         raise out_of_time(problem.task, record.undone())
     raise no_motion(problem, decompositions, record.attempts, record.dead_ends, deadline)
 
 
-def is_planned(problem: Problem, decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline) -> bool:
-    """Tell whether the first starts of the search lead to a verified motion.
+def is_planned(
+    problem: Problem, decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline
+) -> bool | None:
+    """Tell whether a verified motion is found; of a redundant robot along the first joint paths alone.
 
     Parameters
     ----------
     problem, decompositions, stages, deadline
         See `find_fastest`.
+
+    Returns
+    -------
+    bool or None
+        None where there are other joint paths.
     """
 
     def listener(_text: str) -> None:
         """Hear nothing."""
 
     search = _Search(problem, decompositions, stages, deadline, listener)
-    first = next(batches(problem, decompositions, deadline, listener, search.record.note_lattice), None)
-    search.run([first] if first else [])
+    schedule = batches(problem, decompositions, deadline, listener, search.record.note_lattice)
+    redundant = problem.robot.n > problem.task_map.m
+    search.run(itertools.islice(schedule, 1 if redundant else None))
     best = search.record.best
-    return best is not None and best.verified
+    if best is not None and best.verified:
+        return True
+    return None if redundant else False
 
 
 class _Search:

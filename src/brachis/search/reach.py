@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.deadline import NEVER, Deadline
-from brachis.errors import BrachisError, PathError
+from brachis.errors import BrachisError, PathError, Remedy
+from brachis.feasibility import in_figures, load_remedies
 from brachis.kinematics import ClosedFormMap
 from brachis.limits import Limit, Moments
+from brachis.robot import Robot
 from brachis.robot.joint_space import in_turn_of
 
 _RANGE_SLACK = 1e-9
@@ -69,32 +71,38 @@ def reason_out_of_reach(
             found.exists.any(axis=(1, 2, 3)) | anywhere.exists.any(axis=(1, 2, 3)),
             "the path is out of reach from s = {first:.3g} on (no posture was found)",
             "Shorten or move the path, or choose another start posture",
+            [],
         ),
         (
             within,
             "no posture within the joint ranges was found from s = {first:.3g} on"
             + _beyond(joint_map, within, found, anywhere),
             "Shorten or move the path, or widen the joint ranges",
+            [],
         ),
         (
             own.within.any(axis=(1, 2, 3)),
             f"the branch {label!r} of the {given} posture does not reach s = {{first:.3g}}",
             f"Choose a {given} posture of another branch, or leave redundant_joints: auto",
+            [],
         ),
         *(
             (
-                _allowed(limit, own),
-                f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on",
-                f"Raise the {limit.name} limit, or lead the path elsewhere",
+                allowed,
+                f"the {limit.name} limit {limit.refusal} from s = {{first:.3g}} on{nearest}",
+                "Lead the path elsewhere",
+                remedies,
             )
             for limit in limits
             if limit.static and not limit.whole_turns
+            for allowed, nearest, remedies in [_allowed(joint_map.robot, limit, own)]
         ),
     )
-    for possible, problem, hint in reasons:
+    for possible, problem, hint, remedies in reasons:
         if not possible.all():
             first, last = float(s[int(np.argmin(possible))]), float(s[np.flatnonzero(~possible)[-1]])
-            return PathError(problem.format(first=first), s_interval=(first, last), hint=hint)
+            error = PathError(problem.format(first=first), s_interval=(first, last), hint=hint)
+            return error.with_remedies(*remedies)
     others = f"try {'other redundant joints, ' if joint_map.r else ''}another {given} posture"
     return f"Every point of the path is within reach of this branch, but no joint path through them was found; {others}"
 
@@ -182,10 +190,27 @@ def _beyond(joint_map: ClosedFormMap, within: np.ndarray, *found: _Answers) -> s
     )
 
 
-def _allowed(limit: Limit, found: _Answers) -> np.ndarray:
-    """At which stations a limit allows some posture at rest, (S,) bool."""
+def _allowed(robot: Robot, limit: Limit, found: _Answers) -> tuple[np.ndarray, str, list[Remedy]]:
+    """Tell at which stations a limit allows some posture at rest, (S,) bool; in words what is lacking, and what to do.
+
+    What is lacking is told of the station whose best posture is farthest beyond the limit.
+    """
     allowed = np.zeros(len(found.q), dtype=bool)
+    worst = 0.0
+    lack = ""
+    remedies: list[Remedy] = []
     for station, (postures, exist) in enumerate(zip(found.q, found.within, strict=True)):
-        still = Moments.at_rest(postures[exist][:_HELD_CHECKS])
-        allowed[station] = bool(np.any(np.all(limit.violation(limit.values(still)) <= 0.0, axis=1)))
-    return allowed
+        values = limit.values(Moments.at_rest(postures[exist][:_HELD_CHECKS]))
+        beyond = limit.violation(values)
+        if not len(beyond):
+            continue
+        best = int(np.argmin(beyond.max(axis=1)))
+        column = int(np.argmax(beyond[best]))
+        allowed[station] = bool(beyond[best, column] <= 0.0)
+        if beyond[best, column] > worst:
+            worst = float(beyond[best, column])
+            label = limit.labels[column]
+            remedies = load_remedies(robot, limit, column, 1.0 + worst)
+            needed, bound = in_figures(limit, column, float(values[best, column]))
+            lack = f" ({label.subject} needs {needed} {label.unit} and has {bound} {label.unit})"
+    return allowed, lack, remedies

@@ -10,7 +10,7 @@ from brachis.deadline import Deadline
 from brachis.errors import BrachisError, Remedy
 from brachis.task import Task, load_task, with_keys
 
-_TIME = 15.0
+_TIME = 20.0
 """Time, s, in which all numbers of one error are tried."""
 _SHARE = 0.4
 """Part of the time that is left for one trial."""
@@ -18,12 +18,15 @@ _TRIALS = 10
 """Largest number of trials of one number."""
 _NEAR = 1.04
 """The search ends where the smallest change that is enough is known up to this factor."""
-_FURTHER = 0.7
-"""While nothing is enough, the number is multiplied, or divided, by this."""
-_DIGITS = 3
+_FASTER, _LARGEST_STEP = 3, 2.0
+"""Power by which the factor between two numbers grows while they are all enough, or none is; its largest value."""
+_ALONE = 3
+"""Share of the time for a number that is tried once, where others have as many as they have trials."""
+_DIGITS, _ROUNDING = 3, 0.01
+"""Digits of numbers that are tried, and what they leave out of a ratio."""
 
-Trial = Callable[[Task, Deadline], bool]
-"""Says whether a plan of a task is found and verified before a deadline."""
+Trial = Callable[[Task, Deadline], bool | None]
+"""Says whether a plan of a task is found and verified before a deadline; None where it did not look everywhere."""
 
 
 def try_remedies(error: BrachisError, task: Task, joints: Sequence[str], is_planned: Trial, deadline: Deadline) -> None:
@@ -41,25 +44,27 @@ def try_remedies(error: BrachisError, task: Task, joints: Sequence[str], is_plan
     """
     deadline = deadline.within(_TIME)
     content = task.to_dict()
-    advice = []
-    for remedy in error.remedies:
+    advice: list[str] = []
+    weights = [_TRIALS if remedy.is_refined else _ALONE for remedy in error.remedies]
+    for number, remedy in enumerate(error.remedies):
+        own = deadline.part(weights[number] / sum(weights[number:]))
 
-        def is_enough(value: float, remedy: Remedy = remedy) -> bool | None:
-            limit = deadline.part(_SHARE)
+        def is_enough(value: float, remedy: Remedy = remedy, own: Deadline = own) -> bool | None:
+            limit = own.part(_SHARE)
+            found: bool | None = False
             try:
                 changed = load_task(_with_number(content, joints, remedy.key, value))
                 found = is_planned(changed, limit)
             except BrachisError:
-                found = False
-            return None if limit.passed and not found else found
+                pass
+            return None if not found and limit.passed else found
 
-        found = _try_numbers(remedy, is_enough, deadline)
-        text = f"{remedy.verb} {remedy.key} to {found}"
+        found = _try_numbers(remedy, is_enough, own)
         if found:
-            advice.append(text)
+            advice.append(f"{remedy.verb} {remedy.key} to {found}")
     # One number alone may not be enough.
     untried = " and ".join(f"{remedy.verb} {remedy.key}" for remedy in error.remedies if remedy.is_refined)
-    text = ", or ".join(advice) or untried
+    text = ", or ".join(advice) or (untried and f"{untried} (how far was not found out)")
     if text:
         error.put_advice(text[:1].upper() + text[1:])
 
@@ -67,50 +72,51 @@ def try_remedies(error: BrachisError, task: Task, joints: Sequence[str], is_plan
 def _try_numbers(remedy: Remedy, is_enough: Callable[[float], bool | None], deadline: Deadline) -> str:
     """Look for the smallest change that is enough, and say which it is; empty where none was found.
 
-    Of a number `is_enough` says None where the time was up.
+    Of a number `is_enough` says None where it is not known.
     """
-    lowers = remedy.guess < remedy.asked
     unit = f" {remedy.unit}" if remedy.unit else ""
+    lowers = remedy.guess < remedy.asked
+    away = -1.0 if lowers else 1.0
     good: float | None = None
     bad = remedy.asked
-    step = _NEAR
     is_tried = False
-    if not remedy.guess > 0.0:
-        return ""
+    step = _NEAR
     value = _rounded(remedy.guess, down=lowers)
     for _ in range(_TRIALS if remedy.is_refined else 1):
-        if deadline.passed:
+        if deadline.passed or value in (good, bad) or value <= 0.0:
             break
         outcome = is_enough(value)
         if outcome:
             good = value
         else:
-            bad, is_tried = value, outcome is not None
+            bad = value
+            is_tried = outcome is not None
         if good is None:
-            value *= _FURTHER if lowers else 1.0 / _FURTHER
-        elif max(good / bad, bad / good) <= _NEAR * (1.0 + 1e-2):
+            value *= step**away
+        elif abs(math.log(good / bad)) <= math.log(_NEAR) + _ROUNDING:
             break
         else:
-            middle, next_one = math.sqrt(good * bad), good * step if lowers else good / step
-            is_beyond = next_one >= middle if lowers else next_one <= middle
-            value, step = (middle, step) if is_beyond or is_tried and step > _NEAR else (next_one, step**3)
+            middle = math.sqrt(good * bad)
+            back = good / step**away
+            value = back if bad == remedy.asked and abs(back - good) < abs(middle - good) else middle
         value = _rounded(value, down=lowers)
-        if value in (good, bad):
-            break
+        step = min(step**_FASTER, _LARGEST_STEP)
     if good is None:
         return ""
-    limit = f"; none was found with {bad:g}{unit}" if remedy.is_refined and is_tried else ""
+    limit = f"; there was none with {bad:g}{unit}" if remedy.is_refined and is_tried else ""
     return f"{good:g}{unit} (a plan with it was verified{limit})"
 
 
 def _rounded(value: float, *, down: bool) -> float:
     """Round to few digits, towards the larger change."""
-    digits = _DIGITS - 1 - math.floor(math.log10(abs(value)))
+    if value <= 0.0:
+        return value
+    digits = _DIGITS - 1 - math.floor(math.log10(value))
     return (math.floor if down else math.ceil)(value * 10.0**digits) / 10.0**digits
 
 
 def _with_number(content: Mapping[str, Any], joints: Sequence[str], key: str, value: float) -> dict[str, Any]:
-    """Return a task, not checked yet, with a number changed; one that stands for all joints is written joint by joint."""
+    """Return a task, not checked yet, with a number changed; one for all joints is written joint by joint."""
     above, _, last = key.rpartition(".")
     if last not in joints:
         return with_keys(content, {key: value})

@@ -1,0 +1,100 @@
+"""Numbers that an error advises are tried before."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import brachis
+from brachis.deadline import Deadline
+from brachis.errors import PlanningError, Remedy
+from brachis.search import try_remedies
+
+SCARA = Path(__file__).parents[2] / "robots/scara3/robot.urdf"
+IIWA = Path(__file__).parents[2] / "robots/iiwa14/robot.urdf"
+JOINTS = ("j1", "j2", "j3")
+
+
+@pytest.fixture
+def task():
+    content = {
+        "brachis": 1,
+        "robot": {"urdf": str(SCARA), "limits": {"torque": 10.0}, "payload": {"mass": 8.0}},
+        "start": {"joints": [0.5, -2.1, 2.1]},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"by": [0.0, 1.0]}}],
+        "boundary": {"end_speed": 0.9},
+    }
+    return brachis.load_task(content)
+
+
+def hint(task, remedies, is_planned, *, seconds=60.0) -> str:
+    error = PlanningError("no motion", hint="Try another path").with_remedies(*remedies)
+    try_remedies(error, task, JOINTS, is_planned, Deadline.after(seconds))
+    assert str(error).endswith(error.hint)
+    return error.hint
+
+
+@pytest.mark.parametrize("possible", [0.8, 0.52, 0.5, 0.41, 0.1])
+def test_a_speed_is_lowered_to_nearly_the_largest_that_is_possible(task, possible):
+    found = hint(
+        task,
+        [Remedy("boundary.end_speed", 0.9, 0.5, "m/s")],
+        lambda changed, _: changed.boundary.end_speed <= possible,
+    )
+    good, bad = re.match(
+        r"Lower boundary\.end_speed to ([\d.]+) m/s \(a plan with it was verified; there was none with ([\d.]+) m/s\), "
+        "or try another path",
+        found,
+    ).groups()
+    assert float(good) <= possible < float(bad) <= 1.06 * float(good)
+
+
+@pytest.mark.parametrize("needed", [11.0, 24.0, 70.0])
+def test_a_limit_of_all_joints_is_raised_for_one(task, needed):
+    limits = []
+
+    def is_planned(changed, _):
+        limits.append(changed.robot.limits.torque)
+        return changed.robot.limits.torque["j2"] >= needed
+
+    found = hint(task, [Remedy("robot.limits.torque.j2", 10.0, 25.0, "Nm")], is_planned)
+    good = float(re.match(r"Raise robot\.limits\.torque\.j2 to ([\d.]+) Nm \(a plan", found)[1])
+    assert needed <= good <= 1.06 * needed
+    assert all(limit["j1"] == limit["j3"] == 10.0 for limit in limits)
+
+
+def test_what_a_trial_of_one_joint_path_does_not_find_is_not_said_to_be_impossible(task):
+    remedy = Remedy("robot.payload.mass", 8.0, 4.0, "kg")
+    found = hint(task, [remedy], lambda changed, _: changed.robot.payload.mass < 5.0 or None)
+    assert re.match(r"Lower robot\.payload\.mass to 4\.\d+ kg \(a plan with it was verified\), or", found)
+
+
+@pytest.mark.parametrize("seconds", [0.0, 60.0])
+def test_a_number_that_was_not_verified_is_not_told(task, seconds):
+    remedies = [
+        Remedy("boundary.end_speed", 0.9, 0.5, "m/s"),
+        Remedy("robot.payload.mass", 8.0, 4.0, "kg", is_refined=False),
+    ]
+    found = hint(task, remedies, lambda *_: False, seconds=seconds)
+    assert found == "Lower boundary.end_speed (how far was not found out), or try another path"
+
+
+def test_a_payload_that_the_arm_can_hold_is_advised(monkeypatch):
+    monkeypatch.setattr("brachis.search.remedies._TIME", 600.0)
+    task = {
+        "brachis": 1,
+        "robot": {"urdf": str(IIWA), "payload": {"mass": 60.0}},
+        "start": {"joints": [0.0, 0.3, 0.0, -1.2, 0.0, 0.8, 0.0]},
+        "task_space": "joints",
+        "path": [{"line": {"to": [0.6, 0.5, -0.3, -0.9, 0.4, 0.6, 0.5]}}],
+        "spline": {"intervals": 12},
+        "search": {"effort": "single", "least_motion": False, "time_limit": 600.0},
+    }
+    with pytest.raises(brachis.errors.StartError, match="cannot hold the arm against gravity") as caught:
+        brachis.plan(task)
+    mass = float(re.search(r"Lower robot\.payload\.mass to ([\d.]+) kg \(a plan", caught.value.hint)[1])
+    task["robot"]["payload"]["mass"] = mass
+    assert brachis.plan(task).verified
