@@ -195,7 +195,7 @@ def test_beyond_the_tolerance_the_message_tells_the_numbers_apart(excess):
     robot = brachis.robots.iiwa14
     waypoints = np.array([0.0, 0.3, 0.0, -1.2, 0.0, 0.6, 0.0]) * np.ones((2, 1))
     waypoints[1, 0] = robot.limits.position_upper[0] + excess
-    with pytest.raises(PathError, match="joint_1.*out of its range") as caught:
+    with pytest.raises(PathError, match=r"joint_1.*out of its range") as caught:
         brachis.plan(robot, path=waypoints, task_space="joints")
     assert float(caught.value.found.split()[0]) > float(caught.value.allowed.split()[-2])
     with pytest.raises(StartError, match="joint_1") as caught:

@@ -105,9 +105,7 @@ def _check_range_along(robot: Robot, along: np.ndarray, tolerance: float) -> Non
         raise PathError(f"joint {joint!r} is out of its range", where="path", **facts)
 
 
-def _beyond_range(
-    robot: Robot, postures: np.ndarray, tolerance: float
-) -> tuple[int, str, dict[str, Any]] | None:
+def _beyond_range(robot: Robot, postures: np.ndarray, tolerance: float) -> tuple[int, str, dict[str, Any]] | None:
     """Find the first joint that is out of its range in postures, (K, n): where most, its name, and what is told."""
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
     beyond = np.maximum(lower - postures, postures - upper) - tolerance * position_measure(lower, upper)

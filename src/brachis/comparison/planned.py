@@ -9,11 +9,11 @@ from brachis.arguments import check_callable, file_name, named
 from brachis.comparison.comparison import Comparison
 from brachis.errors import PathError, PlanningError
 from brachis.planner import plan
+from brachis.progress import Listener
 from brachis.recording import import_motion
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.task_map import JOINTS
-from brachis.search import Listener
 from brachis.task import SplineSettings, Task
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, Self, Unpack
 
 import numpy as np
 import pinocchio as pin
@@ -86,6 +86,15 @@ class Robot(Summary):
     urdf: str
     rolls_freely: bool = False
 
+    def __new__(cls, *given: object, **named_fields: object) -> Self:
+        """Refuse a file name, which is for `from_urdf`."""
+        if given or (named_fields and "model" not in named_fields):
+            allowed = 'brachis.Robot.from_urdf("robot.urdf")'
+            raise InputError(
+                "a robot is not made of these", where="Robot", found=given or named_fields, allowed=allowed
+            )
+        return super().__new__(cls)
+
     @classmethod
     def from_urdf(
         cls,
@@ -96,7 +105,7 @@ class Robot(Summary):
         base_frame: str | None = None,
         gravity: Sequence[float] = STANDARD_GRAVITY,
         locked_joints: Mapping[str, float] | None = None,
-        limits: LimitSpec | None = None,
+        limits: LimitSpec | LimitKeywords | None = None,
         friction: Mapping[str, object] | None = None,
         payload: Mapping[str, object] | Payload | None = None,
         tool_offset: Mapping[str, object] | Placement | None = None,
@@ -120,7 +129,7 @@ class Robot(Summary):
             Gravitational acceleration in the world frame, m/s^2.
         locked_joints : mapping of str to float, optional
             Joints held at a position, rad or m.
-        limits : LimitSpec, optional
+        limits : LimitSpec or mapping, optional
             Limits that override or complete the URDF's.
         friction : mapping, optional
             Keyword arguments of `Friction.of`; what it leaves out is taken from the URDF.
@@ -150,7 +159,7 @@ class Robot(Summary):
                 "speed_override": speed_override,
             }
         )
-        spec = limits or LimitSpec()
+        spec = check_robot_settings({"limits": limits}).limits if isinstance(limits, Mapping) else limits or LimitSpec()
         vector = _vector(gravity)
         text = read_file(Path(path)) if urdf_text is None else urdf_text
         chain = read_chain(

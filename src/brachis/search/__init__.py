@@ -6,12 +6,11 @@ from brachis.search.pacing import first_breaks, first_point
 from brachis.search.portfolio import Stages, find_fastest
 from brachis.search.recentring import best_of_joints, solved_in_chart
 from brachis.search.record import Record
-from brachis.search.solving import MARGINS, Listener, continued, eased, solve_with
+from brachis.search.solving import MARGINS, continued, eased, solve_with
 
 __all__ = [
     "GIVEN",
     "MARGINS",
-    "Listener",
     "Record",
     "Stages",
     "best_of_joints",

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from threadpoolctl import ThreadpoolController
 
 from brachis import interrupts
-from brachis.search.solving import Listener
+from brachis.progress import Listener
 
 _MAIN = "MainProcess"
 

@@ -157,12 +157,12 @@ def _ends_too_fast(problem: Problem, s: np.ndarray, q: np.ndarray, stations: np.
     share, key = min(found, default=(1.0, ""))
     if share >= _EXACT:
         return None
-    asked = getattr(problem.task.boundary, key)
+    asked, unit = getattr(problem.task.boundary, key), problem.task.speed_unit
     error = PlanningError(
         f"the limits do not allow so high a speed at the path's {key.removesuffix('_speed')}",
         where=f"boundary.{key}",
-        found=f"{asked:g} {problem.task.speed_unit}",
-        allowed=f"about {share * asked:.3g} {problem.task.speed_unit} at most, along the best joint path that was found",
+        found=f"{asked:g} {unit}",
+        allowed=f"about {share * asked:.3g} {unit} at most, along the best joint path that was found",
         hint=f"Lower boundary.{key}, or raise the limits of the joints",
     )
     return TooFast(share, error)

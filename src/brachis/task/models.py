@@ -193,6 +193,9 @@ class Task(Model):
             raise refuse("poses are not segments", found=rows, allowed=allowed)
         if len(rows) > 1 and all(isinstance(row, list) for row in rows):
             return ({"spline": {"starts_at": rows[0], "through": rows[1:]}},)
+        if rows and all(isinstance(row, list | int | float) for row in rows):
+            allowed = "two points or more, [[...], [...]], or a segment such as {line: {to: [...]}}"
+            raise refuse("a path cannot be made of these numbers", found=rows, allowed=allowed)
         return path
 
     @field_validator("path")
@@ -213,7 +216,10 @@ class Task(Model):
             problem = "a free start posture leaves open where the path begins"
             pose = isinstance(self.task_space, str)
             rows = (*POSITION_ROWS, "qw", "qx", "qy", "qz") if pose else self.task_space
-            allowed = "the joints" if self.task_space == "joints" else f"[{', '.join(rows)}]"
+            if self.task_space == "joints":
+                problem = "a path of joints that does not begin with a waypoint needs a start posture"
+                raise refuse(problem, key="start", absent=True, allowed="{joints: [...]}")
+            allowed = f"[{', '.join(rows)}]"
             raise refuse(problem, key="path_start", absent=True, allowed=allowed)
         if self.start == "free" and self.search.guesses == "numeric":
             problem = "numeric inverse kinematics needs a posture to begin with, and start is free"
