@@ -30,6 +30,7 @@ ORDER = (
     "arrays",
     "deadline",
     "interrupts",
+    "progress",
     "summary",
     "cam",
     "task",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 import runpy
 import warnings
 from dataclasses import fields
@@ -200,12 +202,12 @@ def test_one_task_is_no_list_of_tasks():
             brachis.plan_many(one)
 
 
-def test_a_bar_tells_of_many_plans(capsys):
+def test_a_line_tells_of_many_plans(capsys):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         (outcome,) = brachis.plan_many([{"brachis": 1}], progress=True)
     assert isinstance(outcome, TaskError)
-    assert "100%" in capsys.readouterr().err
+    assert "planned 1 of 1 tasks" in capsys.readouterr().err
 
 
 def test_every_key_of_a_task_is_a_keyword():
@@ -229,3 +231,105 @@ def test_a_misspelt_robot_is_told_from_a_missing_file():
     for name in ("gantry2_result", "task"):
         with pytest.raises(TaskError, match="there is no such file"):
             brachis.plan(name)
+
+
+FIRST = [0.0, 0.3, 0.0, -1.2, 0.0, 0.6, 0.0]
+JOINTS = np.add(FIRST, [[0.0] * 7, [0.2, 0.1, 0.1, 0.2, 0.1, -0.1, 0.2], [0.3, 0.3, 0.2, 0.1, 0.0, -0.2, 0.1]])
+SHORT = {"effort": "single", "intervals": 8, "least_motion": False}
+ARM = {"task_space": "joints", **SHORT}
+POINTS = np.array([[1.73205, 0.0], [1.72, 0.1], [1.7, 0.2]])
+NAMED = {"j1": Q0[0], "j2": Q0[1], "j3": Q0[2]}
+WORKS = {
+    "an array of joints": lambda: brachis.plan("iiwa14", path=JOINTS, **ARM),
+    "an array of points": lambda: brachis.plan("scara3", **{**LINE, "path": POINTS}),
+    "a spline through all waypoints": lambda: brachis.plan("iiwa14", path=brachis.Spline(JOINTS), **ARM),
+    "a mapping for a segment": lambda: brachis.plan("scara3", **{**LINE, "path": {"line": {"by": [0.0, 0.3]}}}),
+    "a tuple": lambda: brachis.plan("scara3", **{**LINE, "start": tuple(Q0)}),
+    "joints by name": lambda: brachis.plan("scara3", **{**LINE, "start": NAMED}),
+    "the task by name": lambda: brachis.plan("scara3", task=brachis.examples.scara_line, **QUICK),
+    "limits as a mapping": lambda: brachis.plan("scara3", **LINE, limits={"torque": 12}),
+    "a solver's name": lambda: brachis.plan("scara3", **LINE, solver="slsqp"),
+}
+
+
+@pytest.mark.parametrize("snippet", WORKS)
+def test_what_strangers_type_works(snippet):
+    result = WORKS[snippet]()
+    assert result.verified
+    assert result.duration == result.t_end
+
+
+SEGMENT = brachis.Line(by=[0.0, 0.3])
+SCARA = {"start": Q0, "task_space": ["x", "y"]}
+ANSWERS = {
+    'brachis.Robot("a.urdf")': (InputError, "from_urdf"),
+    'brachis.plan("a.urdf")': (brachis.errors.UrdfError, "does not exist"),
+    "brachis.plan()": (TaskError, "task_space: What the path prescribes"),
+    'brachis.plan(robot="scara3", path=SEGMENT, **SCARA)': (InputError, "brachis.plan('scara3', path=...)"),
+    'brachis.plan("scara3", path=SEGMENT, q0=Q0)': (UnknownNameError, "'start'"),
+    'brachis.plan("scara3", start=Q0, goal=Q0)': (UnknownNameError, "'end'"),
+    'brachis.plan("scara3", waypoints=POINTS)': (UnknownNameError, "'path'"),
+    'brachis.plan("scara3", timeout=3)': (UnknownNameError, "'time_limit'"),
+    'brachis.plan("scara3", verbose=True)': (UnknownNameError, "'progress'"),
+    'brachis.plan("scara3", torque=12)': (UnknownNameError, "limits={'torque': ...}"),
+    'brachis.plan("scara3", velocity_limits=2)': (UnknownNameError, "limits={'velocity': ...}"),
+    'brachis.plan("scara3", n_intervals=12)': (UnknownNameError, "'intervals'"),
+    "brachis.plan_many([], workers=2)": (UnknownNameError, "'jobs'"),
+    'brachis.plan("scara3", path=SEGMENT, **SCARA, solver="IPOPT")': (UnknownNameError, "Did you mean 'ipopt'"),
+    'brachis.plan("scara3", path=SEGMENT, **SCARA, spline=30)': (TaskError, "keys out of degree, intervals"),
+    'brachis.plan("scara3", path=np.sin, **SCARA)': (TaskError, "brachis.bspline_segment"),
+    'brachis.plan("gen3", path=[pin.SE3.Identity()] * 2, task_space="pose", start="free")': (
+        TaskError,
+        "brachis.Spline",
+    ),
+    'brachis.plan("iiwa14", path=[0.1] * 7, task_space="joints")': (TaskError, "two points or more"),
+    'brachis.plan("iiwa14", path=brachis.Line(by=[0.1] * 7), task_space="joints")': (TaskError, "start posture"),
+    'brachis.plan("<robot>\\n</robot>")': (TaskError, "urdf_text"),
+    "brachis.Line(end=[0, 1])": (UnknownNameError, "'to'"),
+    "brachis.load": (AttributeError, "'load_task'"),
+    "brachis.optimize": (AttributeError, "'plan'"),
+    "brachis.version": (AttributeError, "'__version__'"),
+    "brachis.plot": (AttributeError, "'plots'"),
+    "result.success": (AttributeError, "'verified'"),
+    "result.q": (AttributeError, "'trajectory.q'"),
+    "result.torque": (AttributeError, "'trajectory.torque'"),
+    "result.positions": (AttributeError, "'trajectory.q'"),
+    "result.t": (AttributeError, "'trajectory.times'"),
+    "result.export": (AttributeError, "'brachis.export.write'"),
+    "result.trajectory.duration": (AttributeError, "'t_end'"),
+    "result.trajectory.qd": (AttributeError, "'qdot'"),
+    "result.sample(0.1).time": (AttributeError, "'t'"),
+    "result.task.effort": (AttributeError, "'search.effort'"),
+    "brachis.robots.scara3.dof": (AttributeError, "'n'"),
+}
+
+
+@pytest.fixture(scope="module")
+def result():
+    return brachis.plan("scara3", **LINE)
+
+
+@pytest.mark.parametrize("snippet", ANSWERS)
+def test_what_strangers_type_is_answered_with_the_right_name(snippet, result):
+    kind, answer = ANSWERS[snippet]
+    with pytest.raises(kind) as caught:
+        eval(snippet, {**globals(), "result": result})  # noqa: S307
+    assert answer in str(caught.value)
+
+
+def test_what_is_there_is_not_hidden_by_answers(result):
+    assert not hasattr(result, "_repr_png_")
+    assert pickle.loads(pickle.dumps(result.trajectory.task)) == result.trajectory.task  # noqa: S301
+    assert copy.deepcopy(result.task).path == result.task.path
+    assert brachis.Robot.from_urdf(result.trajectory.robot.source, limits={"torque": 12}).limits.torque[0] == 12
+    with pytest.raises(AttributeError, match=r"no attribute 'nothing_like_it'$"):
+        _ = result.nothing_like_it
+
+
+def test_a_solvers_name_keeps_the_solvers_other_settings():
+    file = {**LINE, "solver": {"tolerance": 1e-7}}
+    assert task_with(task_with(**file), solver="slsqp").solver.model_dump(exclude_defaults=True) == {
+        "name": "slsqp",
+        "tolerance": 1e-7,
+    }
+    assert brachis.load_task({**task_with(**LINE).to_dict(), "solver": "slsqp"}).solver.name == "slsqp"

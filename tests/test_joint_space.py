@@ -5,20 +5,22 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import json
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 import brachis
 from brachis.bottleneck import check_sensitivities, solved_again
-from brachis.errors import PathError, StartError
+from brachis.errors import InputError, PathError, StartError
 from brachis.robot import dynamics
 from brachis.task import LimitSpec, task_with
 from brachis.verify import verify_trajectory
-from support.chains import planar_robot
+from support.chains import Joint, chain_urdf, planar_robot
 
 ROOT = Path(__file__).parents[1]
 IIWA = ROOT / "robots/iiwa14/robot.urdf"
@@ -197,7 +199,7 @@ def test_beyond_the_tolerance_the_message_tells_the_numbers_apart(excess):
     robot = brachis.robots.iiwa14
     waypoints = np.array([0.0, 0.3, 0.0, -1.2, 0.0, 0.6, 0.0]) * np.ones((2, 1))
     waypoints[1, 0] = robot.limits.position_upper[0] + excess
-    with pytest.raises(PathError, match="joint_1.*out of its range") as caught:
+    with pytest.raises(PathError, match=r"joint_1.*out of its range") as caught:
         brachis.plan(robot, path=waypoints, task_space="joints")
     assert float(caught.value.found.split()[0]) > float(caught.value.allowed.split()[-2])
     with pytest.raises(StartError, match="joint_1") as caught:
@@ -245,3 +247,16 @@ def test_a_table_of_joints_in_any_order_has_its_start(tmp_path):
 def test_waypoints_that_begin_elsewhere_are_refused():
     with pytest.raises(PathError, match=r"starts elsewhere.*rad or m off"):
         brachis.plan("iiwa14", path=WAYPOINTS[1:], start=WAYPOINTS[0], task_space="joints")
+
+
+@pytest.mark.parametrize("space", ["pose", "joints"])
+def test_a_turn_of_one_joint_is_answered_with_a_path_of_joints(space, tmp_path):
+    limit = {"lower": -3.0, "upper": 3.0, "velocity": 3.0, "effort": 20.0}
+    (tmp_path / "turntable.urdf").write_text(chain_urdf([Joint("revolute", axis=(0.0, 0.0, 1.0), limit=limit)]))
+    turn = {"turn": {"rotate": {"axis": [0, 0, 1], "angle_deg": 90}}}
+    with pytest.raises(InputError, match=r"line: {by: \[[0-9.]+\]}") as caught:
+        brachis.plan(tmp_path / "turntable.urdf", path=turn, start=[0.0], task_space=space)
+    advice = re.search(r"{by: \[[0-9.]+\]}", str(caught.value))
+    line = {"line": yaml.safe_load(advice[0])}
+    result = brachis.plan(tmp_path / "turntable.urdf", path=line, start=[0.0], task_space="joints", intervals=8)
+    assert result.verified

@@ -119,7 +119,11 @@ def __getattr__(name: str) -> object:
     if name in _MODULES:
         return importlib.import_module(f"brachis.{name}")
     if name not in _HOME:
-        message = f"module 'brachis' has no attribute {name!r}"
+        from brachis.errors import nearest  # noqa: PLC0415
+
+        near = None if name.startswith("_") else nearest(name, __all__)
+        hint = f". Did you mean {near!r}?" if near else ""
+        message = f"module 'brachis' has no attribute {name!r}{hint}"
         raise AttributeError(message)
     return getattr(importlib.import_module(f"brachis.{_HOME[name]}"), name)
 

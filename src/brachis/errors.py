@@ -48,6 +48,40 @@ class Remedy:
         return "lower" if self.guess < self.asked else "raise"
 
 
+_NAMES_HERE = {
+    name: tuple(here.split())
+    for names, here in (
+        ("duration end_time total_time", "t_end"),
+        ("success ok valid feasible", "verified"),
+        ("t ts time timestamps", "t times"),
+        ("positions joint_positions qs pos", "q position"),
+        ("velocities qd dq qs_dot", "qdot velocity"),
+        ("accelerations qdd ddq", "qddot acceleration"),
+        ("tau torques", "tau torque"),
+        ("eval evaluate interpolate value", "at"),
+        ("dof ndof nq nv num_joints", "n"),
+        ("fk forward_kinematics tool_pose", "tool_placement"),
+        ("show animate display visualize", "view"),
+        ("to_csv to_file write dump export", "brachis.export.write"),
+        ("q0 q_start initial start_joints start_posture start_state", "start"),
+        ("goal target q_goal q_end goal_state", "end to"),
+        ("stop finish", "end to"),
+        ("waypoints points", "path through"),
+        ("timeout max_time", "time_limit"),
+        ("verbose callback", "progress"),
+        ("workers n_jobs num_workers processes threads", "jobs"),
+        ("gridpoints n_intervals segments", "intervals"),
+        ("optimize optimise solve generate compute_trajectory", "plan"),
+        ("load read open", "load_task"),
+        ("load_robot load_urdf from_urdf model", "Robot"),
+        ("version", "__version__"),
+        ("end", "to"),
+    )
+    for name in names.split()
+}
+"""Names that other libraries use, and those used here, of which the first one that exists is meant."""
+
+
 class BrachisError(Exception):
     """Base class of all errors of brachis.
 
@@ -326,16 +360,39 @@ class PlanningError(BrachisError):
 
 
 def nearest(name: str, valid: Iterable[str], likeness: float = 0.5) -> str | None:
-    """Return the valid name with which `name` begins, or that is most like it; None where none is.
+    """Return the valid name that other libraries call so, with which `name` begins, or that is most like it, or None.
 
-    Names with a likeness of 1 are the same.
+    Names with a likeness of 1 are the same, but for capitals.
     """
-    valid = list(valid)
-    begun = [one for one in valid if name.startswith(f"{one}_")]
+    by_small = {one.lower(): one for one in valid}
+    small = name.lower()
+    known = [one for one in _NAMES_HERE.get(small, ()) if one in by_small.values() or "." in one]
+    begun = [one for one in by_small if small.startswith(f"{one}_")]
+    if known and small not in by_small:
+        return known[0]
     if begun:
-        return max(begun, key=len)
-    near = difflib.get_close_matches(name, valid, n=1, cutoff=likeness)
-    return near[0] if near else None
+        return by_small[max(begun, key=len)]
+    near = difflib.get_close_matches(small, by_small, n=1, cutoff=likeness)
+    return by_small[near[0]] if near else None
+
+
+def missing_attribute(thing: object, name: str) -> AttributeError:
+    """Return what an object without such an attribute raises: it names the one that may be meant, also of its parts."""
+    message = f"{type(thing).__name__!r} object has no attribute {name!r}"
+    if name.startswith("_"):
+        return AttributeError(message)
+    own = [each for each in dir(thing) if not each.startswith("_")]
+    parts = [(part, value) for part, value in vars(thing).items() if part in own]
+    for word in (name, *_NAMES_HERE.get(name.lower(), ())):
+        within = [f"{part}.{word}" for part, value in parts if hasattr(type(value), word) or word in _contents(value)]
+        if word in own or within or "." in word:
+            return AttributeError(f"{message}. Did you mean {word if word in own else [*within, word][0]!r}?")
+    near = nearest(name, own)
+    return AttributeError(message + (f". Did you mean {near!r}?" if near else ""))
+
+
+def _contents(value: object) -> dict[str, object]:
+    return getattr(value, "__dict__", {})
 
 
 def write_apart(value: float, *others: float, digits: int = 4) -> tuple[str, ...]:

@@ -24,8 +24,8 @@ from brachis.completion import completed
 from brachis.deadline import Deadline
 from brachis.errors import UnreachableError
 from brachis.nlp import LeastAcceleration, Program
+from brachis.progress import Iteration, Listener
 from brachis.refine import RefinementOptions, Solve
-from brachis.search import Listener
 from brachis.search.joint_path import reciprocals_near
 from brachis.solvers import SolverOptions, SolverReport, SolveStatus, solver_named
 from brachis.summary import Summary
@@ -175,7 +175,8 @@ def _solver(name: str, deadline: Deadline, listener: Listener, patience: int) ->
     (backend,) = solver_named(name)
 
     def progress(iteration: int, objective: float) -> None:
-        listener(f"least motion: iteration {iteration}, joint accelerations (rms) {100.0 * objective**0.5:.1f} %")
+        rms = 100.0 * objective**0.5
+        listener(Iteration(f"least motion: iteration {iteration}, joint accelerations (rms) {rms:.1f} %"))
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
         options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.left, _PROGRESS, patience, anywhere=True)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import closing
 from typing import Any, Unpack
 
 from brachis.arguments import count
 from brachis.errors import BrachisError, InputError
 from brachis.planner import Given, plan
+from brachis.progress import report_progress
 from brachis.result import Result
 from brachis.search.processes import each, processes
 from brachis.task import Source, TaskKeywords, check_keywords
@@ -23,7 +24,7 @@ def plan_many(
     tasks: Iterable[Source | tuple[Given, Source]],
     *,
     jobs: int = 1,
-    progress: bool | OnProgress = False,
+    progress: bool | OnProgress | None = None,
     **keywords: Unpack[TaskKeywords],
 ) -> list[Outcome]:
     """Plan many tasks, in several processes; a plan that fails is an error in the list and stops no other.
@@ -35,8 +36,8 @@ def plan_many(
     jobs : int, optional
         Processes; no more than there are processors are used.
     progress : bool or callable, optional
-        True: a bar on standard error. A function: called after every plan, in the order of the tasks, with the number
-        of those done, the number of all, and the outcome.
+        True: how many are done, as `plan` shows its progress; left out: in notebooks. A function: called after every
+        plan, in the order of the tasks, with the number of those done, the number of all, and the outcome.
     **keywords
         Keys of all the tasks, as for `plan`.
 
@@ -73,29 +74,21 @@ def plan_many(
         raise InputError("is one task", where="tasks", found=type(tasks).__name__, allowed="a list of tasks")
     if not isinstance(tasks, Iterable):
         raise InputError("wrong type", where="tasks", found=repr(tasks), allowed="a list of tasks")
-    check_keywords(keywords, "plan_many")
+    check_keywords(keywords, "plan_many", ("jobs", "progress"))
     given, jobs = list(tasks), processes(count(jobs, "jobs"))
     outcomes: list[Outcome] = []
     work = _outcome, given, keywords
-    with _telling(progress) as tell, closing(each(*work, jobs=jobs, listener=_deaf)) as made:
+    if callable(progress):
+        heard, progress = progress, False
+    else:
+        heard = None
+    with report_progress(None, progress) as tell, closing(each(*work, jobs=jobs, listener=_deaf)) as made:
         for outcome in made:
             outcomes.append(outcome)
-            tell(len(outcomes), len(given), outcome)
+            tell(f"planned {len(outcomes)} of {len(given)} tasks")
+            if heard is not None:
+                heard(len(outcomes), len(given), outcome)
     return outcomes
-
-
-@contextmanager
-def _telling(progress: bool | OnProgress) -> Iterator[OnProgress]:  # noqa: FBT001
-    """Give what is told of every plan."""
-    if callable(progress):
-        yield progress
-        return
-    from rich.console import Console  # noqa: PLC0415  (for those who want a bar)
-    from rich.progress import Progress  # noqa: PLC0415
-
-    with Progress(console=Console(stderr=True), disable=not progress) as bars:
-        bar = bars.add_task("planning")
-        yield lambda done, total, _outcome: bars.update(bar, completed=done, total=total)
 
 
 def _deaf(_text: str) -> None:
@@ -106,6 +99,6 @@ def _outcome(given: Any, keywords: TaskKeywords, listener: Callable[[str], None]
     """Plan one task."""
     robot, task = given if isinstance(given, tuple) else (None, given)
     try:
-        return plan(robot, task, listener=listener, **keywords)
+        return plan(robot, task, listener=listener, progress=False, **keywords)
     except BrachisError as error:
         return error

@@ -9,8 +9,10 @@ The search decides what is solved and finished, and in which order; the two func
 from __future__ import annotations
 
 import dataclasses
+import os
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Unpack
 
 import numpy as np
@@ -22,22 +24,23 @@ from brachis.attempt import Attempt, Start
 from brachis.completion import completed
 from brachis.custom_limits import LimitModel
 from brachis.deadline import Deadline
-from brachis.errors import BrachisError
+from brachis.errors import BrachisError, InputError
 from brachis.least_motion import calmest
 from brachis.mesh import adapt_mesh, coarsest
 from brachis.nlp import Program
 from brachis.nlp.layout import SHORTEST_TIME
 from brachis.problem import Decomposition, Problem, breaks_of, decompositions_of, phase_in, program_of
+from brachis.progress import Listener, report_progress
 from brachis.refine import RefinementOptions, Solve
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.combine import robot_for
 from brachis.robot.from_task import robot_from_settings
+from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, located
 from brachis.search import (
     GIVEN,
     MARGINS,
-    Listener,
     Stages,
     best_of_joints,
     continued,
@@ -53,26 +56,28 @@ from brachis.search import (
     try_remedies,
 )
 from brachis.solvers import SolveStatus, solver_named
-from brachis.task import Source, Task, TaskKeywords, task_with
+from brachis.task import Source, Task, TaskKeywords, check_keywords, task_with
 from brachis.trajectory import Motion, Trajectory, motion_of
 
 Given = Source | Robot | None
 """A robot, or a task; both may be the name of a file."""
 _MANY_VARIABLES = 150
 """Above this a cold solve takes seconds, and the program is first solved over some of its knots."""
+_OWN_KEYWORDS = ("start_from", "families", "own_limits", "listener", "progress", "strict")
 _KNOT_TIME = 0.4
 """Part of the remaining time that may go into the knots."""
 
 
 def plan(
-    robot_or_task: Given,
-    task: Source | None = None,
+    robot_or_task: Given = None,
     /,
+    task: Source | None = None,
     *,
     start_from: Motion | None = None,
     families: Sequence[ik.Family] = (),
     own_limits: Sequence[LimitModel] = (),
     listener: Listener | None = None,
+    progress: bool | None = None,
     strict: bool = False,
     **keywords: Unpack[TaskKeywords],
 ) -> Result:
@@ -99,7 +104,11 @@ def plan(
         Limits of your own beside those of the task: objects whose ``bind(robot)`` returns a `brachis.limits.Limit`.
         They are not saved with the motion; those of installed packages are named in the task (``custom_limits``).
     listener : callable, optional
-        Told what happens.
+        Told what happens, in a line of text at a time; `logging` has it under the name ``brachis``, stages at level
+        INFO and iterations at DEBUG.
+    progress : bool, optional
+        Whether to show on standard error, or below a notebook's cell, what happens. Left out: in notebooks, unless
+        there is a listener.
     strict : bool, optional
         Whether figures that are hardly meant (degrees for rad, mm for m) are errors, not warnings.
     **keywords
@@ -136,9 +145,9 @@ def plan(
     True
     """
     # Batches are small: a second BLAS thread costs up to twenty times what it gives where cores are busy.
-    with ThreadpoolController().limit(limits=1, user_api="blas"):
+    check_callable(listener, "listener")
+    with ThreadpoolController().limit(limits=1, user_api="blas"), report_progress(listener, progress) as tell:
         began = time.perf_counter()
-        check_callable(listener, "listener")
         check_list(families, "families", "closed forms")
         robot, asked = _read(robot_or_task, task, keywords)
         known = None if start_from is None else motion_of(start_from, "start_from")
@@ -149,8 +158,7 @@ def plan(
             return _is_planned(robot, asked, changed, families, own_limits, limit)
 
         try:
-            hear = listener or (lambda _text: None)
-            return _plan(robot, asked, families, own_limits, known, hear, (began, loaded), deadline, strict=strict)
+            return _plan(robot, asked, families, own_limits, known, tell, (began, loaded), deadline, strict=strict)
         except BrachisError as error:
             try_remedies(error, asked, robot.joint_names, is_task_planned, deadline)
             raise
@@ -158,10 +166,17 @@ def plan(
 
 def _read(first: Given, task: Source | None, keywords: TaskKeywords) -> tuple[Robot, Task]:
     """Return the robot, and the task with all that the robot was made with."""
-    # What is no robot is a task.
+    check_keywords(keywords, "plan", _OWN_KEYWORDS)
+    if is_robot(keywords.get("robot")):
+        allowed = "a robot comes first, without a name: brachis.plan('scara3', path=...)"
+        found = repr(keywords["robot"]) if isinstance(keywords["robot"], str) else type(keywords["robot"]).__name__
+        raise InputError("this is the section of a task, a mapping", where="robot", found=found, allowed=allowed)
+    # Everything else than a robot is a task.
     alone = task is None and first is not None and not is_robot(first)
     given, source = (None, first) if alone else (first, task)
     named = located(given)  # type: ignore[arg-type]
+    if isinstance(named, str | os.PathLike):
+        read_file(Path(named))  # a missing file is the first thing to say
     asked = task_with(source, **keywords)  # type: ignore[arg-type]
     robot = robot_for(named, asked.robot)
     return robot, asked.model_copy(update={"robot": robot.settings})
@@ -183,6 +198,7 @@ def _plan(
     began, loaded = times
     remarks = plausibility.of_robot(robot) + plausibility.of_task(task)
     remarks = plausibility.tell(remarks, strict=strict, stacklevel=4)
+    listener(f"planning for {robot.n} joints along a path of {len(task.path)} segments, task space {_space(task)}")
     problem = Problem.of(robot, task, own_limits)
     places = plausibility.of_places(problem.task_map, problem.path, problem.start, problem.end, task.path_start)
     remarks += plausibility.tell(places, strict=strict, stacklevel=4)
@@ -196,10 +212,14 @@ def _plan(
     assert best.trajectory is not None and best.verification is not None  # noqa: PT018, S101
     searched = time.perf_counter()
     over = Deadline(0.0) if found.interrupted else deadline
+    if task.search.least_motion:
+        listener("looking for the calmest motion that is as fast")
     least = calmest(best, over, listener) if task.search.least_motion else None
     calmed = time.perf_counter()
     end_time = plausibility.of_end_time(best.t_end, SHORTEST_TIME)
     remarks += plausibility.tell(end_time, strict=strict, stacklevel=4)
+    total = time.perf_counter() - began
+    listener(f"planned: t_E = {best.t_end:.4f} s, {best.status}, after {total:.2f} s")
     return Result(
         task=problem.task,
         trajectory=best.trajectory if least is None else least.trajectory,
@@ -211,7 +231,7 @@ def _plan(
             "load": loaded - began,
             "search": searched - loaded,
             "least_motion": calmed - searched,
-            "total": time.perf_counter() - began,
+            "total": total,
         },
         candidates=found.in_order(),
         interrupted=found.interrupted,
@@ -235,6 +255,10 @@ def _is_planned(
         robot if same else robot_from_settings(changed.robot, urdf_text=robot.urdf), changed, own_limits
     )
     return is_planned(problem, decompositions_of(problem, families), Stages(solved, finished), deadline)
+
+
+def _space(task: Task) -> str:
+    return task.task_space if isinstance(task.task_space, str) else f"[{', '.join(task.task_space)}]"
 
 
 def _first(problem: Problem, decompositions: Sequence[Decomposition], known: Trajectory) -> Start | str:
@@ -332,9 +356,9 @@ def _solver(start: Start, deadline: Deadline, listener: Listener) -> Solve:
 
 
 def transcribe(
-    robot_or_task: Given,
-    task: Source | None = None,
+    robot_or_task: Given = None,
     /,
+    task: Source | None = None,
     *,
     families: Sequence[ik.Family] = (),
     own_limits: Sequence[LimitModel] = (),

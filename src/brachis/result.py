@@ -168,6 +168,11 @@ class Result(Summary):
         return self.trajectory.t_end
 
     @property
+    def duration(self) -> float:
+        """End time, s, as other planners name it."""
+        return self.t_end
+
+    @property
     def verified(self) -> bool:
         """True where every check of the verification passed."""
         return self.verification.passed

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from brachis.errors import missing_attribute
 
 COLUMNS, LINES = 100, 22
 _ROOM = 104
@@ -19,6 +21,14 @@ class Summary:
     def summary(self) -> Mapping[str, object]:
         """Return what is shown, by name."""
         return {each.name: getattr(self, each.name) for each in fields(self) if each.repr}  # type: ignore[arg-type]
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:  # noqa: ANN401
+            """Refuse a name that is not there, and name the one that may be meant."""
+            if hasattr(type(self), name):  # a property that failed
+                return object.__getattribute__(self, name)
+            raise missing_attribute(self, name)
 
     def __repr__(self) -> str:
         """Show it on one line, or on one line for each entry."""

@@ -10,11 +10,11 @@ from brachis.comparison.comparison import Comparison
 from brachis.comparison.rows import proven_ratios
 from brachis.errors import PathError, PlanningError
 from brachis.planner import plan
+from brachis.progress import Listener
 from brachis.recording import import_motion
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.task_map import JOINTS
-from brachis.search import Listener
 from brachis.task import SplineSettings, Task
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory

@@ -93,7 +93,7 @@ def waypoints_of(shape: SplineThrough, site: Site) -> Array:
 
 
 def repeats_start(steps: Array) -> bool:
-    """Tell whether the first waypoint is the segment's start, from the steps, (n - 1,), between n waypoints (m, rad)."""
+    """Tell whether the first waypoint is the segment's start, from the steps between it and all waypoints, (n - 1,)."""
     return len(steps) > 1 and bool(steps[0] < START_TOLERANCE and steps[0] <= _OF_NEXT * steps[1])
 
 

@@ -94,8 +94,8 @@ def of_end_time(t_end: float, least: float) -> tuple[Remark, ...]:
 
 def _tool(task: Task) -> Iterator[Figure]:
     """Look at the largest of every kind of limit; feed rates have units of their own."""
-    limits, ends, unit = task.tool_limits, task.boundary, task.speed_unit
-    turning = "degrees per second" if task.task_space == "joints" else "mm/s"
+    limits, ends = task.tool_limits, task.boundary
+    meant_at_ends = "degrees per second" if task.task_space == "joints" else "mm/s"
     speeds = limits.speed.speed if isinstance(limits.speed, SpeedTable) else [limits.speed]
     processes = [part.speed for part in limits.process_speed]
     # Delta robots move at 10 m/s, and accelerate with 15 g.
@@ -104,8 +104,8 @@ def _tool(task: Task) -> Iterator[Figure]:
         ("tool_limits.process_speed", processes, 50.0, "m/s", "mm/s"),
         ("tool_limits.acceleration", [limits.acceleration], 300.0, "m/s^2", "mm/s^2"),
         ("tool_limits.angular_speed", [limits.angular_speed], 60.0, "rad/s", "degrees per second"),
-        ("boundary.start_speed", [ends.start_speed], 50.0, unit, turning),
-        ("boundary.end_speed", [ends.end_speed], 50.0, unit, turning),
+        ("boundary.start_speed", [ends.start_speed], 50.0, task.speed_unit, meant_at_ends),
+        ("boundary.end_speed", [ends.end_speed], 50.0, task.speed_unit, meant_at_ends),
     ):
         largest = max((value for value in values if value is not None and value < _OPEN), default=0.0)
         limit = where.startswith("tool_limits")

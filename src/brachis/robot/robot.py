@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, Self, Unpack
 
 import numpy as np
 import pinocchio as pin
@@ -88,6 +88,15 @@ class Robot(Summary):
     urdf: str
     rolls_freely: bool = False
 
+    def __new__(cls, *given: object, **named_fields: object) -> Self:
+        """Refuse a file name, which is for `from_urdf`."""
+        if given or (named_fields and "model" not in named_fields):
+            allowed = 'brachis.Robot.from_urdf("robot.urdf")'
+            raise InputError(
+                "a robot is not made of these", where="Robot", found=given or named_fields, allowed=allowed
+            )
+        return super().__new__(cls)
+
     @classmethod
     def from_urdf(
         cls,
@@ -98,7 +107,7 @@ class Robot(Summary):
         base_frame: str | None = None,
         gravity: Sequence[float] = STANDARD_GRAVITY,
         locked_joints: Mapping[str, float] | None = None,
-        limits: LimitSpec | None = None,
+        limits: LimitSpec | LimitKeywords | None = None,
         friction: Mapping[str, object] | None = None,
         payload: Mapping[str, object] | Payload | None = None,
         tool_offset: Mapping[str, object] | Placement | None = None,
@@ -122,7 +131,7 @@ class Robot(Summary):
             Gravitational acceleration in the world frame, m/s^2.
         locked_joints : mapping of str to float, optional
             Joints held at a position, rad or m.
-        limits : LimitSpec, optional
+        limits : LimitSpec or mapping, optional
             Limits that override or complete the URDF's; those of joints off the chain, which stand still, have no
             effect.
         friction : mapping, optional
@@ -153,12 +162,13 @@ class Robot(Summary):
                 "speed_override": speed_override,
             }
         )
+        spec = check_robot_settings({"limits": limits}).limits if isinstance(limits, Mapping) else limits or LimitSpec()
         vector = _vector(gravity)
         text = read_file(Path(path)) if urdf_text is None else urdf_text
         chain = read_chain(
             text, str(path), tool_frame=tool_frame, base_frame=base_frame, locked_joints=dict(locked_joints or {})
         )
-        spec = without_joints(limits or LimitSpec(), chain.locked)
+        spec = without_joints(spec, chain.locked)
         model, names = build_model(chain, vector, added, str(path)), chain.joint_names
         resolved = resolve_limits(spec, names, chain.limits, added.speed_override)
         terms = Friction.of(names, chain.stated.friction, **dict(friction or {}))

@@ -7,12 +7,11 @@ from brachis.search.portfolio import Stages, find_fastest, is_planned
 from brachis.search.recentring import best_of_joints, solved_in_chart
 from brachis.search.record import Record
 from brachis.search.remedies import try_remedies
-from brachis.search.solving import MARGINS, Listener, continued, eased, solve_with
+from brachis.search.solving import MARGINS, continued, eased, solve_with
 
 __all__ = [
     "GIVEN",
     "MARGINS",
-    "Listener",
     "Record",
     "Stages",
     "best_of_joints",

@@ -11,6 +11,7 @@ from brachis.deadline import NEVER, Deadline
 from brachis.errors import PathError, UnreachableError
 from brachis.kinematics import CHART, Newton, chart_around
 from brachis.problem import Decomposition, Problem
+from brachis.progress import Listener
 from brachis.robot.task_map import JointSpace
 from brachis.search.holding import refuse_hopeless_loads
 from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
@@ -20,7 +21,6 @@ from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.phase_plane import least_time
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.screening import screened
-from brachis.search.solving import Listener
 from brachis.search.starts import PIECES, fine_places, lattice_starts, smoothed
 from brachis.search.too_fast import refuse_hopeless_speeds
 from brachis.search.variations import varied

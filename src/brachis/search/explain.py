@@ -102,7 +102,7 @@ def no_motion(
         hint=reason + _what_is_missing(problem),
     )
     ends = {f"boundary.{key}": getattr(problem.task.boundary, key) for key in ("start_speed", "end_speed")}
-    remedies = [Remedy(key, speed, _SLOWER * speed, task.speed_unit) for key, speed in ends.items() if speed]
+    remedies = [Remedy(key, speed, _SLOWER * speed, problem.task.speed_unit) for key, speed in ends.items() if speed]
     return error.with_remedies(*remedies)
 
 

@@ -21,12 +21,12 @@ from brachis import interrupts
 from brachis.attempt import Attempt, Start
 from brachis.deadline import Deadline
 from brachis.problem import Decomposition, Problem
+from brachis.progress import Listener
 from brachis.search.explain import no_motion, out_of_time, refuse_what_is_out_of_reach
 from brachis.search.holding import reason_in_holding
 from brachis.search.processes import each, processes
 from brachis.search.record import NOT_TRIED, Numbered, Record, rounded
 from brachis.search.schedule import Batch, batches
-from brachis.search.solving import Listener
 from brachis.search.too_fast import out_of_reach, unlikely
 
 _COARSE_SHARE = 0.6

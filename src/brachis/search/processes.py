@@ -6,12 +6,15 @@ import multiprocessing
 import os
 import warnings
 from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import BrokenExecutor
+from pickle import PicklingError
 from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
 from brachis import interrupts
-from brachis.search.solving import Listener
+from brachis.errors import BrachisError
+from brachis.progress import Listener
 
 _MAIN = "MainProcess"
 
@@ -41,6 +44,11 @@ def each(
     ------
     object
         What the function returns, in the order of the items.
+
+    Raises
+    ------
+    BrachisError
+        The work cannot be sent to other processes, or a process ended before its work was done.
     """
     if jobs == 1 or len(given) <= 1 or _within_a_worker():
         for item in given:
@@ -58,6 +66,12 @@ def each(
             )
         for one in made:  # noqa: UP028  ("yield from" would close `made` before the lines below)
             yield one
+    except (BrokenExecutor, PicklingError) as error:
+        raise BrachisError(
+            "other processes cannot do the work",
+            found=str(error).partition("\n")[0].rstrip("."),
+            hint="Plan with jobs: 1; a limit or closed form of your own has to be in a module that they can import",
+        ) from error
     finally:
         with interrupts.postponed(), warnings.catch_warnings():  # that work is thrown away is meant
             warnings.simplefilter("ignore")

@@ -16,6 +16,7 @@ from brachis.attempt import Start
 from brachis.deadline import Deadline
 from brachis.nlp.differential_ik import STRATEGIES
 from brachis.problem import Decomposition, Problem
+from brachis.progress import Listener
 from brachis.robot.task_map import JointSpace
 from brachis.search.chart_starts import chart_starts
 from brachis.search.holding import refuse_hopeless_loads
@@ -23,7 +24,6 @@ from brachis.search.joint_path import DeadEnd
 from brachis.search.joint_space_start import joint_space_start
 from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.processes import each, processes
-from brachis.search.solving import Listener
 from brachis.search.starts import lattice_starts, numeric_starts
 from brachis.search.too_fast import refuse_hopeless_speeds
 from brachis.solvers import solver_named

@@ -19,11 +19,11 @@ from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap
 from brachis.nlp import Program
 from brachis.problem import Problem, program_of
+from brachis.progress import Listener
 from brachis.refine import Solve
 from brachis.search.pacing import first_point
 from brachis.search.processes import each, processes
 from brachis.search.recentring import solved_in_chart
-from brachis.search.solving import Listener
 from brachis.solvers import SolverOptions, SolverReport, SolveStatus, solver_named
 
 _INTERVALS, _DEGREE = 12, 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,12 +13,10 @@ from brachis.kinematics import ChartMap, JointMap
 from brachis.limits.branch_margin import MARGIN
 from brachis.nlp import Program
 from brachis.nlp.guess import shortest_time
+from brachis.progress import Iteration, Listener
 from brachis.refine import Solve
 from brachis.solvers import Solver, SolverOptions, SolverReport, SolveStatus
 from brachis.task import SolverSettings
-
-Listener = Callable[[str], None]
-"""Told in plain words what the planner is doing, between iterations; may raise KeyboardInterrupt."""
 
 MARGINS = (0.1, 0.02, MARGIN)
 """Branch margins that are tried in turn; see `continued`."""
@@ -144,7 +142,7 @@ def solve_with(
     stagnation = _STAGNATION if isinstance(joint_map, ChartMap) else ()
 
     def progress(iteration: int, objective: float) -> None:
-        listener(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s")
+        listener(Iteration(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s"))
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
         remaining = deadline.within(settings.time_limit).left

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -13,13 +13,13 @@ from typing import Any
 import brachis
 from brachis import interrupts
 from brachis.arguments import check_callable
+from brachis.progress import Listener, report_progress
 from brachis.sweeps.plans import Plan, SweepPlan, load_sweep
 from brachis.sweeps.pools import pool_for
 from brachis.sweeps.result import SweepResult
 from brachis.sweeps.store import COLUMNS, Store
 from brachis.sweeps.worker import FAILED, Outcome
 
-Listener = Callable[[str], None]
 _MINUTE, _HOUR = 60, 3600
 """Seconds."""
 
@@ -32,6 +32,7 @@ def sweep(
     scheduler: str | None = None,
     retry: bool = False,
     listener: Listener | None = None,
+    progress: bool | None = None,
 ) -> SweepResult:
     """Plan a task many times, with other values of its keys.
 
@@ -55,6 +56,8 @@ def sweep(
         Whether stored failures are planned again.
     listener : callable, optional
         Told how far the sweep is, and how much time is left.
+    progress : bool, optional
+        Whether to show that, as `plan` does.
 
     Returns
     -------
@@ -88,7 +91,20 @@ def sweep(
     ['verified', 'verified']
     """
     check_callable(listener, "listener")
-    listener = listener or (lambda _text: None)
+    with report_progress(listener, progress) as tell:
+        return _sweep(source, out, jobs, scheduler, retry=retry, listener=tell)
+
+
+def _sweep(
+    source: str | os.PathLike[str] | Mapping[str, Any],
+    out: str | os.PathLike[str] | None,
+    jobs: int | None,
+    scheduler: str | None,
+    *,
+    retry: bool,
+    listener: Listener,
+) -> SweepResult:
+    """Plan what is not stored yet; see `sweep`."""
     listener("checking the sweep")
     planned = load_sweep(source)
     pool = pool_for(jobs, scheduler, listener)

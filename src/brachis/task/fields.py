@@ -10,11 +10,12 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Strict, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from brachis.errors import missing_attribute
 from brachis.summary import shown
 
 REFUSED = "brachis_refused"
@@ -33,6 +34,15 @@ class Model(BaseModel):
 
     # Instances are checked again, because a program can make limits that nobody has checked.
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, revalidate_instances="always")
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:  # noqa: ANN401
+            """Refuse a name that is not there, and name the one that may be meant."""
+            try:
+                return super().__getattr__(name)
+            except AttributeError:
+                raise missing_attribute(self, name) from None
 
     def __repr_args__(self) -> list[tuple[str | None, Any]]:
         """Leave out what is as by default; `__repr__` is pydantic's and shows these."""

@@ -126,8 +126,16 @@ def task_with(source: Source | None = None, /, **keywords: Unpack[TaskKeywords])
     return load_task(content)
 
 
-def check_keywords(keywords: Iterable[str], where: str = "plan") -> None:
+def check_keywords(keywords: Iterable[str], where: str = "plan", own: Sequence[str] = ()) -> None:
     """Refuse names that are no keywords, and say where keys of these names belong, or which is meant.
+
+    Parameters
+    ----------
+    keywords : iterable of str
+    where : str, optional
+        The function that takes them.
+    own : sequence of str, optional
+        What else it takes by name.
 
     Raises
     ------
@@ -135,12 +143,14 @@ def check_keywords(keywords: Iterable[str], where: str = "plan") -> None:
     """
     for name in keywords:
         if name not in TaskKeywords.__annotations__:
-            raise _no_keyword(name, where)
+            raise _no_keyword(name, where, own)
 
 
-def _no_keyword(name: str, where: str) -> UnknownNameError:
-    hint = " or ".join(_as_keyword(path.split(".")) for path in key_paths(name, Task))
-    valid = sorted(TaskKeywords.__annotations__)
+def _no_keyword(name: str, where: str, own: Sequence[str]) -> UnknownNameError:
+    words = [name, *(word for word in name.split("_") if word in LimitKeywords.__annotations__)]
+    paths = next(filter(None, (key_paths(word, Task) for word in words)), [])
+    hint = " or ".join(_as_keyword(path.split(".")) for path in paths)
+    valid = sorted((*TaskKeywords.__annotations__, *own))
     return UnknownNameError("keyword", name, valid, where=where, hint=hint and f"It is a key of others: {hint}")
 
 

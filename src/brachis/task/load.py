@@ -72,6 +72,9 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
     if not isinstance(source, str | os.PathLike):
         problem = "a task is loaded from a file or a mapping"
         raise TaskError(problem, found=type(source).__name__, allowed="a file name, a mapping, or a Task")
+    if isinstance(source, str) and "\n" in source:
+        allowed = "a file name; of the text of a URDF Robot.from_urdf(name, urdf_text=text)"
+        raise TaskError("a text is not the name of a file", found=show(source), allowed=allowed)
     path = Path(source)
     check_kind(path, Kind.TASK, TaskError)
     hint = "Long lists of waypoints belong in a CSV file"
@@ -147,9 +150,10 @@ def _with_start(task: Task, source: str) -> Task:
     """
     if task.start != "free" or task.path_start is not None:
         return task
-    begins, changes = task.begins, {"path_start": task.begins}
+    begins, first = task.begins, task.path[0]
+    changes: dict[str, object] = {"path_start": begins}
     if task.task_space == "joints" and begins is not None:
-        names = getattr(task.path[0].shape, "joints", None)
+        names = getattr(getattr(first, first.kind), "joints", None)
         changes = {"start": {"joints": dict(zip(names, begins, strict=True)) if names else begins}}
     try:
         return Task.model_validate(task.model_copy(update=changes))

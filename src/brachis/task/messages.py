@@ -148,10 +148,11 @@ def _is_echo(detail: ErrorDetails) -> bool:
     return detail["type"] == "too_short" and len(detail["input"]) >= detail["ctx"]["min_length"]
 
 
-def _missing(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
+def _missing(detail: ErrorDetails, model: type[Model]) -> _Complaint:
     if isinstance(detail["loc"][-1], int):
         return _Complaint("the list is too short: this item is missing", show(detail["input"]))
-    return _Complaint("this key is required, and missing")
+    hint = (_description_at(detail["loc"], model) or "").partition("; ")[0]
+    return _Complaint("this key is required, and missing", hint=hint or None)
 
 
 def _unknown(detail: ErrorDetails, model: type[Model]) -> _Complaint:

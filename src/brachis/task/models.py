@@ -232,6 +232,9 @@ class Task(Model):
             raise refuse("poses are not segments", found=rows, allowed=allowed)
         if len(rows) > 1 and all(isinstance(row, list) for row in rows):
             return ({"spline": {"starts_at": rows[0], "through": rows[1:]}},)
+        if rows and all(isinstance(row, list | int | float) for row in rows):
+            allowed = "two points or more, [[...], [...]], or a segment such as {line: {to: [...]}}"
+            raise refuse("a path cannot be made of these numbers", found=rows, allowed=allowed)
         return path
 
     @field_validator("path")
@@ -250,6 +253,9 @@ class Task(Model):
         unread = isinstance(first, CsvSegment) and not first.csv.relative
         if self.start == "free" and self.path_start is None and not unread and self.begins is None:
             problem = "a free start posture leaves open where the path begins"
+            if self.task_space == "joints":
+                problem = "a path of joints that does not begin with a waypoint needs a start posture"
+                raise refuse(problem, key="start", absent=True, allowed="{joints: [...]}")
             raise refuse(problem, key="path_start", absent=True, allowed=self._start_forms)
         if self.start == "free" and self.search.guesses == "numeric":
             problem = "numeric inverse kinematics needs a posture to begin with, and start is free"

@@ -1,0 +1,99 @@
+"""What a plan is doing: told to a listener, to the log named ``brachis``, and on a line that changes."""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+Listener = Callable[[str], None]
+"""Told in plain words what the planner is doing, between iterations; may raise KeyboardInterrupt."""
+_LOG = logging.getLogger("brachis")
+_PAUSE = 0.1
+"""Least time between two iterations that are shown, s."""
+
+
+class Iteration(str):
+    """A step of a stage: logged at level DEBUG, where stages are logged at INFO."""
+
+    __slots__ = ()
+
+
+@contextmanager
+def report_progress(listener: Listener | None, progress: bool | None) -> Iterator[Listener]:  # noqa: FBT001
+    """Give a listener that logs every step, tells it to another listener, and shows it.
+
+    Parameters
+    ----------
+    listener : callable or None
+    progress : bool or None
+        Whether steps are shown; None: in notebooks, unless there is a listener.
+    """
+    shown = listener is None and _in_notebook() if progress is None else progress
+    line = _Line() if shown else None
+
+    def tell(text: str) -> None:
+        _LOG.log(logging.DEBUG if isinstance(text, Iteration) else logging.INFO, "%s", text)
+        if listener is not None:
+            listener(text)
+        if line is not None:
+            line.show(text)
+
+    try:
+        yield tell
+    finally:
+        if line is not None:
+            line.clear()
+
+
+class _Line:
+    """A line that shows the present step: below a notebook's cell, or on standard error.
+
+    Where standard error is not a terminal, every stage is a line of its own.
+    """
+
+    def __init__(self) -> None:
+        self._display: Any = None
+        self._width = 0
+        self._last = 0.0
+
+    def show(self, text: str) -> None:
+        """Show a step in place of the one before; of quick iterations a few."""
+        now = time.monotonic()
+        if isinstance(text, Iteration) and now - self._last < _PAUSE:
+            return
+        self._last = now
+        if _in_notebook():
+            self._show_in_notebook(text)
+        elif sys.stderr.isatty():
+            sys.stderr.write(f"\r{text:<{self._width}}")
+            self._width = len(text)
+        elif not isinstance(text, Iteration):
+            sys.stderr.write(f"{text}\n")
+        sys.stderr.flush()
+
+    def clear(self) -> None:
+        """Leave nothing of the line."""
+        if self._display is not None:
+            self._show_in_notebook("")
+        elif self._width:
+            sys.stderr.write(f"\r{'':<{self._width}}\r")
+            sys.stderr.flush()
+
+    def _show_in_notebook(self, text: str) -> None:
+        content = {"text/plain": str(text)}
+        if self._display is None:
+            ipython = importlib.import_module("IPython.display")
+            self._display = ipython.display(content, raw=True, display_id=True)
+        else:
+            self._display.update(content, raw=True)
+
+
+def _in_notebook() -> bool:
+    """Tell whether this runs in a notebook's kernel."""
+    ipython = sys.modules.get("IPython")
+    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
