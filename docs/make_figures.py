@@ -15,7 +15,6 @@ from pathlib import Path
 from types import ModuleType
 
 import yaml
-from animations import animate
 from make_mathematics_figures import mathematics
 from make_pages import GALLERY, write_gallery
 from matplotlib.figure import Figure
@@ -38,6 +37,7 @@ ROOT = Path(__file__).parents[1]
 FIGURES = ROOT / "docs/figures"
 DOTS_PER_INCH = 150
 COLOURS = 128
+PERIOD = 0.05  # s
 RAIL_LINE = "examples/03_tx90l_rail_line.yaml"
 
 Planned = Mapping[str, brachis.Result]
@@ -62,6 +62,11 @@ def save(figure: Figure, name: str) -> None:
     )
 
 
+def animate(result: brachis.Result, name: str, slower: float = 1.0) -> None:
+    """Write a GIF, as ``brachis export --slower`` does."""
+    brachis.export.write(result, FIGURES / f"{name}.gif", dt=PERIOD, slower=slower)
+
+
 def planned(name: str) -> brachis.Result:
     """Plan an example's task file."""
     return brachis.plan(ROOT / f"examples/{name}.yaml")
@@ -71,7 +76,7 @@ def scara_line() -> Planned:
     """Draw the paper's line."""
     result = planned("01_scara_line")
     save(plot_overview(result.trajectory), "scara_line")
-    animate(result.trajectory, FIGURES / "scara_line.gif")
+    animate(result, "scara_line")
     return {"j3": result}
 
 
@@ -88,7 +93,7 @@ def tx90l_rail() -> Planned:
     result = brachis.plan(ROOT / RAIL_LINE)
     save(plot_timeline(result.trajectory), "timeline")
     save(plot_overview(result.trajectory), "tx90l_rail")
-    animate(result.trajectory, FIGURES / "tx90l_rail.gif", slower=10.0)
+    animate(result, "tx90l_rail", slower=10.0)
     return {"rail": result}
 
 
@@ -138,7 +143,7 @@ def periodic() -> Planned:
     """Draw a circle that is gone round for ever."""
     results = load("examples/10_periodic_circle.py").main()
     save(plot_overview(results["periodic"].trajectory), "periodic_circle")
-    animate(results["periodic"].trajectory, FIGURES / "periodic_circle.gif")
+    animate(results["periodic"], "periodic_circle")
     return results
 
 

@@ -209,10 +209,27 @@ def test_gif(line_trajectory, written):
     assert durations == [1200, 1200, 1200, 1000]
     assert len(pictures) == len(times)
     for (figure, _), t, picture in zip(frames(line_trajectory, times), times, pictures, strict=True):
-        (ax,) = figure.axes
+        ax, *beside = figure.axes
         place = line_trajectory.robot.tool_placement(line_trajectory.position(t)).translation[:2]
         x, y = ax.transData.transform(place)
         assert picture[picture.shape[0] - round(y), round(x)].max() < 80  # the tool, black
+        (torques,) = beside
+        assert "tau" in torques.get_ylabel()
+        (now,) = (line for line in torques.lines if line.get_gid() == "now")
+        assert list(now.get_xdata()) == [t, t]
+
+
+def test_an_animation_may_be_slower_and_nothing_else_may(line_trajectory, tmp_path):
+    path = tmp_path / "slow.gif"
+    export.write(line_trajectory, path, dt=1.2, slower=3.0)
+    with Image.open(path) as film:
+        assert film.n_frames == len(frame_times(line_trajectory, 0.4))
+    (figure, _), *_ = frames(line_trajectory, np.zeros(1), 3.0)
+    assert figure._suptitle.get_text().endswith("3 times slower")
+    with pytest.raises(InputError, match=r"only animations may be slower; found 2.0; allowed: 1, or .gif, .mp4"):
+        export.write(line_trajectory, tmp_path / "motion.csv", slower=2.0)
+    with pytest.raises(InputError, match=r"slower: out of range; found 0.0; allowed: > 0"):
+        export.write(line_trajectory, path, slower=0.0)
 
 
 @pytest.mark.skipif(shutil.which("ffprobe") is None, reason="ffmpeg is not installed")
@@ -282,7 +299,7 @@ def test_every_format_has_a_suffix_of_its_own():
 
 def test_animations_in_space(ur10):
     (figure, pixels), *_ = frames(ur10, np.array([0.0, 1.0]))
-    (ax,) = figure.axes
+    ax = figure.axes[0]
     place = pin.SE3(ur10.robot.tool_placement(ur10.q[1])).translation
     (tool,) = (line for line in ax.lines if line.get_gid() == "tool")
     np.testing.assert_allclose([part[0] for part in tool.get_data_3d()], place, atol=1e-12)

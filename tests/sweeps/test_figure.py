@@ -35,8 +35,15 @@ def test_a_heat_map_over_two_keys():
     assert math.isnan(shown[1, 2])
     assert [tick.get_text() for tick in ax.get_yticklabels()] == ["x", "y"]
     assert ax.collections[0].get_offsets().tolist() == [[2.0, 1.0]]
-    assert sorted(text.get_text() for text in ax.texts) == ["1", "2", "2", "3", "3"]
+    assert sorted(text.get_text() for text in ax.texts) == ["1.00", "2.00", "2.00", "3.00", "3.00"]
     assert bar.get_ylabel() == r"$t_\mathrm{E}$ (s)"
+
+
+def test_cells_are_written_with_the_digits_that_tell_them_apart():
+    for near, shown in ((0.0012, ["12.3450", "12.3462"]), (2.0, ["12.35", "14.35"]), (1e-7, ["12.35", "12.35"])):
+        rows = [row(12.3450 + near * (a + b), a=a, b=b) for a in (0, 0.5) for b in (0, 0.5)]
+        texts = sorted({text.get_text() for text in plot_sweep(rows, ["a", "b"]).axes[0].texts})
+        assert [texts[0], texts[-1]] == [shown[0], shown[1]]
 
 
 def test_draws_of_two_keys_are_points():
@@ -56,7 +63,7 @@ def test_nothing_to_draw(rows):
 def test_which_keys_are_drawn(undisturbed):
     assert undisturbed.varied == ("path.0.line.angle_deg", "path.0.line.length", "spline.degree")
     ax = undisturbed.plot().axes[0]
-    assert (ax.get_xlabel(), ax.get_ylabel()) == undisturbed.varied[:2]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("path.0.line.angle_deg (deg)", "path.0.line.length (m)")
     assert undisturbed.plot(["spline.degree"]).axes[0].get_xlabel() == "spline.degree"
     with pytest.raises(UnknownNameError, match=r"path\.0\.line\.length"):
         undisturbed.plot(["line.length"])

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from brachis.task import json_schema, load_task
+from brachis.task.schema import unit_of
 
 jsonschema = pytest.importorskip("jsonschema")
 
@@ -101,3 +102,28 @@ def test_the_schema_tells_an_editor_what_keys_mean() -> None:
     assert schema["title"]
     described = [key for key, value in schema["properties"].items() if value.get("description")]
     assert described == list(schema["properties"])
+
+
+@pytest.mark.parametrize(
+    ("key", "unit"),
+    [
+        ("robot.payload.mass", "kg"),
+        ("robot.payload.com.2", "m"),
+        ("robot.limits.velocity", "rad/s (m/s)"),
+        ("robot.limits.acceleration.j1", "rad/s^2 (m/s^2)"),
+        ("tool_limits.speed", "m/s"),
+        ("tool_limits.acceleration", "m/s^2"),
+        ("tool_limits.angular_speed", "rad/s"),
+        ("path.0.line.length", "m"),
+        ("path.1.arc.angle_deg", "deg"),
+        ("robot.mounting.xyz.0", "m"),
+        ("boundary.start_speed", "m/s"),
+        ("robot.gravity.2", "m/s^2"),
+        ("search.time_limit", "s"),
+        ("spline.intervals", ""),
+        ("robot.limits.scale.torque", ""),
+        ("no.such.key", ""),
+    ],
+)
+def test_units_of_keys_are_those_of_their_descriptions(key, unit):
+    assert unit_of(key) == unit

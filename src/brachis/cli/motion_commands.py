@@ -113,12 +113,13 @@ def export(
     joints: Annotated[
         str | None, typer.Option(help="Joints to write, in this order: j1,j2,... Default: all.", show_default=False)
     ] = None,
+    slower: Annotated[float, typer.Option(help="How many times slower an animation shows the motion.")] = 1.0,
 ) -> None:
     """Sample a saved motion for a controller, or animate it."""
     with interrupts.postponed():
         from brachis.cli import results  # noqa: PLC0415
 
-    results.export_command(result, out, form=form, dt=dt, last=last, joints=joints)
+    results.export_command(result, out, form=form, dt=dt, last=last, joints=joints, slower=slower)
 
 
 def plot(

@@ -28,7 +28,7 @@ def verify_command(result: Path, *, urdf: Path | None, as_json: bool) -> int:
 
 
 def export_command(
-    result: Path, out: Path, *, form: str | None, dt: float | None, last: str | None, joints: str | None
+    result: Path, out: Path, *, form: str | None, dt: float | None, last: str | None, joints: str | None, slower: float
 ) -> None:
     """Write a saved motion in one of the formats of `brachis.export.FORMATS`."""
     from brachis import export  # noqa: PLC0415
@@ -39,7 +39,7 @@ def export_command(
     with shown_warnings():
         write_one(
             out,
-            lambda path: export.write(trajectory, path, form=form, dt=dt, last=last, joints=names),
+            lambda path: export.write(trajectory, path, form=form, dt=dt, last=last, joints=names, slower=slower),
             (chosen.suffix,),
             _sources(result, trajectory),
         )

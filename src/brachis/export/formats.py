@@ -51,6 +51,8 @@ class Format:
         Period unless another one is asked for, s.
     last : {"exact", "hold"}
         Last sample unless another one is asked for; see `Trajectory.sample`.
+    animated : bool
+        Whether it shows the motion, which may go slower than it is.
     """
 
     about: str
@@ -58,6 +60,7 @@ class Format:
     export: Exporter
     dt: float = 0.001
     last: str = "exact"
+    animated: bool = False
 
 
 FORMATS: dict[str, Format] = {
@@ -67,8 +70,8 @@ FORMATS: dict[str, Format] = {
     "ros2": Format("trajectory_msgs/JointTrajectory as YAML", ".yaml", export_ros2_yaml, dt=0.01),
     "mcap": Format("trajectory_msgs/JointTrajectory in an MCAP bag", ".mcap", export_mcap, dt=0.01),
     "urscript": Format("program of servoj commands", ".script", export_urscript, dt=0.002, last="hold"),
-    "gif": Format("animation", ".gif", export_gif, dt=0.04),
-    "mp4": Format("animation, where ffmpeg is installed", ".mp4", export_mp4, dt=0.04),
+    "gif": Format("animation", ".gif", export_gif, dt=0.04, animated=True),
+    "mp4": Format("animation, where ffmpeg is installed", ".mp4", export_mp4, dt=0.04, animated=True),
 }
 """Formats by name."""
 
@@ -108,6 +111,7 @@ def write(
     dt: float | None = None,
     last: str | None = None,
     joints: Sequence[str] | None = None,
+    slower: float = 1.0,
 ) -> None:
     """Write a motion in one of the `FORMATS`.
 
@@ -128,6 +132,8 @@ def write(
     joints : sequence of str, optional
         Joints to write, in this order: a controller may drive but some. All of the robot unless given. A joint that
         moves and is left out is warned of, and named in the file.
+    slower : float, optional
+        How many times slower an animation shows the motion.
 
     Raises
     ------
@@ -145,10 +151,14 @@ def write(
     >>> export.write(trajectory, "motion.parquet", dt=0.004)  # doctest: +SKIP
     """
     chosen = format_of(path, form)
+    if slower != 1.0 and not chosen.animated:
+        allowed = ", ".join(each.suffix for each in FORMATS.values() if each.animated)
+        raise InputError("only animations may be slower", where="slower", found=slower, allowed=f"1, or {allowed}")
     chosen.export(
         motion_of(trajectory),
         path,
         chosen.dt if dt is None else dt,
         last=chosen.last if last is None else last,
         joints=joints,
+        **({"slower": slower} if chosen.animated else {}),
     )

@@ -27,8 +27,9 @@ def export_mp4(
     *,
     last: str = "exact",  # noqa: ARG001  (the last picture is the end posture either way)
     joints: Sequence[str] | None = None,
+    slower: float = 1.0,
 ) -> None:
-    """Write the motion in real time; see `brachis.export.write` for the parameters.
+    """Write the motion; see `brachis.export.write` for the parameters.
 
     Raises
     ------
@@ -40,7 +41,7 @@ def export_mp4(
         raise InputError("an MP4 file needs ffmpeg, which is not installed", hint="Install ffmpeg, or write a GIF")
     with tempfile.TemporaryDirectory(prefix="brachis-") as folder:
         film = Path(folder) / "film.mp4"  # a file with a name: MP4 is not written from its beginning to its end
-        _encode(program, pictures(trajectory, dt, _STEP, joints), dt, film)
+        _encode(program, pictures(trajectory, dt, _STEP, joints, slower), dt, film)
         with atomic_write(path) as stream:
             stream.write(film.read_bytes())
 

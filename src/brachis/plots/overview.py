@@ -23,6 +23,7 @@ from brachis.plots.torques import draw_torques, shown_torques
 from brachis.trajectory import Samples, Trajectory, of_motion
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.gridspec import SubplotSpec
 
@@ -58,7 +59,7 @@ def plot_overview(trajectory: Trajectory) -> Figure:
     postures = add_posture_axes(figure, trajectory, grid[0, 0])
     draw_postures(postures, trajectory, samples)
     legend_postures(postures, trajectory, 0.5 * style.PAGE_WIDTH - 10.0)
-    _draw_holding(figure, grid[0, 1], trajectory, samples)
+    draw_holding(figure, grid[0, 1], trajectory, samples)
     joints = []
     for column, (draw, found) in enumerate(rows.items()):
         panels = [figure.add_subplot(grid[row + 1, column]) for row in range(len(found) + 1)]
@@ -73,8 +74,8 @@ def plot_overview(trajectory: Trajectory) -> Figure:
     return figure
 
 
-def _draw_holding(figure: Figure, place: SubplotSpec, trajectory: Trajectory, samples: Samples) -> None:
-    """Draw the limits that hold the motion."""
+def draw_holding(figure: Figure, place: SubplotSpec, trajectory: Trajectory, samples: Samples) -> list[Axes]:
+    """Draw the limits that hold the motion, one panel below the other; see `plot_overview`."""
     ratios = limit_ratios(trajectory)
     shares: dict[str, float] = {}
     for found in saturations_of(ratios):
@@ -96,3 +97,4 @@ def _draw_holding(figure: Figure, place: SubplotSpec, trajectory: Trajectory, sa
         ax.set_ylabel(ax.get_ylabel().replace(" / ", " /\n"), fontsize=style.LABEL_SIZE)
     label_time_once(panels)
     figure.align_ylabels(panels)
+    return panels

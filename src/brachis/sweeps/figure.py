@@ -11,6 +11,7 @@ import numpy as np
 from brachis.errors import InputError
 from brachis.plots import style
 from brachis.sweeps.worker import VERIFIED
+from brachis.task.schema import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,6 +24,8 @@ _MOST_TICKS = 12
 _MOST_WRITTEN = 12
 _FILLED = 0.5
 """Part of all combinations of two keys that have to be there for a heat map; draws at random are points."""
+_ALIKE, _MOST_DECIMALS = 1e-5, 5
+"""Of the longest time: plans that differ by less are as good as the same."""
 _COLOURS = "viridis"
 _LABEL = r"$t_\mathrm{E}$ (s)"
 _Cells = Mapping[tuple[Any, ...], float]
@@ -91,7 +94,7 @@ def _line(cells: _Cells, values: list[Any], key: str) -> Figure:
         **{**style.joint_style(0), "linestyle": line},
     )
     _cross(ax, places[~found], np.full((~found).sum(), times[found].max()))
-    style.dress(ax, style.plain(key), _LABEL)
+    style.dress(ax, _title(key), _LABEL)
     _name(ax, "x", values)
     return figure
 
@@ -106,11 +109,19 @@ def _heat_map(cells: _Cells, axes: Sequence[list[Any]], keys: Sequence[str]) -> 
     failed = np.argwhere(np.isinf(times))
     _cross(ax, failed[:, 1], failed[:, 0])
     if max(times.shape) <= _MOST_WRITTEN:
-        middle = 0.5 * (np.nanmin(shown) + np.nanmax(shown))
+        middle, decimals = 0.5 * (np.nanmin(shown) + np.nanmax(shown)), _decimals(shown)
         for (row, column), time in np.ndenumerate(shown):
             if math.isfinite(time):
                 colour = "white" if time < middle else "black"
-                ax.text(column, row, f"{time:.4g}", color=colour, ha="center", va="center", fontsize=style.TICK_SIZE)
+                ax.text(
+                    column,
+                    row,
+                    f"{time:.{decimals}f}",
+                    color=colour,
+                    ha="center",
+                    va="center",
+                    fontsize=style.TICK_SIZE,
+                )
     _finish(figure, ax, image, keys)
     _name(ax, "x", columns, always=True)
     _name(ax, "y", rows, always=True)
@@ -133,9 +144,22 @@ def _points(cells: _Cells, axes: Sequence[list[Any]], keys: Sequence[str]) -> Fi
 
 
 def _finish(figure: Figure, ax: Axes, image: Any, keys: Sequence[str]) -> None:  # noqa: ANN401  (any of Matplotlib's)
-    style.dress(ax, style.plain(keys[0]), style.plain(keys[1]))
+    style.dress(ax, _title(keys[0]), _title(keys[1]))
     bar = figure.colorbar(image, ax=ax)
     style.dress(bar.ax, "", _LABEL)
+
+
+def _title(key: str) -> str:
+    """Name a key with its unit."""
+    unit = unit_of(key)
+    return style.plain(f"{key} ({unit})" if unit else key)
+
+
+def _decimals(times: np.ndarray) -> int:
+    """Return how many decimals tell the times, s, apart that differ by more than `_ALIKE`, two at least."""
+    apart = np.diff(np.unique(times[np.isfinite(times)]))
+    apart = apart[apart > _ALIKE * np.nanmax(times)]
+    return int(np.clip(np.ceil(-np.log10(apart.min()) - 1e-6), 2, _MOST_DECIMALS)) if len(apart) else 2
 
 
 def _places(values: Sequence[Any]) -> np.ndarray:
