@@ -138,6 +138,12 @@ def test_the_first_point_is_where_a_free_start_begins() -> None:
         load_task({**base, "path": fit_path(position, relative=True)})
 
 
+def test_a_quaternion_of_length_zero_at_the_start_is_no_crash() -> None:
+    curve = {"knots": [0.0] * 6 + [1.0] * 6, "control_points": [[0.1 * i, 0, 0, 0, 0, 0, 0] for i in range(6)]}
+    with pytest.raises(TaskError, match="the quaternion's length is 0"):
+        load_task({"brachis": 1, "start": "free", "task_space": "pose", "path": [{"bspline": curve}]})
+
+
 def test_a_fitted_task_survives_being_saved() -> None:
     position, turns = poses()
     segments = fit_path(matrices(position, turns), tolerance={"position": "0.02 mm"}, speed=np.full(300, 0.1))

@@ -255,3 +255,10 @@ def test_a_task_may_limit_joints_that_stand_still_of_a_robot_that_has_limits():
     robot = Robot.from_urdf(urdf, tool_frame="wrist_2_link", limits=brachis.LimitSpec(velocity={"rail": 0.4}))
     settings = RobotSettings(limits=brachis.LimitSpec(velocity={"shoulder_pan_joint": 1.0, "wrist_3_joint": 0.5}))
     assert robot_for(robot, settings).limits.velocity[:2].tolist() == [0.4, 1.0]
+
+
+@pytest.mark.parametrize("wrong", [{"urdf": "a\0b"}, {"urdf": "."}, {"tool_frame": [1]}, {"locked_joints": 5}], ids=str)
+def test_a_wrong_robot_beside_a_file_of_moveit_is_an_error_of_ours(loaded, tmp_path, wrong):
+    (tmp_path / "joint_limits.yaml").write_text(MOVEIT, encoding="utf-8")
+    with pytest.raises(InputError):
+        robot_from_settings(loaded({"limits_file": "joint_limits.yaml", **wrong}).robot)

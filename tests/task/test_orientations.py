@@ -22,6 +22,7 @@ from brachis.task import (
     Tangent,
     Target,
     Task,
+    ToolPose,
     TurnSegment,
     TurnTo,
     json_schema,
@@ -217,6 +218,12 @@ def test_a_program_gives_the_start_of_a_path_as_a_transform() -> None:
     assert task.path_start is not None
     found = brachis.task_map_of(brachis.robots.iiwa14, "pose").read(task.path_start, "path_start")
     np.testing.assert_allclose(found, [1, 2, 3, *placement.rotation.ravel()], atol=1e-14)
+
+
+def test_another_start_of_the_path_takes_the_place_of_the_first_one() -> None:
+    task = free({"position": [1, 2, 3], "rpy_deg": [0, 0, 90]})
+    other = task_with(task, path_start={"position": [1, 2, 3], "kuka_abc_deg": [90, 0, 0]})
+    assert other.path_start == ToolPose.model_validate({"position": [1, 2, 3], "kuka_abc_deg": [90, 0, 0]})
 
 
 WRONG_STARTS: list[tuple[Any, Any, list[str]]] = [

@@ -15,6 +15,7 @@ from brachis.export.mcap_bag import TOPIC, export_mcap
 from brachis.export.mp4 import export_mp4
 from brachis.export.parquet_table import export_parquet
 from brachis.export.ros2_yaml import export_ros2_yaml
+from brachis.export.rows import LeftOutWarning
 from brachis.export.urscript import export_urscript
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "TOPIC",
     "Exporter",
     "Format",
+    "LeftOutWarning",
     "export_csv",
     "export_gif",
     "export_json",

@@ -177,10 +177,13 @@ def _in_full(key: str, value: object) -> object:
 
 
 def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Merge mappings key by key; everything else of `changes` takes the place of what there is."""
+    """Merge mappings key by key; everything else of `changes` takes the place of what there is.
+
+    A start of the path is replaced as a whole, since its orientation may be in another convention.
+    """
     both = {
         key: _merged(content[key], value)
         for key, value in changes.items()
-        if isinstance(value, Mapping) and isinstance(content.get(key), Mapping)
+        if isinstance(value, Mapping) and isinstance(content.get(key), Mapping) and key != "path_start"
     }
     return {**content, **changes, **both}

@@ -223,13 +223,16 @@ def _check_joints(limited: set[str], robot: Mapping[str, Any], folder: Path, whe
     ------
     UnknownNameError, TaskError
     """
-    names, moving = _joints_of(folder / robot["urdf"], robot.get("tool_frame"), robot.get("base_frame"))
+    tool, base, locked = (robot.get(key) for key in ("tool_frame", "base_frame", "locked_joints"))
+    if not (isinstance(tool, str | None) and isinstance(base, str | None) and isinstance(locked, Mapping | None)):
+        return  # the robot's model says so
+    names, moving = _joints_of(folder / robot["urdf"], tool, base)
     for name in sorted(limited if names else ()):
         if name not in names:
             raise UnknownNameError("joint of the URDF", name, names, where=f"{where}: joint_limits")
     own = robot["limits"]
     own_names = {name for kind, each in own.items() if kind != "scale" and isinstance(each, Mapping) for name in each}
-    stated = {*limited, *(robot.get("locked_joints") or ()), *own_names}
+    stated = {*limited, *(locked or ()), *own_names}
     for_all = any(kind != "scale" and isinstance(each, int | float | list | tuple) for kind, each in own.items())
     missing = [] if for_all else [name for name in moving if name not in stated]
     if missing:
@@ -248,7 +251,7 @@ def _joints_of(urdf: Path, tool: str | None, base: str | None) -> tuple[list[str
 
     try:
         joints = etree.parse(str(urdf), etree.XMLParser(resolve_entities=False)).getroot().findall("joint")
-    except (OSError, etree.XMLSyntaxError):
+    except (OSError, ValueError, etree.XMLSyntaxError):
         return [], []
     ends = [(joint, joint.find("parent"), joint.find("child")) for joint in joints]
     above = {

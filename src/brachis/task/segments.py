@@ -21,6 +21,7 @@ from brachis.task.point_data import PointFile
 from brachis.task.shapes import Arc, Circle, Helix, Line, Shape, SplineThrough
 
 _POSE_COLUMNS = 7
+_POSITIONS = 3
 
 
 class SegmentModel(Model):
@@ -116,7 +117,7 @@ class SplineSegment(MovingSegment):
         place, oriented = spline.starts_at, spline.starts_oriented
         if place is None:
             place, oriented = spline.through[0], spline.orientations[0] if spline.orientations else None
-        if oriented is None:
+        if oriented is None or len(place) != _POSITIONS:
             return place
         return ToolPose.model_validate({"position": place, **oriented.model_dump()})
 
@@ -145,9 +146,9 @@ class BSplineSegment(MovingSegment):
         first = self.bspline.control_points[0]
         if self.bspline.relative or len(first) != _POSE_COLUMNS:
             return None if self.bspline.relative else first
-        length = math.hypot(*first[3:])
-        turn = [number / length for number in first[3:]]
-        return ToolPose.model_validate({"position": first[:3], "quaternion_wxyz": turn})
+        length = math.hypot(*first[_POSITIONS:]) or 1.0
+        turn = [number / length for number in first[_POSITIONS:]]
+        return ToolPose.model_validate({"position": first[:_POSITIONS], "quaternion_wxyz": turn})
 
     @model_validator(mode="after")
     def _one_word_on_orientation(self) -> BSplineSegment:
