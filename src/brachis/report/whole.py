@@ -55,12 +55,16 @@ class Report:
         """
         check_suffix(path, ".html", "A browser prints it as PDF")
         with atomic_write(path) as stream:
-            stream.write(self.html.encode())
+            stream.write(self._content)
 
     @property
     def size(self) -> int:
         """Length of the file, bytes."""
-        return len(self.html.encode())
+        return len(self._content)
+
+    @property
+    def _content(self) -> bytes:
+        return self.html.encode(errors="backslashreplace")  # names of files need not be text
 
     def __repr__(self) -> str:
         """Say what it is, not what is in it."""
