@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
+from brachis.files import mesh_file
 from brachis.robot.urdf_tree import Element, read_tree
 
 if TYPE_CHECKING:
@@ -50,50 +50,39 @@ def link_shapes(urdf: str, folder: Path) -> tuple[dict[str, list[trimesh.Trimesh
     shapes : dict of str to list of Trimesh
         By link, in the link's frame, m.
     unread : list of str
-        Of the shapes that cannot be shown, the link and the reason.
+        Of the shapes that cannot be shown, the link and the reason; of missing files one line.
     """
     tree, shapes, unread = read_tree(urdf, "URDF"), {}, []
+    absent: list[str] = []
     materials = [each for each in tree.robot if each.tag == "material"]
     for name, link in tree.links.items():
         found: list[trimesh.Trimesh] = []
         for visual in link.findall("visual"):
-            missing = _find_mesh(visual, folder)
+            missing = _find_meshes(visual, folder)
+            absent += missing
             try:
                 found += [] if missing else _meshes(name, visual, materials)
             except _UNREADABLE as error:
-                missing = f"{type(error).__name__}: {error}"
-            if missing:
-                unread.append(f"{name}: {missing}")
+                unread.append(f"{name}: {type(error).__name__}: {error}")
         if found:
             shapes[name] = found
+    if absent:
+        count = f"{len(absent)} mesh files are" if len(absent) > 1 else "a mesh file is"
+        where = "; ROS_PACKAGE_PATH may name the folder of its package" if absent[0].startswith("package://") else ""
+        unread.insert(0, f"{count} missing: {absent[0]}{', ...' if len(absent) > 1 else ''}{where}")
     return shapes, unread
 
 
-def mesh_file(name: str, folder: Path) -> Path | None:
-    """Find a mesh file that a URDF in `folder` names, plainly or as ``file://`` or ``package://``; None if it is not.
-
-    A package is looked for in the folders above the URDF, then where ROS has its packages.
-    """
-    from yourdfpy import filename_handler_magic  # noqa: PLC0415  (imports trimesh)
-
-    found = Path(filename_handler_magic(fname=name, dir=str(folder)))
-    if found.is_file():
-        return found
-    places = [Path(place) for place in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if place]
-    places += [Path(place) / "share" for place in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if place]
-    within = name.partition("://")[2]
-    return next((place / within for place in places if within and (place / within).is_file()), None)
-
-
-def _find_mesh(visual: Element, folder: Path) -> str:
-    """Put the path of a visual's mesh file in the place of its name; say what is missing."""
+def _find_meshes(visual: Element, folder: Path) -> list[str]:
+    """Put the paths of a visual's mesh files in the place of their names; return those that are missing."""
+    missing = []
     for mesh in visual.iter("mesh"):
         name = str(mesh.get("filename"))
         path = mesh_file(name, folder)
         if path is None:
-            return f"no file {name}"
+            missing.append(name)
         mesh.set("filename", str(path))
-    return ""
+    return missing
 
 
 def _meshes(name: str, visual: Element, materials: list[Element]) -> Iterator[trimesh.Trimesh]:
