@@ -15,6 +15,7 @@ import secrets
 import shutil
 import socket
 import stat
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -233,3 +234,26 @@ def shipped(folder: str) -> Path:
     package = Path(__file__).parent
     installed = package / "data" / folder
     return installed if installed.is_dir() else package.parents[1] / folder
+
+
+def mesh_file(name: str, folder: Path) -> Path | None:
+    """Find a mesh file that a URDF in `folder` names, plainly or as ``file://`` or ``package://``; None if it is not.
+
+    A package is looked for in the folders above the URDF, then where ROS and this Python installation have packages.
+    """
+    scheme, given, within = name.partition("://")
+    within = within if given else name
+    above = [folder, *folder.absolute().parents]
+    python = [Path(place) / share for place in (*sys.path, sys.prefix) for share in ("cmeel.prefix/share", "share")]
+    found = [place / within for place in above] + ros_files(within) + [place / within for place in python]
+    if scheme == "package":  # which may be in a folder of another name
+        found += [place / within.partition("/")[2] for place in above]
+    return next((path for path in found if os.path.isfile(path)), None)  # noqa: PTH113  (a name may be too long)
+
+
+def ros_files(within: str) -> list[Path]:
+    """Name the places where ROS may have a file of a package, ``<package>/<file>``."""
+    package, _, inner = within.partition("/")
+    roots = [Path(place) for place in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if place]
+    shares = [Path(place, "share") for place in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if place]
+    return [root / inner for root in roots if root.name == package] + [root / within for root in roots + shares]

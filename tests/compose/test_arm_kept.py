@@ -9,6 +9,7 @@ from lxml import etree
 
 from brachis import InputError, Robot
 from brachis.compose import Rail, on_rail
+from brachis.files import mesh_file
 
 from .conftest import RAIL, arm_text
 
@@ -64,6 +65,20 @@ def test_relative_meshes_are_found_from_the_new_file(meshed, tmp_path, folder):
     for name, expected in ((a, "arm/meshes/a.stl"), (wood, "wood.png"), (d, "arm/d.stl")):
         assert not Path(name).is_absolute()
         assert (output.parent.resolve() / name).resolve() == (tmp_path / expected).resolve()
+
+
+@pytest.mark.parametrize("ros", [False, True])
+def test_meshes_of_a_package_are_found_from_another_folder(meshed, tmp_path, monkeypatch, ros):
+    (tmp_path / "arm_description").mkdir()
+    (tmp_path / "arm_description/b.dae").touch()
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path) if ros else "")
+    output = tmp_path / "elsewhere/new.urdf"
+    output.parent.mkdir()
+    package = files(on_rail(meshed, Rail(**RAIL), output=output))[2]
+    assert (package == "package://arm_description/b.dae") == ros
+    found = mesh_file(package, output.parent)
+    assert found is not None
+    assert found.samefile(tmp_path / "arm_description/b.dae")
 
 
 def test_relative_meshes_become_absolute_without_a_file(meshed, tmp_path, monkeypatch):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from brachis.view.visuals import link_shapes, mesh_file
+from brachis.files import mesh_file
+from brachis.view.visuals import link_shapes
 from support.shown import PANDA, ROBOTS
 
 LINK = '<robot name="r"><link name="a"><visual><origin xyz="1 0 0"/><geometry>{}</geometry>{}</visual></link></robot>'
@@ -65,7 +66,24 @@ def test_a_missing_mesh_is_named_and_the_other_links_are_read(tmp_path):
     )
     shapes, unread = link_shapes(text, tmp_path)
     assert list(shapes) == ["b"]
-    assert unread == ["a: no file package://none/a.dae"]
+    (line,) = unread
+    assert line == "a mesh file is missing: package://none/a.dae; ROS_PACKAGE_PATH may name the folder of its package"
+
+
+def test_many_missing_meshes_are_one_line(tmp_path):
+    visual = '<visual><geometry><mesh filename="{}.stl"/></geometry></visual>'
+    text = f'<robot name="r"><link name="a">{"".join(map(visual.format, range(14)))}</link></robot>'
+    _, unread = link_shapes(text, tmp_path)
+    assert unread == ["14 mesh files are missing: 0.stl, ..."]
+
+
+@pytest.mark.skipif(PANDA is None, reason="example-robot-data is not installed")
+def test_packages_of_the_python_installation_are_found_from_anywhere(tmp_path):
+    name = "package://example-robot-data/robots/panda_description/urdf/panda.urdf"
+    found = mesh_file(name, tmp_path)
+    assert found is not None
+    assert found.samefile(PANDA)
+    assert mesh_file(name + 5000 * "x", tmp_path) is None, "longer than a name of a file can be"
 
 
 BROKEN = {

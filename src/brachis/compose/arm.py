@@ -8,6 +8,7 @@ from pathlib import Path
 
 from lxml import etree
 
+from brachis import files
 from brachis.compose.elements import Element
 from brachis.robot.urdf import parse_urdf, read_file
 from brachis.robot.urdf_checks import check_inertias
@@ -68,17 +69,24 @@ def drop_meshes(robot: Element) -> None:
 
 
 def relocate_meshes(robot: Element, source: Path, target: Path | None) -> None:
-    """Make relative mesh and texture files, which lie relative to `source`, relative to the folder of `target`.
+    """Name mesh and texture files, which are found from the folder of `source`, relative to the folder of `target`.
 
-    Without `target` they become absolute. Absolute files and those with a scheme (``package://``) stay as they are.
+    Without `target` they become absolute. Absolute names stay as they are, and so do packages that ROS finds, or that
+    are nowhere.
     """
     old = source.parent.resolve()
     new = None if target is None else target.parent.resolve()
     for element in robot.iter("mesh", "texture"):
         name = element.get("filename")
-        if not name or "://" in name or Path(name).is_absolute():
+        if not name or Path(name).is_absolute():
             continue
-        path = old / name
+        scheme, _, within = name.partition("://")
+        path: Path | None = old / name
+        if within:
+            by_ros = any(place.is_file() for place in files.ros_files(within))
+            path = None if by_ros or scheme != "package" else files.mesh_file(name, old)
+        if path is None:
+            continue
         element.set("filename", os.path.normpath(path) if new is None else os.path.relpath(path, new))
 
 

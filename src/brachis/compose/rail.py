@@ -164,8 +164,8 @@ def on_rail(
     meshes : bool, optional
         False drops all visuals and collisions of the arm that are meshes.
     output : path, optional
-        File to write. Relative mesh files are then kept valid relative to its folder; without `output` they become
-        absolute. ``package://`` and other schemes stay as they are.
+        File to write. Mesh files are then named relative to its folder; without `output` by absolute names. Those in
+        packages that ROS finds, or that are nowhere, stay as they are.
 
     Returns
     -------

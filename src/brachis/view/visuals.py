@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import io
+<<<<<<< HEAD
 import os
 import zipfile
+=======
+from collections.abc import Iterator
+>>>>>>> portable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from lxml import etree
 
+<<<<<<< HEAD
 from brachis.errors import InputError
 from brachis.files import is_file
+=======
+from brachis.files import mesh_file
+>>>>>>> portable
 from brachis.robot.urdf_tree import Element, read_tree
 
 if TYPE_CHECKING:
@@ -47,14 +55,19 @@ def link_shapes(urdf: str, folder: Path) -> tuple[dict[str, list[trimesh.Trimesh
     shapes : dict of str to list of Trimesh
         By link, in the link's frame, m.
     unread : list of str
-        Of the shapes that cannot be shown, the link and the reason.
+        Of the shapes that cannot be shown, the link and the reason; of missing files one line.
     """
     tree, shapes, unread = read_tree(urdf, "URDF"), {}, []
+<<<<<<< HEAD
     room = _LARGEST
+=======
+    absent: list[str] = []
+>>>>>>> portable
     materials = [each for each in tree.robot if each.tag == "material"]
     for name, link in tree.links.items():
         found: list[trimesh.Trimesh] = []
         for visual in link.findall("visual"):
+<<<<<<< HEAD
             try:
                 room -= _find_mesh(visual, folder, room)
                 found += _meshes(name, visual, materials)
@@ -62,11 +75,24 @@ def link_shapes(urdf: str, folder: Path) -> tuple[dict[str, list[trimesh.Trimesh
                 unread.append(f"{name}: {error}"[:_LONGEST])
             except Exception as error:  # noqa: BLE001  (a file may be anything, and so may what its reader raises)
                 unread.append(f"{name}: {type(error).__name__}: {error}"[:_LONGEST])
+=======
+            missing = _find_meshes(visual, folder)
+            absent += missing
+            try:
+                found += [] if missing else _meshes(name, visual, materials)
+            except _UNREADABLE as error:
+                unread.append(f"{name}: {type(error).__name__}: {error}")
+>>>>>>> portable
         if found:
             shapes[name] = found
+    if absent:
+        count = f"{len(absent)} mesh files are" if len(absent) > 1 else "a mesh file is"
+        where = "; ROS_PACKAGE_PATH may name the folder of its package" if absent[0].startswith("package://") else ""
+        unread.insert(0, f"{count} missing: {absent[0]}{', ...' if len(absent) > 1 else ''}{where}")
     return shapes, unread
 
 
+<<<<<<< HEAD
 def mesh_file(name: str, folder: Path) -> Path | None:
     """Find a mesh file that a URDF in `folder` names, plainly or as ``file://`` or ``package://``; None if it is not.
 
@@ -92,10 +118,16 @@ def _find_mesh(visual: Element, folder: Path, room: int) -> int:
         There is no such file, or it is larger than `room`, bytes.
     """
     size = 0
+=======
+def _find_meshes(visual: Element, folder: Path) -> list[str]:
+    """Put the paths of a visual's mesh files in the place of their names; return those that are missing."""
+    missing = []
+>>>>>>> portable
     for mesh in visual.iter("mesh"):
         name = str(mesh.get("filename"))
         path = mesh_file(name, folder)
         if path is None:
+<<<<<<< HEAD
             raise InputError(f"no file {name}")
         mesh.set("filename", str(path))
         if path.suffix in _PACKED:
@@ -105,6 +137,11 @@ def _find_mesh(visual: Element, folder: Path, room: int) -> int:
         found, allowed = f"{size / 1e6:.0f} MB", f"{_LARGEST / 1e6:.0f} MB for all meshes of the robot"
         raise InputError("the mesh is too large to be shown", where=name, found=found, allowed=allowed)
     return size
+=======
+            missing.append(name)
+        mesh.set("filename", str(path))
+    return missing
+>>>>>>> portable
 
 
 def _size(path: Path) -> int:
