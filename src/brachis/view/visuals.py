@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 import io
-<<<<<<< HEAD
-import os
 import zipfile
-=======
-from collections.abc import Iterator
->>>>>>> portable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from lxml import etree
 
-<<<<<<< HEAD
 from brachis.errors import InputError
-from brachis.files import is_file
-=======
 from brachis.files import mesh_file
->>>>>>> portable
 from brachis.robot.urdf_tree import Element, read_tree
 
 if TYPE_CHECKING:
@@ -58,31 +49,23 @@ def link_shapes(urdf: str, folder: Path) -> tuple[dict[str, list[trimesh.Trimesh
         Of the shapes that cannot be shown, the link and the reason; of missing files one line.
     """
     tree, shapes, unread = read_tree(urdf, "URDF"), {}, []
-<<<<<<< HEAD
-    room = _LARGEST
-=======
     absent: list[str] = []
->>>>>>> portable
+    room = _LARGEST
     materials = [each for each in tree.robot if each.tag == "material"]
     for name, link in tree.links.items():
         found: list[trimesh.Trimesh] = []
         for visual in link.findall("visual"):
-<<<<<<< HEAD
+            missing = _find_meshes(visual, folder)
+            absent += missing
+            if missing:
+                continue
             try:
-                room -= _find_mesh(visual, folder, room)
+                room -= _check_size(visual, room)
                 found += _meshes(name, visual, materials)
             except InputError as error:
                 unread.append(f"{name}: {error}"[:_LONGEST])
             except Exception as error:  # noqa: BLE001  (a file may be anything, and so may what its reader raises)
                 unread.append(f"{name}: {type(error).__name__}: {error}"[:_LONGEST])
-=======
-            missing = _find_meshes(visual, folder)
-            absent += missing
-            try:
-                found += [] if missing else _meshes(name, visual, materials)
-            except _UNREADABLE as error:
-                unread.append(f"{name}: {type(error).__name__}: {error}")
->>>>>>> portable
         if found:
             shapes[name] = found
     if absent:
@@ -92,56 +75,36 @@ def link_shapes(urdf: str, folder: Path) -> tuple[dict[str, list[trimesh.Trimesh
     return shapes, unread
 
 
-<<<<<<< HEAD
-def mesh_file(name: str, folder: Path) -> Path | None:
-    """Find a mesh file that a URDF in `folder` names, plainly or as ``file://`` or ``package://``; None if it is not.
-
-    A package is looked for in the folders above the URDF, then where ROS has its packages.
-    """
-    from yourdfpy import filename_handler_magic  # noqa: PLC0415  (imports trimesh)
-
-    found = Path(filename_handler_magic(fname=name, dir=str(folder)))
-    if is_file(found):
-        return found
-    places = [Path(place) for place in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if place]
-    places += [Path(place) / "share" for place in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if place]
-    within = name.partition("://")[2]
-    return next((place / within for place in places if within and is_file(place / within)), None)
-
-
-def _find_mesh(visual: Element, folder: Path, room: int) -> int:
-    """Put the path of a visual's mesh file in the place of its name, and return its size, bytes.
-
-    Raises
-    ------
-    InputError
-        There is no such file, or it is larger than `room`, bytes.
-    """
-    size = 0
-=======
 def _find_meshes(visual: Element, folder: Path) -> list[str]:
     """Put the paths of a visual's mesh files in the place of their names; return those that are missing."""
     missing = []
->>>>>>> portable
     for mesh in visual.iter("mesh"):
         name = str(mesh.get("filename"))
         path = mesh_file(name, folder)
         if path is None:
-<<<<<<< HEAD
-            raise InputError(f"no file {name}")
-        mesh.set("filename", str(path))
-        if path.suffix in _PACKED:
-            raise InputError("packed meshes are not read", where=name, hint="Unpack it")
-        size += _size(path)
-    if size > room:
-        found, allowed = f"{size / 1e6:.0f} MB", f"{_LARGEST / 1e6:.0f} MB for all meshes of the robot"
-        raise InputError("the mesh is too large to be shown", where=name, found=found, allowed=allowed)
-    return size
-=======
             missing.append(name)
         mesh.set("filename", str(path))
     return missing
->>>>>>> portable
+
+
+def _check_size(visual: Element, room: int) -> int:
+    """Return the size of a visual's mesh files, bytes.
+
+    Raises
+    ------
+    InputError
+        They are packed, or larger than `room`, bytes.
+    """
+    size = 0
+    for mesh in visual.iter("mesh"):
+        path = Path(str(mesh.get("filename")))
+        if path.suffix in _PACKED:
+            raise InputError("packed meshes are not read", where=path.name, hint="Unpack it")
+        size += _size(path)
+        if size > room:
+            found, allowed = f"{size / 1e6:.0f} MB", f"{_LARGEST / 1e6:.0f} MB for all meshes of the robot"
+            raise InputError("the mesh is too large to be shown", where=path.name, found=found, allowed=allowed)
+    return size
 
 
 def _size(path: Path) -> int:
