@@ -376,19 +376,36 @@ def nearest(name: str, valid: Iterable[str], likeness: float = 0.5) -> str | Non
     return by_small[near[0]] if near else None
 
 
-def missing_attribute(thing: object, name: str) -> AttributeError:
-    """Return what an object without such an attribute raises: it names the one that may be meant, also of its parts."""
-    message = f"{type(thing).__name__!r} object has no attribute {name!r}"
-    if name.startswith("_"):
-        return AttributeError(message)
+class MissingAttributeError(AttributeError):
+    """An object has no such attribute; the message names the one that may be meant, also of its parts."""
+
+    def __init__(self, thing: object, name: str) -> None:
+        super().__init__()
+        self._thing = thing
+        self._name = name
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Be sent to other processes without the object."""
+        return AttributeError, (str(self),)
+
+    def __str__(self) -> str:
+        """Look for the name that may be meant; most such errors are caught, and nobody reads them."""
+        meant = None if self._name.startswith("_") else _attribute_meant(self._thing, self._name)
+        message = f"{type(self._thing).__name__!r} object has no attribute {self._name!r}"
+        return message + (f". Did you mean {meant!r}?" if meant else "")
+
+
+def _attribute_meant(thing: object, name: str) -> str | None:
+    """Return the attribute of an object, or of one of its parts, that may be meant by a name."""
     own = [each for each in dir(thing) if not each.startswith("_")]
     parts = [(part, value) for part, value in vars(thing).items() if part in own]
     for word in (name, *_NAMES_HERE.get(name.lower(), ())):
+        if word in own or "." in word:
+            return word
         within = [f"{part}.{word}" for part, value in parts if hasattr(type(value), word) or word in _contents(value)]
-        if word in own or within or "." in word:
-            return AttributeError(f"{message}. Did you mean {word if word in own else [*within, word][0]!r}?")
-    near = nearest(name, own)
-    return AttributeError(message + (f". Did you mean {near!r}?" if near else ""))
+        if within:
+            return within[0]
+    return nearest(name, own)
 
 
 def _contents(value: object) -> dict[str, object]:

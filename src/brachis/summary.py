@@ -7,7 +7,7 @@ from dataclasses import fields
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from brachis.errors import missing_attribute
+from brachis.errors import MissingAttributeError
 
 COLUMNS, LINES = 100, 22
 _ROOM = 104
@@ -28,7 +28,7 @@ class Summary:
             """Refuse a name that is not there, and name the one that may be meant."""
             if hasattr(type(self), name):  # a property that failed
                 return object.__getattribute__(self, name)
-            raise missing_attribute(self, name)
+            raise MissingAttributeError(self, name)
 
     def __repr__(self) -> str:
         """Show it on one line, or on one line for each entry."""

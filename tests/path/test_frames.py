@@ -162,7 +162,7 @@ def test_a_path_says_its_frame() -> None:
 
 def test_frames_that_do_not_fit() -> None:
     with pytest.raises(
-        TaskError, match=r"path_frame: there is no frame of this name; found 'table' .*allowed: workpiece"
+        TaskError, match=r"path_frame: this frame is not among frames; found 'table' .*allowed: workpiece"
     ):
         written(SEGMENTS, path_frame="table")
     with pytest.raises(TaskError, match=r"allowed: frames: \{table: \{xyz: \[\.\.\.\], rpy_deg: \[\.\.\.\]\}\} beside"):

@@ -17,7 +17,6 @@ class Convention:
 
     Attributes
     ----------
-    numbers : int
     meaning : str
         In words.
     makers : str
@@ -27,24 +26,23 @@ class Convention:
         what is not made of angles.
     """
 
-    numbers: int
     meaning: str
     makers: str
     euler: str = ""
 
 
 CONVENTIONS: Final = {
-    "quaternion_wxyz": Convention(4, "quaternion, w first", "ABB, MuJoCo, Drake"),
-    "quaternion_xyzw": Convention(4, "quaternion, w last", "ROS, SciPy, Pinocchio's vectors"),
-    "rotation_vector": Convention(3, "axis times angle", "Universal Robots"),
+    "quaternion_wxyz": Convention("quaternion, w first", "ABB, MuJoCo, Drake"),
+    "quaternion_xyzw": Convention("quaternion, w last", "ROS, SciPy, Pinocchio's vectors"),
+    "rotation_vector": Convention("axis times angle", "Universal Robots"),
     "rpy": Convention(
-        3, "roll, pitch, yaw about the fixed x, then y, then z axis", "URDF, Yaskawa, Mitsubishi, UFACTORY", "xyz"
+        "roll, pitch, yaw about the fixed x, then y, then z axis", "URDF, Yaskawa, Mitsubishi, UFACTORY", "xyz"
     ),
-    "kuka_abc": Convention(3, "A about z, B about the new y, C about the new x axis", "KUKA", "ZYX"),
+    "kuka_abc": Convention("A about z, B about the new y, C about the new x axis", "KUKA", "ZYX"),
     "staubli_xyz": Convention(
-        3, "Rx about x, Ry about the new y, Rz about the new z axis", "Staubli, Mecademic, RoboDK's targets", "XYZ"
+        "Rx about x, Ry about the new y, Rz about the new z axis", "Staubli, Mecademic, RoboDK's targets", "XYZ"
     ),
-    "fanuc_wpr": Convention(3, "W, P, R about the fixed x, then y, then z axis", "Fanuc", "xyz"),
+    "fanuc_wpr": Convention("W, P, R about the fixed x, then y, then z axis", "Fanuc", "xyz"),
 }
 """Conventions by name."""
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Strict, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from brachis.errors import missing_attribute
+from brachis.errors import MissingAttributeError
 from brachis.summary import shown
 
 REFUSED = "brachis_refused"
@@ -42,7 +42,7 @@ class Model(BaseModel):
             try:
                 return super().__getattr__(name)
             except AttributeError:
-                raise missing_attribute(self, name) from None
+                raise MissingAttributeError(self, name) from None
 
     def __repr_args__(self) -> list[tuple[str | None, Any]]:
         """Leave out what is as by default; `__repr__` is pydantic's and shows these."""

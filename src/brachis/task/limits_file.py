@@ -47,26 +47,21 @@ _UR_JOINTS = {"shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "w
 _SUFFIX = "_joint"
 
 
-def _has(kind: str) -> Any:  # noqa: ANN401  (what pydantic's Field returns)
-    """Return the field that switches a kind of limits."""
-    return Field(default=None, description=f"Whether there is a {kind} limit. Null: as there are figures.")
-
-
 class RosJointLimits(Model):
-    """Limits of one joint, as ROS writes them."""
+    """Limits of one joint as ROS writes them, in SI units; a kind without figures and ``has_...`` is not stated."""
 
-    has_position_limits: Flag | None = _has("position")
-    min_position: Number | None = Field(default=None, description="rad (m).")
-    max_position: Number | None = Field(default=None, description="rad (m).")
-    has_velocity_limits: Flag | None = _has("velocity")
-    max_velocity: Number | None = Field(default=None, description="rad/s (m/s).")
-    has_acceleration_limits: Flag | None = _has("acceleration")
-    max_acceleration: Number | None = Field(default=None, description="rad/s^2 (m/s^2).")
-    has_jerk_limits: Flag | None = _has("jerk")
-    max_jerk: Number | None = Field(default=None, description="rad/s^3 (m/s^3).")
-    has_effort_limits: Flag | None = _has("effort")
-    max_effort: Number | None = Field(default=None, description="N m (N).")
-    angle_wraparound: Flag = Field(default=False, description="Has no effect.")
+    has_position_limits: Flag | None = None
+    min_position: Number | None = None
+    max_position: Number | None = None
+    has_velocity_limits: Flag | None = None
+    max_velocity: Number | None = None
+    has_acceleration_limits: Flag | None = None
+    max_acceleration: Number | None = None
+    has_jerk_limits: Flag | None = None
+    max_jerk: Number | None = None
+    has_effort_limits: Flag | None = None
+    max_effort: Number | None = None
+    angle_wraparound: Flag = False
 
     @model_validator(mode="after")
     def _figures_fit(self) -> RosJointLimits:
@@ -244,8 +239,8 @@ def _check_joints(limited: set[str], robot: Mapping[str, Any], folder: Path, whe
 def _joints_of(urdf: Path, tool: str | None, base: str | None) -> tuple[list[str], list[str]]:
     """Return the joints of a URDF, and those that move the tool.
 
-    There are none of the latter where the tool is left open, and none at all where the URDF cannot be read: the robot
-    says so when it is made.
+    Both are empty where the URDF cannot be read, which the robot says when it is made; the latter where the tool is
+    left open.
     """
     from lxml import etree  # noqa: PLC0415  (for those who need it)
 

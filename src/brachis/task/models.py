@@ -263,9 +263,9 @@ class Task(Model):
         return self
 
     @model_validator(mode="after")
-    def _path_frame_is_known(self) -> Task:
+    def _check_path_frame(self) -> Task:
         if self.path_frame is not None and self.path_frame not in self.frames:
-            problem = "there is no frame of this name"
+            problem = "this frame is not among frames"
             missing = f"frames: {{{self.path_frame}: {{xyz: [...], rpy_deg: [...]}}}} beside it"
             allowed = ", ".join(self.frames) or missing
             raise refuse(problem, key="path_frame", found=self.path_frame, allowed=allowed)

@@ -35,13 +35,13 @@ Length = Annotated[float, _quantity_of(LENGTHS, "0.05 mm"), Strict(), Field(ge=1
 Angle = Annotated[float, _quantity_of(ANGLES, "0.1 deg"), Strict(), Field(ge=1e-7, le=0.5), _QUANTITY_SCHEMA]
 
 
-def _known(word: str) -> str:
+def _check_convention(word: str) -> str:
     if word not in CONVENTIONS:
         raise refuse("this convention of an orientation is not known", found=word, allowed=choices())
     return word
 
 
-OrientationWord = Annotated[Name, AfterValidator(_known), WithJsonSchema({"enum": list(CONVENTIONS)})]
+OrientationWord = Annotated[Name, AfterValidator(_check_convention), WithJsonSchema({"enum": list(CONVENTIONS)})]
 
 
 class FileUnits(Model):
