@@ -286,7 +286,7 @@ BROKEN = {
     "meta not JSON": ({"meta": np.array("{")}, "not a brachis result"),
     "meta a list": ({"meta": np.array("[1]")}, "no mapping"),
     "meta an array": ({"meta": np.zeros(3)}, "not a brachis result"),
-    "other schema": ({"schema": 99}, "unknown schema version; found 99; allowed: 2"),
+    "other schema": ({"schema": 99}, "unknown schema version; found 99; allowed: 3"),
     "no schema": ({"schema": None}, "unknown schema version"),
     "array missing": ({"qddot": None}, "qddot"),
     "degree a string": ({"degree": "3"}, "degree: wrong type; found str; allowed: int"),
@@ -335,6 +335,31 @@ BROKEN = {
     "fewer splines": ({"control_points": lambda a: a[:1]}, "control_points: wrong shape"),
     "control points infinite": ({"control_points": put((0, 0), -np.inf)}, "control_points: not all are finite"),
 }
+
+
+def test_a_file_of_schema_2_has_its_quaternions_renamed(tmp_path):
+    turn = {"rotate": {"axis": [0.0, 0.0, 1.0], "angle_deg": 10.0, "profile": "smooth"}}
+    flat = {"quaternion_wxyz": [0.0, 1.0, 0.0, 0.0]}
+    made = plan(
+        "iiwa14",
+        start="free",
+        path_start={"position": [0.5, 0.0, 0.6], **flat},
+        task_space="pose",
+        path=[{"line": {"by": [0.0, 0.02, 0.0]}, "orientation": turn}],
+        intervals=6,
+        effort="single",
+        least_motion=False,
+    ).trajectory
+    made.save(tmp_path / "result.npz")
+    old = with_parts(
+        tmp_path / "result.npz",
+        schema=2,
+        task__path_start=[0.5, 0.0, 0.6, 0.0, 1.0, 0.0, 0.0],
+        task__path=lambda path: [
+            {**path[0], "orientation": {"rotate": {**path[0]["orientation"]["rotate"], "frame": "world"}}}
+        ],
+    )
+    assert Trajectory.load(old).task == made.task
 
 
 @pytest.mark.parametrize("case", BROKEN)

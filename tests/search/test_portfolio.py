@@ -26,6 +26,7 @@ from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.joint_path import DeadEnd
 from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.posture_lattice import PostureLattice
+from brachis.search.processes import processes
 from brachis.search.reach import reason_out_of_reach
 from brachis.solvers import apart, uno
 from brachis.task import load_task
@@ -437,3 +438,8 @@ def test_a_motion_of_an_earlier_level_is_not_finished_again(robot):
     result = brachis.plan(robot, task(search={"effort": "thorough"}, redundant_joints=["j1"]))
     finished = [candidate.coarse for candidate in result.candidates if math.isfinite(candidate.t_end)]
     assert len({f"{coarse:.4g}" for coarse in finished}) == len(finished)
+
+
+def test_no_processes_are_started_where_little_time_is_left():
+    assert processes(2) == processes(2, Deadline.after(60.0)) == min(2, os.cpu_count() or 1)
+    assert processes(2, Deadline.after(1.0)) == 1

@@ -160,8 +160,11 @@ class _Search:
     ) -> None:
         self._decompositions, self._stages, self._deadline, self._listener = decompositions, stages, deadline, listener
         self._task = problem.task
-        self._jobs = processes(self._task.search.jobs)
         self.record = Record(refined=self._task.refinement.max_rounds > 0)
+
+    @property
+    def _jobs(self) -> int:
+        return processes(self._task.search.jobs, self._deadline)
 
     @property
     def _latest(self) -> Deadline:

@@ -13,10 +13,13 @@ from typing import Any, TypeVar
 from threadpoolctl import ThreadpoolController
 
 from brachis import interrupts
+from brachis.deadline import NEVER, Deadline
 from brachis.errors import BrachisError
 from brachis.progress import Listener
 
 _MAIN = "MainProcess"
+_START = 5.0
+"""Seconds that processes may take to start: two on a free machine, more on a busy one."""
 
 _Given = TypeVar("_Given")
 _Made = TypeVar("_Made")
@@ -79,9 +82,12 @@ def each(
                 made.close()
 
 
-def processes(jobs: int) -> int:
-    """Return the number of processes that is used where a task asks for `jobs`: no more than there are processors."""
-    return min(jobs, os.cpu_count() or 1)
+def processes(jobs: int, deadline: Deadline = NEVER) -> int:
+    """Return the number of processes that is used where a task asks for `jobs`.
+
+    There are no more than processors, and only this one where the others would hardly have started by the deadline.
+    """
+    return 1 if deadline.left < _START else min(jobs, os.cpu_count() or 1)
 
 
 def _within_a_worker() -> bool:

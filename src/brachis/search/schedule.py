@@ -201,7 +201,8 @@ def _from_lattices(
     redundancy = max(1, len(decompositions[0].redundant))
     ranked: list[tuple[int, float, int, Start]] = []
     number = itertools.count()
-    jobs, deadline = processes(search.jobs), deadline.part(_LATTICE_SHARE)
+    deadline = deadline.part(_LATTICE_SHARE)
+    jobs = processes(search.jobs, deadline)
     outcomes = list(each(_starts_of, decompositions, level, search.seed, deadline, jobs=jobs, listener=listener))
     for decomposition, outcome in zip(decompositions, outcomes, strict=True):
         if isinstance(outcome, DeadEnd):

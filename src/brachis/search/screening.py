@@ -62,7 +62,7 @@ def screened(starts: Sequence[Start], most: int, deadline: Deadline, listener: L
     """
     if len(starts) <= most:
         return list(starts)
-    jobs = processes(starts[0].problem.task.search.jobs)
+    jobs = processes(starts[0].problem.task.search.jobs, deadline)
     listener(f"solving quickly from {len(starts)} joint paths")
     looked_at: list[Start] = []
     with closing(each(_quickly, starts, deadline, jobs=jobs, listener=listener)) as solved:

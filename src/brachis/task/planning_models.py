@@ -91,7 +91,8 @@ class SearchSettings(Model):
     time_limit: Positive = Field(
         default=60.0,
         le=1e6,
-        description="Time after which the best motion so far is returned, s; one that is not verified where none is.",
+        description="Time from the call after which the best motion so far is returned, s; one that is not verified "
+        "where none is, a second later perhaps.",
     )
     seed: Count = Field(default=0, ge=0, description="Seed of what is drawn at random.")
     least_motion: Flag = Field(

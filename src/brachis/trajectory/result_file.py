@@ -21,7 +21,7 @@ from brachis.robot.from_task import robot_from_settings
 from brachis.task import Task, load_task
 from brachis.trajectory.recovered import Recovered
 
-SCHEMA = 2
+SCHEMA = 3
 ARRAYS = ("times", "q", "qdot", "qddot", "qddot_before", "knots", "control_points", "chart_rows", "chart_knots")
 """Names of the arrays in the file; as in `Trajectory`."""
 CHART_DEGREE = 5
@@ -34,6 +34,8 @@ _LARGEST_NUMBER = 1e12
 """Of what an array holds: as in tasks."""
 _SHORTEST_PIECE, _SHORTEST_INTERVAL = 1e-12, 1e-12
 """Of a motion, s, and of its splines, in normalised time: shorter ones are lost in rounding."""
+_RENAMED = {"quaternion": "quaternion_wxyz"}
+"""Keys of tasks in files of schema 2, and what they are called now."""
 _HIGHEST_DEGREE = 7
 """Of splines, as in tasks."""
 
@@ -99,9 +101,11 @@ def read_result(path: Path) -> Content:
             found=getattr(error, "strerror", None) or str(error) or type(error).__name__,
             allowed="a file written by brachis plan",
         ) from error
-    if meta.get("schema") != SCHEMA:
+    if meta.get("schema") not in {2, SCHEMA}:
         raise ResultFileError("unknown schema version", where=str(path), found=meta.get("schema"), allowed=SCHEMA)
     try:
+        if meta["schema"] != SCHEMA:
+            meta = {**meta, "task": _renew_task(meta.get("task"))}
         return _content(meta, arrays)
     except InputError as error:
         raise ResultFileError("the result file is broken", where=str(path), found=str(error)) from error
@@ -129,6 +133,22 @@ def _parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     if not isinstance(meta, dict):
         raise ValueError("metadata that are no mapping")  # noqa: TRY004
     return meta, arrays
+
+
+def _renew_task(part: object) -> object:
+    """Write a task, or a part of one, of a file of schema 2 as tasks are written now: the order of quaternions."""
+    if isinstance(part, list):
+        return [_renew_task(each) for each in part]
+    if not isinstance(part, dict):
+        return part
+    renewed = {_RENAMED.get(key, key): _renew_task(value) for key, value in part.items()}
+    place = renewed.get("path_start")
+    if isinstance(place, list) and renewed.get("task_space") in {"pose", "pose_free_roll"}:
+        renewed["path_start"] = {"position": place[:3], "quaternion_wxyz": place[3:]}
+    turn = renewed.get("rotate")
+    if isinstance(turn, dict) and turn.get("frame") == "world":
+        renewed["rotate"] = {**turn, "frame": "path"}
+    return renewed
 
 
 def _content(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Content:
