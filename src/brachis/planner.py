@@ -69,7 +69,6 @@ def plan(
     families: Sequence[ik.Family] = (),
     own_limits: Sequence[LimitModel] = (),
     listener: Listener | None = None,
-    strict: bool = False,
     **keywords: Unpack[TaskKeywords],
 ) -> Result:
     """Plan the minimum-time motion of a robot along a path.
@@ -96,8 +95,6 @@ def plan(
         They are not saved with the motion; those of installed packages are named in the task (``custom_limits``).
     listener : callable, optional
         Told what happens.
-    strict : bool, optional
-        Whether figures that are hardly meant (degrees for rad, mm for m) are errors, not warnings.
     **keywords
         Keys of the task, without their sections: ``path``, ``start``, ``task_space``, ``limits``, ``intervals``,
         ``effort``, ...; all of them: `brachis.task.TaskKeywords`.
@@ -111,8 +108,8 @@ def plan(
     ------
     InputError
         The task, URDF, path or start posture is wrong (`TaskError`, `UrdfError`, `LimitError`, `PathError`, ...); a
-        `Robot` and the task's ``robot`` part contradict each other (`TaskError`); figures are hardly meant and `strict`
-        (`PlausibilityError`).
+        `Robot` and the task's ``robot`` part contradict each other (`TaskError`); the start posture looks like
+        degrees, or with ``strict=True`` another figure is implausible (`PlausibilityError`).
     PlanningError
         No attempt gave a motion within the limits.
 
@@ -138,7 +135,7 @@ def plan(
         check_list(families, "families", "closed forms")
         robot, asked = _read(robot_or_task, task, keywords)
         known = None if start_from is None else motion_of(start_from, "start_from")
-        return _plan(robot, asked, families, own_limits, known, listener or (lambda _text: None), began, strict=strict)
+        return _plan(robot, asked, families, own_limits, known, listener or (lambda _text: None), began)
 
 
 def _read(first: Given, task: Source | None, keywords: TaskKeywords) -> tuple[Robot, Task]:
@@ -160,16 +157,14 @@ def _plan(
     known: Trajectory | None,
     listener: Listener,
     began: float,
-    *,
-    strict: bool,
 ) -> Result:
     """Run the pipeline stage by stage."""
     loaded, deadline = time.perf_counter(), Deadline.after(task.search.time_limit)
     remarks = plausibility.of_robot(robot) + plausibility.of_task(task)
-    remarks = plausibility.tell(remarks, strict=strict, stacklevel=4)
+    remarks = plausibility.tell(remarks, strict=task.strict, stacklevel=4)
     problem = Problem.of(robot, task, own_limits)
     places = plausibility.of_places(problem.task_map, problem.path, problem.start, problem.end, task.path_start)
-    remarks += plausibility.tell(places, strict=strict, stacklevel=4)
+    remarks += plausibility.tell(places, strict=task.strict, stacklevel=4)
     decompositions = decompositions_of(problem, families)
     plausibility.check_within_reach(problem.task_map, problem.path)
     first = None if known is None else _first(problem, decompositions, known)
@@ -183,7 +178,7 @@ def _plan(
     least = calmest(best, over, listener) if task.search.least_motion else None
     calmed = time.perf_counter()
     end_time = plausibility.of_end_time(best.t_end, SHORTEST_TIME)
-    remarks += plausibility.tell(end_time, strict=strict, stacklevel=4)
+    remarks += plausibility.tell(end_time, strict=task.strict, stacklevel=4)
     return Result(
         task=problem.task,
         trajectory=best.trajectory if least is None else least.trajectory,

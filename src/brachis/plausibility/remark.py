@@ -54,14 +54,14 @@ class Remark:
         return asdict(self)
 
 
-def tell(remarks: tuple[Remark, ...], *, strict: bool, stacklevel: int = 2) -> tuple[Remark, ...]:
-    """Warn of every remark, or refuse them all; return them.
+def tell(remarks: tuple[Remark, ...], *, strict: bool | None, stacklevel: int = 2) -> tuple[Remark, ...]:
+    """Warn of every remark, or refuse some or all of them; return them.
 
     Parameters
     ----------
     remarks : tuple of Remark
-    strict : bool
-        Whether they are errors.
+    strict : bool or None
+        Whether they are errors; None: those of the start posture are.
     stacklevel : int, optional
         As of `warnings.warn`; 2 blames the caller.
 
@@ -69,8 +69,9 @@ def tell(remarks: tuple[Remark, ...], *, strict: bool, stacklevel: int = 2) -> t
     ------
     PlausibilityError
     """
-    if strict and remarks:
-        raise PlausibilityError([str(remark) for remark in remarks])
+    refused = [str(each) for each in remarks if strict or (strict is None and each.where.startswith("start.joints"))]
+    if refused:
+        raise PlausibilityError(refused)
     for remark in remarks:
         warnings.warn(str(remark), PlausibilityWarning, stacklevel=stacklevel)
     return remarks
