@@ -101,9 +101,10 @@ robot:
       j1: [[0, 50.8], [6.28, 50.8], [9.42, 0]]   # rad/s, N m: 3000 and 4500 rpm behind 1:50
 ```
 
-Figures that are allowed and hardly meant (degrees for rad, mm for m, g for kg, mNm for N m, rpm for rad/s, factors
-above 10, an end time at the planner's least) are warned of on standard error and listed as `warnings` in the JSON and
-as `result.warnings`; with `--strict`, or `brachis.plan(..., strict=True)`, they are errors.
+Implausible figures (degrees for rad, mm for m, g for kg, mNm for N m, rpm for rad/s, factors above 10, an end time at
+the planner's least) are warned of on standard error and listed as `warnings` in the JSON and as `result.warnings`. A
+start posture that looks like degrees is an error. `strict: true` (`--strict`, `brachis.plan(..., strict=True)`) makes
+all of them errors, `strict: false` (`--no-strict`) all of them warnings.
 """
 
 LIMITS_FILE = """

@@ -226,10 +226,26 @@ def test_strict_refuses_before_anything_is_planned(monkeypatch):
 
 def test_a_posture_in_degrees_where_joints_turn_without_end():
     # 30, -120 and 120 rad are reached all the same: joints of this arm have no range.
+    degrees = {"start": {"joints": [30.0, -120.0, 120.0]}}
     with pytest.raises(PlausibilityError) as caught:
-        brachis.plan(task(start={"joints": [30.0, -120.0, 120.0]}), strict=True)
+        brachis.plan(task(**degrees))
     (remark,) = caught.value.remarks
     assert remark.startswith("start.joints: the position looks like degrees; found j1 30 rad, j2 -120 rad, j3 120 rad;")
+    assert "30 degrees are 0.523599 rad" in remark
+    for way_out in ("strict: false", "strict=False", "--no-strict"):
+        assert way_out in caught.value.hint
+    with pytest.warns(brachis.PlausibilityWarning, match="looks like degrees"):
+        by_keyword = brachis.plan(task(**degrees), strict=False)
+    with pytest.warns(brachis.PlausibilityWarning, match="looks like degrees"):
+        in_the_task = brachis.plan(task(**degrees, strict=False))
+    assert by_keyword.verified
+    assert len(by_keyword.warnings) == len(in_the_task.warnings) == 1
+
+
+def test_only_the_start_posture_is_refused_where_nothing_is_said():
+    content = task(task_space="joints", redundant_joints="auto", path=[{"spline": {"through": [[9.0, -2.0, 2.0]]}}])
+    with pytest.warns(brachis.PlausibilityWarning, match=r"path\.j1: the position looks like degrees"):
+        assert brachis.plan(content).verified
 
 
 def test_yaw_of_the_path_start_in_degrees():

@@ -192,8 +192,14 @@ class UrdfError(InputError):
     """A URDF file is missing, broken, or describes a robot that brachis cannot plan for."""
 
 
+_NOT_STRICT = (
+    "If they are meant, make them warnings: strict: false in the task file, brachis.plan(..., strict=False), or "
+    "brachis plan --no-strict"
+)
+
+
 class PlausibilityError(InputError):
-    """Figures are hardly meant, and the plan was to be strict about it.
+    """Figures are implausible, and the plan is strict about them.
 
     Attributes
     ----------
@@ -203,7 +209,7 @@ class PlausibilityError(InputError):
 
     def __init__(self, remarks: Sequence[str]) -> None:
         self.remarks = tuple(remarks)
-        super().__init__("not plausible:\n  " + "\n  ".join(self.remarks), hint="Without strict these are warnings")
+        super().__init__("not plausible:\n  " + "\n  ".join(self.remarks), hint=_NOT_STRICT)
 
 
 class UnknownNameError(InputError):

@@ -63,7 +63,7 @@ Given = Source | Robot | None
 """A robot, or a task; both may be the name of a file."""
 _MANY_VARIABLES = 150
 """Above this a cold solve takes seconds, and the program is first solved over some of its knots."""
-_OWN_KEYWORDS = ("start_from", "families", "own_limits", "listener", "progress", "strict")
+_OWN_KEYWORDS = ("start_from", "families", "own_limits", "listener", "progress")
 _KNOT_TIME = 0.4
 """Part of the remaining time that may go into the knots."""
 
@@ -78,7 +78,6 @@ def plan(
     own_limits: Sequence[LimitModel] = (),
     listener: Listener | None = None,
     progress: bool | None = None,
-    strict: bool = False,
     **keywords: Unpack[TaskKeywords],
 ) -> Result:
     """Plan the minimum-time motion of a robot along a path.
@@ -109,8 +108,6 @@ def plan(
     progress : bool, optional
         Whether to show on standard error, or below a notebook's cell, what happens. Left out: in notebooks, unless
         there is a listener.
-    strict : bool, optional
-        Whether figures that are hardly meant (degrees for rad, mm for m) are errors, not warnings.
     **keywords
         Keys of the task, without their sections: ``path``, ``start``, ``task_space``, ``limits``, ``intervals``,
         ``effort``, ...; all of them: `brachis.task.TaskKeywords`.
@@ -124,8 +121,8 @@ def plan(
     ------
     InputError
         The task, URDF, path or start posture is wrong (`TaskError`, `UrdfError`, `LimitError`, `PathError`, ...); a
-        `Robot` and the task's ``robot`` part contradict each other (`TaskError`); figures are hardly meant and `strict`
-        (`PlausibilityError`).
+        `Robot` and the task's ``robot`` part contradict each other (`TaskError`); the start posture looks like
+        degrees, or with ``strict=True`` another figure is implausible (`PlausibilityError`).
     PlanningError
         No attempt gave a motion within the limits.
 
@@ -158,7 +155,7 @@ def plan(
             return _is_planned(robot, asked, changed, families, own_limits, limit)
 
         try:
-            return _plan(robot, asked, families, own_limits, known, tell, (began, loaded), deadline, strict=strict)
+            return _plan(robot, asked, families, own_limits, known, tell, (began, loaded), deadline)
         except BrachisError as error:
             try_remedies(error, asked, robot.joint_names, is_task_planned, deadline)
             raise
@@ -191,17 +188,15 @@ def _plan(
     listener: Listener,
     times: tuple[float, float],
     deadline: Deadline,
-    *,
-    strict: bool,
 ) -> Result:
     """Run the pipeline stage by stage; `times` are those when it began and when the task was read, s."""
     began, loaded = times
     remarks = plausibility.of_robot(robot) + plausibility.of_task(task)
-    remarks = plausibility.tell(remarks, strict=strict, stacklevel=4)
+    remarks = plausibility.tell(remarks, strict=task.strict, stacklevel=4)
     listener(f"planning for {robot.n} joints along a path of {len(task.path)} segments, task space {_space(task)}")
     problem = Problem.of(robot, task, own_limits)
     places = plausibility.of_places(problem.task_map, problem.path, problem.start, problem.end, task.path_start)
-    remarks += plausibility.tell(places, strict=strict, stacklevel=4)
+    remarks += plausibility.tell(places, strict=task.strict, stacklevel=4)
     decompositions = decompositions_of(problem, families)
     plausibility.check_within_reach(problem.task_map, problem.path)
     first = None if known is None else _first(problem, decompositions, known)
@@ -217,7 +212,7 @@ def _plan(
     least = calmest(best, over, listener) if task.search.least_motion else None
     calmed = time.perf_counter()
     end_time = plausibility.of_end_time(best.t_end, SHORTEST_TIME)
-    remarks += plausibility.tell(end_time, strict=strict, stacklevel=4)
+    remarks += plausibility.tell(end_time, strict=task.strict, stacklevel=4)
     total = time.perf_counter() - began
     listener(f"planned: t_E = {best.t_end:.4f} s, {best.status}, after {total:.2f} s")
     return Result(

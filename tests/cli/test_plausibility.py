@@ -43,6 +43,21 @@ def test_strict_is_wrong_input(command, run, percent):
     assert "warning:" not in outcome.err
 
 
+def test_a_start_posture_in_degrees_is_refused_and_the_way_out_works(run, task, write):
+    task["start"] = {"joints": [30, -120, 120]}
+    task |= {"search": QUICK, "spline": {"intervals": 10}}
+    path = write(task)
+    refused = run("plan", path)
+    assert refused.code == 2
+    assert "start.joints.j1: the position looks like degrees" in refused.err
+    assert "--no-strict" in " ".join(refused.err.split())
+    for words in (("--no-strict",), ("--set", "strict=false")):
+        outcome = run("plan", path, *words)
+        assert outcome.code == 0, outcome.err
+        assert outcome.err.count("looks like degrees") == 3
+    assert run("bottleneck", path).code == 2
+
+
 def test_a_failed_plan_shows_its_warnings(run, task, write):
     task["robot"]["limits"] = {"torque": 10, "scale": {"velocity": 80}}
     task["path"] = [{"line": {"length": 5.0, "angle_deg": 0}}]

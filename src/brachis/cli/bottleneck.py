@@ -56,7 +56,6 @@ def bottleneck_command(
     check: bool,
     reference: bool,
     out: Path | None,
-    strict: bool,
     as_json: bool,
 ) -> int:
     """Plan a task or take a saved motion, find the bottlenecks, show, write; returns the exit code."""
@@ -67,7 +66,7 @@ def bottleneck_command(
         if source.suffix.lower() == _SAVED:
             motion = _saved(source, {"--urdf": urdf, "--set": changes})
         else:
-            motion = _planned(changed_task(source, changes), urdf, listener, strict=strict)
+            motion = _planned(changed_task(source, changes), urdf, listener)
         listener("looking for what holds the motion back")
         found = bottleneck.report(motion.made, check=check, reference=reference)
     data = {**motion.data, "bottleneck": found.to_dict()}
@@ -85,8 +84,8 @@ def bottleneck_command(
     return exit_code(motion.verified, written.failures)
 
 
-def _planned(task: Task, urdf: Path | None, listener: Callable[[str], None], *, strict: bool) -> _Motion:
-    result = planner.plan(urdf and urdf_of(urdf), task, listener=listener, strict=strict)
+def _planned(task: Task, urdf: Path | None, listener: Callable[[str], None]) -> _Motion:
+    result = planner.plan(urdf and urdf_of(urdf), task, listener=listener)
     return _Motion(result, result.trajectory, result.verified, result.to_dict(), result.interrupted, result.undone)
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from brachis import interrupts
-from brachis.cli.options import Changes, Degrees, Strict
+from brachis.cli.options import Changes, Degrees, Strict, with_strict
 from brachis.cli.output import Json
 
 ResultFile = Annotated[
@@ -52,7 +52,7 @@ def bottleneck(
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
     changes: Changes = None,
-    strict: Strict = False,
+    strict: Strict = None,
     json: Json = False,
 ) -> None:
     """Say what holds a motion back: which limits cost time.
@@ -64,7 +64,13 @@ def bottleneck(
 
     raise typer.Exit(
         command.bottleneck_command(
-            task, changes or [], urdf=urdf, check=check, reference=reference, out=out, strict=strict, as_json=json
+            task,
+            with_strict(changes, strict=strict),
+            urdf=urdf,
+            check=check,
+            reference=reference,
+            out=out,
+            as_json=json,
         )
     )
 

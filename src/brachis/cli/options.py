@@ -7,8 +7,12 @@ from typing import Annotated
 import typer
 
 Strict = Annotated[
-    bool,
-    typer.Option("--strict", help="Refuse figures that are hardly meant, such as degrees for rad, instead of warning."),
+    bool | None,
+    typer.Option(
+        "--strict/--no-strict",
+        help="Refuse all implausible figures, such as degrees for rad, or warn of them all; otherwise only a start "
+        "posture that looks like degrees is refused.",
+    ),
 ]
 Changes = Annotated[
     list[str] | None,
@@ -20,3 +24,8 @@ Changes = Annotated[
     ),
 ]
 Degrees = Annotated[bool, typer.Option("--degrees", help="Show angles in degrees; files and JSON stay in rad.")]
+
+
+def with_strict(changes: list[str] | None, *, strict: bool | None) -> list[str]:
+    """Add what ``--strict`` or ``--no-strict`` says to the changes of a task."""
+    return [*(changes or []), *([] if strict is None else [f"strict={str(strict).lower()}"])]

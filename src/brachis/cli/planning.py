@@ -40,7 +40,7 @@ _MANY = 40
 
 
 def plan_command(
-    task: Path, changes: Sequence[str], *, urdf: Path | None, out: Path | None, view: bool, strict: bool, as_json: bool
+    task: Path, changes: Sequence[str], *, urdf: Path | None, out: Path | None, view: bool, as_json: bool
 ) -> int:
     """Plan, show, write; returns the exit code."""
     if view:
@@ -48,7 +48,7 @@ def plan_command(
     if out is not None:
         make_folder(out, (*_FILES[True], *_FILES[False]), (task, urdf))
     with shown_warnings(), progress() as listener:
-        result = planner.plan(urdf and urdf_of(urdf), changed_task(task, changes), listener=listener, strict=strict)
+        result = planner.plan(urdf and urdf_of(urdf), changed_task(task, changes), listener=listener)
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
     failures: tuple[InputError, ...] = ()
     if out is not None:

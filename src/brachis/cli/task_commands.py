@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from brachis import interrupts
-from brachis.cli.options import Changes, Degrees, Strict
+from brachis.cli.options import Changes, Degrees, Strict, with_strict
 from brachis.cli.output import Json
 
 TaskFile = Annotated[Path, typer.Argument(help="Task file (YAML).", metavar="TASK")]
@@ -52,7 +52,7 @@ def plan(
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
     changes: Changes = None,
     view: Annotated[bool, typer.Option("--view", help="Show the motion in the browser, until Ctrl-C.")] = False,
-    strict: Strict = False,
+    strict: Strict = None,
     json: Json = False,
 ) -> None:
     """Plan a task, verify the motion, and show what came out."""
@@ -60,7 +60,7 @@ def plan(
         from brachis.cli import planning  # noqa: PLC0415
 
     raise typer.Exit(
-        planning.plan_command(task, changes or [], urdf=urdf, out=out, view=view, strict=strict, as_json=json)
+        planning.plan_command(task, with_strict(changes, strict=strict), urdf=urdf, out=out, view=view, as_json=json)
     )
 
 

@@ -76,7 +76,8 @@ def _places(
                 most = 2.0 if within else (1.0 if along is None else _WINDING)
                 usual, value = most * _TURN, float(values[np.argmax(np.abs(values))])
                 looks, shown = "the position looks like degrees", f"{value:.6g}"
-                yield Figure(f"{key}.{name}", looks, abs(value), usual + _ROUNDED, "rad", shown=shown)
+                aside = f"; {shown} degrees are {math.radians(value):.6g} rad"
+                yield Figure(f"{key}.{name}", looks, abs(value), usual + _ROUNDED, "rad", aside, shown)
     if YAW in task_map.rows:
         yaw = path.sample(np.linspace(0.0, 1.0, _STATIONS)).target[:, -1]
         begins = abs(path_start[-1]) if isinstance(path_start, tuple) else 0.0

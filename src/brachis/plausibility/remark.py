@@ -68,14 +68,14 @@ def _of_all(stem: str, group: list[Remark]) -> Remark:
     return Remark(stem, group[0].message, found, "; ".join(dict.fromkeys(remark.usual for remark in group)))
 
 
-def tell(remarks: tuple[Remark, ...], *, strict: bool, stacklevel: int = 2) -> tuple[Remark, ...]:
-    """Warn of every remark, or refuse them all; return them, those that say the same of several joints as one.
+def tell(remarks: tuple[Remark, ...], *, strict: bool | None, stacklevel: int = 2) -> tuple[Remark, ...]:
+    """Warn of remarks, or refuse some or all of them; return them, one for all joints of which they say the same.
 
     Parameters
     ----------
     remarks : tuple of Remark
-    strict : bool
-        Whether they are errors.
+    strict : bool or None
+        Whether they are errors; None: those of the start posture are.
     stacklevel : int, optional
         As of `warnings.warn`; 2 blames the caller.
 
@@ -84,8 +84,9 @@ def tell(remarks: tuple[Remark, ...], *, strict: bool, stacklevel: int = 2) -> t
     PlausibilityError
     """
     remarks = _together(remarks)
-    if strict and remarks:
-        raise PlausibilityError([str(remark) for remark in remarks])
+    refused = [str(each) for each in remarks if strict or (strict is None and each.where.startswith("start.joints"))]
+    if refused:
+        raise PlausibilityError(refused)
     for remark in remarks:
         warnings.warn(str(remark), PlausibilityWarning, stacklevel=stacklevel)
     return remarks

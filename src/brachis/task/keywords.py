@@ -42,6 +42,7 @@ class TaskKeywords(TypedDict, total=False):
     branch: str
     tool_limits: ToolLimits | Settings
     custom_limits: Mapping[str, Settings]
+    strict: bool | None
     # robot
     tool_frame: str | None
     tool_offset: Placement | Settings | Transform

@@ -187,6 +187,11 @@ class Task(Model):
         json_schema_extra=or_form({"type": "string"}),
     )
     refinement: RefinementSettings = Field(default_factory=RefinementSettings, description="Refinement.")
+    strict: bool | None = Field(
+        default=None,
+        description="Whether implausible figures (degrees for rad, mm for m) are errors: true, all of them; false: all "
+        "are warnings; null: a start posture that looks like degrees is an error, the others are warnings.",
+    )
 
     @field_validator("brachis", mode="before")
     @classmethod
