@@ -44,7 +44,9 @@ def task_of(number: int) -> dict[str, Any]:
     return {
         "brachis": 1,
         "robot": {"urdf": str(ROBOT), "gravity": [0, 0, 0], "limits": limits},
-        "start": {"joints": [rng.uniform(-1.5, 1.5), rng.choice((-1, 1)) * rng.uniform(1.0, 2.0), rng.uniform(0.5, 2.0)]},
+        "start": {
+            "joints": [rng.uniform(-1.5, 1.5), rng.choice((-1, 1)) * rng.uniform(1.0, 2.0), rng.uniform(0.5, 2.0)]
+        },
         "task_space": ["x", "y"],
         "path": [{"line": {"length": size(0.05, 0.6), "angle_deg": rng.uniform(0.0, 360.0)}}],
         "redundant_joints": [rng.choice(("j1", "j3"))],

@@ -38,9 +38,7 @@ _KINDS = {
 }
 
 
-def read_file(
-    path: str | os.PathLike[str], largest: int = LARGEST_TEXT, *, beginning: int | None = None
-) -> bytes:
+def read_file(path: str | os.PathLike[str], largest: int = LARGEST_TEXT, *, beginning: int | None = None) -> bytes:
     """Read a regular file of at most `largest` bytes, or its first bytes; what would never end is refused at once.
 
     Raises

@@ -118,7 +118,9 @@ class Task(Model):
         "of x, y, z); pose; pose_free_roll, a pose that may roll about the tool frame's z axis; or joints: the path is "
         "one of all joints, in the order of the chain (rad, m), and only its timing is planned."
     )
-    path: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=_MOST_SEGMENTS)] = Field(description="Segments of the path, in order.")
+    path: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=_MOST_SEGMENTS)] = Field(
+        description="Segments of the path, in order."
+    )
     boundary: BoundarySettings = Field(
         default_factory=BoundarySettings, description="Speeds at both ends, or a motion that goes round for ever."
     )

@@ -24,17 +24,13 @@ _ROUNDING = float(np.finfo(float).eps)
 """Of a number that is the difference of two, as a part of the larger one."""
 
 
-def travel_without_bend(
-    times: np.ndarray, qdot: np.ndarray, after: np.ndarray, before: np.ndarray
-) -> np.ndarray:
+def travel_without_bend(times: np.ndarray, qdot: np.ndarray, after: np.ndarray, before: np.ndarray) -> np.ndarray:
     """Travel of every piece, (L, n), if its jerk were linear in time; parameters as `relative_coefficients`."""
     h = np.diff(times)[:, None]
     return np.asarray(0.5 * h * (qdot[:-1] + qdot[1:]) - h**2 / 12.0 * (before[1:] - after[:-1]))
 
 
-def _misses(
-    times: np.ndarray, q: np.ndarray, qdot: np.ndarray, after: np.ndarray, before: np.ndarray
-) -> np.ndarray:
+def _misses(times: np.ndarray, q: np.ndarray, qdot: np.ndarray, after: np.ndarray, before: np.ndarray) -> np.ndarray:
     """Return the part of every piece's travel, (L, n), that bends its jerk: what remains beyond rounding."""
     miss = np.diff(q, axis=0) - travel_without_bend(times, qdot, after, before)
     far, fast = (np.maximum(np.abs(part[1:]), np.abs(part[:-1])) for part in (q, qdot))

@@ -194,7 +194,9 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
     times, knots = arrays["times"], arrays["knots"]
     if times.size > MOST_NODES:
         hint = "Import fewer rows, or a part of them"
-        raise InputError("the motion has too many nodes", where="times", found=times.size, allowed=MOST_NODES, hint=hint)
+        raise InputError(
+            "the motion has too many nodes", where="times", found=times.size, allowed=MOST_NODES, hint=hint
+        )
     if times.ndim != 1 or len(times) < 2 or times[0] != 0.0 or not (np.diff(times) >= _SHORTEST_PIECE).all():  # noqa: PLR2004
         allowed = f"ascending numbers from 0, at least {_SHORTEST_PIECE:g} s apart"
         raise InputError("not times", where="times", found=_extent(times), allowed=allowed)
