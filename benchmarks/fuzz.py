@@ -5,9 +5,9 @@
     python benchmarks/fuzz.py --only 1234        # one case again, here, with its traceback; its files are kept
     python benchmarks/fuzz.py --kinds result --cases 1000 --seconds 10 --memory 1000
 
-Every case runs in a worker process that may take 60 s of processor time and 2 GB of memory beyond what its libraries occupy. Another
-exception, a crash, a longer time or more memory is a fault and listed with the case's number. With --memory the
-largest memory of the whole process counts too, in MB. With --kinds a number means another case.
+Every case runs in a worker process that may take 60 s of processor time and 2 GB of memory beyond what its libraries
+occupy. Another exception, a crash, a longer time or more memory is a fault and listed with the case's number. With
+--memory the largest memory of the whole process counts too, in MB. With --kinds a number means another case.
 """
 
 from __future__ import annotations

@@ -323,63 +323,87 @@ _PATHS: tuple[list[dict[str, Any]], ...] = (
 )
 
 
+_Parts = dict[str, Any]
+
+
+def _many_nodes(parts: _Parts, _meta: _Parts, rng: random.Random) -> None:
+    old = parts["times"]
+    parts["times"] = np.linspace(old[0], old[-1], rng.choice(_COUNTS))
+    for name in _MOMENTS:
+        parts[name] = np.column_stack([np.interp(parts["times"], old, column) for column in parts[name].T])
+
+
+def _many_knots(parts: _Parts, meta: _Parts, rng: random.Random) -> None:
+    count, degree = rng.choice(_COUNTS), meta["degree"]
+    parts["knots"] = np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, count), np.ones(degree)])
+    places, old = np.linspace(0.0, 1.0, count + degree - 1), np.linspace(0.0, 1.0, parts["control_points"].shape[1])
+    parts["control_points"] = np.array([np.interp(places, old, row) for row in parts["control_points"]])
+
+
+def _far_and_fast(parts: _Parts, _meta: _Parts, rng: random.Random) -> None:
+    for name in _MOMENTS:
+        parts[name] = parts[name] * 10.0 ** rng.uniform(0.0, 12.0)
+
+
+def _other_task(_parts: _Parts, meta: _Parts, rng: random.Random) -> None:
+    changes = {"path": _PATHS, "tool_limits": _TOOL_LIMITS, "task_space": _SPACES}
+    key = rng.choice(("limits", *changes))
+    if key == "limits":
+        meta["task"]["robot"]["limits"] = rng.choice(_LIMITS)
+    else:
+        meta["task"][key] = rng.choice(changes[key])
+
+
+def _extreme_values(parts: _Parts, _meta: _Parts, rng: random.Random) -> None:
+    name = rng.choice([name for name in parts if name != "meta" and parts[name].size])
+    changed = parts[name].copy().reshape(-1)
+    weird = (math.nan, math.inf, -math.inf, 1e300, -1e300, 1e-300, 1e12, -1e12, 1e6)
+    changed[rng.randrange(changed.size) if rng.random() < 0.5 else slice(None)] = rng.choice(weird)
+    parts[name] = changed.reshape(parts[name].shape)
+
+
+def _close_nodes(parts: _Parts, _meta: _Parts, rng: random.Random) -> None:
+    times, k = parts["times"].copy(), rng.randrange(1, len(parts["times"]))
+    times[k:] += times[k - 1] + 10.0 ** rng.uniform(-15.0, 0.0) - times[k]
+    parts["times"] = times
+
+
+def _other_times(parts: _Parts, _meta: _Parts, rng: random.Random) -> None:
+    parts["times"] = parts["times"] * rng.choice((-1.0, 1e-300, 1e-9, 1e-3, 1e3, 1e9, 1e300))
+
+
+_EXTREMES = (
+    _many_nodes,
+    _many_knots,
+    _far_and_fast,
+    _other_task,
+    _other_task,
+    _extreme_values,
+    _close_nodes,
+    _other_times,
+)
+_MOMENTS = ("q", "qdot", "qddot", "qddot_before")
+_TYPES = (np.longdouble, np.float16, np.uint8, "M8[s]", object, "S8", ">f8", "V8", bool)
+_SPACES = (["x", "y", "yaw"], ["x"], "pose", "joints")
+
+
 def extreme_result(data: bytes, rng: random.Random) -> bytes:
     """Ask a result file for as much work and memory as it can, with figures of any size and arrays of any kind."""
     with np.load(io.BytesIO(data)) as archive:
-        parts: dict[str, Any] = dict(archive)
-    moments = ("q", "qdot", "qddot", "qddot_before")
+        parts: _Parts = dict(archive)
     meta = json.loads(str(parts["meta"]))
-    retyped = rng.choice(list(parts)) if rng.random() < 0.1 else "meta"
     for _ in range(rng.choice((1, 1, 2, 3))):
-        action = rng.choice(("nodes", "knots", "far", "limits", "tool", "path", "value", "close", "time", "space"))
-        if action == "nodes":
-            old, count = parts["times"], rng.choice(_COUNTS)
-            parts["times"] = np.linspace(old[0], old[-1], count)
-            for name in moments:
-                parts[name] = np.column_stack([np.interp(parts["times"], old, column) for column in parts[name].T])
-        elif action == "knots":
-            count, degree = rng.choice(_COUNTS), meta["degree"]
-            ends = np.repeat([0.0, 1.0], degree)
-            parts["knots"] = np.concatenate([ends[:degree], np.linspace(0.0, 1.0, count), ends[degree:]])
-            places = np.linspace(0.0, 1.0, count + degree - 1)
-            old = np.linspace(0.0, 1.0, parts["control_points"].shape[1])
-            parts["control_points"] = np.array([np.interp(places, old, row) for row in parts["control_points"]])
-        elif action == "far":
-            for name in moments:
-                parts[name] = parts[name] * 10.0 ** rng.uniform(0.0, 12.0)
-        elif action == "limits":
-            meta["task"]["robot"]["limits"] = rng.choice(_LIMITS)
-        elif action == "tool":
-            meta["task"]["tool_limits"] = rng.choice(_TOOL_LIMITS)
-        elif action == "path":
-            meta["task"]["path"] = rng.choice(_PATHS)
-        elif action == "value":
-            name = rng.choice([name for name in parts if name != "meta" and parts[name].size])
-            weird = (math.nan, math.inf, -math.inf, 1e300, -1e300, 1e-300, 1e12, -1e12, 1e6)
-            changed = parts[name].copy().reshape(-1)
-            changed[rng.randrange(changed.size) if rng.random() < 0.5 else slice(None)] = rng.choice(weird)
-            parts[name] = changed.reshape(parts[name].shape)
-        elif action == "close":
-            k = rng.randrange(1, len(parts["times"]))
-            parts["times"] = parts["times"].copy()
-            parts["times"][k:] = parts["times"][k - 1] + 10.0 ** rng.uniform(-15.0, 0.0) * (
-                1.0 + parts["times"][k:] - parts["times"][k]
-            )
-        elif action == "time":
-            parts["times"] = parts["times"] * rng.choice((-1.0, 1e-300, 1e-9, 1e-3, 1e3, 1e9, 1e300))
-        else:
-            meta["task"]["task_space"] = rng.choice((["x", "y", "yaw"], ["x"], "pose", "joints"))
+        rng.choice(_EXTREMES)(parts, meta, rng)
+    retyped = rng.choice(list(parts)) if rng.random() < 0.1 else "meta"
     if retyped != "meta":
-        kind = rng.choice((np.longdouble, np.float16, np.uint8, "M8[s]", object, "S8", ">f8", "V8", bool))
         with contextlib.suppress(ValueError, TypeError), np.errstate(all="ignore"):
-            parts[retyped] = parts[retyped].astype(kind)
+            parts[retyped] = parts[retyped].astype(rng.choice(_TYPES))
     parts["meta"] = np.array(json.dumps(meta))
     stream = io.BytesIO()
     with np.errstate(all="ignore"):
         np.savez_compressed(stream, **parts)
-    content = stream.getvalue()
     last = rng.choice(("", "", "", "", "", "", "header", "bomb", "many"))
-    return content if not last else _rezipped(content, last, rng)
+    return stream.getvalue() if not last else _rezipped(stream.getvalue(), last, rng)
 
 
 def _rezipped(data: bytes, how: str, rng: random.Random) -> bytes:

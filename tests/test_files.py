@@ -31,11 +31,11 @@ def test_a_file_of_the_kernel_that_has_nothing_to_say_yet_is_empty(tmp_path, mon
     """Such as /proc/kmsg: read without waiting it gives None, and not bytes."""
 
     class Silent(io.BytesIO):
-        def read(self, size=-1):
+        def read(self, *_):
             return None
 
     (tmp_path / "kmsg").touch()
-    monkeypatch.setattr(files.os, "fdopen", lambda descriptor, mode: os.close(descriptor) or Silent())
+    monkeypatch.setattr(files.os, "fdopen", lambda descriptor, *_: os.close(descriptor) or Silent())
     assert read_file(tmp_path / "kmsg") == b""
     with pytest.raises(ResultFileError, match="the file is not a brachis result"):
         Trajectory.load(tmp_path / "kmsg")

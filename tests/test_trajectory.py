@@ -96,38 +96,28 @@ def test_very_short_lines_are_verified(length):
     assert torque_jump.value < 1e-10
 
 
-def _with_header(path, change):
-    """Change the header of the array of times."""
+_HEADERS = (
+    b"{'descr': '<f8', 'fortran_order': Fal",
+    b"{'descr': '<f8', 'fortran_order': False, 'shape': (3,), \n",
+    b"{'descr': '<f8', 1: 2}\n",
+    b"{'descr': '<f8', 'fortran_order': False, 'shape': (100000000000000000000000,)}\n",
+    b"{'descr': '<f8', 'fortran_order': False, 'shape': (-1,)}\n",
+    b"{'descr': '|O', 'fortran_order': False, 'shape': (1,)}\n",
+    b"(" * 3000 + b"\n",
+    b"  x\n y\n",
+)
+
+
+@pytest.mark.parametrize("header", _HEADERS)
+def test_headers_of_arrays_that_are_broken(header, trajectory, tmp_path):
+    path = tmp_path / "result.npz"
+    trajectory.save(path)
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
-    content = members["times.npy"]
-    length = int.from_bytes(content[8:10], "little")
-    header = change(content[10 : 10 + length])
-    members["times.npy"] = content[:8] + len(header).to_bytes(2, "little") + header + content[10 + length :]
+    members["times.npy"] = members["times.npy"][:8] + len(header).to_bytes(2, "little") + header
     with zipfile.ZipFile(path, "w") as archive:
         for name, member in members.items():
             archive.writestr(name, member)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda header: header[:40],
-        lambda header: header.replace(b"}", b" "),
-        lambda header: b"{'descr': '<f8', 1: 2}\n",
-        lambda header: b"{'descr': '<f8', 'fortran_order': False, 'shape': (100000000000000000000000,)}\n",
-        lambda header: b"{'descr': '<f8', 'fortran_order': False, 'shape': (-1,)}\n",
-        lambda header: b"(" * 3000 + b"\n",
-        lambda header: b"{'descr': '|O', 'fortran_order': False, 'shape': (1,)}\n",
-        lambda header: b"  x\n y\n",
-    ],
-)
-def test_headers_of_arrays_that_are_broken(change, trajectory, tmp_path):
-    path = tmp_path / "result.npz"
-    trajectory.save(path)
-    _with_header(path, lambda header: header)
-    Trajectory.load(path)
-    _with_header(path, change)
     with pytest.raises(ResultFileError, match="not a brachis result"):
         Trajectory.load(path)
 

@@ -9,6 +9,7 @@ from scipy.interpolate import BPoly
 from brachis.errors import UnreachableError
 from brachis.kinematics import interpolate
 from brachis.robot import Robot
+from brachis.trajectory.pieces import jerk_coefficients
 from support.chains import planar_robot
 from support.motions import Sway, joint_map
 
@@ -33,6 +34,22 @@ def test_pieces_agree_with_the_closed_form_at_random_times(pattern, start, redun
     assert np.abs(curve(t, nu=1) - state.qdot).max() < 1e-8
     assert np.abs(curve(t, nu=2) - state.qddot).max() < 1e-5 * np.abs(state.qddot).max()
     assert np.abs(curve(t, nu=3) - state.qdddot).max() < 1e-5 * np.abs(state.qdddot).max()
+
+
+@pytest.mark.parametrize("gap", [1e-4, 2e-5])
+def test_the_jerk_of_short_pieces_is_that_of_the_closed_form(gap):
+    """Positions that are 1e-15 rad off would be a jerk of 60 rad/s^3 over 1e-5 s."""
+    chain = joint_map(planar_robot("RRR"), ["x", "y"], [{"line": {"by": [-0.15, 0.1]}}], [0.4, 1.0, 0.5], ["j2"])
+    motion = Sway(chain)
+    breaks = np.union1d(np.linspace(0.0, 1.0, 6), 0.5 + gap * np.arange(8))
+    nodes = interpolate(chain, motion, breaks, jumps=False)
+    jerk = jerk_coefficients(nodes.times, nodes.q, nodes.qdot, nodes.qddot, nodes.qddot_before)
+    short = np.diff(nodes.times) <= gap
+    assert short.sum() >= 14
+    state = chain.state(*motion(nodes.times))
+    for off in (jerk[0] - state.qdddot[:-1], jerk[2] - state.qdddot[1:]):
+        assert np.abs(off[short]).max() < 5e-5 * np.abs(state.qdddot).max()
+    assert np.abs(nodes.q - state.q).max() < 1e-11
 
 
 def test_nodes_contain_the_breaks_and_are_denser_where_the_motion_bends(scara_urdf):

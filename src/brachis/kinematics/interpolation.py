@@ -20,7 +20,7 @@ from brachis.kinematics.joint_map import JointMap, JointState
 Curves = Callable[[np.ndarray], tuple[np.ndarray, ...]]
 
 _PIECES = 4
-"""Pieces of the longest interval at first; shorter ones have fewer, since rounding shows in the jerk of short pieces."""
+"""Pieces of the longest interval at first; shorter ones have fewer: rounding shows in the jerk of short pieces."""
 _POSITION_TOLERANCE = 1e-11
 _ACCELERATION_TOLERANCE, _JERK_TOLERANCE = 1e-6, 1e-5
 _LARGEST_ERROR = 1e-9

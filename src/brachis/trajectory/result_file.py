@@ -73,9 +73,10 @@ def write_result(path: str | os.PathLike[str], meta: Mapping[str, object], array
     Raises
     ------
     InputError
-        The suffix is another than npz, or the folder does not exist or cannot be written.
+        The suffix is another than npz, the folder does not exist or cannot be written, or there are too many nodes.
     """
     check_suffix(path, ".npz", "brachis.export.write writes tables and formats of controllers")
+    _check_nodes(arrays["times"])
     contents: dict[str, Any] = {"meta": np.array(json.dumps({"schema": SCHEMA, **meta})), **arrays}
     with atomic_write(path) as stream:
         np.savez(stream, **contents)
@@ -212,11 +213,7 @@ def _are_knots(knots: np.ndarray, degree: int) -> bool:
 def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) -> None:
     """Check shapes and order."""
     times, knots = arrays["times"], arrays["knots"]
-    if times.size > MOST_NODES:
-        hint = "Import fewer rows, or a part of them"
-        raise InputError(
-            "the motion has too many nodes", where="times", found=times.size, allowed=MOST_NODES, hint=hint
-        )
+    _check_nodes(times)
     if times.ndim != 1 or len(times) < 2 or times[0] != 0.0 or not (np.diff(times) >= _SHORTEST_PIECE).all():  # noqa: PLR2004
         allowed = f"ascending numbers from 0, at least {_SHORTEST_PIECE:g} s apart"
         raise InputError("not times", where="times", found=_extent(times), allowed=allowed)
@@ -233,6 +230,15 @@ def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) ->
     for name, shape in shapes.items():
         if arrays[name].shape != shape:
             raise InputError("wrong shape", where=name, found=arrays[name].shape, allowed=shape)
+
+
+def _check_nodes(times: np.ndarray) -> None:
+    """Refuse motions of so many nodes that they are not verified."""
+    if times.size > MOST_NODES:
+        hint = "Import fewer rows, or a part of them"
+        raise InputError(
+            "the motion has too many nodes", where="times", found=times.size, allowed=MOST_NODES, hint=hint
+        )
 
 
 def _extent(array: np.ndarray) -> str:

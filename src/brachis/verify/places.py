@@ -71,8 +71,8 @@ def check_instants(count: int) -> None:
             "the motion is too long, too fast or too finely divided to be verified",
             where="trajectory",
             found=f"{count} instants to look at",
-            allowed=f"{MOST_INSTANTS}: {_LEAST_STEPS + 1} in every piece between nodes, one for every {_TRAVEL:g} rad or "
-            "m that a joint travels, 32 in every knot interval and in every piece of the path",
+            allowed=f"{MOST_INSTANTS}: {_LEAST_STEPS + 1} in every piece between nodes, one for every {_TRAVEL:g} rad "
+            "or m that a joint travels, 32 in every knot interval and in every piece of the path",
             hint="Split the motion into parts",
         )
 
