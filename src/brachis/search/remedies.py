@@ -28,7 +28,7 @@ _DIGITS, _ROUNDING = 3, 0.01
 Trial = Callable[[Task, Deadline, int | None], bool | None]
 """Says whether a plan of a task is found and verified before a deadline.
 
-The last argument is how many batches of the search are tried; None: all. It returns None where there may be a plan yet."""
+The last argument is how many batches of the search are tried; None: all. It returns None where a plan may exist."""
 
 
 def try_remedies(error: BrachisError, task: Task, joints: Sequence[str], is_planned: Trial, deadline: Deadline) -> None:
