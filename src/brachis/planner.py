@@ -151,8 +151,8 @@ def plan(
         loaded = time.perf_counter()
         deadline = Deadline.after(asked.search.time_limit - (loaded - began))
 
-        def is_task_planned(changed: Task, limit: Deadline) -> bool | None:
-            return _is_planned(robot, asked, changed, families, own_limits, limit)
+        def is_task_planned(changed: Task, limit: Deadline, most: int | None) -> bool | None:
+            return _is_planned(robot, asked, changed, families, own_limits, limit, most)
 
         try:
             return _plan(robot, asked, families, own_limits, known, tell, (began, loaded), deadline)
@@ -242,14 +242,15 @@ def _is_planned(
     families: Sequence[ik.Family],
     own_limits: Sequence[LimitModel],
     deadline: Deadline,
+    most: int | None,
 ) -> bool | None:
     """Tell whether a plan of a task that was changed is verified; see `brachis.search.is_planned`."""
-    changed = task_with(changed, effort="single")
+    changed = task_with(changed, effort="single") if most else changed
     same = changed.robot == task.robot
     problem = Problem.of(
         robot if same else robot_from_settings(changed.robot, urdf_text=robot.urdf), changed, own_limits
     )
-    return is_planned(problem, decompositions_of(problem, families), Stages(solved, finished), deadline)
+    return is_planned(problem, decompositions_of(problem, families), Stages(solved, finished), deadline, most)
 
 
 def _space(task: Task) -> str:

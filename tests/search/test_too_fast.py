@@ -50,8 +50,9 @@ def advised(error: brachis.BrachisError, key: str) -> float:
 
 
 @pytest.mark.usefixtures("no_hurry")
-def test_a_run_up_that_is_too_short_is_told_with_what_would_do():
+def test_a_run_up_that_is_too_short_is_told_with_what_would_do(monkeypatch):
     """Over the way d the acceleration a leads to sqrt(2 a d)."""
+    monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
     with pytest.raises(
         brachis.PlanningError, match=r"the path before s = 0\.1 is too short for the way to it"
     ) as caught:
@@ -70,7 +71,9 @@ def test_no_number_is_advised_where_the_time_is_up(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     with pytest.raises(brachis.PlanningError) as caught:
         brachis.plan(slide(0.5, (0.1, 0.6)))
-    assert re.match(r"Lower tool_limits\.process_speed\[0\]\.speed, or raise the limits", caught.value.hint)
+    assert re.match(
+        r"Lower tool_limits\.process_speed\[0\]\.speed \(how far was not found out\), or raise", caught.value.hint
+    )
 
 
 def test_a_number_that_was_not_verified_is_not_advised(monkeypatch):
@@ -149,11 +152,12 @@ def test_speeds_far_out_of_reach_of_a_redundant_arm_are_refused_before_a_plan_is
 
 
 @pytest.mark.usefixtures("no_hurry")
-def test_a_speed_at_the_end_that_the_velocity_limit_forbids():
+def test_a_speed_at_the_end_that_the_velocity_limit_forbids(monkeypatch):
+    monkeypatch.setattr("brachis.search.remedies._TRIALS", 1)
     with pytest.raises(brachis.PlanningError, match=r"found 0.9 m/s; allowed: about 0.3 m/s along") as caught:
         brachis.plan(slide(0.2, (0.3, 0.6), limits={"velocity": 0.3}, boundary={"end_speed": 0.9}))
     assert caught.value.where == "boundary.end_speed"
-    assert 0.28 < advised(caught.value, "boundary.end_speed") <= 0.3
+    assert 0.27 < advised(caught.value, "boundary.end_speed") <= 0.3
 
 
 def test_an_end_speed_that_another_one_at_the_start_makes_possible(monkeypatch):

@@ -119,19 +119,25 @@ def find_fastest(
 
 
 def is_planned(
-    problem: Problem, decompositions: Sequence[Decomposition], stages: Stages, deadline: Deadline
+    problem: Problem,
+    decompositions: Sequence[Decomposition],
+    stages: Stages,
+    deadline: Deadline,
+    most: int | None = None,
 ) -> bool | None:
-    """Tell whether a verified motion is found; of a redundant robot along the first joint paths alone.
+    """Tell whether a verified motion is found by the first batches of a search.
 
     Parameters
     ----------
     problem, decompositions, stages, deadline
         See `find_fastest`.
+    most : int, optional
+        How many batches are tried; all of them where it is left out.
 
     Returns
     -------
     bool or None
-        None where there are other joint paths.
+        None where there may be one yet: not all batches were tried, or the robot has more joint paths than these have.
     """
 
     def listener(_text: str) -> None:
@@ -139,12 +145,11 @@ def is_planned(
 
     search = _Search(problem, decompositions, stages, deadline, listener)
     schedule = batches(problem, decompositions, deadline, listener, search.record.note_lattice)
-    redundant = problem.robot.n > problem.task_map.m
-    search.run(itertools.islice(schedule, 1 if redundant else None))
+    search.run(itertools.islice(schedule, most))
     best = search.record.best
     if best is not None and best.verified:
         return True
-    return None if redundant else False
+    return None if most or problem.robot.n > problem.task_map.m else False
 
 
 class _Search:

@@ -25,8 +25,10 @@ _ALONE = 3
 _DIGITS, _ROUNDING = 3, 0.01
 """Digits of numbers that are tried, and what they leave out of a ratio."""
 
-Trial = Callable[[Task, Deadline], bool | None]
-"""Says whether a plan of a task is found and verified before a deadline; None where it did not look everywhere."""
+Trial = Callable[[Task, Deadline, int | None], bool | None]
+"""Says whether a plan of a task is found and verified before a deadline.
+
+The last argument is how many batches of the search are tried; None: all. It returns None where a plan may exist."""
 
 
 def try_remedies(error: BrachisError, task: Task, joints: Sequence[str], is_planned: Trial, deadline: Deadline) -> None:
@@ -49,12 +51,12 @@ def try_remedies(error: BrachisError, task: Task, joints: Sequence[str], is_plan
     for number, remedy in enumerate(error.remedies):
         own = deadline.part(weights[number] / sum(weights[number:]))
 
-        def is_enough(value: float, remedy: Remedy = remedy, own: Deadline = own) -> bool | None:
-            limit = own.part(_SHARE)
+        def is_enough(value: float, most: int | None, remedy: Remedy = remedy, own: Deadline = own) -> bool | None:
+            limit = own.part(_SHARE) if most else own
             found: bool | None = False
             try:
                 changed = load_task(_with_number(content, joints, remedy.key, value))
-                found = is_planned(changed, limit)
+                found = is_planned(changed, limit, most)
             except BrachisError:
                 pass
             return None if not found and limit.passed else found
@@ -69,28 +71,25 @@ def try_remedies(error: BrachisError, task: Task, joints: Sequence[str], is_plan
         error.put_advice(text[:1].upper() + text[1:])
 
 
-def _try_numbers(remedy: Remedy, is_enough: Callable[[float], bool | None], deadline: Deadline) -> str:
+def _try_numbers(remedy: Remedy, is_enough: Callable[[float, int | None], bool | None], deadline: Deadline) -> str:
     """Look for the smallest change that is enough, and say which it is; empty where none was found.
 
-    Of a number `is_enough` says None where it is not known.
+    `is_enough` takes a number and how many batches of the search are tried, as a `Trial` does.
     """
     unit = f" {remedy.unit}" if remedy.unit else ""
     lowers = remedy.guess < remedy.asked
     away = -1.0 if lowers else 1.0
     good: float | None = None
     bad = remedy.asked
-    is_tried = False
     step = _NEAR
     value = _rounded(remedy.guess, down=lowers)
     for _ in range(_TRIALS if remedy.is_refined else 1):
         if deadline.passed or value in (good, bad) or value <= 0.0:
             break
-        outcome = is_enough(value)
-        if outcome:
+        if is_enough(value, 1):
             good = value
         else:
             bad = value
-            is_tried = outcome is not None
         if good is None:
             value *= step**away
         elif abs(math.log(good / bad)) <= math.log(_NEAR) + _ROUNDING:
@@ -103,8 +102,15 @@ def _try_numbers(remedy: Remedy, is_enough: Callable[[float], bool | None], dead
         step = min(step**_FASTER, _LARGEST_STEP)
     if good is None:
         return ""
-    limit = f"; there was none with {bad:g}{unit}" if remedy.is_refined and is_tried else ""
-    return f"{good:g}{unit} (a plan with it was verified{limit})"
+    text = f"{good:g}{unit} (a plan with it was verified"
+    # Quick trials may miss a plan; that there is none is said after a whole search alone.
+    if remedy.is_refined and bad != remedy.asked and not deadline.passed:
+        outcome = is_enough(bad, None)
+        if outcome:
+            text = f"{bad:g}{unit} (a plan with it was verified"
+        elif outcome is False:
+            text += f"; there was none with {bad:g}{unit}"
+    return f"{text})"
 
 
 def _rounded(value: float, *, down: bool) -> float:

@@ -34,6 +34,8 @@ _EXACT, _HOPELESS, _UNLIKELY = 0.97, 0.5, 0.8
 """Share of a speed above which it may be possible yet: where the phase plane is exact, where not, and after plans."""
 _STATIONS, _BISECTIONS, _SAMPLES = 401, 10, 400
 _AT_REST = (0.0, 0.0)
+_FIRST = 0.96
+"""Part of the largest speed in the phase plane that is tried first: splines fall a little short of it."""
 _ROOM = 0.01
 """Part of the path by which a part with a speed begins behind, or ends before, the way to the speed."""
 _STILL = 1e-9
@@ -177,7 +179,7 @@ def _ends_too_fast(problem: Problem, s: np.ndarray, q: np.ndarray, stations: np.
     )
     given = problem.task.boundary
     remedies = [
-        Remedy(f"boundary.{name}", getattr(given, name), part * getattr(given, name), unit)
+        Remedy(f"boundary.{name}", getattr(given, name), _FIRST * part * getattr(given, name), unit)
         for part, name in found
         if part < _EXACT
     ]
@@ -222,7 +224,7 @@ def _falling_short(start: Start, motion: JointMotion, how: str, s: np.ndarray, q
             there = f"{held.speed:.3g} m/s at s = {held.s:.3g}{' on that joint path' if start.joint_map.r else ''}"
             what = f"the {held.limit} limit lets the tool keep no more than {there}"
             cuts = {}
-        remedies.append(Remedy(f"{key}.speed", part.speed, part.speed * possible / figure, "m/s"))
+        remedies.append(Remedy(f"{key}.speed", part.speed, _FIRST * part.speed * possible / figure, "m/s"))
         remedies += [Remedy(f"{key}.s[{end}]", part.s[end], cut, is_refined=False) for end, cut in cuts.items()]
     error = PlanningError(
         f"no motion was found with the {label.kind} that is asked for: {what}",
