@@ -10,16 +10,7 @@ import pytest
 
 import brachis
 from brachis.deadline import Deadline
-from brachis.mesh import (
-    MeshOptions,
-    adapt_mesh,
-    coarsest,
-    h_refinement,
-    knot_optimisation,
-    optimise_knots,
-    refine_mesh,
-    solve_nested,
-)
+from brachis.mesh import MeshOptions, adapt_mesh, coarsest, knot_optimisation, optimise_knots, refine_mesh, solve_nested
 from brachis.refine import RefinementOptions, refine
 from brachis.solvers import SolverOptions, SolveStatus, solver_named
 from brachis.task import SplineSettings
@@ -97,7 +88,7 @@ def test_a_motion_along_a_branch_boundary_is_verified_too():
 
 def test_intervals_are_refined_where_the_motion_switches(solved):
     program, report = solved
-    finer, *_ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.02))
+    finer, *_ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.02), RefinementOptions())
     lengths = np.diff(finer.phases[0].breaks)
     assert len(lengths) < 60
     assert lengths.max() >= 4.0 * lengths.min()
@@ -107,8 +98,8 @@ def test_intervals_are_refined_where_the_motion_switches(solved):
 
 def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
     program, report = solved
-    rough, reports, _ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.1))
-    fine, more, _ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.01))
+    rough, reports, _ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.1), RefinementOptions())
+    fine, more, _ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.01), RefinementOptions())
     assert program.intervals < rough.intervals < fine.intervals
     assert more[-1].objective < reports[-1].objective < report.objective
     assert reports[0] is report
@@ -116,20 +107,18 @@ def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
     assert rough.phases[0].violation(reports[-1].x).max() < 1e-5
 
 
-@pytest.mark.parametrize("tolerance", [0.02, 0.002])
-def test_halving_every_interval_of_a_refined_mesh_gains_less_than_the_tolerance(solved, tolerance):
+def test_the_gain_of_a_doubling_ends_it(solved):
     program, report = solved
-    options = MeshOptions(tolerance)
-    mesh, reports, _ = refine_mesh(program, report, solve, options)
-    finer, x = h_refinement._halved(mesh, reports[-1].x, [np.arange(mesh.intervals)], options)
-    assert finer.intervals > 1.5 * mesh.intervals
-    assert solve(finer, x).objective > (1.0 - tolerance) * reports[-1].objective
-    assert reports[-1].objective < (1.0 - tolerance) * report.objective
+    tolerance = 0.02
+    mesh, reports, _ = refine_mesh(program, report, solve, MeshOptions(tolerance), RefinementOptions())
+    again, further, _ = refine_mesh(mesh, reports[-1], solve, MeshOptions(tolerance), RefinementOptions())
+    assert again.intervals > mesh.intervals
+    assert further[-1].objective > (1.0 - tolerance) * reports[-1].objective
 
 
 def test_what_cannot_be_solved_is_left_as_it_was(solved):
     program, report = solved
-    mesh, reports, _ = refine_mesh(program, report, failing, MeshOptions())
+    mesh, reports, _ = refine_mesh(program, report, failing, MeshOptions(), RefinementOptions())
     assert mesh is program
     assert reports[-1] is report
     assert len(reports) == 2
@@ -208,7 +197,7 @@ def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
     assert [later.status for later in reports][-2:] == [SolveStatus.FAILED, SolveStatus.OPTIMAL]
     assert reports[-1].x.shape == (nested.variables,)
     assert undone == "the motion has 50 of 100 intervals, of which more were not solved"
-    settled = adapt_mesh(coarse, (report,), failing, SplineSettings(intervals=100), RefinementOptions(), target=program)
+    settled = adapt_mesh(coarse, (report,), failing, SplineSettings(), RefinementOptions(), target=program)
     assert settled.reports[-1] is report
     assert settled.undone == "the motion has 13 of 100 intervals, of which more were not solved"
 

@@ -12,19 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.bspline import clamped_knots, spread
-from brachis.deadline import NEVER, Deadline
 from brachis.errors import UnreachableError
-from brachis.mesh.judgement import SHORTEST, Answer, accepted, ending_with
+from brachis.mesh.judgement import SHORTEST, Answer, accepted, end_time, ending_with, gain
 from brachis.nlp import Phase, Program
-from brachis.refine import Solve, merged
+from brachis.refine import Refined, RefinementOptions, Solve, merged, refine
 from brachis.solvers import SolverReport
 
 COARSE_INTERVALS = 10
 """Intervals with which a mesh begins."""
 _SHARE = 0.6
 """A round halves the intervals that lose most, and that lose this part of the time lost altogether."""
-_ROUNDS, _LITTLE = 2, 0.5
-"""If so many rounds together gain less than this part of the tolerance, every interval is halved in the next one."""
 _SAMPLES = 8
 _SHORTEST = 0.5
 """No interval gets shorter than this part of the tolerance, for it cannot lose more than its own length."""
@@ -52,12 +49,13 @@ class MeshOptions:
 
 
 def refine_mesh(
-    program: Program, first: SolverReport, solve: Solve, options: MeshOptions, deadline: Deadline = NEVER
+    program: Program, first: SolverReport, solve: Solve, options: MeshOptions, refinement: RefinementOptions
 ) -> Answer:
     """Insert knots into a solved program until halving every interval gains less than the tolerance.
 
-    A round halves the intervals that lose most. Once such rounds gain little, every interval is halved. If that gains
-    less than the tolerance, the mesh before it is fine enough; otherwise the rounds go on from there.
+    Rounds that halve the intervals that lose most go on until one of them gains little. Then the limits are made to
+    hold in between (`refine`), every interval is halved, and the limits are made to hold again: the gain of that is
+    what is compared with the tolerance. If it is less, the mesh is done, and the faster of the two motions is kept.
 
     Parameters
     ----------
@@ -67,31 +65,43 @@ def refine_mesh(
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     options : MeshOptions
-    deadline : Deadline, optional
-        After it no round is begun; nor is one that looks as if it would end later.
+    refinement : RefinementOptions
+        After its deadline no round is begun; nor is one that looks as if it would end later.
 
     Returns
     -------
     Answer
-        With all knots; the limits hold at the collocation points.
+        With all knots and collocation points.
     """
-    reports, last = [first], first
-    times = [first.objective]
+    reports, last, undone = [first], first, ""
+    held: list[Refined] = []
     for _ in range(_MOST_ROUNDS):
-        if _GROWTH * last.wall_time > deadline.left:
-            return Answer(program, ending_with(last, reports), _UNDONE)
-        stalled = len(times) > _ROUNDS and times[-1] > (1.0 - _LITTLE * options.tolerance) * times[-1 - _ROUNDS]
-        halved = _every(program) if stalled else _losers(program, last.x)
-        finer, x = _halved(program, last.x, halved, options)
+        if _GROWTH * last.wall_time > refinement.deadline.left:
+            undone = _UNDONE
+            break
+        finer, x = _halved(program, last.x, _losers(program, last.x), options)
         if finer.variables == program.variables or finer.intervals >= _MOST_INTERVALS:
             break
         report = accepted(solve(finer, x), last)
         reports.append(report)
-        if not report.status.usable or (stalled and report.objective > (1.0 - options.tolerance) * last.objective):
+        if not report.status.usable:
             break
+        worth_it = report.objective < last.objective * (1.0 - options.tolerance)
         program, last = finer, report
-        times = [report.objective] if stalled else [*times, report.objective]
-    return Answer(program, ending_with(last, reports), _UNDONE if deadline.passed else "")
+        if worth_it:
+            continue
+        refined = refine(program, last, solve, refinement)
+        doubled = _doubled(refined, solve, options, refinement)
+        reports += [*refined.reports[1:], *doubled.reports]
+        held += [refined, doubled]
+        if not gain(refined, doubled, refinement) >= options.tolerance:
+            break
+    best = min(held, key=lambda refined: end_time(refined, refinement), default=None)
+    if refinement.deadline.passed:
+        undone = _UNDONE
+    if best is None or last.objective < end_time(best, refinement):
+        return Answer(program, ending_with(last, reports), undone)
+    return Answer(best.program, ending_with(best.reports[-1], reports), undone)
 
 
 def _losers(program: Program, x: np.ndarray) -> list[np.ndarray]:
@@ -139,3 +149,9 @@ def _with_halves(phase: Phase, intervals: np.ndarray, options: MeshOptions) -> P
     return phase.with_knots(
         clamped_knots(phase.degree, finer), merged(phase, spread(finer, options.points_per_interval))
     )
+
+
+def _doubled(refined: Refined, solve: Solve, options: MeshOptions, refinement: RefinementOptions) -> Refined:
+    """Halve every interval of a refined program, solve and refine again."""
+    finer, x = _halved(refined.program, refined.x, _every(refined.program), options)
+    return refine(finer, accepted(solve(finer, x), refined.reports[-1]), solve, refinement)
