@@ -88,13 +88,15 @@ def case(seed: int, *, limits: bool = True) -> Today:
 def _planar(rng: np.random.Generator) -> dict[str, Any]:
     limits = {"velocity": 2.0, "acceleration": rng.uniform(4.0, 8.0, 3).round(2).tolist()}
     urdf = str(ROOT / "robots/scara3/robot.urdf")
-    return {"brachis": 1, "robot": {"urdf": urdf, "gravity": [0, 0, 0], "limits": limits}, "task_space": ["x", "y"]}
+    robot = {"urdf": urdf, "gravity": [0, 0, 0], "limits": limits}
+    return {"brachis": 1, "robot": robot, "task_space": ["x", "y"], "spline": {"intervals": 20}}
 
 
 def _spatial(rng: np.random.Generator) -> dict[str, Any]:
     limits = {"acceleration": rng.uniform(10.0, 20.0, 7).round(2).tolist(), "scale": {"torque": 0.5}}
     urdf = str(ROOT / "robots/iiwa14/robot.urdf")
-    return {"brachis": 1, "robot": {"urdf": urdf, "limits": limits}, "task_space": "pose"}
+    robot = {"urdf": urdf, "limits": limits}
+    return {"brachis": 1, "robot": robot, "task_space": "pose", "spline": {"intervals": 20}}
 
 
 def _joint_path(rng: np.random.Generator, robot: brachis.Robot, task_map: TaskMap) -> np.ndarray | None:

@@ -22,6 +22,12 @@ SEED, DT = 4, 0.002
 @pytest.fixture(scope="module")
 def benchmark():
     pytest.importorskip("toppra")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(ROOT / "benchmarks"))
+        return _load()
+
+
+def _load():
     spec = importlib.util.spec_from_file_location("today", ROOT / "benchmarks/today.py")
     module = importlib.util.module_from_spec(spec)
     sys.modules["today"] = module  # dataclasses look their module up
