@@ -162,3 +162,14 @@ def test_rails_leave_the_arm_s_tool_frame_alone(run, tmp_path):
     options = ("--axis", "0", "1", "0", "--range", "-2", "2", "--velocity", "2", "--force", "2000", "--mass", "60")
     assert run("compose", published("UR5"), *options, "--out", out).code == 0
     assert decompositions(run, out)["rail"] == "closed_form"
+
+
+def test_tables_may_be_in_degrees_and_json_stays_in_rad(run):
+    robot = ROOT / "robots/tx90l_rail/robot.urdf"
+    text, plain = run("inspect", robot, "--degrees").out, run("inspect", robot).out
+    assert " deg/s" in text
+    assert "rad" not in text.partition("task space")[0]
+    assert "-180 to 180 deg" in text
+    assert " m/s" in text
+    assert "deg" not in plain.partition("task space")[0]
+    assert run("inspect", robot, "--degrees", "--json").out == run("inspect", robot, "--json").out

@@ -36,6 +36,12 @@ LINES = """() => {
 """How far the lines are from where they should be over their plots, pixels."""
 
 
+CUT = """() => [...document.querySelectorAll('table')]
+    .filter((table) => table.offsetWidth > table.parentElement.clientWidth)
+    .map((table) => table.innerText)"""
+"""Tables that are wider than what they stand in."""
+
+
 @pytest.fixture(scope="module")
 def rail_result():
     """The TX90L on its rail."""
@@ -47,7 +53,7 @@ def picture(page, name, folder):
     """The scene between the panels, (height, width, 3), and a file of the whole page."""
     content = page.screenshot(path=folder / f"{name}.png", timeout=PATIENCE)
     whole = np.asarray(image.open(io.BytesIO(content)).convert("RGB"), dtype=int)
-    return whole[220:, 380:-350]
+    return whole[220:, 380:-420]
 
 
 def changed(first, second):
@@ -85,6 +91,11 @@ def test_the_slider_moves_the_robot(browser, rail_result, tmp_path):
         page.wait_for_timeout(1000)
         picture(page, "viewer", folder)
         text, apart = page.inner_text("body"), page.evaluate(LINES)
+        cut = page.evaluate(CUT)
+        page.get_by_role("checkbox", name="again and again").uncheck()
+        with page.expect_download(timeout=PATIENCE) as download:
+            page.get_by_role("button", name="Download the report").click()
+        report = Path(download.value.path()).read_text(encoding="utf-8")
         page.close()
     assert viewer.playback.time == pytest.approx(0.4 * rail_result.t_end)
     assert len(np.unique(first.reshape(-1, 3), axis=0)) > 500  # there is something to see
@@ -92,6 +103,9 @@ def test_the_slider_moves_the_robot(browser, rail_result, tmp_path):
     assert changed(first, last) > 2000
     for part in ("verified", "torque / limit", "tool speed (m/s)", "rail", "joint_6", "candidates"):
         assert part in text
+    assert cut == []
+    assert not viewer.playback.repeats
+    assert "<h1>VERIFIED</h1>" in report
     assert len(apart) >= 4
     assert np.abs(apart).max() < 2.0
     assert faults == []

@@ -22,6 +22,14 @@ def test_a_periodic_motion_goes_on_without_a_pause():
     assert [playback.advance(0.6) for _ in range(3)] == [0.6, 1.0, 0.0]
 
 
+def test_a_motion_that_is_not_repeated_stays_at_its_end_until_it_is_played_again():
+    playback = Playback(t_end=1.0, rate=1.0, repeats=False)
+    assert [playback.advance(0.6) for _ in range(4)] == [0.6, 1.0, 1.0, 1.0]
+    assert not playback.playing
+    playback.toggle()
+    assert playback.advance(0.25) == 0.25
+
+
 def test_a_chosen_instant_stays_until_the_motion_is_played_again():
     playback = Playback(t_end=1.0, rate=1.0)
     playback.go_to(0.7)

@@ -2,17 +2,21 @@ import math
 import socket
 import sys
 import threading
+from types import SimpleNamespace
+from unittest.mock import ANY
 
 import numpy as np
 import pytest
 
+from brachis.plots.style import COLOURS
 from brachis.robot import Robot
 from brachis.search.record import SAME_MOTION
 from brachis.view import Viewer
+from brachis.view.charts import look
 from brachis.view.placements import placements
 from brachis.view.scene import LAYERS
 from brachis.view.tables import candidates_table, state_table, summary
-from support.shown import PANDA
+from support.shown import PANDA, ROOT
 
 pytest.importorskip("viser", reason="viser is not installed")
 
@@ -93,6 +97,48 @@ def test_robots_without_shapes_and_with_lost_meshes_are_shown_as_skeletons(bare_
             assert all(handle.visible for handle in layers["skeleton"])
             assert not any(handle.visible for handle in layers["robot"])
             assert layers["ghost postures"]
+
+
+def test_more_joints_than_colours_are_drawn_apart(motion_of):
+    looks = [look(style) for style in range(30)]
+    assert len(set(looks)) == len(looks)
+    eight = Robot.from_urdf(ROOT / "robots/arm8/robot.urdf")
+    assert eight.n > len(COLOURS)
+    with Viewer(motion_of(eight), port=0) as viewer:
+        assert eight.joint_names[-1] in viewer._panel._state.content
+
+
+def test_angles_may_be_in_degrees(bare_robot, motion_of):
+    motion = motion_of(bare_robot)
+    now = motion.at(np.array([0.5]))
+    table = state_table(motion, now, degrees=True)
+    assert f"{np.rad2deg(now.q[0, 1]):.3f} deg</td>" in table
+    assert f"{np.rad2deg(now.qdot[0, 1]):.3f} deg/s</td>" in table
+    assert f"{now.q[0, 0]:.3f} m</td>" in table
+    with Viewer(motion, degrees=True, port=0) as viewer:
+        viewer.show()
+        assert " deg/s</td>" in viewer._panel._state.content
+
+
+def test_the_report_button_sends_the_page_to_whoever_asks(shown, line_result, monkeypatch):
+    sent, told = {}, []
+
+    class Client:
+        def send_file_download(self, name, content, *, save_immediately):
+            sent[name] = (content.decode(), save_immediately)
+
+        def add_notification(self, title, body):
+            told.append((title, body))
+
+    shown._panel._send_report(SimpleNamespace(client=Client()))
+    page, at_once = sent["report.html"]
+    assert at_once
+    assert "<h1>VERIFIED</h1>" in page
+    assert f"{line_result.t_end:.4f} s" in page
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    shown._panel._send_report(SimpleNamespace(client=Client()))
+    assert told == [("There is no report", ANY)]
+    assert "Jinja2" in told[0][1]
 
 
 def test_tables_have_units_and_escape_names(bare_robot, motion_of):

@@ -13,6 +13,7 @@ from brachis.trajectory import Samples, Trajectory
 _MANY = 60
 """Candidates that are listed."""
 _CELL = "padding:0 0.35em;white-space:nowrap"
+_WRAPPED = "padding:0 0.35em 0.2em 0;vertical-align:top;overflow-wrap:anywhere"
 _STATE = {"position": 3, "velocity": 3, "torque": 2}
 """What is shown of joints, and the decimals."""
 
@@ -51,7 +52,7 @@ def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
     rows = candidate_rows(candidates)
     left = len(candidates) - len(rows[:_MANY])
     note = _paragraph(f"{left} more, slower or the same motion again") if left else ""
-    return _table((*WORDS, *TIMES, STATUS), rows[:_MANY]) + note
+    return _table((*WORDS, *TIMES, STATUS), rows[:_MANY], cell=_WRAPPED) + note
 
 
 def speed_legend(stops: Sequence[str], fastest: float) -> str:
@@ -81,10 +82,10 @@ def _paragraph(*lines: str) -> str:
     return f'<div style="margin:0.3em 0.8em;font-size:0.8em">{text}</div>'
 
 
-def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    head = "".join(f'<th style="{_CELL};text-align:left">{html.escape(column)}</th>' for column in columns)
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], cell: str = _CELL) -> str:
+    head = "".join(f'<th style="{cell};text-align:left">{html.escape(column)}</th>' for column in columns)
     body = "".join(
-        "<tr>" + "".join(f'<td style="{_CELL}">{html.escape(cell)}</td>' for cell in row) + "</tr>" for row in rows
+        "<tr>" + "".join(f'<td style="{cell}">{html.escape(text)}</td>' for text in row) + "</tr>" for row in rows
     )
     return (
         '<div style="margin:0.3em 0.8em;overflow-x:auto"><table style="font-size:0.78em;border-collapse:collapse">'
