@@ -39,6 +39,8 @@ _KEPT_BACK = 0.1e-4
 _WORTH_IT = 0.05
 """A motion whose accelerations are lower by less than this fraction does not replace the fastest one."""
 _TOLERANCE, _ITERATIONS = 1e-6, 60
+_MANY_VARIABLES, _FOR_MANY, _FEW_ITERATIONS = 150, "ipopt", 20
+"""With more variables than these active sets take seconds an iteration; so few of an interior-point solver will do."""
 _PROGRESS, _PATIENCE, _ROUND = 1e-2, 5, 2
 """A solve ends where so many iterations lower the mean square by less than this fraction: near enough will do.
 
@@ -120,7 +122,8 @@ def _calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastM
         return _kept(fastest, "no time was left")
     objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
     program, soon = before.program.minimising(objective), deadline.part(_TIME)
-    solve = _solver(start.solver, soon, listener, _PATIENCE)
+    name = _FOR_MANY if program.variables > _MANY_VARIABLES else start.solver
+    solve = _solver(name, soon, listener, _PATIENCE)
     first = solve(program, program.time_scaled(before.x, 1.0 + slower - _KEPT_BACK))
     if not first.status.usable:
         return _kept(fastest, f"the fastest motion stays: {first.status.value}", (first,))
@@ -130,7 +133,7 @@ def _calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastM
     options = RefinementOptions(
         settings.tolerance, settings.density, settings.max_rounds, soon, before.t_end * (1.0 + slower)
     )
-    solve = _solver(start.solver, soon, listener, _ROUND)
+    solve = _solver(name, soon, listener, _ROUND)
     found = completed(fastest, program, (first,), solve, options)
     return _better(fastest, found, 1.0 - np.sqrt(program.objective(found.refined.x)) if found.refined else 0.0)
 
@@ -179,7 +182,8 @@ def _solver(name: str, deadline: Deadline, listener: Listener, patience: int) ->
         listener(Iteration(f"least motion: iteration {iteration}, joint accelerations (rms) {rms:.1f} %"))
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.left, _PROGRESS, patience, anywhere=True)
+        most = _FEW_ITERATIONS if name == _FOR_MANY else _ITERATIONS
+        options = SolverOptions(_TOLERANCE, most, deadline.left, _PROGRESS, patience, anywhere=True)
         report = backend.solve(program, x, options, progress)
         return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if report.feasible else report
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.deadline import Deadline
+from brachis.deadline import NEVER, Deadline
 from brachis.mesh import MeshOptions, adapt_mesh, coarsest, knot_optimisation, optimise_knots, refine_mesh, solve_nested
 from brachis.refine import RefinementOptions, refine
 from brachis.solvers import SolverOptions, SolveStatus, solver_named
@@ -88,7 +88,7 @@ def test_a_motion_along_a_branch_boundary_is_verified_too():
 
 def test_intervals_are_refined_where_the_motion_switches(solved):
     program, report = solved
-    finer, *_ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.02), RefinementOptions())
+    finer, *_ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.02), NEVER)
     lengths = np.diff(finer.phases[0].breaks)
     assert len(lengths) < 60
     assert lengths.max() >= 4.0 * lengths.min()
@@ -98,8 +98,8 @@ def test_intervals_are_refined_where_the_motion_switches(solved):
 
 def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
     program, report = solved
-    rough, reports, _ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.1), RefinementOptions())
-    fine, more, _ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.01), RefinementOptions())
+    rough, reports, _ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.1), NEVER)
+    fine, more, _ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.01), NEVER)
     assert program.intervals < rough.intervals < fine.intervals
     assert more[-1].objective < reports[-1].objective < report.objective
     assert reports[0] is report
@@ -107,18 +107,18 @@ def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
     assert rough.phases[0].violation(reports[-1].x).max() < 1e-5
 
 
-def test_the_gain_of_a_doubling_ends_it(solved):
+def test_a_round_beyond_its_end_gains_little(solved):
     program, report = solved
     tolerance = 0.02
-    mesh, reports, _ = refine_mesh(program, report, solve, MeshOptions(tolerance), RefinementOptions())
-    again, further, _ = refine_mesh(mesh, reports[-1], solve, MeshOptions(tolerance), RefinementOptions())
+    mesh, reports, _ = refine_mesh(program, report, solve, MeshOptions(tolerance), NEVER)
+    again, further, _ = refine_mesh(mesh, reports[-1], solve, MeshOptions(tolerance), NEVER)
     assert again.intervals > mesh.intervals
     assert further[-1].objective > (1.0 - tolerance) * reports[-1].objective
 
 
 def test_what_cannot_be_solved_is_left_as_it_was(solved):
     program, report = solved
-    mesh, reports, _ = refine_mesh(program, report, failing, MeshOptions(), RefinementOptions())
+    mesh, reports, _ = refine_mesh(program, report, failing, MeshOptions(), NEVER)
     assert mesh is program
     assert reports[-1] is report
     assert len(reports) == 2

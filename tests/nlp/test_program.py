@@ -115,7 +115,7 @@ def test_refinement_holds_the_limits_in_every_phase():
 def test_meshes_of_every_phase_are_refined():
     program = two_moves(degree=3, intervals=4)
     report = solve(program, first_point(program))
-    mesh, reports, undone = refine_mesh(program, report, solve, MeshOptions(tolerance=1e-3), RefinementOptions())
+    mesh, reports, undone = refine_mesh(program, report, solve, MeshOptions(tolerance=1e-3), NEVER)
     assert not undone
     assert min(phase.intervals for phase in mesh.phases) > 8
     assert reports[-1].objective == pytest.approx(bang_bang(0.5, 0.7), rel=1e-3)

@@ -51,7 +51,7 @@ def adapt_mesh(
         adapted = optimise_knots(nested.program, last, solve, spline.shortest_interval, refinement)
     elif spline.intervals == "auto":
         options = MeshOptions(spline.tolerance, spline.points_per_interval)
-        adapted = refine_mesh(nested.program, last, solve, options, refinement)
+        adapted = refine_mesh(nested.program, last, solve, options, refinement.deadline)
     else:
         adapted = Answer(nested.program, (last,))
     undone = "; ".join(filter(None, (nested.undone, adapted.undone)))

@@ -23,11 +23,13 @@ class SplineSettings(Model):
     )
     intervals: Intervals = Field(
         default="auto",
-        description="Number of knot intervals; auto halves them where it pays until halving all of them gains less "
-        "than the tolerance. A number plans sooner, and gives a slower motion; knots: free needs one.",
+        description="Number of knot intervals; auto halves those that lose most time until two rounds together gain "
+        "less than the tolerance. A number plans sooner, and gives a slower motion; knots: free needs one.",
     )
     tolerance: Positive = Field(
-        default=1.0e-3, le=0.1, description="With intervals: auto, the gain, as a fraction of t_E, that ends it."
+        default=1.0e-3,
+        le=0.1,
+        description="With intervals: auto, the gain of two rounds, as a fraction of t_E, that ends it.",
     )
     knots: Literal["uniform", "free"] = Field(
         default="uniform", description="Equal intervals, or their lengths as variables of the optimisation."
