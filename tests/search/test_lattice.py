@@ -135,7 +135,7 @@ def test_why_there_is_no_course(case):
     assert 0.0 < furthest.s <= 1.0
     assert reason in str(furthest)
     with pytest.raises(PathError, match=message) as caught:
-        brachis.plan(given.robot, given.task)
+        brachis.plan(given.robot, given.task, check_advice=False)
     assert caught.value.s_interval is not None
 
 
