@@ -49,7 +49,7 @@ def test_examples_work_in_this_order(run, tmp_path, monkeypatch):
         if command == "new":  # what follows is about commands: with a plan that takes less time
             content = (tmp_path / "task.yaml").read_text()
             content = content.replace("{effort: fast}", str(QUICK)).replace(
-                "# spline: {intervals: 8}", "spline: {intervals: 8}"
+                "# spline: {intervals: 20}", "spline: {intervals: 8}"
             )
             assert str(QUICK) in content
             assert "\nspline: {intervals: 8}" in content
