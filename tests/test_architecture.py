@@ -75,7 +75,7 @@ ORDER = (
 VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "limits", "bspline", "nlp", "solvers", "refine", "mesh"}
 MAY_NAME_KINDS = ("limits", "verify/limits", "task", "robot")
 HEAVY = {"matplotlib", "viser", "yourdfpy", "unopy", "ipyopt", "pyarrow", "pandas", "dask", "ray"}
-MOST_LINES = 400
+MOST_LINES = 500
 
 
 def module_of(path: Path) -> str:

@@ -21,6 +21,7 @@ from brachis.robot import dynamics
 from brachis.task import LimitSpec, task_with
 from brachis.verify import verify_trajectory
 from support.chains import Joint, chain_urdf, planar_robot
+from support.effort import QUICK
 
 ROOT = Path(__file__).parents[1]
 IIWA = ROOT / "robots/iiwa14/robot.urdf"
@@ -210,11 +211,12 @@ def test_beyond_the_tolerance_the_message_tells_the_numbers_apart(excess):
 def test_a_start_posture_may_leave_its_range_and_exceed_its_torque_within_the_tolerance():
     robot, start = brachis.robots.gen3, np.array([0.0, 1.2, 0.0, 1.2, 0.0, 0.6, 0.0])
     need = abs(dynamics.torque(robot, start[None], 0 * start[None], 0 * start[None])[0, 1])
-    line = {"path": brachis.Line(by=[-0.02, 0.0, 0.05]), "task_space": "position", "intervals": 8, "effort": "single"}
+    line = {"path": brachis.Line(by=[-0.02, 0.0, 0.05]), "task_space": "position", "intervals": 8}
+    line |= {"search": {**QUICK, "guesses": "numeric"}}
     within = {"torque": {"joint_2": need * (1 - 5e-5)}, "position": {"joint_4": [-2.0, 1.2 - 5e-5]}}
-    assert brachis.plan(robot, limits=within, start=start, **line, least_motion=False).verified
+    assert brachis.plan(robot, limits=within, start=start, **line).verified
     with pytest.raises(StartError, match="cannot hold the arm"):
-        brachis.plan(robot, limits={"torque": {"joint_2": need * (1 - 2e-4)}}, start=start, **line)
+        brachis.plan(robot, limits={"torque": {"joint_2": need * (1 - 2e-4)}}, start=start, check_advice=False, **line)
 
 
 def test_the_first_waypoint_may_be_the_start(tmp_path):

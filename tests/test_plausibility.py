@@ -243,8 +243,8 @@ def test_a_posture_in_degrees_where_joints_turn_without_end():
 
 
 def test_only_the_start_posture_is_refused_where_nothing_is_said():
-    content = task(task_space="joints", redundant_joints="auto", path=[{"spline": {"through": [[9.0, -2.0, 2.0]]}}])
-    with pytest.warns(brachis.PlausibilityWarning, match=r"path\.j1: the position looks like degrees"):
+    content = task(task_space="joints", redundant_joints="auto", path=[{"spline": {"through": [[33.0, -2.0, 2.0]]}}])
+    with pytest.warns(brachis.PlausibilityWarning, match=r"path\.j1: the position looks like degrees; found 33 rad"):
         assert brachis.plan(content).verified
 
 

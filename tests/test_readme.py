@@ -47,7 +47,7 @@ PAGES = [page for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.m
 
 
 def test_there_are_snippets():
-    assert {page.name for page in PAGES} == {"README.md", "closed_forms.md", "from_toppra.md", "python.md"}
+    assert {page.name for page in PAGES} == {"README.md", "closed_forms.md", "from_toppra.md", "index.md", "python.md"}
 
 
 @pytest.mark.usefixtures("rough_figures")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import zipfile
 from dataclasses import fields, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from brachis.robot import Robot, dynamics
 from brachis.trajectory import Trajectory
 from brachis.trajectory.pieces import jerk_coefficients, relative_coefficients
 from support.effort import QUICK
+from support.result_files import with_parts
 
 ROOT = Path(__file__).parents[1]
 SCARA = ROOT / "robots/scara3/robot.urdf"
@@ -240,27 +240,6 @@ def test_file_does_not_need_the_urdf_file(trajectory, tmp_path):
     trajectory.save(tmp_path / "result.npz")
     moved = with_parts(tmp_path / "result.npz", task__robot__urdf="/nowhere/robot.urdf")
     assert Trajectory.load(moved).joint_names == trajectory.joint_names
-
-
-def with_parts(path, **parts):
-    """Rewrite a result file with other parts; ``task__robot__urdf`` is meta["task"]["robot"]["urdf"]."""
-    with np.load(path) as archive:
-        contents = dict(archive)
-    meta = json.loads(str(contents["meta"]))
-    for name, value in parts.items():
-        change = value if callable(value) else (lambda _old, value=value: value)
-        if name in contents:
-            contents[name] = change(contents[name])
-            continue
-        place = meta
-        *parents, last = name.split("__")
-        for parent in parents:
-            place = place[parent]
-        place[last] = change(place.get(last))
-    if "meta" not in parts:
-        contents["meta"] = np.array(json.dumps(meta))
-    np.savez(path, **{name: value for name, value in contents.items() if value is not None})
-    return path
 
 
 def put(place, value):

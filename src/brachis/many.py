@@ -44,7 +44,7 @@ def plan_many(
     Returns
     -------
     list of Result or BrachisError
-        In the order of the tasks. An error is what `plan` would have raised.
+        In the order of the tasks. An error is what `plan` would have raised with ``check_advice=False``.
 
     Raises
     ------
@@ -99,6 +99,6 @@ def _outcome(given: Any, keywords: TaskKeywords, listener: Callable[[str], None]
     """Plan one task."""
     robot, task = given if isinstance(given, tuple) else (None, given)
     try:
-        return plan(robot, task, listener=listener, progress=False, **keywords)
+        return plan(robot, task, listener=listener, progress=False, check_advice=False, **keywords)
     except BrachisError as error:
         return error

@@ -63,7 +63,7 @@ Given = Source | Robot | None
 """A robot, or a task; both may be the name of a file."""
 _MANY_VARIABLES = 150
 """Above this a cold solve takes seconds, and the program is first solved over some of its knots."""
-_OWN_KEYWORDS = ("start_from", "families", "own_limits", "listener", "progress")
+_OWN_KEYWORDS = ("start_from", "families", "own_limits", "listener", "progress", "check_advice")
 _KNOT_TIME = 0.4
 """Part of the remaining time that may go into the knots."""
 
@@ -78,6 +78,7 @@ def plan(
     own_limits: Sequence[LimitModel] = (),
     listener: Listener | None = None,
     progress: bool | None = None,
+    check_advice: bool = True,
     **keywords: Unpack[TaskKeywords],
 ) -> Result:
     """Plan the minimum-time motion of a robot along a path.
@@ -108,6 +109,9 @@ def plan(
     progress : bool, optional
         Whether to show on standard error, or below a notebook's cell, what happens. Left out: in notebooks, unless
         there is a listener.
+    check_advice : bool, optional
+        Where there is no plan: whether numbers that the error advises are first tried in plans, for up to 20 s. False:
+        the error names what to change, but not how far.
     **keywords
         Keys of the task, without their sections: ``path``, ``start``, ``task_space``, ``limits``, ``intervals``,
         ``effort``, ...; all of them: `brachis.task.TaskKeywords`.
@@ -157,7 +161,8 @@ def plan(
         try:
             return _plan(robot, asked, families, own_limits, known, tell, (began, loaded), deadline)
         except BrachisError as error:
-            try_remedies(error, asked, robot.joint_names, is_task_planned, deadline)
+            until = deadline if check_advice else Deadline(0.0)
+            try_remedies(error, asked, robot.joint_names, is_task_planned, until)
             raise
 
 

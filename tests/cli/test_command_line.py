@@ -48,8 +48,11 @@ def test_examples_work_in_this_order(run, tmp_path, monkeypatch):
             assert outcome.code == 0, f"{line}: {outcome.err}"
         if command == "new":  # what follows is about commands: with a plan that takes less time
             content = (tmp_path / "task.yaml").read_text()
-            content = content.replace("{effort: fast}", str(QUICK)).replace("intervals: 20", "intervals: 8")
+            content = content.replace("{effort: fast}", str(QUICK)).replace(
+                "# spline: {intervals: 20}", "spline: {intervals: 8}"
+            )
             assert str(QUICK) in content
+            assert "\nspline: {intervals: 8}" in content
             (tmp_path / "task.yaml").write_text(content.replace("False", "false"))
 
 

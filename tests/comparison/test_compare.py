@@ -20,7 +20,7 @@ SEED, DT = 4, 0.002
 
 
 @pytest.fixture(scope="module")
-def benchmark():
+def today_benchmark():
     pytest.importorskip("toppra")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(ROOT / "benchmarks"))
@@ -36,8 +36,8 @@ def _load():
 
 
 @pytest.fixture(scope="module")
-def today(benchmark):
-    return benchmark.case(SEED)
+def today(today_benchmark):
+    return today_benchmark.case(SEED)
 
 
 @pytest.fixture(scope="module")

@@ -108,3 +108,29 @@ def test_a_payload_that_the_arm_can_hold_is_advised(monkeypatch):
     mass = float(re.search(r"Lower robot\.payload\.mass to ([\d.]+) kg \(a plan", caught.value.hint)[1])
     task["robot"]["payload"]["mass"] = mass
     assert brachis.plan(task).verified
+
+
+@pytest.mark.parametrize("way", ["plan", "plan_many", "sweep"])
+def test_of_many_plans_none_spends_time_on_advice(way, monkeypatch, tmp_path):
+    trials = []
+    monkeypatch.setattr("brachis.planner.is_planned", lambda *_: bool(trials.append(1)))
+    task = {
+        "brachis": 1,
+        "robot": {"urdf": str(SCARA), "gravity": [0.0, -9.81, 0.0], "limits": {"torque": [200.0, 300.0, 300.0]}},
+        "start": {"joints": [0.5, -2.1, 2.1]},
+        "task_space": ["x", "y"],
+        "path": [{"line": {"by": [0.0, 0.5]}}],
+    }
+    if way == "plan":
+        with pytest.raises(brachis.errors.StartError) as caught:
+            brachis.plan(task)
+        message = str(caught.value)
+    elif way == "plan_many":
+        (error,) = brachis.plan_many([task])
+        message = str(error)
+    else:
+        sweep = {"sweep": 1, "task": task, "rows": [{"spline.degree": 3}]}
+        (row,) = brachis.sweep(sweep, tmp_path / "out", jobs=1).rows()
+        message = row["message"]
+    assert "Raise robot.limits.torque.j1 (how far was not found out)" in message
+    assert bool(trials) is (way == "plan")

@@ -93,7 +93,7 @@ BROKEN = {
     "words.stl": (b"solid nonsense", "no faces"),
     "nan.stl": (b"\0" * 80 + struct.pack("<I12fH", 1, *[math.nan] * 12, 0), "not finite"),
     "packed.tar.gz": (b"\x1f\x8b", "packed meshes are not read"),
-    "a" * 5000 + ".stl": (None, "no file"),
+    "a" * 5000 + ".stl": (None, "a mesh file is missing"),
 }
 
 

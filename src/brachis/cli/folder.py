@@ -115,13 +115,14 @@ def make_folder(out: Path, names: Iterable[str], inputs: Iterable[Path | None]) 
     InputError
         It cannot be made, or one of the files is not ours to write.
     """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        found = getattr(error, "strerror", None) or str(error)
+        raise InputError("the folder cannot be made", where=str(out), found=found) from error
     inputs = tuple(inputs)
     for name in names:
         check_output(out / name, (Path(name).suffix,), inputs)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError("the folder cannot be made", where=str(out), found=error.strerror) from error
 
 
 def write_files(

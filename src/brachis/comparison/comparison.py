@@ -60,7 +60,7 @@ class Comparison(Summary):
     verification : Verification
         Of today's motion, as it was made of its rows.
     proven : tuple of Proven
-        What its rows alone prove, limit by limit.
+        What its rows alone prove, limit by limit; empty where they are not known.
     result : Result
         Of the plan along the same path, within the same limits.
 
@@ -123,7 +123,9 @@ class Comparison(Summary):
             f"{100.0 * (use.today_up_to - 1.0):.2g} %"
             for use in self.exceeded
         )
-        return (*exceeded, *([jumps] if self.today.task.spline.rest != "full" else []))
+        unknown = "the rows of today's motion are not known: import its CSV file again to compare it with the limits"
+        remarks = {jumps: self.today.task.spline.rest != "full", unknown: not self.proven}
+        return (*exceeded, *(remark for remark, holds in remarks.items() if holds))
 
     def summary(self) -> dict[str, object]:
         """Return what is shown."""
@@ -150,7 +152,7 @@ class Comparison(Summary):
             "saved": self.saved,
             "verdict": self.verdict,
             "verified": self.result.verified,
-            "today_within_limits": not self.exceeded,
+            "today_within_limits": not self.exceeded if self.proven else None,
             "remarks": list(self.remarks),
             "limits": [vars(use) for use in self.uses],
             "recovered": self.today.recovered.to_dict(),

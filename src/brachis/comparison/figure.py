@@ -40,7 +40,7 @@ def plot_today(comparison: Comparison) -> Figure:
         panels[0].plot(samples.t, samples.s, label=label, **look)
         panels[1].plot(samples.t, samples.tool_speed, **look)
         t, largest = ratios.t, np.abs(ratios.values).max(axis=1, initial=0.0)
-        if motion is comparison.today:
+        if motion is comparison.today and comparison.proven:
             proven = np.max([each.ratios.max(axis=1) for each in comparison.proven], axis=0)
             least = np.interp(t, comparison.proven[0].t, proven)
             label = "today, between its rows: up to"

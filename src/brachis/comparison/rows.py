@@ -52,10 +52,12 @@ class Proven:
 
 
 def proven_ratios(trajectory: Trajectory) -> tuple[Proven, ...]:
-    """Compare the rows of an imported motion with every limit of its task."""
+    """Compare the rows of an imported motion with every limit of its task; nothing where the rows are not known."""
     assert trajectory.recovered is not None  # noqa: S101  (it was imported)
-    robot, _ = bind(trajectory.robot, trajectory.task.task_space)
     t = trajectory.recovered.rows[:, 0]
+    if not len(t):
+        return ()
+    robot, _ = bind(trajectory.robot, trajectory.task.task_space)
     return tuple(
         Proven(limit.name, tuple(label.subject for label in limit.labels), t, _proven(trajectory, limit))
         for limit in limits_of(robot, trajectory.task)

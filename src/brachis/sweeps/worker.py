@@ -56,7 +56,7 @@ def planned(plan: Plan) -> Outcome:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PlausibilityWarning)  # they are among the outcome's remarks
-            result = planner.plan(robot_of(plan), plan.task, progress=False)
+            result = planner.plan(robot_of(plan), plan.task, progress=False, check_advice=False)
         return Outcome(_facts(result, time.perf_counter() - began), _saved(result))
     except Exception as error:  # noqa: BLE001  (of thousands of plans one must not end the others, whatever it is)
         return Outcome.of_error(error, time.perf_counter() - began)

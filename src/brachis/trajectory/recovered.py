@@ -43,7 +43,8 @@ class Recovered:
     told : tuple of str
         What is known, and what is not, in plain words.
     rows : (K, 1 + n) ndarray
-        Times, s, and joint positions, rad or m, as the file has them. Read-only.
+        Times, s, and joint positions, rad or m, as the file has them; none where they are not known, as in result
+        files of schema 2. Read-only.
     error : (n,) ndarray
         How far these positions may be off, rad or m. Read-only.
     """
@@ -91,8 +92,10 @@ class Recovered:
             raise InputError(
                 "wrong type", where="recovered", found=", ".join(parts) or type(data).__name__, allowed=allowed
             )
-        rows = numbers(parts.get("rows", ()), "recovered.rows", "s, then rad or m")
-        error = numbers(parts.get("error", ()), "recovered.error", "rad or m")
+        rows = numbers(parts.get("rows", np.empty((0, 1 + n))), "recovered.rows", "s, then rad or m")
+        error = numbers(parts.get("error", np.zeros(n)), "recovered.error", "rad or m")
+        if not rows.size:
+            return cls(source, tolerance, tuple(told or ()), rows.reshape(0, 1 + n), error)
         fits = rows.shape == (len(np.atleast_1d(rows)), 1 + n) and len(rows) > 1 and error.shape == (n,)
         finite = np.isfinite(rows).all() and np.isfinite(error).all()
         if not fits or not finite or not (np.diff(rows[:, 0]) > 0.0).all():

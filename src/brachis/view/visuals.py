@@ -71,7 +71,7 @@ def link_shapes(urdf: str, folder: Path) -> tuple[dict[str, list[trimesh.Trimesh
     if absent:
         count = f"{len(absent)} mesh files are" if len(absent) > 1 else "a mesh file is"
         where = "; ROS_PACKAGE_PATH may name the folder of its package" if absent[0].startswith("package://") else ""
-        unread.insert(0, f"{count} missing: {absent[0]}{', ...' if len(absent) > 1 else ''}{where}")
+        unread.insert(0, f"{count} missing: {absent[0]}{', ...' if len(absent) > 1 else ''}{where}"[:_LONGEST])
     return shapes, unread
 
 
