@@ -13,6 +13,7 @@ import pytest
 from brachis.bottleneck.multipliers import multipliers_of
 from brachis.bottleneck.sensitivities import sensitivities_at
 from brachis.bspline import clamped_uniform_knots, spread
+from brachis.deadline import NEVER
 from brachis.kinematics import DirectJointMap
 from brachis.limits import Role
 from brachis.limits.position import PositionLimit
