@@ -104,7 +104,7 @@ def plan(
         Limits of your own beside those of the task: objects whose ``bind(robot)`` returns a `brachis.limits.Limit`.
         They are not saved with the motion; those of installed packages are named in the task (``custom_limits``).
     listener : callable, optional
-        Told what happens, in a line of text at a time; `logging` has it under the name ``brachis``, stages at level
+        Told what happens, in a line of text at a time; ``logging`` has it under the name ``brachis``, stages at level
         INFO and iterations at DEBUG.
     progress : bool, optional
         Whether to show on standard error, or below a notebook's cell, what happens. Left out: in notebooks, unless

@@ -36,7 +36,7 @@ class KnotCost:
     intervals : int
         Number of knot intervals of the motion.
     given : bool
-        Whether the task gives this number, so that `intervals: auto` is left to try.
+        Whether the task gives this number, so that ``intervals: auto`` is left to try.
     t_end : float
         Of the fastest timing of the same joint path, s, to about 0.2 %.
     saved : float
