@@ -23,6 +23,10 @@ COARSE_INTERVALS = 10
 """Intervals with which a mesh begins."""
 _SHARE = 0.6
 """A round halves the intervals that lose most, and that lose this part of the time lost altogether."""
+_ENOUGH = 0.5
+"""Rounds end when the last two gained less than this part of the tolerance: further ones would gain as much."""
+_FEW_VARIABLES = 150
+"""Up to so many it is cheap to halve every interval, in case the wrong ones were thought to lose most."""
 _SAMPLES = 8
 _SHORTEST = 0.5
 """No interval gets shorter than this part of the tolerance, for it cannot lose more than its own length."""
@@ -41,7 +45,7 @@ class MeshOptions:
     Attributes
     ----------
     tolerance : float
-        Gain of two rounds together, as a fraction of t_E, that ends the refinement.
+        Of the end time, as a fraction of it: the refinement ends when two rounds together gain less than half of it.
     points_per_interval : int
         Collocation points of every interval.
     """
@@ -56,7 +60,7 @@ def refine_mesh(
     """Insert knots into a solved program until that gains little.
 
     Every round halves the intervals that lose most, and solves again from the same motion. Rounds end when the last two
-    of them together gained less than the tolerance.
+    of them together gained less than half the tolerance; small meshes are halved everywhere before.
 
     Parameters
     ----------
@@ -75,10 +79,12 @@ def refine_mesh(
         Over all knots.
     """
     reports, last, gains = [first], first, [1.0]
+    is_settled = False
     for _ in range(_MOST_ROUNDS):
         if _GROWTH * last.wall_time > deadline.left:
             return Answer(program, ending_with(last, reports), _UNDONE)
-        finer, x = _halved(program, last.x, _losers(program, last.x, options), options)
+        intervals = _every(program) if is_settled else _losers(program, last.x, options)
+        finer, x = _halved(program, last.x, intervals, options)
         if finer.variables > _MOST_VARIABLES:
             return Answer(program, ending_with(last, reports), _UNDONE)
         if finer.variables == program.variables:
@@ -89,7 +95,8 @@ def refine_mesh(
             break
         gains.append(1.0 - report.objective / last.objective)
         program, last = finer, report
-        if sum(gains[-2:]) < options.tolerance:
+        is_settled = sum(gains[-2:]) < _ENOUGH * options.tolerance
+        if is_settled and 2 * program.variables > _FEW_VARIABLES:
             break
     return Answer(program, ending_with(last, reports))
 

@@ -24,12 +24,12 @@ class SplineSettings(Model):
     intervals: Intervals = Field(
         default="auto",
         description="Number of knot intervals; auto halves those that lose most time until two rounds together gain "
-        "less than the tolerance. A number plans sooner, and gives a slower motion; knots: free needs one.",
+        "less than half the tolerance. A number plans sooner, and gives a slower motion; knots: free needs one.",
     )
     tolerance: Positive = Field(
         default=1.0e-3,
         le=0.1,
-        description="With intervals: auto, the gain of two rounds, as a fraction of t_E, that ends it.",
+        description="With intervals: auto, how near, as a fraction of t_E, the end time is to be to that of many.",
     )
     knots: Literal["uniform", "free"] = Field(
         default="uniform", description="Equal intervals, or their lengths as variables of the optimisation."
