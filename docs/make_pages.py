@@ -49,8 +49,9 @@ BENCHMARKS_HEAD = """\
 
 # Benchmarks
 
-Each table is made from a file in `benchmarks/results`, which the script named above it writes with `--save`. Times are
-processor times on the machine that the file names, unless a table says otherwise; they do not compare between machines.
+Each table is made from a file in `benchmarks/results`, which the script named above it writes with `--save`. `pip
+install -e ".[benchmark]"` installs what the scripts need. Times are processor times on the machine that the file
+names, unless a table says otherwise; they do not compare between machines.
 
 ## How long a plan takes
 

@@ -254,3 +254,12 @@ def test_contradictions_are_refused_with_their_key(given, asked, key):
 def test_what_cannot_be_is_refused(options, words):
     with pytest.raises((InputError, LimitError), match=words):
         of(IIWA, **options)
+
+
+def test_slower_limits_are_said_to_be_in_use():
+    slower = brachis.LimitSpec(scale={"velocity": 0.1})
+    assert (
+        in_use(of(DAMPED, tool_frame="tool", limits=slower))["limits"]
+        == "velocity 10 % of what is stated (limits.scale)"
+    )
+    assert "limits" not in in_use(of(DAMPED, tool_frame="tool"))

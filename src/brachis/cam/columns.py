@@ -85,7 +85,7 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
         return possible[0] if possible else None
     if stated is None:
         problem = f"the columns {', '.join(columns)} do not say how the orientation is meant"
-        hint = f"State it in the task, for example csv: {{file: ..., orientation: {possible[0]}}}"
+        hint = "State it in the task, csv: {file: ..., orientation: ...}; another choice gives another motion"
         raise TaskError(problem, allowed=f"csv.orientation: {choices(possible)}", where=where, hint=hint)
     if stated not in possible:
         usual = [", ".join(each) for each, conventions in _ORIENTATIONS.items() if stated in conventions]

@@ -1,4 +1,4 @@
-"""What acts on a robot beside its URDF's links: payload, offset, mounting, friction, armature, speed override."""
+"""What acts on a robot beside its URDF's links: payload, offset, mounting, friction, armature, slower limits."""
 
 from __future__ import annotations
 
@@ -29,6 +29,10 @@ def in_use(robot: Robot) -> dict[str, str]:
             said[name] = f"at {_vector(placement.xyz)} m, roll, pitch, yaw {_vector(placement.rpy_deg)} deg"
     if settings.speed_override != 1.0:
         said["speed override"] = f"{100.0 * settings.speed_override:g} % of the joint velocity limits"
+    factors = {kind: factor for kind, factor in settings.limits.scale if factor != 1.0}
+    if factors:
+        parts = ", ".join(f"{kind.replace('_', ' ')} {100.0 * factor:g} %" for kind, factor in factors.items())
+        said["limits"] = f"{parts} of what is stated (limits.scale)"
     if robot.friction.armature.any():
         said["armature"] = _by_joint(robot, "armature")
     for kind, stated in robot.stated.friction.items():

@@ -132,8 +132,9 @@ def read_file(path: Path) -> str:
     try:
         return files.read_file(path).decode()
     except FileNotFoundError as error:
-        of_ours = "" if path.suffix else "A task gives robots that come along by their files, as brachis new does"
-        raise UrdfError("the URDF file does not exist", where=str(path), hint=of_ours) from error
+        ours = files.shipped("robots") / path.name / "robot.urdf"
+        hint = f"The robot of this name that comes with brachis is {ours}" if files.is_file(ours) else ""
+        raise UrdfError("the URDF file does not exist", where=str(path), hint=hint) from error
     except UnicodeDecodeError as error:
         raise UrdfError("the URDF file cannot be read", where=str(path), found=str(error)) from error
     except OSError as error:

@@ -173,8 +173,7 @@ def _ends_too_fast(problem: Problem, s: np.ndarray, q: np.ndarray, stations: np.
     error = PlanningError(
         f"the limits do not allow so high a speed at the path's {key.removesuffix('_speed')}",
         where=f"boundary.{key}",
-        found=f"{asked:g} {unit}",
-        allowed=f"about {share * asked:.3g} {unit} along the best joint path that was found (an estimate)",
+        found=f"{asked:g} {unit}, where one joint path was estimated to allow about {share * asked:.3g} {unit}",
         hint="Raise the limits that hold the motion back",
     )
     given = problem.task.boundary
