@@ -262,3 +262,10 @@ def test_a_turn_of_one_joint_is_answered_with_a_path_of_joints(space, tmp_path):
     line = {"line": yaml.safe_load(advice[0])}
     result = brachis.plan(tmp_path / "turntable.urdf", path=line, start=[0.0], task_space="joints", intervals=8)
     assert result.verified
+
+
+def test_a_bspline_of_seven_joints_is_no_pose():
+    rows = np.linspace([0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0], [0.3, 0.5, 0.1, -0.3, 0.1, 0.2, 0.1], 6)
+    curve = {"degree": 5, "knots": [0.0] * 6 + [1.0] * 6, "control_points": rows.tolist()}
+    asked = brachis.load_task({"brachis": 1, "task_space": "joints", "path": [{"bspline": curve}]})
+    np.testing.assert_array_equal(asked.start.joints, rows[0])

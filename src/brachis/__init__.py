@@ -121,7 +121,7 @@ def __getattr__(name: str) -> object:
     if name not in _HOME:
         from brachis.errors import nearest  # noqa: PLC0415
 
-        near = None if name.startswith("_") else nearest(name, __all__)
+        near = None if name.startswith("_") else nearest(name, __all__, is_attribute=True)
         hint = f". Did you mean {near!r}?" if near else ""
         message = f"module 'brachis' has no attribute {name!r}{hint}"
         raise AttributeError(message)

@@ -365,14 +365,15 @@ class PlanningError(BrachisError):
     """
 
 
-def nearest(name: str, valid: Iterable[str], likeness: float = 0.5) -> str | None:
-    """Return the valid name that other libraries call so, with which `name` begins, or that is most like it, or None.
+def nearest(name: str, valid: Iterable[str], likeness: float = 0.5, *, is_attribute: bool = False) -> str | None:
+    """Suggest a valid name: the one for a word of other libraries, else the longest beginning of `name`, else the nearest.
 
-    Names with a likeness of 1 are the same, but for capitals.
+    Names with a likeness of 1 are the same, but for capitals. Where an attribute is asked for, functions that stand
+    elsewhere in brachis count as well.
     """
     by_small = {one.lower(): one for one in valid}
     small = name.lower()
-    known = [one for one in _NAMES_HERE.get(small, ()) if one in by_small.values() or "." in one]
+    known = [one for one in _NAMES_HERE.get(small, ()) if one in by_small.values() or (is_attribute and "." in one)]
     begun = [one for one in by_small if small.startswith(f"{one}_")]
     if known and small not in by_small:
         return known[0]
@@ -411,7 +412,7 @@ def _attribute_meant(thing: object, name: str) -> str | None:
         within = [f"{part}.{word}" for part, value in parts if hasattr(type(value), word) or word in _contents(value)]
         if within:
             return within[0]
-    return nearest(name, own)
+    return nearest(name, own, is_attribute=True)
 
 
 def _contents(value: object) -> dict[str, object]:

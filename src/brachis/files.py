@@ -248,7 +248,7 @@ def mesh_file(name: str, folder: Path) -> Path | None:
     found = [place / within for place in above] + ros_files(within) + [place / within for place in python]
     if scheme == "package":  # which may be in a folder of another name
         found += [place / within.partition("/")[2] for place in above]
-    return next((path for path in found if os.path.isfile(path)), None)  # noqa: PTH113  (a name may be too long)
+    return next((path for path in found if is_file(path)), None)
 
 
 def ros_files(within: str) -> list[Path]:

@@ -18,7 +18,7 @@ from typing import Unpack
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from brachis import ik, plausibility
+from brachis import ik, interrupts, plausibility
 from brachis.arguments import check_callable, check_list
 from brachis.attempt import Attempt, Start
 from brachis.completion import completed
@@ -162,7 +162,10 @@ def plan(
             return _plan(robot, asked, families, own_limits, known, tell, (began, loaded), deadline)
         except BrachisError as error:
             until = deadline if check_advice else Deadline(0.0)
-            try_remedies(error, asked, robot.joint_names, is_task_planned, until)
+            try:
+                try_remedies(error, asked, robot.joint_names, is_task_planned, until)
+            except KeyboardInterrupt:
+                interrupts.forget()
             raise
 
 

@@ -260,7 +260,7 @@ AMBIGUOUS = [
         {},
         ["line 1: the columns rx, ry, rz do not say how", "rotation_vector (axis times angle: Universal"],
     ),
-    ("x,y,z,rx_deg,ry_deg,rz_deg", {}, ["staubli_xyz (Rx about x", "orientation: rotation_vector}"]),
+    ("x,y,z,rx_deg,ry_deg,rz_deg", {}, ["staubli_xyz (Rx about x", "another choice gives another motion"]),
     ("x,y,z,a,b,c", {}, ["kuka_abc (A about z, B about the new y", "rpy (roll, pitch, yaw about the fixed x"]),
     ("x,y,z,a,b,c", {"orientation": "kuka_abc"}, ["the unit of a is not stated", "Write a_deg in the header"]),
     ("x,y,z,rx,ry,rz", {"orientation": "kuka_abc"}, ["csv.orientation is kuka_abc", "columns a, b, c for kuka_abc"]),

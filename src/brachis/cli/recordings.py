@@ -133,6 +133,8 @@ def _show(found: comparison.Comparison, files: tuple[str, ...]) -> None:
     assert found.today.recovered is not None  # noqa: S101
     console.print(found.verdict)
     exceeded = f"{len(found.exceeded)} exceeded" if found.exceeded else "kept, as far as rows tell"
+    if not found.proven:
+        exceeded = "not known"
     rows = [
         ("end time t_E", f"{found.today.t_end:.4f} s", "", f"{found.result.t_end:.4f} s"),
         *(

@@ -83,7 +83,7 @@ def relocate_meshes(robot: Element, source: Path, target: Path | None) -> None:
         scheme, _, within = name.partition("://")
         path: Path | None = old / name
         if within:
-            by_ros = any(place.is_file() for place in files.ros_files(within))
+            by_ros = any(files.is_file(place) for place in files.ros_files(within))
             path = None if by_ros or scheme != "package" else files.mesh_file(name, old)
         if path is None:
             continue

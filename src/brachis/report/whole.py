@@ -55,15 +55,16 @@ class Report:
         """
         check_suffix(path, ".html", "A browser prints it as PDF")
         with atomic_write(path) as stream:
-            stream.write(self._content)
+            stream.write(self.content)
 
     @property
     def size(self) -> int:
         """Length of the file, bytes."""
-        return len(self._content)
+        return len(self.content)
 
     @property
-    def _content(self) -> bytes:
+    def content(self) -> bytes:
+        """What the file holds."""
         return self.html.encode(errors="backslashreplace")  # names of files need not be text
 
     def __repr__(self) -> str:

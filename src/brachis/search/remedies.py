@@ -124,7 +124,7 @@ def _rounded(value: float, *, down: bool) -> float:
 def _with_number(content: Mapping[str, Any], joints: Sequence[str], key: str, value: float) -> dict[str, Any]:
     """Return a task, not checked yet, with a number changed; one for all joints is written joint by joint."""
     above, _, last = key.rpartition(".")
-    if last not in joints:
+    if last not in joints or not above.startswith("robot.limits."):
         return with_keys(content, {key: value})
     place: Any = content
     for part in above.split("."):

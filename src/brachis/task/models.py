@@ -341,7 +341,7 @@ class Task(Model):
     @property
     def begins(self) -> tuple[float, ...] | ToolPose | None:
         """Where the first segment says that the path begins, as `path_start`; None where it leaves that open."""
-        place = self.path[0].begins
+        place = self.path[0].begins(of_poses=self.of_poses)
         return place if isinstance(place, ToolPose) == self.of_poses else None
 
     @property

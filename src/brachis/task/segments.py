@@ -49,8 +49,7 @@ class SegmentModel(Model):
         given = ", ".join(f"{name}={value!r}" for name, value in (*shape.__repr_args__(), *rest))
         return f"{type(self).__name__.removesuffix('Segment')}({given})"
 
-    @property
-    def begins(self) -> tuple[float, ...] | ToolPose | None:
+    def begins(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:  # noqa: ARG002  (others ask)
         """Where the segment says that it begins, as ``path_start`` of a task; None where it leaves that open.
 
         Without relative waypoints and another word on it, that is the first waypoint.
@@ -108,8 +107,7 @@ class SplineSegment(MovingSegment):
 
     spline: SplineThrough
 
-    @property
-    def begins(self) -> tuple[float, ...] | ToolPose | None:
+    def begins(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
         """See `SegmentModel.begins`."""
         spline = self.spline
         if spline.relative:
@@ -117,7 +115,7 @@ class SplineSegment(MovingSegment):
         place, oriented = spline.starts_at, spline.starts_oriented
         if place is None:
             place, oriented = spline.through[0], spline.orientations[0] if spline.orientations else None
-        if oriented is None or len(place) != _POSITIONS:
+        if oriented is None or not of_poses or len(place) != _POSITIONS:
             return place
         return ToolPose.model_validate({"position": place, **oriented.model_dump()})
 
@@ -140,11 +138,10 @@ class BSplineSegment(MovingSegment):
 
     bspline: BSplineCurve
 
-    @property
-    def begins(self) -> tuple[float, ...] | ToolPose | None:
+    def begins(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
         """See `SegmentModel.begins`."""
         first = self.bspline.control_points[0]
-        if self.bspline.relative or len(first) != _POSE_COLUMNS:
+        if self.bspline.relative or not of_poses or len(first) != _POSE_COLUMNS:
             return None if self.bspline.relative else first
         length = math.hypot(*first[_POSITIONS:]) or 1.0
         turn = [number / length for number in first[_POSITIONS:]]

@@ -128,7 +128,7 @@ class Panel:
         except BrachisError as error:
             event.client.add_notification("There is no report", str(error))
             return
-        event.client.send_file_download("report.html", page.html.encode(), save_immediately=True)
+        event.client.send_file_download("report.html", page.content, save_immediately=True)
 
     def _add_switches(self, scene: Scene) -> None:
         """Add a box to tick for every layer of the scene."""
