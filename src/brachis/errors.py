@@ -366,7 +366,7 @@ class PlanningError(BrachisError):
 
 
 def nearest(name: str, valid: Iterable[str], likeness: float = 0.5, *, is_attribute: bool = False) -> str | None:
-    """Suggest a valid name: the one for a word of other libraries, else the longest beginning of `name`, else the nearest.
+    """Suggest a valid name: one for a word of other libraries, else the longest beginning of `name`, else the nearest.
 
     Names with a likeness of 1 are the same, but for capitals. Where an attribute is asked for, functions that stand
     elsewhere in brachis count as well.
