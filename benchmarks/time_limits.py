@@ -65,7 +65,8 @@ def tasks(folder: Path) -> Iterator[tuple[str, Any]]:
     for robot in ("gen3", "gen3_rails", "arm8"):
         yield f"{robot} line", line(robot)
     yield "gen3_rails position", line("gen3_rails", task_space="position")
-    yield "gen3_rails free start", line("gen3_rails", start="free", path_start=[0.8, 0.5, 0.7, 0.0, 1.0, 0.0, 0.0])
+    downwards = {"position": [0.8, 0.5, 0.7], "quaternion_wxyz": [0.0, 1.0, 0.0, 0.0]}
+    yield "gen3_rails free start", line("gen3_rails", start="free", path_start=downwards)
     yield "arm8 joints", line("arm8", task_space="joints", path=[{"spline": {"through": [[0.5] * 8, [0.1] * 8]}}])
     yield "tx90l_rail 300 intervals", line("tx90l_rail", spline={"intervals": 300})
     yield (
@@ -86,6 +87,7 @@ def tasks(folder: Path) -> Iterator[tuple[str, Any]]:
         "csv": {
             "file": str(folder / "seam.csv"),
             "corner": "blend",
+            "orientation": "rotation_vector",
             "tolerance": {"position": "0.15 mm", "orientation": "0.1 deg", "corner": "5 mm"},
         }
     }
