@@ -26,6 +26,8 @@ from brachis.solvers.watch import ended
 
 ENTRIES = 1_000_000
 """Variables times rows above which a solve runs apart: an iteration takes Uno 0.2 s there, 18 s at nine times that."""
+SHORT = 10.0
+"""Seconds of a time limit below which smaller problems, too, are solved apart: one iteration may take all of them."""
 _GRACE = 0.25
 """Seconds after its time limit at which a process is ended; a backend that hears of the limit answers before."""
 _METHOD = "fork" if sys.platform.startswith("linux") else "spawn"
@@ -41,7 +43,8 @@ def apart_if_large(solve: Solve) -> Solve:
     @functools.wraps(solve)
     def solved(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
         # A daemonic process may have none of its own; the backend's limit then holds between its iterations alone.
-        if len(x) * len(problem.lower) <= ENTRIES or multiprocessing.current_process().daemon:
+        entries_allowed = ENTRIES * min(1.0, (options.time_limit / SHORT) ** 2)
+        if len(x) * len(problem.lower) <= entries_allowed or multiprocessing.current_process().daemon:
             return solve(problem, x, options, progress)
         name = solve.__module__.rpartition(".")[2]
         return _solve_apart(solve.__module__, name, problem, x, options, progress)
