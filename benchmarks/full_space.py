@@ -20,7 +20,8 @@ from brachis.kinematics import DirectJointMap, JointState
 from brachis.nlp import Boundary, FixedGrid, Motion, Phase, Program
 from brachis.nlp.boundary import LocalBasis, SparsityPattern
 from brachis.path import Path
-from brachis.problem import Problem, breaks_of
+from brachis.problem import Problem
+from brachis.transcription import breaks_of
 from brachis.robot import TaskMap
 
 

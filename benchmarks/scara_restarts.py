@@ -13,7 +13,8 @@ import numpy as np
 
 from brachis import load_task, plan
 from brachis.nlp.guess import starting_point
-from brachis.problem import Problem, decompositions_of, program_of
+from brachis.problem import Problem, decompositions_of
+from brachis.transcription import program_of
 from brachis.search.solving import MARGINS, continued
 from brachis.solvers import SolverOptions, solver_named
 

@@ -18,7 +18,7 @@ from typing import Unpack
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from brachis import ik, interrupts, plausibility
+from brachis import ik, interrupts
 from brachis.arguments import check_callable, check_list
 from brachis.attempt import Attempt, Start
 from brachis.completion import completed
@@ -29,7 +29,9 @@ from brachis.least_motion import calmest
 from brachis.mesh import adapt_mesh, coarsest
 from brachis.nlp import Program
 from brachis.nlp.layout import SHORTEST_TIME
-from brachis.problem import Decomposition, Problem, breaks_of, decompositions_of, phase_in, program_of
+from brachis.plausibility import check_within_reach, of_end_time, of_places, of_robot, of_task, tell
+from brachis.problem import Decomposition, Problem, decompositions_of
+from brachis.transcription import breaks_of, phase_in, program_of
 from brachis.progress import Listener, report_progress
 from brachis.refine import RefinementOptions, Solve
 from brachis.result import Result
@@ -199,14 +201,14 @@ def _plan(
 ) -> Result:
     """Run the pipeline stage by stage; `times` are those when it began and when the task was read, s."""
     began, loaded = times
-    remarks = plausibility.of_robot(robot) + plausibility.of_task(task)
-    remarks = plausibility.tell(remarks, strict=task.strict, stacklevel=4)
+    remarks = of_robot(robot) + of_task(task)
+    remarks = tell(remarks, strict=task.strict, stacklevel=4)
     listener(f"planning for {robot.n} joints along a path of {len(task.path)} segments, task space {_space(task)}")
     problem = Problem.of(robot, task, own_limits)
-    places = plausibility.of_places(problem.task_map, problem.path, problem.start, problem.end, task.path_start)
-    remarks += plausibility.tell(places, strict=task.strict, stacklevel=4)
+    places = of_places(problem.task_map, problem.path, problem.start, problem.end, task.path_start)
+    remarks += tell(places, strict=task.strict, stacklevel=4)
     decompositions = decompositions_of(problem, families)
-    plausibility.check_within_reach(problem.task_map, problem.path)
+    check_within_reach(problem.task_map, problem.path)
     first = None if known is None else _first(problem, decompositions, known)
     warm = first if isinstance(first, Start) else None
     found = find_fastest(problem, decompositions, Stages(solved, finished), deadline, listener, warm)
@@ -219,8 +221,8 @@ def _plan(
         listener("looking for the calmest motion that is as fast")
     least = calmest(best, over, listener) if task.search.least_motion else None
     calmed = time.perf_counter()
-    end_time = plausibility.of_end_time(best.t_end, SHORTEST_TIME)
-    remarks += plausibility.tell(end_time, strict=task.strict, stacklevel=4)
+    end_time = of_end_time(best.t_end, SHORTEST_TIME)
+    remarks += tell(end_time, strict=task.strict, stacklevel=4)
     total = time.perf_counter() - began
     listener(f"planned: t_E = {best.t_end:.4f} s, {best.status}, after {total:.2f} s")
     return Result(

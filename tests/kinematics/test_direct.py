@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.kinematics import DirectJointMap
-from brachis.limits import branch_margin
+from brachis.limits.branch_margin import build_branch_margins
 from support.chains import planar_robot
 
 
@@ -28,7 +28,7 @@ def test_every_joint_is_a_curve():
 
 def test_nothing_guards_it():
     free = DirectJointMap(planar_robot("RRP"), np.zeros(3))
-    assert branch_margin.build(free) == ()
+    assert build_branch_margins(free) == ()
     still = np.zeros((4, 3))
     state = free.state(still, still, still, still, t=np.linspace(0.0, 1.0, 4))
     by_q, by_s = free.margin_gradient(state)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brachis.kinematics import JointSpaceMap
-from brachis.limits import branch_margin
+from brachis.limits.branch_margin import build_branch_margins
 from brachis.path import build_path
 from brachis.robot.task_map import task_map_of
 from brachis.robot.task_map.rows import joint_rows
@@ -77,7 +77,7 @@ def test_nothing_is_chosen_and_nothing_guards_it(along, states):
     state = along.state(*states)
     assert along.r == 0
     assert along.redundant_joints == ()
-    assert branch_margin.build(along) == ()
+    assert build_branch_margins(along) == ()
     by_q, by_s = along.margin_gradient(state)
     assert by_q.shape == (6, 0, 3)
     assert by_s is None

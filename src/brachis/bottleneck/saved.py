@@ -16,7 +16,8 @@ from brachis.deadline import Deadline
 from brachis.errors import PlanningError, UnreachableError
 from brachis.kinematics import ChartMap, ChartRows, JointMap, JointSpaceMap, chart_around
 from brachis.nlp import Motion, Program
-from brachis.problem import Problem, decompositions_of, program_of
+from brachis.problem import Problem, decompositions_of
+from brachis.transcription import program_of
 from brachis.refine import Refined, RefinementOptions, refine
 from brachis.robot import ROLL_JOINT
 from brachis.robot.task_map import JOINTS

@@ -60,10 +60,10 @@ def bottleneck(
     How much each of them costs, and when it is active, of a task that is planned for it or of a saved motion.
     """
     with interrupts.postponed():
-        from brachis.cli import bottleneck as command  # noqa: PLC0415  (each command imports what it needs)
+        from brachis.cli import motions  # noqa: PLC0415  (each command imports what it needs)
 
     raise typer.Exit(
-        command.bottleneck_command(
+        motions.bottleneck_command(
             task,
             with_strict(changes, strict=strict),
             urdf=urdf,
@@ -82,9 +82,9 @@ def verify(
 ) -> None:
     """Check a saved motion again: path, limits, ends."""
     with interrupts.postponed():
-        from brachis.cli import results  # noqa: PLC0415
+        from brachis.cli import motions  # noqa: PLC0415
 
-    raise typer.Exit(results.verify_command(result, urdf=urdf, as_json=json))
+    raise typer.Exit(motions.verify_command(result, urdf=urdf, as_json=json))
 
 
 def export(
@@ -123,9 +123,9 @@ def export(
 ) -> None:
     """Sample a saved motion for a controller, or animate it."""
     with interrupts.postponed():
-        from brachis.cli import results  # noqa: PLC0415
+        from brachis.cli import motions  # noqa: PLC0415
 
-    results.export_command(result, out, form=form, dt=dt, last=last, joints=joints, slower=slower)
+    motions.export_command(result, out, form=form, dt=dt, last=last, joints=joints, slower=slower)
 
 
 def plot(
@@ -137,9 +137,9 @@ def plot(
 ) -> None:
     """Draw a saved motion."""
     with interrupts.postponed():
-        from brachis.cli import results  # noqa: PLC0415
+        from brachis.cli import motions  # noqa: PLC0415
 
-    results.plot_command(result, out=out, kind=kind)
+    motions.plot_command(result, out=out, kind=kind)
 
 
 def report(
@@ -154,9 +154,9 @@ def report(
 ) -> None:
     """Write a saved motion as one HTML page to judge it by."""
     with interrupts.postponed():
-        from brachis.cli import report as command  # noqa: PLC0415
+        from brachis.cli import motions  # noqa: PLC0415
 
-    raise typer.Exit(command.report_command(result, out=out, title=title, degrees=degrees))
+    raise typer.Exit(motions.report_command(result, out=out, title=title, degrees=degrees))
 
 
 def view(
@@ -174,6 +174,6 @@ def view(
     Robot, path, tool trace and ghost postures, with plots over the limits that follow a slider. Ctrl-C ends it.
     """
     with interrupts.postponed():
-        from brachis.cli import viewing  # noqa: PLC0415
+        from brachis.cli import motions  # noqa: PLC0415
 
-    viewing.view_command(result, host=host, port=port, browser=browser, degrees=degrees)
+    motions.view_command(result, host=host, port=port, browser=browser, degrees=degrees)

@@ -134,7 +134,7 @@ def sweep(
 ) -> None:
     """Plan a task many times, with its keys varied."""
     with interrupts.postponed():
-        from brachis.cli import sweep as command  # noqa: PLC0415
+        from brachis.cli import planning as command  # noqa: PLC0415
 
     raise typer.Exit(command.sweep_command(source, out=out, jobs=jobs, scheduler=scheduler, retry=retry, as_json=json))
 
@@ -145,6 +145,6 @@ def schema(
 ) -> None:
     """Print the JSON schema of tasks, or of exported JSON."""
     with interrupts.postponed():
-        from brachis.cli import results  # noqa: PLC0415
+        from brachis.cli import motions  # noqa: PLC0415
 
-    results.schema_command(out, of)
+    motions.schema_command(out, of)

@@ -17,20 +17,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from brachis.custom_limits import LimitModel, custom_limits
-from brachis.limits import (
-    branch_margin,
-    joint_rate,
-    position,
-    power,
-    process_speed,
-    rms_torque,
-    tool_acceleration,
-    tool_angular_speed,
-    tool_speed,
-    torque,
-    torque_rate,
-    torque_speed,
-)
+from brachis.limits.torque import build_torque
+from brachis.limits.position import build_position
+from brachis.limits.tool_speed import build_tool_speed
+from brachis.limits.tool_acceleration import build_tool_acceleration
+from brachis.limits.tool_angular_speed import build_tool_angular_speed
+from brachis.limits.rms_torque import build_rms_torque
+from brachis.limits.torque_rate import build_torque_rate
+from brachis.limits.torque_speed import build_torque_speed
+from brachis.limits.power import build_power, build_total_power
+from brachis.limits.process_speed import build_process_speed, build_least_process_speed
+from brachis.limits.joint_rate import build_velocity, build_acceleration, build_jerk
 from brachis.limits.checks import bound_limits
 from brachis.limits.protocol import (
     Approach,
@@ -50,21 +47,21 @@ Build = Callable[[Robot, Task], Limit | None]
 """Makes the limit of a kind for a task on a robot; None where nothing is limited."""
 
 TABLE: dict[str, Build] = {
-    "torque": torque.build,
-    "velocity": joint_rate.build_velocity,
-    "acceleration": joint_rate.build_acceleration,
-    "position": position.build,
-    "tool_speed": tool_speed.build,
-    "tool_acceleration": tool_acceleration.build,
-    "tool_angular_speed": tool_angular_speed.build,
-    "process_speed": process_speed.build_greatest,
-    "least_process_speed": process_speed.build_least,
-    "power": power.build,
-    "total_power": power.build_total,
-    "torque_speed": torque_speed.build,
-    "rms_torque": rms_torque.build,
-    "jerk": joint_rate.build_jerk,
-    "torque_rate": torque_rate.build,
+    "torque": build_torque,
+    "velocity": build_velocity,
+    "acceleration": build_acceleration,
+    "position": build_position,
+    "tool_speed": build_tool_speed,
+    "tool_acceleration": build_tool_acceleration,
+    "tool_angular_speed": build_tool_angular_speed,
+    "process_speed": build_process_speed,
+    "least_process_speed": build_least_process_speed,
+    "power": build_power,
+    "total_power": build_total_power,
+    "torque_speed": build_torque_speed,
+    "rms_torque": build_rms_torque,
+    "jerk": build_jerk,
+    "torque_rate": build_torque_rate,
 }
 
 

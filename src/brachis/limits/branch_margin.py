@@ -50,7 +50,7 @@ class BranchMargin(Limit):
         return Partials(q=by_q, s=by_s)
 
 
-def build(joint_map: JointMap, margin: float = MARGIN) -> tuple[BranchMargin, ...]:
+def build_branch_margins(joint_map: JointMap, margin: float = MARGIN) -> tuple[BranchMargin, ...]:
     """Build the limit, where the joint map has margins: what keeps the motion where it can be computed."""
     at_start = joint_map.start_margins()
     return (BranchMargin(joint_map, at_start, margin),) if len(at_start) else ()

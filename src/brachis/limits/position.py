@@ -82,7 +82,7 @@ class PositionLimit(Limit):
         return Partials(q=np.broadcast_to(self._selection, (len(motion.q), *self._selection.shape)))
 
 
-def build(robot: Robot, _task: Task) -> PositionLimit | None:
+def build_position(robot: Robot, _task: Task) -> PositionLimit | None:
     """Build the limit for the joints with a finite end of range."""
     limits = robot.limits
     joints = np.flatnonzero(np.isfinite(limits.position_lower) | np.isfinite(limits.position_upper))

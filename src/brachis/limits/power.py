@@ -81,12 +81,12 @@ def _power_partials(robot: Robot, motion: JointMotion) -> tuple[np.ndarray, np.n
     return by_q, by_qdot, by_qddot
 
 
-def build(robot: Robot, _task: Task) -> PowerLimit | None:
+def build_power(robot: Robot, _task: Task) -> PowerLimit | None:
     """Build the limit for the joints with a finite power limit."""
     joints = np.flatnonzero(np.isfinite(robot.limits.power))
     return PowerLimit(robot, joints) if len(joints) else None
 
 
-def build_total(robot: Robot, _task: Task) -> TotalPowerLimit | None:
+def build_total_power(robot: Robot, _task: Task) -> TotalPowerLimit | None:
     """Build the limit where there is one."""
     return TotalPowerLimit(robot) if np.isfinite(robot.limits.total_power) else None

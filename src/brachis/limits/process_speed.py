@@ -151,13 +151,13 @@ class LeastProcessSpeed(_ProcessSpeedLimit):
         self.lower = -self._tolerances
 
 
-def build_greatest(robot: Robot, task: Task) -> GreatestProcessSpeed | None:
+def build_process_speed(robot: Robot, task: Task) -> GreatestProcessSpeed | None:
     """Build the upper side where the task has process speeds."""
     parts = task.tool_limits.process_speed
     return GreatestProcessSpeed(robot, parts) if parts else None
 
 
-def build_least(robot: Robot, task: Task) -> LeastProcessSpeed | None:
+def build_least_process_speed(robot: Robot, task: Task) -> LeastProcessSpeed | None:
     """Build the lower side where the task has process speeds."""
     parts = task.tool_limits.process_speed
     return LeastProcessSpeed(robot, parts) if parts else None

@@ -56,7 +56,7 @@ class RmsTorqueLimit(JointRatioLimit):
         return np.asarray(np.sqrt(np.maximum(values, 0.0) / self.upper))
 
 
-def build(robot: Robot, _task: Task) -> RmsTorqueLimit | None:
+def build_rms_torque(robot: Robot, _task: Task) -> RmsTorqueLimit | None:
     """Build the limit for the joints that have one."""
     joints = np.flatnonzero(np.isfinite(robot.limits.rms_torque))
     return RmsTorqueLimit(robot, joints) if len(joints) else None

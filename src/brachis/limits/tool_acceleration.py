@@ -61,7 +61,7 @@ class ToolAccelerationLimit(Limit):
         return PhaseLines(by_u, self._acceleration(twists, q_ds, q_dds), np.zeros_like(by_u))
 
 
-def build(robot: Robot, task: Task) -> ToolAccelerationLimit | None:
+def build_tool_acceleration(robot: Robot, task: Task) -> ToolAccelerationLimit | None:
     """Build the limit where the task has one."""
     figure = task.tool_limits.acceleration
     return None if figure is None else ToolAccelerationLimit(robot, figure)

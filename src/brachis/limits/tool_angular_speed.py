@@ -68,7 +68,7 @@ class ToolAngularSpeedLimit(Limit):
         return PhaseLines(None, self._speed(q, q_ds) ** 2, np.zeros((len(q), 1)))
 
 
-def build(robot: Robot, task: Task) -> ToolAngularSpeedLimit | None:
+def build_tool_angular_speed(robot: Robot, task: Task) -> ToolAngularSpeedLimit | None:
     """Build the limit where the task has one."""
     figure = task.tool_limits.angular_speed
     return None if figure is None else ToolAngularSpeedLimit(robot, figure)

@@ -62,7 +62,7 @@ class ToolSpeedLimit(Limit):
         return PhaseLines(None, squares, np.zeros_like(squares))
 
 
-def build(robot: Robot, task: Task) -> ToolSpeedLimit | None:
+def build_tool_speed(robot: Robot, task: Task) -> ToolSpeedLimit | None:
     """Build the limit where the task has one, or its path has feed rates."""
     speed, feed = task.tool_limits.speed, task.tool_limits.feed
     tables, labels = [], []

@@ -52,7 +52,7 @@ class TorqueLimit(JointRatioLimit):
         return dynamics.mass_matrices(self._robot, q)[:, self._joints] * self._scale[:, None], None
 
 
-def build(robot: Robot, _task: Task) -> TorqueLimit | None:
+def build_torque(robot: Robot, _task: Task) -> TorqueLimit | None:
     """Build the limit for the joints with a finite torque limit."""
     joints = np.flatnonzero(np.isfinite(robot.limits.torque_upper))
     return TorqueLimit(robot, joints) if len(joints) else None

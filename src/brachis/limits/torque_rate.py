@@ -61,7 +61,7 @@ class TorqueRateLimit(JointRatioLimit):
         return Partials(q, qdot + by_q, qddot + by_qdot, by_qddot)
 
 
-def build(robot: Robot, _task: Task) -> TorqueRateLimit | None:
+def build_torque_rate(robot: Robot, _task: Task) -> TorqueRateLimit | None:
     """Build the limit for the joints with a finite limit of the torque's rate."""
     joints = np.flatnonzero(np.isfinite(robot.limits.torque_rate))
     return TorqueRateLimit(robot, joints) if len(joints) else None

@@ -73,7 +73,7 @@ class TorqueSpeedLimit(Limit):
         return Partials(by_q, by_qdot, by_qddot)
 
 
-def build(robot: Robot, _task: Task) -> TorqueSpeedLimit | None:
+def build_torque_speed(robot: Robot, _task: Task) -> TorqueSpeedLimit | None:
     """Build the limit where a joint's torque falls with its speed."""
     rounded = {joint: RoundedCurve.below(curve) for joint, curve in enumerate(robot.limits.torque_speed) if curve}
     falling = {joint: curve for joint, curve in rounded.items() if curve is not None}

@@ -19,8 +19,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from brachis.kinematics import JointMap, JointState
-from brachis.limits import Limit, Partials, Role, branch_margin
-from brachis.limits.branch_margin import MARGIN
+from brachis.limits import Limit, Partials, Role
+from brachis.limits.branch_margin import MARGIN, build_branch_margins
 from brachis.nlp.boundary import Boundary, LocalBasis
 from brachis.nlp.chain import chain
 from brachis.nlp.grid import FixedGrid, FreeGrid, Grid
@@ -61,7 +61,7 @@ class Phase:
 
     def __init__(self, joint_map: JointMap, limits: Sequence[Limit], grid: Grid, boundary: Boundary) -> None:
         self.joint_map = joint_map
-        self.limits = (*limits, *branch_margin.build(joint_map, MARGIN))
+        self.limits = (*limits, *build_branch_margins(joint_map, MARGIN))
         self._lay_out(grid, boundary)
 
     def _lay_out(self, grid: Grid, boundary: Boundary) -> None:
@@ -113,7 +113,7 @@ class Phase:
     def with_margin(self, margin: float) -> Phase:
         """Return the same phase with another least branch margin; x keeps its meaning."""
         own = tuple(limit for limit in self.limits if limit.role is not Role.SAFEGUARD)
-        return self.with_limits((*own, *branch_margin.build(self.joint_map, margin)))
+        return self.with_limits((*own, *build_branch_margins(self.joint_map, margin)))
 
     @property
     def variables(self) -> int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from brachis.limits import tool_speed
+from brachis.limits.tool_speed import build_tool_speed
 from brachis.robot.limits import Limits
 from brachis.robot.units import UNITS, shown_unit
 from brachis.trajectory import Samples, Trajectory
@@ -172,5 +172,5 @@ def limits_of(limits: Limits, kind: str) -> np.ndarray:
 
 def allowed_tool_speeds(trajectory: Trajectory, samples: Samples) -> np.ndarray:
     """Largest speeds of the tool that the task allows, (c, K), m/s; infinite where there is no limit."""
-    limit = tool_speed.build(trajectory.robot, trajectory.task)
+    limit = build_tool_speed(trajectory.robot, trajectory.task)
     return np.empty((0, len(samples.t))) if limit is None else limit.largest_at(samples.s)[0].T

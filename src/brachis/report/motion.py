@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from brachis import bottleneck, plausibility
+from brachis import bottleneck
 from brachis.attempt import Attempt
 from brachis.bottleneck import LimitRatios, Saturation, limit_ratios
 from brachis.bottleneck.saturation import saturations_of
 from brachis.bottleneck.words import active_in_words
 from brachis.errors import BrachisError
 from brachis.limits import Limit, Role
-from brachis.plausibility import Remark
+from brachis.plausibility import Remark, of_robot, of_task
 from brachis.plots.curves import dense_samples
 from brachis.trajectory import Samples, Trajectory
 from brachis.verify import Verification, verify_trajectory
@@ -70,7 +70,7 @@ def reported_motion(motion: Result | Trajectory, *, degrees: bool = False) -> Re
             motion,
             verify_trajectory(motion),
             limits=None,
-            remarks=plausibility.of_robot(motion.robot) + plausibility.of_task(motion.task),
+            remarks=of_robot(motion.robot) + of_task(motion.task),
             degrees=degrees,
         )
     refined = motion.attempt.refined

@@ -19,7 +19,7 @@ from brachis.attempt import Start
 from brachis.limits import Limit
 from brachis.nlp import Program
 from brachis.nlp.guess import starting_point
-from brachis.problem import breaks_of
+from brachis.transcription import breaks_of
 from brachis.search.phase_plane import least_times
 
 _STATIONS = 401

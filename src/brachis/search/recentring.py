@@ -17,7 +17,8 @@ from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap, ChartRows, Newton, chart_around, null_spaces, transversality
 from brachis.nlp import Program
 from brachis.nlp.guess import fitted, shortest_time
-from brachis.problem import Problem, phase_in
+from brachis.problem import Problem
+from brachis.transcription import phase_in
 from brachis.refine import Solve
 from brachis.search.solving import HELD_BACK, MARGINS, WORTH_IT, continued
 from brachis.solvers import SolverReport, SolveStatus

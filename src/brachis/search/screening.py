@@ -18,7 +18,8 @@ from brachis.deadline import Deadline
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap
 from brachis.nlp import Program
-from brachis.problem import Problem, program_of
+from brachis.problem import Problem
+from brachis.transcription import program_of
 from brachis.progress import Listener
 from brachis.refine import Solve
 from brachis.search.pacing import first_point

@@ -8,37 +8,35 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from brachis.custom_limits import LimitModel, custom_limits
-from brachis.verify.limits import (
-    drives,
-    joint_rate,
-    position,
-    process_speed,
-    tool_motion,
-    tool_speed,
-    torque,
-    torque_rate,
-)
+from brachis.verify.limits.drives import worst_power, worst_total_power, worst_torque_at_speed, worst_rms_torque
+from brachis.verify.limits.joint_rate import worst_velocity, worst_acceleration, worst_jerk
+from brachis.verify.limits.position import worst_position
+from brachis.verify.limits.process_speed import worst_process_speed, worst_least_process_speed
+from brachis.verify.limits.tool_motion import worst_tool_acceleration, worst_tool_angular_speed
+from brachis.verify.limits.tool_speed import worst_tool_speed
+from brachis.verify.limits.torque import worst_torque
+from brachis.verify.limits.torque_rate import worst_torque_rate
 from brachis.verify.limits.own import check_own
 from brachis.verify.limits.protocol import Given, LimitCheck, Worst
 from brachis.verify.options import VerifyOptions
 from brachis.verify.report import Check
 
 TABLE: dict[str, LimitCheck] = {
-    "torque": torque.worst,
-    "velocity": joint_rate.worst_velocity,
-    "acceleration": joint_rate.worst_acceleration,
-    "position": position.worst,
-    "tool_speed": tool_speed.worst,
-    "tool_acceleration": tool_motion.worst_acceleration,
-    "tool_angular_speed": tool_motion.worst_angular_speed,
-    "process_speed": process_speed.worst_above,
-    "least_process_speed": process_speed.worst_below,
-    "power": drives.worst_power,
-    "total_power": drives.worst_total_power,
-    "torque_speed": drives.worst_torque_at_speed,
-    "rms_torque": drives.worst_rms_torque,
-    "jerk": joint_rate.worst_jerk,
-    "torque_rate": torque_rate.worst,
+    "torque": worst_torque,
+    "velocity": worst_velocity,
+    "acceleration": worst_acceleration,
+    "position": worst_position,
+    "tool_speed": worst_tool_speed,
+    "tool_acceleration": worst_tool_acceleration,
+    "tool_angular_speed": worst_tool_angular_speed,
+    "process_speed": worst_process_speed,
+    "least_process_speed": worst_least_process_speed,
+    "power": worst_power,
+    "total_power": worst_total_power,
+    "torque_speed": worst_torque_at_speed,
+    "rms_torque": worst_rms_torque,
+    "jerk": worst_jerk,
+    "torque_rate": worst_torque_rate,
 }
 
 

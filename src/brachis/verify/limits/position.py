@@ -13,7 +13,7 @@ _LEAST_HALF, _LARGEST_HALF = 1e-5, 1.0
 _REMARK = "0: the middle of the range, 1: an end"
 
 
-def worst(given: Given) -> Worst | None:
+def worst_position(given: Given) -> Worst | None:
     """Find the position that is nearest to an end of its range, or furthest beyond, anywhere.
 
     Inside, the ratio is the place in the range: 0 in its middle, 1 at its ends. Of a range with one end it is

@@ -10,12 +10,12 @@ from brachis.verify.limits.protocol import Given, Worst
 from brachis.verify.limits.tool_speed import speeds
 
 
-def worst_above(given: Given) -> Worst | None:
+def worst_process_speed(given: Given) -> Worst | None:
     """Find the largest speed; a ratio of 1 is the process speed and its tolerance."""
     return _worst(given, 1.0)
 
 
-def worst_below(given: Given) -> Worst | None:
+def worst_least_process_speed(given: Given) -> Worst | None:
     """Find the smallest speed; a ratio of 1 is the process speed without its tolerance, 2 a tool at rest."""
     return _worst(given, -1.0)
 

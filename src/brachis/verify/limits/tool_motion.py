@@ -13,7 +13,7 @@ from brachis.verify.motion import States
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
-def worst_acceleration(given: Given) -> Worst | None:
+def worst_tool_acceleration(given: Given) -> Worst | None:
     """Find the largest ratio of the size of the tool's acceleration, at the states and between them."""
     limit, robot = given.trajectory.task.tool_limits.acceleration, given.robot
     if limit is None:
@@ -30,7 +30,7 @@ def worst_acceleration(given: Given) -> Worst | None:
     return worst_between(given, ratios, ("tool",))
 
 
-def worst_angular_speed(given: Given) -> Worst | None:
+def worst_tool_angular_speed(given: Given) -> Worst | None:
     """Find the largest ratio of the tool's angular speed; the virtual joint of a free roll turns nothing."""
     limit, robot = given.trajectory.task.tool_limits.angular_speed, given.robot
     if limit is None:

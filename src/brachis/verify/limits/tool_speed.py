@@ -12,7 +12,7 @@ from brachis.verify.limits.protocol import Given, Worst
 from brachis.verify.motion import States
 
 
-def worst(given: Given) -> Worst | None:
+def worst_tool_speed(given: Given) -> Worst | None:
     """Find the largest ratio of the tool's speed, at the states and between them; at the places of tables too."""
     limits, robot = given.trajectory.task.tool_limits, given.robot
     stated, feed = limits.speed, limits.feed

@@ -8,7 +8,7 @@ from brachis.verify.limits.peaks import worst_between
 from brachis.verify.limits.protocol import Given, Worst
 
 
-def worst(given: Given) -> Worst | None:
+def worst_torque(given: Given) -> Worst | None:
     """Find the largest torque ratio, at the states and between them."""
     lower, upper = given.robot.limits.torque_lower, given.robot.limits.torque_upper
     if not np.isfinite(upper).any():

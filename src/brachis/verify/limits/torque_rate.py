@@ -10,7 +10,7 @@ from brachis.verify.mechanics import torque_rates
 from brachis.verify.motion import States
 
 
-def worst(given: Given) -> Worst | None:
+def worst_torque_rate(given: Given) -> Worst | None:
     """Find the largest ratio of a torque's rate, at the states and between them."""
     limit, robot = given.robot.limits.torque_rate, given.robot
     if not np.isfinite(limit).any():
