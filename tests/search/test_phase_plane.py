@@ -9,7 +9,7 @@ import pytest
 
 import brachis
 from brachis.limits.joint_rate import build_acceleration, build_velocity
-from brachis.limits.torque import build as build_torque
+from brachis.limits.torque import build_torque
 from brachis.robot import dynamics
 from brachis.search import phase_plane
 

@@ -19,7 +19,7 @@ from brachis.arrays import cross
 from brachis.ik.geometry import ChainGeometry
 from brachis.ik.vectors import across, dot
 
-EXACT = 1e-8
+EXACT_AXES = 1e-8
 """Axes this near to parallel, or to meeting, are taken to do so, rad or m."""
 COARSE = 4e-5
 """The same where EAIK makes nothing of axes that are almost parallel; such answers need polishing."""
@@ -67,7 +67,7 @@ class EaikChain:
 
     def knows(self, values: np.ndarray) -> bool:
         """Whether EAIK has a decomposition at each of some held values (U, h)."""
-        return all(robot is not None for robot in self._made(values, EXACT))
+        return all(robot is not None for robot in self._made(values, EXACT_AXES))
 
     def answers(self, targets: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Let EAIK solve for six joints.
@@ -105,13 +105,13 @@ class EaikChain:
         kept = self._robots if len(self._robots) <= _KEPT else {}
         new = [key for key in dict.fromkeys(keys) if key not in kept]
         if new:
-            made = self._made(np.array(new).reshape(len(new), len(self._held)), EXACT)
+            made = self._made(np.array(new).reshape(len(new), len(self._held)), EXACT_AXES)
             for key, robot in zip(new, made, strict=True):
                 if robot is None:
                     kept[key] = (self._made(np.array([key]), COARSE)[0], _AMPLIFIED * COARSE)
                 else:
                     quartic = _QUARTIC in robot.get_kinematic_family()
-                    kept[key] = (robot, _FEW_DIGITS if quartic else _AMPLIFIED * EXACT)
+                    kept[key] = (robot, _FEW_DIGITS if quartic else _AMPLIFIED * EXACT_AXES)
         self._robots = kept
         return [kept[key] for key in keys]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+import pathlib
 from typing import Any
 
 import numpy as np
@@ -147,7 +147,7 @@ def _is_task(given: object) -> bool:
     """Tell a task, or its file, from a robot."""
     return isinstance(given, Task | Mapping) or (
         isinstance(given, str | os.PathLike)
-        and (kind_of(given) is Kind.TASK or Path(given).suffix.lower() in _TASK_SUFFIXES)
+        and (kind_of(given) is Kind.TASK or pathlib.Path(given).suffix.lower() in _TASK_SUFFIXES)
     )
 
 

@@ -17,7 +17,8 @@ from brachis.errors import InputError
 from brachis.robot.friction import Friction
 from brachis.robot.limits import UrdfLimit
 from brachis.robot.robot import ROLL_JOINT, Robot
-from brachis.robot.task_map import FREE_ROLL, TaskMap, task_map_of
+from brachis.robot.task_map.choice import FREE_ROLL, task_map_of
+from brachis.robot.task_map.protocol import TaskMap
 
 _NO_SPEED_SCALE = 1.0
 
