@@ -87,7 +87,7 @@ def import_command(recorded: Recorded, *, out: Path, as_json: bool) -> None:
         console.print(line)
     print_verification(console, verification)
     console.print("these ratios are of the motion that was made of the rows; the rows alone prove:")
-    for proven in comparison.proven_ratios(trajectory):
+    for proven in comparison.bound_ratios(trajectory):
         ratio, subject, time = proven.worst
         console.print(f"{proven.limit} ratio {ratio:.4f}, {subject} at {time:.4f} s")
     console.print(f"wrote {out}")

@@ -212,17 +212,17 @@ def _peak(part: Quantity, column: int, tolerance: float) -> Row:
     ratios = np.abs(part.ratios[:, column]) if limited else np.zeros(1)
     at = int(np.argmax(ratios if limited else np.abs(values)))
     value = values[at] if abs(values[at]) > _SMALL else 0.0
-    low, high = _written(lower), _written(upper)
+    low, high = _write_number(lower), _write_number(upper)
     limit = f"{high} {part.unit}" if upper == -lower else f"{low} to {high} {part.unit}"
     return Row(
-        value=f"{_written(value)} {part.unit}",
+        value=f"{_write_number(value)} {part.unit}",
         limit=limit if limited else "",
         share=f"{100.0 * ratios.max():.1f} %" if limited else "",
         level=_level(float(ratios.max()), tolerance),
     )
 
 
-def _written(value: float) -> str:
+def _write_number(value: float) -> str:
     """Write a number with four significant figures, large ones without an exponent."""
     return f"{value:.0f}" if _LARGE <= abs(value) < np.inf else f"{value:.4g}"
 

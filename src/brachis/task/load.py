@@ -150,11 +150,11 @@ def _with_start(task: Task, source: str) -> Task:
     """
     if task.start != "free" or task.path_start is not None:
         return task
-    begins, first = task.begins, task.path[0]
-    changes: dict[str, object] = {"path_start": begins}
-    if task.task_space == "joints" and begins is not None:
+    place, first = task.start_place, task.path[0]
+    changes: dict[str, object] = {"path_start": place}
+    if task.task_space == "joints" and place is not None:
         names = getattr(getattr(first, first.kind), "joints", None)
-        changes = {"start": {"joints": dict(zip(names, begins, strict=True)) if names else begins}}
+        changes = {"start": {"joints": dict(zip(names, place, strict=True)) if names else place}}
     try:
         return Task.model_validate(task.model_copy(update=changes))
     except ValidationError as error:
