@@ -218,6 +218,10 @@ class Task(Model):
         if set(path) != {"frame", "segments"}:
             problem = "a path in a frame is the frame's name and the segments"
             raise refuse(problem, key="path", found=path, allowed="{frame: NAME, segments: [...]}")
+        other = content.get("path_frame")
+        if other not in (None, path["frame"]):
+            allowed = f"{path['frame']}, or one of both keys"
+            raise refuse("another frame than in path.frame", key="path_frame", found=other, allowed=allowed)
         return {**content, "path": path["segments"], "path_frame": path["frame"]}
 
     @field_validator("path", mode="before")
