@@ -105,7 +105,7 @@ def identity(motion: ReportedMotion) -> dict[str, str]:
     task_space = trajectory.task.task_space
     rows = task_space if isinstance(task_space, str) else ", ".join(task_space)
     return {
-        "robot": f"{trajectory.robot.name}{file}",
+        "robot": f"{trajectory.robot.name}{file}".strip(),
         "path": f"{path_in_words(trajectory.task)}; the tool moves {way:.3f} m; prescribed: {rows}",
         **({} if recovered is None else {"recovered from": _file_name(recovered.source)}),
         "payload": "none",
@@ -247,16 +247,18 @@ class CheckRow:
 
 def check_rows(motion: ReportedMotion) -> list[CheckRow]:
     """List the checks of the verification, those that failed first."""
-    return [_check_row(check) for check in sorted(motion.verification.checks, key=lambda check: check.passed)]
+    checks = sorted(motion.verification.checks, key=lambda check: check.passed)
+    return [_check_row(check, degrees=motion.degrees) for check in checks]
 
 
-def _check_row(check: Check) -> CheckRow:
-    unit = "" if check.unit == "-" else f" {check.unit}"
+def _check_row(check: Check, *, degrees: bool) -> CheckRow:
+    found, allowed, unit = check.figures(degrees=degrees)
+    after = "" if unit == "-" else f" {unit}"
     parts = [check.subject or "", "" if check.time is None else f"{check.time:.4f} s"]
     return CheckRow(
         name=check.name,
-        found=check.figures[0] + unit,
-        allowed=check.figures[1] + unit,
+        found=found + after,
+        allowed=allowed + after,
         where=" at ".join(part for part in parts if part),
         passed=check.passed,
         remark=check.remark,
