@@ -198,7 +198,7 @@ def test_accelerations_that_jump_do_not_overshoot():
     fine = np.linspace(0.0, 2.0, 20001)
     assert np.abs(pieces(fine, nu=2)).max() < 1.005
     np.testing.assert_allclose(pieces(t), q, atol=1e-12)
-    assert "accelerations jump between 1 pairs of rows" in nodes.told
+    assert "accelerations jump between 1 pair of rows" in nodes.told
 
 
 def test_ends_in_motion(motion, table, write):
