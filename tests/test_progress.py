@@ -28,7 +28,7 @@ def test_the_log_has_stages_at_info_and_iterations_at_debug(caplog):
         result = brachis.plan(brachis.examples.scara_line, **QUICK)
     stages = [record.message for record in caplog.records if record.levelno == logging.INFO]
     details = [record.message for record in caplog.records if record.levelno == logging.DEBUG]
-    assert stages[0] == "planning for 3 joints along a path of 1 segments, task space [x, y]"
+    assert stages[0] == "planning for 3 joints along a path of 1 segment, task space [x, y]"
     assert stages[-1].startswith(f"planned: t_E = {result.t_end:.4f} s, verified")
     assert details
     assert all("iteration" in text for text in details)

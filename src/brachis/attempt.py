@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from brachis.errors import write_count
 from brachis.kinematics import CHART, ChartMap, ClosedFormMap, JointSpaceMap
 from brachis.nlp import Program
 from brachis.problem import Problem
@@ -215,8 +216,8 @@ class Attempt(Summary):
                 found = f"limits exceeded by {100.0 * refined.violation:.2g} %"
             else:
                 found = "too sharp for a trajectory" if verification is None else "the verification fails"
-            rounds = len(refined.reports) - 1
-            status = f"{last.solver}: t_E = {refined.t_end:.4f} s after {rounds} refinement rounds, {found}"
+            rounds = write_count(len(refined.reports) - 1, "refinement round")
+            status = f"{last.solver}: t_E = {refined.t_end:.4f} s after {rounds}, {found}"
         (phase,) = refined.program.phases
         return dataclasses.replace(
             self,

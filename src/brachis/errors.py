@@ -428,6 +428,11 @@ def write_apart(value: float, *others: float, digits: int = 4) -> tuple[str, ...
     return (text, *texts)
 
 
+def write_count(count: int, noun: str) -> str:
+    """Write how many there are of something, as ``1 row`` or ``2 rows``."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def no_attribute(module: str, kind: str, name: str, valid: Sequence[str]) -> AttributeError:
     """Return what a module raises that has things of one kind, such as robots, by their names."""
     near = nearest(name, valid)

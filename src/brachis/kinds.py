@@ -10,6 +10,8 @@ from enum import Enum
 from brachis.errors import InputError
 from brachis.files import LARGEST_TEXT, read_file
 
+TASK_SUFFIXES = (".yaml", ".yml")
+"""Suffixes of task files."""
 _LOOKED_AT = 16_384
 """Bytes at the beginning of a file."""
 _TASK = re.compile(rb"^brachis\s*:", re.MULTILINE)

@@ -8,7 +8,7 @@ from contextlib import closing
 from typing import Any, Unpack
 
 from brachis.arguments import count
-from brachis.errors import BrachisError, InputError
+from brachis.errors import BrachisError, InputError, write_count
 from brachis.planner import Given, plan
 from brachis.progress import report_progress
 from brachis.result import Result
@@ -85,7 +85,7 @@ def plan_many(
     with report_progress(None, progress) as tell, closing(each(*work, jobs=jobs, listener=_deaf)) as made:
         for outcome in made:
             outcomes.append(outcome)
-            tell(f"planned {len(outcomes)} of {len(given)} tasks")
+            tell(f"planned {len(outcomes)} of {write_count(len(given), 'task')}")
             if heard is not None:
                 heard(len(outcomes), len(given), outcome)
     return outcomes

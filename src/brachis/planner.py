@@ -24,7 +24,7 @@ from brachis.attempt import Attempt, Start
 from brachis.completion import completed
 from brachis.custom_limits import LimitModel
 from brachis.deadline import Deadline
-from brachis.errors import BrachisError, InputError
+from brachis.errors import BrachisError, InputError, write_count
 from brachis.least_motion import calmest
 from brachis.mesh import adapt_mesh, coarsest
 from brachis.nlp import Program
@@ -203,7 +203,8 @@ def _plan(
     began, loaded = times
     remarks = of_robot(robot) + of_task(task)
     remarks = tell(remarks, strict=task.strict, stacklevel=4)
-    listener(f"planning for {robot.n} joints along a path of {len(task.path)} segments, task space {_space(task)}")
+    joints, segments = write_count(robot.n, "joint"), write_count(len(task.path), "segment")
+    listener(f"planning for {joints} along a path of {segments}, task space {_space(task)}")
     problem = Problem.of(robot, task, own_limits)
     places = of_places(problem.task_map, problem.path, problem.start, problem.end, task.path_start)
     remarks += tell(places, strict=task.strict, stacklevel=4)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 import brachis
@@ -30,7 +32,7 @@ def test_few_intervals_cost_what_the_fastest_motion_saves():
     assert report.knots.t_end == pytest.approx(FASTEST, rel=2e-3)
     assert report.knots.saved == pytest.approx(1.0 - FASTEST / result.t_end, abs=2e-3)
     assert report.knots.saved > 0.1
-    assert "the 10 knot intervals cost about" in str(report)
+    assert re.search(r"the knots cost about \d.* with 10 intervals: ", str(report))
     assert "spline.intervals: auto" in str(report)
     assert report.to_dict()["knots"]["saved"] == report.knots.saved
 
@@ -40,7 +42,7 @@ def test_a_refined_mesh_costs_next_to_nothing():
     report = result.bottleneck()
     assert result.t_end == pytest.approx(FASTEST, rel=3e-3)
     assert abs(report.knots.saved) < 3e-3
-    assert "knot intervals" not in str(report)
+    assert "the knots cost" not in str(report)
 
 
 @pytest.mark.parametrize("limits", [{"friction": {"viscous": 0.5}}, {"limits": {"torque": 10, "jerk": 100}}], ids=str)
@@ -49,7 +51,7 @@ def test_nothing_is_said_if_the_phase_plane_leaves_out_what_holds_the_motion(lim
     report = result.bottleneck()
     assert report.knots is None
     assert report.to_dict()["knots"] is None
-    assert "knot intervals" not in str(report)
+    assert "the knots cost" not in str(report)
 
 
 def test_a_redundant_arm_gains_at_least_that(scara):

@@ -6,6 +6,7 @@ import builtins
 import csv
 import json
 import math
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -376,3 +377,17 @@ def test_module_runs(capfd, monkeypatch):
     with pytest.raises(SystemExit):
         runpy.run_module("brachis", run_name="__main__")
     assert "inspect" in capfd.readouterr().out
+
+
+def test_every_command_shows_angles_in_degrees_and_json_stays_in_rad(run, task, write):
+    task["robot"]["limits"] = {"torque": None, "acceleration": 20.0, "velocity": 0.5}
+    planned = run("plan", file := write(task), "--out", file.parent, "--degrees")
+    assert planned.code == 0, planned.err
+    assert "j1 30.0000 deg, j2 -120.0000 deg" in planned.out
+    result = file.parent / "result.npz"
+    verified, plain = run("verify", result, "--degrees").out, run("verify", result).out
+    assert (" deg/s " in verified, " rad/s " in verified) == (True, False)
+    assert (" deg/s " in plain, " rad/s " in plain) == (False, True)
+    found = re.findall(r"\((.*?) deg/s\) saves", run("bottleneck", result, "--degrees").out)
+    assert found[0] == f"{np.rad2deg(0.05):.3g}"
+    assert run("verify", result, "--degrees", "--json").out == run("verify", result, "--json").out

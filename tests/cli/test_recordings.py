@@ -32,8 +32,9 @@ def recorded(tmp_path_factory):
 def test_import(run, recorded, tmp_path):
     file, cell, trajectory = recorded
     out = tmp_path / "today.npz"
-    outcome = run("import", file, "--robot", cell, "--angle", "deg", "--out", out)
+    outcome = run("import", file, "--robot", cell, "--angle", "deg", "--out", out, "--degrees")
     assert outcome.code == 0, outcome.err
+    assert " deg/s " in outcome.out
     assert f"end time t_E: {trajectory.t_end:.4f} s" in outcome.out
     assert "verification: passed" in outcome.out
     assert "not known: what the motion does between the rows" in outcome.out

@@ -105,7 +105,7 @@ URDFS = {
     "broken XML": ("<robot name='x'><link", "not well-formed XML"),
     "not a URDF": ("<sdf version='1.6'/>", "root element <sdf>"),
     "no links": ("<robot name='x'/>", "no links"),
-    "not text": ("", "not well-formed XML"),
+    "not text": ("", "not a URDF"),
 }
 
 
@@ -186,6 +186,8 @@ def test_suggestions_come_from_the_valid_names():
         (("plan", "scara3"), "scara3: is a robot; allowed: a task file. brachis new scara3 writes a first task for it"),
         (("plan", "scara4"), "there is no robot named 'scara4'"),
         (("plan", "sweep.yaml"), "found a sweep file; allowed: a task file. brachis sweep sweep.yaml plans it"),
+        (("plan", "README.md"), "README.md: the file is not a task; found README.md: line 1, column 1: not valid YAML"),
+        (("inspect", "p.csv"), "p.csv: the file is not a URDF; found 't,j1\\n0,1\\n' at its beginning"),
         (("sweep", "task.yaml"), "found a task file; allowed: a sweep file"),
         (("import", "task.yaml", "--robot", "scara3", "--out", "x.npz"), "found a task file; allowed: a CSV file"),
     ],
@@ -193,6 +195,8 @@ def test_suggestions_come_from_the_valid_names():
 def test_other_things_than_are_asked_for(run, tmp_path, monkeypatch, command, told):
     (tmp_path / "task.yaml").write_text("brachis: 1\n")
     (tmp_path / "sweep.yaml").write_text("sweep: 1\ntask: task.yaml\n")
+    (tmp_path / "README.md").write_text("`a` page")
+    (tmp_path / "p.csv").write_text("t,j1\n0,1\n")
     monkeypatch.chdir(tmp_path)
     outcome = run(*command)
     assert outcome.code == 2

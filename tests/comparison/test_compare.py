@@ -96,7 +96,7 @@ def test_what_may_be_between_rows_of_few_digits_is_no_fact(found, today, task, t
     table, header = np.column_stack([t, today.motion(t)]), ",".join(["t", *today.robot.joint_names])
     np.savetxt(tmp_path / "today.csv", table, delimiter=",", header=header, comments="", fmt="%.4f")
     rough = brachis.import_motion(tmp_path / "today.csv", task=task)
-    proven, verification = comparison.proven_ratios(rough), brachis.verify_trajectory(rough)
+    proven, verification = comparison.bound_ratios(rough), brachis.verify_trajectory(rough)
     coarse = dataclasses.replace(found, today=rough, proven=proven, verification=verification)
     assert verification.worst_ratio > 1.02  # the overshoot of a smoothing spline
     assert not coarse.exceeded

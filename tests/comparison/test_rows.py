@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.comparison import proven_ratios
+from brachis.comparison import bound_ratios
 from brachis.robot import dynamics
 from brachis.verify import verify_trajectory
 
@@ -43,7 +43,7 @@ def imported(folder, digits, dt, kind, share):
 
 
 def worst(trajectory, kind):
-    return next(proven.worst for proven in proven_ratios(trajectory) if proven.limit == kind)
+    return next(proven.worst for proven in bound_ratios(trajectory) if proven.limit == kind)
 
 
 def check(trajectory, kind):

@@ -56,7 +56,7 @@ def test_no_figure_of_the_rail_is_guessed(figure):
 BASE = "<robot name='x'><link name='base'><inertial><mass value='1'/>{}</inertial></link></robot>"
 URDFS = {
     "not XML": ("<robot name='x'><link", ["not well-formed XML"]),
-    "empty": ("", ["not well-formed XML"]),
+    "empty": ("", ["not a URDF"]),
     "not a URDF": ("<sdf/>", ["the file is not a URDF", "root element <sdf>", "<robot>"]),
     "no links": ("<robot name='x'/>", ["the URDF has no links"]),
     "nameless link": ("<robot name='x'>\n<link/></robot>", ["line 2", "a <link> has no name"]),

@@ -169,6 +169,11 @@ def test_frames_that_do_not_fit() -> None:
         written(SEGMENTS, frames={}, path_frame="table")
     with pytest.raises(TaskError, match=r"frames\.workpiece\.xy: unknown key; found xy; allowed: xyz, rpy_deg"):
         written(SEGMENTS, frames={"workpiece": {"xy": [0, 0]}})
+    with pytest.raises(
+        TaskError,
+        match=r"path_frame: another frame than in path.frame; found 'workpiece' .*allowed: table, or one of both keys",
+    ):
+        written({"frame": "table", "segments": SEGMENTS}, frames={"workpiece": PLACE, "table": PLACE})  # type: ignore[arg-type]
     with pytest.raises(TaskError, match="path_frame: a path of joints is in no frame"):
         written([{"line": {"by": [0.1]}}], task_space="joints")
     with pytest.raises(TaskError, match=r"path: a path in a frame is .*allowed: \{frame: NAME, segments"):

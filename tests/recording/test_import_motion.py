@@ -61,8 +61,8 @@ def test_the_rows_of_a_file_of_schema_2_are_not_known(imported, tmp_path):
     again = Trajectory.load(old)
     assert again.recovered.to_dict() == imported.recovered.to_dict()
     assert again.recovered.rows.shape == (0, 1 + imported.robot.n)
-    assert comparison.proven_ratios(imported)
-    assert comparison.proven_ratios(again) == ()
+    assert comparison.bound_ratios(imported)
+    assert comparison.bound_ratios(again) == ()
     again.save(tmp_path / "again.npz")
     assert Trajectory.load(tmp_path / "again.npz").recovered.to_file() == again.recovered.to_file()
     result = plan(again.task, intervals=8, effort="single", least_motion=False)
@@ -198,7 +198,7 @@ def test_accelerations_that_jump_do_not_overshoot():
     fine = np.linspace(0.0, 2.0, 20001)
     assert np.abs(pieces(fine, nu=2)).max() < 1.005
     np.testing.assert_allclose(pieces(t), q, atol=1e-12)
-    assert "accelerations jump between 1 pairs of rows" in nodes.told
+    assert "accelerations jump between 1 pair of rows" in nodes.told
 
 
 def test_ends_in_motion(motion, table, write):

@@ -219,8 +219,8 @@ def test_chain_without_moving_joints():
     ("text", "words"),
     [
         ("<robot name='x'><link name='a'>", "not well-formed XML"),
-        ("not xml at all", "not well-formed XML"),
-        ("", "not well-formed XML"),
+        ("j1,j2", "not a URDF; found 'j1,j2' at its beginning; .* a URDF, the name of a robot, or a task file"),
+        ("", "not a URDF; found '' at its beginning"),
         ("<sdf version='1.7'></sdf>", "the file is not a URDF; found root element <sdf>"),
         ("<robot name='x'></robot>", "the URDF has no links"),
         ("<robot name='x'><link name='a'/><link name='b'/></robot>", "links"),

@@ -16,6 +16,8 @@ from brachis.robot.limits import UrdfLimit
 from brachis.starter import Starter, starter_task
 from brachis.starter.choice import choices
 from brachis.starter.missing import placeholders
+from brachis.starter.text import task_text
+from brachis.task import LimitSpec
 from support.chains import Joint, chain_urdf
 
 PACKAGE = "cmeel.prefix/share/example-robot-data/robots"
@@ -63,6 +65,15 @@ def test_an_arm_on_a_rail_begins_away_from_its_own_singularities(name, slides):
     first = next(choices(space))
     arm = space.jacobian(space.twists(first.posture[None]))[0, :, slides:]
     assert np.linalg.svd(arm, compute_uv=False)[-1] > 0.1  # 0.011 to 0.017 with the rail's help alone
+
+
+def test_the_limits_that_are_suggested_are_those_of_the_urdf():
+    robot, space = bind(brachis.robots.tx90l_rail, "pose")
+    text = task_text(robot, "pose", next(choices(space)), LimitSpec(), Path())
+    (line,) = [line for line in text.splitlines() if "# limits:" in line]
+    assert f"torque: {{rail: {robot.limits.torque_upper[0]}}}" in line
+    assert "# N, as the URDF" in line
+    assert "acceleration" not in line
 
 
 def test_heights_are_above_the_base_wherever_it_is():

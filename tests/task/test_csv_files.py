@@ -171,7 +171,7 @@ MISTAKES: list[tuple[str, list[str]]] = [
     ("x,y,z,qx,qy,qz\n0,0,0,0,0,0", ["line 1: wrong columns"]),
     ("x|y|z\n0|0|0", ["line 1: wrong columns; found x|y|z", "separated by commas, semicolons"]),
     ("0,0,0\n1,1,1", ["line 1: wrong columns; found 0, 0, 0"]),
-    ("x,y,z\n0,0,0", ["poses.csv: a path needs its start and at least one waypoint; found 1 rows"]),
+    ("x,y,z\n0,0,0", ["poses.csv: a path needs its start and at least one waypoint; found 1 row of"]),
     ("x,y,z\n0,0,0\n1,2\n", ["poses.csv: line 3: wrong number of values; found 2; allowed: 3: x, y, z"]),
     ("x,y,z\n\n0,0,0\n1,1,one\n", ["line 4: the value of column z is not a finite number; found 'one'"]),
     ("x,y,z\n0,0,0\n1,,1\n", ["line 3: the value of column y is not a finite number; found ''"]),

@@ -262,3 +262,8 @@ def test_a_wrong_robot_beside_a_file_of_moveit_is_an_error_of_ours(loaded, tmp_p
     (tmp_path / "joint_limits.yaml").write_text(MOVEIT, encoding="utf-8")
     with pytest.raises(InputError):
         robot_from_settings(loaded({"limits_file": "joint_limits.yaml", **wrong}).robot)
+
+
+def test_a_task_is_not_a_limits_file(loaded):
+    with pytest.raises(TaskError, match=r"task.yaml: .* another kind; found a task file; allowed: a limits file"):
+        loaded({"limits_file": "task.yaml"})

@@ -1,3 +1,5 @@
+import contextlib
+import http.client
 import importlib.util
 import socket
 import urllib.request
@@ -28,6 +30,16 @@ def test_the_page_is_served_on_this_machine_alone(server):
     with urllib.request.urlopen(f"http://{LOOPBACK}:{server.get_port()}", timeout=10) as answer:
         assert b"<html" in answer.read(200)
     assert not connects("127.0.0.2", server.get_port())  # which a server on all addresses answers, too
+
+
+def test_a_probe_of_the_server_is_refused_without_a_traceback(caplog):
+    server = start_server(LOOPBACK, 0)
+    with contextlib.closing(http.client.HTTPConnection(LOOPBACK, server.get_port(), timeout=10)) as connection:
+        connection.request("HEAD", "/")
+        with pytest.raises(http.client.RemoteDisconnected):
+            connection.getresponse()
+    server.stop()
+    assert not caplog.records
 
 
 def test_nothing_is_printed_on_standard_output(capfd):

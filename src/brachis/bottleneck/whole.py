@@ -62,7 +62,11 @@ class BottleneckReport:
 
     def __str__(self) -> str:
         """Say all in plain words."""
-        return "\n".join(in_words(**vars(self)))
+        return self.text()
+
+    def text(self, *, degrees: bool = False) -> str:
+        """Say all in plain words, angles in degrees where asked for."""
+        return "\n".join(in_words(**vars(self), degrees=degrees))
 
     def __repr__(self) -> str:
         """Say what there is room for on a screen."""

@@ -9,6 +9,8 @@ from brachis.bottleneck.knots import KnotCost
 from brachis.bottleneck.reference import MEANING, Reference
 from brachis.bottleneck.saturation import RIPPLE, THRESHOLD, Saturation
 from brachis.bottleneck.sensitivities import BranchBoundary, Sensitivities, Sensitivity
+from brachis.errors import write_count
+from brachis.robot.units import shown_unit
 
 _FRACTION = 0.1
 _NOTHING = 1e-5
@@ -29,11 +31,12 @@ def in_words(
     check: SensitivityCheck | None,
     reference: Reference | None,
     reference_sought: bool,
+    degrees: bool,
 ) -> list[str]:
     """Say what a report found, a line each; see `BottleneckReport` for its parts."""
     lines = [
         *(["the motion was not planned: what a limit costs is not known"] if sensitivities is None else []),
-        *([] if sensitivities is None else _costs(sensitivities, t_end)),
+        *([] if sensitivities is None else _costs(sensitivities, t_end, degrees=degrees)),
         *([] if knots is None else _knots(knots, t_end)),
         *([] if check is None else _checked(check)),
         *active_in_words(saturations),
@@ -50,7 +53,7 @@ def _figures(value: float) -> str:
     return f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f}"
 
 
-def _costs(found: Sensitivities, t_end: float) -> list[str]:
+def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
     """Sentences on every limit that costs time, the costliest first."""
     lines = []
     if not found.reliable:
@@ -59,18 +62,19 @@ def _costs(found: Sensitivities, t_end: float) -> list[str]:
             "motion is not an optimum, and the savings below are rough"
         )
     costly = [entry for entry in found.limits if -entry.change(_FRACTION) > _NOTHING * t_end]
-    lines += [_saving(entry, t_end) for entry in costly]
+    lines += [_saving(entry, t_end, degrees=degrees) for entry in costly]
     if len(costly) < len(found.limits):
         lines.append("no other limit costs time" if costly else "no limit costs time")
     lines.append(f"(to first order, from multipliers by the {found.source}, residual {found.residual:.0e})")
     return lines + [_boundary(e) for e in found.boundaries if e.derivative * e.margin > _NOTHING * t_end]
 
 
-def _saving(entry: Sensitivity, t_end: float) -> str:
+def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:
     """Say what more room at one limit saves."""
     saved = -entry.change(_FRACTION)
     label, end = entry.label, entry.bound.end
-    amount = f"{_FRACTION * entry.bound.whole:.3g} {label.unit}"
+    unit, factor = shown_unit(label.unit, degrees=degrees)
+    amount = f"{factor * _FRACTION * entry.bound.whole:.3g} {unit}"
     if label.room:
         more = f"{amount} more {label.room}"
     elif end is None:
@@ -87,7 +91,7 @@ def _knots(found: KnotCost, t_end: float) -> list[str]:
     saved = f"{_figures(100.0 * found.saved)} % ({_figures(1e3 * found.saved * t_end)} ms)"
     hint = "; spline.intervals: auto, or more of them, come nearer to that" if found.given else ""
     again = f"timed anew in the phase plane, where torques jump, the same joint path takes {found.t_end:.4g} s"
-    return [f"the {found.intervals} knot intervals cost about {saved}: {again}{hint}"]
+    return [f"the knots cost about {saved} with {write_count(found.intervals, 'interval')}: {again}{hint}"]
 
 
 def _boundary(entry: BranchBoundary) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from brachis.cam.points import Points, angles_between
 from brachis.cam.scatter import Scatter
-from brachis.errors import TaskError
+from brachis.errors import TaskError, write_count
 
 SAME = 1e-9
 """What a path takes for standing still, m or rad."""
@@ -44,7 +44,8 @@ def without_repetitions(points: Points) -> tuple[Points, tuple[str, ...]]:
         raise TaskError(problem, found=f"{len(points)} times the same", allowed="a motion", where=points.source)
     if not again.size:
         return points, ()
-    return kept, (f"left out {len(again)} rows that repeat their predecessors: {points.row}s {_listed(points, again)}",)
+    left_out = f"left out {write_count(len(again), 'row')} at the place of the row before"
+    return kept, (f"{left_out}: {points.row}s {_listed(points, again)}",)
 
 
 def refuse_repetitions(points: Points) -> None:

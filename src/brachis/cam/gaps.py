@@ -8,6 +8,7 @@ import numpy as np
 
 from brachis.arrays import with_like_signs
 from brachis.cam.points import QUATERNION, Points
+from brachis.errors import write_count
 
 _FEWEST = 20
 _LONG = 5.0
@@ -34,5 +35,6 @@ def with_gaps_filled(points: Points) -> tuple[Points, tuple[str, ...]]:
     speed = None if points.speed is None else np.concatenate([points.speed[:1], points.speed[before + 1]])
     rows = np.concatenate([points.rows[:1], points.rows[before + 1]])
     turning = with_like_signs(turning) if turning.shape[1] == QUATERNION else turning
-    told = f"{np.count_nonzero(long)} ways longer than {_LONG:g} times the usual spacing are taken as straight"
+    ways = write_count(int(np.count_nonzero(long)), "way")
+    told = f"taken as straight: {ways} longer than {_LONG:g} times the usual spacing"
     return replace(points, position=filled(points.position), turning=turning, speed=speed, rows=rows), (told,)

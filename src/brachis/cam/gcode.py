@@ -16,7 +16,7 @@ import numpy as np
 
 from brachis.cam.columns import POSITION
 from brachis.cam.points import Points
-from brachis.errors import TaskError
+from brachis.errors import TaskError, write_count
 
 SUFFIXES: Final = (".nc", ".ngc", ".gcode", ".tap")
 _WORD = re.compile(r"([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
@@ -86,7 +86,7 @@ def read_gcode(text: str, rows: tuple[str, ...] | str, source: str) -> tuple[Poi
         never = [name.upper() for name, place in zip(POSITION, machine.at, strict=True) if place is None]
         hint = f"{', '.join(never)} is never stated" if never else None
         raise TaskError(
-            "no motion", found=f"{len(machine.points)} places", allowed="2 or more", where=source, hint=hint
+            "no motion", found=write_count(len(machine.points), "place"), allowed="2 or more", where=source, hint=hint
         )
     chosen = [POSITION.index(name) for name in names]
     speed = np.array(machine.speeds)

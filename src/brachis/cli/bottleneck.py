@@ -56,6 +56,7 @@ def bottleneck_command(
     check: bool,
     reference: bool,
     out: Path | None,
+    degrees: bool,
     as_json: bool,
 ) -> int:
     """Plan a task or take a saved motion, find the bottlenecks, show, write; returns the exit code."""
@@ -77,7 +78,7 @@ def bottleneck_command(
     if as_json:
         print_json(data)
     else:
-        _show(motion.trajectory, found, written.files)
+        _show(motion.trajectory, found.text(degrees=degrees), written.files)
     print_what_was_left(motion.undone, interrupted=motion.interrupted)
     if not motion.verified:
         print_error("the motion found did not pass the verification; what is said of it may not hold")
@@ -119,11 +120,11 @@ def _write(motion: _Motion, data: dict[str, Any], out: Path) -> Written:
     return write_files(out, results, figures, stale=_FILES[not motion.verified])
 
 
-def _show(trajectory: Trajectory, found: bottleneck.BottleneckReport, files: tuple[str, ...]) -> None:
+def _show(trajectory: Trajectory, found: str, files: tuple[str, ...]) -> None:
     """Print the report for a person."""
     console = result_console()
     redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
     console.print(f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}")
-    console.print(str(found))
+    console.print(found)
     for name in files:
         console.print(f"wrote {name}")

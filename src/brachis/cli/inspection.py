@@ -17,8 +17,8 @@ from brachis.cli.output import print_json, result_console
 from brachis.cli.point_inspection import print_points
 from brachis.cli.settings import changed_task, task_space_of, urdf_of
 from brachis.cli.tables import Column, print_table
-from brachis.errors import InputError
-from brachis.kinds import Kind, kind_of
+from brachis.errors import InputError, write_count
+from brachis.kinds import TASK_SUFFIXES, Kind, kind_of
 from brachis.plausibility import of_robot
 from brachis.robot import Robot, TaskMap, bind, in_use
 from brachis.robot.from_task import robot_from_settings
@@ -26,7 +26,6 @@ from brachis.robot.limb import first_limb
 from brachis.robot.urdf import read_file
 from brachis.task import LimitSpec, Task
 
-_TASK_FILES = (".yaml", ".yml")
 _LISTED = 12
 _OTHER_TASKS = (
     "a whole pose is prescribed",
@@ -51,7 +50,7 @@ def inspect_command(
 ) -> None:
     """Print a robot's joints and its decompositions."""
     remarks: list[str] = []
-    if source.suffix in _TASK_FILES or kind_of(source) is Kind.TASK:
+    if source.suffix in TASK_SUFFIXES or kind_of(source) is Kind.TASK:
         given = {"--tool-frame": tool_frame, "--base-frame": base_frame, "--lock": lock}
         task = _task_of(source, changes, [option for option, value in given.items() if value])
         robot = robot_from_settings(task.robot)
@@ -104,7 +103,7 @@ class _Inspected:
     def show(self, console: Console, *, degrees: bool) -> None:
         """Print all for a person."""
         robot, joints = self.robot, joint_rows(self.robot, degrees=degrees)
-        console.print(f"{self.source}: {robot.base_frame} -> {robot.tool_frame}, {robot.n} joints")
+        console.print(f"{self.source}: {robot.base_frame} -> {robot.tool_frame}, {write_count(robot.n, 'joint')}")
         for remark in self.remarks:
             console.print(remark)
         shown = [key for key in joints[0] if any(row[key] != NONE for row in joints)]
@@ -236,7 +235,7 @@ def _print_decompositions(console: Console, rows: list[dict[str, Any]]) -> None:
         console.print(f"branches with {choices} redundant: {labels}")
     refused = [row for row in rows if row["solver"] == "-"]
     if refused:
-        console.print(f"no closed form with these redundant ({len(refused)} of {len(rows)} choices):")
+        console.print(f"no closed form with these redundant ({len(refused)} of {write_count(len(rows), 'choice')}):")
     for row in refused[:_LISTED]:
         console.print(f"  {row['redundant joints']}: {row['why not']}")
     if len(refused) > _LISTED:

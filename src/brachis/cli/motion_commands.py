@@ -53,6 +53,7 @@ def bottleneck(
     urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
     changes: Changes = None,
     strict: Strict = None,
+    degrees: Degrees = False,
     json: Json = False,
 ) -> None:
     """Say what holds a motion back: which limits cost time.
@@ -70,6 +71,7 @@ def bottleneck(
             check=check,
             reference=reference,
             out=out,
+            degrees=degrees,
             as_json=json,
         )
     )
@@ -78,13 +80,14 @@ def bottleneck(
 def verify(
     result: ResultFile,
     urdf: Annotated[Path | None, typer.Option(help="Check against this URDF instead of the saved one.")] = None,
+    degrees: Degrees = False,
     json: Json = False,
 ) -> None:
     """Check a saved motion again: path, limits, ends."""
     with interrupts.postponed():
         from brachis.cli import motions  # noqa: PLC0415
 
-    raise typer.Exit(motions.verify_command(result, urdf=urdf, as_json=json))
+    raise typer.Exit(motions.verify_command(result, urdf=urdf, degrees=degrees, as_json=json))
 
 
 def export(

@@ -219,14 +219,13 @@ def _log() -> Callable[[str], None]:
     return show
 
 
-def print_verification(console: Console, verification: Verification) -> None:
+def print_verification(console: Console, verification: Verification, *, degrees: bool) -> None:
     """Print the checks, one a row."""
     title = "verification: passed" if verification.passed else "verification: FAILED"
     rows = [
         (
             check.name,
-            *check.figures,
-            check.unit,
+            *check.figures(degrees=degrees),
             check.subject or "",
             "" if check.time is None else f"{check.time:.4f}",
             ("ok" if check.passed else "FAILED") + (f" ({check.remark})" if check.remark else ""),

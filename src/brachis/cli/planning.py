@@ -25,8 +25,9 @@ from brachis.cli.output import (
 from brachis.cli.settings import changed_task, urdf_of
 from brachis.cli.tables import Column, print_table
 from brachis.cli.viewing import show
-from brachis.errors import InputError
+from brachis.errors import InputError, write_count
 from brachis.result import Result
+from brachis.robot.units import shown_unit
 from brachis.search.listing import STATUS, TIMES, WORDS, candidate_rows
 from brachis.view import require_viser
 
@@ -40,7 +41,14 @@ _MANY = 40
 
 
 def plan_command(
-    task: Path, changes: Sequence[str], *, urdf: Path | None, out: Path | None, view: bool, as_json: bool
+    task: Path,
+    changes: Sequence[str],
+    *,
+    urdf: Path | None,
+    out: Path | None,
+    view: bool,
+    degrees: bool,
+    as_json: bool,
 ) -> int:
     """Plan, show, write; returns the exit code."""
     if view:
@@ -57,12 +65,12 @@ def plan_command(
     if as_json:
         print_json(data)
     else:
-        _show(result, data)
+        _show(result, data, degrees=degrees)
     print_what_was_left(result.undone, interrupted=result.interrupted)
     if not result.verified:
         print_error("the motion found did not pass the verification; it is marked unverified")
     if view:
-        show(result.trajectory, data["candidates"], verified=result.verified)
+        show(result.trajectory, data["candidates"], verified=result.verified, degrees=degrees)
     return exit_code(result.verified, failures)
 
 
@@ -87,7 +95,7 @@ def _write(result: Result, data: dict[str, object], out: Path) -> Written:
     return write_files(out, results, figures, stale=(*_FILES[not result.verified], fit))
 
 
-def _show(result: Result, data: dict[str, Any]) -> None:
+def _show(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan for a person."""
     console = result_console()
     attempt, trajectory = result.attempt, result.trajectory
@@ -96,12 +104,12 @@ def _show(result: Result, data: dict[str, Any]) -> None:
         "end time t_E": f"{result.t_end:.4f} s",
         "redundant joints": coordinates(trajectory.redundant_joints, trajectory.branch),
         "branch": f"{trajectory.branch} ({result.family})" if named else result.family,
-        "start posture": _posture(data, "start_posture"),
-        "end posture": _posture(data, "end_posture"),
+        "start posture": _posture(data, "start_posture", degrees=degrees),
+        "end posture": _posture(data, "end_posture", degrees=degrees),
         **data["in_use"],
         "solver": f"{result.solver_report.solver}, {result.solver_report.status.value}",
-        "iterations": f"{sum(r.iterations for r in attempt.reports)} in {len(attempt.reports)} solves (refined to "
-        f"{attempt.collocation_points} collocation points)",
+        "iterations": f"{sum(r.iterations for r in attempt.reports)} in {write_count(len(attempt.reports), 'solve')} "
+        f"(refined to {attempt.collocation_points} collocation points)",
         "wall time": f"{1e3 * result.timing['total']:.0f} ms",
         "least motion": "off" if result.least_motion is None else result.least_motion.status,
         "worst ratio to a limit": f"{result.verification.worst_ratio:.6f}",
@@ -116,15 +124,18 @@ def _show(result: Result, data: dict[str, Any]) -> None:
         console.print(f"path from {fit}")
     if len(data["candidates"]) > 1:
         _print_candidates(console, data["candidates"])
-    print_verification(console, result.verification)
+    print_verification(console, result.verification, degrees=degrees)
     for name in data.get("files", []):
         console.print(f"wrote {name}")
 
 
-def _posture(data: dict[str, Any], key: str) -> str:
+def _posture(data: dict[str, Any], key: str, *, degrees: bool) -> str:
     """Write a posture with names and units."""
-    values = zip(data["joint_names"], data[key], data["position_units"], strict=True)
-    return ", ".join(f"{name} {value:.4f} {unit}" for name, value, unit in values)
+    parts = []
+    for name, value, si_unit in zip(data["joint_names"], data[key], data["position_units"], strict=True):
+        unit, factor = shown_unit(si_unit, degrees=degrees)
+        parts.append(f"{name} {factor * value:.4f} {unit}")
+    return ", ".join(parts)
 
 
 def _print_candidates(console: Console, candidates: Sequence[Mapping[str, Any]]) -> None:

@@ -71,7 +71,7 @@ class Recorded:
         )
 
 
-def import_command(recorded: Recorded, *, out: Path, as_json: bool) -> None:
+def import_command(recorded: Recorded, *, out: Path, degrees: bool, as_json: bool) -> None:
     """Import a motion, verify and save it, and say what is known of it."""
     trajectory = recorded.load()
     write_one(out, trajectory.save, (".npz",), (recorded.file, recorded.robot))
@@ -85,9 +85,9 @@ def import_command(recorded: Recorded, *, out: Path, as_json: bool) -> None:
     console.print(f"end time t_E: {trajectory.t_end:.4f} s")
     for line in trajectory.recovered.told:
         console.print(line)
-    print_verification(console, verification)
+    print_verification(console, verification, degrees=degrees)
     console.print("these ratios are of the motion that was made of the rows; the rows alone prove:")
-    for proven in comparison.proven_ratios(trajectory):
+    for proven in comparison.bound_ratios(trajectory):
         ratio, subject, time = proven.worst
         console.print(f"{proven.limit} ratio {ratio:.4f}, {subject} at {time:.4f} s")
     console.print(f"wrote {out}")

@@ -19,7 +19,7 @@ def report_command(result: Path, *, out: Path | None, title: str | None, degrees
     out = result.with_suffix(SUFFIX) if out is None else out
     trajectory = Trajectory.load(result)
     urdf = trajectory.task.robot.urdf
-    title = f"{trajectory.robot.name}, {result.name}" if title is None else title
+    title = ", ".join(filter(None, (trajectory.robot.name, result.name))) if title is None else title
     page = make_report(trajectory, title=title, degrees=degrees)
     write_one(out, page.save, (SUFFIX,), [result, None if urdf is None else Path(urdf)])
     result_console().print(f"wrote {out} ({1e-6 * page.size:.1f} MB)")

@@ -15,7 +15,7 @@ from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
 
 
-def verify_command(result: Path, *, urdf: Path | None, as_json: bool) -> int:
+def verify_command(result: Path, *, urdf: Path | None, degrees: bool, as_json: bool) -> int:
     """Verify a saved motion; returns the exit code."""
     trajectory = Trajectory.load(motion_file(result))
     robot = None if urdf is None else robot_from_settings(trajectory.task.robot, urdf=urdf)
@@ -23,7 +23,7 @@ def verify_command(result: Path, *, urdf: Path | None, as_json: bool) -> int:
     if as_json:
         print_json(verification.to_dict())
     else:
-        print_verification(result_console(), verification)
+        print_verification(result_console(), verification, degrees=degrees)
     return 0 if verification.passed else 1
 
 

@@ -12,7 +12,7 @@ from brachis.cli.folder import ended_cleanly
 from brachis.cli.output import exit_code, print_error, print_json, progress, result_console
 from brachis.cli.tables import Column, print_table
 from brachis.cli.verbosity import Verbosity, chosen
-from brachis.errors import InputError
+from brachis.errors import InputError, write_count
 from brachis.files import writing_errors
 from brachis.plots import save_figure
 from brachis.sweeps import SweepResult, sweep
@@ -72,7 +72,7 @@ def _show(result: SweepResult, files: Sequence[str]) -> None:
     """Print the sweep for a person."""
     console, found = result_console(), result.summary()
     counts = ", ".join(f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED))
-    title = f"sweep: {found['plans']} plans, {counts}"
+    title = f"sweep: {write_count(found['plans'], 'plan')}, {counts}"
     shown = [name for name in ("best", "median", "worst") if name in found]
     if shown:
         keys = {"t_end_s": "t_end [s]", "plan": "plan", **{key: key for key in result.keys}}

@@ -53,6 +53,7 @@ def plan(
     changes: Changes = None,
     view: Annotated[bool, typer.Option("--view", help="Show the motion in the browser, until Ctrl-C.")] = False,
     strict: Strict = None,
+    degrees: Degrees = False,
     json: Json = False,
 ) -> None:
     """Plan a task, verify the motion, and show what came out."""
@@ -60,7 +61,15 @@ def plan(
         from brachis.cli import planning  # noqa: PLC0415
 
     raise typer.Exit(
-        planning.plan_command(task, with_strict(changes, strict=strict), urdf=urdf, out=out, view=view, as_json=json)
+        planning.plan_command(
+            task,
+            with_strict(changes, strict=strict),
+            urdf=urdf,
+            out=out,
+            view=view,
+            degrees=degrees,
+            as_json=json,
+        )
     )
 
 

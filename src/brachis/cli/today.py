@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from brachis import interrupts
+from brachis.cli.options import Degrees
 from brachis.cli.output import Json
 
 RecordedFile = Annotated[
@@ -61,6 +62,7 @@ def import_(
     time: TimeUnit = None,
     tolerance: PathTolerance = None,
     noise: Noise = None,
+    degrees: Degrees = False,
     json: Json = False,
 ) -> None:
     """Make a result of a motion that runs today."""
@@ -68,7 +70,7 @@ def import_(
         from brachis.cli import recordings  # noqa: PLC0415
 
     recorded = recordings.Recorded(csv, robot, task_space, angle, length, time, tolerance, noise)
-    recordings.import_command(recorded, out=out, as_json=json)
+    recordings.import_command(recorded, out=out, degrees=degrees, as_json=json)
 
 
 def compare(

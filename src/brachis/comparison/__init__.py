@@ -3,6 +3,6 @@
 from brachis.comparison.comparison import Comparison, Use
 from brachis.comparison.figure import plot_today
 from brachis.comparison.planned import compare
-from brachis.comparison.rows import Proven, proven_ratios
+from brachis.comparison.rows import RatioBounds, bound_ratios
 
-__all__ = ["Comparison", "Proven", "Use", "compare", "plot_today", "proven_ratios"]
+__all__ = ["Comparison", "RatioBounds", "Use", "bound_ratios", "compare", "plot_today"]

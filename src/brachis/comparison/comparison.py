@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from brachis.comparison.rows import Proven
+from brachis.comparison.rows import RatioBounds
 from brachis.result import Result
 from brachis.summary import Summary
 from brachis.trajectory import Trajectory
@@ -21,7 +21,7 @@ class Use:
     limit : str
         Its kind.
     today : float
-        Largest ratio that the rows of today's motion prove; 1 is all of it. See `brachis.comparison.Proven`.
+        Largest ratio that the rows of today's motion prove; 1 is all of it. See `brachis.comparison.RatioBounds`.
     today_at : str
         What comes nearest to it: a joint, or the tool.
     today_time : float
@@ -59,7 +59,7 @@ class Comparison(Summary):
         With the path recovered from it.
     verification : Verification
         Of today's motion, as it was made of its rows.
-    proven : tuple of Proven
+    proven : tuple of RatioBounds
         What its rows alone prove, limit by limit; empty where they are not known.
     result : Result
         Of the plan along the same path, within the same limits.
@@ -78,7 +78,7 @@ class Comparison(Summary):
 
     today: Trajectory
     verification: Verification
-    proven: tuple[Proven, ...]
+    proven: tuple[RatioBounds, ...]
     result: Result
 
     @property

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from brachis.arguments import check_callable, file_name, named
 from brachis.comparison.comparison import Comparison
-from brachis.comparison.rows import proven_ratios
+from brachis.comparison.rows import bound_ratios
 from brachis.errors import PathError, PlanningError
 from brachis.planner import plan
 from brachis.progress import Listener
@@ -101,7 +101,7 @@ def compare(
     if best is None:
         assert failure is not None  # noqa: S101  (else there would be a plan)
         raise failure
-    return Comparison(today, verification, proven_ratios(today), best)
+    return Comparison(today, verification, bound_ratios(today), best)
 
 
 def _tasks(today: Trajectory, *, keep_end: bool) -> Iterator[Task]:

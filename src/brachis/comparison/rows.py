@@ -24,7 +24,7 @@ _STRIDES = (1, 2, 4)
 
 
 @dataclass(frozen=True, eq=False)
-class Proven:
+class RatioBounds:
     """What rows prove of one limit.
 
     Attributes
@@ -51,7 +51,7 @@ class Proven:
         return float(self.ratios[row, column]), self.subjects[column], float(self.t[row])
 
 
-def proven_ratios(trajectory: Trajectory) -> tuple[Proven, ...]:
+def bound_ratios(trajectory: Trajectory) -> tuple[RatioBounds, ...]:
     """Compare the rows of an imported motion with every limit of its task; nothing where the rows are not known."""
     assert trajectory.recovered is not None  # noqa: S101  (it was imported)
     t = trajectory.recovered.rows[:, 0]
@@ -59,12 +59,12 @@ def proven_ratios(trajectory: Trajectory) -> tuple[Proven, ...]:
         return ()
     robot, _ = bind(trajectory.robot, trajectory.task.task_space)
     return tuple(
-        Proven(limit.name, tuple(label.subject for label in limit.labels), t, _proven(trajectory, limit))
+        RatioBounds(limit.name, tuple(label.subject for label in limit.labels), t, _bound_limit(trajectory, limit))
         for limit in limits_of(robot, trajectory.task)
     )
 
 
-def _proven(trajectory: Trajectory, limit: Limit) -> np.ndarray:
+def _bound_limit(trajectory: Trajectory, limit: Limit) -> np.ndarray:
     """Return the sizes of the ratios to one limit, (K, c)."""
     assert trajectory.recovered is not None  # noqa: S101
     t = trajectory.recovered.rows[:, 0]

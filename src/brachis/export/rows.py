@@ -90,14 +90,14 @@ def rows_of(trajectory: Trajectory, dt: float, last: str, joints: Sequence[str] 
     samples = trajectory.sample(dt, last=last)
     parts = (getattr(samples, quantity)[:, index] for quantity in COLUMNS.values())
     units = tuple(trajectory.robot.position_units[each] for each in index)
-    left_out = tuple(_left_out(trajectory, np.vstack([trajectory.q, samples.q]), chosen))
+    left_out = tuple(_list_missing(trajectory, np.vstack([trajectory.q, samples.q]), chosen))
     if left_out:
         hint = "Move what is missing by its own controller at the same time, or write all joints"
         warnings.warn(f"{'; '.join(left_out)}. {hint}", LeftOutWarning, stacklevel=4)
     return JointRows(chosen, units, left_out, samples.t, samples.s, *parts)
 
 
-def _left_out(trajectory: Trajectory, q: np.ndarray, chosen: Sequence[str]) -> Iterator[str]:
+def _list_missing(trajectory: Trajectory, q: np.ndarray, chosen: Sequence[str]) -> Iterator[str]:
     """Yield a sentence, with its travel over postures (K, n), for every joint that moves and is not written."""
     lowest = q.min(axis=0)
     highest = q.max(axis=0)

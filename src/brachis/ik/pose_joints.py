@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.arrays import cross
+from brachis.errors import write_count
 from brachis.ik.arm import aligned, meeting
 from brachis.ik.geometry import ChainGeometry, PosedScrews
 from brachis.ik.protocol import NotApplicableError
@@ -37,7 +38,7 @@ class PoseJoints(RemainingJoints):
         if not isinstance(task_map, Pose):
             raise NotApplicableError("only for poses")
         if geometry.n - len(redundant) != _JOINTS:
-            raise NotApplicableError(f"{geometry.n - len(redundant)} joints would be left over, not six")
+            raise NotApplicableError(f"{write_count(geometry.n - len(redundant), 'joint')} would be left over, not six")
         return cls.beside(geometry, redundant)
 
     def parallel(self, *places: int) -> bool:

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.errors import write_count
 from brachis.ik.arm import Arm
 from brachis.ik.factored_solver import FactoredSolver, PlacingStructure, fitted
 from brachis.ik.geometry import ChainGeometry, PosedScrews
@@ -105,7 +106,7 @@ def positioning(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int
     if isinstance(task_map, Pose) or len(task_map.axes) != _JOINTS:
         raise NotApplicableError("only for the position: x, y and z")
     if geometry.n - len(redundant) != _JOINTS:
-        raise NotApplicableError(f"{geometry.n - len(redundant)} joints would be left over, not three")
+        raise NotApplicableError(f"{write_count(geometry.n - len(redundant), 'joint')} would be left over, not three")
     three = RemainingJoints.beside(geometry, redundant)
     _refuse_idle(geometry, three)
     structure = fitted(geometry, three, (ToolStructure.of,))

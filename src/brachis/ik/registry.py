@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from brachis.errors import DecompositionError, UnknownNameError
+from brachis.errors import DecompositionError, UnknownNameError, write_count
 from brachis.ik.check import check_answers
 from brachis.ik.eaik import eaik
 from brachis.ik.geometry import ChainGeometry
@@ -119,11 +119,13 @@ def find(robot: Robot, task_map: TaskMap, redundant_joints: Sequence[str], *, fa
             raise UnknownNameError("joint", name, robot.joint_names, where="redundant_joints")
     r = robot.n - task_map.m
     if len(set(names)) != len(names) or len(names) != r:
+        joints = write_count(robot.n, "joint")
+        rows = write_count(task_map.m, "row")
         raise DecompositionError(
             "wrong number of redundant joints" if r >= 0 else "the robot has fewer joints than the task space has rows",
             redundant_joints=names,
             found=f"{len(names)} ({', '.join(names) or 'none'})" if r >= 0 else f"{robot.n} for {task_map.m} rows",
-            allowed=f"{r}: {robot.n} joints less {task_map.m} rows ({', '.join(task_map.rows)})"
+            allowed=f"{r}: {joints} less {rows} ({', '.join(task_map.rows)})"
             if r >= 0
             else f"at most {robot.n} rows; or task_space: joints, with a path of the joints such as "
             f"line: {{by: [{', '.join(['0.5'] * robot.n)}]}}",

@@ -12,7 +12,7 @@ import numpy as np
 from brachis import ik
 from brachis.arguments import file_name, named, numbers
 from brachis.errors import InputError, PathError
-from brachis.kinds import Kind, kind_of
+from brachis.kinds import TASK_SUFFIXES, Kind, kind_of
 from brachis.recording.columns import Units
 from brachis.recording.nodes import Nodes, nodes_of
 from brachis.recording.path_coordinate import DEGREE, coordinate_spline
@@ -140,14 +140,11 @@ _BLANK: dict[str, Any] = {
 """A task that only stands for the defaults of all settings."""
 
 
-_TASK_SUFFIXES = (".yaml", ".yml")
-
-
 def _is_task(given: object) -> bool:
     """Tell a task, or its file, from a robot."""
     return isinstance(given, Task | Mapping) or (
         isinstance(given, str | os.PathLike)
-        and (kind_of(given) is Kind.TASK or pathlib.Path(given).suffix.lower() in _TASK_SUFFIXES)
+        and (kind_of(given) is Kind.TASK or pathlib.Path(given).suffix.lower() in TASK_SUFFIXES)
     )
 
 

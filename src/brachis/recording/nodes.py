@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from brachis.errors import write_count
 from brachis.recording.jumps import States, with_jumps
 from brachis.recording.recording import FEWEST, Recording
 from brachis.recording.smoothing import smoothed
@@ -80,7 +81,8 @@ def nodes_of(recording: Recording, deviation: np.ndarray) -> Nodes:
         return _nodes(States(t, *parts[:3]), *told)
     parts[:, :, exact], how = _interpolated(recording, exact)
     motion, jumps = with_jumps(States(t, *parts[:3]), parts[3])
-    return _nodes(motion, *told, how, *([f"accelerations jump between {jumps} pairs of rows"] if jumps else []))
+    pairs = write_count(jumps, "pair")
+    return _nodes(motion, *told, how, *([f"accelerations jump between {pairs} of rows"] if jumps else []))
 
 
 def _smoothed(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 
 from brachis.arrays import freeze
 from brachis.cam.table import Table, read_table
-from brachis.errors import TaskError
+from brachis.errors import TaskError, write_count
 from brachis.kinds import check_kind
 from brachis.recording.columns import Kind, Units, allowed_columns, in_si, understood
 from brachis.robot import Robot
@@ -167,4 +167,4 @@ def _beginning(t: np.ndarray, q: np.ndarray, recording: Recording) -> int:
 
 
 def _refuse(problem: str, recording: Recording) -> NoReturn:
-    raise TaskError(problem, found=f"{len(recording.t)} rows", allowed="a motion", where=recording.source)
+    raise TaskError(problem, found=write_count(len(recording.t), "row"), allowed="a motion", where=recording.source)

@@ -109,7 +109,7 @@ def _gathered(
         verification=verification,
         ratios=ratios,
         saturations=found,
-        held_back=_held_back(source, found),
+        held_back=_held_back(source, found, degrees=degrees),
         remarks=remarks,
         left_undone=left_undone,
         candidates=candidates,
@@ -118,10 +118,10 @@ def _gathered(
     )
 
 
-def _held_back(source: Result | Trajectory, found: tuple[Saturation, ...]) -> tuple[str, ...]:
+def _held_back(source: Result | Trajectory, found: tuple[Saturation, ...], *, degrees: bool) -> tuple[str, ...]:
     """Say what the limits cost; where that cannot be known, when they are active and why no more is known."""
     try:
-        return tuple(str(bottleneck.report(source)).splitlines())
+        return tuple(bottleneck.report(source).text(degrees=degrees).splitlines())
     except BrachisError as error:
         return (*active_in_words(found), f"What the limits cost is not known: {error}")
 

@@ -105,7 +105,7 @@ def identity(motion: ReportedMotion) -> dict[str, str]:
     task_space = trajectory.task.task_space
     rows = task_space if isinstance(task_space, str) else ", ".join(task_space)
     return {
-        "robot": f"{trajectory.robot.name}{file}",
+        "robot": f"{trajectory.robot.name}{file}".strip(),
         "path": f"{path_in_words(trajectory.task)}; the tool moves {way:.3f} m; prescribed: {rows}",
         **({} if recovered is None else {"recovered from": _file_name(recovered.source)}),
         "payload": "none",
@@ -212,17 +212,17 @@ def _peak(part: Quantity, column: int, tolerance: float) -> Row:
     ratios = np.abs(part.ratios[:, column]) if limited else np.zeros(1)
     at = int(np.argmax(ratios if limited else np.abs(values)))
     value = values[at] if abs(values[at]) > _SMALL else 0.0
-    low, high = _written(lower), _written(upper)
+    low, high = _write_number(lower), _write_number(upper)
     limit = f"{high} {part.unit}" if upper == -lower else f"{low} to {high} {part.unit}"
     return Row(
-        value=f"{_written(value)} {part.unit}",
+        value=f"{_write_number(value)} {part.unit}",
         limit=limit if limited else "",
         share=f"{100.0 * ratios.max():.1f} %" if limited else "",
         level=_level(float(ratios.max()), tolerance),
     )
 
 
-def _written(value: float) -> str:
+def _write_number(value: float) -> str:
     """Write a number with four significant figures, large ones without an exponent."""
     return f"{value:.0f}" if _LARGE <= abs(value) < np.inf else f"{value:.4g}"
 
@@ -247,16 +247,18 @@ class CheckRow:
 
 def check_rows(motion: ReportedMotion) -> list[CheckRow]:
     """List the checks of the verification, those that failed first."""
-    return [_check_row(check) for check in sorted(motion.verification.checks, key=lambda check: check.passed)]
+    checks = sorted(motion.verification.checks, key=lambda check: check.passed)
+    return [_check_row(check, degrees=motion.degrees) for check in checks]
 
 
-def _check_row(check: Check) -> CheckRow:
-    unit = "" if check.unit == "-" else f" {check.unit}"
+def _check_row(check: Check, *, degrees: bool) -> CheckRow:
+    found, allowed, unit = check.figures(degrees=degrees)
+    after = "" if unit == "-" else f" {unit}"
     parts = [check.subject or "", "" if check.time is None else f"{check.time:.4f} s"]
     return CheckRow(
         name=check.name,
-        found=check.figures[0] + unit,
-        allowed=check.figures[1] + unit,
+        found=found + after,
+        allowed=allowed + after,
         where=" at ".join(part for part in parts if part),
         passed=check.passed,
         remark=check.remark,

@@ -85,7 +85,7 @@ def make_report(motion: Result | Trajectory, *, title: str = "", degrees: bool =
     motion : Result or Trajectory
         Of `brachis.plan`; or a trajectory, a loaded one for example, which is verified again.
     title : str, optional
-        Of the page; the robot's name if left out.
+        Of the page; the robot's name if left out, "motion" if it has none.
     degrees : bool, optional
         Whether the tables and the interactive figures show angles in degrees; the pictures are in rad either way.
 
@@ -109,7 +109,7 @@ def make_report(motion: Result | Trajectory, *, title: str = "", degrees: bool =
     reported = reported_motion(motion, degrees=degrees)
     checks = tables.check_rows(reported)
     page = template.render(
-        title=title or reported.trajectory.robot.name,
+        title=title or reported.trajectory.robot.name or "motion",
         verified=reported.verification.passed,
         points=reported.verification.points,
         failed=[check for check in checks if not check.passed],

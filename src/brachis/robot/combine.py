@@ -139,7 +139,7 @@ def _only(settings: RobotSettings, names: Sequence[str]) -> RobotSettings:
     return RobotSettings(**{name: getattr(settings, name) for name in names if name in settings.model_fields_set})
 
 
-def _written(asked: LimitSpec, default: LimitSpec) -> list[str]:
+def _list_set_fields(asked: LimitSpec, default: LimitSpec) -> list[str]:
     """List the fields that a task may have written: a limit that is as by default counts as left out."""
     pairs = ((each.name, getattr(asked, each.name)) for each in fields(asked))
     return [name for name, value in pairs if isinstance(value, Model) or value != getattr(default, name)]
@@ -153,7 +153,7 @@ def _merged(key: str, given: Any, asked: Any, default: Any, names: Sequence[str]
     if asked == given:
         return given
     if isinstance(given, Model | LimitSpec) and default is not None:
-        written = asked.model_fields_set if isinstance(asked, Model) else _written(asked, default)
+        written = asked.model_fields_set if isinstance(asked, Model) else _list_set_fields(asked, default)
         parts = {
             name: _merged(f"{key}.{name}", getattr(given, name), getattr(asked, name), getattr(default, name), names)
             for name in written

@@ -13,6 +13,8 @@ from brachis.errors import UrdfError, nearest
 
 Element: TypeAlias = Any  # lxml comes without types
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+_SHOWN = 20
+"""Characters of a file that is not a URDF."""
 _EXPAND = "Expand the file with xacro first: xacro robot.xacro > robot.urdf"
 
 
@@ -80,6 +82,14 @@ def end_of(joint: Element, end: str) -> str | None:
 
 def _robot_element(text: str, where: str) -> Element:
     """Parse the text, and refuse what is no expanded URDF."""
+    if not text.lstrip("\ufeff\t\r\n ").startswith("<"):
+        raise UrdfError(
+            "the file is not a URDF",
+            where=where,
+            found=f"{text[:_SHOWN]!r} at its beginning",
+            allowed="XML, with the root element <robot>",
+            hint="brachis inspect takes a URDF, the name of a robot, or a task file (.yaml)",
+        )
     parser = etree.XMLParser(remove_blank_text=True, resolve_entities=False, encoding="utf-8")
     try:
         robot = etree.fromstring(text.encode("utf-8", "surrogatepass"), parser)

@@ -13,7 +13,7 @@ from brachis.kinematics import CHART, Newton, chart_around
 from brachis.problem import Decomposition, Problem
 from brachis.progress import Listener
 from brachis.robot.task_map import JointSpace
-from brachis.search.holding import refuse_hopeless_loads
+from brachis.search.holding import check_holding
 from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
 from brachis.search.joint_space_start import joint_space_start
 from brachis.search.lattice import LARGEST_STEP
@@ -87,7 +87,7 @@ def chart_starts(
     ranked = sorted((start for start in starts if start is not None), key=lambda start: start.estimate)
     if not ranked and not deadline.passed:
         return DeadEnd(0.0, {NO_CHART: len(named)})
-    refuse_hopeless_loads(ranked)
+    check_holding(ranked)
     refuse_hopeless_speeds(ranked)
     hopeful = [start for start in ranked if start.estimate <= _HOPELESS * ranked[0].estimate or start is ranked[0]]
     return screened(hopeful, level.in_charts, deadline, listener) if hopeful else []

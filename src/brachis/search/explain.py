@@ -87,7 +87,7 @@ def no_motion(
     if dead_ends and not joint_path:
         name, furthest = min(dead_ends.items(), key=lambda item: np.diff(item[1].interval)[0])
         own = name if name == ALL_POSTURES else f"redundant joints {name}"
-        others = f" ({own}; {len(dead_ends) - 1} other lattices end sooner)" if len(dead_ends) > 1 else ""
+        others = f" ({own}; the furthest of {len(dead_ends)} lattices)" if len(dead_ends) > 1 else ""
         start = "" if problem.start is None else "start in another posture, "
         return PathError(
             f"no joint path was found: {furthest}{others}",

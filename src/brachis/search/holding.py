@@ -19,7 +19,7 @@ _SUSPECT = 0.95
 """Ratio from which on the limit is the reason where no plan was found."""
 
 
-def refuse_hopeless_loads(starts: Sequence[Start]) -> None:
+def check_holding(starts: Sequence[Start]) -> None:
     """Refuse a limit that all postures of all joint paths exceed at rest, before plans are tried.
 
     Friction may help to hold the arm, and a motion between different speeds may be a fall: these are tried.
@@ -32,12 +32,12 @@ def refuse_hopeless_loads(starts: Sequence[Start]) -> None:
         return
     problem = starts[0].problem
     rubs = bool((problem.robot.friction.viscous + problem.robot.friction.coulomb > 0.0).any())
-    error = None if rubs or any(problem.end_rates) else reason_in_holding(starts, everywhere=True)
+    error = None if rubs or any(problem.end_rates) else explain_holding(starts, everywhere=True)
     if error is not None:
         raise error
 
 
-def reason_in_holding(starts: Sequence[Start], *, everywhere: bool = False) -> PlanningError | None:
+def explain_holding(starts: Sequence[Start], *, everywhere: bool = False) -> PlanningError | None:
     """Tell which limit of a mean leaves too little for holding the arm along all joint paths; None: none does.
 
     Parameters

@@ -23,7 +23,7 @@ from brachis.deadline import Deadline
 from brachis.problem import Decomposition, Problem
 from brachis.progress import Listener
 from brachis.search.explain import no_motion, out_of_time, refuse_what_is_out_of_reach
-from brachis.search.holding import reason_in_holding
+from brachis.search.holding import explain_holding
 from brachis.search.processes import each, processes
 from brachis.search.record import NOT_TRIED, Numbered, Record, rounded
 from brachis.search.schedule import Batch, batches
@@ -109,7 +109,7 @@ def find_fastest(
         return record
     if record.too_fast is not None:
         raise record.too_fast.error
-    heavy = reason_in_holding([attempt.start for attempt in record.attempts if attempt.start is not None])
+    heavy = explain_holding([attempt.start for attempt in record.attempts if attempt.start is not None])
     if heavy is not None:
         raise heavy
     if record.interrupted or record.cut_short(problem.task.solver.time_limit):

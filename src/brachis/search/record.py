@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from brachis.attempt import Attempt
-from brachis.errors import UnreachableError
+from brachis.errors import UnreachableError, write_count
 from brachis.problem import Decomposition
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.too_fast import TooFast
@@ -150,7 +150,7 @@ class Record:
         counts = [f"{self._unsolved} not planned"] * bool(self._unsolved) + [f"{waiting} not refined"] * bool(waiting)
         if counts:
             unseen = max(0, self._unsolved - sum(attempt.status == NOT_TRIED for attempt in self.attempts))
-            parts.append(f"of {total + unseen} candidates {', '.join(counts)}")
+            parts.append(f"of {write_count(total + unseen, 'candidate')} {', '.join(counts)}")
         return (*parts, "what search.effort asks for was not tried to its end")
 
     def in_order(self) -> tuple[Attempt, ...]:

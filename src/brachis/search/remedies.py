@@ -82,7 +82,7 @@ def _try_numbers(remedy: Remedy, is_enough: Callable[[float, int | None], bool |
     good: float | None = None
     bad = remedy.asked
     step = _NEAR
-    value = _rounded(remedy.guess, down=lowers)
+    value = _round(remedy.guess, down=lowers)
     for _ in range(_TRIALS if remedy.is_refined else 1):
         if deadline.passed or value in (good, bad) or value <= 0.0:
             break
@@ -98,7 +98,7 @@ def _try_numbers(remedy: Remedy, is_enough: Callable[[float, int | None], bool |
             middle = math.sqrt(good * bad)
             back = good / step**away
             value = back if bad == remedy.asked and abs(back - good) < abs(middle - good) else middle
-        value = _rounded(value, down=lowers)
+        value = _round(value, down=lowers)
         step = min(step**_FASTER, _LARGEST_STEP)
     if good is None:
         return ""
@@ -113,7 +113,7 @@ def _try_numbers(remedy: Remedy, is_enough: Callable[[float, int | None], bool |
     return f"{text})"
 
 
-def _rounded(value: float, *, down: bool) -> float:
+def _round(value: float, *, down: bool) -> float:
     """Round to few digits, towards the larger change."""
     if value <= 0.0:
         return value

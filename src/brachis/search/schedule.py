@@ -19,7 +19,7 @@ from brachis.problem import Decomposition, Problem
 from brachis.progress import Listener
 from brachis.robot.task_map import JointSpace
 from brachis.search.chart_starts import chart_starts
-from brachis.search.holding import refuse_hopeless_loads
+from brachis.search.holding import check_holding
 from brachis.search.joint_path import DeadEnd
 from brachis.search.joint_space_start import joint_space_start
 from brachis.search.levels import SEARCH_LEVELS, SearchLevel
@@ -90,7 +90,7 @@ def batches(
 def _timings(problem: Problem, solvers: Sequence[str]) -> Iterator[Batch]:
     """Yield batches for a path of joints: its timing alone is planned, solver after solver."""
     start = joint_space_start(problem)
-    refuse_hopeless_loads([start])
+    check_holding([start])
     refuse_hopeless_speeds([start])
     for solver in solvers:
         yield Batch((start.with_solver(solver),), 1, last_resort=solver != solvers[0])
@@ -124,7 +124,7 @@ def _in_closed_forms(
             else:
                 starts = _from_lattices(batch, level, deadline, listener, note)
         known += starts
-        refuse_hopeless_loads(known)
+        check_holding(known)
         refuse_hopeless_speeds(known)
         for first in range(0, len(starts), _SIZE):
             yield Batch(

@@ -209,7 +209,7 @@ def _falling_short(start: Start, motion: JointMotion, how: str, s: np.ndarray, q
     inside = np.flatnonzero(parts[:, int(np.argmax(parts[place]))])
     best = inside[int(np.argmin(beyond[inside]))]
     most, _ = in_figures(limit, column, float(values[best]))
-    what, cuts = _where_reached(motion.s[inside], beyond[inside] <= 0.0)
+    what, cuts = _explain_reach(motion.s[inside], beyond[inside] <= 0.0)
     figure = next(bound.figure for bound in limit.bounds if bound.column == column)
     possible = float(found)
     remedies: list[Remedy] = []
@@ -217,11 +217,11 @@ def _falling_short(start: Start, motion: JointMotion, how: str, s: np.ndarray, q
         key = f"tool_limits.process_speed[{number}]"
         if not label.key.startswith(key):
             continue
-        held = _largest_held(problem, s, q, part.s)
-        possible = min(possible, held.speed)
-        if held.speed < figure:
-            there = f"{held.speed:.3g} m/s at s = {held.s:.3g}{' on that joint path' if start.joint_map.r else ''}"
-            what = f"the {held.limit} limit lets the tool keep no more than {there}"
+        cap = _find_speed_cap(problem, s, q, part.s)
+        possible = min(possible, cap.speed)
+        if cap.speed < figure:
+            there = f"{cap.speed:.3g} m/s at s = {cap.s:.3g}{' on that joint path' if start.joint_map.r else ''}"
+            what = f"the {cap.limit} limit lets the tool keep no more than {there}"
             cuts = {}
         remedies.append(Remedy(f"{key}.speed", part.speed, _FIRST * part.speed * possible / figure, "m/s"))
         remedies += [Remedy(f"{key}.s[{end}]", part.s[end], cut, is_refined=False) for end, cut in cuts.items()]
@@ -236,7 +236,7 @@ def _falling_short(start: Start, motion: JointMotion, how: str, s: np.ndarray, q
 
 
 @dataclass(frozen=True)
-class _Held:
+class _SpeedCap:
     """Largest speed of the tool, m/s, that a limit allows it to keep, and the s at which it allows no more."""
 
     speed: float
@@ -244,16 +244,16 @@ class _Held:
     limit: str = ""
 
 
-def _largest_held(problem: Problem, s: np.ndarray, q: np.ndarray, part: tuple[float, float]) -> _Held:
+def _find_speed_cap(problem: Problem, s: np.ndarray, q: np.ndarray, part: tuple[float, float]) -> _SpeedCap:
     """Find the largest speed that the tool can keep on a part of a joint path, q, (S, n), at s, (S,)."""
     q_ds = np.gradient(q, s, axis=0, edge_order=2)
     slope = ToolSpeed(problem.robot).slope(q, q_ds)
     inside = (s >= part[0]) & (s <= part[1]) & (slope > _STILL)
     if not inside.any():
-        return _Held(math.inf)
+        return _SpeedCap(math.inf)
     q_dds = np.gradient(q_ds, s, axis=0, edge_order=2)
     bend = -np.gradient(slope, s) / np.maximum(slope, _STILL)
-    worst = _Held(math.inf)
+    worst = _SpeedCap(math.inf)
     for limit in _others(problem):
         lines = limit.lines(s[inside], q[inside], q_ds[inside], q_dds[inside])
         if lines is None:
@@ -268,7 +268,7 @@ def _largest_held(problem: Problem, s: np.ndarray, q: np.ndarray, part: tuple[fl
         speed = math.sqrt(squares[row, column])
         if speed < worst.speed:
             label = limit.labels[column if squares.shape[1] == len(limit.labels) else 0]
-            worst = _Held(speed, float(s[inside][row]), str(label))
+            worst = _SpeedCap(speed, float(s[inside][row]), str(label))
     return worst
 
 
@@ -279,7 +279,7 @@ def _within(limit: Limit, s: np.ndarray) -> np.ndarray:
     return np.asarray((s[:, None] >= ends[:, 0]) & (s[:, None] <= ends[:, 1]))
 
 
-def _where_reached(s: np.ndarray, reached: np.ndarray) -> tuple[str, dict[int, float]]:
+def _explain_reach(s: np.ndarray, reached: np.ndarray) -> tuple[str, dict[int, float]]:
     """Say where of the places, (P,), a speed is reached, (P,) bool, and to which s ends of the part could be moved."""
     if not reached.any():
         return "it is reached nowhere on that part", {}

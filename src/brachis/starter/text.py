@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from brachis.errors import write_count
 from brachis.robot import Robot
+from brachis.robot.units import UNITS
 from brachis.starter.choice import Choice
 from brachis.task import LimitSpec
 
@@ -45,7 +47,7 @@ search: {{effort: fast}}    # single, fast, thorough or exhaustive
 """
 _OWN_LIMITS = """\
   # Limits of torque, velocity and position are the URDF's; brachis inspect shows them. To change some:
-  # limits: {{torque: {{{joint}: 10}}, acceleration: 20, scale: {{velocity: 0.5}}}}"""
+  # limits: {{torque: {{{joint}: {torque}}}, scale: {{velocity: 0.5}}}}    # {unit}, as the URDF; half of all speeds"""
 _PLACEHOLDERS = """\
   limits:    # the URDF states no usable ones for these joints: PUT THE MAKER'S FIGURES HERE (null: none)"""
 
@@ -73,7 +75,7 @@ def task_text(robot: Robot, space: str | list[str], choice: Choice, limits: Limi
         limits=_limits(robot, limits),
         joints="\n".join(_joint(robot, i, choice.posture[i]) for i in range(robot.n)),
         space=_inline(space),
-        degree=f"{robot.n} joints: {degree} redundant" if degree else f"{robot.n} joints: none is redundant",
+        degree=f"{write_count(robot.n, 'joint')}: {degree or 'none is'} redundant",
         by=_inline([float(each) for each in choice.displacement]),
     )
 
@@ -101,7 +103,11 @@ def _limits(robot: Robot, limits: LimitSpec) -> str:
     given = {each.name: getattr(limits, each.name) for each in fields(limits)}
     needed = {kind: values for kind, values in given.items() if isinstance(values, dict)}
     if not needed:
-        return _OWN_LIMITS.format(joint=_inline(robot.joint_names[0]))
+        return _OWN_LIMITS.format(
+            joint=_inline(robot.joint_names[0]),
+            torque=_inline(float(f"{robot.limits.torque_upper[0]:.4g}")),
+            unit=UNITS["torque"][robot.position_units[0]],
+        )
     return "\n".join((_PLACEHOLDERS, *(f"    {kind}: {_inline(_lists(values))}" for kind, values in needed.items())))
 
 

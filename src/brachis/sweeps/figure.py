@@ -172,10 +172,10 @@ def _name(ax: Axes, axis: str, values: Sequence[Any], *, always: bool = False) -
     if always or not _are_numbers(values):
         step = math.ceil(len(values) / _MOST_TICKS)
         shown = range(0, len(values), step)
-        ax.set(**{f"{axis}ticks": list(shown), f"{axis}ticklabels": [_written(values[place]) for place in shown]})
+        ax.set(**{f"{axis}ticks": list(shown), f"{axis}ticklabels": [_write_value(values[place]) for place in shown]})
 
 
-def _written(value: Any) -> str:  # noqa: ANN401  (of a task)
+def _write_value(value: Any) -> str:  # noqa: ANN401  (of a task)
     if value is None:
         return "not set"
     return f"{value:.4g}" if _are_numbers([value]) else style.plain(str(value))

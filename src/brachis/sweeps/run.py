@@ -13,6 +13,7 @@ from typing import Any
 import brachis
 from brachis import interrupts
 from brachis.arguments import check_callable
+from brachis.errors import write_count
 from brachis.progress import Listener, report_progress
 from brachis.sweeps.plans import Plan, SweepPlan, load_sweep
 from brachis.sweeps.pools import pool_for
@@ -162,13 +163,13 @@ class _Progress:
     def __init__(self, total: int, found: Mapping[str, Mapping[str, Any]], listener: Listener) -> None:
         self._total, self._found, self._listener = total, found, listener
         self._before, self._began = len(found), time.monotonic()
-        listener(f"{len(found)} of {total} plans are stored already" if found else f"0 of {total} plans")
+        listener(f"{len(found)} of {write_count(total, 'plan')}{' are stored already' if found else ''}")
 
     def tell(self) -> None:
         """Say it."""
         done, failed = len(self._found), sum(facts["status"] == FAILED for facts in self._found.values())
         each = (time.monotonic() - self._began) / (done - self._before)
-        text = f"{done} of {self._total} plans"
+        text = f"{done} of {write_count(self._total, 'plan')}"
         text += f", {failed} failed" if failed else ""
         self._listener(f"{text}; {in_words(each * (self._total - done))} left")
 

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from brachis.errors import TaskError
+from brachis.errors import TaskError, write_count
 from brachis.task.fitted import Wanted, segments_along
 from brachis.task.models import Task
 from brachis.task.point_data import PointFile
@@ -112,4 +112,4 @@ def _along_joints(segment: CsvSegment, where: str, folder: Path) -> SplineSegmen
 def _check_count(rows: int, path: Path) -> None:
     if rows < _FEWEST_ROWS:
         problem = "a path needs its start and at least one waypoint"
-        raise TaskError(problem, found=f"{rows} rows of numbers", allowed="2 or more", where=str(path))
+        raise TaskError(problem, found=f"{write_count(rows, 'row')} of numbers", allowed="2 or more", where=str(path))

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from math import degrees
 from typing import TYPE_CHECKING, Any, Literal
 
-from brachis.errors import TaskError
+from brachis.errors import TaskError, write_count
 from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.orientation import Attitude, OrientationMode, Rotate, TurnTo
 from brachis.task.point_data import FitReport, FitTolerance
@@ -136,7 +136,9 @@ def _check_corners(report: Report, wanted: Wanted) -> None:
     if wanted.corner == "refuse":
         hint = "Set corner: blend to round them within the tolerance"
         where = f"{wanted.where}.corner"
-        raise TaskError(f"the points have {len(found)} corners", found=listed, allowed="none", where=where, hint=hint)
+        raise TaskError(
+            f"the points have {write_count(len(found), 'corner')}", found=listed, allowed="none", where=where, hint=hint
+        )
     if isinstance(wanted.orientation, Rotate | TurnTo):
         hint = "Give an orientation for every point, or orientation: tangent"
         where = f"{wanted.where}.orientation"

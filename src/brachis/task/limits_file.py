@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from brachis.errors import TaskError, UnknownNameError
+from brachis.kinds import check_kind
 from brachis.task.fields import Flag, Model, Name, Number, Positive, plain, refuse
 from brachis.task.limit_models import LimitSpec
 from brachis.task.messages import show, task_error
@@ -180,6 +181,7 @@ def _by_joint(
 
     Return its limits by kind and joint, and the one of all joints together.
     """
+    check_kind(path, "a limits file", TaskError)
     text = read_text(path, where=where, folder=folder, found=found, largest=_LARGEST)
     content = read_yaml(text, str(path))
     if not isinstance(content, Mapping):

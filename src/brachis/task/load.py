@@ -9,7 +9,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from brachis.errors import TaskError
-from brachis.kinds import Kind, check_kind
+from brachis.kinds import TASK_SUFFIXES, Kind, check_kind
 from brachis.task.csv_path import expand_csv_files
 from brachis.task.fields import plain
 from brachis.task.keys import with_keys
@@ -79,7 +79,17 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
     check_kind(path, Kind.TASK, TaskError)
     hint = "Long lists of waypoints belong in a CSV file"
     text = read_text(path, where=str(path), folder=Path.cwd(), largest=LARGEST_TASK, hint=hint)
-    task = task_from(read_yaml(text, str(path)), str(path), path.absolute().parent, changes or {})
+    try:
+        content = read_yaml(text, str(path))
+    except TaskError as error:
+        if path.suffix.lower() in TASK_SUFFIXES:
+            raise
+        allowed = f"a YAML file ({' or '.join(TASK_SUFFIXES)})"
+        hint = "brachis new writes a first task"
+        raise TaskError(
+            "the file is not a task", where=str(path), found=str(error), allowed=allowed, hint=hint
+        ) from error
+    task = task_from(content, str(path), path.absolute().parent, changes or {})
     if task.robot.urdf is None:
         problem = "this key is required in a task file, and missing"
         raise TaskError(problem, where=f"{path}: robot.urdf", hint="Give the URDF's path, relative to the task file")
@@ -150,11 +160,11 @@ def _with_start(task: Task, source: str) -> Task:
     """
     if task.start != "free" or task.path_start is not None:
         return task
-    begins, first = task.begins, task.path[0]
-    changes: dict[str, object] = {"path_start": begins}
-    if task.task_space == "joints" and begins is not None:
+    place, first = task.start_place, task.path[0]
+    changes: dict[str, object] = {"path_start": place}
+    if task.task_space == "joints" and place is not None:
         names = getattr(getattr(first, first.kind), "joints", None)
-        changes = {"start": {"joints": dict(zip(names, begins, strict=True)) if names else begins}}
+        changes = {"start": {"joints": dict(zip(names, place, strict=True)) if names else place}}
     try:
         return Task.model_validate(task.model_copy(update=changes))
     except ValidationError as error:

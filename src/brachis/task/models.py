@@ -218,6 +218,10 @@ class Task(Model):
         if set(path) != {"frame", "segments"}:
             problem = "a path in a frame is the frame's name and the segments"
             raise refuse(problem, key="path", found=path, allowed="{frame: NAME, segments: [...]}")
+        other = content.get("path_frame")
+        if other not in (None, path["frame"]):
+            allowed = f"{path['frame']}, or one of both keys"
+            raise refuse("another frame than in path.frame", key="path_frame", found=other, allowed=allowed)
         return {**content, "path": path["segments"], "path_frame": path["frame"]}
 
     @field_validator("path", mode="before")
@@ -256,7 +260,7 @@ class Task(Model):
     def _free_start_needs_a_place(self) -> Task:
         first = self.path[0]
         unread = isinstance(first, CsvSegment) and not first.csv.relative
-        if self.start == "free" and self.path_start is None and not unread and self.begins is None:
+        if self.start == "free" and self.path_start is None and not unread and self.start_place is None:
             problem = "a free start posture leaves open where the path begins"
             if self.task_space == "joints":
                 problem = "a path of joints that does not begin with a waypoint needs a start posture"
@@ -339,9 +343,9 @@ class Task(Model):
         return self.task_space in {"pose", "pose_free_roll"}
 
     @property
-    def begins(self) -> tuple[float, ...] | ToolPose | None:
+    def start_place(self) -> tuple[float, ...] | ToolPose | None:
         """Where the first segment says that the path begins, as `path_start`; None where it leaves that open."""
-        place = self.path[0].begins(of_poses=self.of_poses)
+        place = self.path[0].start_place(of_poses=self.of_poses)
         return place if isinstance(place, ToolPose) == self.of_poses else None
 
     @property

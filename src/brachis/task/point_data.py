@@ -9,6 +9,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, Strict, WithJsonSch
 
 from brachis.cam.conventions import CONVENTIONS, choices
 from brachis.cam.units import ANGLES, LENGTHS, quantity
+from brachis.errors import write_count
 from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, refuse
 
 _LISTED = 10
@@ -146,13 +147,15 @@ class FitReport(Model):
         off, rms, allowed = (1e3 * x for x in (self.position_error, self.position_rms, self.position_tolerance))
         turned, turned_allowed = map(degrees, (self.orientation_error, self.orientation_tolerance))
         text = (
-            f"{self.source}: {self.points} points along {1e3 * self.length:.5g} mm, {self.intervals} knot intervals; "
+            f"{self.source}: {self.points} points along {1e3 * self.length:.5g} mm, "
+            f"{write_count(self.intervals, 'knot interval')}; "
         )
         text += f"at most {off:.3g} mm off (allowed {allowed:.3g} mm), rms {rms:.3g} mm"
         text += f"; orientation at most {turned:.2g} deg off (allowed {turned_allowed:.3g} deg)" if turned else ""
         corners = [f"row {corner.row} ({degrees(corner.angle):.3g} deg)" for corner in self.corners[:_LISTED]]
         corners += ["..."] if len(self.corners) > _LISTED else []
-        text += f"; {len(self.corners)} corners blended: {', '.join(corners)}" if corners else "; no corners"
+        count = write_count(len(self.corners), "corner")
+        text += f"; {count} blended: {', '.join(corners)}" if corners else "; no corners"
         return f"{text}; {'; '.join(self.told)}" if self.told else text
 
     def to_dict(self) -> dict[str, Any]:

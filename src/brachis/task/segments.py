@@ -49,7 +49,7 @@ class SegmentModel(Model):
         given = ", ".join(f"{name}={value!r}" for name, value in (*shape.__repr_args__(), *rest))
         return f"{type(self).__name__.removesuffix('Segment')}({given})"
 
-    def begins(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:  # noqa: ARG002  (others ask)
+    def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:  # noqa: ARG002  (others ask)
         """Where the segment says that it begins, as ``path_start`` of a task; None where it leaves that open.
 
         Without relative waypoints and another word on it, that is the first waypoint.
@@ -107,8 +107,8 @@ class SplineSegment(MovingSegment):
 
     spline: SplineThrough
 
-    def begins(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
-        """See `SegmentModel.begins`."""
+    def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
+        """See `SegmentModel.start_place`."""
         spline = self.spline
         if spline.relative:
             return None
@@ -138,8 +138,8 @@ class BSplineSegment(MovingSegment):
 
     bspline: BSplineCurve
 
-    def begins(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
-        """See `SegmentModel.begins`."""
+    def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
+        """See `SegmentModel.start_place`."""
         first = self.bspline.control_points[0]
         if self.bspline.relative or not of_poses or len(first) != _POSE_COLUMNS:
             return None if self.bspline.relative else first

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BeforeValidator, Field, Tag, field_validator, model_validator
 
+from brachis.errors import write_count
 from brachis.task.fields import Model, Number, Positive, Share, by_form, plain, refuse
 
 _LEAST_TOLERANCE = 1e-3
@@ -35,7 +36,7 @@ class SpeedTable(Model):
     def _is_a_table(self) -> SpeedTable:
         if len(self.speed) != len(self.s):
             problem = "there is not one speed for every path coordinate"
-            raise refuse(problem, key=".speed", found=f"{len(self.speed)} speeds", allowed=f"{len(self.s)}")
+            raise refuse(problem, key=".speed", found=write_count(len(self.speed), "speed"), allowed=f"{len(self.s)}")
         for row in range(1, len(self.s)):
             if self.s[row] < self.s[row - 1]:
                 problem = "the path coordinates do not ascend"

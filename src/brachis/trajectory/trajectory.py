@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from brachis.arguments import file_name, number, numbers
 from brachis.arrays import freeze
-from brachis.errors import InputError, UnknownNameError, write_apart
+from brachis.errors import InputError, UnknownNameError, write_apart, write_count
 from brachis.robot import Robot, dynamics
 from brachis.summary import Summary
 from brachis.task import Task
@@ -263,7 +263,7 @@ class Trajectory(Summary):
             "start posture": self.robot.in_words(self.q[0]),
             "end posture": self.robot.in_words(self.q[-1]),
             **({"recovered from": self.recovered.source} if self.recovered else {}),
-            "splines": f"degree {self.degree}, {len(self.knots) - 2 * self.degree - 1} intervals",
+            "splines": f"degree {self.degree}, {write_count(len(self.knots) - 2 * self.degree - 1, 'interval')}",
         }
 
     def view(

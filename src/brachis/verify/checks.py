@@ -6,6 +6,7 @@ import numpy as np
 
 from brachis.path import Path
 from brachis.robot import Robot, TaskMap
+from brachis.robot.units import UNITS
 from brachis.trajectory import CONTINUOUS_TORQUE, Trajectory
 from brachis.verify.motion import Pieces, States
 from brachis.verify.options import VerifyOptions
@@ -50,17 +51,17 @@ def end_checks(
             given = robot.posture(posture.joints, f"{name}.joints")
             place = path.sample(np.array([time / trajectory.t_end])).target
             miss = np.abs(trajectory.position(time) - _on_path(given, task_map, place))
-            checks.append(_worst_joint(f"{name} posture", miss, options.posture_tolerance, "rad, m", robot, time))
+            checks.append(_worst_joint(f"{name} posture", miss, options.posture_tolerance, "position", robot, time))
         if boundary.periodic:
             continue
         if given_speed:
             checks += _moving_end(name, trajectory, task_map, path, given_speed, time, options)
             continue
         speed, allowed = np.abs(trajectory.velocity(time)), options.rest_velocity_tolerance
-        checks.append(_worst_joint(f"{name} velocity", speed, allowed, "rad/s, m/s", robot, time))
+        checks.append(_worst_joint(f"{name} velocity", speed, allowed, "velocity", robot, time))
         if task.spline.vanishing > 1:
             bend, allowed = np.abs(trajectory.acceleration(time)), options.rest_acceleration_tolerance
-            checks.append(_worst_joint(f"{name} acceleration", bend, allowed, "rad/s2, m/s2", robot, time))
+            checks.append(_worst_joint(f"{name} acceleration", bend, allowed, "acceleration", robot, time))
         if task.spline.vanishing > 2:  # noqa: PLR2004  (jerk)
             jerk = np.abs(trajectory.jerk(time)) / (1.0 + np.abs(trajectory.jerk(trajectory.times)).max())
             checks.append(_worst_joint(f"{name} jerk", jerk, options.rest_jerk_tolerance, "relative", robot, time))
@@ -87,7 +88,7 @@ def _moving_end(
         rate, bend = (abs(float(trajectory.path_spline(time, nu=order))) for order in (1, 2))
         change, allowed = wanted * bend / rate if rate else np.inf, options.rest_acceleration_tolerance
         checks.append(
-            Check(f"{name} acceleration along the path", change, allowed, f"{unit}2", change <= allowed, time=time)
+            Check(f"{name} acceleration along the path", change, allowed, f"{unit}^2", change <= allowed, time=time)
         )
     return checks
 
@@ -121,7 +122,7 @@ def spline_checks(trajectory: Trajectory, robot: Robot, states: States, options:
     worst = int(np.argmax(misses.max(axis=1)))
     time = float(states.t[worst])
     allowed = options.spline_tolerance
-    return [_worst_joint("redundant joints' splines", misses[worst], allowed, "rad, m", robot, time)]
+    return [_worst_joint("redundant joints' splines", misses[worst], allowed, "position", robot, time)]
 
 
 def continuity_checks(trajectory: Trajectory, pieces: Pieces, robot: Robot, options: VerifyOptions) -> list[Check]:
@@ -148,8 +149,9 @@ def _jumps(before: States, after: States, what: str, degree: int, options: Verif
     return checks
 
 
-def _worst_joint(name: str, misses: np.ndarray, allowed: float, unit: str, robot: Robot, time: float) -> Check:
-    """Make a check of the joint that misses most."""
+def _worst_joint(name: str, misses: np.ndarray, allowed: float, kind: str, robot: Robot, time: float) -> Check:
+    """Make a check of the joint that misses most; `kind` is a key of `UNITS`, or the unit of all joints."""
     joint = int(np.argmax(misses))
+    unit = UNITS[kind][robot.position_units[joint]] if kind in UNITS else kind
     value = float(misses[joint])
     return Check(name, value, allowed, unit, value <= allowed, robot.joint_names[joint], time)

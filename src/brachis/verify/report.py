@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from brachis.errors import write_apart
+from brachis.robot.units import shown_unit
 from brachis.summary import Summary
 
 
@@ -45,11 +46,15 @@ class Check:
     remark: str = ""
     of_limit: bool = False
 
-    @property
-    def figures(self) -> tuple[str, str]:
-        """What was found and what is allowed, as text without the unit; ratios to a limit with six decimals."""
+    def figures(self, *, degrees: bool) -> tuple[str, str, str]:
+        """Write what was found, what is allowed, and the unit of both; ratios to a limit with six decimals.
+
+        With `degrees` angles are in deg; what is in rad or m, whichever is larger, stays.
+        """
         ratio = self.of_limit or (self.unit == "-" and self.allowed > 1.0)
-        return f"{self.value:.6f}" if ratio else f"{self.value:.1e}", f"{self.allowed:.6g}"
+        unit, factor = shown_unit(self.unit, degrees=degrees)
+        value = factor * self.value
+        return f"{value:.6f}" if ratio else f"{value:.1e}", f"{factor * self.allowed:.6g}", unit
 
     def in_words(self) -> str:
         """Say what was found, and what is allowed."""

@@ -7,6 +7,7 @@ import errno
 import importlib.util
 import io
 import ipaddress
+import logging
 import socket
 from typing import TYPE_CHECKING
 
@@ -55,6 +56,7 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
 
     chosen = _free_port(host) if port is None else port
     _check(host, chosen)
+    logging.getLogger("websockets.server").addFilter(_is_of_a_page)
     with _quiet():
         server = Server(host=host, port=chosen, label="brachis", verbose=False)
     if chosen not in (0, server.get_port()):  # somebody took it in between
@@ -83,6 +85,13 @@ def is_local(host: str) -> bool:
 def _quiet() -> contextlib.redirect_stdout[io.StringIO]:
     """Keep viser's own messages from standard output, which is for results."""
     return contextlib.redirect_stdout(io.StringIO())
+
+
+def _is_of_a_page(record: logging.LogRecord) -> bool:
+    """Whether a record of the server is about a page's request; probes, such as HEAD, are refused without a word."""
+    from websockets.exceptions import InvalidMessage  # noqa: PLC0415  (comes with viser)
+
+    return record.exc_info is None or not isinstance(record.exc_info[1], InvalidMessage)
 
 
 def _free_port(host: str) -> int:

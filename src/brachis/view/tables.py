@@ -38,7 +38,7 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
     for kind, digits in _STATE.items():
         for part in quantities(trajectory, now, kind, degrees=degrees):
             for joint, value in zip(part.joints.tolist(), part.values[0].tolist(), strict=True):
-                cells[joint].append(f"{_rounded(value, digits)} {part.unit}")
+                cells[joint].append(f"{_write_number(value, digits)} {part.unit}")
     return head + _table(("joint", "position", "velocity", "torque, force"), list(cells.values()))
 
 
@@ -72,7 +72,7 @@ def summary(trajectory: Trajectory, notes: Sequence[str], *, verified: bool | No
     return text + (_paragraph(*notes) if notes else "")
 
 
-def _rounded(value: float, digits: int) -> str:
+def _write_number(value: float, digits: int) -> str:
     """Write a number without a minus sign before zero."""
     return f"{round(float(value), digits) + 0.0:.{digits}f}"
 
