@@ -15,13 +15,15 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from brachis.bspline import clamped_knots, spread
 from brachis.kinematics import DirectJointMap, JointState
-from brachis.nlp import Boundary, FixedGrid, Motion, Phase, Program
-from brachis.nlp.boundary import LocalBasis, SparsityPattern
+from brachis.optimise.boundary import Boundary, LocalBasis, SparsityPattern
+from brachis.optimise.bspline import clamped_knots, spread
+from brachis.optimise.grid import FixedGrid
+from brachis.optimise.phase import Motion, Phase
+from brachis.optimise.program import Program
+from brachis.optimise.transcription import breaks_of
 from brachis.path import Path
-from brachis.problem import Problem
-from brachis.transcription import breaks_of
+from brachis.problem.problem import Problem
 from brachis.robot import TaskMap
 
 
@@ -54,7 +56,7 @@ class AllJointsMap(DirectJointMap):
 
 
 class FullSpace:
-    """The transcription as a `brachis.solvers.protocol.Problem`.
+    """The transcription as a `brachis.optimise.backends.protocol.Problem`.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import brachis
 import fuzz_cases
-from brachis.cli.inspection import inspect_command
+from brachis.apps.cli.inspection import inspect_command
 
 _MEMORY = 2_000_000_000
 _BUSY, _MAKING = 8.0, 30.0

@@ -10,9 +10,9 @@ import os
 from pathlib import Path
 
 from brachis import LimitSpec, Robot, load_task, transcribe
-from brachis.nlp.differential_ik import differential_ik_paths
-from brachis.nlp.guess import starting_point
-from brachis.solvers import SolverOptions, solver_named
+from brachis.optimise.backends import SolverOptions, solver_named
+from brachis.optimise.guess import starting_point
+from brachis.search.differential_ik import differential_ik_paths
 from committed import save
 
 ROOT = Path(__file__).parents[1]

@@ -22,7 +22,7 @@ import yaml
 from brachis.errors import BrachisError
 from brachis.path import path_of
 from brachis.robot import Robot, TaskMap, bind, dynamics
-from brachis.robot.combine import robot_for
+from brachis.robot.from_task import robot_for
 from brachis.task import Task, load_task
 from mixed_paths import CLOSED, SHAPES, place_of, random_path
 from mixed_robots import ROBOTS, SPATIAL, TOOLS, urdf_of

@@ -30,7 +30,7 @@ import numpy as np
 import mixed_cases
 from brachis import plan
 from brachis.errors import BrachisError
-from brachis.plausibility import PlausibilityWarning
+from brachis.robot.plausibility import PlausibilityWarning
 from brachis.task import load_task
 from committed import save
 from mixed_robots import ROBOTS, ROOT

@@ -19,7 +19,7 @@ import random_lines
 import random_poses
 from brachis import LimitSpec, Robot, load_task
 from brachis.errors import BrachisError
-from brachis.problem import Problem, decompositions_of
+from brachis.problem.problem import Problem, decompositions_of
 from brachis.search.joint_path import DeadEnd
 from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.starts import lattice_starts

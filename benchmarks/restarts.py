@@ -22,10 +22,10 @@ import numpy as np
 import mixed_cases
 from brachis import plan
 from brachis.errors import BrachisError
-from brachis.plausibility import PlausibilityWarning
-from brachis.problem import Problem
-from brachis.robot.combine import robot_for
-from brachis.solvers import SolverOptions, ipopt
+from brachis.optimise.backends import SolverOptions, ipopt
+from brachis.problem.problem import Problem
+from brachis.robot.from_task import robot_for
+from brachis.robot.plausibility import PlausibilityWarning
 from brachis.task import load_task
 from full_space import FullSpace
 from mixed_robots import ROBOTS

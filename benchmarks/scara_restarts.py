@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from brachis import load_task, plan
-from brachis.nlp.guess import starting_point
-from brachis.problem import Problem, decompositions_of
-from brachis.transcription import program_of
+from brachis.optimise.backends import SolverOptions, solver_named
+from brachis.optimise.guess import starting_point
+from brachis.optimise.transcription import program_of
+from brachis.problem.problem import Problem, decompositions_of
 from brachis.search.solving import MARGINS, continued
-from brachis.solvers import SolverOptions, solver_named
 
 ROOT = Path(__file__).parents[1]
 spec = importlib.util.spec_from_file_location("scara_table", ROOT / "examples/02_scara_table.py")

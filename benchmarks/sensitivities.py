@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from brachis import LimitSpec, Result, Robot, Trajectory, load_task, plan
-from brachis.bottleneck import CheckedSensitivity, check_sensitivities, sensitivities
+from brachis.apps.bottleneck import CheckedSensitivity, check_sensitivities
+from brachis.apps.bottleneck.sensitivities import sensitivities
 from committed import processor_time, save
 
 ROOT = Path(__file__).parents[1]

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from brachis import plan, transcribe
-from brachis.nlp.differential_ik import differential_ik_paths
-from brachis.nlp.guess import starting_point
-from brachis.solvers import SolverOptions, solver_named
+from brachis.optimise.backends import SolverOptions, solver_named
+from brachis.optimise.guess import starting_point
+from brachis.search.differential_ik import differential_ik_paths
 
 
 def first_point(program):

@@ -13,10 +13,10 @@ import pytest
 
 from brachis import Robot, ik, load_task, plan, transcribe
 from brachis.ik.eaik import eaik
-from brachis.nlp.differential_ik import differential_ik_paths
-from brachis.nlp.guess import starting_point
+from brachis.optimise.backends import SolverOptions, solver_named
+from brachis.optimise.guess import starting_point
 from brachis.robot import task_map_of
-from brachis.solvers import SolverOptions, solver_named
+from brachis.search.differential_ik import differential_ik_paths
 
 ROOT = Path(__file__).parents[1]
 POSES = 2000

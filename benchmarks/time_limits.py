@@ -26,9 +26,9 @@ from typing import Any
 import brachis
 import joint_paths
 import mixed_cases
-from brachis import deadline
-from brachis.plausibility import PlausibilityWarning
-from brachis.solvers import watch
+from brachis.common import deadline
+from brachis.optimise.backends import monitor
+from brachis.robot.plausibility import PlausibilityWarning
 from mixed_robots import ROOT
 
 ALLOWED = 1.5
@@ -125,7 +125,7 @@ def main() -> int:
     clock = time.monotonic if given.wall else time.process_time
     if not given.wall:
         deadline.time = types.SimpleNamespace(monotonic=clock)
-        watch.time = types.SimpleNamespace(perf_counter=clock)
+        monitor.time = types.SimpleNamespace(perf_counter=clock)
     brachis.plan(ROOT / "examples/01_scara_line.yaml")  # what is loaded on first use is not timed
     faults, latest = 0, -math.inf
     with tempfile.TemporaryDirectory() as folder:

@@ -21,8 +21,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import brachis
-from brachis.comparison import plot_today
-from brachis.plots import (
+from brachis.apps.comparison import plot_today
+from brachis.apps.plots import (
     plot_candidates,
     plot_comparison,
     plot_fit,

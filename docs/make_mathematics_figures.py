@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import brachis
+from brachis.apps.plots import style
+from brachis.apps.plots.postures import skeleton
 from brachis.ik import find
-from brachis.plots import style
-from brachis.plots.skeleton import skeleton
 from brachis.robot import bind
 
 ROOT = Path(__file__).parents[1]

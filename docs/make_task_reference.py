@@ -29,11 +29,20 @@ from brachis.task import (
     Task,
     ToolLimits,
 )
-from brachis.task.bspline_curve import BSplineCurve
 from brachis.task.orientation import Attitude, Rotation, Tangent, Target
 from brachis.task.point_data import FileUnits, FitTolerance, PointFile
-from brachis.task.segments import MovingSegment
-from brachis.task.shapes import ArcCenter, ArcVia, Circle, Helix, LineBy, LineHeading, LineTo, SplineThrough
+from brachis.task.segments import (
+    ArcCenter,
+    ArcVia,
+    BSplineCurve,
+    Circle,
+    Helix,
+    LineBy,
+    LineHeading,
+    LineTo,
+    MovingSegment,
+    SplineThrough,
+)
 
 PAGE = Path(__file__).parent / "task_files.md"
 

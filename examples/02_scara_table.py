@@ -64,7 +64,7 @@ def main() -> None:
     verified = sum(result.verified for result in results.values())
     print(f"\n{verified} of {len(results)} plans verified, {time.perf_counter() - began:.1f} s in all")
     if len(sys.argv) > 1:
-        from brachis.plots import plot_comparison, save_figure  # noqa: PLC0415  (only when a figure is wanted)
+        from brachis.apps.plots import plot_comparison, save_figure  # noqa: PLC0415  (only when a figure is wanted)
 
         rows = [(float(angle), joint, result.t_end) for (angle, joint), result in results.items()]
         save_figure(plot_comparison(rows, "direction of the path", "\N{DEGREE SIGN}"), sys.argv[1])

@@ -58,7 +58,7 @@ def main() -> None:
     print(f"\n{verified} of {len(results)} plans verified, {time.perf_counter() - began:.1f} s in all")
     print(f"longest auto plan: {longest:.2f} s")
     if len(sys.argv) > 1:
-        from brachis.plots import plot_candidates, save_figure  # noqa: PLC0415  (only when a figure is wanted)
+        from brachis.apps.plots import plot_candidates, save_figure  # noqa: PLC0415  (only when a figure is wanted)
 
         save_figure(plot_candidates(results[180, "auto"].candidates), sys.argv[1])
         print(f"wrote {sys.argv[1]}")

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import brachis
-from brachis.plots import plot_fit, save_figure
+from brachis.apps.plots import plot_fit, save_figure
 
 TASK = Path(__file__).with_suffix(".yaml")
 COLUMNS = ("x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg", "feed_mm/min")

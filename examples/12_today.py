@@ -11,8 +11,8 @@ import sys
 from pathlib import Path
 
 import brachis
-from brachis.comparison import plot_today
-from brachis.plots import save_figure
+from brachis.apps.comparison import plot_today
+from brachis.apps.plots import save_figure
 
 ROOT = Path(__file__).parents[1]
 

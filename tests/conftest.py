@@ -30,7 +30,7 @@ _CHROMIUM = (
     "--disable-sync",
     "--enable-unsafe-swiftshader",
 )
-_WITH_DEADLINES = ("brachis.deadline", "brachis.solvers.watch", "brachis.bottleneck.reference")
+_WITH_DEADLINES = ("brachis.common.deadline", "brachis.optimise.backends.monitor", "brachis.apps.bottleneck.reference")
 """Modules that look at the clock to see whether the time is up."""
 if str(_TESTS) not in sys.path:
     sys.path.append(str(_TESTS))
@@ -84,7 +84,7 @@ def wall_clock(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def rough_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures of few pixels and with no layout, which take a third of the time; tests of plots have the real ones."""
-    from brachis.plots import style  # noqa: PLC0415
+    from brachis.apps.plots import style  # noqa: PLC0415
 
     honest = style.new_figure
 
@@ -94,7 +94,7 @@ def rough_figures(monkeypatch: pytest.MonkeyPatch) -> None:
         return figure
 
     monkeypatch.setattr(style, "new_figure", rough)
-    monkeypatch.setattr("brachis.plots.save._DPI", 30)
+    monkeypatch.setattr("brachis.apps.plots.style._DPI", 30)
 
 
 @pytest.fixture(scope="session")

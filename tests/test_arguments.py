@@ -5,7 +5,7 @@ import pytest
 
 import brachis
 from brachis import export
-from brachis.arguments import count, named, number, numbers
+from brachis.common.arguments import count, named, number, numbers
 from brachis.errors import InputError, ResultFileError, UnknownNameError
 
 SCARA = brachis.robots.path_of("scara3")

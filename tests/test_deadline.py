@@ -6,14 +6,14 @@ import math
 
 import pytest
 
-from brachis.deadline import NEVER, Deadline
+from brachis.common.deadline import NEVER, Deadline
 
 
 @pytest.fixture
 def clock(monkeypatch):
     """A clock that stands still at 100 s unless it is set."""
     now = [100.0]
-    monkeypatch.setattr("brachis.deadline.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("brachis.common.deadline.time.monotonic", lambda: now[0])
     return now
 
 

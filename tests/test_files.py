@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from brachis import files
-from brachis.cli.folder import write_files, write_text
+from brachis.apps.cli.folder import write_files, write_text
+from brachis.common import files
+from brachis.common.files import atomic_write, is_file, is_folder, read_file
 from brachis.errors import InputError, ResultFileError
-from brachis.files import atomic_write, is_file, is_folder, read_file
 from brachis.trajectory import Trajectory
 
 LARGE = 1_000_000_000_000

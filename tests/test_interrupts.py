@@ -10,7 +10,7 @@ import threading
 
 import pytest
 
-from brachis import interrupts
+from brachis.common import interrupts
 
 
 @pytest.fixture

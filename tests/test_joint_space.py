@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 import brachis
-from brachis.bottleneck import check_sensitivities, solved_again
+from brachis.apps.bottleneck import check_sensitivities, solved_again
 from brachis.errors import InputError, PathError, StartError
 from brachis.robot import dynamics
 from brachis.task import LimitSpec, task_with

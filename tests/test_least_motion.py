@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis import least_motion
-from brachis.deadline import NEVER, Deadline
-from brachis.robot.combine import robot_for
+from brachis.common.deadline import NEVER, Deadline
+from brachis.optimise import least_motion
+from brachis.robot.from_task import robot_for
 from brachis.task import task_with
 from brachis.trajectory import Trajectory
 from support.starts import starting_points

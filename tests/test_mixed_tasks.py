@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brachis.problem import Problem
-from brachis.robot.combine import robot_for
+from brachis.problem.problem import Problem
+from brachis.robot.from_task import robot_for
 from brachis.task import load_task
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"

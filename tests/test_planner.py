@@ -12,9 +12,9 @@ import pytest
 
 import brachis
 from brachis.errors import StartError
-from brachis.refine import RefinementOptions, refine
+from brachis.optimise.backends import SolverOptions, SolveStatus, solver_named
+from brachis.optimise.refine import RefinementOptions, refine
 from brachis.search.solving import MARGINS, continued
-from brachis.solvers import SolverOptions, SolveStatus, solver_named
 from support.effort import QUICK
 from support.starts import starting_points
 

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 import brachis
 from brachis import LimitSpec
 from brachis.errors import BrachisError, PathError, PlausibilityError, StartError, UrdfError
-from brachis.plausibility import of_end_time, of_robot, of_task
+from brachis.problem.plausibility import of_end_time, of_robot, of_task
 from brachis.robot import Robot
 from brachis.robot.limb import first_limb
 from brachis.robot.urdf import read_file

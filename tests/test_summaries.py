@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.summary import COLUMNS, LINES, shown
+from brachis.common.summary import COLUMNS, LINES, shown
 
 PUBLIC = {
     "result": lambda result: result,

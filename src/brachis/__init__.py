@@ -28,35 +28,35 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from brachis import bottleneck as bottleneck
-    from brachis import compose as compose
     from brachis import errors as errors
     from brachis import examples as examples
-    from brachis import export as export
     from brachis import ik as ik
     from brachis import limits as limits
-    from brachis import plots as plots
-    from brachis import report as report
     from brachis import robots as robots
-    from brachis.attempt import Attempt as Attempt
-    from brachis.bottleneck import BottleneckReport as BottleneckReport
-    from brachis.comparison import Comparison as Comparison
-    from brachis.comparison import compare as compare
+    from brachis.apps import bottleneck as bottleneck
+    from brachis.apps import compose as compose
+    from brachis.apps import export as export
+    from brachis.apps import plots as plots
+    from brachis.apps import report as report
+    from brachis.apps.bottleneck import BottleneckReport as BottleneckReport
+    from brachis.apps.comparison import Comparison as Comparison
+    from brachis.apps.comparison import compare as compare
+    from brachis.apps.recording import import_motion as import_motion
+    from brachis.apps.sweeps import SweepResult as SweepResult
+    from brachis.apps.sweeps import sweep as sweep
     from brachis.errors import BrachisError as BrachisError
     from brachis.errors import InputError as InputError
     from brachis.errors import PlanningError as PlanningError
-    from brachis.many import plan_many as plan_many
+    from brachis.optimise.candidate import Attempt as Attempt
     from brachis.path import bspline_segment as bspline_segment
     from brachis.planner import plan as plan
+    from brachis.planner import plan_many as plan_many
     from brachis.planner import transcribe as transcribe
-    from brachis.plausibility import PlausibilityWarning as PlausibilityWarning
-    from brachis.recording import import_motion as import_motion
     from brachis.result import Result as Result
     from brachis.robot import Robot as Robot
     from brachis.robot import TaskMap as TaskMap
     from brachis.robot import task_map_of as task_map_of
-    from brachis.sweeps import SweepResult as SweepResult
-    from brachis.sweeps import sweep as sweep
+    from brachis.robot.plausibility import PlausibilityWarning as PlausibilityWarning
     from brachis.task import LimitSpec as LimitSpec
     from brachis.task import Task as Task
     from brachis.task import fit_path as fit_path

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from brachis.common.files import shipped
 from brachis.errors import no_attribute
-from brachis.files import shipped
 
 
 def names() -> tuple[str, ...]:

@@ -4,6 +4,8 @@ task -> robot -> path, limits -> decompositions -> joint paths (search) -> `solv
 -> `finished`: mesh, refinement, trajectory, verification -> the calmest motion that is as fast -> result.
 
 The search decides what is solved and finished, and in which order; the two functions say how.
+
+Many plans at a time.
 """
 
 from __future__ import annotations
@@ -11,33 +13,36 @@ from __future__ import annotations
 import dataclasses
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from brachis import ik, interrupts
-from brachis.arguments import check_callable, check_list
-from brachis.attempt import Attempt, Start
-from brachis.completion import completed
-from brachis.custom_limits import LimitModel
-from brachis.deadline import Deadline
+from brachis import ik
+from brachis.common import interrupts
+from brachis.common.arguments import check_callable, check_list, count
+from brachis.common.deadline import Deadline
+from brachis.common.progress import Listener, report_progress
 from brachis.errors import BrachisError, InputError, write_count
-from brachis.least_motion import calmest
-from brachis.mesh import adapt_mesh, coarsest
-from brachis.nlp import Program
-from brachis.nlp.layout import SHORTEST_TIME
-from brachis.plausibility import check_within_reach, of_end_time, of_places, of_robot, of_task, tell
-from brachis.problem import Decomposition, Problem, decompositions_of
-from brachis.transcription import breaks_of, phase_in, program_of
-from brachis.progress import Listener, report_progress
-from brachis.refine import RefinementOptions, Solve
+from brachis.optimise.backends import SolveStatus, solver_named
+from brachis.optimise.candidate import Attempt, Start
+from brachis.optimise.completion import completed
+from brachis.optimise.layout import SHORTEST_TIME
+from brachis.optimise.least_motion import calmest
+from brachis.optimise.mesh import adapt_mesh, coarsest
+from brachis.optimise.program import Program
+from brachis.optimise.refine import RefinementOptions, Solve
+from brachis.optimise.transcription import breaks_of, phase_in, program_of
+from brachis.problem.plausibility import of_end_time, of_places, of_robot, of_task
+from brachis.problem.problem import Decomposition, Problem, decompositions_of
 from brachis.result import Result
 from brachis.robot import Robot
-from brachis.robot.combine import robot_for
-from brachis.robot.from_task import robot_from_settings
+from brachis.robot.custom_limits import LimitModel
+from brachis.robot.from_task import robot_for, robot_from_settings
+from brachis.robot.plausibility import check_within_reach, tell
 from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, located
 from brachis.search import (
@@ -57,7 +62,7 @@ from brachis.search import (
     solved_in_chart,
     try_remedies,
 )
-from brachis.solvers import SolveStatus, solver_named
+from brachis.search.processes import each, processes
 from brachis.task import Source, Task, TaskKeywords, check_keywords, task_with
 from brachis.trajectory import Motion, Trajectory, motion_of
 
@@ -402,3 +407,92 @@ def transcribe(
     problem = Problem.of(robot, asked, own_limits)
     joint_map, family = first_map(problem, decompositions_of(problem, families))
     return program_of(problem, joint_map, breaks_of(problem.task)), family
+
+
+Outcome = Result | BrachisError
+OnProgress = Callable[[int, int, Outcome], None]
+"""Told after every plan: how many are done, of how many, and what came out."""
+
+
+def plan_many(
+    tasks: Iterable[Source | tuple[Given, Source]],
+    *,
+    jobs: int = 1,
+    progress: bool | OnProgress | None = None,
+    **keywords: Unpack[TaskKeywords],
+) -> list[Outcome]:
+    """Plan many tasks, in several processes; a plan that fails is an error in the list and stops no other.
+
+    Parameters
+    ----------
+    tasks : iterable of path, mapping, Task, or pair of robot and task
+        Each as `plan` takes it.
+    jobs : int, optional
+        Processes; no more than there are processors are used.
+    progress : bool or callable, optional
+        True: how many are done, as `plan` shows its progress; left out: in notebooks. A function: called after every
+        plan, in the order of the tasks, with the number of those done, the number of all, and the outcome.
+    **keywords
+        Keys of all the tasks, as for `plan`.
+
+    Returns
+    -------
+    list of Result or BrachisError
+        In the order of the tasks. An error is what `plan` would have raised with ``check_advice=False``.
+
+    Raises
+    ------
+    InputError
+        One task is given in place of several, `jobs` is no number of processes, or there is no such keyword.
+    KeyboardInterrupt
+        Ctrl-C ends all.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> tasks = [
+    ...     {
+    ...         "brachis": 1,
+    ...         "robot": {"urdf": brachis.robots.path_of("scara3"), "tool_frame": "tool"},
+    ...         "start": {"joints": [0.5236, -2.0944, 2.0944]},
+    ...         "task_space": ["x", "y"],
+    ...         "path": brachis.Line(by=[0.0, length]),
+    ...     }
+    ...     for length in (0.1, 9.0)
+    ... ]
+    >>> outcomes = brachis.plan_many(tasks, redundant_joints=["j1"], intervals=8, effort="single")
+    >>> [type(outcome).__name__ for outcome in outcomes]
+    ['Result', 'PathError']
+    """
+    if isinstance(tasks, str | os.PathLike | Mapping):
+        raise InputError("is one task", where="tasks", found=type(tasks).__name__, allowed="a list of tasks")
+    if not isinstance(tasks, Iterable):
+        raise InputError("wrong type", where="tasks", found=repr(tasks), allowed="a list of tasks")
+    check_keywords(keywords, "plan_many", ("jobs", "progress"))
+    given, jobs = list(tasks), processes(count(jobs, "jobs"))
+    outcomes: list[Outcome] = []
+    work = _outcome, given, keywords
+    if callable(progress):
+        heard, progress = progress, False
+    else:
+        heard = None
+    with report_progress(None, progress) as tell, closing(each(*work, jobs=jobs, listener=_deaf)) as made:
+        for outcome in made:
+            outcomes.append(outcome)
+            tell(f"planned {len(outcomes)} of {write_count(len(given), 'task')}")
+            if heard is not None:
+                heard(len(outcomes), len(given), outcome)
+    return outcomes
+
+
+def _deaf(_text: str) -> None:
+    """Listen to nothing."""
+
+
+def _outcome(given: Any, keywords: TaskKeywords, listener: Callable[[str], None]) -> Outcome:  # noqa: ANN401
+    """Plan one task."""
+    robot, task = given if isinstance(given, tuple) else (None, given)
+    try:
+        return plan(robot, task, listener=listener, progress=False, check_advice=False, **keywords)
+    except BrachisError as error:
+        return error

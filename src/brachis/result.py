@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from brachis import bottleneck, plots, report
-from brachis.attempt import Attempt
+from brachis.apps import bottleneck, plots, report
+from brachis.common.summary import Summary
 from brachis.errors import UnknownNameError
-from brachis.least_motion import LeastMotion
-from brachis.plausibility import Remark
-from brachis.robot import in_use
-from brachis.solvers import SolverReport
-from brachis.summary import Summary
+from brachis.optimise.backends import SolverReport
+from brachis.optimise.candidate import Attempt
+from brachis.optimise.least_motion import LeastMotion
+from brachis.robot.from_task import in_use
+from brachis.robot.plausibility import Remark
 from brachis.task import FitReport, Task
 from brachis.trajectory import Samples, Trajectory
 from brachis.verify import Verification
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from brachis.bottleneck import BottleneckReport
-    from brachis.report import Report
-    from brachis.view import Viewer
+    from brachis.apps.bottleneck import BottleneckReport
+    from brachis.apps.report import Report
+    from brachis.apps.view import Viewer
 
 CANDIDATES = "candidates"
 

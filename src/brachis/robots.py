@@ -16,8 +16,8 @@ import os
 from functools import cache
 from pathlib import Path
 
+from brachis.common.files import is_file, shipped
 from brachis.errors import UnknownNameError, no_attribute
-from brachis.files import is_file, shipped
 from brachis.robot import Robot
 
 _MISSPELT = 0.75

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.bottleneck import check, check_sensitivities, sensitivities
+from brachis.apps.bottleneck import check, check_sensitivities
+from brachis.apps.bottleneck.sensitivities import sensitivities
 from brachis.errors import InputError
-from brachis.solvers import solver_named
+from brachis.optimise.backends import solver_named
 from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]

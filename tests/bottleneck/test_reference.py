@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.bottleneck import find_reference
+from brachis.apps.bottleneck import find_reference
 from brachis.robot import dynamics
 
 from .conftest import FORCE, LENGTH, MASS
@@ -50,7 +50,7 @@ def test_nothing_faster_is_said(slide):
 
 def test_end_posture_is_kept(slide):
     limits = {"torque": {"j1": 30.0}}
-    from brachis.bottleneck.reference import _on_mesh  # noqa: PLC0415
+    from brachis.apps.bottleneck.reference import _on_mesh  # noqa: PLC0415
 
     free = slide(((1.0, 0.0, 0.0),) * 2, ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits})
     np.testing.assert_array_equal(free.attempt.refined.program.phases[0].boundary.end, [1.0, np.nan])

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from brachis.bottleneck import limit_ratios, saturations
+from brachis.apps.bottleneck import limit_ratios, saturations
 
 from .conftest import FORCE, MASS
 

@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.bottleneck import sensitivities
-from brachis.bottleneck.multipliers import ActiveSet, Multipliers, multipliers_of
-from brachis.bottleneck.sensitivities import sensitivities_at
-from brachis.solvers import SolverOptions, solver_named
+from brachis.apps.bottleneck.sensitivities import (
+    ActiveSet,
+    Multipliers,
+    multipliers_of,
+    sensitivities,
+    sensitivities_at,
+)
+from brachis.optimise.backends import SolverOptions, solver_named
 
 from .conftest import FORCE, LENGTH, MASS, X, Z
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from brachis.bspline import basis_matrix, clamped_uniform_knots, local_basis
+from brachis.optimise.bspline import basis_matrix, clamped_uniform_knots, local_basis
 
 CASES = [(degree, derivative) for degree in range(2, 7) for derivative in range(min(degree, 3) + 1)]
 

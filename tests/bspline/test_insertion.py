@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from brachis.bspline import (
+from brachis.optimise.bspline import (
     basis_derivatives,
     basis_functions,
     clamped_knots,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.cam.arrays import points_from
-from brachis.cam.units import Units
 from brachis.errors import TaskError
+from brachis.task.points.points import points_from
+from brachis.task.points.units import Units
 
 POINTS = np.linspace([0.0, 0.0, 0.0], [0.1, 0.2, 0.3], 20)
 WRONG = [

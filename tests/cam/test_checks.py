@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from brachis.arrays import with_like_signs
-from brachis.cam.checks import of_size, refuse_spikes, without_repetitions
-from brachis.cam.curves import fit_curves, interpolated
-from brachis.cam.least_squares import Tolerance
-from brachis.cam.scatter import decimals_of, scatter_of
+from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
+from brachis.task.points.checks import of_size, refuse_spikes, without_repetitions
+from brachis.task.points.curves import fit_curves, interpolated
+from brachis.task.points.least_squares import Tolerance
+from brachis.task.points.scatter import decimals_of, scatter_of
 from support.seams import bent, points, wave
 
 MM = 1e-3

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from brachis.cam.conventions import CONVENTIONS, rotation_by
 from brachis.path.rotations import rotation_from
 from brachis.task.orientation import Attitude
+from brachis.task.points.units import CONVENTIONS, rotation_by
 
 X, Y, Z = (lambda angle, axis=axis: Rotation.from_rotvec(angle * axis) for axis in np.eye(3))
 ANGLES = np.radians([20.0, -35.0, 110.0])

@@ -9,12 +9,11 @@ import pytest
 from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
-from brachis.cam import stretches
-from brachis.cam.curves import fit_curves
-from brachis.cam.deviations import deviations
-from brachis.cam.fit import fit_points
-from brachis.cam.least_squares import Tolerance
 from brachis.errors import TaskError
+from brachis.task.points import curves
+from brachis.task.points.curves import fit_curves
+from brachis.task.points.fit import deviations, fit_points
+from brachis.task.points.least_squares import Tolerance
 from support.seams import bent, brute_distances, points, wave
 
 MM = 1e-3
@@ -159,7 +158,7 @@ def test_a_round_that_is_left_out_is_seen():
 
 def test_a_curve_that_does_not_pass_its_points_is_refused(monkeypatch):
     position = wave(500)[:, :2]
-    monkeypatch.setattr(stretches, "fit_points", lambda given, *rest: shifted(fit_points(given, *rest)))
+    monkeypatch.setattr(curves, "fit_points", lambda given, *rest: shifted(fit_points(given, *rest)))
     with pytest.raises(TaskError, match=r"does not pass the points within the tolerance.* mm off"):
         fit_curves(points(position), tolerance(0.05 * MM))
 

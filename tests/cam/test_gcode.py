@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.cam.curves import fit_curves
-from brachis.cam.gcode import read_gcode
-from brachis.cam.least_squares import Tolerance
 from brachis.errors import TaskError
+from brachis.task.points.curves import fit_curves
+from brachis.task.points.gcode import read_gcode
+from brachis.task.points.least_squares import Tolerance
 
 
 def points_of(text, rows="position"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.cam.speeds import speed_runs
+from brachis.task.points.curves import speed_runs
 
 NAN = float("nan")
 

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brachis.cam.columns import allowed_columns, points_of, understood
-from brachis.cam.table import read_table
-from brachis.cam.units import Units
 from brachis.errors import TaskError
+from brachis.task.points.tables import allowed_columns, points_of, read_table, understood
+from brachis.task.points.units import Units
 
 
 def read(text, rows="pose", units=None, orientation=None):

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from brachis import completion
+from brachis.optimise import completion
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification, VerifyOptions
 from support.command_line import code_of, interrupts_kept
@@ -57,7 +57,7 @@ def too_strict(monkeypatch: pytest.MonkeyPatch) -> None:
         return honest(trajectory, strict, **more)
 
     monkeypatch.setattr(completion, "verify_trajectory", refusing)
-    monkeypatch.setattr("brachis.deadline.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("brachis.common.deadline.time.monotonic", lambda: now[0])
 
 
 def quick_task() -> dict:

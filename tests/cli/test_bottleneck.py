@@ -8,7 +8,8 @@ import re
 
 import pytest
 
-from brachis import planner, plots
+from brachis import planner
+from brachis.apps import plots
 from brachis.errors import InputError
 
 from .conftest import SCARA

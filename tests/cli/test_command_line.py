@@ -11,8 +11,7 @@ import sys
 import pytest
 
 from brachis import planner
-from brachis.cli.examples import EXAMPLES
-from brachis.cli.main import app
+from brachis.apps.cli.app import EXAMPLES, app
 from support.effort import QUICK
 
 from .conftest import ROOT, SCARA
@@ -36,7 +35,7 @@ def test_help_of_every_command_has_an_example(command, option, run):
 
 def test_examples_work_in_this_order(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("brachis.view.Viewer.wait", lambda _viewer: None)  # for Ctrl-C
+    monkeypatch.setattr("brachis.apps.view.Viewer.wait", lambda _viewer: None)  # for Ctrl-C
     (tmp_path / "out").mkdir()
     fixed = "fixed: {search.effort: single, spline.intervals: 6}"
     (tmp_path / "lines.yaml").write_text(f"sweep: 1\ntask: task.yaml\n{fixed}\ngrid: {{spline.degree: [3, 4]}}\n")

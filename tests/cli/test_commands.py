@@ -17,9 +17,11 @@ import pytest
 import yaml
 
 import brachis
-from brachis import __version__, completion, planner, plots
-from brachis.cli import planning
+from brachis import __version__, planner
+from brachis.apps import plots
+from brachis.apps.cli import planning
 from brachis.errors import InputError
+from brachis.optimise import completion
 from brachis.trajectory import Trajectory
 
 from .conftest import SCARA
@@ -210,7 +212,7 @@ def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monke
         return made
 
     monkeypatch.setattr(planner, "solved", slow)
-    monkeypatch.setattr("brachis.deadline.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("brachis.common.deadline.time.monotonic", lambda: now[0])
     task |= {"spline": {"intervals": 10, "points_per_interval": 1}, "search": {"effort": "fast"}}
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
     assert outcome.code == 1
@@ -225,7 +227,7 @@ def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monke
 @pytest.mark.parametrize("command", [("verify", "gone.npz"), ("plan", "gone.yaml"), ("inspect", "gone.urdf")])
 def test_interrupt_while_importing(command, run, monkeypatch):
     def interrupt(name, *_arguments):
-        if name == "brachis.cli":
+        if name == "brachis.apps.cli":
             raise KeyboardInterrupt
         return honest(name, *_arguments)
 
@@ -237,7 +239,7 @@ def test_interrupt_while_importing(command, run, monkeypatch):
 
 
 def test_help_loads_neither_pinocchio_nor_numpy():
-    code = "import sys, brachis.cli.main\nprint(sorted({'pinocchio', 'numpy', 'scipy'} & set(sys.modules)))"
+    code = "import sys, brachis.apps.cli.main\nprint(sorted({'pinocchio', 'numpy', 'scipy'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

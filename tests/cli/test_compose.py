@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from brachis import Robot
-from brachis.cli.composition import split_vectors
-from brachis.compose import Rail, on_rail
+from brachis.apps.cli.starting import split_vectors
+from brachis.apps.compose import Rail, on_rail
 
 from .conftest import ROOT, SCARA
 

@@ -46,7 +46,7 @@ def brachis(where: str, how: str, *arguments: object) -> subprocess.CompletedPro
 @pytest.mark.parametrize(
     ("where", "how"),
     [
-        ("brachis.cli.main", "swallowed"),
+        ("brachis.apps.cli.main", "swallowed"),
         ("rich.console", "raised"),
         ("numpy", "swallowed"),
         ("pinocchio", "raised"),

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 import brachis
-from brachis.plots import PLOTS
+from brachis.apps.plots import PLOTS
 from support.chains import Joint, chain_urdf
 from support.effort import QUICK
 

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 import brachis
-from brachis.cli.output import progress
+from brachis.apps.cli.output import progress
 from support.effort import QUICK
 
 from .conftest import SCARA

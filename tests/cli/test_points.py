@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from brachis.cli.main import app
+from brachis.apps.cli.app import app
 from brachis.errors import PlausibilityError, TaskError
 from brachis.planner import plan
 from brachis.task import load_task

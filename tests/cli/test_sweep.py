@@ -7,8 +7,8 @@ import json
 import pytest
 import yaml
 
-from brachis.sweeps import run as sweeps_run
-from brachis.sweeps.worker import Outcome
+from brachis.apps.sweeps import run as sweeps_run
+from brachis.apps.sweeps.pools import Outcome
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 import brachis
-from brachis.cli.tables import Column, print_table
+from brachis.apps.cli.output import Column, print_table
 
 from .conftest import ROOT
 

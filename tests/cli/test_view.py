@@ -7,11 +7,11 @@ import urllib.request
 
 import pytest
 
-from brachis.cli.viewing import _candidates_beside
+from brachis.apps.cli.motions import _candidates_beside
+from brachis.apps.view import Viewer
 from brachis.planner import plan
 from brachis.task import load_task
 from brachis.trajectory import Trajectory
-from brachis.view import Viewer
 from support.shown import ROOT
 
 pytest.importorskip("viser", reason="viser is not installed")

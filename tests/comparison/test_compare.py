@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis import comparison
-from brachis.comparison import compare, plot_today
+from brachis.apps import comparison
+from brachis.apps.comparison import compare, plot_today
 from brachis.robot import bind
 from support.effort import QUICK
 
@@ -142,14 +142,14 @@ def test_where_the_first_plan_is_slower_others_are_made(found, monkeypatch):
     class Planned(Exception):  # noqa: N818
         pass
 
-    monkeypatch.setattr(sys.modules["brachis.comparison.planned"], "plan", plan)
+    monkeypatch.setattr(sys.modules["brachis.apps.comparison.planned"], "plan", plan)
     with pytest.raises(Planned):
         compare(found.today)
     assert wanted == [(12, ("x", "y")), (36, ("x", "y")), (36, "joints")]
 
 
 def test_the_joint_path_of_today_is_timed(found):
-    from brachis.comparison.planned import _tasks  # noqa: PLC0415
+    from brachis.apps.comparison.planned import _tasks  # noqa: PLC0415
 
     *_, last = _tasks(found.today, keep_end=False)
     result = brachis.plan(found.today.robot, last)

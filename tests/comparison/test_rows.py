@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.comparison import bound_ratios
+from brachis.apps.comparison import bound_ratios
 from brachis.robot import dynamics
 from brachis.verify import verify_trajectory
 

@@ -8,8 +8,8 @@ import pytest
 from lxml import etree
 
 from brachis import InputError, Robot
-from brachis.compose import Rail, on_rail
-from brachis.files import mesh_file
+from brachis.apps.compose import Rail, on_rail
+from brachis.common.files import mesh_file
 
 from .conftest import RAIL, arm_text
 

@@ -16,7 +16,7 @@ from lxml import etree
 
 import brachis
 from brachis import Robot
-from brachis.compose import Rail, on_rail, rail
+from brachis.apps.compose import Rail, on_rail, rail
 from brachis.robot import dynamics
 
 from .conftest import RAIL, ROOT, arm_text

@@ -12,7 +12,7 @@ import yourdfpy
 from lxml import etree
 
 from brachis import Robot
-from brachis.compose import Rail, on_rail
+from brachis.apps.compose import Rail, on_rail
 from brachis.robot import dynamics
 
 from .conftest import ROOT

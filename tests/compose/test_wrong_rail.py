@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from brachis.compose import Rail, on_rail
+from brachis.apps.compose import Rail, on_rail
 from brachis.errors import InputError, UrdfError
 
 from .conftest import RAIL, arm_text

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from brachis.common.files import atomic_write
 from brachis.errors import InputError
-from brachis.files import atomic_write
 from brachis.trajectory import Trajectory
 
 

@@ -5,8 +5,8 @@ import sys
 import numpy as np
 import pytest
 
+from brachis.apps.export import export_csv
 from brachis.errors import InputError
-from brachis.export import export_csv
 
 HEADER = "t,q_j1,q_j2,q_j3,qd_j1,qd_j2,qd_j3,qdd_j1,qdd_j2,qdd_j3,tau_j1,tau_j2,tau_j3"
 DT = 0.004

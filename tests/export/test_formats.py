@@ -17,8 +17,8 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_typestore
 
 from brachis import export
+from brachis.apps.export.animation import frame_times, frames
 from brachis.errors import BrachisWarning, InputError, UnknownNameError
-from brachis.export.frames import frame_times, frames
 from brachis.robot import Robot
 from brachis.trajectory import Trajectory
 

@@ -12,8 +12,7 @@ import pytest
 
 from brachis.errors import DecompositionError
 from brachis.ik import ChainGeometry, NotApplicableError, check_answers, find, margin_gradient
-from brachis.ik.eaik import eaik
-from brachis.ik.eaik_answers import exact_axes
+from brachis.ik.eaik import eaik, exact_axes
 from brachis.ik.idealised import Polished
 from brachis.robot import task_map_of
 from support.closed_forms import wrapped
@@ -254,7 +253,7 @@ def test_values_that_recur_and_values_that_are_dropped_give_the_same_answers(mon
     q[:, 2] = np.tile(np.linspace(-1.0, 1.0, 20), 10)
     first = bench.solve(q)
     assert bench.own_gap(q, first).max() < 1e-6
-    monkeypatch.setattr("brachis.ik.eaik_answers._KEPT", 5)
+    monkeypatch.setattr("brachis.ik.eaik._KEPT", 5)
     for _ in range(2):
         np.testing.assert_allclose(bench.solve(q[::-1]), first[::-1], atol=1e-12)
     one_by_one = np.concatenate([bench.solve(posture[None]) for posture in q])

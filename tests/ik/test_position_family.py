@@ -11,7 +11,7 @@ import pytest
 
 import brachis
 from brachis.ik import ChainGeometry, NotApplicableError, find, find_all
-from brachis.ik.position_recipes import RECIPES
+from brachis.ik.factored_solver import RECIPES
 from brachis.ik.positioning import positioning
 from brachis.robot import Robot, task_map_of
 from brachis.robot.task_map import RowsAndYaw

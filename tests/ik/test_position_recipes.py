@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.ik.position_recipes import RECIPES
+from brachis.ik.factored_solver import RECIPES
 from support.factored_bench import Bench
 from support.screw_arms import BASES, extra, screw_robot, wrist
 

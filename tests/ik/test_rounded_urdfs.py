@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.cli.inspection import inspect_command
+from brachis.apps.cli.inspection import inspect_command
 from brachis.errors import DecompositionError
 from brachis.ik import ChainGeometry, Family, check_answers, find, find_all
 from brachis.ik.idealised import Polished, idealised

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.kinematics import DirectJointMap
-from brachis.limits.branch_margin import build_branch_margins
+from brachis.limits.safeguards import build_branch_margins
 from support.chains import planar_robot
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from brachis.kinematics import JointSpaceMap
-from brachis.limits.branch_margin import build_branch_margins
+from brachis.limits.safeguards import build_branch_margins
 from brachis.path import build_path
 from brachis.robot.task_map import task_map_of
-from brachis.robot.task_map.rows import joint_rows
+from brachis.robot.task_map.protocol import joint_rows
 from brachis.task import SplineSegment, SplineThrough
 from support.chains import planar_robot
 

@@ -10,7 +10,7 @@ import pytest
 import brachis
 from brachis import LimitSpec
 from brachis.limits import Moments, limits_of
-from brachis.problem import Problem
+from brachis.problem.problem import Problem
 from brachis.task import SpeedTable, Task
 from support.chains import gantry_robot
 

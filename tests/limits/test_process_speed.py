@@ -11,8 +11,8 @@ import pytest
 
 import brachis
 from brachis.errors import InputError, TaskError
-from brachis.limits.process_ramps import largest_acceleration
-from brachis.limits.speed_table import SpeedTable
+from brachis.limits.process_speed import largest_acceleration
+from brachis.limits.tool import SpeedTable
 from brachis.robot import dynamics, task_map_of
 from brachis.task import LimitSpec
 from brachis.verify import verify_trajectory

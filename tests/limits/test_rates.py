@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.bottleneck import check_sensitivities, limit_ratios
+from brachis.apps.bottleneck import check_sensitivities, limit_ratios
+from brachis.apps.plots import plot_timeline
 from brachis.errors import InputError
 from brachis.limits import Label, Limit, Partials
-from brachis.plots import plot_timeline
 from brachis.verify import verify_trajectory
 from brachis.verify.mechanics import torque_rates, torques
 from support.effort import QUICK

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from brachis.limits.rounded_curve import WIDTH, RoundedCurve
+from brachis.limits.torque import WIDTH, RoundedCurve
 
 PIECES = st.lists(st.tuples(st.floats(1e-3, 10.0), st.floats(0.0, 1.0)), min_size=1, max_size=7)
 """Lengths of pieces, and the part of the torque that is left behind each of them."""

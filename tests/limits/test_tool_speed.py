@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 import brachis
+from brachis.apps.plots import plot_timeline
 from brachis.errors import TaskError
-from brachis.plots import plot_timeline
 from brachis.verify import verify_trajectory
 from support.effort import QUICK
 

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.deadline import NEVER, Deadline
-from brachis.mesh import MeshOptions, adapt_mesh, coarsest, knot_optimisation, optimise_knots, refine_mesh, solve_nested
-from brachis.refine import RefinementOptions, refine
-from brachis.solvers import SolverOptions, SolveStatus, solver_named
+from brachis.common.deadline import NEVER, Deadline
+from brachis.optimise import mesh
+from brachis.optimise.backends import SolverOptions, SolveStatus, solver_named
+from brachis.optimise.mesh import MeshOptions, adapt_mesh, coarsest, optimise_knots, refine_mesh, solve_nested
+from brachis.optimise.refine import RefinementOptions, refine
 from brachis.task import SplineSettings
 from support.effort import QUICK
 from support.starts import starting_points
@@ -135,7 +136,7 @@ def test_no_interval_is_so_short_that_points_fall_together(solved):
 
 def test_free_knots_without_a_motion_within_the_limits_are_given_up(solved, monkeypatch):
     program, report = solved
-    monkeypatch.setattr(knot_optimisation, "refine", lambda *given: dataclasses.replace(refine(*given), violation=0.5))
+    monkeypatch.setattr(mesh, "refine", lambda *given: dataclasses.replace(refine(*given), violation=0.5))
     kept, reports, _ = optimise_knots(program, report, solve, 0.1, RefinementOptions())
     assert kept is program
     assert reports[-1] is report

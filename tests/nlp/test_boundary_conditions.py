@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from brachis.bspline import clamped_uniform_knots
-from brachis.nlp.boundary import BoundarySpline, EndCondition
+from brachis.optimise.boundary import BoundarySpline, EndCondition
+from brachis.optimise.bspline import clamped_uniform_knots
 from support.phases import CASES, phase_of, reachable_points
 
 

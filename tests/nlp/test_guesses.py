@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.nlp import Program
-from brachis.nlp.differential_ik import STRATEGIES, differential_ik_path
-from brachis.nlp.guess import shortest_time, worst_time_scaling_ratio
+from brachis.optimise.guess import shortest_time, worst_time_scaling_ratio
+from brachis.optimise.program import Program
+from brachis.search.differential_ik import STRATEGIES, differential_ik_path
 from support.chains import planar_robot, program_of
 from support.phases import CASES, phase_of
 from support.starts import starting_points

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.bspline import clamped_knots, spread
+from brachis.optimise.bspline import clamped_knots, spread
 from support.phases import phase_of, reachable_points
 
 SHORTEST = 0.1

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from brachis.bspline import clamped_knots
-from brachis.nlp.boundary import Boundary, BoundarySpline, EndCondition, periodic
+from brachis.optimise.boundary import Boundary, BoundarySpline, EndCondition, periodic
+from brachis.optimise.bspline import clamped_knots
 from support.jacobians import dense, differences, told
 from support.phases import phase_of, reachable_points
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.nlp import LeastAcceleration, Link, Program
+from brachis.optimise.program import LeastAcceleration, Link, Program
 from support.phases import CASES, phase_of, reachable_points
 
 

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 import brachis
-from brachis.limits.position import PositionLimit
+from brachis.limits.joint import PositionLimit
 from support.phases import phase_of, reachable_points
 
 NEAR = 2.0944 - 0.05  # rad; without a range joint 3 goes further

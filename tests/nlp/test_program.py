@@ -10,20 +10,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from brachis.bottleneck.multipliers import multipliers_of
-from brachis.bottleneck.sensitivities import sensitivities_at
-from brachis.bspline import clamped_uniform_knots, spread
-from brachis.deadline import NEVER
+from brachis.apps.bottleneck.sensitivities import multipliers_of, sensitivities_at
+from brachis.common.deadline import NEVER
 from brachis.kinematics import DirectJointMap
 from brachis.limits import Role
-from brachis.limits.position import PositionLimit
+from brachis.limits.joint import PositionLimit
 from brachis.limits.torque import TorqueLimit
-from brachis.mesh import MeshOptions, coarsest, optimise_knots, refine_mesh, solve_nested
-from brachis.nlp import Boundary, FixedGrid, Link, Phase, Program
-from brachis.nlp.guess import starting_point
-from brachis.refine import RefinementOptions, refine
+from brachis.optimise.backends import SolverOptions, SolveStatus, solver_named
+from brachis.optimise.boundary import Boundary
+from brachis.optimise.bspline import clamped_uniform_knots, spread
+from brachis.optimise.grid import FixedGrid
+from brachis.optimise.guess import starting_point
+from brachis.optimise.mesh import MeshOptions, coarsest, optimise_knots, refine_mesh, solve_nested
+from brachis.optimise.phase import Phase
+from brachis.optimise.program import Link, Program
+from brachis.optimise.refine import RefinementOptions, refine
 from brachis.robot import Robot
-from brachis.solvers import SolverOptions, SolveStatus, solver_named
 from support.chains import INERTIAL, Joint, chain_urdf
 from support.phases import phase_of, reachable_points
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brachis.bspline import clamped_knots, spread
-from brachis.nlp import FixedGrid
-from brachis.nlp.grid import FreeGrid
+from brachis.optimise.bspline import clamped_knots, spread
+from brachis.optimise.grid import FixedGrid, FreeGrid
 
 BREAKS = np.array([0.0, 0.2, 0.5, 0.6, 1.0])
 EXTRA = np.array([0.23, 0.2301, 0.23013, 0.55, 0.8, 0.9999])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.bottleneck import report
+from brachis.apps.bottleneck import report
 from brachis.verify import verify_trajectory
 from support.chains import INERTIAL, Joint, chain_urdf
 

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from brachis.errors import PathError, TaskError
 from brachis.path import build_path
-from brachis.path.feed_table import feed_tables
-from brachis.robot.task_map.rows import POSE_ROWS
+from brachis.path.from_curve import feed_tables
+from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import BSplineCurve, Task, ToolPose, fit_path, load_task
 from support.poses import pose
 from support.seams import bent, brute_distances, wave

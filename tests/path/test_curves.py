@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from brachis.errors import PathError
 from brachis.path import Array, Curve, SequencePath, build_path
-from brachis.path.septic import septic
+from brachis.path.blends import septic
 from brachis.path.site import Site
 from brachis.task import ArcSegment, load_task
 

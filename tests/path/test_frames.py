@@ -12,7 +12,7 @@ import pytest
 import brachis
 from brachis.errors import PathError, StartError, TaskError
 from brachis.path import PathFrame, build_path
-from brachis.robot.task_map.rows import POSE_ROWS
+from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import Placement, load_task
 from brachis.trajectory import Trajectory
 

@@ -8,7 +8,7 @@ from scipy.interpolate import BSpline, CubicSpline, PPoly, make_interp_spline
 
 from brachis import InputError, bspline_segment
 from brachis.path import build_path
-from brachis.robot.task_map.rows import joint_rows
+from brachis.robot.task_map.protocol import joint_rows
 from brachis.task import load_task
 
 RNG = np.random.default_rng(0)

@@ -7,7 +7,7 @@ import pytest
 
 from brachis.errors import BrachisError, PathError, TaskError
 from brachis.path import build_path
-from brachis.robot.task_map.rows import joint_rows
+from brachis.robot.task_map.protocol import joint_rows
 from brachis.task import load_task
 
 ROWS = joint_rows(["a", "b", "x"])

@@ -6,18 +6,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from brachis.arrays import with_like_signs
-from brachis.path.leibniz import product, sine_cosine, unit
+from brachis.common.arrays import with_like_signs
+from brachis.path.joins import smallest
 from brachis.path.rotations import (
     angular_velocity,
     hat,
     matrices,
+    product,
     quaternion_derivatives,
     quaternions_of,
     rotation_from,
     rotation_of,
+    sine_cosine,
+    unit,
 )
-from brachis.path.sampling import smallest
 from brachis.task import Attitude
 
 ORDER = 4

@@ -9,8 +9,8 @@ import pytest
 
 from brachis.errors import PathError, UnknownNameError
 from brachis.path import build_path
+from brachis.path.blends import septic
 from brachis.path.joins import Join, row_corner
-from brachis.path.septic import septic
 from brachis.task import LineBy, LineSegment, load_task
 
 X, XY, XYZ, XYW = ["x"], ["x", "y"], ["x", "y", "z"], ["x", "y", "yaw"]

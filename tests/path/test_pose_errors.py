@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from brachis.errors import PathError
 from brachis.path import build_path
-from brachis.robot.task_map.rows import POSE_ROWS
+from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import CsvSegment, LineBy, LineSegment, PointFile
 from support.poses import pose, pose_path
 

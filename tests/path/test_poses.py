@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from brachis.path import PathSample, PosePath, build_path
-from brachis.robot.task_map.rows import POSE_ROWS
+from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import LineBy, LineSegment
 from support.poses import (
     START,

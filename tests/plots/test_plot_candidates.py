@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from brachis.attempt import Attempt
+from brachis.apps.plots import plot_candidates
 from brachis.errors import InputError
-from brachis.plots import plot_candidates
+from brachis.optimise.candidate import Attempt
 from brachis.search.record import SAME_MOTION
 
 

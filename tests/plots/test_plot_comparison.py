@@ -3,8 +3,8 @@ import math
 
 import pytest
 
+from brachis.apps.plots import plot_comparison
 from brachis.errors import InputError
-from brachis.plots import plot_comparison
 
 JOINTS = ("j1", "j2", "j3")
 NAN = math.nan

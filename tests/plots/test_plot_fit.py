@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from brachis.plots import plot_fit
+from brachis.apps.plots import plot_fit
 from brachis.task import fit_path
 from support.seams import bent, wave
 

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from brachis.bottleneck import limit_ratios
-from brachis.plots import plot_limits
+from brachis.apps.bottleneck import limit_ratios
+from brachis.apps.plots import plot_limits
 from brachis.task import ToolLimits
 
 

@@ -3,8 +3,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from brachis.plots import plot_motion, plot_overview
-from brachis.plots.style import limit_dashes
+from brachis.apps.plots import plot_motion, plot_overview
+from brachis.apps.plots.style import limit_dashes
 from brachis.task import SpeedTable, ToolLimits
 
 INF = float("inf")

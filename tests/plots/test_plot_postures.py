@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from mpl_toolkits.mplot3d import proj3d
 
-from brachis.plots import plot_postures
-from brachis.plots.skeleton import drawing_plane, skeleton
+from brachis.apps.plots import plot_postures
+from brachis.apps.plots.postures import drawing_plane, skeleton
 
 POSTURES = 7
 

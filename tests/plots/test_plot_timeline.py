@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection, QuadMesh
 
-from brachis.bottleneck import limit_ratios, saturations
-from brachis.plots import plot_timeline
+from brachis.apps.bottleneck import limit_ratios, saturations
+from brachis.apps.plots import plot_timeline
 
 
 def rows(ax):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from brachis.plots import plot_torques
+from brachis.apps.plots import plot_torques
 
 INF = float("inf")
 

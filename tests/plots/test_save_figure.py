@@ -8,8 +8,8 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
+from brachis.apps.plots import PLOTS, SUFFIXES, plot_torques, save_figure, style
 from brachis.errors import InputError
-from brachis.plots import PLOTS, SUFFIXES, plot_torques, save_figure, style
 
 MAGIC = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
 

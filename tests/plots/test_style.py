@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 
-from brachis.plots import plot_motion
-from brachis.plots.style import joint_style
+from brachis.apps.plots import plot_motion
+from brachis.apps.plots.style import joint_style
 
 
 def test_line_styles_differ_from_the_first_joint_on():

@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brachis.export import export_csv
+from brachis.apps.export import export_csv
+from brachis.apps.recording import import_motion
 from brachis.planner import plan
-from brachis.recording import import_motion
 from support.effort import QUICK
 
 ROOT = Path(__file__).parents[2]

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from brachis.apps.recording import Units, read_recording
 from brachis.errors import InputError, TaskError
-from brachis.recording import Units, read_recording
 from brachis.robot import Robot
 
 from .conftest import ROOT, SCARA

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis import bottleneck, comparison, export, plan, plots
+from brachis.apps import bottleneck, comparison, export, plots
+from brachis.apps.recording import Units, import_motion, read_recording
+from brachis.apps.recording.nodes import nodes_of
+from brachis.apps.recording.recording import Recording
 from brachis.errors import InputError, PathError, ResultFileError
-from brachis.recording import Units, import_motion, read_recording
-from brachis.recording.nodes import nodes_of
-from brachis.recording.recording import Recording
+from brachis.planner import plan
 from brachis.robot import Robot
 from brachis.trajectory import Recovered, Trajectory
 from brachis.verify import verify_trajectory

@@ -10,7 +10,7 @@ import yaml
 
 import brachis
 from brachis.kinematics import JointState
-from brachis.refine.reversals import reversals
+from brachis.optimise.refine import reversals
 from brachis.robot import Friction
 
 COUNT = 61

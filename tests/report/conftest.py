@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.report import make_report
+from brachis.apps.report import make_report
 from support.effort import QUICK
 
 SMALL = {"search": QUICK, "spline": {"intervals": 8}}

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis.apps.report import make_report, tables
+from brachis.apps.report.figures import motion_figure
+from brachis.apps.report.motion import reported_motion
+from brachis.apps.report.page import _plotly
 from brachis.errors import NotInstalledError
-from brachis.plausibility import Remark
-from brachis.report import make_report, tables
-from brachis.report.figures import motion_figure
-from brachis.report.motion import reported_motion
-from brachis.report.whole import _plotly
 from brachis.robot.from_task import robot_from_settings
+from brachis.robot.plausibility import Remark
 
 from .conftest import data_of, floats
 

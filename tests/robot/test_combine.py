@@ -11,7 +11,7 @@ import pytest
 import brachis
 from brachis.errors import InputError, TaskError, UnknownNameError
 from brachis.robot import Robot, bind
-from brachis.robot.combine import robot_for
+from brachis.robot.from_task import robot_for
 from brachis.task import RobotSettings, check_robot_settings
 
 ROOT = Path(__file__).parents[2]

@@ -10,9 +10,8 @@ import pytest
 
 import brachis
 from brachis.errors import InputError, LimitError, TaskError
-from brachis.robot import Robot, bind, dynamics, in_use
-from brachis.robot.combine import robot_for
-from brachis.robot.from_task import robot_from_settings
+from brachis.robot import Robot, bind, dynamics
+from brachis.robot.from_task import in_use, robot_for, robot_from_settings
 from brachis.task import check_robot_settings
 from support.chains import Joint, chain_urdf, planar_urdf
 

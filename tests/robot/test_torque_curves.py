@@ -7,7 +7,7 @@ import pytest
 
 from brachis.errors import InputError, LimitError, UnknownNameError
 from brachis.robot import bind
-from brachis.robot.combine import robot_for
+from brachis.robot.from_task import robot_for
 from brachis.task import LimitScale, LimitSpec, RobotSettings
 from support.chains import planar_robot
 from support.spatial import rail_arm

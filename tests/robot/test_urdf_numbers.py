@@ -10,8 +10,7 @@ from brachis import LimitSpec
 from brachis.errors import UrdfError
 from brachis.robot import Robot
 from brachis.robot.urdf_bodies import check_bodies, stated_chain
-from brachis.robot.urdf_numbers import check_numbers
-from brachis.robot.urdf_tree import read_tree
+from brachis.robot.urdf_elements import check_numbers, read_tree
 from support.chains import INERTIAL, Joint, chain_urdf, planar_urdf
 
 TURN = Joint("revolute", xyz=(0.4, 0.0, 0.0))

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 import brachis
-from brachis.deadline import NEVER
+from brachis.common.deadline import NEVER
 from brachis.kinematics import CHART
-from brachis.problem import Problem, decompositions_of
+from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.schedule import batches

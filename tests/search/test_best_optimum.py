@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.problem import Problem
+from brachis.problem.problem import Problem
 
 ROOT = Path(__file__).parents[2]
 RESTARTS = 4

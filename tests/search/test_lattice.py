@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.deadline import Deadline
+from brachis.common.deadline import Deadline
 from brachis.errors import PathError, PlanningError
-from brachis.problem import Problem, decompositions_of
+from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.closed_form_lattice import ClosedFormLattice
-from brachis.search.explain import no_motion
+from brachis.search.failure import no_motion
 from brachis.search.joint_path import DeadEnd
 from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.starts import lattice_starts

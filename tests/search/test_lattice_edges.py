@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.problem import Problem, decompositions_of
+from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.closed_form_lattice import ClosedFormLattice
 from brachis.search.joint_path import DeadEnd
-from brachis.search.stations import stations
+from brachis.search.lattice import stations
 
 ROOT = Path(__file__).parents[2]
 SCARA = ROOT / "robots/scara3/robot.urdf"

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from brachis.search import pacing
+from brachis.search import phase_plane
 from brachis.task import load_task
 
 TASK = {
@@ -21,8 +21,8 @@ TASK = {
 
 def breaks(times: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> np.ndarray:
     start = SimpleNamespace(problem=SimpleNamespace(task=load_task(TASK)))
-    monkeypatch.setattr(pacing, "_paced", lambda _start: (np.linspace(0.0, 1.0, len(times))[:, None], times))
-    return pacing.first_breaks(start)
+    monkeypatch.setattr(phase_plane, "_paced", lambda _start: (np.linspace(0.0, 1.0, len(times))[:, None], times))
+    return phase_plane.first_breaks(start)
 
 
 def test_a_constant_speed_has_even_knots(monkeypatch):
@@ -43,7 +43,7 @@ def test_knots_are_closer_where_the_speed_changes(monkeypatch):
 
 
 def test_intervals_grow_by_half_with_their_distance_from_a_switch():
-    found = pacing._graded(np.array([0.0, 0.3, 1.0]), 24)
+    found = phase_plane._graded(np.array([0.0, 0.3, 1.0]), 24)
     lengths, middle = np.diff(found), 0.5 * (found[1:] + found[:-1])
     away = np.abs(middle[:, None] - [0.0, 0.3, 1.0]).min(axis=1)
     assert len(lengths) == 24
@@ -53,6 +53,6 @@ def test_intervals_grow_by_half_with_their_distance_from_a_switch():
 
 
 def test_more_intervals_than_switches_need_are_spread_over_the_whole_time():
-    lengths = np.diff(pacing._graded(np.array([0.0, 0.3, 1.0]), 400))
+    lengths = np.diff(phase_plane._graded(np.array([0.0, 0.3, 1.0]), 400))
     assert lengths.min() > 1e-6
     assert lengths.max() < 0.04

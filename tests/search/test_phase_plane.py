@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.limits.joint_rate import build_acceleration, build_velocity
+from brachis.limits.joint import build_acceleration, build_velocity
 from brachis.limits.torque import build_torque
 from brachis.robot import dynamics
 from brachis.search import phase_plane

@@ -16,19 +16,19 @@ import pytest
 
 import brachis
 from brachis import planner
-from brachis.deadline import Deadline
+from brachis.apps.plots import plot_candidates
+from brachis.common.deadline import Deadline
 from brachis.errors import PlanningError, TaskError, UnknownNameError
 from brachis.kinematics import CHART
-from brachis.plots import plot_candidates
-from brachis.problem import Problem, decompositions_of
+from brachis.optimise.backends import child_process, uno
+from brachis.problem.problem import Problem, decompositions_of
 from brachis.search import chart_starts, record, schedule, starts
 from brachis.search.closed_form_lattice import ClosedFormLattice
+from brachis.search.failure import reason_out_of_reach
 from brachis.search.joint_path import DeadEnd
 from brachis.search.levels import SEARCH_LEVELS
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.processes import processes
-from brachis.search.reach import reason_out_of_reach
-from brachis.solvers import apart, uno
 from brachis.task import load_task
 
 ROOT = Path(__file__).parents[2]
@@ -263,7 +263,7 @@ class Clock:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 0.0
         self._monkeypatch = monkeypatch
-        monkeypatch.setattr("brachis.deadline.time.monotonic", lambda: self.now)
+        monkeypatch.setattr("brachis.common.deadline.time.monotonic", lambda: self.now)
 
     def jump(self, where: Any, name: str, *, at: int, by: float = 90.0) -> list[int]:
         """Jump at the end of the `at`-th call of a function, and of every later one; the calls are counted."""
@@ -397,7 +397,7 @@ def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(robot, monkeyp
         return time.sleep(1e6) if len(x) > 60 else honest(watch, x, *rest)
 
     monkeypatch.setattr(uno, "_run", hanging)
-    monkeypatch.setattr(apart, "ENTRIES", 60 * 300)
+    monkeypatch.setattr(child_process, "ENTRIES", 60 * 300)
     result = brachis.plan(robot, task(redundant_joints=["j1"], spline={"intervals": 100}, search={"time_limit": 5.0}))
     assert result.verified
     assert "the motion has 25 of 100 intervals, of which more were not solved" in result.undone

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.deadline import Deadline
-from brachis.problem import Problem, decompositions_of
+from brachis.common.deadline import Deadline
+from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import dynamics
 from brachis.robot.from_task import robot_from_settings
 from brachis.search.closed_form_lattice import ClosedFormLattice

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import brachis
-from brachis.deadline import Deadline
+from brachis.common.deadline import Deadline
 from brachis.errors import PlanningError, Remedy
 from brachis.search import try_remedies
 

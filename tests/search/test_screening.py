@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brachis.deadline import NEVER, Deadline
-from brachis.problem import Problem, decompositions_of
+from brachis.common.deadline import NEVER, Deadline
+from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.search import screening
 from brachis.search.chart_starts import chart_starts

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brachis.problem import Problem, decompositions_of
+from brachis.problem.problem import Problem, decompositions_of
 from brachis.robot import Robot
 from brachis.search import chart_starts as module
 from brachis.search.joint_path import JointPath
 from brachis.search.levels import SEARCH_LEVELS
-from brachis.search.variations import varied
+from brachis.search.starts import varied
 from brachis.task import load_task
 
 URDF = Path(__file__).parents[2] / "robots/iiwa14/robot.urdf"

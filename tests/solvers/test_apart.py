@@ -12,7 +12,7 @@ import time
 import numpy as np
 import pytest
 
-from brachis.solvers import SolverOptions, SolveStatus, apart, solver_named, uno
+from brachis.optimise.backends import SolverOptions, SolveStatus, child_process, solver_named, uno
 from support.programs import disc
 
 pytestmark = pytest.mark.skipif(
@@ -23,7 +23,7 @@ START, OPTIONS = np.array([4.0, 0.5]), SolverOptions()
 
 @pytest.fixture(autouse=True)
 def everything_is_large(monkeypatch):
-    monkeypatch.setattr(apart, "ENTRIES", 0)
+    monkeypatch.setattr(child_process, "ENTRIES", 0)
 
 
 def own_children() -> list[str]:
@@ -39,7 +39,7 @@ def solve(options=OPTIONS, progress=None, name="uno"):
 def test_the_answer_and_the_progress_are_those_of_a_solve_here(name, monkeypatch):
     calls: dict[str, list] = {"apart": [], "here": []}
     far = solve(progress=lambda *call: calls["apart"].append(call), name=name)
-    monkeypatch.setattr(apart, "ENTRIES", 10)
+    monkeypatch.setattr(child_process, "ENTRIES", 10)
     near = solve(progress=lambda *call: calls["here"].append(call), name=name)
     assert calls["here"]
     np.testing.assert_allclose(calls["apart"], calls["here"], atol=1e-6)  # another process may have other BLAS threads
@@ -67,7 +67,8 @@ def test_the_system_ends_it_even_if_nobody_waits(monkeypatch):
     context = multiprocessing.get_context("fork")
     _, sender = context.Pipe(duplex=False)
     process = context.Process(
-        target=apart._work, args=(sender, "brachis.solvers.uno", disc(), START, SolverOptions(time_limit=0.05))
+        target=child_process._work,
+        args=(sender, "brachis.optimise.backends.uno", disc(), START, SolverOptions(time_limit=0.05)),
     )
     process.start()
     process.join()
@@ -97,5 +98,7 @@ def test_ctrl_c_ends_it():
 
 def test_a_process_that_may_start_none_solves_itself(monkeypatch):
     monkeypatch.setitem(multiprocessing.current_process()._config, "daemon", 1)
-    monkeypatch.setattr(apart, "_solve_apart", lambda *_: pytest.fail("a daemonic process may have no children"))
+    monkeypatch.setattr(
+        child_process, "_solve_apart", lambda *_: pytest.fail("a daemonic process may have no children")
+    )
     assert solve().status is SolveStatus.OPTIMAL

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from brachis.errors import UnknownNameError, UnreachableError
-from brachis.solvers import AUTO_ORDER, NAMES, SolverOptions, SolveStatus, residual, solver_named
-from brachis.solvers.registry import TABLE
-from brachis.solvers.watch import Watch
+from brachis.optimise.backends import AUTO_ORDER, NAMES, SolverOptions, SolveStatus, residual, solver_named
+from brachis.optimise.backends.monitor import Watch
+from brachis.optimise.backends.registry import TABLE
 from support.programs import bounded, corner, curved, disc, impossible
 
 OPTIONS = SolverOptions()

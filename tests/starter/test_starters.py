@@ -10,13 +10,10 @@ import pytest
 import yaml
 
 import brachis
+from brachis.apps.starter import Starter, choices, placeholders, starter_task, task_text
 from brachis.errors import PlanningError, UrdfError
 from brachis.robot import bind
 from brachis.robot.limits import UrdfLimit
-from brachis.starter import Starter, starter_task
-from brachis.starter.choice import choices
-from brachis.starter.missing import placeholders
-from brachis.starter.text import task_text
 from brachis.task import LimitSpec
 from support.chains import Joint, chain_urdf
 

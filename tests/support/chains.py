@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from brachis.nlp import Program
+from brachis.optimise.program import Program
 from brachis.planner import transcribe
 from brachis.robot import Robot
 from brachis.task import load_task

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from brachis.cli.main import main
+from brachis.apps.cli.main import main
 
 
 def code_of(*arguments: object, columns: int = 200) -> int:

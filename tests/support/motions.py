@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from brachis.feasibility import branch_of
 from brachis.ik import find
 from brachis.kinematics import ChartMap, ClosedFormMap, JointDerivatives
 from brachis.path import build_path
+from brachis.problem.feasibility import branch_of
 from brachis.robot import Robot, task_map_of
 from brachis.task import load_task
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from brachis.nlp import Phase, Program
+from brachis.optimise.phase import Phase
+from brachis.optimise.program import Program
 from brachis.task import FROM_URDF, LimitSpec
 from support.chains import planar_robot, program_of
 from support.starts import starting_points

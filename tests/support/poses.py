@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from brachis.path import PosePath, build_path
-from brachis.robot.task_map.rows import POSE_ROWS
+from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import load_task
 
 START = np.array([0.5, 0.1, 0.3])

@@ -1,4 +1,4 @@
-"""Small nonlinear programs with known optima that implement `brachis.solvers.Problem`."""
+"""Small nonlinear programs with known optima that implement `brachis.optimise.backends.Problem`."""
 
 from __future__ import annotations
 

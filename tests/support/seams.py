@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.cam.points import Points
+from brachis.task.points.points import Points
 
 Array = np.ndarray
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from brachis.nlp import Program
-from brachis.nlp.differential_ik import differential_ik_paths
-from brachis.nlp.guess import starting_point
+from brachis.optimise.guess import starting_point
+from brachis.optimise.program import Program
+from brachis.search.differential_ik import differential_ik_paths
 
 
 def starting_points(program: Program) -> Iterator[np.ndarray]:

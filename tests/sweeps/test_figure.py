@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from brachis.apps.sweeps.figure import plot_sweep
 from brachis.errors import InputError, UnknownNameError
-from brachis.sweeps.figure import plot_sweep
 
 
 def row(t_end, **keys):

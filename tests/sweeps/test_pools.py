@@ -11,11 +11,8 @@ from pathlib import Path
 import pytest
 
 import brachis
+from brachis.apps.sweeps.pools import Outcome, as_completed, on_dask, pool_for
 from brachis.errors import ClusterError, InputError
-from brachis.sweeps.clusters import on_dask
-from brachis.sweeps.completed import as_completed
-from brachis.sweeps.pools import pool_for
-from brachis.sweeps.worker import Outcome
 
 DASK = Path(sys.executable).with_name("dask")
 WAIT = 120.0
@@ -52,7 +49,7 @@ def test_a_plan_that_ends_its_process_fails_and_no_other(monkeypatch):
             processes.work()
         return {future for future in futures if future.done()}, None
 
-    monkeypatch.setattr("brachis.sweeps.completed.wait", wait)
+    monkeypatch.setattr("brachis.apps.sweeps.pools.wait", wait)
     found = dict(as_completed(range(10), processes.submit, lambda: 3))
     assert sorted(found) == list(range(10))
     assert processes.most == 3
@@ -119,7 +116,7 @@ def test_a_sweep_on_dask_survives_a_worker_that_is_killed(cluster, content, tmp_
 
 def test_no_scheduler_answers(content, tmp_path, monkeypatch):
     pytest.importorskip("distributed", reason="Dask is not installed: pip install 'brachis[cluster]'")
-    monkeypatch.setattr("brachis.sweeps.clusters._CONNECTING", 0.1)
+    monkeypatch.setattr("brachis.apps.sweeps.pools._CONNECTING", 0.1)
     with pytest.raises(ClusterError, match=r"tcp://127\.0\.0\.1:9: no Dask scheduler answers"):
         brachis.sweep(content, tmp_path / "out", scheduler="tcp://127.0.0.1:9")
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
+from brachis.apps.sweeps import SweepSettings
+from brachis.apps.sweeps.plans import Plan, load_sweep
+from brachis.apps.sweeps.result import COLUMNS
 from brachis.errors import TaskError
-from brachis.sweeps import SweepSettings
-from brachis.sweeps.plans import Plan, load_sweep
-from brachis.sweeps.store import COLUMNS
 from brachis.task import Task
 
 ROOT = Path(__file__).parents[2]

@@ -14,9 +14,9 @@ import pytest
 import yaml
 
 import brachis
+from brachis.apps.sweeps import run
+from brachis.apps.sweeps.pools import planned
 from brachis.errors import InputError, TaskError
-from brachis.sweeps import run
-from brachis.sweeps.worker import planned
 
 WAIT = 120.0
 

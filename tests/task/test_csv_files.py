@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from brachis.errors import PathError, TaskError
 from brachis.path import Path as TaskPath
 from brachis.path import build_path
-from brachis.robot.task_map.rows import POSE_ROWS
+from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import CsvSegment, SplineSegment, SplineThrough, Task, load_task
 from support.poses import pose
 

@@ -12,8 +12,7 @@ import yaml
 import brachis
 from brachis.errors import InputError, TaskError, UnknownNameError
 from brachis.robot import Robot
-from brachis.robot.combine import robot_for
-from brachis.robot.from_task import robot_from_settings
+from brachis.robot.from_task import robot_for, robot_from_settings
 from brachis.task import RobotSettings, load_task, read_limits
 
 ROOT = Path(__file__).parents[2]

@@ -9,12 +9,12 @@ import pytest
 import yaml
 
 import brachis
-from brachis.bspline import insert_knots
 from brachis.errors import InputError
+from brachis.optimise.bspline import insert_knots
 from brachis.robot import dynamics
 from brachis.robot.limits import MAGNITUDES
 from brachis.task import ProcessSpeed
-from brachis.task.tool_limits import ToolLimits
+from brachis.task.limit_models import ToolLimits
 from brachis.verify import verify_trajectory
 from support.effort import QUICK
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from brachis.verify.polynomials import roots, turns, values_of
+from brachis.verify.motion import roots, turns, values_of
 
 
 def powers_of(c):

@@ -9,7 +9,7 @@ import pytest
 
 import brachis
 from brachis import Trajectory, verify_trajectory
-from brachis.export import export_csv
+from brachis.apps.export import export_csv
 from support.effort import QUICK
 from support.spatial import START, rail_arm
 

@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from brachis.apps.view.bodies import bodies_of, placements
 from brachis.robot import Robot
-from brachis.view.bodies import bodies_of
-from brachis.view.placements import placements
 from support.shown import PANDA, ROBOTS
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from brachis.apps.view import Viewer
 from brachis.planner import plan
 from brachis.task import load_task
-from brachis.view import Viewer
 from support.shown import ROOT
 
 pytest.importorskip("viser", reason="viser is not installed")

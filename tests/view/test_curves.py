@@ -3,9 +3,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from brachis.apps.view.curves import all_curves
 from brachis.robot import Robot
 from brachis.task import ToolLimits
-from brachis.view.curves import all_curves
 from support.shown import ROBOTS
 
 

@@ -1,6 +1,6 @@
 import pytest
 
-from brachis.view.playback import RATES, Playback, first_rate
+from brachis.apps.view.panel import RATES, Playback, first_rate
 
 
 @pytest.mark.parametrize(("t_end", "rate"), [(10.0, 1.0), (3.0, 1.0), (2.0, 0.5), (0.4, 0.1), (0.001, RATES[0])])

@@ -6,9 +6,9 @@ import urllib.request
 
 import pytest
 
+from brachis.apps.view import require_viser
+from brachis.apps.view.server import LOOPBACK, is_local, start_server
 from brachis.errors import InputError, NotInstalledError
-from brachis.view import require_viser
-from brachis.view.server import LOOPBACK, is_local, start_server
 
 pytest.importorskip("viser", reason="viser is not installed")
 
@@ -56,7 +56,7 @@ def test_a_port_in_use_is_refused_and_left_out_the_next_one_is_taken(server, mon
     taken = server.get_port()
     with pytest.raises(InputError, match=rf"the port is in use; found {taken} on 127.0.0.1.*next free one"):
         start_server(LOOPBACK, taken)
-    monkeypatch.setattr("brachis.view.server.FIRST_PORT", taken)
+    monkeypatch.setattr("brachis.apps.view.server.FIRST_PORT", taken)
     other = start_server(LOOPBACK, None)
     try:
         assert taken < other.get_port() < taken + 100
@@ -65,7 +65,7 @@ def test_a_port_in_use_is_refused_and_left_out_the_next_one_is_taken(server, mon
 
 
 def test_a_port_that_somebody_takes_in_between_is_refused_as_well(server, monkeypatch):
-    monkeypatch.setattr("brachis.view.server._check", lambda *_address: None)
+    monkeypatch.setattr("brachis.apps.view.server._check", lambda *_address: None)
     with pytest.raises(InputError, match="the port is in use"):
         start_server(LOOPBACK, server.get_port())
 

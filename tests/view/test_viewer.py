@@ -8,14 +8,14 @@ from unittest.mock import ANY
 import numpy as np
 import pytest
 
-from brachis.plots.style import COLOURS
+from brachis.apps.plots.style import COLOURS
+from brachis.apps.view import Viewer
+from brachis.apps.view.bodies import placements
+from brachis.apps.view.panel import look
+from brachis.apps.view.scene import LAYERS
+from brachis.apps.view.tables import candidates_table, state_table, summary
 from brachis.robot import Robot
 from brachis.search.record import SAME_MOTION
-from brachis.view import Viewer
-from brachis.view.charts import look
-from brachis.view.placements import placements
-from brachis.view.scene import LAYERS
-from brachis.view.tables import candidates_table, state_table, summary
 from support.shown import PANDA, ROOT
 
 pytest.importorskip("viser", reason="viser is not installed")

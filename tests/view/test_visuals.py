@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from brachis.files import mesh_file
-from brachis.view.visuals import link_shapes
+from brachis.apps.view.bodies import link_shapes
+from brachis.common.files import mesh_file
 from support.shown import PANDA, ROBOTS
 
 LINK = '<robot name="r"><link name="a"><visual><origin xyz="1 0 0"/><geometry>{}</geometry>{}</visual></link></robot>'

@@ -9,12 +9,10 @@ Examples
 ('planar', ('elbow_positive', 'elbow_negative'))
 """
 
-from brachis.ik.advice import NO_CLOSED_FORM, missing_eaik
 from brachis.ik.check import check_answers
-from brachis.ik.geometry import ChainGeometry, PosedScrews
-from brachis.ik.natural_space import natural_space
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError, ik_family, margin_gradient
-from brachis.ik.registry import BUILTIN, Candidate, Match, find, find_all
+from brachis.ik.registry import BUILTIN, NO_CLOSED_FORM, Candidate, Match, find, find_all, missing_eaik, natural_space
+from brachis.ik.screws import ChainGeometry, PosedScrews
 
 __all__ = [
     "BUILTIN",

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.ik.geometry import ChainGeometry
-from brachis.ik.pose_joints import determinant
+from brachis.ik.arm import determinant
 from brachis.ik.protocol import IKSolver
-from brachis.robot.joint_space import TURN
+from brachis.ik.screws import ChainGeometry
+from brachis.robot.joints import TURN
 
 _SAME = 1e-5
 """Answers whose angles (rad) and slides (m, in proportion to their size) differ by less are the same."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.ik.geometry import ChainGeometry
 from brachis.ik.protocol import IKSolver, NotApplicableError
+from brachis.ik.screws import ChainGeometry
 from brachis.robot import Robot, TaskMap
-from brachis.robot.joint_space import complement, difference
+from brachis.robot.joints import complement, difference
 
 _CHECKED_POSTURES = 100
 _INSIDE = 1e-2

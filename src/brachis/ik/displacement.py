@@ -15,10 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.ik.geometry import ChainGeometry
-from brachis.ik.screws import Screw
+from brachis.ik.screws import ChainGeometry, Screw
 from brachis.ik.vectors import apply, apply_inverse
-from brachis.robot.joint_space import complement
+from brachis.robot.joints import complement
 
 
 @dataclass(frozen=True)

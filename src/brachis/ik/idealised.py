@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from brachis.ik.geometry import ChainGeometry
 from brachis.ik.polish import goal_of, polished
 from brachis.ik.protocol import IKSolver
+from brachis.ik.screws import ChainGeometry
 from brachis.ik.vectors import meeting_point
 from brachis.robot import TaskMap
-from brachis.robot.joint_space import complement
+from brachis.robot.joints import complement
 from brachis.robot.task_map import Pose
 
 TOLERANCE = 1e-4

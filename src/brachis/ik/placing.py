@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.arrays import cross
+from brachis.common.arrays import cross
 from brachis.ik.arm import Arm
 from brachis.ik.screws import Screw
 from brachis.ik.vectors import across, angle_about, dot

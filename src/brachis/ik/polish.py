@@ -19,8 +19,8 @@ from typing import Protocol
 
 import numpy as np
 
-from brachis.arrays import cross
-from brachis.ik.geometry import ChainGeometry, PosedScrews
+from brachis.common.arrays import cross
+from brachis.ik.screws import ChainGeometry, PosedScrews
 from brachis.ik.vectors import apply, apply_inverse
 from brachis.robot import TaskMap
 from brachis.robot.task_map import Pose

@@ -42,14 +42,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from brachis.ik.arm import PoseJoints, determinant, largest_determinant, random_postures
 from brachis.ik.by_sign import SignSolver
 from brachis.ik.displacement import Displacement
-from brachis.ik.geometry import ChainGeometry
 from brachis.ik.polish import Poses
 from brachis.ik.polynomial_answers import joints_of_roots
 from brachis.ik.polynomial_equations import Equations
-from brachis.ik.pose_joints import PoseJoints, determinant, largest_determinant, random_postures
 from brachis.ik.protocol import Kind, NotApplicableError, ik_family
+from brachis.ik.screws import ChainGeometry
 from brachis.ik.trigonometric import real_roots, sample_angles
 from brachis.ik.vectors import dot, wrap
 from brachis.robot import TaskMap

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.arrays import cross
+from brachis.common.arrays import cross
 from brachis.ik.displacement import Displacement
 from brachis.ik.vectors import apply, dot, meeting_point, perpendiculars
 

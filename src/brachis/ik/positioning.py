@@ -22,14 +22,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.errors import write_count
-from brachis.ik.arm import Arm
-from brachis.ik.factored_solver import FactoredSolver, PlacingStructure, fitted
-from brachis.ik.geometry import ChainGeometry, PosedScrews
-from brachis.ik.pose_joints import random_postures
-from brachis.ik.position_recipes import recipe_for
+from brachis.ik.arm import Arm, RemainingJoints, random_postures
+from brachis.ik.factored_solver import FactoredSolver, PlacingStructure, fitted, recipe_for
 from brachis.ik.protocol import NotApplicableError, ik_family
-from brachis.ik.remaining_joints import RemainingJoints
-from brachis.ik.screws import Screw
+from brachis.ik.screws import ChainGeometry, PosedScrews, Screw
 from brachis.robot import TaskMap
 from brachis.robot.task_map import Pose
 

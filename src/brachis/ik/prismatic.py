@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.ik.geometry import ChainGeometry
 from brachis.ik.protocol import IKSolver, Kind, NotApplicableError, ik_family
+from brachis.ik.screws import ChainGeometry
 from brachis.robot import TaskMap
-from brachis.robot.joint_space import complement
+from brachis.robot.joints import complement
 from brachis.robot.task_map import Pose, RowsAndYaw
 
 _SAMPLES = 64

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from brachis.ik.geometry import ChainGeometry
+from brachis.ik.screws import ChainGeometry
 from brachis.robot import TaskMap
 
 Kind = Literal["closed_form", "polynomial"]

@@ -5,6 +5,10 @@ entries are `Family` objects (see `ik_family`). No answer is believed: a solver 
 been put into the chain's forward kinematics (`check`).
 
 Where no family fits the chain as it is, the ideal one is tried that it almost is (`idealised`); answers are polished.
+
+What is said of closed forms that a robot lacks.
+
+The most that a robot can prescribe for its tool.
 """
 
 from __future__ import annotations
@@ -16,10 +20,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
+import numpy as np
+
 from brachis.errors import DecompositionError, UnknownNameError, write_count
 from brachis.ik.check import check_answers
-from brachis.ik.eaik import eaik
-from brachis.ik.geometry import ChainGeometry
+from brachis.ik.eaik import NOT_INSTALLED, eaik
 from brachis.ik.idealised import TOLERANCE, Ideal, Polished, idealised
 from brachis.ik.parallel_axes import parallel_axes
 from brachis.ik.planar import planar
@@ -27,9 +32,11 @@ from brachis.ik.polynomial import polynomial
 from brachis.ik.positioning import positioning
 from brachis.ik.prismatic import prismatic
 from brachis.ik.protocol import Family, IKSolver, NotApplicableError
+from brachis.ik.screws import ChainGeometry
 from brachis.ik.spherical_wrist import spherical_wrist
 from brachis.robot import Robot, TaskMap
 from brachis.robot.task_map import JointSpace
+from brachis.robot.task_map.protocol import AXES, POSE_ROWS
 
 BUILTIN: tuple[Family, ...] = (prismatic, planar, positioning, spherical_wrist, parallel_axes, eaik, polynomial)
 
@@ -218,3 +225,48 @@ def _name_rounding(
                 f"fits an ideal arm only, and its axes are up to {ideal.miss} from there; at most {TOLERANCE:.0e} is "
                 "taken for rounding. If the URDF rounds angles, as in 1.57, write them with more digits"
             )
+
+
+NO_CLOSED_FORM = (
+    "no choice of redundant joints has a closed form: motions are planned from differential inverse kinematics"
+)
+"""Of a robot and a task space without any."""
+_INSTALLING = "installing it takes a C++ compiler except on macOS and on Linux for x86_64 with Python 3.13 or older"
+"""What installing EAIK may ask for; where it has wheels it comes with brachis."""
+
+
+def missing_eaik(candidates: Sequence[Candidate]) -> str:
+    """Say which choices of redundant joints EAIK might add, and how to get it.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        All choices, as `find_all` returns them.
+
+    Returns
+    -------
+    str
+        A sentence without its full stop; empty where EAIK is installed or would add nothing.
+    """
+    further = [
+        candidate.redundant_joints
+        for candidate in candidates
+        if candidate.solver is None and candidate.reasons.get(eaik.name) == NOT_INSTALLED
+    ]
+    if not further:
+        return ""
+    names = ", ".join("[" + ", ".join(joints) + "]" for joints in further)
+    return f"{NOT_INSTALLED}; it might add the redundant joints {names}; {_INSTALLING}"
+
+
+_PARALLEL = 1e-9
+
+
+def natural_space(robot: Robot) -> str | list[str]:
+    """Return the task space of a whole pose, of three rows, or of those of the plane in which a robot moves."""
+    geometry = ChainGeometry.of(robot)
+    along = np.abs(np.where(geometry.revolute[:, None], 1.0 - np.abs(geometry.axes), np.abs(geometry.axes)))
+    normals = np.flatnonzero(np.all(along < _PARALLEL, axis=0))
+    if len(normals):
+        return [row for i, row in enumerate(AXES) if i != normals[0]][: robot.n]
+    return "pose" if robot.n >= len(POSE_ROWS) else list(AXES[: robot.n])

@@ -29,18 +29,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.arrays import cross
-from brachis.ik.arm import Anchor, Arm, meeting, miss
+from brachis.common.arrays import cross
+from brachis.ik.arm import Anchor, Arm, PoseJoints, RemainingJoints, meeting, miss
 from brachis.ik.displacement import Displacement
-from brachis.ik.factored_solver import FactoredSolver, PlacingStructure, fitted
-from brachis.ik.factors import Factor
-from brachis.ik.geometry import ChainGeometry, PosedScrews
+from brachis.ik.factored_solver import Factor, FactoredSolver, PlacingStructure, fitted, recipe_for
 from brachis.ik.placing import FLIP
-from brachis.ik.pose_joints import PoseJoints
-from brachis.ik.position_recipes import recipe_for
 from brachis.ik.protocol import NotApplicableError, ik_family
-from brachis.ik.remaining_joints import RemainingJoints
-from brachis.ik.screws import Circle, Screw
+from brachis.ik.screws import ChainGeometry, Circle, PosedScrews, Screw
 from brachis.ik.vectors import angle_about, apply, apply_inverse, dot
 from brachis.robot import TaskMap
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.arrays import cross
+from brachis.common.arrays import cross
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -1,13 +1,11 @@
 """Joint maps: joint motion and its derivatives from curves y, such as (s, q_r)."""
 
-from brachis.kinematics.chart import CHART, ChartMap
-from brachis.kinematics.chart_rows import ChartRows
+from brachis.kinematics.chart import CHART, ChartMap, ChartRows
 from brachis.kinematics.charting import chart_around, moving_most, transversality
 from brachis.kinematics.closed_form import ClosedFormMap
-from brachis.kinematics.direct import DirectJointMap
 from brachis.kinematics.interpolation import Nodes, interpolate
 from brachis.kinematics.joint_map import JointDerivatives, JointMap, JointState
-from brachis.kinematics.joint_space import JointSpaceMap
+from brachis.kinematics.joint_space import DirectJointMap, JointSpaceMap
 from brachis.kinematics.newton import Newton, null_spaces, solved_each
 
 __all__ = [

@@ -13,8 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.errors import UnreachableError
-from brachis.kinematics.chart import ChartMap
-from brachis.kinematics.chart_rows import DEGREE, ChartRows
+from brachis.kinematics.chart import DEGREE, ChartMap, ChartRows
 from brachis.kinematics.newton import Newton, null_spaces
 from brachis.path import Path
 from brachis.robot import TaskMap

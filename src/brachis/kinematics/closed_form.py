@@ -26,7 +26,7 @@ from brachis.ik import IKSolver, margin_gradient
 from brachis.kinematics.joint_map import JointDerivatives, JointState, PathState
 from brachis.path import Path, PathSample
 from brachis.robot import TaskMap
-from brachis.robot.joint_space import TURN, complement, difference, in_turn_of
+from brachis.robot.joints import TURN, complement, difference, in_turn_of
 
 _SURE = 0.25
 """A step that differs from its prediction by more than this part of a turn is not counted."""

@@ -24,7 +24,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from brachis.arrays import rates
+from brachis.common.arrays import rates
 from brachis.path import Path, PathSample
 from brachis.robot import Robot
 from brachis.robot.dynamics import SharedTorques

@@ -16,31 +16,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from brachis.custom_limits import LimitModel, custom_limits
-from brachis.limits.torque import build_torque
-from brachis.limits.position import build_position
-from brachis.limits.tool_speed import build_tool_speed
-from brachis.limits.tool_acceleration import build_tool_acceleration
-from brachis.limits.tool_angular_speed import build_tool_angular_speed
-from brachis.limits.rms_torque import build_rms_torque
-from brachis.limits.torque_rate import build_torque_rate
-from brachis.limits.torque_speed import build_torque_speed
-from brachis.limits.power import build_power, build_total_power
-from brachis.limits.process_speed import build_process_speed, build_least_process_speed
-from brachis.limits.joint_rate import build_velocity, build_acceleration, build_jerk
 from brachis.limits.checks import bound_limits
-from brachis.limits.protocol import (
-    Approach,
-    Bound,
-    JointMotion,
-    Label,
-    Limit,
-    Moments,
-    Partials,
-    PhaseLines,
-    Role,
-)
+from brachis.limits.joint import build_acceleration, build_jerk, build_position, build_velocity
+from brachis.limits.power import build_power, build_total_power
+from brachis.limits.process_speed import build_least_process_speed, build_process_speed
+from brachis.limits.protocol import Approach, Bound, JointMotion, Label, Limit, Moments, Partials, PhaseLines, Role
+from brachis.limits.tool import build_tool_acceleration, build_tool_angular_speed, build_tool_speed
+from brachis.limits.torque import build_rms_torque, build_torque, build_torque_rate, build_torque_speed
 from brachis.robot import Robot
+from brachis.robot.custom_limits import LimitModel, custom_limits
 from brachis.task import Task
 
 Build = Callable[[Robot, Task], Limit | None]

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.arguments import check_list
-from brachis.custom_limits import LimitModel
+from brachis.common.arguments import check_list
 from brachis.errors import InputError
 from brachis.limits.protocol import Label, Limit, Moments, Partials
 from brachis.robot import Robot
+from brachis.robot.custom_limits import LimitModel
 
 _MOMENTS = 2
 """Moments at which a limit is tried; two tell (K, c) from (c,)."""

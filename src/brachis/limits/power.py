@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.limits.per_joint import JointRatioLimit
+from brachis.limits.joint import JointRatioLimit
 from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials
 from brachis.robot import Robot
 from brachis.task import Task

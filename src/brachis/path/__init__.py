@@ -1,14 +1,11 @@
 """The prescribed path and its derivatives by the path coordinate, up to the third."""
 
-from brachis.path.build import build_path
-from brachis.path.ends import check_closed, path_speed
-from brachis.path.feed_table import with_feed_rates
+from brachis.path.build import build_path, check_on_path, path_of
 from brachis.path.frame import PathFrame
-from brachis.path.from_curve import bspline_segment
-from brachis.path.origin import check_on_path, path_of
+from brachis.path.from_curve import bspline_segment, with_feed_rates
 from brachis.path.pose import PosePath
 from brachis.path.protocol import Array, Curve, Path, PathSample
-from brachis.path.sequence import SequencePath
+from brachis.path.sequence import SequencePath, check_closed, path_speed
 
 __all__ = [
     "Array",

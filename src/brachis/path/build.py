@@ -1,4 +1,9 @@
-"""From the segments of a task to a path."""
+"""From the segments of a task to a path.
+
+Joining curves to a path, with blends.
+
+The path of a task: from where the start posture's tool is, or from the place that the task names.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +13,61 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.errors import PathError
-from brachis.path.assembly import join_curves
-from brachis.path.joint_coordinates import JointCoordinates
-from brachis.path.pose_coordinates import PoseCoordinates
-from brachis.path.row_coordinates import RowCoordinates
-from brachis.robot.task_map.rows import POSE_ROWS, joints_of
+from brachis.errors import PathError, StartError, write_apart
+from brachis.path.coordinates import JointCoordinates, PoseCoordinates, RowCoordinates
+from brachis.path.frame import PathFrame
+from brachis.path.joins import find_joins, refuse_corners
+from brachis.path.protocol import Path
+from brachis.path.sequence import Piece, SequencePath
+from brachis.robot import TaskMap
+from brachis.robot.plausibility import place_hint, turn_hint
+from brachis.robot.task_map.protocol import POSE_ROWS, joints_of, position_rows
+from brachis.task import Task
 
 if TYPE_CHECKING:
     from brachis.path.coordinates import Coordinates
-    from brachis.path.frame import PathFrame
+    from brachis.path.joins import Corner
     from brachis.path.protocol import Array, Curve, Path
     from brachis.task import Segment
+
+_NOTHING = 1e-11
+
+
+def join_curves(curves: Sequence[Curve], blends: Sequence[float | None], coordinates: Coordinates) -> SequencePath:
+    """Return the path along curves, with their corners rounded.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+        Each starts where its predecessor ends.
+    blends : sequence of float or None
+        For every curve, what its blend with the next one takes from either, m.
+    coordinates : Coordinates
+        What the curves' columns are.
+
+    Raises
+    ------
+    PathError
+        Curves do not continue each other to the third derivative and are not blended; or a blend does not fit.
+    """
+    corners: list[Corner | None] = []
+    pieces: list[Piece] = []
+    taken = 0.0
+    joins = find_joins(curves, coordinates.rows)
+    for join, curve, following, size in zip(joins, curves, curves[1:], blends, strict=False):
+        if size is None:
+            corners.append(coordinates.corner(join, curve, following))
+            pieces.append(Piece(curve, taken, curve.length, join.index))
+            taken = 0.0
+        else:
+            rounded = coordinates.blend(curve, following, size, join)
+            pieces += [Piece(curve, taken, curve.length - size, join.index), Piece(rounded, 0.0, rounded.length)]
+            taken = size
+    pieces.append(Piece(curves[-1], taken, curves[-1].length, len(curves) - 1))
+    refuse_corners([corner for corner in corners if corner is not None])
+    # Two blends that meet in the middle of a segment leave nothing of it, but rounding.
+    kept = tuple(piece for piece in pieces if piece.length > _NOTHING * piece.curve.length)
+    return SequencePath.of(kept, len(position_rows(coordinates.rows)))
 
 
 def build_path(
@@ -38,7 +86,7 @@ def build_path(
         Task coordinates at the start posture, m and rad; of a pose the position and the rotation matrix row by row.
     task_space_rows : sequence of str
         Rows of the task space, out of x, y, z and yaw, where yaw comes last; x, y, z, rx, ry, rz for poses; or the rows
-        of all joints (`brachis.robot.task_map.rows.joint_rows`).
+        of all joints (`brachis.robot.task_map.protocol.joint_rows`).
     frame : PathFrame, optional
         Frame in which the segments are given; the world's unless given. The start is in the world either way.
 
@@ -84,3 +132,70 @@ def _coordinates(rows: tuple[str, ...]) -> Coordinates:
     if joints_of(rows):
         return JointCoordinates(rows)
     return PoseCoordinates() if rows == POSE_ROWS else RowCoordinates(rows)
+
+
+_ON_PATH = 1e-6
+
+
+def path_of(task_map: TaskMap, task: Task) -> Path:
+    """Build the path of a task.
+
+    Parameters
+    ----------
+    task_map : TaskMap
+    task : Task
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    StartError
+        The start posture's tool is not at the task's ``path_start``.
+    PathError, UnknownNameError, InputError
+        See `build_path`; or ``path_start`` does not fit the task space.
+    """
+    placement = task.path_placement
+    frame = None if placement is None else PathFrame.of(placement, task_map.rows)
+    given = None if task.path_start is None else task_map.read(task.path_start, "path_start")
+    if given is not None and frame is not None:
+        given = frame.to_world(given)
+    if task.start == "free":
+        assert given is not None  # noqa: S101  (the task model sees to it)
+        return build_path(task.path, given, task_map.rows, frame)
+    start = task_map.robot.posture(task.start.joints, "start.joints")
+    if given is not None:
+        check_on_path(task_map, start, given, "start")
+    return build_path(task.path, task_map.value(start), task_map.rows, frame)
+
+
+def check_on_path(task_map: TaskMap, posture: np.ndarray, target: np.ndarray, name: str) -> None:
+    """Refuse a posture, (n,), whose tool is not at the path's beginning or end, `target`, (c,).
+
+    Raises
+    ------
+    StartError
+    """
+    place = task_map.value(posture)
+    miss = np.abs(task_map.difference(place, target))
+    worst = int(np.argmax(miss))
+    if miss[worst] > _ON_PATH:
+        found, allowed = write_apart(miss[worst], _ON_PATH, digits=3)
+        raise StartError(
+            f"the {name} posture is off the path",
+            where=f"{name}.joints",
+            found=f"{found} {task_map.units[worst]} off in {task_map.rows[worst]}",
+            allowed=f"at most {allowed} {task_map.units[worst]}",
+            hint=_hint(task_map, place, target)
+            or f"Choose a posture whose tool is at the path's {'beginning' if name == 'start' else 'end'}",
+        )
+
+
+def _hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str | None:
+    """Say what stated coordinates, (c,), that are not the tool's, (c,), look like."""
+    axes = len(task_map.axes)
+    found = place_hint(place[:axes], target[:axes], task_map.rows)
+    if found is None and len(target) == axes + 9:
+        return turn_hint(place[axes:].reshape(3, 3), target[axes:].reshape(3, 3))
+    return found

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.cam.conventions import rotation_by
 from brachis.errors import PathError
-from brachis.robot.task_map.rows import AXES, POSE_ROWS, YAW, position_rows
+from brachis.robot.task_map.protocol import AXES, POSE_ROWS, YAW, position_rows
+from brachis.task.points.units import rotation_by
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

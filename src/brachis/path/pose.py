@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.path.leibniz import product, unit
 from brachis.path.protocol import PathSample
-from brachis.path.rotations import angular_velocity, matrices
+from brachis.path.rotations import angular_velocity, matrices, product, unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,11 +6,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from brachis.errors import PathError
-from brachis.path.arc import arc_center, arc_via, circle
-from brachis.path.bspline import bspline_curve
-from brachis.path.helix import helix
-from brachis.path.line import line_by, line_heading, line_to
-from brachis.path.spline import spline_through
+from brachis.path.curves import arc_center, arc_via, circle, helix, line_by, line_heading, line_to
+from brachis.path.splines import bspline_curve, spline_through
 from brachis.task import (
     ArcCenter,
     ArcVia,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import PathError
-from brachis.robot.task_map.rows import position_rows
+from brachis.robot.task_map.protocol import position_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,10 +8,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 import pinocchio as pin
 
-from brachis.arrays import freeze
+from brachis.common.arrays import freeze
+from brachis.common.summary import Summary
 from brachis.errors import InputError
 from brachis.robot.limits import LARGEST, per_joint_values
-from brachis.summary import Summary
 from brachis.task import FROM_URDF
 
 _LEAST_SPEED = 1e-9

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from brachis.errors import UrdfError
-from brachis.robot.urdf import joints_between, parse_urdf
-from brachis.robot.urdf_checks import MOVING_TYPES
+from brachis.robot.urdf import MOVING_TYPES, joints_between, parse_urdf
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from brachis.common.summary import Summary
 from brachis.errors import UrdfError
-from brachis.robot.urdf_numbers import numbers_of
-from brachis.robot.urdf_tree import Element, UrdfTree, end_of
-from brachis.summary import Summary
+from brachis.robot.urdf_elements import Element, UrdfTree, end_of, numbers_of
 
 _ROUNDING = 1e-9
 _ZEROS = "0 0 0"

@@ -2,12 +2,11 @@
 
 from brachis.search.chart_starts import first_map
 from brachis.search.given_motion import GIVEN, given_start
-from brachis.search.pacing import first_breaks, first_point
+from brachis.search.phase_plane import first_breaks, first_point
 from brachis.search.portfolio import Stages, find_fastest, is_planned
-from brachis.search.recentring import best_of_joints, solved_in_chart
 from brachis.search.record import Record
 from brachis.search.remedies import try_remedies
-from brachis.search.solving import MARGINS, continued, eased, solve_with
+from brachis.search.solving import MARGINS, best_of_joints, continued, eased, solve_with, solved_in_chart
 
 __all__ = [
     "GIVEN",

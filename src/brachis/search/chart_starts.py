@@ -6,24 +6,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.attempt import PathMap, Start
-from brachis.deadline import NEVER, Deadline
+from brachis.common.deadline import NEVER, Deadline
+from brachis.common.progress import Listener
 from brachis.errors import PathError, UnreachableError
 from brachis.kinematics import CHART, Newton, chart_around
-from brachis.problem import Decomposition, Problem
-from brachis.progress import Listener
+from brachis.optimise.candidate import PathMap, Start
+from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
 from brachis.search.holding import check_holding
 from brachis.search.joint_path import NO_CHART, DeadEnd, JointPath
-from brachis.search.joint_space_start import joint_space_start
 from brachis.search.lattice import LARGEST_STEP
 from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.phase_plane import least_time
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.screening import screened
-from brachis.search.starts import PIECES, fine_places, lattice_starts, smoothed
+from brachis.search.starts import PIECES, fine_places, joint_space_start, lattice_starts, smoothed, varied
 from brachis.search.too_fast import refuse_hopeless_speeds
-from brachis.search.variations import varied
 
 _FINER = 2
 SCREENED = 4

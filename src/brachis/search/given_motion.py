@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.attempt import PathMap, Start
 from brachis.errors import UnreachableError
 from brachis.kinematics import (
     CHART,
@@ -22,12 +21,13 @@ from brachis.kinematics import (
     null_spaces,
     transversality,
 )
-from brachis.problem import Decomposition, Problem
+from brachis.optimise.candidate import PathMap, Start
+from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
-from brachis.search.joint_space_start import FAMILY
 from brachis.search.lattice import LARGEST_STEP
-from brachis.search.recentring import SELECTABLE
 from brachis.search.schedule import charts_allowed
+from brachis.search.solving import SELECTABLE
+from brachis.search.starts import FAMILY
 from brachis.trajectory import Trajectory
 
 GIVEN = "given motion"

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.attempt import Start
 from brachis.errors import PlanningError
-from brachis.feasibility import load_remedies
 from brachis.limits import Limit, Moments
-from brachis.search.pacing import along
+from brachis.optimise.candidate import Start
+from brachis.problem.feasibility import load_remedies
+from brachis.search.phase_plane import along
 
 _STATIONS = 101
 _HOPELESS = 1.05

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.limits import Limit
-from brachis.problem import Problem
+from brachis.problem.problem import Problem
 from brachis.robot import Robot
 
 _APART = 0.02

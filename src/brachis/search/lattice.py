@@ -15,21 +15,112 @@ the ranges as long as some multiple of 2 pi brings the whole joint path there. T
 
 with the rows A (M / tau_max, 1 / a_max) and B (1 / v_max) of `Limit.step_rows`, does not depend on how fast the joint
 path is followed: with the first term alone the time of a straight one is 2 sqrt(length).
+
+Nodes of the lattice at one station.
+
+Stations along the path at which the lattice has its layers.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from brachis.deadline import NEVER, Deadline
-from brachis.limits import Moments
-from brachis.problem import Problem
-from brachis.robot.joint_space import TURN
-from brachis.search.joint_path import JUMPS, DeadEnd, JointPath, distinct
-from brachis.search.layer import Layer
-from brachis.search.stations import stations
+from brachis.common.deadline import NEVER, Deadline
+from brachis.limits import Limit, Moments
+from brachis.path import Path
+from brachis.problem.problem import Problem
+from brachis.robot import Robot, TaskMap
+from brachis.robot.joints import TURN
+from brachis.search.joint_path import JUMPS, DeadEnd, JointPath, distinct, weights_near
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Nodes at a station.
+
+    Attributes
+    ----------
+    cell : (K, r) int ndarray
+        Of the redundant joints of a closed form; (K, 0) without one.
+    branch : (K,) int ndarray
+        What joint paths keep: index into the closed form's branches, or where they began.
+    q : (K, n) ndarray
+        Postures, rad or m, continuous along the joint paths there.
+    low, high : (K, n) ndarray
+        Least and largest positions along the joint path to the node.
+    length : (K,) ndarray
+        Of the shortest joint path to the node.
+    parent : (K,) int ndarray
+        Its last node in the layer before.
+    """
+
+    cell: np.ndarray
+    branch: np.ndarray
+    q: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    length: np.ndarray
+    parent: np.ndarray
+
+    def __getitem__(self, chosen: np.ndarray) -> Layer:
+        """Return some of the nodes, by index or mask."""
+        return Layer(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+    def bounded(self, most: int, cost: np.ndarray, robot: Robot, limits: Sequence[Limit]) -> Layer:
+        """Keep `most` nodes: half of them of least `cost`, (K,), the others far from each other and from those."""
+        if len(self.branch) <= most:
+            return self
+        order = np.argsort(cost, kind="stable")
+        half = most // 2
+        nearest, others = self[order[:half]], self[order[half:]]
+        weights = weights_near(robot, limits, self.q[order[0]])
+        chosen = farthest(others.q * weights, nearest.q * weights, most - half)
+        return self[np.sort(np.concatenate([order[:half], order[half:][np.unique(chosen)]]))]
+
+
+def farthest(places: np.ndarray, kept: np.ndarray, count: int) -> list[int]:
+    """Choose among places (K, n), one after the other, the one that is farthest from all that are kept, (H, n)."""
+    distance = np.abs(places[:, None] - kept[None]).max(axis=2).min(axis=1)
+    chosen: list[int] = []
+    for _ in range(count):
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.abs(places - places[chosen[-1]]).max(axis=1))
+    return chosen
+
+
+_STEP_LENGTH, _STEP_ANGLE = 0.05, 0.25  # m, rad
+_FEWEST, _MOST = 24, 600
+_DENSE = 2000
+
+
+def stations(path: Path, task_map: TaskMap, density: float = 1.0) -> np.ndarray:
+    """Spread stations evenly over the path coordinate, as many as its length and its turns ask for.
+
+    Parameters
+    ----------
+    path : Path
+    task_map : TaskMap
+    density : float, optional
+        Factor on their number.
+
+    Returns
+    -------
+    (S + 1,) ndarray
+        From 0 to 1.
+    """
+    targets = path.sample(np.linspace(0.0, 1.0, _DENSE + 1)).target
+    moves = np.diff(targets[:, : len(task_map.axes)], axis=0)
+    sizes = np.linalg.norm(moves, axis=1)
+    along = moves[sizes > 0.0] / sizes[sizes > 0.0, None]
+    bends = np.arccos(np.clip(np.sum(along[1:] * along[:-1], axis=1), -1.0, 1.0)).sum()
+    turns = task_map.norms(task_map.difference(targets[1:], targets[:-1]))[1].sum()
+    steps = max(path.length / _STEP_LENGTH, max(bends, turns) / _STEP_ANGLE, _FEWEST)
+    return np.linspace(0.0, 1.0, int(min(np.ceil(density * steps), _MOST)) + 1)
+
 
 LARGEST_STEP = 0.8
 """Of any joint between stations, rad or m."""

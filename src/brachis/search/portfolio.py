@@ -17,12 +17,12 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from typing import NamedTuple
 
-from brachis import interrupts
-from brachis.attempt import Attempt, Start
-from brachis.deadline import Deadline
-from brachis.problem import Decomposition, Problem
-from brachis.progress import Listener
-from brachis.search.explain import no_motion, out_of_time, refuse_what_is_out_of_reach
+from brachis.common import interrupts
+from brachis.common.deadline import Deadline
+from brachis.common.progress import Listener
+from brachis.optimise.candidate import Attempt, Start
+from brachis.problem.problem import Decomposition, Problem
+from brachis.search.failure import no_motion, out_of_time, refuse_what_is_out_of_reach
 from brachis.search.holding import explain_holding
 from brachis.search.processes import each, processes
 from brachis.search.record import NOT_TRIED, Numbered, Record, rounded

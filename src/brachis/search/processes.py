@@ -12,10 +12,10 @@ from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
-from brachis import interrupts
-from brachis.deadline import NEVER, Deadline
+from brachis.common import interrupts
+from brachis.common.deadline import NEVER, Deadline
+from brachis.common.progress import Listener
 from brachis.errors import BrachisError
-from brachis.progress import Listener
 
 _MAIN = "MainProcess"
 _START = 5.0

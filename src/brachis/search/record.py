@@ -1,18 +1,23 @@
-"""What the search has seen so far: attempts, the best motion, and what is left to do."""
+"""What the search has seen so far: attempts, the best motion, and what is left to do.
+
+What the search looked at, as a table.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from brachis.attempt import Attempt
 from brachis.errors import UnreachableError, write_count
-from brachis.problem import Decomposition
+from brachis.optimise.backends import SolveStatus
+from brachis.optimise.candidate import Attempt, coordinates
+from brachis.problem.problem import Decomposition
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.too_fast import TooFast
-from brachis.solvers import SolveStatus
 
 NOT_TRIED = "not tried: the time was up"
 """Status of an attempt for which there was no time."""
@@ -182,3 +187,25 @@ def _agree(first: Attempt, second: Attempt) -> bool:
                 return False
             postures.append(state.q)
     return bool(np.abs(postures[0] - postures[1]).max() < _SAME_MOTION)
+
+
+WORDS, TIMES, STATUS = ("joints", "branch", "origin"), ("coarse [s]", "t_end [s]"), "status"
+"""The columns; named as in the JSON."""
+
+
+def candidate_rows(candidates: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
+    """Return a row of text for each candidate, as `Attempt.to_dict` gives it; the same motion is listed once."""
+    return [
+        (
+            coordinates(candidate.get("redundant_joints", ()), str(candidate.get("branch", ""))),
+            *(str(candidate.get(key, "")) for key in ("branch", "origin")),
+            *(_seconds(candidate.get(key)) for key in ("coarse", "t_end")),
+            str(candidate.get("status", "")),
+        )
+        for candidate in candidates
+        if candidate.get("status") != SAME_MOTION
+    ]
+
+
+def _seconds(value: object) -> str:
+    return f"{value:.4f}" if isinstance(value, int | float) and math.isfinite(value) else ""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from brachis.deadline import Deadline
+from brachis.common.deadline import Deadline
 from brachis.errors import BrachisError, Remedy
 from brachis.task import Task, load_task, with_keys
 

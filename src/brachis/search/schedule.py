@@ -12,21 +12,20 @@ import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from brachis.attempt import Start
-from brachis.deadline import Deadline
-from brachis.nlp.differential_ik import STRATEGIES
-from brachis.problem import Decomposition, Problem
-from brachis.progress import Listener
+from brachis.common.deadline import Deadline
+from brachis.common.progress import Listener
+from brachis.optimise.backends import solver_named
+from brachis.optimise.candidate import Start
+from brachis.problem.problem import Decomposition, Problem
 from brachis.robot.task_map import JointSpace
 from brachis.search.chart_starts import chart_starts
+from brachis.search.differential_ik import STRATEGIES
 from brachis.search.holding import check_holding
 from brachis.search.joint_path import DeadEnd
-from brachis.search.joint_space_start import joint_space_start
 from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.processes import each, processes
-from brachis.search.starts import lattice_starts, numeric_starts
+from brachis.search.starts import joint_space_start, lattice_starts, numeric_starts
 from brachis.search.too_fast import refuse_hopeless_speeds
-from brachis.solvers import solver_named
 
 _SIZE = 12
 _NEAR_SINGULAR = 0.1

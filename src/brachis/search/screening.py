@@ -13,19 +13,19 @@ from contextlib import closing
 
 import numpy as np
 
-from brachis.attempt import Start
-from brachis.deadline import Deadline
+from brachis.common.deadline import Deadline
+from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap
-from brachis.nlp import Program
-from brachis.problem import Problem
-from brachis.transcription import program_of
-from brachis.progress import Listener
-from brachis.refine import Solve
-from brachis.search.pacing import first_point
+from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus, solver_named
+from brachis.optimise.candidate import Start
+from brachis.optimise.program import Program
+from brachis.optimise.refine import Solve
+from brachis.optimise.transcription import program_of
+from brachis.problem.problem import Problem
+from brachis.search.phase_plane import first_point
 from brachis.search.processes import each, processes
-from brachis.search.recentring import solved_in_chart
-from brachis.solvers import SolverOptions, SolverReport, SolveStatus, solver_named
+from brachis.search.solving import solved_in_chart
 
 _INTERVALS, _DEGREE = 12, 2
 """Parabolas jump from one acceleration to the next, as fastest motions do: so few say most."""

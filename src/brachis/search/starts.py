@@ -1,20 +1,35 @@
-"""Starts: joint paths from which plans are begun, each with an estimate of its least time."""
+"""Starts: joint paths from which plans are begun, each with an estimate of its least time.
+
+Joint paths around others, for arms with several redundant joints.
+
+The lattice's sample of such an arm's postures may hold a single class of joint paths, above all where both ends are
+given, and a solve from it ends at the optimum next to it. Solves from joint paths around it, displaced by waves over s,
+end at others.
+
+The start for a path of all joints: the phase plane's own timing along it.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.attempt import Start
-from brachis.deadline import NEVER, Deadline
-from brachis.kinematics import ClosedFormMap
-from brachis.nlp.differential_ik import differential_ik_paths
-from brachis.problem import Decomposition
-from brachis.search.closed_form_lattice import ClosedFormLattice
+from brachis.common.deadline import NEVER, Deadline
+from brachis.errors import PathError
+from brachis.kinematics import ClosedFormMap, JointSpaceMap
+from brachis.limits import Limit
+from brachis.optimise.candidate import Start
+from brachis.problem.feasibility import beyond_at_rest, in_figures, load_remedies
+from brachis.problem.problem import Decomposition, Problem
+from brachis.robot import Robot
+from brachis.search.closed_form_lattice import ClosedFormLattice, cell_sizes
+from brachis.search.differential_ik import differential_ik_paths
 from brachis.search.joint_path import DeadEnd, JointPath
 from brachis.search.levels import SearchLevel
-from brachis.search.phase_plane import least_time
+from brachis.search.phase_plane import least_time, least_times
 
 PIECES = (3, 8)
 """Pieces of the splines that smooth a joint path; more where it cannot be followed so."""
@@ -125,3 +140,103 @@ def numeric_starts(decomposition: Decomposition, most: int, deadline: Deadline) 
         Start(decomposition.problem, joint_map, joint_path, np.inf, f"numeric {number}", decomposition.match.family)
         for number, joint_path in enumerate(joint_paths, 1)
     ]
+
+
+_LARGEST, _SIZES = 1.0 / 16.0, 4
+"""Standard deviation of the largest waves, in turns, and how many sizes there are, each half the one before."""
+
+
+def varied(joint_paths: Sequence[JointPath], most: int, seed: int) -> list[JointPath]:
+    """Displace joint paths, one after the other and over again, by waves at random.
+
+    Parameters
+    ----------
+    joint_paths : sequence of JointPath
+        At least one.
+    most : int
+        How many to make.
+    seed : int
+
+    Returns
+    -------
+    list of JointPath
+        Within the joints' ranges and from the given ends, but beside the prescribed path: the nearest postures on it
+        are meant.
+    """
+    rng = np.random.default_rng(seed)
+    robot, limits = joint_paths[0].problem.robot, joint_paths[0].problem.robot.limits
+    size = _LARGEST * cell_sizes(robot.revolute, 1)
+    found = []
+    for number in range(most):
+        given = joint_paths[number % len(joint_paths)]
+        waves = _waves(given)
+        heights = rng.normal(0.0, size / 2.0 ** (number // len(joint_paths) % _SIZES), (len(waves), robot.n))
+        q = np.clip(given.q + waves.T @ heights, limits.position_lower, limits.position_upper)
+        found.append(dataclasses.replace(given, q=q))
+    return found
+
+
+def _waves(joint_path: JointPath) -> np.ndarray:
+    """Displacements over s, (W, S + 1): zero at the ends that are given."""
+    s, problem = joint_path.s, joint_path.problem
+    waves = [np.sin(np.pi * s), 0.5 * np.sin(2.0 * np.pi * s)]
+    if problem.start is None:
+        waves.append(1.0 - s)
+    if problem.end is None:
+        waves.append(s)
+    return np.array(waves)
+
+
+FAMILY = "path of joints"
+_STATIONS = 401
+
+
+def joint_space_start(problem: Problem) -> Start:
+    """Time the path in the phase plane, and start from there.
+
+    Parameters
+    ----------
+    problem : Problem
+        In a space of joints.
+
+    Returns
+    -------
+    Start
+
+    Raises
+    ------
+    PathError
+        The path leaves the joint ranges, or no motion along it was found and the arm cannot hold a posture on it.
+    """
+    s = np.linspace(0.0, 1.0, _STATIONS)
+    q = problem.path.sample(s).target
+    times = least_times(problem.limits, s, q, problem.end_rates)
+    for limit in problem.limits:
+        # In motion an arm may pass postures that it cannot hold.
+        if limit.static and (times is None or not limit.time_scaling):
+            _refuse_beyond(problem.robot, limit, s, q, problem.task.refinement.tolerance)
+    joint_map = JointSpaceMap(problem.robot, problem.path)
+    if times is None:
+        return Start(problem, joint_map, s[:, None], np.inf, FAMILY, FAMILY)
+    estimate = float(times[-1])
+    timed = np.interp(s * estimate, times, s)[:, None]
+    return Start(problem, joint_map, timed, estimate, FAMILY, FAMILY, timed=True)
+
+
+def _refuse_beyond(robot: Robot, limit: Limit, s: np.ndarray, q: np.ndarray, tolerance: float) -> None:
+    """Refuse a path along which the arm at rest is beyond a limit."""
+    values, beyond = beyond_at_rest(limit, q, tolerance)
+    station, column = (int(place) for place in np.unravel_index(np.argmax(beyond), beyond.shape))
+    if beyond[station, column] <= 0.0:
+        return
+    where, label = s[beyond[:, column] > 0.0], limit.labels[column]
+    found, allowed = in_figures(limit, column, float(values[station, column]))
+    error = PathError(
+        f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
+        s_interval=(float(where[0]), float(where[-1])),
+        where="path",
+        found=f"{found} {label.unit} at s = {s[station]:.3g}",
+        allowed=f"{allowed} {label.unit}",
+        hint="Lead the path elsewhere",
+    )
+    raise error.with_remedies(*load_remedies(robot, limit, column, 1.0 + float(beyond[station, column])))

@@ -21,14 +21,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.attempt import Attempt, Start
 from brachis.errors import PlanningError, Remedy, UnreachableError
-from brachis.feasibility import in_figures
 from brachis.limits import JointMotion, Limit, Moments
 from brachis.limits.tool import ToolSpeed
-from brachis.problem import Problem
-from brachis.search.pacing import along, graded
-from brachis.search.phase_plane import fastest
+from brachis.optimise.candidate import Attempt, Start
+from brachis.problem.feasibility import in_figures
+from brachis.problem.problem import Problem
+from brachis.search.phase_plane import along, fastest, graded
 
 _EXACT, _HOPELESS, _UNLIKELY = 0.97, 0.5, 0.8
 """Share of a speed above which it may be possible yet: where the phase plane is exact, where not, and after plans."""

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Strict, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from brachis.common.summary import shown
 from brachis.errors import MissingAttributeError
-from brachis.summary import shown
 
 REFUSED = "brachis_refused"
 """Error type of a value that a validator of ours refuses; see `refuse`."""

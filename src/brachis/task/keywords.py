@@ -6,19 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, TypedDict, Unpack
 
 from brachis.errors import UnknownNameError
-from brachis.task.boundary import BoundarySettings
 from brachis.task.constructors import Transform, poses_of
 from brachis.task.fields import Model, plain
-from brachis.task.limit_models import Array, LimitKeywords, LimitSpec
+from brachis.task.limit_models import Array, LimitKeywords, LimitSpec, ToolLimits
 from brachis.task.load import Source, load_task
 from brachis.task.messages import key_paths
-from brachis.task.models import Task
-from brachis.task.mounting_models import Payload, Placement
+from brachis.task.models import BoundarySettings, Task
 from brachis.task.orientation import ToolPose
 from brachis.task.planning_models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings
-from brachis.task.robot_models import RobotSettings
+from brachis.task.robot_models import Payload, Placement, RobotSettings
 from brachis.task.segments import SegmentModel
-from brachis.task.tool_limits import ToolLimits
 
 Posture = Array | Sequence[float] | Mapping[str, float] | Mapping[str, Sequence[float]] | Literal["free"]
 Settings = Mapping[str, Any]

@@ -10,12 +10,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
+from brachis.common.files import check_kind, read_text
 from brachis.errors import TaskError, UnknownNameError
-from brachis.kinds import check_kind
 from brachis.task.fields import Flag, Model, Name, Number, Positive, plain, refuse
 from brachis.task.limit_models import LimitSpec
 from brachis.task.messages import show, task_error
-from brachis.task.text_file import read_text
 from brachis.task.yaml_reader import read_yaml
 
 _LARGEST = 100_000

@@ -2,7 +2,7 @@
 
 ``orientation: fixed`` stands beside the segment's kind, or ``{rotate: ...}``, ``{to: ...}``, ``tangent``. A given
 orientation is that of the tool frame in the frame of the path, the world unless it is another, in one of the
-conventions of `brachis.cam.conventions`. Angles are in degrees where the key ends with ``_deg``, otherwise in radians.
+conventions of `brachis.task.points.units`. Angles are in degrees where the key ends with ``_deg``, otherwise in radians.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from pydantic import (
     model_validator,
 )
 
-from brachis.cam.conventions import CONVENTIONS, choices
 from brachis.task.fields import Model, Number, by_form, by_key, refuse
+from brachis.task.points.units import CONVENTIONS, choices
 
 _UNIT = 0.01
 
@@ -101,7 +101,7 @@ class Attitude(Model):
 
     @property
     def convention_and_numbers(self) -> tuple[str, tuple[float, ...]]:
-        """Name of the convention in `brachis.cam.conventions`, and the numbers: quaternions, or angles in rad."""
+        """Name of the convention in `brachis.task.points.units`, and the numbers: quaternions, or angles in rad."""
         key, values = next((key, value) for key in Attitude.model_fields if (value := getattr(self, key)) is not None)
         if key.endswith(_DEGREES):
             return key.removesuffix(_DEGREES), tuple(math.radians(angle) for angle in values)

@@ -7,10 +7,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, WithJsonSchema, field_validator
 
-from brachis.cam.conventions import CONVENTIONS, choices
-from brachis.cam.units import ANGLES, LENGTHS, quantity
 from brachis.errors import write_count
 from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, refuse
+from brachis.task.points.units import ANGLES, CONVENTIONS, LENGTHS, choices, quantity
 
 _LISTED = 10
 

@@ -1,10 +1,9 @@
 """The trajectory: immutable, evaluated at any time, saved and loaded with all that is needed to verify it again."""
 
-from brachis.trajectory.given import Motion, motion_of, of_motion
 from brachis.trajectory.recovered import Recovered, check_tolerance
 from brachis.trajectory.result_file import SCHEMA
 from brachis.trajectory.samples import Samples
-from brachis.trajectory.trajectory import CONTINUOUS_TORQUE, Trajectory
+from brachis.trajectory.trajectory import CONTINUOUS_TORQUE, Motion, Trajectory, motion_of, of_motion
 
 __all__ = [
     "CONTINUOUS_TORQUE",

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from brachis.arguments import number, numbers
-from brachis.arrays import freeze
+from brachis.common.arguments import number, numbers
+from brachis.common.arrays import freeze
 from brachis.errors import InputError
 
 SMALLEST, LARGEST = 2e-7, 1e-3

@@ -13,9 +13,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from brachis.common.files import Kind, atomic_write, check_kind, check_suffix, read_file
 from brachis.errors import InputError, ResultFileError
-from brachis.files import atomic_write, check_suffix, read_file
-from brachis.kinds import Kind, check_kind
 from brachis.robot import Robot, bind
 from brachis.robot.from_task import robot_from_settings
 from brachis.task import Task, load_task

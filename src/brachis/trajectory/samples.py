@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.arrays import freeze
+from brachis.common.arrays import freeze
+from brachis.common.summary import Summary
 from brachis.errors import NotInstalledError
-from brachis.summary import Summary
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,35 +1,71 @@
-"""Joint motion along a path, evaluated at any time."""
+"""Joint motion along a path, evaluated at any time.
+
+Where the tool is, and how fast, in a batch of states.
+
+Motions as they are given: a trajectory, what has one, or its file.
+"""
 
 from __future__ import annotations
 
 import importlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Protocol, TypeVar
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from brachis.arguments import file_name, number, numbers
-from brachis.arrays import freeze
+from brachis.common.arguments import file_name, number, numbers
+from brachis.common.arrays import freeze
+from brachis.common.summary import Summary
 from brachis.errors import InputError, UnknownNameError, write_apart, write_count
 from brachis.robot import Robot, dynamics
-from brachis.summary import Summary
 from brachis.task import Task
 from brachis.trajectory.pieces import jerk_coefficients, relative_coefficients
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
 from brachis.trajectory.samples import Samples
-from brachis.trajectory.tool import tool_motion
 
 if TYPE_CHECKING:
     import pandas as pd
     from scipy.interpolate import BPoly, BSpline
 
-    from brachis.view import Viewer
+    from brachis.apps.view import Viewer
+
+
+def tool_motion(robot: Robot, q: np.ndarray, qdot: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pose and speed of the tool frame in the world.
+
+    Parameters
+    ----------
+    robot : Robot
+    q, qdot : (K, n) ndarray
+
+    Returns
+    -------
+    position : (K, 3) ndarray
+        m.
+    quaternion : (K, 4) ndarray
+        w, x, y, z, of length 1, with signs such that neighbours are close.
+    speed : (K,) ndarray
+        m/s.
+    """
+    model, data, frame = robot.model, robot.model.createData(), robot.frame_id
+    position, quaternion, speed = np.empty((len(q), 3)), np.empty((len(q), 4)), np.empty(len(q))
+    for k in range(len(q)):
+        pin.forwardKinematics(model, data, q[k], qdot[k])
+        placement = pin.updateFramePlacement(model, data, frame)
+        position[k] = placement.translation
+        quaternion[k] = np.roll(pin.Quaternion(placement.rotation).coeffs(), 1)
+        speed[k] = np.linalg.norm(pin.getFrameVelocity(model, data, frame).linear)
+    turned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0.0
+    quaternion[1:] *= np.cumprod(np.where(turned, -1.0, 1.0))[:, None]
+    return position, quaternion, speed
+
 
 CONTINUOUS_TORQUE = 3
 """Least B-spline degree that gives continuous acceleration, and so torque."""
@@ -297,7 +333,7 @@ class Trajectory(Summary):
 
         Returns
         -------
-        brachis.view.Viewer
+        brachis.apps.view.Viewer
             With its ``url``; ``stop()`` ends it.
 
         Raises
@@ -307,7 +343,7 @@ class Trajectory(Summary):
         NotInstalledError
             viser is not installed.
         """
-        viewer = importlib.import_module("brachis.view")  # a later stage, which knows trajectories
+        viewer = importlib.import_module("brachis.apps.view")  # a later stage, which knows trajectories
         return viewer.open_viewer(
             self, candidates, verified=verified, degrees=degrees, host=host, port=port, block=block
         )
@@ -363,3 +399,49 @@ class Trajectory(Summary):
             found, allowed = f"{times.min():g} s to {last} s", f"0 s to {t_end} s"
             raise InputError("time outside the trajectory", found=found, allowed=allowed)
         return np.clip(times, 0.0, self.t_end)
+
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+class HasMotion(Protocol):
+    """A result of a plan."""
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Return the motion."""
+
+
+Motion = Trajectory | HasMotion | str | os.PathLike[str]
+
+
+def motion_of(given: Motion, where: str = "trajectory") -> Trajectory:
+    """Return the trajectory that is given, as the argument `where` of a public function.
+
+    Raises
+    ------
+    ResultFileError
+        A file is none of a motion.
+    InputError
+        It is something else.
+    """
+    if isinstance(given, Trajectory):
+        return given
+    if isinstance(given, str | os.PathLike):
+        return Trajectory.load(given)
+    motion = getattr(given, "trajectory", None)
+    if not isinstance(motion, Trajectory):
+        allowed = "a Trajectory, a Result, or the npz file of one"
+        raise InputError("no motion", where=where, found=type(given).__name__, allowed=allowed)
+    return motion
+
+
+def of_motion(function: Callable[Concatenate[Trajectory, _P], _R]) -> Callable[Concatenate[Motion, _P], _R]:
+    """Let a function of a trajectory take all that `motion_of` does."""
+
+    @wraps(function)
+    def taking(trajectory: Motion, *args: _P.args, **kwargs: _P.kwargs) -> _R:
+        return function(motion_of(trajectory), *args, **kwargs)
+
+    return taking  # type: ignore[return-value]  # mypy fears a second `trajectory` among the keywords

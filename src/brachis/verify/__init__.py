@@ -1,7 +1,6 @@
 """Independent verification of a trajectory from URDF, path and limits alone."""
 
-from brachis.verify.options import VerifyOptions
-from brachis.verify.report import Check, Verification
+from brachis.verify.report import Check, Verification, VerifyOptions
 from brachis.verify.verify import verify_trajectory
 
 __all__ = ["Check", "Verification", "VerifyOptions", "verify_trajectory"]

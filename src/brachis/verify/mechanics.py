@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brachis.arrays import cross
+from brachis.common.arrays import cross
 from brachis.robot import Robot
 from brachis.task import Placement
 

@@ -11,19 +11,28 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.custom_limits import LimitModel
 from brachis.errors import InputError
 from brachis.path import Path, path_of
 from brachis.robot import Robot, TaskMap, bind
+from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JointSpace
 from brachis.trajectory import Motion, Trajectory, motion_of
-from brachis.verify.checks import continuity_checks, end_checks, progress_checks, seam_checks, spline_checks
+from brachis.verify.checks import (
+    check_instants,
+    continuity_checks,
+    end_checks,
+    progress_checks,
+    reversals,
+    seam_checks,
+    sharpest,
+    spline_checks,
+    spread_out,
+    within_path_pieces,
+)
 from brachis.verify.limits import Given, limit_checks
 from brachis.verify.mechanics import tool_placements
 from brachis.verify.motion import Pieces, States
-from brachis.verify.options import VerifyOptions
-from brachis.verify.places import check_instants, reversals, sharpest, spread_out, within_path_pieces
-from brachis.verify.report import Check, Verification
+from brachis.verify.report import Check, Verification, VerifyOptions
 
 
 def verify_trajectory(

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from brachis.arrays import cross
+from brachis.common.arrays import cross
 from brachis.ik import ChainGeometry, IKSolver, NotApplicableError, PosedScrews, ik_family
 from brachis.ik.vectors import across, angle_about, dot, meeting_point
 from brachis.robot import TaskMap

@@ -1,19 +1,91 @@
-"""The task map that a task asks for."""
+"""The task map that a task asks for.
+
+The joints themselves as task coordinates: what a path prescribes is the motion of every joint.
+
+Free roll about the tool axis: a virtual joint after the tool frame, of zero inertia and without limits.
+
+A pose whose rotation about the tool frame's z axis is left open has five rows. With a revolute joint about this axis
+added to the chain it is a pose of six rows again, and the joint is one more that may be redundant: the closed forms for
+poses serve both.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import NoReturn
 
 import numpy as np
+import pinocchio as pin
 
 from brachis.errors import InputError
-from brachis.robot.robot import Robot
-from brachis.robot.task_map.joint_space import JointSpace
-from brachis.robot.task_map.pose import Pose
-from brachis.robot.task_map.protocol import TaskMap
-from brachis.robot.task_map.rows import AXES, POSE_ROWS, ROWS, YAW, position_rows
-from brachis.robot.task_map.rows_and_yaw import RowsAndYaw
-from brachis.robot.task_map.world_rows import WorldRows
+from brachis.robot.friction import Friction
+from brachis.robot.limits import UrdfLimit
+from brachis.robot.robot import ROLL_JOINT, Robot
+from brachis.robot.task_map.protocol import (
+    AXES,
+    POSE_ROWS,
+    ROWS,
+    YAW,
+    TaskDerivatives,
+    TaskMap,
+    joint_rows,
+    position_rows,
+)
+from brachis.robot.task_map.tool import Pose, RowsAndYaw, WorldRows
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class JointSpace(TaskMap):
+    """All n joint positions; the Jacobian is the identity."""
+
+    frame = pin.ReferenceFrame.LOCAL
+
+    rows: tuple[str, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Name the rows after the joints."""
+        object.__setattr__(self, "rows", joint_rows(self.robot.joint_names))
+        super().__post_init__()
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """See `TaskMap.units`."""
+        return self.robot.position_units
+
+    def values(self, q: np.ndarray) -> np.ndarray:
+        """See `TaskMap.values`."""
+        return q
+
+    def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """See `TaskMap.difference`; whole turns count, since the path says in which turn a joint is."""
+        return np.asarray(first - second, dtype=float)
+
+    def jacobian(self, twists: np.ndarray) -> np.ndarray:
+        """See `TaskMap.jacobian`."""
+        return np.broadcast_to(np.eye(self.m), (twists.shape[1], self.m, self.m))
+
+    def bias(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:  # noqa: ARG002
+        """See `TaskMap.bias`."""
+        return np.zeros_like(qdot)
+
+    def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:  # noqa: ARG002
+        """See `TaskMap.velocity_slopes`."""
+        return np.zeros((len(qdot), self.m, self.m))
+
+    def derivatives(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:  # noqa: ARG002
+        """See `TaskMap.derivatives`."""
+        zeros = np.zeros((len(qdot), self.m, self.m))
+        return TaskDerivatives(zeros, zeros, zeros)
+
+    def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> NoReturn:
+        """Refuse: placements of the tool do not say where the joints are."""
+        raise NotImplementedError
+
+    def rates(self, twists: np.ndarray) -> NoReturn:
+        """Refuse: twists of the tool do not say how the joints move."""
+        raise NotImplementedError
+
 
 FREE_ROLL = "pose_free_roll"
 JOINTS = "joints"
@@ -85,3 +157,67 @@ def _of_word(robot: Robot, word: str) -> Pose | JointSpace:
             hint="brachis.robot.bind makes a robot whose tool does",
         )
     return Pose(robot)
+
+
+_NO_SPEED_SCALE = 1.0
+
+
+def bind(robot: Robot, space: str | Sequence[str]) -> tuple[Robot, TaskMap]:
+    """Return the robot as a task space needs it, and the task map bound to it.
+
+    Parameters
+    ----------
+    robot : Robot
+    space : str or sequence of str
+        Rows, or one of ``position``, ``pose``, ``pose_free_roll``. The last one adds the virtual joint `ROLL_JOINT`
+        unless the robot has it already.
+
+    Raises
+    ------
+    InputError
+        See `task_map_of`; or the robot has a joint of the virtual joint's name.
+    """
+    if robot.rolls_freely and space != FREE_ROLL:
+        raise InputError(
+            "the robot's tool rolls freely",
+            where="task_space",
+            found=space,
+            allowed=FREE_ROLL,
+            hint="Use the robot as it was before it was bound to pose_free_roll",
+        )
+    if space == FREE_ROLL and not robot.rolls_freely:
+        robot = with_free_roll(robot)
+    return robot, task_map_of(robot, space)
+
+
+def with_free_roll(robot: Robot) -> Robot:
+    """Append the virtual joint `ROLL_JOINT` about the tool frame's z axis.
+
+    Raises
+    ------
+    InputError
+        The robot has a joint of this name.
+    """
+    if robot.model.existJointName(ROLL_JOINT):
+        raise InputError("the robot has a joint with the name of the virtual one", where="task_space", found=ROLL_JOINT)
+    model = robot.model.copy()
+    tool = model.frames[robot.frame_id]
+    joint = model.addJoint(tool.parentJoint, pin.JointModelRZ(), tool.placement, ROLL_JOINT)
+    frame = f"{robot.tool_frame}/{ROLL_JOINT}"
+    model.addFrame(pin.Frame(frame, joint, robot.frame_id, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    old, friction = robot.limits, robot.friction
+    return replace(
+        robot,
+        rolls_freely=True,
+        model=model,
+        joint_names=(*robot.joint_names, ROLL_JOINT),
+        tool_frame=frame,
+        limits=old.with_free_joint(),
+        stated_limits=(*robot.stated_limits, UrdfLimit(None, None, None, None)),
+        friction=Friction(
+            armature=np.append(friction.armature, 0.0),
+            viscous=np.append(friction.viscous, 0.0),
+            coulomb=np.append(friction.coulomb, 0.0),
+            v_eps=np.append(friction.v_eps, _NO_SPEED_SCALE),
+        ),
+    )

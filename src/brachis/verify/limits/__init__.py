@@ -7,19 +7,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from brachis.custom_limits import LimitModel, custom_limits
-from brachis.verify.limits.drives import worst_power, worst_total_power, worst_torque_at_speed, worst_rms_torque
-from brachis.verify.limits.joint_rate import worst_velocity, worst_acceleration, worst_jerk
-from brachis.verify.limits.position import worst_position
-from brachis.verify.limits.process_speed import worst_process_speed, worst_least_process_speed
-from brachis.verify.limits.tool_motion import worst_tool_acceleration, worst_tool_angular_speed
-from brachis.verify.limits.tool_speed import worst_tool_speed
-from brachis.verify.limits.torque import worst_torque
-from brachis.verify.limits.torque_rate import worst_torque_rate
-from brachis.verify.limits.own import check_own
+from brachis.robot.custom_limits import LimitModel, custom_limits
+from brachis.verify.limits.custom import check_own
+from brachis.verify.limits.joint import worst_acceleration, worst_jerk, worst_position, worst_velocity
 from brachis.verify.limits.protocol import Given, LimitCheck, Worst
-from brachis.verify.options import VerifyOptions
-from brachis.verify.report import Check
+from brachis.verify.limits.tool import (
+    worst_least_process_speed,
+    worst_process_speed,
+    worst_tool_acceleration,
+    worst_tool_angular_speed,
+    worst_tool_speed,
+)
+from brachis.verify.limits.torque import (
+    worst_power,
+    worst_rms_torque,
+    worst_torque,
+    worst_torque_at_speed,
+    worst_torque_rate,
+    worst_total_power,
+)
+from brachis.verify.report import Check, VerifyOptions
 
 TABLE: dict[str, LimitCheck] = {
     "torque": worst_torque,

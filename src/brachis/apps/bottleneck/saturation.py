@@ -1,0 +1,206 @@
+"""Which limit is active when, and for how much of the time, from the trajectory alone.
+
+How near a motion is to its limits over time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from brachis.common.arrays import freeze
+from brachis.common.summary import Summary
+from brachis.limits import Label, Limit, Moments, limits_of
+from brachis.robot import bind
+from brachis.trajectory import Trajectory
+
+_POINTS_PER_INTERVAL = 40
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LimitRatios(Summary):
+    """Ratios of the motion to all limits of its task. The arrays are read-only.
+
+    Attributes
+    ----------
+    t : (K,) ndarray
+        Ascending, s; a time at which a derivative that a limit asks for jumps occurs twice, before and after the jump.
+    labels : tuple of Label
+        What every column is.
+    values : (K, c) ndarray
+        1 at the upper limit, -1 at the lower one. Of a position it is the place in its range: 0 in the middle. Of
+        a range with one end it is 1 minus the distance from it, rad or m, and 0 farther away.
+    """
+
+    t: np.ndarray
+    labels: tuple[Label, ...]
+    values: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Take copies that nobody can write to."""
+        freeze(self, "t", "values")
+
+
+def limit_ratios(trajectory: Trajectory, limits: Sequence[Limit] | None = None) -> LimitRatios:
+    """Compare a trajectory with every limit at its nodes, its knots and densely between.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    limits : sequence of Limit, optional
+        Those of the trajectory's task if left out.
+
+    Returns
+    -------
+    LimitRatios
+    """
+    if limits is None:
+        robot, _ = bind(trajectory.robot, trajectory.task.task_space)
+        limits = limits_of(robot, trajectory.task)
+    knots = np.unique(trajectory.knots) * trajectory.t_end
+    steps = np.arange(_POINTS_PER_INTERVAL) / _POINTS_PER_INTERVAL
+    grid = (knots[:-1, None] + np.diff(knots)[:, None] * steps).ravel()
+    samples = trajectory.at(np.clip(np.union1d(grid, trajectory.times), 0.0, trajectory.t_end))
+    behind = (samples.t, samples.q, samples.qdot, samples.qddot, trajectory.jerk(samples.t), samples.s)
+    before, jumps = _just_before(trajectory), np.any(trajectory.qddot_before != trajectory.qddot, axis=1)[1:]
+    if trajectory.degree <= max(limit.order for limit in limits):
+        jumps[:-1] |= np.isin(trajectory.times[1:-1], knots)
+    t, *motion = (np.concatenate([first[jumps], then]) for first, then in zip(before, behind, strict=True))
+    order = np.argsort(t, kind="stable")
+    moments = Moments(*(part[order] for part in motion))
+    values = [limit.ratios(moments, t[order]) for limit in limits]
+    return LimitRatios(t[order], tuple(label for limit in limits for label in limit.labels), np.hstack(values))
+
+
+def _just_before(trajectory: Trajectory) -> tuple[np.ndarray, ...]:
+    """Return times, positions, three derivatives and path coordinates just before every node but the first."""
+    nodes = (trajectory.times, trajectory.q, trajectory.qdot, trajectory.qddot_before)
+    return *(part[1:] for part in nodes), trajectory.jerk_pieces.c[-1], trajectory.path_spline(trajectory.times[1:])
+
+
+THRESHOLD = 0.99
+"""A limit is active from where the motion is at this part of it ..."""
+RIPPLE = 0.95
+"""... until it falls below this one: splines ripple on a limit between their knots."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A stretch of time on which a limit is active, ripple included.
+
+    Attributes
+    ----------
+    begin, end : float
+        s.
+    side : {"lower", "upper"}
+        Which of the two bounds is active; of a torque, velocity or acceleration ``lower`` is the negative one.
+    """
+
+    begin: float
+    end: float
+    side: str
+
+
+@dataclass(frozen=True, repr=False)
+class Saturation(Summary):
+    """How long one value of a limit is at it.
+
+    Attributes
+    ----------
+    label : Label
+        What is limited.
+    share : float
+        Part of the time, 0 to 1, that the stretches together take.
+    peak : float
+        Largest ratio to the limit.
+    active : tuple of Stretch
+        When, in the order of time.
+    """
+
+    label: Label
+    share: float
+    peak: float
+    active: tuple[Stretch, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as plain data for JSON."""
+        return {
+            "subject": self.label.subject,
+            "kind": self.label.kind,
+            "share": self.share,
+            "peak_ratio": self.peak,
+            "active_s": [[stretch.begin, stretch.end, stretch.side] for stretch in self.active],
+        }
+
+
+def saturations(
+    trajectory: Trajectory,
+    limits: Sequence[Limit] | None = None,
+    *,
+    threshold: float = THRESHOLD,
+    ripple: float = RIPPLE,
+) -> tuple[Saturation, ...]:
+    """Find when every limit is active.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Any one, a saved one for example.
+    limits : sequence of Limit, optional
+        Those of the trajectory's task if left out.
+    threshold : float, optional
+        Part of the limit from which on it counts as active.
+    ripple : float, optional
+        Part of the limit above which dips below the threshold count as ripple, which interrupts no stretch.
+
+    Returns
+    -------
+    tuple of Saturation
+        Of all limits, those active longest first.
+    """
+    return saturations_of(limit_ratios(trajectory, limits), threshold=threshold, ripple=ripple)
+
+
+def saturations_of(
+    ratios: LimitRatios, *, threshold: float = THRESHOLD, ripple: float = RIPPLE
+) -> tuple[Saturation, ...]:
+    """As `saturations`, from ratios already computed."""
+    found = []
+    for label, column in zip(ratios.labels, ratios.values.T, strict=True):
+        active = [
+            Stretch(begin, end, side)
+            for side, sign in (("lower", -1.0), ("upper", 1.0))
+            for begin, end in _stretches(ratios.t, sign * column, threshold, ripple)
+        ]
+        active.sort(key=lambda stretch: stretch.begin)
+        duration = sum(stretch.end - stretch.begin for stretch in active)
+        peak = float(np.abs(column).max())
+        found.append(Saturation(label, float(duration / ratios.t[-1]), peak, tuple(active)))
+    return tuple(sorted(found, key=lambda entry: (-entry.share, -entry.peak)))
+
+
+def _stretches(t: np.ndarray, values: np.ndarray, threshold: float, ripple: float) -> list[tuple[float, float]]:
+    """Stretches of time on which values, linear between the times (K,), keep to the threshold but for ripple."""
+    above = np.concatenate([[False], values >= threshold, [False]])
+    edges = np.flatnonzero(np.diff(above.astype(int))).reshape(-1, 2)
+    if len(edges) == 0:
+        return []
+    dips = np.array([values[end:begin].min() for end, begin in zip(edges[:-1, 1], edges[1:, 0], strict=True)])
+    apart = dips < ripple
+    firsts, afters = edges[np.append(True, apart), 0], edges[np.append(apart, True), 1]
+    return [
+        (
+            _crossing(t, values, first - 1, threshold) if first else float(t[0]),
+            _crossing(t, values, after - 1, threshold) if after < len(t) else float(t[-1]),
+        )
+        for first, after in zip(firsts.tolist(), afters.tolist(), strict=True)
+    ]
+
+
+def _crossing(t: np.ndarray, values: np.ndarray, before: int, threshold: float) -> float:
+    """Time between two neighbours at which the line between them meets the threshold, s."""
+    low, high = values[before], values[before + 1]
+    return float(t[before] + (t[before + 1] - t[before]) * (threshold - low) / (high - low))

@@ -1,0 +1,446 @@
+"""What a limit costs: the derivative of t_E with respect to every limit, from the multipliers.
+
+Every limit tells which figures a user could change, and at which rate d the bounds of its rows move outwards when one
+of them gives way (`brachis.limits.Bound`): with the multipliers w of these rows
+
+    dt_E / d(figure) = -sum w d.
+
+See `multipliers` for w, and for what holds where it is not unique.
+
+Multipliers of a solved program: the solver's where they balance the gradient, otherwise least squares.
+
+At an optimum the gradient of t_E is a combination of the slopes of the active rows and variable bounds,
+
+    grad t_E = sum_i w_i p_i,    w_i >= 0,
+
+with p_i the gradient of a row or variable at its lower bound, or minus that at its upper bound. The norm of what is
+left over, relative to the gradient's, tells how far an answer is from being stationary.
+
+If the bounds of the active rows give way at rates d_i >= 0, then dt_E = -sum_i w_i d_i. Where the slopes are linearly
+dependent, many sets of multipliers balance the gradient, and the one that holds for a relaxation is the one that
+promises the least (Gauvin and Tolle, SIAM J. Control Optim. 15, 1977): a linear program.
+
+The change of t_E for a limit that rises by a finite step, from the problem linearised at its answer.
+
+Multipliers are derivatives: they hold for steps so small that the same rows stay active. The linear program
+
+    minimise dt_E    over dx    subject to    lower <= rows(x) + J dx <= upper
+
+with the raised limit lets other rows take over within the step. Its optimum is no lower than what the multipliers
+promise, since they are feasible for its dual; it tells how much of the promise other limits take back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from brachis.common.summary import Summary
+from brachis.limits import Bound, Label, Limit, Role
+from brachis.optimise.program import Program
+from brachis.optimise.refine import Refined
+
+if TYPE_CHECKING:
+    from scipy import sparse
+
+_NEAR = 0.1
+"""Rows farther from their bounds are left out at first; dimensionless."""
+_LARGEST_STEP = 1.0
+"""Of any variable: directions that change nothing to first order are not followed without end."""
+_TOUCHED = 1e-9
+
+
+def rows_and_jacobian(program: Program, x: np.ndarray) -> tuple[np.ndarray, sparse.csr_array]:
+    """Evaluate the rows of a program, (c,), and their Jacobian, (c, v).
+
+    Raises
+    ------
+    UnreachableError
+        A collocation point is out of the branch's reach.
+    """
+    from scipy import sparse  # noqa: PLC0415
+
+    places = (program.jacobian_rows, program.jacobian_columns)
+    shape = (len(program.lower), len(x))
+    return program.rows(x), sparse.coo_array((program.jacobian(x), places), shape=shape).tocsr()
+
+
+def linearised_change(program: Program, x: np.ndarray) -> float | None:
+    """Predict the change of t_E from the answer to a problem with less strict limits.
+
+    Parameters
+    ----------
+    program : Program
+        With the raised limit.
+    x : (v,) ndarray
+        Answer to the problem before.
+
+    Returns
+    -------
+    float or None
+        s; None where the linear program has no answer.
+
+    Raises
+    ------
+    UnreachableError
+        A collocation point is out of the branch's reach.
+    """
+    from scipy import sparse  # noqa: PLC0415
+
+    rows, jacobian = rows_and_jacobian(program, x)
+    below, above = np.isfinite(program.lower), np.isfinite(program.upper)
+    slopes = sparse.vstack([-jacobian[np.flatnonzero(below)], jacobian[np.flatnonzero(above)]], format="csr")
+    room = np.concatenate([(rows - program.lower)[below], (program.upper - rows)[above]])
+    lowest = np.clip(program.x_lower - x, -_LARGEST_STEP, 0.0)
+    highest = np.clip(program.x_upper - x, 0.0, _LARGEST_STEP)
+    kept, gradient = room < _NEAR, program.gradient(x)
+    while True:
+        step = _solved(gradient, slopes[np.flatnonzero(kept)].toarray(), room[kept], lowest, highest)
+        if step is None:
+            return None
+        overrun = slopes @ step > room + _TOUCHED
+        if not (overrun & ~kept).any():
+            return float(gradient @ step)
+        kept |= overrun
+
+
+def _solved(
+    gradient: np.ndarray, slopes: np.ndarray, room: np.ndarray, lowest: np.ndarray, highest: np.ndarray
+) -> np.ndarray | None:
+    """Solve the linear program over some of the rows; None where it has no answer."""
+    from scipy.optimize import linprog  # noqa: PLC0415
+
+    bounds = list(zip(lowest.tolist(), highest.tolist(), strict=True))
+    found = linprog(gradient, A_ub=slopes, b_ub=room, bounds=bounds, method="highs")
+    return np.asarray(found.x) if found.success else None
+
+
+ACTIVE = (1e-8, 1e-7, 1e-6, 1e-5)
+"""Distances from a bound within which rows and variables press on it; dimensionless. The least that gives a balance
+counts: solvers differ in how near they come, and a row that is near its bound without being active would count as one
+that takes over within any step."""
+_GOOD = 1e-5
+"""The solver's multipliers with a smaller residual are taken as they are."""
+_DEPENDENT = 1e-9
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ActiveSet(Summary):
+    """What presses on a point x.
+
+    Attributes
+    ----------
+    slopes : (p, v) ndarray
+        Gradients of active rows, then of active variables; negative ones at upper bounds.
+    rows : (a,) int ndarray
+        Rows to which the first a slopes belong.
+    signs : (a,) ndarray
+        1 at a lower bound, -1 at an upper one.
+    """
+
+    slopes: np.ndarray
+    rows: np.ndarray
+    signs: np.ndarray
+
+    @classmethod
+    def at(cls, program: Program, x: np.ndarray, near: float) -> ActiveSet:
+        """Collect what presses on x, (v,): what is nearer to its bound than `near`, dimensionless.
+
+        Raises
+        ------
+        UnreachableError
+            A collocation point is out of the branch's reach.
+        """
+        values, jacobian = rows_and_jacobian(program, x)
+        low = np.flatnonzero(values <= program.lower + near)
+        high = np.flatnonzero(values >= program.upper - near)
+        rows, signs = np.concatenate([low, high]), np.repeat([1.0, -1.0], [len(low), len(high)])
+        slopes = signs[:, None] * jacobian[rows].toarray()
+        pressing = slopes.any(axis=1)  # what holds at the given start posture holds whatever x
+        unit = np.eye(len(x))
+        bounds = unit[x <= program.x_lower + near], -unit[x >= program.x_upper - near]
+        return cls(np.vstack([slopes[pressing], *bounds]), rows[pressing], signs[pressing])
+
+    @property
+    def dependent(self) -> bool:
+        """True where several sets of multipliers may balance a gradient."""
+        return bool(np.linalg.matrix_rank(self.slopes, tol=_DEPENDENT) < len(self.slopes))
+
+    def stationarity_residual(self, gradient: np.ndarray, weights: np.ndarray) -> float:
+        """Norm of the part of a gradient, (v,), that weights, (p,), do not balance; relative to the gradient's."""
+        return float(np.linalg.norm(gradient - weights @ self.slopes) / np.linalg.norm(gradient))
+
+    def weights_of(self, gradient: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        """Weights, (p,), from a solver's multipliers of all rows, (c,); those of variables balance what they can."""
+        of_rows = np.maximum(self.signs * multipliers[self.rows], 0.0)
+        rest = gradient - of_rows @ self.slopes[: len(of_rows)]
+        return np.concatenate([of_rows, np.maximum(self.slopes[len(of_rows) :] @ rest, 0.0)])
+
+    def fitted_weights(self, gradient: np.ndarray) -> np.ndarray:
+        """Weights, (p,), that balance a gradient best: non-negative least squares (Lawson and Hanson)."""
+        from scipy.optimize import nnls  # noqa: PLC0415
+
+        return np.asarray(nnls(self.slopes.T, gradient)[0]) if len(self.slopes) else np.empty(0)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Multipliers(Summary):
+    """Multipliers at an answer, and how well they balance the gradient.
+
+    Attributes
+    ----------
+    active_set : ActiveSet
+    weights : (p,) ndarray
+        Multipliers of the active_set, >= 0; s for a row, whose values are dimensionless.
+    source : str
+        ``"solver"`` or ``"least squares"``.
+    residual : float
+        See `ActiveSet.stationarity_residual`; 1 where nothing balances.
+    unique : bool
+        False where other multipliers balance the gradient as well.
+    """
+
+    active_set: ActiveSet
+    weights: np.ndarray
+    source: str
+    residual: float
+    unique: bool
+
+    def change(self, relaxation: np.ndarray, side: float | None = None) -> float:
+        """Directional derivative of t_E as bounds give way.
+
+        Parameters
+        ----------
+        relaxation : (c,) ndarray
+            Rates >= 0 at which the bounds of every row move outwards, dimensionless.
+        side : {1, -1}, optional
+            Only lower, or only upper bounds move.
+
+        Returns
+        -------
+        float
+            <= 0, s.
+        """
+        rates = relaxation[self.active_set.rows]
+        if side is not None:
+            rates = np.where(self.active_set.signs == side, rates, 0.0)
+        active = self.weights[: len(rates)]
+        if self.unique or not (rates @ active):
+            return -float(rates @ active)
+        return -self._least(np.concatenate([rates, np.zeros(len(self.weights) - len(rates))]))
+
+    def _least(self, rates: np.ndarray) -> float:
+        """Least of ``rates @ w`` over all weights that balance as much as `weights` do."""
+        from scipy.optimize import linprog  # noqa: PLC0415
+
+        slopes = self.active_set.slopes
+        found = linprog(rates, A_eq=slopes.T, b_eq=self.weights @ slopes, bounds=(0.0, None), method="highs")
+        best = self.weights if found.x is None else found.x
+        return float(rates @ best)
+
+
+def multipliers_of(program: Program, x: np.ndarray, given: np.ndarray | None = None) -> Multipliers:
+    """Find the multipliers at an answer.
+
+    Parameters
+    ----------
+    program : Program
+    x : (v,) ndarray
+    given : (c,) ndarray, optional
+        The solver's own multipliers of the rows; L = t_E - given . rows.
+
+    Returns
+    -------
+    Multipliers
+
+    Raises
+    ------
+    UnreachableError
+        A collocation point is out of the branch's reach.
+    """
+    tried: list[Multipliers] = []
+    for near in ACTIVE:
+        tried.append(_balancing(ActiveSet.at(program, x, near), program.gradient(x), given))
+        if tried[-1].residual <= _GOOD:
+            break
+    return min(tried, key=lambda multipliers: multipliers.residual)
+
+
+def _balancing(active_set: ActiveSet, gradient: np.ndarray, given: np.ndarray | None) -> Multipliers:
+    """Choose the weights of active_set that balance a gradient, (v,), best."""
+    candidates = [] if given is None else [("solver", active_set.weights_of(gradient, given))]
+    if not candidates or active_set.stationarity_residual(gradient, candidates[0][1]) > _GOOD:
+        candidates.append(("least squares", active_set.fitted_weights(gradient)))
+    source, weights = min(candidates, key=lambda candidate: active_set.stationarity_residual(gradient, candidate[1]))
+    residual = active_set.stationarity_residual(gradient, weights)
+    return Multipliers(active_set, weights, source, residual, unique=not active_set.dependent)
+
+
+def multipliers_of_answer(refined: Refined) -> Multipliers:
+    """Find the multipliers of a refined answer, before its end time was lengthened."""
+    report = refined.reports[-1]
+    return multipliers_of(refined.program, report.x, report.multipliers)
+
+
+STATIONARY = 1e-3
+"""With a larger residual the answer is not an optimum, and its multipliers say little."""
+_SMALLEST = 1e-9
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What one figure of a limit costs.
+
+    Attributes
+    ----------
+    limit : Limit
+    bound : Bound
+        The figure.
+    derivative : float
+        Derivative of t_E with respect to the figure, s per unit; <= 0 but at a lower end, which is raised by it.
+    """
+
+    limit: Limit
+    bound: Bound
+    derivative: float
+
+    @property
+    def label(self) -> Label:
+        """What is limited, and the figure's unit."""
+        return self.limit.labels[self.bound.column]
+
+    @property
+    def outwards(self) -> float:
+        """Sign of a change of the figure that leaves more room."""
+        return -1.0 if self.bound.end == "lower" else 1.0
+
+    def change(self, fraction: float) -> float:
+        """Predict the change of t_E, s, for a limit that leaves more room by a fraction; 0.01 is +1 %."""
+        return self.outwards * self.derivative * self.bound.whole * fraction
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as plain data for JSON."""
+        return {
+            "subject": self.label.subject,
+            "kind": self.label.kind,
+            "end": self.bound.end,
+            "limit": self.bound.figure,
+            "unit": self.label.unit,
+            "derivative_s_per_unit": self.derivative,
+            "change_for_1_percent_s": self.change(0.01),
+            "change_for_10_percent_s": self.change(0.1),
+        }
+
+
+@dataclass(frozen=True)
+class BranchBoundary:
+    """What the branch's boundary costs; no limit of the robot, but of the choice of redundant joints.
+
+    Attributes
+    ----------
+    label : str
+        Of the margin.
+    margin : float
+        Least branch margin in force, dimensionless.
+    derivative : float
+        Derivative of t_E with respect to it, s.
+    """
+
+    label: str
+    margin: float
+    derivative: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as plain data for JSON."""
+        return {"label": self.label, "margin": self.margin, "derivative_s": self.derivative}
+
+
+@dataclass(frozen=True, repr=False)
+class Sensitivities(Summary):
+    """What all limits cost.
+
+    Attributes
+    ----------
+    limits : tuple of Sensitivity
+        All figures of all limits but safeguards, the costliest first.
+    boundaries : tuple of BranchBoundary
+        Branch margins that hold the motion back.
+    source : str
+        Where the multipliers are from: ``"solver"`` or ``"least squares"``.
+    residual : float
+        Part of the gradient of t_E that they do not balance; an optimum has 0.
+    unique : bool
+        False where the multipliers are not unique: the derivatives then hold for more room only, not for less.
+    """
+
+    limits: tuple[Sensitivity, ...]
+    boundaries: tuple[BranchBoundary, ...]
+    source: str
+    residual: float
+    unique: bool
+
+    @property
+    def reliable(self) -> bool:
+        """True where the answer is an optimum as far as the multipliers tell."""
+        return self.residual <= STATIONARY
+
+    def of(self, subject: str, kind: str, end: str | None = None) -> Sensitivity:
+        """Sensitivity to one figure, such as ``of("j1", "torque")``; KeyError where there is none."""
+        for entry in self.limits:
+            if (entry.label.subject, entry.label.kind, entry.bound.end) == (subject, kind, end):
+                return entry
+        raise KeyError((subject, kind, end))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as plain data for JSON."""
+        return {
+            "limits": [entry.to_dict() for entry in self.limits],
+            "branch_boundaries": [entry.to_dict() for entry in self.boundaries],
+            "multipliers": self.source,
+            "residual": self.residual,
+            "reliable": self.reliable,
+            "unique": self.unique,
+        }
+
+
+def sensitivities(refined: Refined) -> Sensitivities:
+    """Derive from a refined answer what every limit costs.
+
+    Parameters
+    ----------
+    refined : Refined
+        ``result.attempt.refined``.
+
+    Returns
+    -------
+    Sensitivities
+        Of the answer before its end time was lengthened to meet the limits between collocation points.
+    """
+    return sensitivities_at(refined.program, multipliers_of_answer(refined))
+
+
+def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivities:
+    """As `sensitivities`, from a problem and the multipliers of its answer."""
+    found: list[Sensitivity] = []
+    boundaries: list[BranchBoundary] = []
+    for limit in program.limits:
+        rows = program.rows_of(limit)
+        for bound in limit.bounds:
+            rates = np.zeros(len(program.lower))
+            rates[rows[:, bound.column]] = bound.per_unit
+            if limit.role is not Role.SAFEGUARD:
+                found.append(_sensitivity(limit, bound, rates, multipliers))
+            elif (slope := -multipliers.change(rates)) > _SMALLEST:
+                boundaries.append(BranchBoundary(limit.labels[bound.column].subject, bound.figure, slope))
+    found.sort(key=lambda entry: entry.change(1.0))
+    return Sensitivities(tuple(found), tuple(boundaries), multipliers.source, multipliers.residual, multipliers.unique)
+
+
+def _sensitivity(limit: Limit, bound: Bound, rates: np.ndarray, multipliers: Multipliers) -> Sensitivity:
+    """Sensitivity to a figure that moves the bounds of the rows outwards at `rates`, (c,)."""
+    if bound.end is None:
+        return Sensitivity(limit, bound, multipliers.change(rates))
+    sign = 1.0 if bound.end == "lower" else -1.0
+    return Sensitivity(limit, bound, -sign * multipliers.change(rates, sign))

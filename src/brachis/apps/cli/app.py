@@ -1,0 +1,210 @@
+"""The application: what all commands have in common. The commands themselves are in `brachis.apps.cli.main`.
+
+Examples of every command, and the exit codes, as the help shows them.
+
+Run in this order the examples work, given a sweep file ``lines.yaml`` (docs/sweeps.md).
+
+How much a command says: the options ``--quiet`` and ``--verbose`` of every command.
+
+Options that several commands have.
+"""
+
+from __future__ import annotations
+
+from contextvars import ContextVar
+from enum import IntEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from brachis.common import interrupts
+from brachis.common.files import is_file
+from brachis.common.interrupts import INTERRUPTED
+from brachis.errors import BrachisError
+
+EXIT_CODES = (
+    "0    done; of a plan: planned and verified",
+    "1    no verified plan; a fault of brachis; output that cannot be written",
+    "2    wrong input: a file, a key, an option",
+    "3    planned and verified, but a figure could not be written",
+    "130  interrupted (Ctrl-C) before there was a motion",
+)
+
+EXAMPLES: dict[str, tuple[str, ...]] = {
+    "": (
+        "brachis new scara3                # a task for a robot that comes along",
+        "brachis plan task.yaml --out out  # plan, verify, draw",
+    ),
+    "robots": ("brachis robots", "brachis robots --json"),
+    "new": ("brachis new scara3", "brachis new gantry2 --out gantry.yaml"),
+    "plan": (
+        "brachis plan task.yaml --out out",
+        "brachis plan task.yaml --set search.effort=single --set 'path.0.line.by=[0, 0.4]'",
+    ),
+    "bottleneck": ("brachis bottleneck task.yaml --set search.effort=single",),
+    "verify": ("brachis verify out/result.npz",),
+    "export": (
+        "brachis export out/result.npz --out out/motion.csv --dt 0.004",
+        "brachis export out/result.npz --out out/motion.gif --dt 0.1",
+    ),
+    "import": ("brachis import out/motion.csv --robot task.yaml --out out/today.npz",),
+    "compare": ("brachis compare out/motion.csv --robot task.yaml",),
+    "plot": ("brachis plot out/result.npz --kind torques --out out/torques.svg",),
+    "report": ("brachis report out/result.npz", "brachis report out/result.npz --title 'cell 3' --out out/cell3.html"),
+    "view": ("brachis view out", "brachis view out/result.npz --port 0 --no-browser"),
+    "inspect": ("brachis inspect task.yaml", "brachis inspect tx90l_rail --task-space pose"),
+    "compose": ("brachis compose iiwa14 --range -2 2 --velocity 2 --force 1500 --mass 50 --out cell.urdf",),
+    "schema": ("brachis schema --out task.schema.json", "brachis schema --of trajectory"),
+    "sweep": (
+        "brachis sweep lines.yaml --jobs 2",
+        "brachis sweep lines.yaml --retry  # goes on where it was ended",
+    ),
+}
+"""By command; those of the whole program under no name."""
+
+
+class Verbosity(IntEnum):
+    """How much is said besides errors, and besides the JSON or file that was asked for."""
+
+    QUIET = 0
+    NORMAL = 1
+    VERBOSE = 2
+
+
+_CHOSEN = ContextVar("verbosity", default=Verbosity.NORMAL)
+
+
+def chosen() -> Verbosity:
+    """Return what the command line asks for."""
+    return _CHOSEN.get()
+
+
+def choose(verbosity: Verbosity) -> None:
+    """Say this much from now on, within the context of the running command."""
+    _CHOSEN.set(verbosity)
+
+
+_OF_ALL = ("quiet", "verbose")
+"""Options that every command takes, after its name too."""
+
+
+class InterruptedByUserError(BrachisError):
+    """The user pressed Ctrl-C."""
+
+    exit_code = INTERRUPTED
+
+
+class _Commands(TyperGroup):
+    """Commands that the user may interrupt, with examples in their help, and the options of all commands."""
+
+    def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override]
+        """Run a command, its imports included; however it ends, a press that nobody heard ends it."""
+        try:
+            with interrupts.heard():
+                return super().invoke(ctx)
+        except KeyboardInterrupt as interrupt:
+            told = str(interrupt)
+            raise InterruptedByUserError(f"interrupted; {told}" if told else "interrupted") from interrupt
+
+    def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:  # type: ignore[override]  # noqa: ANN401  (Typer's own classes have moved)
+        """Find a command, and give it what all of them have."""
+        command = super().get_command(ctx, cmd_name)
+        if command is not None and command.epilog is None:
+            command.epilog = _paragraphs("Examples", EXAMPLES.get(cmd_name, ()))
+            command.params += [each for each in self.params if each.name in _OF_ALL]
+        return command
+
+    def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override]  # noqa: ANN401
+        """Find the command that is named; a file is none."""
+        if self.get_command(ctx, args[0]) is None and is_file(args[0]):
+            command = "inspect" if Path(args[0]).suffix == ".urdf" else "plan"
+            ctx.fail(f"A command comes before a file: brachis {command} {args[0]}")
+        return super().resolve_command(ctx, args)
+
+
+def _paragraphs(title: str, lines: tuple[str, ...]) -> str:
+    """Write lines that help leaves as they are: what stands in one can be copied."""
+    return "\n  ".join((f"\b\n{title}:", *lines))
+
+
+app = typer.Typer(
+    name="brachis",
+    cls=_Commands,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=_paragraphs("Examples", EXAMPLES[""]) + "\n\n" + _paragraphs("Exit codes", EXIT_CODES),
+)
+
+
+def _print_version(asked: bool) -> None:  # noqa: FBT001  (Typer calls it so)
+    """Print the version and stop, where asked."""
+    if asked:
+        import brachis  # noqa: PLC0415
+
+        typer.echo(f"brachis {brachis.__version__}")
+        raise typer.Exit
+
+
+def _be_quiet(asked: bool) -> None:  # noqa: FBT001
+    if asked:
+        choose(Verbosity.QUIET)
+
+
+def _be_verbose(asked: bool) -> None:  # noqa: FBT001
+    if asked:
+        choose(Verbosity.VERBOSE)
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+    quiet: Annotated[
+        bool,
+        typer.Option(
+            "--quiet", "-q", callback=_be_quiet, expose_value=False, help="Print errors only, and JSON if asked for."
+        ),
+    ] = False,
+    verbose: Annotated[
+        bool,
+        typer.Option(
+            "--verbose",
+            "-v",
+            callback=_be_verbose,
+            expose_value=False,
+            help="Say on standard error what is done and when; tracebacks.",
+        ),
+    ] = False,
+) -> None:
+    """Plan minimum-time motions of redundant robots along prescribed paths."""
+    del version, quiet, verbose
+
+
+Strict = Annotated[
+    bool | None,
+    typer.Option(
+        "--strict/--no-strict",
+        help="Refuse all implausible figures, such as degrees for rad, or warn of them all; otherwise only a start "
+        "posture that looks like degrees is refused.",
+    ),
+]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a key of the task, dotted as in spline.intervals=40 or path.0.line.length=0.5; the value is YAML. "
+        "Repeatable.",
+    ),
+]
+Degrees = Annotated[bool, typer.Option("--degrees", help="Show angles in degrees; files and JSON stay in rad.")]
+
+
+def with_strict(changes: list[str] | None, *, strict: bool | None) -> list[str]:
+    """Add what ``--strict`` or ``--no-strict`` says to the changes of a task."""
+    return [*(changes or []), *([] if strict is None else [f"strict={str(strict).lower()}"])]

@@ -1,0 +1,133 @@
+"""What a controller is given: the motion of a robot's joints at regular times.
+
+Libraries that only some formats need.
+"""
+
+from __future__ import annotations
+
+import importlib
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+
+from brachis.errors import BrachisWarning, NotInstalledError, UnknownNameError
+from brachis.robot import ROLL_JOINT
+from brachis.trajectory import Trajectory
+from brachis.trajectory.samples import COLUMNS
+
+_STILL = 1e-9
+"""rad or m: a joint that moves less stands still."""
+
+
+class LeftOutWarning(BrachisWarning):
+    """A joint that moves is not written to the exported file."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointRows:
+    """Motion of some joints at K times.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        Names, in the order of the columns.
+    units : tuple of str
+        Of their positions, ``rad`` or ``m``.
+    left_out : tuple of str
+        A sentence for every joint that moves and is not among `joints`.
+    t, s : (K,) ndarray
+        s; path coordinate, dimensionless.
+    q, qdot, qddot, tau : (K, joints) ndarray
+        Position (rad or m), velocity, acceleration, torque (Nm) or force (N).
+    """
+
+    joints: tuple[str, ...]
+    units: tuple[str, ...]
+    left_out: tuple[str, ...]
+    t: np.ndarray
+    s: np.ndarray
+    q: np.ndarray
+    qdot: np.ndarray
+    qddot: np.ndarray
+    tau: np.ndarray
+
+    def columns(self) -> Iterator[tuple[str, np.ndarray]]:
+        """Yield names and values, (K,), of a table: ``t``, then ``q_``, ``qd_``, ``qdd_``, ``tau_`` of every joint."""
+        yield "t", self.t
+        for prefix, quantity in COLUMNS.items():
+            yield from zip((f"{prefix}_{joint}" for joint in self.joints), getattr(self, quantity).T, strict=True)
+
+
+def rows_of(trajectory: Trajectory, dt: float, last: str, joints: Sequence[str] | None) -> JointRows:
+    """Sample joints of a trajectory.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    dt : float
+        Period, s.
+    last : {"exact", "hold"}
+        See `Trajectory.sample`.
+    joints : sequence of str or None
+        Which, in which order; None: all that the robot has, which the virtual joint of a freely rolling tool is not.
+
+    Raises
+    ------
+    InputError
+        `dt` or `last` cannot be used.
+    UnknownNameError
+        There is no such joint.
+
+    Warns
+    -----
+    LeftOutWarning
+        A joint that moves is not among them.
+    """
+    names = trajectory.joint_names
+    chosen = tuple(name for name in names if name != ROLL_JOINT) if joints is None else tuple(joints)
+    unknown = [name for name in chosen if name not in names]
+    if unknown:
+        raise UnknownNameError("joint", unknown[0], names, where="joints")
+    index = [names.index(name) for name in chosen]
+    samples = trajectory.sample(dt, last=last)
+    parts = (getattr(samples, quantity)[:, index] for quantity in COLUMNS.values())
+    units = tuple(trajectory.robot.position_units[each] for each in index)
+    left_out = tuple(_list_missing(trajectory, np.vstack([trajectory.q, samples.q]), chosen))
+    if left_out:
+        hint = "Move what is missing by its own controller at the same time, or write all joints"
+        warnings.warn(f"{'; '.join(left_out)}. {hint}", LeftOutWarning, stacklevel=4)
+    return JointRows(chosen, units, left_out, samples.t, samples.s, *parts)
+
+
+def _list_missing(trajectory: Trajectory, q: np.ndarray, chosen: Sequence[str]) -> Iterator[str]:
+    """Yield a sentence, with its travel over postures (K, n), for every joint that moves and is not written."""
+    lowest = q.min(axis=0)
+    highest = q.max(axis=0)
+    units = trajectory.robot.position_units
+    for joint, unit, low, high in zip(trajectory.joint_names, units, lowest, highest, strict=True):
+        if joint not in (*chosen, ROLL_JOINT) and high - low > _STILL:
+            travel = f"{high - low:.4g} {unit} ({low:.4g} to {high:.4g} {unit})"
+            yield f"joint {joint} moves by {travel} and is not in this file"
+
+
+def needed(name: str, what: str) -> ModuleType:
+    """Import a library of the extra ``export``.
+
+    Parameters
+    ----------
+    name : str
+        Of the module.
+    what : str
+        What needs it.
+
+    Raises
+    ------
+    NotInstalledError
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise NotInstalledError(what, name.split(".", maxsplit=1)[0], "export") from error

@@ -1,0 +1,55 @@
+"""Figures of a trajectory; a plot is one file here and one line in `PLOTS`.
+
+Every function returns a Matplotlib figure of its own, made without pyplot and without touching Matplotlib's settings.
+Matplotlib is imported when the first figure is made.
+
+Examples
+--------
+>>> import brachis
+>>> sorted(brachis.plots.PLOTS)[:3]
+['fit', 'limits', 'motion']
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from brachis.apps.plots.comparison import plot_candidates, plot_comparison, plot_fit
+from brachis.apps.plots.limits import plot_limits, plot_timeline
+from brachis.apps.plots.motion import plot_motion, plot_torques
+from brachis.apps.plots.overview import plot_overview
+from brachis.apps.plots.postures import plot_postures
+from brachis.apps.plots.style import SUFFIXES, as_html, check_suffix, save_figure
+from brachis.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PLOTS: dict[str, Callable[[Trajectory], Figure]] = {
+    "torques": plot_torques,
+    "postures": plot_postures,
+    "motion": plot_motion,
+    "overview": plot_overview,
+    "timeline": plot_timeline,
+    "limits": plot_limits,
+    "fit": plot_fit,
+}
+"""Plots of one trajectory by name; `plot_comparison` compares many, `plot_candidates` draws a search."""
+
+__all__ = [
+    "PLOTS",
+    "SUFFIXES",
+    "as_html",
+    "check_suffix",
+    "plot_candidates",
+    "plot_comparison",
+    "plot_fit",
+    "plot_limits",
+    "plot_motion",
+    "plot_overview",
+    "plot_postures",
+    "plot_timeline",
+    "plot_torques",
+    "save_figure",
+]

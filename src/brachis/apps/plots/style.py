@@ -1,0 +1,276 @@
+"""What all figures share: sizes, fonts, colours, axes and legends.
+
+Everything is set on the figure at hand; Matplotlib's own settings are left alone.
+
+Figures to files.
+
+Figures in notebooks, which know those of pyplot alone.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import itertools
+import os
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from brachis.common.files import atomic_write
+from brachis.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SUFFIXES = ("png", "pdf", "svg")
+"""Formats of `save_figure`."""
+
+_DPI = 300
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None},
+    "svg": {"Date": None},
+}
+
+
+def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure as png (300 dpi), pdf or svg, by the suffix of `path`.
+
+    Fonts are embedded in pdf as TrueType, which publishers ask for, and text stays text in svg. The same figure gives
+    the same file.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : path
+        File to write; an older one is replaced, and kept if writing fails.
+
+    Raises
+    ------
+    InputError
+        The suffix is not one of `SUFFIXES`, or the file cannot be written.
+    """
+    import matplotlib as mpl  # noqa: PLC0415  (imports in 0.3 s, and only plots need it)
+
+    suffix = check_suffix(path)
+    content = io.BytesIO()  # first, so that only errors of writing are reported as such
+    fonts: dict[Any, Any] = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "brachis"}
+    with mpl.rc_context(fonts):  # these three have no other way in; the context puts them back
+        figure.savefig(content, format=suffix, dpi=_DPI, metadata=_METADATA[suffix])
+    with atomic_write(path) as stream:
+        stream.write(content.getvalue())
+
+
+def check_suffix(path: str | os.PathLike[str]) -> str:
+    """Return the format that the suffix of `path` asks for.
+
+    Raises
+    ------
+    InputError
+        The suffix is not one of `SUFFIXES`.
+    """
+    suffix = Path(path).suffix.lower().removeprefix(".")
+    if suffix not in SUFFIXES:
+        raise InputError(
+            "cannot tell the format of the figure",
+            where=str(path),
+            found=f"suffix .{suffix}" if suffix else "no suffix",
+            allowed=", ".join(f".{name}" for name in SUFFIXES),
+        )
+    return suffix
+
+
+_DPI_NOTEBOOK = 110
+
+
+@cache
+def figure_class() -> type[Figure]:
+    """Return a class of Matplotlib's figures that notebooks show without further ado."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  (imports in 0.3 s, and only plots need it)
+
+    class NotebookFigure(Figure):
+        """A figure that a notebook shows."""
+
+        def _repr_png_(self) -> bytes:
+            return _png(self)
+
+    return NotebookFigure
+
+
+def as_html(figure: Figure) -> str:
+    """Return an image element with the figure in it."""
+    data = base64.b64encode(_png(figure)).decode()
+    return f'<img alt="figure" style="min-width:0;max-width:100%;height:auto" src="data:image/png;base64,{data}"/>'
+
+
+def _png(figure: Figure) -> bytes:
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=_DPI_NOTEBOOK)
+    return stream.getvalue()
+
+
+COLUMN_WIDTH = 89.0
+"""One column of a journal, mm."""
+PAGE_WIDTH = 183.0
+"""Two columns, mm."""
+LABEL_SIZE = 8.0
+"""Font size of axis labels, points."""
+TICK_SIZE = 7.0
+"""Font size of all other text, points."""
+LINE_WIDTH = 1.2
+"""Of data, points."""
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Okabe and Ito's colours, told apart by colour-blind readers; their yellow is too faint on white."""
+LINE_STYLES: tuple[Any, ...] = (
+    "-",
+    (0, (6.0, 1.6)),
+    (0, (1.2, 1.2)),
+    (0, (6.0, 1.6, 1.2, 1.6)),
+    (0, (2.6, 1.2)),
+    (0, (6.0, 1.3, 1.2, 1.3, 1.2, 1.3)),
+)
+"""Told apart in print without colours. One fewer than colours, so that joints far down the chain still differ."""
+HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----")
+LIMIT: dict[str, Any] = {"linewidth": 0.7, "linestyle": (0, (4.0, 2.0)), "zorder": 1.0, "gid": "limit"}
+"""Line properties of limits."""
+GREY = "#666666"
+FAINT = "#CFCFCF"
+FORBIDDEN = "#EFEFEF"
+"""What is beyond limits."""
+
+_MM_PER_INCH = 25.4
+_MM_PER_CHARACTER = 1.45  # of TICK_SIZE, with some reserve
+_MM_PER_HANDLE = 10.5
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Make an empty figure of `width` times `height`, mm, that no global state knows of."""
+    size = width / _MM_PER_INCH, height / _MM_PER_INCH
+    figure = figure_class()(figsize=size, layout="constrained", facecolor="white")
+    figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.04)  # type: ignore[union-attr,call-arg]
+    return figure
+
+
+def joint_style(joint: int) -> dict[str, Any]:
+    """Line properties of the joint with this index: a colour and, for print in greys, a line style."""
+    return {
+        "color": COLOURS[joint % len(COLOURS)],
+        "linestyle": LINE_STYLES[joint % len(LINE_STYLES)],
+        "linewidth": LINE_WIDTH,
+    }
+
+
+def bar_style(column: int) -> dict[str, Any]:
+    """Look of the bars of one choice: a colour and, for print in greys, a hatching."""
+    return {
+        "color": COLOURS[column % len(COLOURS)],
+        "hatch": HATCHES[column % len(HATCHES)],
+        "edgecolor": "white",
+        "linewidth": 0.0,
+    }
+
+
+def limit_dashes(place: int, sharing: int) -> tuple[float, tuple[float, float]]:
+    """Line style of a limit that some joints share: the dashes of each lie in the gaps of the others."""
+    dash, gap = 4.0, 2.0
+    period = (dash + gap) * sharing
+    return (period - place * (dash + gap)) % period, (dash, period - dash)
+
+
+def dress(ax: Axes, xlabel: str, ylabel: str) -> None:
+    """Set labels, fonts and spines of one pair of axes."""
+    ax.set_xlabel(xlabel, fontsize=LABEL_SIZE)
+    ax.set_ylabel(ylabel, fontsize=LABEL_SIZE)
+    ax.tick_params(which="both", labelsize=TICK_SIZE, direction="in", width=0.6, colors="black")
+    ax.tick_params(which="major", length=3.0)
+    for spine in ax.spines.values():
+        spine.set_linewidth(0.6)
+
+
+def dress_time(ax: Axes, t_end: float, knots: np.ndarray) -> None:
+    """Let the time axis run from start to end, with the knots (s) as faint ticks inside the lower edge."""
+    ax.set_xlim(0.0, t_end)
+    ax.set_xticks(knots[(knots > 0.0) & (knots < t_end)], minor=True)
+    ax.tick_params(axis="x", which="minor", length=2.0, color="#A0A0A0", width=0.5)
+
+
+def mark_end(ax: Axes, t_end: float) -> None:
+    """Write the end time beside the right edge, where no data are."""
+    ax.text(
+        1.02,
+        0.5,
+        rf"$t_\mathrm{{E}} = {t_end:.3f}$ s",
+        transform=ax.transAxes,
+        rotation=90.0,
+        fontsize=TICK_SIZE,
+        verticalalignment="center",
+    )
+
+
+def legend_above(
+    ax: Axes, width: float, handles: Sequence[Artist] | None = None, labels: Sequence[str] | None = None
+) -> None:
+    """Put a legend above the axes, in as many columns as fit.
+
+    Parameters
+    ----------
+    ax : Axes
+    width : float
+        Room, mm.
+    handles, labels : sequences, optional
+        What the legend shows; the labelled artists of the axes if left out.
+    """
+    if handles is None or labels is None:
+        handles, labels = ax.get_legend_handles_labels()
+    if not labels:
+        return
+    ax.legend(
+        handles,
+        labels,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=_columns_that_fit(labels, width),
+        fontsize=TICK_SIZE,
+        frameon=False,
+        handlelength=2.3,
+        columnspacing=1.2,
+        borderaxespad=0.2,
+        borderpad=0.2,
+    )
+
+
+def legend_below(figure: Figure, width: float, handles: Sequence[Artist], labels: Sequence[str]) -> None:
+    """Put one legend for all axes at the foot of the figure, in as many columns as fit `width`, mm."""
+    figure.legend(
+        handles,
+        labels,
+        loc="outside lower center",
+        ncols=_columns_that_fit(labels, width),
+        fontsize=TICK_SIZE,
+        frameon=False,
+        handlelength=2.3,
+        columnspacing=1.2,
+    )
+
+
+def _columns_that_fit(labels: Sequence[str], width: float) -> int:
+    """Return the largest number of legend columns within `width`, mm; Matplotlib fills column by column."""
+    for columns in range(len(labels), 1, -1):
+        rows, longer = divmod(len(labels), columns)
+        starts = [column * rows + min(column, longer) for column in range(columns + 1)]
+        longest = [max(map(len, labels[begin:end])) for begin, end in itertools.pairwise(starts)]
+        if columns * _MM_PER_HANDLE + sum(longest) * _MM_PER_CHARACTER <= width:
+            return columns
+    return 1
+
+
+def plain(name: str) -> str:
+    """Keep Matplotlib from reading a joint's name as mathematics."""
+    return name.replace("$", r"\$")

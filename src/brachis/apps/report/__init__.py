@@ -1,0 +1,14 @@
+"""A motion as one HTML file, from which a person decides whether to run it; `make_report` does the whole.
+
+Examples
+--------
+>>> import brachis
+>>> result = brachis.plan("scara3", brachis.examples.scara_line, redundant_joints=["j1"], intervals=8, effort="single")
+>>> page = brachis.report.make_report(result)
+>>> page.html[:15]
+'<!doctype html>'
+"""
+
+from brachis.apps.report.page import Report, make_report
+
+__all__ = ["Report", "make_report"]

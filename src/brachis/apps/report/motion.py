@@ -1,0 +1,138 @@
+"""What a report is made of: a motion, its verification, and what holds it back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from brachis.apps import bottleneck
+from brachis.apps.bottleneck import LimitRatios, Saturation, limit_ratios
+from brachis.apps.bottleneck.saturation import saturations_of
+from brachis.apps.bottleneck.text import active_in_words
+from brachis.apps.plots.motion import dense_samples
+from brachis.errors import BrachisError
+from brachis.limits import Limit, Role
+from brachis.optimise.candidate import Attempt
+from brachis.problem.plausibility import of_robot, of_task
+from brachis.robot.plausibility import Remark
+from brachis.trajectory import Samples, Trajectory
+from brachis.verify import Verification, verify_trajectory
+
+if TYPE_CHECKING:
+    from brachis.result import Result
+
+
+@dataclass(frozen=True, eq=False)
+class ReportedMotion:
+    """A motion with all that is said of it.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+    samples : Samples
+        Dense ones.
+    verification : Verification
+    ratios : LimitRatios
+    saturations : tuple of Saturation
+        Those active longest first.
+    held_back : tuple of str
+        What holds the motion back, a sentence each.
+    remarks : tuple of Remark
+        What of robot and task is hardly meant.
+    left_undone : tuple of str
+        What the search left undone.
+    candidates : tuple of Attempt
+        What the search looked at; none for a saved motion.
+    planned : dict of str to str
+        How the motion was planned, where that is known.
+    degrees : bool
+        Whether angles are shown in degrees.
+    """
+
+    trajectory: Trajectory
+    samples: Samples
+    verification: Verification
+    ratios: LimitRatios
+    saturations: tuple[Saturation, ...]
+    held_back: tuple[str, ...]
+    remarks: tuple[Remark, ...]
+    left_undone: tuple[str, ...]
+    candidates: tuple[Attempt, ...]
+    planned: dict[str, str]
+    degrees: bool
+
+
+def reported_motion(motion: Result | Trajectory, *, degrees: bool = False) -> ReportedMotion:
+    """Gather what there is to say of a planned or a saved motion; a saved one is verified again."""
+    if isinstance(motion, Trajectory):
+        return _gathered(
+            motion,
+            motion,
+            verify_trajectory(motion),
+            limits=None,
+            remarks=of_robot(motion.robot) + of_task(motion.task),
+            degrees=degrees,
+        )
+    refined = motion.attempt.refined
+    limits = None if refined is None else [each for each in refined.program.limits if each.role is not Role.SAFEGUARD]
+    early = ("the search was ended early: a faster motion may have been missed",) if motion.interrupted else ()
+    return _gathered(
+        motion,
+        motion.trajectory,
+        motion.verification,
+        limits=limits,
+        remarks=motion.warnings,
+        left_undone=(*early, *motion.undone),
+        candidates=motion.candidates,
+        planned=_planned(motion),
+        degrees=degrees,
+    )
+
+
+def _gathered(
+    source: Result | Trajectory,
+    trajectory: Trajectory,
+    verification: Verification,
+    *,
+    limits: Sequence[Limit] | None,
+    remarks: tuple[Remark, ...],
+    degrees: bool,
+    left_undone: tuple[str, ...] = (),
+    candidates: tuple[Attempt, ...] = (),
+    planned: dict[str, str] | None = None,
+) -> ReportedMotion:
+    ratios = limit_ratios(trajectory, limits)
+    found = saturations_of(ratios)
+    return ReportedMotion(
+        trajectory=trajectory,
+        samples=dense_samples(trajectory),
+        verification=verification,
+        ratios=ratios,
+        saturations=found,
+        held_back=_held_back(source, found, degrees=degrees),
+        remarks=remarks,
+        left_undone=left_undone,
+        candidates=candidates,
+        planned=planned or {},
+        degrees=degrees,
+    )
+
+
+def _held_back(source: Result | Trajectory, found: tuple[Saturation, ...], *, degrees: bool) -> tuple[str, ...]:
+    """Say what the limits cost; where that cannot be known, when they are active and why no more is known."""
+    try:
+        return tuple(bottleneck.report(source).text(degrees=degrees).splitlines())
+    except BrachisError as error:
+        return (*active_in_words(found), f"What the limits cost is not known: {error}")
+
+
+def _planned(result: Result) -> dict[str, str]:
+    """Say how a motion was planned."""
+    report, least = result.solver_report, result.least_motion
+    return {
+        "solver": f"{report.solver}, {report.status.value}",
+        "collocation points": str(result.attempt.collocation_points),
+        "planning time": f"{result.timing['total']:.2f} s",
+        "least motion": "off" if least is None else least.status,
+    }

@@ -1,0 +1,178 @@
+"""A motion as one HTML file without links to anything: all data, pictures and programs are in it."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import html
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+from brachis.apps.plots import as_html, plot_candidates, plot_fit, plot_overview
+from brachis.apps.plots.quantities import kinds_of
+from brachis.apps.report import tables
+from brachis.apps.report.figures import motion_figure, scene, timeline_figure
+from brachis.apps.report.motion import ReportedMotion, reported_motion
+from brachis.common.files import atomic_write, check_suffix
+from brachis.errors import NotInstalledError
+from brachis.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from brachis.result import Result
+
+_NEEDED_BY = "a report"
+_EXTRA = "report"
+
+
+@dataclass(frozen=True, repr=False)
+class Report:
+    """A report as HTML.
+
+    Attributes
+    ----------
+    html : str
+        The whole page.
+    verified : bool
+        Whether the motion passed the verification.
+    """
+
+    html: str
+    verified: bool
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the page to a file; an older one is replaced, and kept if writing fails.
+
+        Raises
+        ------
+        InputError
+            The suffix is another than html, or the file cannot be written.
+        """
+        check_suffix(path, ".html", "A browser prints it as PDF")
+        with atomic_write(path) as stream:
+            stream.write(self.content)
+
+    @property
+    def size(self) -> int:
+        """Length of the file, bytes."""
+        return len(self.content)
+
+    @property
+    def content(self) -> bytes:
+        """What the file holds."""
+        return self.html.encode(errors="backslashreplace")  # names of files need not be text
+
+    def __repr__(self) -> str:
+        """Say what it is, not what is in it."""
+        return f"Report({'verified' if self.verified else 'NOT verified'}, {1e-6 * self.size:.1f} MB)"
+
+    def _repr_html_(self) -> str:
+        """Show the page in a notebook."""
+        frame = 'style="width:100%;height:80vh;border:1px solid #8888" sandbox="allow-scripts"'
+        return f'<iframe {frame} srcdoc="{html.escape(self.html)}"></iframe>'
+
+
+def make_report(motion: Result | Trajectory, *, title: str = "", degrees: bool = False) -> Report:
+    """Make a page from which a person decides whether to run a motion.
+
+    Parameters
+    ----------
+    motion : Result or Trajectory
+        Of `brachis.plan`; or a trajectory, a loaded one for example, which is verified again.
+    title : str, optional
+        Of the page; the robot's name if left out, "motion" if it has none.
+    degrees : bool, optional
+        Whether the tables and the interactive figures show angles in degrees; the pictures are in rad either way.
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    NotInstalledError
+        Jinja2 or Plotly is not installed: ``pip install "brachis[report]"``.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> from brachis.report import make_report
+    >>> page = make_report(brachis.Trajectory.load("out/result.npz"))  # doctest: +SKIP
+    >>> page.save("out/report.html")  # doctest: +SKIP
+    """
+    template, program = _template(), _plotly()
+    reported = reported_motion(motion, degrees=degrees)
+    checks = tables.check_rows(reported)
+    page = template.render(
+        title=title or reported.trajectory.robot.name or "motion",
+        verified=reported.verification.passed,
+        points=reported.verification.points,
+        failed=[check for check in checks if not check.passed],
+        checks=checks,
+        figures=tables.figures_of_merit(reported),
+        what_limits=tables.what_limits(reported),
+        joints=tables.joint_rows(reported),
+        held_back=reported.held_back,
+        remarks=reported.remarks,
+        left_undone=reported.left_undone,
+        identity=tables.identity(reported),
+        kinds=kinds_of(reported.trajectory),
+        pictures=list(_pictures(reported)),
+        task=tables.task_text(reported.trajectory.task),
+        versions=tables.versions(),
+        data=_json(
+            {"motion": motion_figure(reported), "timeline": timeline_figure(reported), "scene": scene(reported)}
+        ),
+        plotly=program,
+        style=_part("page.css"),
+        program=_part("page.js"),
+    )
+    return Report(page, reported.verification.passed)
+
+
+def _pictures(reported: ReportedMotion) -> Iterator[tuple[str, str]]:
+    """Captions and pictures, which print and show without JavaScript."""
+    trajectory = reported.trajectory
+    yield (
+        "The motion at a glance; dashed lines are limits, faint ticks the knots of the splines",
+        as_html(plot_overview(trajectory)),
+    )
+    if len(reported.candidates) > 1:
+        yield "End times of all that the search looked at", as_html(plot_candidates(reported.candidates))
+    if any(fit.profile for fit in trajectory.task.fits):
+        yield "How far the points are from the path that was fitted to them", as_html(plot_fit(trajectory))
+
+
+def _json(data: dict[str, Any]) -> str:
+    """Write data for a script element, which no text in it can end."""
+    return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _part(name: str) -> str:
+    return resources.files("brachis.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _template() -> Any:  # noqa: ANN401  (a Jinja2 template)
+    """Read the page's template; what is filled in is escaped unless it is said to be safe."""
+    try:
+        import jinja2  # noqa: PLC0415  (an extra)
+    except ImportError:
+        raise NotInstalledError(_NEEDED_BY, "Jinja2", _EXTRA) from None
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    return environment.from_string(_part("page.html"))
+
+
+@cache
+def _plotly() -> str:
+    """Pack Plotly's program: 1.5 of 4.8 MB."""
+    try:
+        from plotly.offline import get_plotlyjs  # noqa: PLC0415  (an extra)
+    except ImportError:
+        raise NotInstalledError(_NEEDED_BY, "Plotly", _EXTRA) from None
+    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), mtime=0)).decode()

@@ -1,0 +1,271 @@
+"""The tables of a report, in words and figures with their units."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import platform
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import PurePosixPath, PureWindowsPath
+from typing import Any
+
+import numpy as np
+import yaml
+
+import brachis
+from brachis.apps.bottleneck import THRESHOLD
+from brachis.apps.plots.quantities import Quantity, kinds_of, quantities
+from brachis.apps.report.motion import ReportedMotion
+from brachis.optimise.candidate import coordinates
+from brachis.robot.from_task import in_use
+from brachis.task import Task
+from brachis.verify import Check
+
+_LIBRARIES = ("pin", "numpy", "scipy", "plotly")
+NEAR = 0.9
+"""Values that use more of a limit are marked as near it; 1 is the limit itself."""
+_SMALL, _LARGE = 1e-9, 1e4
+_LISTED = 6
+"""Segments of a path, and numbers of one, that are named."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A joint's extreme value of one quantity.
+
+    Attributes
+    ----------
+    value, limit : str
+        With units; the limit is empty where there is none.
+    share : str
+        Of the limit, per cent; empty where there is none.
+    level : str
+        ``beyond``, ``at``, ``near`` or empty: how near to the limit.
+    """
+
+    value: str
+    limit: str
+    share: str
+    level: str
+
+
+@dataclass(frozen=True)
+class JointRow:
+    """What a joint does.
+
+    Attributes
+    ----------
+    name : str
+    redundant : bool
+    start, end : str
+        Positions with their unit.
+    travel : str
+        Lowest and highest position.
+    peaks : tuple of Row
+        Of every kind of quantity, the position first.
+    """
+
+    name: str
+    redundant: bool
+    start: str
+    end: str
+    travel: str
+    peaks: tuple[Row, ...]
+
+
+def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
+    """Say what a person asks first."""
+    trajectory, samples, verification = motion.trajectory, motion.samples, motion.verification
+    boundary = trajectory.task.boundary
+    named = trajectory.branch not in {"", coordinates(trajectory.redundant_joints, trajectory.branch)}
+    fastest = int(np.argmax(samples.tool_speed))
+    ends = "goes round for ever" if boundary.periodic else "from rest to rest"
+    if boundary.start_speed or boundary.end_speed:
+        first, last = samples.tool_speed[[0, -1]]
+        ends = f"begins with the tool at {first:.3f} m/s and ends with it at {last:.3f} m/s"
+    return {
+        "end time t_E": f"{trajectory.t_end:.4f} s",
+        "moves": ends,
+        "largest tool speed": f"{samples.tool_speed[fastest]:.3f} m/s at {samples.t[fastest]:.3f} s",
+        "worst ratio to a limit": f"{verification.worst_ratio:.5f} (1 is the limit)",
+        "largest distance from the path": f"{verification.path_error:.1e} m or rad",
+        "redundant joints": coordinates(trajectory.redundant_joints, trajectory.branch),
+        **({"branch": trajectory.branch} if named else {}),
+        **motion.planned,
+    }
+
+
+def identity(motion: ReportedMotion) -> dict[str, str]:
+    """Say what the motion is of: robot, path, payload and where the robot stands; and when the page was made."""
+    trajectory = motion.trajectory
+    urdf, recovered = trajectory.task.robot.urdf, trajectory.recovered
+    file = "" if urdf is None else f" ({_file_name(urdf)})"
+    way = float(np.linalg.norm(np.diff(motion.samples.tool_position, axis=0), axis=1).sum())
+    task_space = trajectory.task.task_space
+    rows = task_space if isinstance(task_space, str) else ", ".join(task_space)
+    return {
+        "robot": f"{trajectory.robot.name}{file}".strip(),
+        "path": f"{path_in_words(trajectory.task)}; the tool moves {way:.3f} m; prescribed: {rows}",
+        **({} if recovered is None else {"recovered from": _file_name(recovered.source)}),
+        "payload": "none",
+        "tool offset": "none",
+        "mounting": "at the world's origin, upright",
+        **in_use(trajectory.robot),
+        "report of": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
+        "SHA-256 of the URDF": hashlib.sha256(trajectory.urdf.encode()).hexdigest(),
+        "SHA-256 of the task as it stands below": hashlib.sha256(task_text(trajectory.task).encode()).hexdigest(),
+    }
+
+
+def path_in_words(task: Task) -> str:
+    """Name the segments of a path, each by its shape and what the task says of it."""
+    segments = [segment.model_dump(exclude_defaults=True) for segment in task.path]
+    said = [
+        f"{shape.replace('_', ' ')} ({', '.join(_entry(key, value) for key, value in given.items())})"
+        for segment in segments
+        for shape, given in segment.items()
+        if isinstance(given, dict)
+    ]
+    more = f", and {len(said) - _LISTED} more" if len(said) > _LISTED else ""
+    return ", then ".join(said[:_LISTED]) + more
+
+
+def _entry(key: str, value: object) -> str:
+    """Say what a task says of a segment: short lists as they are, long ones and mappings by their length."""
+    if (
+        isinstance(value, list | tuple)
+        and len(value) <= _LISTED
+        and not any(isinstance(each, list | tuple | dict) for each in value)
+    ):
+        shown = f"[{', '.join(f'{each:.4g}' if isinstance(each, float) else str(each) for each in value)}]"
+    elif isinstance(value, list | tuple | dict):
+        shown = f"{len(value)} entries"
+    elif isinstance(value, float):
+        shown = f"{value:.4g}"
+    else:
+        shown = _file_name(str(value))
+    return f"{key.replace('_', ' ')} {shown}"
+
+
+def task_text(task: Task) -> str:
+    """Write a task as YAML; of files without their folders, which say nothing to another reader."""
+    return str(yaml.safe_dump(_without_folders(task.to_dict()), sort_keys=False))
+
+
+def _without_folders(value: Any) -> Any:  # noqa: ANN401  (of a task)
+    """Replace absolute paths of files, wherever they are, by the files' names."""
+    if isinstance(value, dict):
+        return {key: _without_folders(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_folders(each) for each in value]
+    return _file_name(value) if isinstance(value, str) else value
+
+
+def _file_name(text: str) -> str:
+    """Return the name of the file of an absolute path; any other text as it is."""
+    for kind in (PurePosixPath, PureWindowsPath):
+        if kind(text).is_absolute():
+            return kind(text).name
+    return text
+
+
+def what_limits(motion: ReportedMotion) -> str:
+    """Name the limits that are active longest, in one sentence."""
+    active = [entry for entry in motion.saturations if entry.active][:3]
+    if not active:
+        return "No limit is active."
+    shares = (f"{entry.label} ({100.0 * entry.share:.0f} % of the time)" for entry in active)
+    return f"At its limits longest: {', '.join(shares)}."
+
+
+def joint_rows(motion: ReportedMotion) -> list[JointRow]:
+    """List what every joint does, in chain order."""
+    trajectory, tolerance = motion.trajectory, motion.trajectory.task.refinement.tolerance
+    peaks: dict[int, list[Row]] = {joint: [] for joint in range(trajectory.robot.n)}
+    positions: dict[int, tuple[np.ndarray, str]] = {}
+    for kind in kinds_of(trajectory):
+        for part in quantities(trajectory, motion.samples, kind, degrees=motion.degrees):
+            for column, joint in enumerate(part.joints.tolist()):
+                positions.setdefault(joint, (part.values[:, column], part.unit))
+                peaks[joint].append(_peak(part, column, tolerance))
+    rows = []
+    for joint, name in enumerate(trajectory.joint_names):
+        q, unit = positions[joint]
+        rows.append(
+            JointRow(
+                name=name,
+                redundant=name in trajectory.redundant_joints,
+                start=f"{q[0]:.4f} {unit}",
+                end=f"{q[-1]:.4f} {unit}",
+                travel=f"{q.min():.4f} to {q.max():.4f} {unit}",
+                peaks=tuple(peaks[joint]),
+            )
+        )
+    return rows
+
+
+def _peak(part: Quantity, column: int, tolerance: float) -> Row:
+    """Find the value of a joint that is nearest to its limit, or the largest one where there is no limit."""
+    values, lower, upper = part.values[:, column], part.lower[column], part.upper[column]
+    limited = bool(part.is_limited[column])
+    ratios = np.abs(part.ratios[:, column]) if limited else np.zeros(1)
+    at = int(np.argmax(ratios if limited else np.abs(values)))
+    value = values[at] if abs(values[at]) > _SMALL else 0.0
+    low, high = _write_number(lower), _write_number(upper)
+    limit = f"{high} {part.unit}" if upper == -lower else f"{low} to {high} {part.unit}"
+    return Row(
+        value=f"{_write_number(value)} {part.unit}",
+        limit=limit if limited else "",
+        share=f"{100.0 * ratios.max():.1f} %" if limited else "",
+        level=_level(float(ratios.max()), tolerance),
+    )
+
+
+def _write_number(value: float) -> str:
+    """Write a number with four significant figures, large ones without an exponent."""
+    return f"{value:.0f}" if _LARGE <= abs(value) < np.inf else f"{value:.4g}"
+
+
+def _level(share: float, tolerance: float) -> str:
+    """Grade how near a value is to its limit."""
+    edges = (("beyond", 1.0 + tolerance), ("at", THRESHOLD), ("near", NEAR))
+    return next((level for level, edge in edges if share >= edge), "")
+
+
+@dataclass(frozen=True)
+class CheckRow:
+    """One check of the verification in words."""
+
+    name: str
+    found: str
+    allowed: str
+    where: str
+    passed: bool
+    remark: str
+
+
+def check_rows(motion: ReportedMotion) -> list[CheckRow]:
+    """List the checks of the verification, those that failed first."""
+    checks = sorted(motion.verification.checks, key=lambda check: check.passed)
+    return [_check_row(check, degrees=motion.degrees) for check in checks]
+
+
+def _check_row(check: Check, *, degrees: bool) -> CheckRow:
+    found, allowed, unit = check.figures(degrees=degrees)
+    after = "" if unit == "-" else f" {unit}"
+    parts = [check.subject or "", "" if check.time is None else f"{check.time:.4f} s"]
+    return CheckRow(
+        name=check.name,
+        found=found + after,
+        allowed=allowed + after,
+        where=" at ".join(part for part in parts if part),
+        passed=check.passed,
+        remark=check.remark,
+    )
+
+
+def versions() -> dict[str, str]:
+    """Name the versions of what made the report."""
+    found = {name: importlib.metadata.version(name) for name in _LIBRARIES}
+    return {"brachis": brachis.__version__, "Python": platform.python_version(), **found}

@@ -1,0 +1,344 @@
+"""What a sweep gives: its table, and what can be read off it.
+
+A sweep's folder: every finished plan in files of its own, and the table of all of them.
+
+``plans/3f/3f0a....parquet`` is one row, ``plans/3f/3f0a....npz`` its motion. Both are whole or not there: they are
+written under temporary names, the motion first, so that a row is a plan that is finished.
+"""
+
+from __future__ import annotations
+
+import collections
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from brachis.apps.sweeps.pools import FAILED, UNVERIFIED, VERIFIED, Outcome
+from brachis.apps.sweeps.settings import SweepSettings
+from brachis.common.files import atomic_write, is_file, is_folder, read_file, writing_errors
+from brachis.common.summary import Summary
+from brachis.errors import InputError, NotInstalledError, UnknownNameError
+from brachis.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+    from matplotlib.figure import Figure
+
+COLUMNS = {
+    "status": "string",
+    "t_end_s": "double",
+    "worst_ratio": "double",
+    "path_error": "double",
+    "chosen_joints": "string",
+    "chosen_branch": "string",
+    "chosen_solver": "string",
+    "iterations": "int64",
+    "wall_time_s": "double",
+    "error": "string",
+    "message": "string",
+    "remarks": "string",
+    "motion": "string",
+}
+"""Of what came of a plan: names and Arrow types. Times in s; the path error in m, or rad, whichever is larger."""
+TABLES = ("table.parquet", "table.csv")
+_ABOUT = "sweep.json"
+_MARK = "brachis_sweep"
+
+
+def arrow() -> ModuleType:
+    """Import pyarrow.
+
+    Raises
+    ------
+    NotInstalledError
+        It is not.
+    """
+    try:
+        import pyarrow as pa  # noqa: PLC0415  (an extra, and only sweeps need it)
+        import pyarrow.csv  # noqa: PLC0415
+        import pyarrow.parquet  # noqa: PLC0415
+    except ImportError as error:
+        raise NotInstalledError("a sweep", "pyarrow", "sweep") from error
+    return pa
+
+
+class Store:
+    """The folder of a sweep.
+
+    Parameters
+    ----------
+    folder : Path
+        Made where there is none. One that holds other files than a sweep's is refused.
+
+    Raises
+    ------
+    InputError
+        The folder is not a sweep's, or cannot be written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._arrow = arrow()
+        with writing_errors(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            foreign = any(folder.iterdir()) and not self._is_ours()
+        if foreign:
+            problem = "the folder holds other files"
+            raise InputError(problem, where=str(folder), allowed=f"a new folder, or one with a sweep's {_ABOUT}")
+
+    def _is_ours(self) -> bool:
+        try:
+            return _MARK in json.loads(read_file(self.folder / _ABOUT))
+        except (OSError, ValueError, TypeError):
+            return False
+
+    def describe(self, about: Mapping[str, Any]) -> None:
+        """Write down what the folder is for."""
+        with atomic_write(self.folder / _ABOUT) as stream:
+            stream.write(json.dumps({_MARK: 1, **about}, indent=2).encode() + b"\n")
+
+    def about(self) -> dict[str, Any]:
+        """Return what was written down.
+
+        Raises
+        ------
+        InputError
+            The folder is not a sweep's.
+        """
+        if not self._is_ours():
+            raise InputError("the folder is not a sweep's", where=str(self.folder), allowed=f"one with its {_ABOUT}")
+        about: dict[str, Any] = json.loads(read_file(self.folder / _ABOUT))
+        return about
+
+    def _place(self, digest: str, suffix: str) -> Path:
+        """Name a file; of folders with thousands of files every write would have to read the list."""
+        return self.folder / "plans" / digest[:2] / f"{digest}{suffix}"
+
+    def write(self, digest: str, outcome: Outcome) -> dict[str, Any]:
+        """Store a finished plan; returns its columns."""
+        motion, part = self._place(digest, ".npz"), self._place(digest, ".parquet")
+        with writing_errors(part):
+            part.parent.mkdir(parents=True, exist_ok=True)
+        facts = {**dict.fromkeys(COLUMNS), **outcome.facts}
+        if outcome.motion is not None:
+            with atomic_write(motion) as stream:
+                stream.write(outcome.motion)
+            facts["motion"] = motion.relative_to(self.folder).as_posix()
+        schema = self._arrow.schema(COLUMNS.items())
+        with atomic_write(part) as stream:
+            self._arrow.parquet.write_table(self._arrow.Table.from_pylist([facts], schema), stream)
+        return facts
+
+    def read(self, digest: str) -> dict[str, Any] | None:
+        """Return the columns of a finished plan; None where it is not stored, or not as a whole."""
+        try:
+            content = read_file(self._place(digest, ".parquet"))
+            table = self._arrow.parquet.read_table(self._arrow.BufferReader(content))
+            (facts,) = table.to_pylist()
+        except (OSError, ValueError, self._arrow.ArrowException):
+            return None
+        whole = set(facts) == set(COLUMNS) and (not facts["motion"] or is_file(self.folder / facts["motion"]))
+        return facts if whole else None
+
+    def table(self, keys: Sequence[str], rows: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> pa.Table:
+        """Make the table of all plans.
+
+        Parameters
+        ----------
+        keys : sequence of str
+            Columns of what was varied.
+        rows : sequence of (mapping, mapping)
+            What a plan sets of them, and its columns.
+        """
+        pa = self._arrow
+        varied = {key: _column([changes.get(key) for changes, _ in rows]) for key in keys}
+        found = {name: pa.array([facts[name] for _, facts in rows], kind) for name, kind in COLUMNS.items()}
+        return pa.table({"plan": pa.array(range(len(rows)), "int64"), **varied, **found})
+
+    def write_table(self, table: pa.Table) -> None:
+        """Write the table as Parquet and as CSV."""
+        pa = self._arrow
+        for name, write in zip(TABLES, (pa.parquet.write_table, pa.csv.write_csv), strict=True):
+            with atomic_write(self.folder / name) as stream:
+                write(table, stream)
+
+    def read_table(self) -> pa.Table:
+        """Read the table.
+
+        Raises
+        ------
+        InputError
+            There is none that can be read.
+        """
+        path = self.folder / TABLES[0]
+        try:
+            return self._arrow.parquet.read_table(path)
+        except (OSError, self._arrow.ArrowException) as error:
+            raise InputError("no table of a sweep", where=str(path), found=str(error)) from error
+
+
+def _column(values: Sequence[Any]) -> list[Any]:
+    """Return values of one kind as they are, and others, lists for example, as JSON."""
+    kinds = {bool if isinstance(value, bool) else type(value) for value in values if value is not None}
+    if kinds == {int, float}:
+        return [None if value is None else float(value) for value in values]
+    if len(kinds) <= 1 and kinds <= {int, float, str, bool}:
+        return list(values)
+    return [None if value is None else json.dumps(value) for value in values]
+
+
+_MOST_AXES = 2
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SweepResult(Summary):
+    """The plans of a sweep.
+
+    Attributes
+    ----------
+    folder : Path
+        Where plans and table are stored.
+    keys : tuple of str
+        Task keys that were varied.
+    table : pyarrow.Table
+        One row for each plan: ``plan`` (its number), the keys, and what came of it: ``status`` (verified, unverified or
+        failed), ``t_end_s`` (s), ``worst_ratio`` (to a limit), ``path_error`` (m or rad), ``chosen_joints``,
+        ``chosen_branch``, ``chosen_solver``, ``iterations``, ``wall_time_s`` (s), ``error`` (its class) and
+        ``message``, ``remarks``, ``motion`` (its file in the folder). Values that are neither numbers nor strings are
+        JSON.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import brachis
+    >>> found = brachis.sweep(
+    ...     {
+    ...         "sweep": 1,
+    ...         "task": "examples/01_scara_line.yaml",
+    ...         "fixed": {"search.effort": "single"},
+    ...         "grid": {"spline.intervals": [6, 7]},
+    ...     },
+    ...     tempfile.mkdtemp(),
+    ...     jobs=1,
+    ... )
+    >>> [row["spline.intervals"] for row in found.ranked()]
+    [7, 6]
+    >>> round(found.trajectory(1).t_end, 1)
+    2.8
+    """
+
+    folder: Path
+    keys: tuple[str, ...]
+    table: pa.Table
+
+    @classmethod
+    def load(cls, folder: str | os.PathLike[str]) -> SweepResult:
+        """Read the sweep that a folder holds.
+
+        Raises
+        ------
+        InputError
+            It holds none, or none that was finished.
+        """
+        path = Path(folder)
+        if not is_folder(path):
+            raise InputError("there is no such folder", where=str(path))
+        store = Store(path)
+        settings = SweepSettings.model_validate(store.about()["settings"])
+        return cls(path, settings.keys, store.read_table())
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Keys that take more than one value."""
+        return tuple(key for key in self.keys if len(set(self.table.column(key).to_pylist())) > 1)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The table as Parquet and as CSV."""
+        return tuple(self.folder / name for name in TABLES)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the table as a pandas data frame."""
+        return self.table.to_pandas()
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the table as a list of rows."""
+        rows: list[dict[str, Any]] = self.table.to_pylist()
+        return rows
+
+    def trajectory(self, plan: int) -> Trajectory:
+        """Load the motion of a plan.
+
+        Parameters
+        ----------
+        plan : int
+            Its number, from 0.
+
+        Raises
+        ------
+        InputError
+            There is no such plan, or it failed.
+        """
+        if not 0 <= plan < len(self.table):
+            raise InputError("there is no such plan", found=plan, allowed=f"0 to {len(self.table) - 1}")
+        row = self.table.slice(plan, 1).to_pylist()[0]
+        if row["motion"] is None:
+            raise InputError(f"plan {plan} failed", found=f"{row['error']}: {row['message']}")
+        return Trajectory.load(self.folder / row["motion"])
+
+    def ranked(self) -> list[dict[str, Any]]:
+        """Return the rows of verified plans, the fastest first."""
+        return sorted((row for row in self.rows() if row["status"] == VERIFIED), key=lambda row: row["t_end_s"])
+
+    def count(self, status: str) -> int:
+        """Count the plans of a status: verified, unverified or failed."""
+        return self.table.column("status").to_pylist().count(status)
+
+    def failures(self) -> dict[str, tuple[int, str]]:
+        """Return, for each class of error, the commonest first, how many plans failed with it, and one message."""
+        failed = [(row["error"], row["message"]) for row in self.rows() if row["status"] == FAILED]
+        counts = collections.Counter(error for error, _ in failed)
+        return {error: (count, dict(failed)[error]) for error, count in counts.most_common()}
+
+    def summary(self) -> dict[str, Any]:
+        """Return the sweep in short: numbers of plans, best, median and worst verified ones, failures by cause."""
+        ranked = self.ranked()
+        places = {"best": 0, "median": (len(ranked) - 1) // 2, "worst": -1} if ranked else {}
+        return {
+            "plans": len(self.table),
+            **{status: self.count(status) for status in (VERIFIED, UNVERIFIED, FAILED)},
+            **{
+                name: {key: ranked[place][key] for key in ("plan", *self.keys, "t_end_s")}
+                for name, place in places.items()
+            },
+            "failures": {
+                error: {"plans": count, "message": message} for error, (count, message) in self.failures().items()
+            },
+            "wall_time_s": sum(filter(None, self.table.column("wall_time_s").to_pylist())),
+        }
+
+    def plot(self, keys: Sequence[str] | None = None) -> Figure:
+        """Draw the end times of verified plans over one key, a line, or two, a heat map.
+
+        Parameters
+        ----------
+        keys : sequence of str, optional
+            One or two of the varied keys; by default the first two that take more than one value. Where plans differ
+            in others too, the fastest of them is shown.
+
+        Raises
+        ------
+        InputError
+            No key varies, or no plan is verified.
+        """
+        from brachis.apps.sweeps.figure import plot_sweep  # noqa: PLC0415  (matplotlib takes 0.7 s)
+
+        for key in keys or ():
+            if key not in self.varied:
+                raise UnknownNameError("key that varies", key, self.varied, where="keys")
+        return plot_sweep(self.rows(), tuple(keys or self.varied[:_MOST_AXES]))

@@ -1,0 +1,11 @@
+"""A motion in the browser: robot, path, tool trace and ghost postures, with plots that follow a slider.
+
+The browser talks to a server on this machine (viser, of the extra ``view``), which plays the motion.
+"""
+
+from __future__ import annotations
+
+from brachis.apps.view.server import LOOPBACK, require_viser
+from brachis.apps.view.viewer import Viewer, open_viewer
+
+__all__ = ["LOOPBACK", "Viewer", "open_viewer", "require_viser"]

@@ -1,0 +1,193 @@
+"""The viewer: a motion in the browser."""
+
+from __future__ import annotations
+
+import html
+import sys
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import Any, Self
+
+from brachis.apps.view.bodies import bodies_of
+from brachis.apps.view.curves import Motion
+from brachis.apps.view.panel import Panel, Playback, first_rate
+from brachis.apps.view.scene import Scene
+from brachis.apps.view.server import LOOPBACK, is_local, start_server
+from brachis.common import interrupts
+from brachis.trajectory import Trajectory
+
+_FRAME = 1.0 / 30.0
+"""Period of the robot's pictures, s."""
+_EVERY = 3
+"""Pictures of the robot for each of the plots and the table."""
+
+
+class Viewer:
+    """A motion in the browser, until it is stopped.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    candidates : sequence of mapping, optional
+        What the search looked at, as `Attempt.to_dict` gives it.
+    verified : bool, optional
+        Whether the motion passed the verification, where that is known.
+    degrees : bool, optional
+        Whether angles are shown in degrees.
+    host : str, optional
+        Address that the server listens on; by default nobody but this machine reaches it.
+    port : int, optional
+        0 takes any free port; the first free one from 8080 on if left out.
+
+    Attributes
+    ----------
+    url : str
+        Where to look at it.
+    local : bool
+        Whether nobody but this machine reaches it.
+    playback : Playback
+        Which instant is shown.
+
+    Raises
+    ------
+    InputError
+        Host or port cannot be listened on.
+    NotInstalledError
+        viser is not installed.
+    """
+
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        candidates: Sequence[Mapping[str, Any]] = (),
+        *,
+        verified: bool | None = None,
+        degrees: bool = False,
+        host: str = LOOPBACK,
+        port: int | None = None,
+    ) -> None:
+        self._server = start_server(host, port)
+        try:
+            self._fill(trajectory, candidates, verified=verified, degrees=degrees)
+        except BaseException:
+            self._server.stop()
+            raise
+        shown = {"0.0.0.0": LOOPBACK, "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)  # noqa: S104
+        self.local = is_local(host)
+        self.url = f"http://{shown}:{self._server.get_port()}"
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="brachis viewer", daemon=True)
+        self._thread.start()
+
+    def _fill(
+        self,
+        trajectory: Trajectory,
+        candidates: Sequence[Mapping[str, Any]],
+        *,
+        verified: bool | None,
+        degrees: bool,
+    ) -> None:
+        motion, bodies = Motion.of(trajectory), bodies_of(trajectory)
+        boundary = trajectory.task.boundary
+        self.playback = Playback(trajectory.t_end, first_rate(trajectory.t_end), loops=boundary.periodic)
+        self._trajectory, self._lock = trajectory, threading.RLock()
+        self._scene = Scene(self._server, motion, bodies)
+        notes = [f"not shown: {reason}" for reason in bodies.unread]
+        self._panel = Panel(
+            self._server,
+            motion,
+            self._scene,
+            self.playback,
+            self.show,
+            candidates,
+            notes,
+            verified=verified,
+            degrees=degrees,
+        )
+        self.show()
+
+    def show(self) -> None:
+        """Show the instant of the playback."""
+        with self._lock, self._server.atomic():
+            self._scene.show(self._trajectory.position(self.playback.time))
+            self._panel.update()
+
+    def wait(self) -> None:
+        """Wait until Ctrl-C, then stop."""
+        with interrupts.expected():
+            while not self._stopped.wait(0.5):
+                interrupts.check()
+        self.stop()
+
+    def stop(self) -> None:
+        """Stop the server; the page says that it has lost its connection."""
+        self._stopped.set()
+        self._thread.join()
+        self._server.stop()
+
+    def __enter__(self) -> Self:
+        """Return the viewer, which is stopped at the end of the block."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop."""
+        self.stop()
+
+    def __repr__(self) -> str:
+        """Say where it is."""
+        return f"<brachis viewer at {self.url}>"
+
+    def _repr_html_(self) -> str:
+        """Show the viewer within a notebook."""
+        url = html.escape(self.url, quote=True)
+        return f'<iframe src="{url}" width="100%" height="640" style="border:0"></iframe><a href="{url}">{url}</a>'
+
+    def _run(self) -> None:
+        """Play the motion as long as somebody looks."""
+        before, picture = time.monotonic(), 0
+        while not self._stopped.wait(_FRAME):
+            now = time.monotonic()
+            elapsed, before = now - before, now
+            if not self.playback.playing or not self._server.get_clients():
+                continue
+            with self._lock, self._server.atomic():
+                self._scene.show(self._trajectory.position(self.playback.advance(elapsed)))
+                picture += 1
+                if picture % _EVERY == 0:
+                    self._panel.update()
+                else:
+                    self._panel.follow()
+
+
+def open_viewer(
+    trajectory: Trajectory,
+    candidates: Sequence[Mapping[str, Any]] = (),
+    *,
+    verified: bool | None = None,
+    degrees: bool = False,
+    host: str = LOOPBACK,
+    port: int | None = None,
+    block: bool | None = None,
+) -> Viewer:
+    """Show a motion in the browser.
+
+    Parameters
+    ----------
+    trajectory, candidates, verified, degrees, host, port
+        See `Viewer`.
+    block : bool, optional
+        Whether to wait until Ctrl-C. If left out, a script waits, and an interactive session or a notebook does not.
+
+    Returns
+    -------
+    Viewer
+    """
+    viewer = Viewer(trajectory, candidates, verified=verified, degrees=degrees, host=host, port=port)
+    print(f"the motion is shown at {viewer.url}", file=sys.stderr)  # noqa: T201
+    if block if block is not None else not hasattr(sys, "ps1"):
+        viewer.wait()
+    return viewer

@@ -1,0 +1,258 @@
+"""The seam between a problem and a backend: counting, interruption, deadline and the judgement of the answer."""
+
+from __future__ import annotations
+
+import functools
+import signal
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Self
+
+import numpy as np
+
+from brachis.common.interrupts import Presses
+from brachis.errors import UnreachableError
+from brachis.optimise.backends.protocol import Problem, Progress, Solve, SolverOptions, SolverReport, SolveStatus
+
+_EVALUATIONS = 10
+"""Evaluations for each iteration allowed, on average: a solver that needs more cannot leave a point out of reach."""
+_LARGEST = 1e30
+"""Backends multiply what they get: the square of a larger number may overflow, and end the interpreter."""
+_FEASIBLE = 10.0
+"""An answer counts as feasible up to this many times the solver's tolerance."""
+
+
+class Watch:
+    """Watches one solve.
+
+    A backend written in another language must not see a KeyboardInterrupt, which Python would raise at the first line
+    of any callback. Used as a context manager around the backend, the watch turns SIGINT into a flag; the backend is
+    told to stop, and `report` raises the interrupt.
+
+    Parameters
+    ----------
+    problem : Problem
+    options : SolverOptions
+    progress : Progress or None
+    """
+
+    def __init__(self, problem: Problem, options: SolverOptions, progress: Progress | None) -> None:
+        self.problem = problem
+        self.options = options
+        self.iterations = 0
+        self.interrupt: KeyboardInterrupt | None = None
+        self.timed_out = False
+        self.exhausted = False
+        self._evaluations = 0
+        self.stagnated = False
+        self._feasible: list[float] = []
+        self._progress = progress
+        self._handler: Any = None
+        self._during: Any = None
+        self._began = time.perf_counter()
+
+    def __enter__(self) -> Self:
+        """Take over SIGINT where this thread may, and where it is not ignored."""
+        ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+        if threading.current_thread() is threading.main_thread():
+            self._during = signal.SIG_IGN if ignored else self._keep_interrupt
+            self._handler = signal.signal(signal.SIGINT, self._during)
+            if isinstance(self._handler, Presses) and self._handler.pending:  # it went unheard until now
+                self.interrupt = KeyboardInterrupt()
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        """Give SIGINT back."""
+        if self._handler is not None:
+            signal.signal(signal.SIGINT, self._handler)
+
+    def _keep_interrupt(self, _signal: int, _frame: object) -> None:
+        self.interrupt = KeyboardInterrupt()
+        if isinstance(self._handler, Presses):
+            self._handler.remember()
+
+    @property
+    def elapsed(self) -> float:
+        """Wall time since the beginning, s."""
+        return time.perf_counter() - self._began
+
+    def between_iterations(self, objective: float) -> bool:
+        """Count an iteration, tell the user, and answer whether the backend has to stop."""
+        self.iterations += 1
+        if self._progress is not None:
+            try:
+                self._progress(self.iterations, objective)
+            except KeyboardInterrupt as interrupt:
+                self.interrupt = interrupt
+        return self.must_stop()
+
+    def has_settled(self, objective: float, infeasibility: float) -> bool:
+        """Tell whether feasible iterates have the same objective for long; kept in `stagnated`.
+
+        A redundant joint that no limit touches, the roll of a tool for example, leaves a set of equally fast motions,
+        within which a solver wanders without ever seeing its conditions of optimality hold.
+        """
+        self._feasible = [*self._feasible, objective] if infeasibility <= _FEASIBLE * self.options.tolerance else []
+        recent = self._feasible[-self.options.patience :]
+        spread = max(recent, default=0.0) - min(recent, default=0.0)
+        self.stagnated = len(recent) == self.options.patience and spread <= self.options.progress * abs(objective)
+        return self.stagnated
+
+    def must_stop(self) -> bool:
+        """Tell whether the user has interrupted or the time is over."""
+        self.timed_out = self.timed_out or self.elapsed > self.options.time_limit
+        self.exhausted = self._evaluations > _EVALUATIONS * self.options.max_iterations
+        return self.timed_out or self.exhausted or self.interrupt is not None
+
+    def objective(self, x: np.ndarray) -> float:
+        """Objective at x, finite; raises UnreachableError else."""
+        return float(self._finite(self.problem.objective, x))
+
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """Gradient of the objective at x, finite; raises UnreachableError else."""
+        return self._finite(self.problem.gradient, x)
+
+    def rows(self, x: np.ndarray) -> np.ndarray:
+        """Rows at x, all finite; raises UnreachableError else, and everywhere once the solve has to stop."""
+        return self._evaluate(self.problem.rows, x)
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Jacobian entries at x; raises as `rows` does."""
+        return self._evaluate(self.problem.jacobian, x)
+
+    def _evaluate(self, function: Callable[[np.ndarray], Any], x: np.ndarray) -> np.ndarray:
+        if self._handler is not None:  # a backend may have put a handler of its own in place since
+            signal.signal(signal.SIGINT, self._during)
+        if self.must_stop():
+            raise UnreachableError("the solve has to stop")
+        self._evaluations += 1
+        return self._finite(function, x)
+
+    def _finite(self, function: Callable[[np.ndarray], Any], x: np.ndarray) -> np.ndarray:
+        if not _usable(x):
+            raise UnreachableError("the solver asked for a point that is not finite")
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # what comes of it is looked at
+                values = np.asarray(function(np.array(x)))
+        except KeyboardInterrupt as interrupt:
+            self.interrupt = interrupt
+            raise UnreachableError("the solve has to stop") from interrupt
+        if not _usable(values):
+            raise UnreachableError("a value or a slope is not a finite number there")
+        return values
+
+    def report(
+        self, solver: str, status: SolveStatus, x: np.ndarray, multipliers: np.ndarray | None, message: str
+    ) -> SolverReport:
+        """Judge the answer by its own residuals.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            If one was kept.
+        """
+        if self.interrupt is not None:
+            raise self.interrupt
+        violation = residual(self.problem, x)
+        if self.stagnated and not status.usable:
+            status = SolveStatus.STAGNATED
+        feasible = violation <= _FEASIBLE * self.options.tolerance
+        if status.usable and not feasible:
+            status = SolveStatus.INFEASIBLE
+        elif self.timed_out and not status.usable:
+            status = SolveStatus.TIME_LIMIT
+        elif self.exhausted and not status.usable:
+            status = SolveStatus.ITERATION_LIMIT
+        elif violation == np.inf:
+            status = SolveStatus.EVALUATION_ERROR
+        return SolverReport(
+            solver=solver,
+            status=status,
+            x=x,
+            objective=objective_at(self.problem, x),
+            violation=violation,
+            multipliers=np.zeros(len(self.problem.lower)) if multipliers is None else multipliers,
+            iterations=self.iterations,
+            wall_time=self.elapsed,
+            message=message,
+        )
+
+
+def ended(
+    solver: str, problem: Problem, x: np.ndarray, status: SolveStatus, message: str, wall_time: float = 0.0
+) -> SolverReport:
+    """Report of a solve that gave no answer: the start `x`, (v,), stays.
+
+    Parameters
+    ----------
+    solver : str
+    problem : Problem
+    x : (v,) ndarray
+    status : SolveStatus
+    message : str
+    wall_time : float, optional
+        s.
+
+    Returns
+    -------
+    SolverReport
+    """
+    none = np.zeros(len(problem.lower))
+    return SolverReport(
+        solver,
+        status,
+        x,
+        objective_at(problem, x),
+        residual(problem, x),
+        none,
+        iterations=0,
+        wall_time=wall_time,
+        message=message,
+    )
+
+
+def from_finite_numbers(solve: Solve) -> Solve:
+    """Refuse a start or bounds that are not numbers, which a backend could not be trusted with (decorator).
+
+    Where no time is left no solve is begun.
+    """
+
+    @functools.wraps(solve)
+    def checked(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
+        bounds = (problem.lower, problem.upper, problem.x_lower, problem.x_upper)
+        name = solve.__module__.rpartition(".")[2]
+        if options.time_limit <= 0.0:
+            return ended(name, problem, x, SolveStatus.TIME_LIMIT, "no time was left")
+        if _usable(x) and not any(np.isnan(bound).any() for bound in bounds):
+            return solve(problem, x, options, progress)
+        return ended(name, problem, x, SolveStatus.EVALUATION_ERROR, "the start or a bound is not a finite number")
+
+    return checked
+
+
+def _usable(values: np.ndarray) -> bool:
+    """Tell whether all values are finite, and not so large that products of them are not; NaN is neither."""
+    return bool(np.abs(values).max(initial=0.0) <= _LARGEST)
+
+
+def objective_at(problem: Problem, x: np.ndarray, otherwise: float = np.inf) -> float:
+    """Objective at x; another value where x cannot be evaluated."""
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            value = problem.objective(x)
+    except UnreachableError:
+        return otherwise
+    return otherwise if np.isnan(value) else value
+
+
+def residual(problem: Problem, x: np.ndarray) -> float:
+    """Largest violation of rows and bounds at x; infinite where x cannot be evaluated."""
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            rows = problem.rows(x)
+    except UnreachableError:
+        return np.inf
+    gaps = (problem.lower - rows, rows - problem.upper, problem.x_lower - x, x - problem.x_upper)
+    worst = float(np.max([gap.max(initial=0.0) for gap in gaps]))
+    return np.inf if np.isnan(worst) else worst

@@ -1,0 +1,152 @@
+"""What a solver backend is: problem in, report out."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from brachis.common.summary import Summary
+
+_FEASIBLE = 1e-5
+"""Violation of rows and bounds, dimensionless, that refinement mends."""
+
+
+class SolveStatus(enum.Enum):
+    """How a solve ended; the value is the advice to the user."""
+
+    OPTIMAL = "optimal: first-order conditions hold"
+    ACCEPTABLE = "acceptable: feasible, but the solver could not confirm optimality; another start may be better"
+    STAGNATED = "stagnated: feasible, and the last iterations made it no faster; other motions take as long"
+    ITERATION_LIMIT = "iteration limit reached; raise solver.max_iterations"
+    STALLED = "the solver crept on without progress; another start or solver may do better"
+    TIME_LIMIT = "time limit reached"
+    INFEASIBLE = "no feasible point near this start; check limits, choose another redundant joint or start posture"
+    EVALUATION_ERROR = "the motion could not be evaluated near this start; choose another redundant joint"
+    FAILED = "the solver broke down; choose another solver"
+
+    @property
+    def usable(self) -> bool:
+        """True where the answer satisfies the rows."""
+        return self in (SolveStatus.OPTIMAL, SolveStatus.STAGNATED, SolveStatus.ACCEPTABLE)
+
+
+class Problem(Protocol):
+    """A sparse nonlinear program; `brachis.nlp.Program` is one."""
+
+    x_lower: np.ndarray
+    x_upper: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    jacobian_rows: np.ndarray
+    jacobian_columns: np.ndarray
+
+    def objective(self, x: np.ndarray) -> float:
+        """Value to be minimised; raises UnreachableError where it does not exist."""
+        ...
+
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """Gradient of the objective; raises UnreachableError as `objective` does."""
+        ...
+
+    def rows(self, x: np.ndarray) -> np.ndarray:
+        """Values of the rows; raises UnreachableError where they do not exist."""
+        ...
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Entries of the Jacobian on its pattern; raises UnreachableError as `rows` does."""
+        ...
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """Bounds on a solve.
+
+    Attributes
+    ----------
+    tolerance : float
+        On constraint violation and optimality, dimensionless.
+    max_iterations : int
+    time_limit : float
+        s; no solve is begun where it is 0.
+    progress : float
+        Relative change of the objective over the last feasible iterates below which a solve has stagnated.
+    patience : int
+        How many iterates these are.
+    anywhere : bool
+        Whether iterates far from stationarity count too: where near enough will do, and not where a solver creeps. Uno
+        asks; IPOPT counts all feasible iterates in any case.
+    """
+
+    tolerance: float = 1e-6
+    max_iterations: int = 300
+    time_limit: float = 20.0
+    progress: float = 1e-6
+    patience: int = 15
+    anywhere: bool = False
+
+
+@dataclass(frozen=True, repr=False)
+class SolverReport(Summary):
+    """Answer of a solver.
+
+    Attributes
+    ----------
+    solver : str
+    status : SolveStatus
+        Judged by the residuals below, not by the backend's word alone.
+    x : (v,) ndarray
+    objective : float
+        s, where it is the end time; infinite if `x` cannot be evaluated.
+    violation : float
+        Largest violation of rows and bounds, recomputed by brachis; infinite if `x` cannot be evaluated.
+    multipliers : (c,) ndarray
+        Of the rows, L = objective - multipliers . rows; zeros where the backend gives none.
+    iterations : int
+    wall_time : float
+        s.
+    message : str
+        The backend's own words.
+    """
+
+    solver: str
+    status: SolveStatus
+    x: np.ndarray
+    objective: float
+    violation: float
+    multipliers: np.ndarray
+    iterations: int
+    wall_time: float
+    message: str
+
+    @property
+    def feasible(self) -> bool:
+        """True where the answer is a motion within the limits at the collocation points, however the solve ended."""
+        return self.violation <= _FEASIBLE
+
+
+Progress = Callable[[int, float], None]
+"""Called between iterations with the iteration's number and the objective in seconds; may raise KeyboardInterrupt."""
+
+
+Solve = Callable[[Problem, np.ndarray, SolverOptions, Progress | None], SolverReport]
+"""What a backend does; see `Solver`."""
+
+
+class Solver(Protocol):
+    """A backend."""
+
+    name: str
+
+    def solve(self, problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
+        """Solve `problem` from the start `x`.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            The user interrupted; passed on once the backend has returned.
+        """
+        ...

@@ -1,0 +1,213 @@
+"""B-spline basis functions as functions of the interval lengths, and their exact derivatives by these.
+
+A point lies at a fixed fraction of its interval. The d + 1 basis functions of degree d that differ from zero there
+depend on the lengths of the 2 d - 1 intervals around it alone, by the recursion of Cox and de Boor (Piegl and Tiller,
+The NURBS Book, A2.2). Its denominators are never less than the point's own interval, so that neighbours may have length
+zero: beyond the ends of a clamped knot vector they do. The recursion is rational and takes complex lengths; a step
+along the imaginary axis gives derivatives without cancellation (Squire and Trapp, 1998).
+
+Clamped knot vectors in normalised time.
+
+Knot insertion: the same curves over a finer knot vector.
+
+A control point of a spline is the blossom (polar form) of any polynomial piece that it belongs to, at the d knots
+behind its first: c_i = b(t_{i+1}, ..., t_{i+d}). For a finer knot vector the blossom of the old piece is evaluated at
+the new knots by de Boor's recursion with another argument in every step (the Oslo algorithm of Cohen, Lyche and
+Riesenfeld, 1980).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+ORDERS = 4
+"""Value and three derivatives."""
+_STEP = 1e-30
+
+
+def local_basis(knots: np.ndarray, degree: int, t_norm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Value and three derivatives of the basis functions that differ from zero at given times.
+
+    Parameters
+    ----------
+    knots : (N + 2 d + 1,) ndarray
+        Clamped knot vector, strictly ascending within.
+    degree : int
+        d >= 2.
+    t_norm : (K,) ndarray
+        Times; beyond the knots they are taken back to the nearest end.
+
+    Returns
+    -------
+    first : (K,) int ndarray
+        Interval of each time, which is the control point of the first of its basis functions.
+    values : (4, K, d + 1) ndarray
+        Per unit of the knots' time.
+    """
+    breaks = knots[degree : len(knots) - degree]
+    t_norm = np.clip(t_norm, breaks[0], breaks[-1])
+    first = np.clip(np.searchsorted(breaks, t_norm, side="right") - 1, 0, len(breaks) - 2)
+    lengths = np.diff(knots)[first[:, None] + np.arange(1, 2 * degree)]
+    return first, basis_functions(lengths, (t_norm - breaks[first]) / lengths[:, degree - 1])
+
+
+def basis_matrix(knots: np.ndarray, degree: int, t_norm: np.ndarray) -> np.ndarray:
+    """Matrix B, (K, N + d), with ``B @ control_points`` the spline at given times; parameters as of `local_basis`."""
+    first, values = local_basis(knots, degree, t_norm)
+    matrix = np.zeros((len(first), len(knots) - degree - 1))
+    np.put_along_axis(matrix, first[:, None] + np.arange(degree + 1), values[0], axis=1)
+    return matrix
+
+
+def basis_functions(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+    """Value and three derivatives of the basis functions that differ from zero at points.
+
+    Parameters
+    ----------
+    lengths : (..., 2 d - 1) ndarray, real or complex
+        Of the intervals around each point; its own is the middle one. d >= 2.
+    fraction : (...) ndarray
+        Place within the point's own interval, 0 to 1.
+
+    Returns
+    -------
+    (4, ..., d + 1) ndarray
+        Per unit of what the lengths are measured in.
+    """
+    degree = (lengths.shape[-1] + 1) // 2
+    middle = degree - 1
+    own = lengths[..., middle : middle + 1]
+    part = fraction[..., None] * own
+    # left[m]: from the m-th knot before the point to the point; right[m]: from it to the m-th knot behind.
+    left = np.cumsum(np.concatenate([part, lengths[..., :middle][..., ::-1]], axis=-1), axis=-1)
+    right = np.cumsum(np.concatenate([own - part, lengths[..., middle + 1 :]], axis=-1), axis=-1)
+    value = [np.ones_like(part)]
+    for p in range(1, degree + 1):
+        value.append(_raised(value[-1], left, right, p))
+    orders = [value[degree]]
+    for order in range(1, ORDERS):
+        part = value[degree - order] if order <= degree else np.zeros_like(value[0])
+        for p in range(max(degree - order, 0) + 1, degree + 1):
+            part = _slope(part, left, right, p)
+        orders.append(part)
+    return np.array(orders)
+
+
+def basis_derivatives(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+    """Differentiate `basis_functions` by each of the lengths, at K points.
+
+    Parameters
+    ----------
+    lengths : (K, 2 d - 1) ndarray
+    fraction : (K,) ndarray
+
+    Returns
+    -------
+    (4, 2 d - 1, K, d + 1) ndarray
+    """
+    steps = 1j * _STEP * np.eye(lengths.shape[-1])
+    return np.asarray(basis_functions(lengths + steps[:, None], fraction[None]).imag / _STEP)
+
+
+def _raised(value: np.ndarray, left: np.ndarray, right: np.ndarray, p: int) -> np.ndarray:
+    """Basis functions of degree p from those of degree p - 1."""
+    before, behind = left[..., :p][..., ::-1], right[..., :p]
+    share = value / (before + behind)
+    return _shifted(before * share) + _padded(behind * share)
+
+
+def _slope(lower: np.ndarray, left: np.ndarray, right: np.ndarray, p: int) -> np.ndarray:
+    """Differentiate functions of degree p, given `lower`, the same functions of degree p - 1."""
+    share = p * lower / (left[..., :p][..., ::-1] + right[..., :p])
+    return _shifted(share) - _padded(share)
+
+
+def _padded(values: np.ndarray) -> np.ndarray:
+    return np.concatenate([values, np.zeros_like(values[..., :1])], axis=-1)
+
+
+def _shifted(values: np.ndarray) -> np.ndarray:
+    return np.concatenate([np.zeros_like(values[..., :1]), values], axis=-1)
+
+
+def clamped_knots(degree: int, breaks: np.ndarray) -> np.ndarray:
+    """Knots of a clamped spline over given intervals.
+
+    Parameters
+    ----------
+    degree : int
+    breaks : (N + 1,) ndarray
+        Ends of the intervals in normalised time, strictly ascending from 0 to 1.
+
+    Returns
+    -------
+    (N + 2 degree + 1,) ndarray
+    """
+    return np.concatenate([np.zeros(degree), breaks, np.ones(degree)])
+
+
+def clamped_uniform_knots(degree: int, intervals: int) -> np.ndarray:
+    """Knots of a clamped spline with equal intervals.
+
+    Parameters
+    ----------
+    degree : int
+    intervals : int
+        N; the spline has N + degree control points.
+
+    Returns
+    -------
+    (N + 2 degree + 1,) ndarray
+        Normalised time, from 0 to 1.
+    """
+    return clamped_knots(degree, np.linspace(0.0, 1.0, intervals + 1))
+
+
+def spread(breaks: np.ndarray, points: int | np.ndarray) -> np.ndarray:
+    """Spread times evenly over every interval, with both its ends.
+
+    Parameters
+    ----------
+    breaks : (N + 1,) ndarray
+        Ends of the intervals, ascending.
+    points : int or (N,) int ndarray
+        Steps into which each interval is divided.
+
+    Returns
+    -------
+    (sum of points + 1,) ndarray
+    """
+    steps = np.broadcast_to(points, len(breaks) - 1)
+    parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(breaks[:-1], breaks[1:], steps, strict=True)]
+    return np.append(np.concatenate(parts), breaks[-1])
+
+
+def insert_knots(control_points: np.ndarray, knots: np.ndarray, finer: np.ndarray, degree: int) -> np.ndarray:
+    """Control points of the same curves over more knots.
+
+    Parameters
+    ----------
+    control_points : (c, N + d) ndarray
+        Of c scalar splines.
+    knots : (N + 2 d + 1,) ndarray
+        Clamped knot vector.
+    finer : (N' + 2 d + 1,) ndarray
+        Clamped knot vector that contains `knots`.
+    degree : int
+        d.
+
+    Returns
+    -------
+    (c, N' + d) ndarray
+    """
+    new = np.arange(len(finer) - degree - 1)
+    piece = np.searchsorted(knots, finer[new], side="right") - 1
+    window = piece[:, None] + np.arange(-degree, 1)
+    points = control_points[:, window]
+    for level in range(1, degree + 1):
+        at = finer[new + level][:, None]
+        left = knots[window[:, level:]]
+        right = knots[window[:, level:] + degree - level + 1]
+        share = (at - left) / (right - left)
+        points = share * points[..., 1:] + (1.0 - share) * points[..., :-1]
+    return np.asarray(points[..., 0])

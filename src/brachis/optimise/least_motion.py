@@ -1,0 +1,190 @@
+"""The calmest motion among those that are as fast as the fastest one.
+
+Where the end time leaves freedom (a tool that may roll, joints far from their limits), a time-optimal motion is one of
+many, and the solver may return one that swings light joints to and fro. A second solve from it, over the same knots and
+within the same limits,
+
+    minimises   the mean of sum_i (weights_i qddot_i)^2    subject to    t_E <= (1 + slower) t_E of the fastest
+
+is refined and verified as the first one was. It counts if it is verified and calmer; otherwise the fastest motion
+stays. The multipliers that bottlenecks are found by are those of the fastest one in any case.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from brachis.common import interrupts
+from brachis.common.deadline import Deadline
+from brachis.common.progress import Iteration, Listener
+from brachis.common.summary import Summary
+from brachis.errors import UnreachableError
+from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus, solver_named
+from brachis.optimise.candidate import Attempt
+from brachis.optimise.completion import completed
+from brachis.optimise.program import LeastAcceleration, Program
+from brachis.optimise.refine import RefinementOptions, Solve
+from brachis.search.joint_path import reciprocals_near
+from brachis.trajectory import Trajectory
+from brachis.verify import Verification
+
+AS_FAST = 1e-4
+"""Motions whose end times differ by a smaller fraction are equally fast."""
+_KEPT_BACK = 0.1e-4
+"""Part of the end time by which refinement may still lengthen the motion."""
+_WORTH_IT = 0.05
+"""A motion whose accelerations are lower by less than this fraction does not replace the fastest one."""
+_TOLERANCE, _ITERATIONS = 1e-6, 60
+_MANY_VARIABLES, _FOR_MANY, _FEW_ITERATIONS = 150, "ipopt", 20
+"""With more variables than these active sets take seconds an iteration; so few of an interior-point solver will do."""
+_PROGRESS, _PATIENCE, _ROUND = 1e-2, 5, 2
+"""A solve ends where so many iterations lower the mean square by less than this fraction: near enough will do.
+
+Rounds of refinement begin near enough, and end sooner.
+"""
+_TIME = 0.5
+"""Part of the remaining time that may be used."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LeastMotion(Summary):
+    """What came of the search for the calmest motion.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+        The calmest motion, or the fastest one where that stays.
+    verification : Verification
+        Of the trajectory.
+    reduction : float
+        Fraction by which the joint accelerations, as root mean square, are lower; 0 where the fastest motion stays.
+    later : float
+        Fraction by which the end time is longer.
+    status : str
+        In plain words.
+    reports : tuple of SolverReport
+        Of all solves.
+    """
+
+    trajectory: Trajectory
+    verification: Verification
+    reduction: float
+    later: float
+    status: str
+    reports: tuple[SolverReport, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return {
+            "status": self.status,
+            "acceleration_reduction": self.reduction,
+            "later": self.later,
+            "iterations": sum(report.iterations for report in self.reports),
+        }
+
+
+def calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMotion:
+    """Find the calmest motion that is as fast as a finished attempt, or as little slower as the task allows.
+
+    Parameters
+    ----------
+    fastest : Attempt
+        Finished.
+    deadline : Deadline
+    listener : callable
+
+    Returns
+    -------
+    LeastMotion
+    """
+    try:
+        return _calmest(fastest, deadline, listener)
+    except UnreachableError as error:
+        return _kept(fastest, f"the fastest motion stays: {error}")
+    except KeyboardInterrupt:
+        interrupts.forget()
+        return _kept(fastest, "interrupted")
+
+
+def _calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMotion:
+    """Solve, and complete what came of it if it is worth it."""
+    start, before = fastest.start, fastest.refined
+    assert start is not None and before is not None  # noqa: PT018, S101  (it is finished)
+    task = start.problem.task
+    slower = max(task.search.slower, AS_FAST)
+    if not fastest.verified:
+        return _kept(fastest, "the fastest motion is not verified")
+    if deadline.passed:
+        return _kept(fastest, "no time was left")
+    objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
+    program, soon = before.program.minimising(objective), deadline.part(_TIME)
+    name = _FOR_MANY if program.variables > _MANY_VARIABLES else start.solver
+    solve = _solver(name, soon, listener, _PATIENCE)
+    first = solve(program, program.time_scaled(before.x, 1.0 + slower - _KEPT_BACK))
+    if not first.status.usable:
+        return _kept(fastest, f"the fastest motion stays: {first.status.value}", (first,))
+    if 1.0 - np.sqrt(first.objective) < _WORTH_IT:
+        return _kept(fastest, "the fastest motion stays: hardly any other is calmer", (first,))
+    settings = task.refinement
+    options = RefinementOptions(
+        settings.tolerance, settings.density, settings.max_rounds, soon, before.t_end * (1.0 + slower)
+    )
+    solve = _solver(name, soon, listener, _ROUND)
+    found = completed(fastest, program, (first,), solve, options)
+    return _better(fastest, found, 1.0 - np.sqrt(program.objective(found.refined.x)) if found.refined else 0.0)
+
+
+def _better(fastest: Attempt, found: Attempt, reduction: float) -> LeastMotion:
+    """Take the motion that was found if it is verified and calmer by a fraction that is worth it."""
+    if found.trajectory is None or found.verification is None or not found.verified:
+        return _kept(fastest, "the fastest motion stays: a calmer one was not verified", found.reports)
+    if reduction < _WORTH_IT:
+        return _kept(fastest, "the fastest motion stays: hardly any other is calmer", found.reports)
+    later = found.t_end / fastest.t_end - 1.0
+    status = f"joint accelerations (rms) {100.0 * reduction:.2g} % lower at {100.0 * later:+.2g} % end time"
+    return LeastMotion(found.trajectory, found.verification, float(reduction), later, status, found.reports)
+
+
+def _kept(fastest: Attempt, status: str, reports: tuple[SolverReport, ...] = ()) -> LeastMotion:
+    """Keep the fastest motion."""
+    assert fastest.trajectory is not None and fastest.verification is not None  # noqa: PT018, S101  (it is finished)
+    return LeastMotion(fastest.trajectory, fastest.verification, 0.0, 0.0, status, reports)
+
+
+def least_acceleration(program: Program, x: np.ndarray, slower: float) -> LeastAcceleration:
+    """Make the objective that is 1 at x, (v,), and with which phases last longer by a fraction of up to `slower`.
+
+    Every joint's acceleration counts in proportion to its largest velocity: that of its limit; without one the largest
+    that any such joint of its unit has at x. Joints that nothing limits, the virtual roll of a tool, do not count.
+    """
+    robot, states = program.phases[0].joint_map.robot, program.states(x)
+    by_acceleration, weights = reciprocals_near(robot, program.limits, states[0].q[len(states[0].q) // 2])
+    speeds, units = np.max([np.abs(state.qdot).max(axis=0) for state in states], axis=0), np.array(robot.position_units)
+    for unit in set(robot.position_units):
+        own = (units == unit) & (weights == 0.0) & (by_acceleration > 0.0)
+        if speeds[own].any():
+            weights[own] = 1.0 / speeds[own].max()
+    longest = np.array([part[0] for _, part in program.split(x)]) * (1.0 + slower)
+    size = program.minimising(LeastAcceleration(weights, longest)).objective(x)
+    return LeastAcceleration(weights / np.sqrt(size) if size > 0.0 else weights, longest)
+
+
+def _solver(name: str, deadline: Deadline, listener: Listener, patience: int) -> Solve:
+    """Make a function that solves with a backend; any feasible motion will do, however the solve ended."""
+    (backend,) = solver_named(name)
+
+    def progress(iteration: int, objective: float) -> None:
+        rms = 100.0 * objective**0.5
+        listener(Iteration(f"least motion: iteration {iteration}, joint accelerations (rms) {rms:.1f} %"))
+
+    def solve(program: Program, x: np.ndarray) -> SolverReport:
+        most = _FEW_ITERATIONS if name == _FOR_MANY else _ITERATIONS
+        options = SolverOptions(_TOLERANCE, most, deadline.left, _PROGRESS, patience, anywhere=True)
+        report = backend.solve(program, x, options, progress)
+        return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if report.feasible else report
+
+    return solve

@@ -1,0 +1,375 @@
+"""Refinement to truth: from limits at collocation points to limits everywhere.
+
+After a solve the limits are evaluated on a grid many times denser. Where one is violated between collocation points,
+points are added around the worst place of each stretch and the problem is solved again from where it stands, until the
+worst ratio is within the tolerance. A last violation of the tolerance's own size is met by lengthening t_E by as
+little, and by up to one per cent once the rounds, or the time, are used up.
+
+Where limits are violated between collocation points.
+
+Where joints with Coulomb friction reverse: their torque rises by twice the friction within its own width.
+
+A width of 1e-5 rad/s is passed in microseconds, which no grid resolves. Between grid points the velocity of a joint is
+taken for the cubic that its velocities and accelerations there define.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis.common.deadline import NEVER, Deadline
+from brachis.common.summary import Summary
+from brachis.errors import UnreachableError
+from brachis.kinematics import JointState
+from brachis.optimise.backends import SolverReport
+from brachis.optimise.bspline import spread
+from brachis.optimise.phase import Phase
+from brachis.optimise.program import Program
+from brachis.robot import Friction
+
+_LEVELS = np.array([-7.0, -4.5, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 7.0])
+"""Velocities, in widths of the friction, that are looked for: at 7 all but 2e-6 of it is there."""
+_NEAR_REVERSALS = 10.0
+"""A velocity that turns within so many widths of zero is looked at as well."""
+_BISECTIONS = 40
+
+
+def reversals(friction: Friction, times: np.ndarray, state: JointState) -> np.ndarray:
+    """Find the times at which joints with Coulomb friction pass through its width.
+
+    Parameters
+    ----------
+    friction : Friction
+    times : (K,) ndarray
+        Ascending, s.
+    state : JointState
+        At these times.
+
+    Returns
+    -------
+    (Z,) ndarray
+        s, ascending.
+    """
+    rubbing = np.flatnonzero(friction.coulomb > 0.0)
+    if not len(rubbing):
+        return np.empty(0)
+    speed = state.qdot[:, rubbing] / friction.v_eps[rubbing]
+    h = np.diff(times)[:, None]
+    gain = state.qddot[:, rubbing] / friction.v_eps[rubbing]
+    cubic = np.array([speed[:-1], speed[:-1] + h * gain[:-1] / 3.0, speed[1:] - h * gain[1:] / 3.0, speed[1:]])
+    step, joint = np.nonzero((cubic.min(axis=0) < _NEAR_REVERSALS) & (cubic.max(axis=0) > -_NEAR_REVERSALS))
+    cubic = cubic[:, step, joint]
+    first, last = cubic[0, :, None] - _LEVELS, cubic[-1, :, None] - _LEVELS
+    which, level = np.nonzero(first * last < 0.0)
+    crossing = _place(cubic[:, which] - _LEVELS[level])
+    slopes = np.diff(cubic, axis=0)
+    turns = np.flatnonzero((slopes[0] * slopes[-1] < 0.0) & (np.abs(cubic).min(axis=0) < _NEAR_REVERSALS))
+    which, u = np.append(which, turns), np.append(crossing, _place(slopes[:, turns]))
+    return np.unique(times[step[which]] + u * h[step[which], 0])
+
+
+def _place(c: np.ndarray) -> np.ndarray:
+    """Place in [0, 1] at which polynomials in Bernstein form, (m + 1, F), whose ends differ in sign are zero."""
+    low, high = np.zeros(c.shape[1]), np.ones(c.shape[1])
+    for _ in range(_BISECTIONS if c.size else 0):
+        middle = 0.5 * (low + high)
+        value = c
+        while len(value) > 1:  # de Casteljau
+            value = value[:-1] * (1.0 - middle) + value[1:] * middle
+        same = value[0] * c[0] > 0.0
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    return np.asarray(0.5 * (low + high))
+
+
+_NEAR = 0.005
+"""A violation may hide between grid points where the motion comes so near a limit, as a part of it."""
+_COARSE = 20.0
+"""Violations of so many times the goal are held down at the grid's points first."""
+_FINE, _ZOOMS = 9, 2
+"""Points of every finer grid around a peak, and how many such grids follow each other."""
+_PIECE_POINTS = 9
+_CLOSEST = 1e-5
+"""Collocation points are at least so far apart, in normalised time."""
+_SAME_TIME = 1e-9
+_EVERYWHERE = slice(5, None, 10)
+"""Of the dense grid's times: one more between neighbouring collocation points."""
+_JUST_BEFORE = 1e-7
+"""How long before a knot what jumps there is looked at, in normalised time."""
+_BESIDE = np.array([-12.0, -8.0, -5.0, -3.0, -1.5, -0.5, 0.5, 1.5, 3.0, 5.0, 8.0, 12.0])
+"""Points around an abrupt change, in steps of the dense grid."""
+
+
+def dense_grid(phase: Phase, density: int) -> np.ndarray:
+    """Spread times evenly over every knot interval, `density` for each of its collocation points."""
+    breaks = phase.breaks
+    behind = np.searchsorted(phase.t_norm, breaks + _SAME_TIME)
+    grid = spread(breaks, density * np.maximum(np.diff(behind), 1))
+    return np.union1d(grid, phase.jumps - _JUST_BEFORE)
+
+
+def violations(dense: Program, x: np.ndarray, goal: float) -> tuple[float, list[np.ndarray]]:
+    """Largest violation, and the normalised times of every phase at which collocation points are missing.
+
+    Around every peak of the grid that comes near a limit ever finer grids look for the true peak.
+    """
+    found = [_of_phase(phase, part, goal) for phase, part in dense.split(x)]
+    return max(largest for largest, _ in found), [places for _, places in found]
+
+
+def _of_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
+    """Largest violation of a phase, and where points are missing."""
+    t_norm = dense.t_norm
+    try:
+        table, of_means = dense.violation(x), dense.violation_of_means(x)
+        centres = _suspects(t_norm, table, dense.knots, goal - _NEAR)
+        heights = table.max(axis=1)[np.searchsorted(t_norm, centres - _SAME_TIME).clip(max=len(t_norm) - 1)]
+        if table.max() > _COARSE * goal:  # the grid's own peaks will do until they are nearly held down
+            missing = _around(centres[heights > goal], t_norm)
+            return max(float(table.max()), of_means), np.union1d(missing, _beside_breaks(dense, x, missing))
+        reach = _spacing(t_norm, centres)
+        for _ in range(_ZOOMS):
+            if not len(centres):
+                break
+            centres, heights = _zoomed(dense, x, centres, reach)
+            kept = heights > goal - 0.1 * _NEAR
+            centres, heights, reach = centres[kept], heights[kept], reach[kept] * 2.0 / (_FINE - 1)
+        places = np.unique(np.concatenate([_within_pieces(dense, x), _within_friction(dense, x), _at_breaks(dense, x)]))
+        worst = dense.violation_at(x, places).max(axis=1) if len(places) else places
+    except UnreachableError:
+        return np.inf, _unreachable(dense, x)
+    largest = max(table.max(), heights.max(initial=-np.inf), worst.max(initial=-np.inf), of_means)
+    missing = np.union1d(_around(centres[heights > goal], t_norm), places[worst > goal])
+    missing = np.union1d(missing, _beside_breaks(dense, x, missing))
+    # A mean that is wrong has too few points everywhere.
+    return float(largest), np.union1d(missing, t_norm[_EVERYWHERE]) if of_means > goal else missing
+
+
+def _within_pieces(dense: Phase, x: np.ndarray) -> np.ndarray:
+    """Spread points t_norm over every piece of a path of several: a blend of millimetres lies between grid points."""
+    path, motion = dense.joint_map.path, dense.motion(x)
+    breaks = np.empty(0) if path is None else path.breaks
+    if len(breaks) <= 2:  # noqa: PLR2004  (a single piece, which the grid sees)
+        return np.empty(0)
+    return motion.times_of(spread(breaks, _PIECE_POINTS - 1)) / motion.t_end
+
+
+def _at_breaks(dense: Phase, x: np.ndarray) -> np.ndarray:
+    """List t_norm at which the path coordinate is where a limit changes abruptly."""
+    breaks, motion = np.concatenate([limit.breaks for limit in dense.limits]), dense.motion(x)
+    return motion.times_of(breaks) / motion.t_end
+
+
+def _beside_breaks(dense: Phase, x: np.ndarray, missing: np.ndarray) -> np.ndarray:
+    """Spread points t_norm around the abrupt changes near which points are missing.
+
+    The time of a change moves with every solve: single points would follow it for many rounds.
+    """
+    at = _at_breaks(dense, x)
+    steps = _spacing(dense.t_norm, at)
+    if not (len(at) and len(missing)):
+        return np.empty(0)
+    near = np.abs(at[:, None] - missing).min(axis=1) <= _BESIDE[-1] * steps
+    return np.clip(at[near, None] + steps[near, None] * _BESIDE, 0.0, 1.0).ravel()
+
+
+def _within_friction(dense: Phase, x: np.ndarray) -> np.ndarray:
+    """List t_norm at which a joint with Coulomb friction reverses, or nearly so: peaks as narrow as the friction."""
+    t_end, friction = dense.motion(x).t_end, dense.joint_map.robot.friction
+    return reversals(friction, dense.t_norm * t_end, dense.state(x)) / t_end
+
+
+def _spacing(t_norm: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Find the distance between grid times around each of `times`; at a knot the larger one of its two sides."""
+    gaps = np.diff(t_norm)
+    before = np.clip(np.searchsorted(t_norm, times - _SAME_TIME) - 1, 0, len(gaps) - 1)
+    behind = np.clip(np.searchsorted(t_norm, times + _SAME_TIME) - 1, 0, len(gaps) - 1)
+    return np.maximum(gaps[before], gaps[behind])
+
+
+def _around(centres: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
+    """List times at and a grid step beside the centres: a peak moves when it is held down."""
+    steps = _spacing(t_norm, centres)[:, None] * np.array([-1.0, 0.0, 1.0])
+    return np.unique(np.clip(centres[:, None] + steps, 0.0, 1.0))
+
+
+def _unreachable(dense: Phase, x: np.ndarray) -> np.ndarray:
+    """List the middle of every stretch of the dense grid on which the branch has no answer."""
+    motion = dense.motion(x)
+    lost = ~np.all(np.isfinite(dense.joint_map.postures(motion.at(dense.t_norm * motion.t_end)[0])), axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]).astype(int)))
+    if not len(edges):  # reachable, but singular or too far apart to count turns: more points everywhere
+        return dense.t_norm[_EVERYWHERE]
+    return dense.t_norm[(edges[::2] + edges[1::2] - 1) // 2]
+
+
+def _suspects(t_norm: np.ndarray, table: np.ndarray, knots: np.ndarray, near: float) -> np.ndarray:
+    """List times around which a violation may hide: the grid's peaks near a limit, and both sides of knots near one.
+
+    A peak between grid points is higher than its neighbours by an eighth of their second difference; four times that
+    is allowed for. The motion's higher derivatives jump at knots: a peak beside a knot need not show on the grid.
+    """
+    padded = np.pad(table, ((1, 1), (0, 0)), mode="edge")
+    bend = np.abs(padded[:-2] - 2.0 * table + padded[2:])
+    peaks = (table + 0.5 * bend > near + _NEAR) & (table > near) & (table >= padded[:-2]) & (table >= padded[2:])
+    at_knots = np.searchsorted(t_norm, np.unique(knots) - _SAME_TIME)
+    close = t_norm[at_knots[(table[at_knots] > near).any(axis=1)]]
+    half = 0.5 * _spacing(t_norm, close)
+    return np.unique(np.clip(np.concatenate([t_norm[peaks.any(axis=1)], close - half, close + half]), 0.0, 1.0))
+
+
+def _zoomed(dense: Phase, x: np.ndarray, centres: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Look on a fine grid within `reach` of every centre: the places of the largest violation, and its size there."""
+    fine = np.clip(centres[:, None] + reach[:, None] * np.linspace(-1.0, 1.0, _FINE), 0.0, 1.0)
+    order = np.argsort(fine.ravel(), kind="stable")
+    worst = np.empty(fine.size)
+    worst[order] = dense.violation_at(x, fine.ravel()[order]).max(axis=1)
+    best = np.argmax(worst.reshape(fine.shape), axis=1)
+    chosen = np.arange(len(centres)), best
+    return fine[chosen], worst.reshape(fine.shape)[chosen]
+
+
+def merged(phase: Phase, extra: np.ndarray) -> np.ndarray:
+    """Collocation points of a phase with extra ones, without pairs so close that their rows would be the same."""
+    t_norm, jumps = phase.t_norm, phase.jumps
+    sides = [np.searchsorted(jumps, times, side="right") for times in (extra, t_norm)]
+    apart = np.where(sides[0][:, None] == sides[1], np.abs(extra[:, None] - t_norm), np.inf)
+    return np.union1d(t_norm, extra[apart.min(axis=1) > _CLOSEST])
+
+
+Solve = Callable[[Program, np.ndarray], SolverReport]
+_LONGEST = 0.01
+_GOAL = 0.5
+"""Refinement aims at this part of the tolerance: the verification's grid is another one."""
+
+
+@dataclass(frozen=True)
+class RefinementOptions:
+    """When refinement is content.
+
+    Attributes
+    ----------
+    tolerance : float
+        Largest violation of a limit, as a fraction of it.
+    density : int
+        Grid points per collocation point of the first solve.
+    max_rounds : int
+        Solves after the first one; with 0 the first answer is left as it is.
+    deadline : Deadline
+        No solve is begun after it.
+    longest : float
+        End time beyond which it is not lengthened, s.
+    """
+
+    tolerance: float = 1e-4
+    density: int = 10
+    max_rounds: int = 10
+    deadline: Deadline = NEVER
+    longest: float = np.inf
+
+
+@dataclass(frozen=True, repr=False)
+class Refined(Summary):
+    """A solve and what refinement made of it.
+
+    Attributes
+    ----------
+    program : Program
+        With all collocation points.
+    reports : tuple of SolverReport
+        Of every round, the first one included.
+    x : (v,) ndarray
+        The answer.
+    violation : float
+        Largest violation of a limit on the dense grid, as a fraction of it; infinite where out of reach.
+    time_scaled : float
+        Factor by which t_E was lengthened at the very end, 1 if not at all.
+    """
+
+    program: Program
+    reports: tuple[SolverReport, ...]
+    x: np.ndarray
+    violation: float
+    time_scaled: float
+
+    @property
+    def t_end(self) -> float:
+        """End time of the answer, s."""
+        return self.program.end_time(self.x)
+
+    @property
+    def converged(self) -> bool:
+        """True where the first solve ended well, so that `x` is a motion and not a mere iterate."""
+        return self.reports[0].status.usable
+
+
+def refine(program: Program, first: SolverReport, solve: Solve, options: RefinementOptions) -> Refined:
+    """Add collocation points to a solved program until the limits hold on the dense grid.
+
+    Parameters
+    ----------
+    program : Program
+    first : SolverReport
+        Of the program's solve.
+    solve : callable
+        ``solve(program, x)`` returns a `SolverReport`.
+    options : RefinementOptions
+
+    Returns
+    -------
+    Refined
+    """
+    dense = program.resampled([dense_grid(phase, options.density) for phase in program.phases])
+    goal = options.tolerance * _GOAL
+    reports = [first]
+    if not first.status.usable:
+        return Refined(program, (first,), first.x, np.inf, 1.0)
+    for _ in range(options.max_rounds):
+        answer = reports[-1].x
+        violation, places = violations(dense, answer, goal)
+        longest = min(program.end_time(answer) * (1.0 + options.tolerance), options.longest)
+        x, remaining = _time_scaled(dense, answer, violation, goal, longest)
+        if remaining <= goal:
+            return Refined(program, tuple(reports), x, remaining, program.end_time(x) / program.end_time(answer))
+        extended = [merged(phase, extra) for phase, extra in zip(program.phases, places, strict=True)]
+        finer = program.resampled(extended)
+        if finer.collocation_points == program.collocation_points or options.deadline.passed:
+            break
+        report = solve(finer, answer)
+        if not report.status.usable and not _still_good(report, reports[-1]):
+            break
+        program = finer
+        reports.append(report)
+    answer = reports[-1].x
+    violation, _ = violations(dense, answer, goal)
+    longest = min(program.end_time(answer) * (1.0 + (_LONGEST if options.max_rounds else 0.0)), options.longest)
+    x, remaining = _time_scaled(dense, answer, violation, goal, longest)
+    return Refined(program, tuple(reports), x, remaining, program.end_time(x) / program.end_time(answer))
+
+
+def _still_good(report: SolverReport, before: SolverReport) -> bool:
+    """Tell whether a solve that ended early left a feasible motion about as fast as the one before it."""
+    return report.feasible and report.objective <= before.objective * (1.0 + _LONGEST)
+
+
+def _time_scaled(
+    dense: Program, x: np.ndarray, violation: float, goal: float, longest: float
+) -> tuple[np.ndarray, float]:
+    """Lengthen the time to `longest`, s, at most where that brings the violation to the goal.
+
+    A longer time relieves torques that only accelerate by twice its own fraction, velocities by as much; those that
+    gravity or friction add to by less, and least speeds not at all. So this is tried, and the best is kept.
+    """
+    best = x, violation
+    while goal < violation:
+        factor = 1.0 + violation - 0.5 * goal
+        if not dense.end_time(x) * factor <= longest:
+            break
+        x = dense.time_scaled(x, factor)
+        before, (violation, _) = violation, violations(dense, x, goal)
+        best = min(best, (x, violation), key=lambda pair: pair[1])
+        if violation > 0.99 * before:
+            break
+    return best

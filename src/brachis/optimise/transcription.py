@@ -1,0 +1,72 @@
+"""The nonlinear program of a task on a robot: one phase, along the path, in the coordinates of a joint map."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brachis.errors import UnreachableError
+from brachis.kinematics import ChartMap, JointMap
+from brachis.optimise.boundary import Boundary
+from brachis.optimise.bspline import clamped_knots, spread
+from brachis.optimise.grid import FixedGrid, Grid
+from brachis.optimise.mesh import COARSE_INTERVALS
+from brachis.optimise.phase import Phase
+from brachis.optimise.program import Program
+from brachis.problem.problem import Problem
+from brachis.task import Task
+
+
+def program_of(problem: Problem, joint_map: JointMap, breaks: np.ndarray) -> Program:
+    """Write the NLP of a decomposition down: one phase, along the path.
+
+    Parameters
+    ----------
+    problem : Problem
+    joint_map : JointMap
+        Beginning at the task's start posture, or at a first guess of it where that is free.
+    breaks : (N + 1,) ndarray
+        Ends of the knot intervals in normalised time.
+
+    Returns
+    -------
+    Program
+    """
+    spline = problem.task.spline
+    grid = FixedGrid(clamped_knots(spline.degree, breaks), spline.degree, spread(breaks, spline.points_per_interval))
+    return Program([phase_in(problem, joint_map, grid)])
+
+
+def phase_in(problem: Problem, joint_map: JointMap, grid: Grid) -> Phase:
+    """Write the motion along the path down as a phase, in the coordinates of a joint map, over a grid.
+
+    Raises
+    ------
+    UnreachableError
+        A periodic motion is asked for in coordinates that do not close with the path.
+    """
+    return Phase(joint_map, problem.limits, grid, _boundary(problem, joint_map))
+
+
+def _boundary(problem: Problem, joint_map: JointMap) -> Boundary:
+    """Write the task's boundary conditions in the coordinates of a joint map."""
+    task, given = problem.task, problem.task.boundary
+    free = np.full(problem.robot.n, np.nan)
+    start, end = (free if posture is None else posture for posture in (problem.start, problem.end))
+    values = joint_map.coordinates(0.0, start), joint_map.coordinates(1.0, end)
+    if not given.periodic:
+        first, last = (_rates(rate, len(values[0])) for rate in problem.end_rates)
+        return Boundary(*values, task.spline.vanishing, first, last)
+    if isinstance(joint_map, ChartMap) and not joint_map.rows.closes:
+        raise UnreachableError("the chart's measure of self-motion is another one at the path's end")
+    return Boundary(*values, task.spline.vanishing, periodic=True)
+
+
+def _rates(rate: float, count: int) -> np.ndarray | None:
+    """Rates of the curves at an end with a given ds/dt; None at rest."""
+    return np.append(rate, np.full(count - 1, np.nan)) if rate else None
+
+
+def breaks_of(task: Task) -> np.ndarray:
+    """Return the ends of the task's uniform intervals, (N + 1,); of the first mesh where their number is left open."""
+    intervals = COARSE_INTERVALS if task.spline.intervals == "auto" else task.spline.intervals
+    return np.linspace(0.0, 1.0, intervals + 1)

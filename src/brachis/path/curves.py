@@ -1,0 +1,310 @@
+"""Straight lines in task coordinates.
+
+Circular arcs and circles, in the plane of two position rows or anywhere in three.
+
+Helices in three position rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brachis.errors import PathError
+from brachis.path.site import ZERO_LENGTH, Site
+
+if TYPE_CHECKING:
+    from brachis.path.protocol import Array
+    from brachis.path.site import Site
+    from brachis.task import ArcCenter, ArcVia, Circle, Helix, LineBy, LineHeading, LineTo
+
+
+@dataclass(frozen=True, eq=False)
+class LineCurve:
+    """A straight line ``start + slope sigma``.
+
+    Attributes
+    ----------
+    start : ndarray, shape (m,)
+        Task coordinates at its start.
+    slope : ndarray, shape (m,)
+        Task coordinates per unit sigma; of norm 1 in the position rows, or in yaw where they stand still.
+    length : float
+        Range of sigma, m (rad where the position stands still).
+    """
+
+    start: Array
+    slope: Array
+    length: float
+
+    @property
+    def knots(self) -> Array:
+        """Start and end: the line is analytic."""
+        return np.array([0.0, self.length])
+
+    def derivatives(self, sigma: Array, order: int = 3) -> Array:
+        """Return the line and its derivatives by sigma, shape (order + 1, K, m)."""
+        result = np.zeros((order + 1, sigma.size, self.start.size))
+        result[0] = self.start + sigma[:, None] * self.slope
+        if order:
+            result[1] = self.slope
+        return result
+
+
+def line_to(shape: LineTo, site: Site) -> LineCurve:
+    """Return the line to a point."""
+    return _line(site.coordinates(shape.to, "to", site.rows) - site.start, site, ".to", list(shape.to))
+
+
+def line_by(shape: LineBy, site: Site) -> LineCurve:
+    """Return the line by a displacement."""
+    return _line(site.coordinates(shape.by, "by", site.rows), site, ".by", list(shape.by))
+
+
+def line_heading(shape: LineHeading, site: Site) -> LineCurve:
+    """Return the line of given length and direction in the plane of the two position rows."""
+    site.need_plane("a line by length and angle_deg", (2,))
+    angle = np.deg2rad(shape.angle_deg)
+    displacement = np.zeros_like(site.start)
+    displacement[:2] = shape.length * np.array([np.cos(angle), np.sin(angle)])
+    return _line(displacement, site, ".length", shape.length)
+
+
+def _line(displacement: Array, site: Site, key: str, found: object) -> LineCurve:
+    length = float(np.linalg.norm(displacement[: len(site.positions)]))
+    if length < ZERO_LENGTH:
+        length = float(np.linalg.norm(displacement))
+    if length < ZERO_LENGTH:
+        raise site.zero_length(key=key, found=found)
+    return LineCurve(site.start, displacement / length, length)
+
+
+_PLANE_ROWS = 2
+# Relative: coordinates are given with a few digits.
+_PERPENDICULAR = 1e-3
+_COLLINEAR = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class ArcCurve:
+    """An arc ``center + cos(sigma / radius) outward + sin(sigma / radius) forward``, with yaw linear in sigma.
+
+    Attributes
+    ----------
+    center : ndarray, shape (2,) or (3,)
+        Centre, m.
+    outward, forward : ndarray, shape of `center`
+        From the centre to the start, and in the direction of motion there; both as long as the radius, m.
+    length : float
+        Length of the arc, m.
+    yaw : tuple of float, optional
+        Yaw at the start (rad) and its slope (rad/m), where yaw is a row.
+    """
+
+    center: Array
+    outward: Array
+    forward: Array
+    length: float
+    yaw: tuple[float, float] | None = None
+
+    @property
+    def radius(self) -> float:
+        """Radius, m."""
+        return float(np.linalg.norm(self.outward))
+
+    @property
+    def normal(self) -> Array:
+        """Unit vector of the axis about which the arc turns, for three position rows."""
+        normal: Array = np.cross(self.outward, self.forward) / self.radius**2
+        return normal
+
+    @property
+    def knots(self) -> Array:
+        """Every quarter turn: the arc is analytic, but a quadrature needs several intervals on many turns."""
+        quarters = int(np.ceil(self.length / self.radius / (np.pi / 2)))
+        return np.linspace(0.0, self.length, max(quarters, 1) + 1)
+
+    def derivatives(self, sigma: Array, order: int = 3) -> Array:
+        """Return the arc and its derivatives by sigma, shape (order + 1, K, m)."""
+        rows = self.center.size
+        result = np.zeros((order + 1, sigma.size, rows + (self.yaw is not None)))
+        angle = sigma[:, None] / self.radius
+        for k in range(order + 1):
+            # Each derivative turns the position vector by a quarter and divides it by the radius.
+            turned = angle + k * np.pi / 2
+            result[k, :, :rows] = (np.cos(turned) * self.outward + np.sin(turned) * self.forward) / self.radius**k
+        result[0, :, :rows] += self.center
+        if self.yaw is not None:
+            result[0, :, rows] = self.yaw[0] + self.yaw[1] * sigma
+            result[1:2, :, rows] = self.yaw[1]
+        return result
+
+
+def arc_center(shape: ArcCenter, site: Site) -> ArcCurve:
+    """Return the arc about a centre by an angle."""
+    angle = float(np.deg2rad(shape.angle_deg))
+    if abs(angle) < ZERO_LENGTH:
+        raise site.zero_length(key=".angle_deg", found=shape.angle_deg)
+    return _with_yaw(about_center(shape, angle, site), shape.yaw, site)
+
+
+def circle(shape: Circle, site: Site) -> ArcCurve:
+    """Return the turns about a centre."""
+    return _with_yaw(about_center(shape, 2 * np.pi * shape.turns, site), shape.yaw, site)
+
+
+def arc_via(shape: ArcVia, site: Site) -> ArcCurve:
+    """Return the arc through a point to another one.
+
+    The centre c is as far from the start p as from the two points p + a and p + b: ``a.(c - p) = a.a / 2`` and the same
+    with b, where c - p is a combination of a and b, whatever the number of rows.
+    """
+    site.need_plane("an arc")
+    to_via = site.coordinates(shape.via, "via", site.positions) - site.position
+    to_end = site.coordinates(shape.to, "to", site.positions) - site.position
+    if np.linalg.norm(to_end) < ZERO_LENGTH:
+        raise site.zero_length(key=".to", found=list(shape.to))
+    sides = np.stack([to_via, to_end])
+    gram = sides @ sides.T
+    if np.linalg.det(gram) <= _COLLINEAR**2 * gram[0, 0] * gram[1, 1]:
+        problem = "start, via and end of the arc lie on a line"
+        raise PathError(
+            problem,
+            found=f"start {site.position.tolist()}, via {list(shape.via)}, to {list(shape.to)}",
+            allowed="three different points that are not collinear",
+            where=f"{site.key}.via",
+            hint="Use line: {to: [...]} for a straight segment",
+        )
+    to_center = np.linalg.solve(gram, np.diag(gram) / 2) @ sides
+    outward = -to_center
+    radius = float(np.linalg.norm(outward))
+    # Of the two directions along the circle, forward is the one in which via comes before the end.
+    forward = to_via - (to_via @ outward) / radius**2 * outward
+    if np.linalg.norm(forward) < _COLLINEAR * radius:  # via is opposite to the start
+        forward = -(to_end - (to_end @ outward) / radius**2 * outward)
+    forward *= radius / np.linalg.norm(forward)
+    angles = [_angle_of(point - to_center, outward, forward) for point in (to_via, to_end)]
+    if angles[0] > angles[1]:
+        forward = -forward
+        angles[1] = 2 * np.pi - angles[1]
+    return _with_yaw(ArcCurve(site.position + to_center, outward, forward, radius * angles[1]), shape.yaw, site)
+
+
+def _angle_of(vector: Array, outward: Array, forward: Array) -> float:
+    return float(np.arctan2(vector @ forward, vector @ outward) % (2 * np.pi))
+
+
+def about_center(shape: ArcCenter | Circle | Helix, angle: float, site: Site) -> ArcCurve:
+    """Return the arc by a signed angle, rad, about the centre of a shape; yaw is left out."""
+    site.need_plane("an arc")
+    center = site.coordinates(shape.center, "center", site.positions)
+    outward = site.position - center
+    if np.linalg.norm(outward) < ZERO_LENGTH:
+        problem = "the arc has zero length: its centre is its start, so that the radius is zero"
+        raise PathError(problem, found=list(shape.center), allowed="another point", where=f"{site.key}.center")
+    if center.size == _PLANE_ROWS:
+        if shape.normal is not None:
+            problem = "a normal is for three position rows; here the plane is that of the task space"
+            raise PathError(problem, found=list(shape.normal), allowed="no normal", where=f"{site.key}.normal")
+        forward = np.array([-outward[1], outward[0]])
+    else:
+        normal = _normal(shape.normal, outward, site)
+        # The plane is the one through the start: a centre given with a few digits is moved into it.
+        center = center + (normal @ outward) * normal
+        outward = site.position - center
+        forward = np.cross(normal, outward)
+    length = abs(angle) * float(np.linalg.norm(outward))
+    return ArcCurve(center, outward, np.sign(angle) * forward, length)
+
+
+def _normal(normal: tuple[float, float, float] | None, outward: Array, site: Site) -> Array:
+    """Return the unit normal of an arc in three rows."""
+    where = f"{site.key}.normal"
+    if normal is None:
+        problem = "with three position rows a centre does not determine the plane of the arc"
+        raise PathError(
+            problem,
+            found="no normal",
+            allowed="the axis of rotation, [nx, ny, nz]",
+            where=where,
+            hint="Or use via and to",
+        )
+    size = float(np.linalg.norm(normal))
+    if size < ZERO_LENGTH:
+        problem = "the normal has zero length"
+        raise PathError(problem, found=list(normal), allowed="any other vector", where=where)
+    unit = np.asarray(normal) / size
+    slope = float(unit @ outward / np.linalg.norm(outward))
+    if abs(slope) > _PERPENDICULAR:
+        problem = "the normal is not perpendicular to the radius from the centre to the segment's start"
+        raise PathError(
+            problem,
+            found=f"{np.rad2deg(np.arccos(np.clip(slope, -1, 1))):.6g} degrees between them",
+            allowed=f"90 degrees to within {np.rad2deg(_PERPENDICULAR):.2g}",
+            where=where,
+            hint=f"Move the centre by {float(unit @ outward):.6g} m along the normal, or use via and to",
+        )
+    return unit
+
+
+def _with_yaw(arc: ArcCurve, turning: str, site: Site) -> ArcCurve:
+    """Return the arc with the yaw that the segment asks for."""
+    if site.has_yaw:
+        sense = float(np.sign(arc.outward[0] * arc.forward[1] - arc.outward[1] * arc.forward[0]))
+        return replace(arc, yaw=(float(site.start[-1]), sense / arc.radius if turning == "tangent" else 0.0))
+    if turning == "tangent":
+        problem = "yaw is not a row of the task space"
+        raise PathError(problem, found="tangent", allowed="fixed", where=f"{site.key}.yaw", hint=site.along_tangent)
+    return arc
+
+
+_SPACE = (3,)
+
+
+@dataclass(frozen=True, eq=False)
+class HelixCurve:
+    """A circular arc that climbs along its axis, over its own length sigma.
+
+    Attributes
+    ----------
+    arc : ArcCurve
+        The projection along the axis.
+    rise : ndarray, shape (3,)
+        From start to end along the axis, m.
+    """
+
+    arc: ArcCurve
+    rise: Array
+
+    @property
+    def length(self) -> float:
+        """Length of the helix, m."""
+        return float(np.hypot(self.arc.length, np.linalg.norm(self.rise)))
+
+    @property
+    def normal(self) -> Array:
+        """Unit vector of the axis about which the helix turns."""
+        return self.arc.normal
+
+    @property
+    def knots(self) -> Array:
+        """Every quarter turn, as of the arc."""
+        return self.arc.knots * (self.length / self.arc.length)
+
+    def derivatives(self, sigma: Array, order: int = 3) -> Array:
+        """Return the helix and its derivatives by sigma, shape (order + 1, K, 3)."""
+        part = self.arc.length / self.length
+        result = self.arc.derivatives(part * sigma, order) * (part ** np.arange(order + 1))[:, None, None]
+        result[0] += (sigma / self.length)[:, None] * self.rise
+        result[1:2] += self.rise / self.length
+        return result
+
+
+def helix(shape: Helix, site: Site) -> HelixCurve:
+    """Return the climbing turns about an axis."""
+    site.need_plane("a helix", _SPACE)
+    arc = about_center(shape, 2 * np.pi * shape.turns, site)
+    axis = np.asarray(shape.normal) / np.linalg.norm(shape.normal)
+    return HelixCurve(arc, abs(shape.turns) * shape.pitch * axis)

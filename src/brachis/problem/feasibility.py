@@ -1,0 +1,303 @@
+"""Start and end postures that are refused at once: out of range, too heavy to hold, off the path, on another branch."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from brachis.errors import InputError, PathError, Remedy, StartError, UnknownNameError, write_apart
+from brachis.ik import Match
+from brachis.limits import Limit, Moments
+from brachis.limits.joint import PositionLimit, position_measure
+from brachis.path import Path, check_on_path
+from brachis.robot import Robot, TaskMap
+from brachis.robot.joints import complement, difference
+from brachis.robot.plausibility import position_hint
+from brachis.robot.task_map import JointSpace
+from brachis.task import SplineSettings
+
+_SAME_POSTURE = 1e-5
+_REGULAR = 1e-6
+"""Least singular value of the Jacobian, in m and rad, below which a posture is a singularity of the arm."""
+_ROOM = 1.05
+"""Limits are raised to so many times what holding the arm takes."""
+_STATIONS = 401
+_TRIED = 20
+"""Postures by which it is told whether the arm lacks a direction everywhere."""
+
+
+def check_postures(
+    task_map: TaskMap,
+    limits: Sequence[Limit],
+    start: np.ndarray | None,
+    end: np.ndarray | None,
+    path: Path,
+    tolerance: float,
+) -> tuple[Limit, ...]:
+    """Refuse start and end postures out of range, beyond a limit that holds at rest, or off the path.
+
+    Parameters
+    ----------
+    task_map : TaskMap
+    limits : sequence of Limit
+    start, end : (n,) ndarray or None
+        None where free.
+    path : Path
+    tolerance : float
+        By which limits may be exceeded anywhere: ``refinement.tolerance``.
+
+    Returns
+    -------
+    tuple of Limit
+        Widened where such a posture, or a path of joints, exceeds them within the tolerance.
+
+    Raises
+    ------
+    StartError
+    """
+    robot = task_map.robot
+    for name, posture in (("start", start), ("end", end)):
+        if posture is not None:
+            _check_range(robot, posture, name, tolerance)
+            _check_at_rest(robot, limits, posture, name, tolerance)
+            limits = [_widen(limit, posture[None], tolerance) for limit in limits]
+    if end is not None:
+        check_on_path(task_map, end, path.sample(np.array([1.0])).target[0], "end")
+    if isinstance(task_map, JointSpace):
+        along = path.sample(np.linspace(0.0, 1.0, _STATIONS)).target
+        _check_range_along(robot, along, tolerance)
+        ranges = [limit for limit in limits if isinstance(limit, PositionLimit)]
+        limits = [_widen(limit, along, tolerance) if limit in ranges else limit for limit in limits]
+    return tuple(limits)
+
+
+def _widen(limit: Limit, postures: np.ndarray, tolerance: float) -> Limit:
+    """Let a limit hold at rest in postures, (K, n), that exceed it within the tolerance."""
+    if not limit.static:
+        return limit
+    values = limit.values(Moments.at_rest(postures))
+    excess = limit.violation(values).max(axis=0)
+    near = (excess > 0.0) & (excess <= tolerance)
+    if not near.any():
+        return limit
+    wider = copy.copy(limit)
+    wider.lower = np.where(near, np.minimum(limit.lower, values.min(axis=0)), limit.lower)
+    wider.upper = np.where(near, np.maximum(limit.upper, values.max(axis=0)), limit.upper)
+    return wider
+
+
+def _check_range(robot: Robot, posture: np.ndarray, name: str, tolerance: float) -> None:
+    beyond = _beyond_range(robot, posture[None], tolerance)
+    if beyond is not None:
+        _, joint, facts = beyond
+        facts["hint"] = facts["hint"] or f"Change the posture, or the range with robot.limits.position.{joint}"
+        raise StartError(f"joint {joint!r} is out of its range", where=f"{name}.joints", **facts)
+
+
+def _check_range_along(robot: Robot, along: np.ndarray, tolerance: float) -> None:
+    """Refuse a path of joints, postures (K, n), that leaves a joint's range."""
+    beyond = _beyond_range(robot, along, tolerance)
+    if beyond is not None:
+        station, joint, facts = beyond
+        facts["found"] = f"{facts['found']} at s = {station / (len(along) - 1):.3g}"
+        facts["hint"] = facts["hint"] or f"Lead the path elsewhere, or raise robot.limits.position.{joint}"
+        raise PathError(f"joint {joint!r} is out of its range", where="path", **facts)
+
+
+def _beyond_range(robot: Robot, postures: np.ndarray, tolerance: float) -> tuple[int, str, dict[str, Any]] | None:
+    """Find the first joint that is out of its range in postures, (K, n): where most, its name, and what is told."""
+    lower, upper = robot.limits.position_lower, robot.limits.position_upper
+    beyond = np.maximum(lower - postures, postures - upper) - tolerance * position_measure(lower, upper)
+    joints = np.flatnonzero(beyond.max(axis=0) > 0.0)
+    if not len(joints):
+        return None
+    i = int(joints[0])
+    k = int(np.argmax(beyond[:, i]))
+    value, unit, low, high = float(postures[k, i]), robot.position_units[i], float(lower[i]), float(upper[i])
+    found, first, last = write_apart(value, low, high, digits=6)
+    facts: dict[str, Any] = {
+        "found": f"{found} {unit}",
+        "allowed": f"{first} {unit} to {last} {unit}",
+        "hint": position_hint(value, low, high, unit),
+    }
+    return k, robot.joint_names[i], facts
+
+
+def beyond_at_rest(limit: Limit, q: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Values of a limit in postures (K, n) at rest, (K, c), and how far beyond its tolerance they are, if positive."""
+    values = limit.values(Moments.at_rest(q))
+    return values, limit.violation(values) - tolerance
+
+
+def _check_at_rest(robot: Robot, limits: Sequence[Limit], posture: np.ndarray, name: str, tolerance: float) -> None:
+    """Refuse a posture in which a limit is exceeded although the arm stands still."""
+    for limit in limits:
+        if not limit.static:
+            continue
+        (values,), (beyond,) = beyond_at_rest(limit, posture[None], tolerance)
+        worst = int(np.argmax(beyond))
+        if beyond[worst] > 0.0:
+            label = limit.labels[worst]
+            found, allowed = in_figures(limit, worst, float(values[worst]))
+            weak = [limit.labels[i] for i in np.flatnonzero(beyond > 0.0)]
+            remedies = load_remedies(robot, limit, worst, 1.0 + float(beyond[worst]))
+            more = ""
+            if len(weak) > 1:
+                # No number for one of several joints is enough.
+                more = f"; too low as well: {', '.join(str(one.subject) for one in weak if one is not label)}"
+                remedies = [remedy for remedy in remedies if remedy.key != label.key]
+            keys = {one.key: None for one in weak if one.key} if label.key not in {one.key for one in remedies} else {}
+            error = StartError(
+                f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
+                where=f"{name}.joints",
+                found=f"{found} {label.unit} needed at rest{more}",
+                allowed=f"{allowed} {label.unit}",
+                hint=f"Choose another posture{', or raise ' + ', '.join(keys) if keys else ''}",
+            )
+            raise error.with_remedies(*remedies)
+
+
+def load_remedies(robot: Robot, limit: Limit, column: int, ratio: float) -> list[Remedy]:
+    """List what may help where holding the arm takes so many times a limit: a larger limit, a smaller payload."""
+    label = limit.labels[column]
+    figures = [bound.figure for bound in limit.bounds if bound.column == column and bound.end is None]
+    scale = getattr(robot.settings.limits.scale, limit.kind, 1.0)
+    found = [Remedy(label.key, one / scale, _ROOM * ratio * one / scale, label.unit) for one in figures if label.key]
+    payload = robot.settings.payload
+    if payload is not None and payload.mass:
+        found.append(Remedy("robot.payload.mass", payload.mass, payload.mass / ratio, "kg"))
+    return found
+
+
+def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:
+    """Refuse limits on a derivative that is unbounded, where the one before it jumps: at knots, or at the ends.
+
+    Raises
+    ------
+    InputError
+    """
+    for limit in limits:
+        jumping = {2: "velocity", 3: "acceleration"}[limit.order]
+        asked = f"the {limit.name} limit asks for a continuous {jumping}"
+        if spline.degree < limit.order:
+            found = f"{spline.degree}, with which it jumps at knots"
+            raise InputError(asked, where="spline.degree", found=found, allowed=f">= {limit.order}")
+        if spline.vanishing + 1 < limit.order:
+            found = f"{spline.rest}, with which it jumps at the ends"
+            raise InputError(asked, where="spline.rest", found=found, allowed="full or jerk")
+
+
+def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
+    """Write a value and its bounds in the unit of the value's label, which is left out."""
+    bounds = [bound for bound in limit.bounds if bound.column == column]
+    if not bounds:
+        found, low, high = write_apart(value, limit.lower[column], limit.upper[column])
+        return found, f"{low} to {high}"
+    first = bounds[0]
+    if first.end is None:  # the value is a ratio to one figure
+        found, allowed = write_apart(abs(value) * first.figure, first.figure)
+        return found, allowed
+    level = limit.lower[column] if first.end == "lower" else limit.upper[column]
+    found, *figures = write_apart(first.figure + (value - level) / first.per_unit, *(bound.figure for bound in bounds))
+    ends = dict(zip((bound.end for bound in bounds), figures, strict=True))
+    words = {"lower": "at least ", "upper": "at most "} if len(ends) == 1 else {}
+    allowed = " to ".join(f"{words.get(end, '')}{ends[end]}" for end in ("lower", "upper") if end in ends)
+    return found, allowed
+
+
+def check_regular(task_map: TaskMap, start: np.ndarray | None, end: np.ndarray | None) -> None:
+    """Refuse a start or end posture that is a singularity of the arm: no coordinates describe motions from there.
+
+    Raises
+    ------
+    StartError
+    """
+    for name, posture in (("start", start), ("end", end)):
+        if posture is not None and _least_singular_values(task_map, posture[None])[0] < _REGULAR:
+            raise StartError(
+                f"the {name} posture is singular",
+                where=f"{name}.joints",
+                found="a posture in which the tool cannot move in all directions of the task space",
+                allowed="a posture in which it can",
+                hint="Bend the arm a little",
+            )
+
+
+def lacks_a_direction(task_map: TaskMap) -> bool:
+    """Tell whether the arm can nowhere move its tool in all directions of the task space."""
+    postures = np.random.default_rng(0).uniform(-1.0, 1.0, (_TRIED, task_map.robot.n))
+    return bool(_least_singular_values(task_map, postures).max() < _REGULAR)
+
+
+def _least_singular_values(task_map: TaskMap, postures: np.ndarray) -> np.ndarray:
+    """Least singular values of the task Jacobian, (K,), in postures (K, n)."""
+    jacobian = task_map.jacobian(task_map.twists(postures))
+    return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[:, -1])
+
+
+def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, wanted: str, *, name: str = "start") -> int:
+    """Index of the closed form's branch on which the given posture, at the path's start or end, lies.
+
+    Raises
+    ------
+    StartError
+        The posture lies on no branch's inside, or on another than the `wanted` one.
+    UnknownNameError
+        There is no branch of the wanted name.
+    """
+    branches = match.solver.branches
+    if wanted != "auto" and wanted not in branches:
+        raise UnknownNameError("branch", wanted, branches, where="branch")
+    branch = _branch_of(task_map, match, posture, name)
+    if wanted != "auto" and branches[branch] != wanted:
+        raise StartError(
+            f"the {name} posture is on another branch",
+            where="branch",
+            found=branches[branch],
+            allowed=wanted,
+            hint=f"Leave branch out, or {name} in a posture of that branch",
+        )
+    return branch
+
+
+def check_end_branch(task_map: TaskMap, match: Match, end: np.ndarray, branch: int) -> None:
+    """Refuse an end posture on another branch than the start posture's.
+
+    Raises
+    ------
+    StartError
+    """
+    found = _branch_of(task_map, match, end, "end")
+    if found != branch:
+        raise StartError(
+            "the end posture is on another branch than the start posture",
+            where="end.joints",
+            found=match.solver.branches[found],
+            allowed=match.solver.branches[branch],
+            hint="Choose an end posture of the same branch, or leave end: free",
+        )
+
+
+def _branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) -> int:
+    """Index of the branch in whose inside a posture lies."""
+    robot, solver = task_map.robot, match.solver
+    redundant = [robot.joint_names.index(joint) for joint in match.redundant_joints]
+    rest = complement(robot.n, redundant)
+    target = task_map.value(posture)
+    answers = solver.solve(target[None], posture[None, redundant])[0]
+    gap = difference(answers, posture[rest], robot.revolute[rest])
+    gaps = np.where(np.isfinite(gap).all(axis=2), np.abs(gap).max(axis=2), np.inf).min(axis=1)
+    branch = int(np.argmin(gaps))
+    margins = solver.branch_margins(posture[None], branch)[0]
+    if gaps[branch] > _SAME_POSTURE or np.any(margins <= 0.0):
+        raise StartError(
+            f"the {name} posture is singular for redundant joints [{', '.join(match.redundant_joints)}]",
+            where=f"{name}.joints",
+            found="a posture where branches of the closed form meet",
+            allowed="a posture inside a branch",
+            hint="Bend the arm a little, or choose other redundant joints",
+        )
+    return branch

@@ -1,0 +1,242 @@
+"""What a task comes to on a robot: path and postures, and the choices of redundant joints and branch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from brachis import ik
+from brachis.common.summary import Summary
+from brachis.errors import DecompositionError, StartError, UnknownNameError
+from brachis.kinematics import ClosedFormMap, Newton
+from brachis.limits import Limit, limits_of
+from brachis.limits.process_speed import approach_of
+from brachis.path import Path, check_closed, path_of, path_speed, with_feed_rates
+from brachis.problem.feasibility import (
+    branch_of,
+    check_end_branch,
+    check_postures,
+    check_regular,
+    check_smoothness,
+    lacks_a_direction,
+)
+from brachis.robot import ROLL_JOINT, Robot, TaskMap, bind
+from brachis.robot.custom_limits import LimitModel
+from brachis.robot.task_map import JointSpace
+from brachis.task import Task
+
+_EXACT = 1e-12
+"""m or rad."""
+
+
+@dataclass(frozen=True, repr=False)
+class Problem(Summary):
+    """A task on a robot.
+
+    Attributes
+    ----------
+    task : Task
+    robot : Robot
+        With the virtual roll joint where the tool may roll.
+    task_map : TaskMap
+    path : Path
+    start, end : (n,) ndarray or None
+        Postures, None where free; the same one where the motion is periodic. Otherwise the end is the posture nearest
+        to the given one that is on the path, which that one may miss by what its digits leave out.
+    limits : tuple of Limit
+    further : tuple of LimitModel
+        Those of the limits that are not in the task, as the user gave them.
+    """
+
+    task: Task
+    robot: Robot
+    task_map: TaskMap
+    path: Path
+    start: np.ndarray | None
+    end: np.ndarray | None
+    limits: tuple[Limit, ...]
+    further: tuple[LimitModel, ...] = ()
+
+    @classmethod
+    def of(cls, robot: Robot, task: Task, further: Sequence[LimitModel] = ()) -> Problem:
+        """Bind robot and task, and check the postures that the task gives.
+
+        Parameters
+        ----------
+        robot : Robot
+        task : Task
+        further : sequence of LimitModel, optional
+            Limits of the user's own.
+
+        Raises
+        ------
+        InputError
+            Task space, postures, path or a limit of the user's do not fit the robot; the splines are not smooth enough
+            for a limit.
+        """
+        robot, task_map = bind(robot, task.task_space)
+        start = None if task.start == "free" else robot.posture(task.start.joints, "start.joints")
+        end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
+        path = path_of(task_map, task)
+        task = with_feed_rates(task, path)
+        if task.boundary.periodic:
+            check_closed(task_map, path)
+            end = start
+        approach = approach_of(task, robot, task_map, path, end if start is None else start, own=bool(further))
+        limits = limits_of(robot, task, further, approach)
+        check_smoothness(limits, task.spline)
+        limits = check_postures(task_map, limits, start, end, path, task.refinement.tolerance)
+        if end is not None and not task.boundary.periodic:
+            end = _on_path(task_map, end, path)
+        return cls(task, robot, task_map, path, start, end, limits, tuple(further))
+
+    @property
+    def end_rates(self) -> tuple[float, float]:
+        """ds/dt at start and end, 1/s; zero at rest, and where a periodic motion has no ends."""
+        given = self.task.boundary
+        first, last = (
+            speed / path_speed(self.task_map, self.path, s) if speed else 0.0
+            for s, speed in ((0.0, given.start_speed), (1.0, given.end_speed))
+        )
+        return first, last
+
+
+def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
+    """Return the posture nearest to a given one, (n,), at the end of the path; the given one if it is there already."""
+    place = path.sample(np.ones(1)).target
+    if isinstance(task_map, JointSpace):
+        return np.asarray(place[0])
+    newton = Newton(task_map)
+    miss = task_map.difference(place, task_map.values(posture[None]))
+    if task_map.robot.n < task_map.m or np.abs(miss).max() < _EXACT:
+        return posture
+    (found,) = newton.nearest(place, posture[None])
+    return found if np.isfinite(found).all() else posture
+
+
+@dataclass(frozen=True, repr=False)
+class Decomposition(Summary):
+    """Redundant joints with their closed form, and the branches on which a motion may begin.
+
+    Attributes
+    ----------
+    problem : Problem
+    match : Match
+    redundant : tuple of int
+        Indices of the redundant joints, ascending.
+    branches : tuple of int
+        Indices into ``match.solver.branches``; one where start or end posture is given.
+    """
+
+    problem: Problem
+    match: ik.Match
+    redundant: tuple[int, ...]
+    branches: tuple[int, ...]
+
+    @property
+    def name(self) -> str:
+        """Names of the redundant joints."""
+        return ", ".join(self.match.redundant_joints) or "none"
+
+    @property
+    def clearance(self) -> float:
+        """Least branch margin of the start posture, of the end posture where the start is free; zero without both."""
+        given = self.problem.end if self.problem.start is None else self.problem.start
+        if given is None:
+            return 0.0
+        margins = self.match.solver.branch_margins(given[None], self.branches[0])
+        return float(margins.min(initial=np.inf))
+
+    def joint_map(self, start: np.ndarray, branch: int) -> ClosedFormMap:
+        """Put robot, path and closed form together for a motion that begins at, or near, `start`, (n,)."""
+        given = self.problem
+        solver = self.match.solver
+        return ClosedFormMap(given.task_map, given.path, solver, self.redundant, branch, start)
+
+
+def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> list[Decomposition]:
+    """List the choices that the task allows.
+
+    Parameters
+    ----------
+    problem : Problem
+    families : sequence of Family, optional
+        Closed forms to try before the built-in ones.
+
+    Returns
+    -------
+    list of Decomposition
+        With ``redundant_joints: auto`` the one with the largest branch margin at the start posture first, and closed
+        forms before polynomials; none where the robot has no closed form, or the path is one of joints. At least one
+        if the task names the joints.
+
+    Raises
+    ------
+    DecompositionError
+        No closed form fits.
+    StartError
+        A given posture is singular, or on another branch than the task's or the end posture's where a branch or named
+        joints bind the motion to one.
+    UnknownNameError
+        There is no such joint or branch.
+    """
+    task, robot, task_map = problem.task, problem.robot, problem.task_map
+    if isinstance(task_map, JointSpace):
+        return []
+    if task.redundant_joints != "auto":
+        wanted = _with_roll(task_map, task.redundant_joints)
+        return [_decomposition(problem, ik.find(robot, task_map, wanted, families=families))]
+    found = ik.find_all(robot, task_map, families=families)
+    matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
+    asked = task.branch != "auto" or task.search.guesses != "lattice"
+    if not matches and (asked or robot.n < task_map.m or lacks_a_direction(task_map)):
+        if len(found) <= 1:  # nothing to choose: the reasons of the only choice, or the wrong number of joints
+            return [_decomposition(problem, ik.find(robot, task_map, (), families=families))]
+        raise DecompositionError(
+            "no choice of redundant joints has a closed form",
+            redundant_joints=(),
+            reasons={", ".join(c.redundant_joints): "; ".join(c.reasons.values()) for c in found},
+            available=[],
+        )
+    allowed: list[Decomposition] = []
+    refusals: list[StartError | UnknownNameError] = []
+    for match in matches:
+        try:
+            allowed.append(_decomposition(problem, match))
+        except (StartError, UnknownNameError) as error:
+            refusals.append(error)
+    if refusals and not allowed and (asked or robot.n == task_map.m):
+        raise refusals[0]
+    if not allowed:
+        check_regular(task_map, problem.start, problem.end)
+    return sorted(
+        allowed, key=lambda decomposition: (decomposition.match.solver.kind != "closed_form", -decomposition.clearance)
+    )
+
+
+def _with_roll(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Add the free roll where it is the one redundant joint that is left out."""
+    robot = task_map.robot
+    missing = robot.n - task_map.m - len(names)
+    return (*names, ROLL_JOINT) if robot.rolls_freely and missing == 1 and ROLL_JOINT not in names else names
+
+
+def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
+    """Find the branches on which a motion may begin."""
+    robot, task_map, wanted = problem.robot, problem.task_map, problem.task.branch
+    redundant = tuple(robot.joint_names.index(name) for name in match.redundant_joints)
+    labels = match.solver.branches
+    if problem.start is not None:
+        branch = branch_of(task_map, match, problem.start, wanted)
+        if problem.end is not None:
+            check_end_branch(task_map, match, problem.end, branch)
+        return Decomposition(problem, match, redundant, (branch,))
+    if problem.end is not None:
+        branch = branch_of(task_map, match, problem.end, wanted, name="end")
+        return Decomposition(problem, match, redundant, (branch,))
+    if wanted != "auto" and wanted not in labels:
+        raise UnknownNameError("branch", wanted, labels, where="branch")
+    allowed = tuple(branch for branch, label in enumerate(labels) if wanted in ("auto", label))
+    return Decomposition(problem, match, redundant, allowed)

@@ -1,0 +1,223 @@
+"""Corners of points: places where the direction changes at once, whatever the scale at which it is looked at.
+
+Long straight ways between points: nothing else would hold a curve to them.
+
+How much of its neighbours a blend may take so that it stays near the corner that it rounds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import cos, sin
+
+import numpy as np
+
+from brachis.common.arrays import with_like_signs
+from brachis.errors import write_count
+from brachis.task.points.least_squares import lengths_along
+from brachis.task.points.points import QUATERNION, Array, Indices, Points
+from brachis.task.points.scatter import Scatter
+
+LEAST_ANGLE = np.deg2rad(12.0)
+"""Smaller changes of direction are left to the fit."""
+_CERTAIN = np.deg2rad(50.0)
+"""A polygon that turns by this much from one side to the next is no smooth curve."""
+_SHARP = 1.5
+"""Over twice the distance a smooth curve turns by twice the angle, a corner by the same one."""
+_DIRECTION = 0.02
+"""rad: what scatter may do to a direction."""
+_DOUBTS = 8.0
+_NOTHING = 1e-24
+_NOISY_POINTS = 4
+_OF_TOLERANCE = 2.0
+_GUARD = 0.3
+_OF_SPACING = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class Corner:
+    """A corner.
+
+    Attributes
+    ----------
+    index : int
+        The nearest point.
+    before, after : int
+        How many points come before it, and index of the first one after it.
+    angle : float
+        Change of direction, rad.
+    place : (p,) ndarray
+        Where the straight lines before and after meet, m.
+    """
+
+    index: int
+    before: int
+    after: int
+    angle: float
+    place: Array
+
+
+def find_corners(points: Points, scatter: Scatter, tolerance: float) -> tuple[Corner, ...]:
+    """Return the corners in order.
+
+    Parameters
+    ----------
+    points : Points
+    scatter : Scatter
+        Of the points.
+    tolerance : float
+        Corners that are rounded within it are corners, m.
+    """
+    if len(points) < 3 or points.position.shape[1] < 2:  # noqa: PLR2004
+        return ()
+    noisy = scatter.deviation > 0.0
+    u = lengths_along(points.position, scatter.deviation)
+    spacing = u[-1] / (len(points) - 1)
+    for_direction = (12.0 * spacing * (scatter.deviation / _DIRECTION) ** 2) ** (1.0 / 3.0)
+    width, least = max(for_direction, _OF_TOLERANCE * tolerance), _NOISY_POINTS if noisy else 1
+    angle, doubt = _turning(points.position, u, width, least)
+    wide, _ = _turning(points.position, u, 2.0 * width, 2 * least)
+    sharp = (wide > 0.0) & (wide < _SHARP * angle) | (angle > _CERTAIN)
+    sharp &= angle > np.maximum(LEAST_ANGLE, _DOUBTS * scatter.deviation * doubt)
+    peaks = _peaks(angle, sharp, u, width, least)
+    return tuple(_located(points, u, i, float(angle[i]), width, least, tolerance / 4.0) for i in peaks)
+
+
+def _turning(position: Array, u: Array, width: float, least: int) -> tuple[Array, Array]:
+    """Return the angle between the directions before and after every point, (n,), rad; zero at the ends.
+
+    Beside it stands the standard deviation that points which scatter by 1 m give it, (n,), rad.
+    """
+    count = len(u)
+    index = np.arange(count)
+    first = np.clip(np.minimum(np.searchsorted(u, u - width), index - least), 0, None)
+    last = np.clip(np.maximum(np.searchsorted(u, u + width, side="right") - 1, index + least), None, count - 1)
+    (before, doubt), (after, other) = (_directions(position, u, *ends) for ends in ((first, index), (index, last)))
+    crossing = np.linalg.norm(before - after, axis=1), np.linalg.norm(before + after, axis=1)
+    angle = 2.0 * np.arctan2(*crossing)
+    angle[(index < least) | (index >= count - least)] = 0.0
+    return angle, np.hypot(doubt, other)
+
+
+def _directions(position: Array, u: Array, first: Indices, last: Indices) -> tuple[Array, Array]:
+    """Return unit vectors along the lines that fit points `first` to `last`, (n, p), and their doubts, (n,)."""
+    moment = np.hstack([np.ones((len(u), 1)), u[:, None], u[:, None] ** 2, position, u[:, None] * position])
+    sums = np.concatenate([np.zeros((1, moment.shape[1])), np.cumsum(moment, axis=0)])
+    part = sums[last + 1] - sums[first]
+    dimension = position.shape[1]
+    count, mean = part[:, :1], part[:, 1:2] / part[:, :1]
+    spread = np.maximum(part[:, 2:3] - count * mean**2, _NOTHING)
+    slope = (part[:, 3 + dimension :] - mean * part[:, 3 : 3 + dimension]) / spread
+    sizes = np.maximum(np.linalg.norm(slope, axis=1), _NOTHING)
+    return slope / sizes[:, None], 1.0 / np.sqrt(spread[:, 0])
+
+
+def _peaks(angle: Array, sharp: np.ndarray, u: Array, width: float, least: int) -> list[int]:
+    """Return the indices of the largest angles, one in every run of sharp ones as wide as the lines that fit."""
+    found: list[int] = []
+    for i in np.flatnonzero(sharp).tolist():
+        near = bool(found) and (u[i] - u[found[-1]] < width or i - found[-1] < least)
+        if not near:
+            found.append(i)
+        elif angle[i] > angle[found[-1]]:
+            found[-1] = i
+    return found
+
+
+def _located(points: Points, u: Array, i: int, angle: float, width: float, least: int, off: float) -> Corner:
+    """Return the corner near a point: the point, or where the straight lines before and after come nearest together.
+
+    It is the point where nothing scatters and the points before it, and those after it, lead there, but for `off`, m.
+    """
+    position, sides = points.position, []
+    here = Corner(i, i, i + 1, angle, position[i])
+    from_before, from_after = (_continues(position, u, i, sign, off) for sign in (-1, 1))
+    if least == 1 and from_before == from_after:
+        return here
+    for sign in (-1.0, 1.0):
+        away = sign * (u - u[i])
+        side = np.flatnonzero((away > _GUARD * width) & (away < 2.0 * width))
+        if len(side) <= least:
+            side = np.clip(i + int(sign) * np.arange(1, 1 + max(least, 2)), 0, len(u) - 1)
+        along = (
+            np.polyfit(u[side], position[side], 1)[0] if np.ptp(u[side]) else sign * (position[side[0]] - position[i])
+        )
+        sides.append((position[side].mean(axis=0), along / np.linalg.norm(along)))
+    (one, a), (other, b) = sides
+    steps, *_ = np.linalg.lstsq(np.stack([a, -b], axis=1), other - one, rcond=None)
+    place = (one + steps[0] * a + other + steps[1] * b) / 2.0
+    gap = u[min(i + 1, len(u) - 1)] - u[max(i - 1, 0)]
+    after = float((position[i] - place) @ (a + b)) > 0.0
+    if np.linalg.norm(place - position[i]) > max(width, gap) or (least == 1 and after != from_after):
+        return here
+    return Corner(i, i + (not after), i + (not after), angle, place)
+
+
+def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool:
+    """Tell whether the cubic through four points on one side, or what fewer points there give, leads to a point.
+
+    It may miss it by `off`, m, or by a small part of the spacing.
+    """
+    side = i + sign * np.arange(1, 5)
+    side = side[(side >= 0) & (side < len(u))]
+    if len(side) == 1:
+        return True
+    foreseen = np.zeros(position.shape[1])
+    for k in side:
+        others = side[side != k]
+        foreseen += position[k] * np.prod((u[i] - u[others]) / (u[k] - u[others]))
+    return bool(np.linalg.norm(foreseen - position[i]) <= max(off, _OF_SPACING * abs(u[side[0]] - u[i])))
+
+
+_FEWEST = 20
+_LONG = 5.0
+_MOST = 200
+
+
+def with_gaps_filled(points: Points) -> tuple[Points, tuple[str, ...]]:
+    """Put points on the straight ways that are five times longer than usual, and say how many ways there are."""
+    chords = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
+    usual = float(np.median(chords))
+    long = chords > _LONG * usual
+    if len(points) < _FEWEST or not np.any(long):
+        return points, ()
+    counts = np.where(long, np.minimum(np.ceil(chords / (2.0 * usual)), _MOST), 1.0).astype(int)
+    before = np.repeat(np.arange(len(chords)), counts)
+    firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    shares = ((np.arange(len(before)) - firsts[before] + 1) / counts[before])[:, None]
+
+    def filled(values: np.ndarray) -> np.ndarray:
+        between = values[before] + shares * (values[before + 1] - values[before])
+        return np.concatenate([values[:1], between])
+
+    turning = filled(points.turning)
+    speed = None if points.speed is None else np.concatenate([points.speed[:1], points.speed[before + 1]])
+    rows = np.concatenate([points.rows[:1], points.rows[before + 1]])
+    turning = with_like_signs(turning) if turning.shape[1] == QUATERNION else turning
+    ways = write_count(int(np.count_nonzero(long)), "way")
+    told = f"taken as straight: {ways} longer than {_LONG:g} times the usual spacing"
+    return replace(points, position=filled(points.position), turning=turning, speed=speed, rows=rows), (told,)
+
+
+_MIDDLE = 11.0 / 64.0
+"""Weight of the first derivatives, of opposite signs, in the middle of the septic polynomial between two points."""
+_OF_NEIGHBOUR = 0.45
+
+
+def blend_size(angle: float, distance: float, shortest: float) -> float:
+    """Return what a blend takes from either side, m, that passes a corner of straight lines at a distance, m.
+
+    With `size` from either side and unit tangents a, b the ends lie at -size a and size b of the corner, and the
+    blend's parameter has the length ``size (1 + cos(angle / 2))``, see `brachis.path.blends`. Its middle is
+    ``(b - a) (size / 2 - 11/64 length)`` away, and ``|b - a| = 2 sin(angle / 2)``.
+
+    Parameters
+    ----------
+    angle : float
+        Change of direction, rad.
+    distance : float
+    shortest : float
+        Length of the shorter neighbour, m.
+    """
+    of_size = 2.0 * sin(angle / 2.0) * (0.5 - _MIDDLE * (1.0 + cos(angle / 2.0)))
+    return min(distance / of_size, _OF_NEIGHBOUR * shortest)

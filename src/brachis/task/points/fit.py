@@ -1,0 +1,252 @@
+"""A smooth curve within a tolerance of points, with few knots.
+
+The curve is a quintic B-spline, C4, through the first and the last point; of all with the same knots it has the least
+sum of squared distances. Intervals in which the tolerance is exceeded are halved; then knots that are not needed are
+taken away, and fewer ones spread in the same proportion are tried.
+
+How far points are from a fitted curve, by a formula that the fit does not use.
+
+The curve is drawn as a polygon of many sides. Stretch by stretch of the points, the nearest of its corners to each is
+found in a k-d tree of those that lie near where the stretch before ended: a path may cross itself, or go round several
+times. The nearest place on the two sides at this corner is a place on the curve, to which distance and angle are taken.
+Where the fit took the point to be is not known here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brachis.task.points.least_squares import (
+    DEGREE,
+    Fit,
+    Tolerance,
+    clamped,
+    fit_over,
+    lengths_along,
+    measured,
+    over_arc_length,
+)
+from brachis.task.points.points import Array, Points, angles_between
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+    from brachis.task.points.scatter import Scatter
+
+_FEW = DEGREE + 1
+_MOST_ROUNDS = 40
+_PRUNING_ROUNDS = 12
+_SAMPLE = 8_000
+"""Points that are looked at while knots are added."""
+_NOISY_POINTS = 10
+"""Least number of points in an interval where points scatter: with fewer a curve would follow the scatter."""
+_REMOVABLE = 0.95
+_INTERPOLATED = 2_000
+"""Most points that are interpolated where no fewer knots will do."""
+
+
+def fit_points(points: Points, tolerance: Tolerance, scatter: Scatter) -> Fit:
+    """Return a curve within the tolerance of points, or the one that is nearest to it.
+
+    Parameters
+    ----------
+    points : Points
+        At least two; the position moves from each to the next.
+    tolerance : Tolerance
+    scatter : Scatter
+        Of the points.
+    """
+    sigma = lengths_along(points.position, scatter.deviation)
+    if len(points) < _FEW:
+        return _polynomial(points, sigma)
+    every = -(-len(points) // _SAMPLE)
+    chosen = np.unique(np.append(np.arange(0, len(points), every), len(points) - 1))
+    noisy, dimension = scatter.noisy(tolerance), points.position.shape[1]
+    rough = _with_knots_added(points.only(chosen), sigma[chosen], _first_breaks(points, sigma), tolerance, noisy=noisy)
+    if rough is None:
+        return _interpolated(points, sigma)
+    places, breaks = over_arc_length(rough, dimension)
+    sigma = np.interp(sigma, sigma[chosen], np.maximum.accumulate(places))
+    fit = _with_knots_added(points, sigma, breaks, tolerance, noisy=noisy)
+    if fit is not None and fit.ratios(tolerance).max() <= 1.0:
+        return _with_fewest_knots(points, _with_knots_removed(points, fit, tolerance), tolerance)
+    return _interpolated(points, sigma) if fit is None or (not noisy and len(points) <= _INTERPOLATED) else fit
+
+
+def _first_breaks(points: Points, sigma: Array) -> Array:
+    """Return the knots to begin with: as many intervals as the path is longer than what it extends over."""
+    extent = float(np.linalg.norm(np.ptp(points.position, axis=0)))
+    count = max(1, min(int(sigma[-1] / extent), len(points) // _NOISY_POINTS))
+    return np.linspace(0.0, float(sigma[-1]), count + 1)
+
+
+def _with_knots_added(points: Points, sigma: Array, breaks: Array, tolerance: Tolerance, *, noisy: bool) -> Fit | None:
+    """Halve the intervals in which the tolerance is exceeded, until none is or none can be; None where no fit is."""
+    least, fit = _NOISY_POINTS if noisy else 1, None
+    for _ in range(_MOST_ROUNDS):
+        try:
+            fit = fit_over(points, sigma, breaks)
+        except (ValueError, np.linalg.LinAlgError):
+            return fit
+        bad = fit.worst(tolerance) > 1.0
+        counts = np.bincount(fit.intervals, minlength=len(breaks) - 1)
+        halved = np.flatnonzero(bad & (counts >= 2 * least))
+        if not halved.size:
+            return fit
+        sigma, breaks = fit.sigma, np.sort(np.append(breaks, (breaks[halved] + breaks[halved + 1]) / 2.0))
+    return fit
+
+
+def _with_knots_removed(points: Points, fit: Fit, tolerance: Tolerance) -> Fit:
+    """Take knots away, many at a time, as long as all points stay within the tolerance."""
+    needed = np.empty(0)
+    for _ in range(_PRUNING_ROUNDS):
+        removed = _removable(fit, tolerance, needed)
+        if not removed.size:
+            break
+        left = np.setdiff1d(fit.breaks, removed)
+        trial = fit_over(points, fit.sigma, left)
+        back = removed[_near_bad(left, trial.worst(tolerance) > 1.0, removed)]
+        if back.size:
+            needed = np.append(needed, back)
+            if len(back) == len(removed):
+                continue
+            trial = fit_over(points, fit.sigma, np.union1d(left, back))
+            if trial.ratios(tolerance).max() > 1.0:
+                needed = np.append(needed, removed)
+                continue
+        fit = trial
+    return fit
+
+
+def _near_bad(breaks: Array, bad: np.ndarray, removed: Array) -> np.ndarray:
+    """Tell which of the removed knots lie in a bad interval, or in one beside it."""
+    wide = bad.copy()
+    wide[1:] |= bad[:-1]
+    wide[:-1] |= bad[1:]
+    near: np.ndarray = wide[np.searchsorted(breaks, removed) - 1]
+    return near
+
+
+def _with_fewest_knots(points: Points, fit: Fit, tolerance: Tolerance) -> Fit:
+    """Spread fewer knots as densely in proportion, over the arc length, as long as all points are within the tolerance.
+
+    Their number is halved between one that will do and one that will not.
+    """
+    sigma, breaks = over_arc_length(fit, points.position.shape[1])
+    most = len(breaks) - 1
+    fewest = most // 2
+    trial = fit_over(points, sigma, breaks)
+    if trial.ratios(tolerance).max() <= 1.0:
+        fit = trial
+    while most - fewest > 1:
+        count = (most + fewest) // 2
+        trial = fit_over(
+            points, sigma, np.interp(np.linspace(0.0, 1.0, count + 1), np.linspace(0.0, 1.0, len(breaks)), breaks)
+        )
+        if trial.ratios(tolerance).max() <= 1.0:
+            most, fit = count, trial
+        else:
+            fewest = count
+    return fit
+
+
+def _removable(fit: Fit, tolerance: Tolerance, needed: Array) -> Array:
+    """Choose knots that are not neighbours, those with the least of the tolerance taken beside them first."""
+    worst = fit.worst(tolerance)
+    beside = np.maximum(worst[:-1], worst[1:])
+    taken = np.zeros(len(beside) + 2, dtype=bool)
+    for i in np.argsort(beside):
+        if beside[i] < _REMOVABLE and not np.any(needed == fit.breaks[i + 1]) and not (taken[i] or taken[i + 2]):
+            taken[i + 1] = True
+    return fit.breaks[1:-1][taken[1:-1]]
+
+
+def _polynomial(points: Points, sigma: Array) -> Fit:
+    """Return the polynomial through few points, as a spline without inner knots."""
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415
+
+    through = make_interp_spline(sigma, points.columns, k=len(points) - 1)
+    at, breaks = np.linspace(0.0, sigma[-1], _FEW), sigma[[0, -1]]
+    return measured(points, make_interp_spline(at, through(at), k=DEGREE, t=clamped(breaks)), breaks, sigma)
+
+
+def _interpolated(points: Points, sigma: Array) -> Fit:
+    """Return the spline through all points."""
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415
+
+    spline = make_interp_spline(sigma, points.columns, k=DEGREE)
+    return measured(points, spline, np.unique(spline.t), sigma)
+
+
+_SIDES = 20_000
+_LEAST_SIDES = 64
+_STRETCH, _AROUND = 0.005, 0.01
+"""Parts of the curve's length: of a stretch of points, and of how far beyond its ends its corners are looked for."""
+_SHARE_OF_POINTS = 1_000
+
+
+def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
+    """Return the distances, m, and the angles, rad, between points and a curve, (n,) each.
+
+    Parameters
+    ----------
+    points : Points
+        In the order in which the curve passes them; it begins at the first one.
+    spline : BSpline
+        Position and turning, as `Points.columns`.
+    """
+    breaks = np.unique(spline.t)
+    count = max(_LEAST_SIDES, _SIDES // (len(breaks) - 1))
+    sides = np.arange(count) / count
+    sigma = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * sides).ravel(), breaks[-1])
+    dimension = points.position.shape[1]
+    place = spline(sigma)[:, :dimension]
+    nearest = _nearest(points.position, place)
+    distances, at = np.full(len(points), np.inf), np.zeros(len(points))
+    for offset in (-1, 0):
+        first = np.clip(nearest + offset, 0, len(place) - 2)
+        side = place[first + 1] - place[first]
+        share = np.sum((points.position - place[first]) * side, axis=1) / np.maximum(np.sum(side**2, axis=1), 1e-300)
+        share = np.clip(share, 0.0, 1.0)
+        away = np.linalg.norm(points.position - place[first] - share[:, None] * side, axis=1)
+        nearer = away < distances
+        distances[nearer] = away[nearer]
+        at[nearer] = (sigma[first] + share * (sigma[first + 1] - sigma[first]))[nearer]
+    curve = spline(at)
+    distances = np.linalg.norm(points.position - curve[:, :dimension], axis=1)
+    return distances, angles_between(curve[:, dimension:], points.turning)
+
+
+def _nearest(position: Array, place: Array) -> Array:
+    """Return the polygon's nearest corner to each of n points, (n,), in their order."""
+    from scipy.spatial import cKDTree  # noqa: PLC0415
+
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))
+    nearest, reached = np.zeros(len(position), dtype=int), 0.0
+    for stretch, length in _stretches(position, along[-1]):
+        beyond = _AROUND * along[-1]
+        low, high = np.searchsorted(along, [reached - beyond, reached + length + beyond])
+        low, high = max(0, low - 1), high + 1
+        nearest[stretch] = low + cKDTree(place[low:high]).query(position[stretch])[1]
+        reached = along[nearest[stretch][-1]]
+    return nearest
+
+
+def _stretches(position: Array, total: float) -> Iterator[tuple[slice, float]]:
+    """Cut n points into stretches, with the length of each from the last point before it to its own last one, m.
+
+    The points' polygon is no shorter than the path between them, but for the tolerance.
+    """
+    lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1)))
+    most = max(1, len(position) // _SHARE_OF_POINTS)
+    first = 0
+    while first < len(position):
+        before = lengths[max(first - 1, 0)]
+        last = min(int(np.searchsorted(lengths, before + _STRETCH * total, side="right")), first + most)
+        last = max(last, first + 1)
+        yield slice(first, last), float(lengths[last - 1] - before)
+        first = last

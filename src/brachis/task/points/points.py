@@ -1,0 +1,190 @@
+"""Points that a path is to follow, in SI units, with what messages need to name them.
+
+Points from arrays and transforms.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from brachis.common.arrays import with_like_signs
+from brachis.errors import TaskError
+from brachis.task.points.units import ANGLES, LENGTHS, SPEEDS, Units
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
+
+QUATERNION = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Points in the order in which the tool passes them.
+
+    Attributes
+    ----------
+    position : (n, p) ndarray
+        m.
+    turning : (n, q) ndarray
+        Unit quaternions w, x, y, z whose signs make neighbours close (q = 4), yaw in rad (q = 1), or nothing (q = 0).
+    speed : (n,) ndarray or None
+        Speed of the tool on the way to each point, m/s; NaN where it is not prescribed.
+    rows : (n,) int ndarray
+        Lines of a file, or indices of an array.
+    source : str
+        File or argument, for messages.
+    row : str
+        What `rows` counts: ``line`` or ``row``.
+    """
+
+    position: Array
+    turning: Array
+    speed: Array | None
+    rows: Indices
+    source: str
+    row: str = "line"
+
+    def __len__(self) -> int:
+        """Return the number of points, n."""
+        return len(self.position)
+
+    @property
+    def columns(self) -> Array:
+        """Position and turning side by side, (n, p + q)."""
+        return np.hstack([self.position, self.turning])
+
+    def only(self, chosen: Any) -> Points:  # noqa: ANN401  (whatever NumPy takes as an index)
+        """Return some of the points."""
+        speed = None if self.speed is None else self.speed[chosen]
+        parts = {"position": self.position[chosen], "turning": self.turning[chosen], "rows": self.rows[chosen]}
+        return replace(self, **parts, speed=speed)
+
+    def named(self, i: int) -> str:
+        """Name the row of a point."""
+        return f"{self.row} {self.rows[i]}"
+
+    def described(self, i: int) -> str:
+        """Name the row and the position of a point."""
+        place = ", ".join(f"{value:.6g}" for value in self.position[i])
+        return f"{self.named(i)}, [{place}] m"
+
+    def wrong(self, i: int, problem: str, *, found: str, allowed: str, hint: str | None = None) -> TaskError:
+        """Return the error that something is wrong with a point."""
+        return TaskError(problem, found=found, allowed=allowed, where=f"{self.source}: {self.named(i)}", hint=hint)
+
+
+def angles_between(one: Array, other: Array) -> Array:
+    """Return the angles, (n,), rad, between what `Points.turning` holds, (n, q) both; zero where it holds nothing."""
+    if one.shape[1] != QUATERNION:
+        return np.asarray(np.abs(one - other).sum(axis=1))
+    unit = one / np.linalg.norm(one, axis=1)[:, None]
+    apart = np.minimum(np.linalg.norm(unit - other, axis=1), np.linalg.norm(unit + other, axis=1))
+    return np.asarray(4.0 * np.arcsin(np.minimum(apart / 2.0, 1.0)))
+
+
+_ROTATION = 1e-4
+_MOST_ROWS = 3
+_HOMOGENEOUS = (4, 4)
+_MATRIX = (3, 3)
+
+
+def points_from(points: Any, orientations: Any, speed: Any, units: Units, source: str, *, least: int = 2) -> Points:  # noqa: ANN401
+    """Return points from what a program has.
+
+    Parameters
+    ----------
+    points : array_like, (n, p) or (n, 4, 4), or sequence of transforms
+        Positions; or homogeneous matrices, or objects that have one.
+    orientations : Rotation, array_like, (n, 3, 3) or (n,), or None
+        SciPy's rotations; rotation matrices; yaw.
+    speed : array_like, (n,), or None
+        NaN where none is prescribed.
+    units : Units
+        Of the numbers; m, rad and m/s where not stated.
+    source : str
+        What messages call the points.
+    least : int, optional
+        How many there must be.
+
+    Raises
+    ------
+    TaskError
+        Arrays of other shapes, or with numbers that are not finite, or that are no rotations; the row is named.
+    """
+    values = _array(_matrices(points), source, source)
+    if values.ndim == 3 and values.shape[1:] == _HOMOGENEOUS and orientations is None:  # noqa: PLR2004
+        values, orientations = values[:, :3, 3], values[:, :3, :3]
+    if values.ndim != 2 or not 1 <= values.shape[1] <= _MOST_ROWS or len(values) < least:  # noqa: PLR2004
+        allowed = f"(n, 1 to 3) positions, or (n, 4, 4) matrices, of {least} rows or more"
+        raise TaskError("points of the wrong shape", found=values.shape, allowed=allowed, where=source)
+    turning = np.empty((len(values), 0)) if orientations is None else _turning(orientations, units, source)
+    speeds = None
+    if speed is not None:
+        where = f"{source}: speed"
+        speeds = _numbers(speed, where) * SPEEDS[units.speed or "m/s"]
+        if speeds.ndim != 1:
+            raise TaskError("speeds of the wrong shape", found=speeds.shape, allowed="(n,)", where=where)
+        problem = "a speed must be positive and finite, or NaN where there is none"
+        _refuse_first((speeds <= 0.0) | np.isinf(speeds), problem, speeds, source)
+    for name, one in (("orientations", turning), ("speed", speeds)):
+        if one is not None and len(np.atleast_1d(one)) != len(values):
+            raise TaskError(f"as many {name} as points are needed", found=len(np.atleast_1d(one)), allowed=len(values))
+    return Points(values * LENGTHS[units.length or "m"], turning, speeds, np.arange(len(values)), source, "row")
+
+
+def _matrices(points: Any) -> Any:  # noqa: ANN401
+    """Return the homogeneous matrices of transforms; anything else as it is."""
+    if not isinstance(points, np.ndarray) and callable(getattr(points, "as_matrix", None)):
+        return points.as_matrix()
+    if isinstance(points, list | tuple) and points:
+        if all(hasattr(one, "homogeneous") for one in points):
+            return [one.homogeneous for one in points]
+        if callable(getattr(points[0], "as_matrix", None)):
+            return [one.as_matrix() for one in points]
+    return points
+
+
+def _turning(orientations: Any, units: Units, source: str) -> Array:  # noqa: ANN401
+    """Return quaternions, (n, 4), or yaw, (n, 1)."""
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415  (imports in 0.2 s)
+
+    where = f"{source}: orientations"
+    if isinstance(orientations, Rotation):
+        return with_like_signs(np.roll(orientations.as_quat(), 1, axis=-1))
+    values = _array(orientations, where, source)
+    if values.ndim == 1:
+        return values[:, None] * ANGLES[units.angle or "rad"]
+    if values.shape[1:] == _MATRIX:
+        off = np.abs(values @ np.swapaxes(values, 1, 2) - np.eye(3)).max(axis=(1, 2))
+        _refuse_first((off > _ROTATION) | (np.linalg.det(values) < 0.0), "no rotation matrix", values, source)
+        return with_like_signs(np.roll(Rotation.from_matrix(values).as_quat(), 1, axis=1))
+    problem = "orientations of the wrong shape"
+    if values.shape[1:] == (QUATERNION,):
+        problem = "an array of quaternions does not say whether w is first or last"
+    allowed = "SciPy's Rotation (Rotation.from_quat(q) takes x, y, z, w); (n, 3, 3) matrices; (n,) yaw"
+    raise TaskError(problem, found=values.shape, allowed=allowed, where=where)
+
+
+def _array(values: Any, where: str, source: str) -> Array:  # noqa: ANN401
+    array = _numbers(values, where)
+    if not array.size:
+        raise TaskError("an array without numbers", found=array.shape, allowed="2 rows or more", where=where)
+    _refuse_first(~np.isfinite(array.reshape(len(array), -1) if array.ndim else array), "not finite", array, source)
+    return array
+
+
+def _numbers(values: Any, where: str) -> Array:  # noqa: ANN401
+    try:
+        return np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise TaskError("not an array of numbers", found=str(error), where=where) from None
+
+
+def _refuse_first(bad: np.ndarray, problem: str, values: Array, source: str) -> None:
+    rows = np.flatnonzero(bad.any(axis=1) if bad.ndim > 1 else bad)
+    if rows.size:
+        raise TaskError(problem, found=values[rows[0]].tolist(), where=f"{source}: row {rows[0]}")

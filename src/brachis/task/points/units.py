@@ -1,0 +1,107 @@
+"""Units of lengths, angles and speeds, and quantities that are written with them.
+
+How orientations are written down: by quaternions, rotation vectors, and the angles that the makers of robots use.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from math import pi
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+    from brachis.task.points.points import Array
+
+LENGTHS: Final = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "inch": 0.0254}
+ANGLES: Final = {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0}
+SPEEDS: Final = {
+    "m/s": 1.0,
+    "mm/s": 1e-3,
+    "m/min": 1.0 / 60.0,
+    "mm/min": 1e-3 / 60.0,
+    "in/min": 0.0254 / 60.0,
+    "inch/min": 0.0254 / 60.0,
+}
+_QUANTITY = re.compile(r"^\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([a-z/]+)\s*$")
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units of the numbers in a file.
+
+    Attributes
+    ----------
+    length, angle, speed : str or None
+        Out of `LENGTHS`, `ANGLES`, `SPEEDS`; None where nobody has stated it.
+    """
+
+    length: str | None = None
+    angle: str | None = None
+    speed: str | None = None
+
+
+def quantity(text: str, units: dict[str, float]) -> float | None:
+    """Read ``0.05 mm`` as a number in SI units; None where it is none."""
+    match = _QUANTITY.match(text)
+    if match is None or match[2] not in units:
+        return None
+    return float(match[1]) * units[match[2]]
+
+
+@dataclass(frozen=True)
+class Convention:
+    """Meaning of the numbers of an orientation.
+
+    Attributes
+    ----------
+    meaning : str
+        In words.
+    makers : str
+        Who uses it.
+    euler : str
+        SciPy's word for the axes of three angles: small letters are fixed axes, capitals turn with the tool; empty for
+        what is not made of angles.
+    """
+
+    meaning: str
+    makers: str
+    euler: str = ""
+
+
+CONVENTIONS: Final = {
+    "quaternion_wxyz": Convention("quaternion, w first", "ABB, MuJoCo, Drake"),
+    "quaternion_xyzw": Convention("quaternion, w last", "ROS, SciPy, Pinocchio's vectors"),
+    "rotation_vector": Convention("axis times angle", "Universal Robots"),
+    "rpy": Convention(
+        "roll, pitch, yaw about the fixed x, then y, then z axis", "URDF, Yaskawa, Mitsubishi, UFACTORY", "xyz"
+    ),
+    "kuka_abc": Convention("A about z, B about the new y, C about the new x axis", "KUKA", "ZYX"),
+    "staubli_xyz": Convention(
+        "Rx about x, Ry about the new y, Rz about the new z axis", "Staubli, Mecademic, RoboDK's targets", "XYZ"
+    ),
+    "fanuc_wpr": Convention("W, P, R about the fixed x, then y, then z axis", "Fanuc", "xyz"),
+}
+"""Conventions by name."""
+
+
+def choices(names: tuple[str, ...] = tuple(CONVENTIONS), suffix: str = "") -> str:
+    """List conventions with their meaning and who uses them, for messages; `suffix` follows those of angles."""
+    listed = ((name, CONVENTIONS[name]) for name in names)
+    return "; ".join(f"{name}{suffix if c.euler else ''} ({c.meaning}: {c.makers})" for name, c in listed)
+
+
+def rotation_by(convention: str, values: Array) -> Rotation:
+    """Return the rotations of orientations, (..., 3) in rad or (..., 4), in one of the `CONVENTIONS`."""
+    import numpy as np  # noqa: PLC0415  (tasks without orientations need neither)
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415
+
+    if convention == "quaternion_xyzw":
+        return Rotation.from_quat(values)
+    if convention == "quaternion_wxyz":
+        return Rotation.from_quat(np.roll(values, -1, axis=-1))
+    if convention == "rotation_vector":
+        return Rotation.from_rotvec(values)
+    return Rotation.from_euler(CONVENTIONS[convention].euler, values)
