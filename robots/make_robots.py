@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from lxml import etree
-
 from brachis.compose import Rail, elements, on_rail
 from brachis.compose.elements import Element
+from lxml import etree
 
 ROBOTS = Path(__file__).parent
 COLOURS = {

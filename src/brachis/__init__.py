@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from brachis.apps.recording import import_motion as import_motion
     from brachis.apps.sweeps import SweepResult as SweepResult
     from brachis.apps.sweeps import sweep as sweep
+    from brachis.apps.view import view as view
     from brachis.errors import BrachisError as BrachisError
     from brachis.errors import InputError as InputError
     from brachis.errors import PlanningError as PlanningError
@@ -74,41 +75,53 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_MODULES = ("bottleneck", "compose", "errors", "examples", "export", "ik", "limits", "plots", "report", "robots")
+_MODULES = {
+    "bottleneck": "apps.bottleneck",
+    "compose": "apps.compose",
+    "errors": "errors",
+    "examples": "examples",
+    "export": "apps.export",
+    "ik": "ik",
+    "limits": "limits",
+    "plots": "apps.plots",
+    "report": "apps.report",
+    "robots": "robots",
+}
 _HOME = {
     "Arc": "task.constructors",
-    "Attempt": "attempt",
-    "BottleneckReport": "bottleneck",
+    "Attempt": "optimise.candidate",
+    "BottleneckReport": "apps.bottleneck",
     "BrachisError": "errors",
     "Circle": "task.constructors",
-    "Comparison": "comparison",
+    "Comparison": "apps.comparison",
     "Helix": "task.constructors",
     "InputError": "errors",
     "LimitSpec": "task",
     "Line": "task.constructors",
     "PlanningError": "errors",
-    "PlausibilityWarning": "plausibility",
+    "PlausibilityWarning": "robot.plausibility",
     "Result": "result",
     "Robot": "robot",
     "Samples": "trajectory",
     "Spline": "task.constructors",
-    "SweepResult": "sweeps",
+    "SweepResult": "apps.sweeps",
     "Task": "task",
     "TaskMap": "robot",
     "Trajectory": "trajectory",
     "Verification": "verify",
     "bspline_segment": "path",
-    "compare": "comparison",
+    "compare": "apps.comparison",
     "fit_path": "task",
-    "import_motion": "recording",
+    "import_motion": "apps.recording",
     "load_task": "task",
     "plan": "planner",
-    "plan_many": "many",
+    "plan_many": "planner",
     "read_limits": "task",
-    "sweep": "sweeps",
+    "sweep": "apps.sweeps",
     "task_map_of": "robot",
     "transcribe": "planner",
     "verify_trajectory": "verify",
+    "view": "apps.view",
 }
 
 __all__ = ["__version__", *_MODULES, *_HOME]  # noqa: PLE0604  (names)
@@ -117,7 +130,7 @@ __all__ = ["__version__", *_MODULES, *_HOME]  # noqa: PLE0604  (names)
 def __getattr__(name: str) -> object:
     """Import a public name when it is first used."""
     if name in _MODULES:
-        return importlib.import_module(f"brachis.{name}")
+        return importlib.import_module(f"brachis.{_MODULES[name]}")
     if name not in _HOME:
         from brachis.errors import nearest  # noqa: PLC0415
 

@@ -36,13 +36,13 @@ from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, Solve
 from brachis.optimise.transcription import breaks_of, phase_in, program_of
-from brachis.problem.plausibility import of_end_time, of_places, of_robot, of_task
+from brachis.problem.plausibility import check_within_reach, of_end_time, of_places, of_robot, of_task
 from brachis.problem.problem import Decomposition, Problem, decompositions_of
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.from_task import robot_for, robot_from_settings
-from brachis.robot.plausibility import check_within_reach, tell
+from brachis.robot.plausibility import tell
 from brachis.robot.urdf import read_file
 from brachis.robots import is_robot, located
 from brachis.search import (

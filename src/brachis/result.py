@@ -1,37 +1,27 @@
-"""What a plan gives: trajectory, verification, and how they came about."""
+"""The result of a plan, and the methods that lead from it to what is done with a motion."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from brachis.apps import bottleneck, plots, report
-from brachis.common.summary import Summary
+from brachis.apps.view import Viewer, view
 from brachis.errors import UnknownNameError
-from brachis.optimise.backends import SolverReport
-from brachis.optimise.candidate import Attempt
-from brachis.optimise.least_motion import LeastMotion
-from brachis.robot.from_task import in_use
-from brachis.robot.plausibility import Remark
-from brachis.task import FitReport, Task
-from brachis.trajectory import Samples, Trajectory
-from brachis.verify import Verification
+from brachis.search.planned import PlannedMotion
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
     from brachis.apps.bottleneck import BottleneckReport
     from brachis.apps.report import Report
-    from brachis.apps.view import Viewer
 
 CANDIDATES = "candidates"
 
 
 @dataclass(frozen=True, repr=False)
-class Result(Summary):
+class Result(PlannedMotion):
     """What a plan gives: trajectory, verification, and how they came about.
 
     Attributes
@@ -67,30 +57,6 @@ class Result(Summary):
     >>> print(type(result.bottleneck()).__name__)
     BottleneckReport
     """
-
-    task: Task
-    trajectory: Trajectory
-    verification: Verification
-    family: str
-    attempt: Attempt
-    least_motion: LeastMotion | None = None
-    timing: dict[str, float] = field(default_factory=dict)
-    candidates: tuple[Attempt, ...] = ()
-    interrupted: bool = False
-    undone: tuple[str, ...] = ()
-    warnings: tuple[Remark, ...] = ()
-
-    def sample(self, dt: float, *, last: str = "exact") -> Samples:
-        """Sample the trajectory every `dt` seconds; see `Trajectory.sample`."""
-        return self.trajectory.sample(dt, last=last)
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the trajectory to an npz file, which `Trajectory.load` reads; see `Trajectory.save`."""
-        self.trajectory.save(path)
-
-    def to_dataframe(self, dt: float) -> pd.DataFrame:
-        """Return a pandas table, a row every `dt` seconds; see `Trajectory.to_dataframe`."""
-        return self.trajectory.to_dataframe(dt)
 
     def plot(self, kind: str = "overview") -> Figure:
         """Draw the motion.
@@ -140,53 +106,6 @@ class Result(Summary):
         """Find out what holds the motion back; see `brachis.bottleneck.report`."""
         return bottleneck.report(self, check=check, reference=reference)
 
-    def summary(self) -> Mapping[str, object]:
-        """Return what is shown."""
-        trajectory, last = self.trajectory, self.solver_report
-        left = {"undone": "; ".join(self.undone)} if self.undone else {}
-        remarks = {"warnings": "; ".join(remark.message for remark in self.warnings)} if self.warnings else {}
-        return {
-            **trajectory.summary(),
-            "verified": "yes" if self.verified else "NO",
-            "worst ratio to a limit": f"{self.verification.worst_ratio:.5f}",
-            "path error": f"{self.verification.path_error:.1e} m or rad",
-            "solver": f"{last.solver}, {last.status.name.lower()}",
-            "candidates": f"{len(self.candidates)}, {sum(each.verified for each in self.candidates)} verified",
-            "wall time": f"{self.timing.get('total', 0.0):.2f} s",
-            **left,
-            **remarks,
-        }
-
-    def _repr_html_(self) -> str:
-        """Show the summary beside the overview in a notebook."""
-        picture = plots.as_html(self.plot())
-        return f'<div style="display:flex;align-items:flex-start">{super()._repr_html_()}{picture}</div>'
-
-    @property
-    def t_end(self) -> float:
-        """End time, s."""
-        return self.trajectory.t_end
-
-    @property
-    def duration(self) -> float:
-        """End time, s, as other planners name it."""
-        return self.t_end
-
-    @property
-    def verified(self) -> bool:
-        """True where every check of the verification passed."""
-        return self.verification.passed
-
-    @property
-    def fits(self) -> tuple[FitReport, ...]:
-        """How near the path is to the points that it was fitted to, one for each file or array."""
-        return self.task.fits
-
-    @property
-    def solver_report(self) -> SolverReport:
-        """Report of the solve that gave the trajectory."""
-        return self.attempt.reports[-1]
-
     def view(
         self,
         *,
@@ -195,41 +114,13 @@ class Result(Summary):
         port: int | None = None,
         block: bool | None = None,
     ) -> Viewer:
-        """Show the motion and the list of candidates in the browser; as `Trajectory.view`."""
+        """Show the motion and the list of candidates in the browser; see `brachis.view`."""
         candidates = [candidate.to_dict() for candidate in self.candidates]
-        return self.trajectory.view(
-            candidates, verified=self.verified, degrees=degrees, host=host, port=port, block=block
+        return view(
+            self.trajectory, candidates, verified=self.verified, degrees=degrees, host=host, port=port, block=block
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the figures of the plan as plain data for JSON."""
-        last = self.attempt
-        return {
-            "t_end": self.t_end,
-            "redundant_joints": list(self.trajectory.redundant_joints),
-            "branch": self.trajectory.branch,
-            "start_posture": self.trajectory.position(0.0).tolist(),
-            "end_posture": self.trajectory.position(self.t_end).tolist(),
-            "position_units": list(self.trajectory.robot.position_units),
-            "family": self.family,
-            "in_use": in_use(self.trajectory.robot),
-            "status": self.solver_report.status.name.lower(),
-            "advice": self.solver_report.status.value,
-            "solver": self.solver_report.solver,
-            "iterations": sum(report.iterations for report in last.reports),
-            "refinement_rounds": last.refinement_rounds,
-            "collocation_points": last.collocation_points,
-            "time_scaled": last.time_scaled,
-            "least_motion": None if self.least_motion is None else self.least_motion.to_dict(),
-            "fits": [fit.to_dict() for fit in self.fits],
-            "candidates": [candidate.to_dict() for candidate in self.candidates],
-            "interrupted": self.interrupted,
-            "undone": list(self.undone),
-            "warnings": [remark.to_dict() for remark in self.warnings],
-            "wall_time_s": self.timing["total"],
-            "timing_s": self.timing,
-            "verified": self.verified,
-            "worst_ratio": self.verification.worst_ratio,
-            "path_error": self.verification.path_error,
-            "joint_names": list(self.trajectory.joint_names),
-        }
+    def _repr_html_(self) -> str:
+        """Show the summary beside the overview in a notebook."""
+        picture = plots.as_html(self.plot())
+        return f'<div style="display:flex;align-items:flex-start">{super()._repr_html_()}{picture}</div>'

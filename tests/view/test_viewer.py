@@ -8,6 +8,7 @@ from unittest.mock import ANY
 import numpy as np
 import pytest
 
+import brachis
 from brachis.apps.plots.style import COLOURS
 from brachis.apps.view import Viewer
 from brachis.apps.view.bodies import placements
@@ -80,10 +81,10 @@ def test_a_stopped_viewer_leaves_its_port_and_no_thread(line_result):
 def test_a_script_waits_and_a_notebook_does_not(line_result, monkeypatch):
     waited = []
     monkeypatch.setattr(Viewer, "wait", lambda self: waited.append(self.stop()))
-    line_result.trajectory.view(port=0)
+    brachis.view(line_result.trajectory, port=0)
     assert len(waited) == 1
     monkeypatch.setattr(sys, "ps1", ">>> ", raising=False)
-    line_result.trajectory.view(port=0).stop()
+    brachis.view(line_result.trajectory, port=0).stop()
     assert len(waited) == 1
 
 

@@ -260,3 +260,17 @@ def build_jerk(robot: Robot, _task: Task) -> JerkLimit | None:
     """Build the limit for the joints with a finite jerk limit."""
     joints = np.flatnonzero(np.isfinite(robot.limits.jerk))
     return JerkLimit(robot, joints, robot.limits.jerk[joints]) if len(joints) else None
+
+
+def reciprocals_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Reciprocals of the largest acceleration and of the largest velocity, (n,) each, of each joint alone near `q`.
+
+    They are what the joints' own limits allow, 0 where these allow any.
+    """
+    by_acceleration, by_velocity = np.zeros(robot.n), np.zeros(robot.n)
+    for limit in limits:
+        own = np.array([[label.subject == name for name in robot.joint_names] for label in limit.labels])
+        for weights, rows in zip((by_acceleration, by_velocity), limit.step_rows(q[None]), strict=True):
+            if rows is not None:
+                np.maximum(weights, np.abs(np.where(own, rows[0], 0.0)).max(axis=0), out=weights)
+    return by_acceleration, by_velocity

@@ -23,12 +23,12 @@ from brachis.common.deadline import Deadline
 from brachis.common.progress import Iteration, Listener
 from brachis.common.summary import Summary
 from brachis.errors import UnreachableError
+from brachis.limits.joint import reciprocals_near
 from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus, solver_named
 from brachis.optimise.candidate import Attempt
 from brachis.optimise.completion import completed
 from brachis.optimise.program import LeastAcceleration, Program
 from brachis.optimise.refine import RefinementOptions, Solve
-from brachis.search.joint_path import reciprocals_near
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from brachis.errors import PathError, write_apart
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import UNITS
 from brachis.robot.limits import STATED
@@ -33,6 +34,9 @@ _WINDING = 5.0
 """Turns of a joint without a range that a path of joints may ask for: in degrees, 30 are nearly as many."""
 _ROUNDED = 1e-3
 _STATIONS = 401
+_THOUSAND = 1000.0
+_HARDLY = 3.0
+"""A path that is so much farther away than the robot reaches is not a path that is a little too long."""
 _EIGHTHS, _ROUNDING = 16, 2e-3
 """Angles in rad up to two turns are looked for, within so many rad: 3.14 is half a turn, 5.5 is not seven eighths."""
 _OPEN = 1e5
@@ -390,3 +394,34 @@ def _masses(robot: Robot) -> Iterator[Figure]:
         yield Figure(where, "the mass looks like g", inertia.mass, heaviest, "kg", _OF_SIZE)
         moment, most = float(np.linalg.eigvalsh(inertia.inertia)[-1]), inertia.mass * _WIDEST_BODY**2
         yield Figure(where, "the inertia looks like kg mm^2", moment, most, "kg m^2", " for this mass")
+
+
+def check_within_reach(task_map: TaskMap, path: Path) -> None:
+    """Refuse a path of the tool that is farther away than the arm's links and slides together can reach.
+
+    Raises
+    ------
+    PathError
+    """
+    if not task_map.axes:  # of joints
+        return
+    s = np.linspace(0.0, 1.0, _STATIONS)
+    robot, axes = task_map.robot, list(task_map.axes)
+    base = np.array(robot.model.jointPlacements[1].translation)[axes]
+    away = np.linalg.norm(path.sample(s).target[:, : len(axes)] - base, axis=1)
+    far = reach(robot)
+    if not away.max() > far * (1.0 + _ROUNDED):
+        return
+    beyond = s[away > far]
+    furthest = float(away.max())
+    found, most = write_apart(furthest, far)
+    looks = furthest > _HARDLY * far and furthest / _THOUSAND < _HARDLY * far
+    raise PathError(
+        f"the path is out of reach from s = {beyond[0]:.3g} on",
+        s_interval=(float(beyond[0]), float(beyond[-1])),
+        found=f"{found} m away from the robot's first joint at s = {s[int(np.argmax(away))]:.3g}",
+        allowed=f"at most {most} m, which is all links and slides in one line",
+        hint=f"The path looks like mm: divided by 1000 it is {furthest / _THOUSAND:.3g} m away"
+        if looks
+        else "Shorten or move the path, or the robot's mounting",
+    )

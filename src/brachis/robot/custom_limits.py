@@ -8,14 +8,11 @@ the task gives, as keywords, and returns an object with ``bind(robot)``, which g
 from __future__ import annotations
 
 import importlib.metadata
-from typing import TYPE_CHECKING, Protocol
+from typing import Any, Protocol
 
 from brachis.errors import InputError, UnknownNameError
 from brachis.robot import Robot
 from brachis.task import Task
-
-if TYPE_CHECKING:
-    from brachis.limits import Limit
 
 GROUP = "brachis.limits"
 
@@ -23,8 +20,8 @@ GROUP = "brachis.limits"
 class LimitModel(Protocol):
     """A limit as a user gives it, which does not know the robot yet."""
 
-    def bind(self, robot: Robot, /) -> Limit:
-        """Return the limit for a robot."""
+    def bind(self, robot: Robot, /) -> Any:  # noqa: ANN401
+        """Return the limit for a robot, a `brachis.limits.Limit`."""
         ...
 
 

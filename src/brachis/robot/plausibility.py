@@ -14,17 +14,13 @@ import math
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
-from brachis.errors import BrachisWarning, PathError, PlausibilityError, write_apart
-from brachis.robot import Robot, TaskMap
+from brachis.errors import BrachisWarning, PlausibilityError
+from brachis.robot import Robot
 from brachis.robot.task_map.protocol import AXES
-
-if TYPE_CHECKING:
-    from brachis.path import Path
 
 
 class PlausibilityWarning(BrachisWarning):
@@ -187,37 +183,6 @@ def position_hint(value: float, lower: float, upper: float, unit: str) -> str | 
     if unit == "m" and abs(value) > 10.0 * largest and lower <= value / _THOUSAND <= upper:
         return f"It looks like mm: {value:.6g} mm are {value / _THOUSAND:.6g} m"
     return None
-
-
-def check_within_reach(task_map: TaskMap, path: Path) -> None:
-    """Refuse a path of the tool that is farther away than the arm's links and slides together can reach.
-
-    Raises
-    ------
-    PathError
-    """
-    if not task_map.axes:  # of joints
-        return
-    s = np.linspace(0.0, 1.0, _STATIONS)
-    robot, axes = task_map.robot, list(task_map.axes)
-    base = np.array(robot.model.jointPlacements[1].translation)[axes]
-    away = np.linalg.norm(path.sample(s).target[:, : len(axes)] - base, axis=1)
-    far = reach(robot)
-    if not away.max() > far * (1.0 + _ROUNDED):
-        return
-    beyond = s[away > far]
-    furthest = float(away.max())
-    found, most = write_apart(furthest, far)
-    looks = furthest > _HARDLY * far and furthest / _THOUSAND < _HARDLY * far
-    raise PathError(
-        f"the path is out of reach from s = {beyond[0]:.3g} on",
-        s_interval=(float(beyond[0]), float(beyond[-1])),
-        found=f"{found} m away from the robot's first joint at s = {s[int(np.argmax(away))]:.3g}",
-        allowed=f"at most {most} m, which is all links and slides in one line",
-        hint=f"The path looks like mm: divided by 1000 it is {furthest / _THOUSAND:.3g} m away"
-        if looks
-        else "Shorten or move the path, or the robot's mounting",
-    )
 
 
 def place_hint(here: np.ndarray, stated: np.ndarray, rows: Sequence[str]) -> str | None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.limits import Limit
+from brachis.limits.joint import reciprocals_near
 from brachis.problem.problem import Problem
 from brachis.robot import Robot
 
@@ -121,20 +122,6 @@ def weights_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> np.nda
     """
     by_acceleration, by_velocity = reciprocals_near(robot, limits, q)
     return by_acceleration if by_acceleration.any() else by_velocity
-
-
-def reciprocals_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Reciprocals of the largest acceleration and of the largest velocity, (n,) each, of each joint alone near `q`.
-
-    They are what the joints' own limits allow, 0 where these allow any.
-    """
-    by_acceleration, by_velocity = np.zeros(robot.n), np.zeros(robot.n)
-    for limit in limits:
-        own = np.array([[label.subject == name for name in robot.joint_names] for label in limit.labels])
-        for weights, rows in zip((by_acceleration, by_velocity), limit.step_rows(q[None]), strict=True):
-            if rows is not None:
-                np.maximum(weights, np.abs(np.where(own, rows[0], 0.0)).max(axis=0), out=weights)
-    return by_acceleration, by_velocity
 
 
 def causes_of(

@@ -201,7 +201,7 @@ def _points_of(settings: PointFile, task: Task, where: str, folder: Path) -> tup
     from brachis.task.points.tables import (  # noqa: PLC0415
         allowed_columns,
         points_of,
-        read_table,  # noqa: PLC0415
+        read_table,
         understood,
     )
     from brachis.task.points.units import Units  # noqa: PLC0415

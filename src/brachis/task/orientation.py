@@ -2,7 +2,7 @@
 
 ``orientation: fixed`` stands beside the segment's kind, or ``{rotate: ...}``, ``{to: ...}``, ``tangent``. A given
 orientation is that of the tool frame in the frame of the path, the world unless it is another, in one of the
-conventions of `brachis.task.points.units`. Angles are in degrees where the key ends with ``_deg``, otherwise in radians.
+conventions of `brachis.task.points.units`. Angles are in degrees where the key ends with ``_deg``, else in radians.
 """
 
 from __future__ import annotations

@@ -7,13 +7,12 @@ Motions as they are given: a trajectory, what has one, or its file.
 
 from __future__ import annotations
 
-import importlib
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Protocol, TypeVar
+from typing import TYPE_CHECKING, Concatenate, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -33,8 +32,6 @@ from brachis.trajectory.samples import Samples
 if TYPE_CHECKING:
     import pandas as pd
     from scipy.interpolate import BPoly, BSpline
-
-    from brachis.apps.view import Viewer
 
 
 def tool_motion(robot: Robot, q: np.ndarray, qdot: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -301,52 +298,6 @@ class Trajectory(Summary):
             **({"recovered from": self.recovered.source} if self.recovered else {}),
             "splines": f"degree {self.degree}, {write_count(len(self.knots) - 2 * self.degree - 1, 'interval')}",
         }
-
-    def view(
-        self,
-        candidates: Sequence[Mapping[str, Any]] = (),
-        *,
-        verified: bool | None = None,
-        degrees: bool = False,
-        host: str = "127.0.0.1",
-        port: int | None = None,
-        block: bool | None = None,
-    ) -> Viewer:
-        """Show the motion in the browser: robot, path, ghost postures, and plots that follow a slider.
-
-        Needs the extra ``view``.
-
-        Parameters
-        ----------
-        candidates : sequence of mapping, optional
-            What the search looked at, as `Result.to_dict` lists it.
-        verified : bool, optional
-            Whether the motion passed the verification, where that is known.
-        degrees : bool, optional
-            Whether angles are shown in degrees.
-        host : str, optional
-            Address that the viewer listens on; by default nobody but this machine reaches it.
-        port : int, optional
-            0 takes any free port; the first free one from 8080 on if left out.
-        block : bool, optional
-            Whether to wait until Ctrl-C. If left out, a script waits, an interactive session or a notebook does not.
-
-        Returns
-        -------
-        brachis.apps.view.Viewer
-            With its ``url``; ``stop()`` ends it.
-
-        Raises
-        ------
-        InputError
-            Host or port cannot be listened on.
-        NotInstalledError
-            viser is not installed.
-        """
-        viewer = importlib.import_module("brachis.apps.view")  # a later stage, which knows trajectories
-        return viewer.open_viewer(
-            self, candidates, verified=verified, degrees=degrees, host=host, port=port, block=block
-        )
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file with all that is needed to load and verify the trajectory.

@@ -40,7 +40,7 @@ from brachis.search.solving import MARGINS, solve_with
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from brachis.result import Result
+    from brachis.search.planned import PlannedMotion
 
 _SAME = 1e-3
 """End times that differ by a larger fraction, beyond what the task gave away, are those of two motions."""
@@ -209,7 +209,7 @@ class BottleneckReport:
 
 
 def report(
-    motion: Result | Trajectory | str | os.PathLike[str], *, check: bool = False, reference: bool = False
+    motion: PlannedMotion | Trajectory | str | os.PathLike[str], *, check: bool = False, reference: bool = False
 ) -> BottleneckReport:
     """Find out what holds a planned motion back.
 

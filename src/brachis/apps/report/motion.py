@@ -20,7 +20,7 @@ from brachis.trajectory import Samples, Trajectory
 from brachis.verify import Verification, verify_trajectory
 
 if TYPE_CHECKING:
-    from brachis.result import Result
+    from brachis.search.planned import PlannedMotion
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class ReportedMotion:
     degrees: bool
 
 
-def reported_motion(motion: Result | Trajectory, *, degrees: bool = False) -> ReportedMotion:
+def reported_motion(motion: PlannedMotion | Trajectory, *, degrees: bool = False) -> ReportedMotion:
     """Gather what there is to say of a planned or a saved motion; a saved one is verified again."""
     if isinstance(motion, Trajectory):
         return _gathered(
@@ -91,7 +91,7 @@ def reported_motion(motion: Result | Trajectory, *, degrees: bool = False) -> Re
 
 
 def _gathered(
-    source: Result | Trajectory,
+    source: PlannedMotion | Trajectory,
     trajectory: Trajectory,
     verification: Verification,
     *,
@@ -119,7 +119,7 @@ def _gathered(
     )
 
 
-def _held_back(source: Result | Trajectory, found: tuple[Saturation, ...], *, degrees: bool) -> tuple[str, ...]:
+def _held_back(source: PlannedMotion | Trajectory, found: tuple[Saturation, ...], *, degrees: bool) -> tuple[str, ...]:
     """Say what the limits cost; where that cannot be known, when they are active and why no more is known."""
     try:
         return tuple(bottleneck.report(source).text(degrees=degrees).splitlines())
@@ -127,7 +127,7 @@ def _held_back(source: Result | Trajectory, found: tuple[Saturation, ...], *, de
         return (*active_in_words(found), f"What the limits cost is not known: {error}")
 
 
-def _planned(result: Result) -> dict[str, str]:
+def _planned(result: PlannedMotion) -> dict[str, str]:
     """Say how a motion was planned."""
     report, least = result.solver_report, result.least_motion
     return {

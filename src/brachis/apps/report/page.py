@@ -23,7 +23,7 @@ from brachis.errors import NotInstalledError
 from brachis.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from brachis.result import Result
+    from brachis.search.planned import PlannedMotion
 
 _NEEDED_BY = "a report"
 _EXTRA = "report"
@@ -76,7 +76,7 @@ class Report:
         return f'<iframe {frame} srcdoc="{html.escape(self.html)}"></iframe>'
 
 
-def make_report(motion: Result | Trajectory, *, title: str = "", degrees: bool = False) -> Report:
+def make_report(motion: PlannedMotion | Trajectory, *, title: str = "", degrees: bool = False) -> Report:
     """Make a page from which a person decides whether to run a motion.
 
     Parameters
@@ -153,7 +153,7 @@ def _json(data: dict[str, Any]) -> str:
 
 
 def _part(name: str) -> str:
-    return resources.files("brachis.report").joinpath(name).read_text(encoding="utf-8")
+    return resources.files("brachis.apps.report").joinpath(name).read_text(encoding="utf-8")
 
 
 def _template() -> Any:  # noqa: ANN401  (a Jinja2 template)

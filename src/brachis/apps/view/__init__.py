@@ -6,6 +6,6 @@ The browser talks to a server on this machine (viser, of the extra ``view``), wh
 from __future__ import annotations
 
 from brachis.apps.view.server import LOOPBACK, require_viser
-from brachis.apps.view.viewer import Viewer, open_viewer
+from brachis.apps.view.viewer import Viewer, view
 
-__all__ = ["LOOPBACK", "Viewer", "open_viewer", "require_viser"]
+__all__ = ["LOOPBACK", "Viewer", "require_viser", "view"]

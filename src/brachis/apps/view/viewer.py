@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import os
 import sys
 import threading
 import time
@@ -16,7 +17,7 @@ from brachis.apps.view.panel import Panel, Playback, first_rate
 from brachis.apps.view.scene import Scene
 from brachis.apps.view.server import LOOPBACK, is_local, start_server
 from brachis.common import interrupts
-from brachis.trajectory import Trajectory
+from brachis.trajectory import Trajectory, motion_of
 
 _FRAME = 1.0 / 30.0
 """Period of the robot's pictures, s."""
@@ -163,8 +164,8 @@ class Viewer:
                     self._panel.follow()
 
 
-def open_viewer(
-    trajectory: Trajectory,
+def view(
+    motion: Trajectory | str | os.PathLike[str],
     candidates: Sequence[Mapping[str, Any]] = (),
     *,
     verified: bool | None = None,
@@ -173,19 +174,40 @@ def open_viewer(
     port: int | None = None,
     block: bool | None = None,
 ) -> Viewer:
-    """Show a motion in the browser.
+    """Show a motion in the browser: robot, path, ghost postures, and plots that follow a slider.
+
+    Needs the extra ``view``.
 
     Parameters
     ----------
-    trajectory, candidates, verified, degrees, host, port
-        See `Viewer`.
+    motion : Trajectory or path
+        The motion, or its result file.
+    candidates : sequence of mapping, optional
+        What the search looked at, as `Result.to_dict` lists it.
+    verified : bool, optional
+        Whether the motion passed the verification, where that is known.
+    degrees : bool, optional
+        Whether angles are shown in degrees.
+    host : str, optional
+        Address that the viewer listens on; by default nobody but this machine reaches it.
+    port : int, optional
+        0 takes any free port; the first free one from 8080 on if left out.
     block : bool, optional
-        Whether to wait until Ctrl-C. If left out, a script waits, and an interactive session or a notebook does not.
+        Whether to wait until Ctrl-C. If left out, a script waits, an interactive session or a notebook does not.
 
     Returns
     -------
-    Viewer
+    brachis.apps.view.Viewer
+        With its ``url``; ``stop()`` ends it.
+
+    Raises
+    ------
+    InputError
+        Host or port cannot be listened on.
+    NotInstalledError
+        viser is not installed.
     """
+    trajectory = motion_of(motion)
     viewer = Viewer(trajectory, candidates, verified=verified, degrees=degrees, host=host, port=port)
     print(f"the motion is shown at {viewer.url}", file=sys.stderr)  # noqa: T201
     if block if block is not None else not hasattr(sys, "ps1"):

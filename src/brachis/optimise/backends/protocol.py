@@ -35,7 +35,7 @@ class SolveStatus(enum.Enum):
 
 
 class Problem(Protocol):
-    """A sparse nonlinear program; `brachis.nlp.Program` is one."""
+    """A sparse nonlinear program; `brachis.optimise.program.Program` is one."""
 
     x_lower: np.ndarray
     x_upper: np.ndarray

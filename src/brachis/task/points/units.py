@@ -8,12 +8,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from math import pi
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
     from scipy.spatial.transform import Rotation
 
-    from brachis.task.points.points import Array
 
 LENGTHS: Final = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "inch": 0.0254}
 ANGLES: Final = {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0}
@@ -93,7 +93,7 @@ def choices(names: tuple[str, ...] = tuple(CONVENTIONS), suffix: str = "") -> st
     return "; ".join(f"{name}{suffix if c.euler else ''} ({c.meaning}: {c.makers})" for name, c in listed)
 
 
-def rotation_by(convention: str, values: Array) -> Rotation:
+def rotation_by(convention: str, values: npt.NDArray[Any]) -> Rotation:
     """Return the rotations of orientations, (..., 3) in rad or (..., 4), in one of the `CONVENTIONS`."""
     import numpy as np  # noqa: PLC0415  (tasks without orientations need neither)
     from scipy.spatial.transform import Rotation  # noqa: PLC0415
