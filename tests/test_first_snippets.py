@@ -207,7 +207,7 @@ def test_a_line_tells_of_many_plans(capsys):
         warnings.simplefilter("error")
         (outcome,) = brachis.plan_many([{"brachis": 1}], progress=True)
     assert isinstance(outcome, TaskError)
-    assert "planned 1 of 1 tasks" in capsys.readouterr().err
+    assert "planned 1 of 1 task" in capsys.readouterr().err
 
 
 def test_every_key_of_a_task_is_a_keyword():

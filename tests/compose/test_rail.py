@@ -151,7 +151,7 @@ def test_example_of_the_docstring(monkeypatch):
 def test_compose_is_public_and_loaded_when_used():
     assert brachis.compose.on_rail is on_rail
     code = (
-        "import sys, brachis; assert 'brachis.compose' not in sys.modules; "
+        "import sys, brachis; assert 'brachis.apps.compose' not in sys.modules; "
         "brachis.compose.on_rail; assert 'yourdfpy' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

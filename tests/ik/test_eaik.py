@@ -316,7 +316,7 @@ def test_without_eaik_the_reason_is_that(monkeypatch):
 def test_only_the_compiled_part_of_eaik_is_loaded_and_that_when_needed():
     code = """
 import sys
-import brachis.ik.eaik_answers as answers
+import brachis.ik.eaik as answers
 assert not [name for name in sys.modules if name.startswith("eaik")]
 assert answers.installed()
 assert "eaik.pybindings.EAIK" in sys.modules

@@ -237,7 +237,7 @@ def shipped(folder: str) -> Path:
     ----------
     folder : {"robots", "examples"}
     """
-    package = Path(__file__).parent
+    package = Path(__file__).parents[1]
     installed = package / "data" / folder
     return installed if installed.is_dir() else package.parents[1] / folder
 

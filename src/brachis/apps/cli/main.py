@@ -17,9 +17,9 @@ from typing import TextIO, cast
 import typer
 
 from brachis.apps.cli.app import Verbosity, app, chosen
+from brachis.apps.cli.composition import VectorCommand, compose
 from brachis.apps.cli.motion_commands import bottleneck, compare, export, import_, plot, report, verify, view
 from brachis.apps.cli.output import StandardOutput, open_streams, print_failure, print_usage_error
-from brachis.apps.cli.starting import VectorCommand, compose
 from brachis.apps.cli.task_commands import inspect, list_robots, new, plan, schema, sweep
 from brachis.errors import BrachisError
 
