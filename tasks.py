@@ -37,9 +37,24 @@ COMMANDS = {
     "test": [["python", "-m", "pytest", "-n", "2", "--dist", "worksteal"]],
     "lint": [["ruff", "check", "."], ["ruff", "format", "--check", "."]],
     "types": [["mypy"]],
-    "bench": [["python", "-m", "pytest", "benchmarks", "-p", "no:xdist"], ["python", "benchmarks/growth.py"]],
+    "bench": [
+        ["python", "-m", "pytest", "benchmarks", "-p", "no:xdist"],
+        ["python", "benchmarks/growth.py"],
+    ],
     "docs": [
-        ["python", "-m", "sphinx", "-q", "-j", "auto", "-E", "-W", "--keep-going", "docs", "out/site"],
+        [
+            "python",
+            "-m",
+            "sphinx",
+            "-q",
+            "-j",
+            "auto",
+            "-E",
+            "-W",
+            "--keep-going",
+            "docs",
+            "out/site",
+        ],
         ["python", "docs/check_links.py", "out/site"],
     ],
 }
@@ -56,7 +71,11 @@ def prepare(extra: str) -> None:
     if stamp.exists() and stamp.stat().st_mtime > project.stat().st_mtime:
         return
     print(f"installing {extra}", flush=True)
-    subprocess.run([python, "-m", "pip", "install", "--quiet", "--editable", extra], cwd=ROOT, check=True)
+    subprocess.run(
+        [python, "-m", "pip", "install", "--quiet", "--editable", extra],
+        cwd=ROOT,
+        check=True,
+    )
     stamp.touch()
 
 
@@ -68,15 +87,24 @@ def run(task: str, arguments: list[str]) -> int:
     code = 0
     for command in COMMANDS[task]:
         print("+", *command, *arguments, flush=True)
-        code = max(code, subprocess.run([BIN / command[0], *command[1:], *arguments], cwd=ROOT, check=False).returncode)
+        code = max(
+            code,
+            subprocess.run(
+                [BIN / command[0], *command[1:], *arguments], cwd=ROOT, check=False
+            ).returncode,
+        )
     if task == "demo" and code == 0:
-        print(f"look at out/overview.png; then '. {ENVIRONMENT.name}/bin/activate', and README.md goes on from there")
+        print(
+            f"look at out/overview.png; then '. {ENVIRONMENT.name}/bin/activate', and README.md goes on from there"
+        )
     return code
 
 
 def main() -> None:
     """Read the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("task", choices=[*COMMANDS, "check"])
     options, rest = parser.parse_known_args()
     sys.exit(run(options.task, rest))

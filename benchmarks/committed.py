@@ -17,11 +17,16 @@ FOLDER = Path(__file__).parent / "results"
 
 def processor_time() -> float:
     """Return the processor time, s, of this process and of its children that have ended: large solves run in one."""
-    used = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    used = (
+        resource.getrusage(who)
+        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
-def save(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], about: str = "") -> None:
+def save(
+    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], about: str = ""
+) -> None:
     """Write benchmarks/results/NAME.json, named after the script that runs, if the command line has ``--save``.
 
     Parameters
@@ -47,7 +52,12 @@ def save(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], abou
 
 
 def write(
-    name: str, command: str, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], about: str
+    name: str,
+    command: str,
+    title: str,
+    columns: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    about: str,
 ) -> None:
     """Write one file of results."""
     machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
@@ -61,4 +71,6 @@ def write(
         "rows": [list(row) for row in rows],
     }
     FOLDER.mkdir(exist_ok=True)
-    (FOLDER / f"{name}.json").write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    (FOLDER / f"{name}.json").write_text(
+        json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+    )

@@ -17,7 +17,9 @@ ROOT = Path(__file__).parents[1]
 @pytest.fixture(scope="session")
 def robot() -> brachis.Robot:
     limits = brachis.LimitSpec(torque=10.0, velocity=None)
-    return brachis.Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
+    return brachis.Robot.from_urdf(
+        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits
+    )
 
 
 @pytest.fixture(scope="session")
@@ -52,8 +54,16 @@ def pytest_benchmark_update_json(output_json):
     sys.path.insert(0, str(ROOT / "benchmarks"))
     committed = importlib.import_module("committed")
     rows = [
-        (each["fullname"].split("::")[1], *(f"{1e3 * each['stats'][name]:.3g} ms" for name in ("median", "min", "max")))
+        (
+            each["fullname"].split("::")[1],
+            *(
+                f"{1e3 * each['stats'][name]:.3g} ms"
+                for name in ("median", "min", "max")
+            ),
+        )
         for each in output_json["benchmarks"]
     ]
     command = "python -m pytest benchmarks --benchmark-json FILE --benchmark-timer time.process_time"
-    committed.write("speed", command, "Timings", ("what", "median", "least", "most"), rows, "")
+    committed.write(
+        "speed", command, "Timings", ("what", "median", "least", "most"), rows, ""
+    )

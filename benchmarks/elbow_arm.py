@@ -34,14 +34,20 @@ _JOINT = """
 def urdf() -> str:
     """Write the arm as URDF text."""
     rods = [
-        _LINK.format(name=name, half=0.5 * LENGTH_M, mass=mass, inertia=mass * LENGTH_M**2 / 12.0)
+        _LINK.format(
+            name=name, half=0.5 * LENGTH_M, mass=mass, inertia=mass * LENGTH_M**2 / 12.0
+        )
         for name, mass in zip(("upper_arm", "forearm"), MASSES_KG, strict=True)
     ]
     rods.append(_LINK.format(name="column", half=0, mass=1, inertia=1e-6))
     joints = [
         _JOINT.format(name="waist", parent="base", child="column", x=0, axis="0 0 1"),
-        _JOINT.format(name="shoulder", parent="column", child="upper_arm", x=0, axis="0 1 0"),
-        _JOINT.format(name="elbow", parent="upper_arm", child="forearm", x=LENGTH_M, axis="0 1 0"),
+        _JOINT.format(
+            name="shoulder", parent="column", child="upper_arm", x=0, axis="0 1 0"
+        ),
+        _JOINT.format(
+            name="elbow", parent="upper_arm", child="forearm", x=LENGTH_M, axis="0 1 0"
+        ),
     ]
     tool = '\n  <joint name="flange" type="fixed"><parent link="forearm"/><child link="tool"/>'
     tool += f'<origin xyz="{LENGTH_M} 0 0"/></joint>'
@@ -52,12 +58,18 @@ def urdf() -> str:
 def path_points(count: int) -> list[list[float]]:
     """Sample the path, m."""
     p = np.linspace(0.0, 1.0, count)
-    return np.column_stack([np.full(count, 0.5), 20.0 * p**3 - 30.0 * p**2 + 10.0 * p, p - 0.5]).tolist()
+    return np.column_stack(
+        [np.full(count, 0.5), 20.0 * p**3 - 30.0 * p**2 + 10.0 * p, p - 0.5]
+    ).tolist()
 
 
 def planned(**settings: object) -> brachis.Result:
     """Plan the motion; `settings` are those of the splines and of the joint limits."""
-    limits = {"torque": TORQUES_NM, "velocity": None, "torque_rate": settings.pop("torque_rate", RATES_NM_S)}
+    limits = {
+        "torque": TORQUES_NM,
+        "velocity": None,
+        "torque_rate": settings.pop("torque_rate", RATES_NM_S),
+    }
     first, *through = path_points(61)
     task = {
         "brachis": 1,
@@ -81,7 +93,10 @@ def main() -> None:
     for intervals in (20, 40, 80):
         result = planned(intervals=intervals)
         state = "verified" if result.verified else "not verified"
-        print(f"N = {intervals:3d}: {result.t_end:.3f} s, {state}, on branch {result.attempt.branch} ", end="")
+        print(
+            f"N = {intervals:3d}: {result.t_end:.3f} s, {state}, on branch {result.attempt.branch} ",
+            end="",
+        )
         print(f"in {result.timing['total']:.1f} s (published: {PUBLISHED_S} s)")
 
 

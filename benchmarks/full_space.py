@@ -48,11 +48,20 @@ class AllJointsMap(DirectJointMap):
         return y[:, 1:]
 
     def state(
-        self, y: np.ndarray, ydot: np.ndarray, yddot: np.ndarray, ydddot: np.ndarray, **_turns: object
+        self,
+        y: np.ndarray,
+        ydot: np.ndarray,
+        yddot: np.ndarray,
+        ydddot: np.ndarray,
+        **_turns: object,
     ) -> JointState:
         """See `JointMap`."""
-        gradient = np.broadcast_to(np.eye(self.r, self.r + 1, 1), (len(y), self.r, self.r + 1))
-        return JointState(self, y, ydot, yddot, ydddot, y[:, 1:], ydot[:, 1:], yddot[:, 1:], gradient)
+        gradient = np.broadcast_to(
+            np.eye(self.r, self.r + 1, 1), (len(y), self.r, self.r + 1)
+        )
+        return JointState(
+            self, y, ydot, yddot, ydddot, y[:, 1:], ydot[:, 1:], yddot[:, 1:], gradient
+        )
 
 
 class FullSpace:
@@ -70,31 +79,52 @@ class FullSpace:
         spline, robot = problem.task.spline, problem.robot
         joint_map, breaks = AllJointsMap(problem), breaks_of(problem.task)
         free = np.full(robot.n, np.nan)
-        ends = [free if posture is None else posture for posture in (problem.start, problem.end)]
+        ends = [
+            free if posture is None else posture
+            for posture in (problem.start, problem.end)
+        ]
         order = spline.vanishing
-        boundary = Boundary(joint_map.coordinates(0.0, ends[0]), joint_map.coordinates(1.0, ends[1]), order)
-        grid = FixedGrid(clamped_knots(spline.degree, breaks), spline.degree, spread(breaks, points))
+        boundary = Boundary(
+            joint_map.coordinates(0.0, ends[0]),
+            joint_map.coordinates(1.0, ends[1]),
+            order,
+        )
+        grid = FixedGrid(
+            clamped_knots(spline.degree, breaks), spline.degree, spread(breaks, points)
+        )
         self.task_map, self.path = problem.task_map, problem.path
         self.phase = Phase(joint_map, problem.limits, grid, boundary)
         self.program = Program([self.phase])
         self.x_lower, self.x_upper = self.program.x_lower, self.program.x_upper
-        self._equations(order + 1, [posture is None for posture in (problem.start, problem.end)])
+        self._equations(
+            order + 1, [posture is None for posture in (problem.start, problem.end)]
+        )
 
     def _equations(self, still: int, free: list[bool]) -> None:
         """Lay the path's equations out; `still` control points at each end are one, which is free or not."""
         greville = self.phase.splines[0].greville[still:-still]
         self.t_norm = np.concatenate([[0.0][: free[0]], greville, [1.0][: free[1]]])
         self._basis = LocalBasis.of(self.phase.knots, self.phase.degree, self.t_norm)
-        self._places = [SparsityPattern.of(self._basis.columns, spline) for spline in self.phase.splines]
-        self._values = [places.entries(self._basis.values)[0] for places in self._places]
+        self._places = [
+            SparsityPattern.of(self._basis.columns, spline)
+            for spline in self.phase.splines
+        ]
+        self._values = [
+            places.entries(self._basis.values)[0] for places in self._places
+        ]
         m, first = self.task_map.m, len(self.program.lower)
         zeros = np.zeros(len(self.t_norm) * m)
-        self.lower, self.upper = (np.append(side, zeros) for side in (self.program.lower, self.program.upper))
+        self.lower, self.upper = (
+            np.append(side, zeros) for side in (self.program.lower, self.program.upper)
+        )
         rows, columns = [self.program.jacobian_rows], [self.program.jacobian_columns]
         for places, part in zip(self._places, self.phase.slices, strict=True):
             rows.append((first + places.point[:, None] * m + np.arange(m)).ravel())
             columns.append(np.repeat(places.variable + part.start, m))
-        self.jacobian_rows, self.jacobian_columns = np.concatenate(rows), np.concatenate(columns)
+        self.jacobian_rows, self.jacobian_columns = (
+            np.concatenate(rows),
+            np.concatenate(columns),
+        )
 
     def objective(self, x: np.ndarray) -> float:
         """End time, s."""
@@ -113,7 +143,9 @@ class FullSpace:
         """Entries of the Jacobian on its pattern."""
         _, slopes = misses(self.task_map, self.path, self._curves(x))
         entries = [self.program.jacobian(x)]
-        for j, (places, values) in enumerate(zip(self._places, self._values, strict=True)):
+        for j, (places, values) in enumerate(
+            zip(self._places, self._values, strict=True)
+        ):
             entries.append((slopes[places.point, :, j] * values[:, None]).ravel())
         return np.concatenate(entries)
 
@@ -127,17 +159,23 @@ class FullSpace:
         s = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
         at = np.linspace(0.0, 1.0, len(joint_path))
         points = np.array([s, *(np.interp(s, at, joint) for joint in joint_path.T)])
-        return self.phase.variables_from(Motion(t_end, self.phase.knots, self.phase.degree, points))
+        return self.phase.variables_from(
+            Motion(t_end, self.phase.knots, self.phase.degree, points)
+        )
 
     def in_between(self, x: np.ndarray) -> tuple[float, float]:
         """Largest excess over a limit, and largest distance from the path, m or rad, at any time."""
         t_norm = np.linspace(0.0, 1.0, 2001)
         motion = self.phase.motion(x)
         miss, _ = misses(self.task_map, self.path, motion.at(t_norm * motion.t_end)[0])
-        return float(self.phase.violation_at(x, t_norm).max()), float(np.abs(miss).max())
+        return float(self.phase.violation_at(x, t_norm).max()), float(
+            np.abs(miss).max()
+        )
 
 
-def misses(task_map: TaskMap, path: Path, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def misses(
+    task_map: TaskMap, path: Path, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Displacements, (K, m), from the path's targets to where the tool is, and their derivatives by y, (K, m, 1 + n).
 
     Of poses they are logarithms of SE(3), whose derivative is known; of rows plain differences.
@@ -150,7 +188,9 @@ def misses(task_map: TaskMap, path: Path, y: np.ndarray) -> tuple[np.ndarray, np
         return task_map.difference(values, sample.target), slopes
     miss, slopes = np.empty((len(y), 6)), np.empty((len(y), 6, y.shape[1]))
     for k, (value, target) in enumerate(zip(values, sample.target, strict=True)):
-        tool, wanted = (pin.SE3(pose[3:].reshape(3, 3), pose[:3]) for pose in (value, target))
+        tool, wanted = (
+            pin.SE3(pose[3:].reshape(3, 3), pose[:3]) for pose in (value, target)
+        )
         gap = wanted.actInv(tool)
         miss[k] = pin.log6(gap).vector
         by_body = pin.Jlog6(gap)

@@ -40,7 +40,10 @@ _BUSY, _MAKING = 8.0, 30.0
 """Time per processor time on a busy machine, and time to make a case's files, s, before a worker is ended."""
 _BASES = (
     {"redundant_joints": ["j3"]},
-    {"redundant_joints": ["j1"], "spline": {"degree": 2, "intervals": 6, "rest": "velocity"}},
+    {
+        "redundant_joints": ["j1"],
+        "spline": {"degree": 2, "intervals": 6, "rest": "velocity"},
+    },
 )
 
 
@@ -50,7 +53,10 @@ def results() -> tuple[bytes, ...]:
     for changes in _BASES:
         task = {
             "brachis": 1,
-            "robot": {"urdf": str(fuzz_cases.ROBOTS / "scara3/robot.urdf"), "gravity": [0, 0, 0]},
+            "robot": {
+                "urdf": str(fuzz_cases.ROBOTS / "scara3/robot.urdf"),
+                "gravity": [0, 0, 0],
+            },
             "start": {"joints": [0.5236, -2.0944, 2.0944]},
             "task_space": ["x", "y"],
             "path": [{"line": {"length": 0.3, "angle_deg": 90}}],
@@ -76,7 +82,13 @@ def run(case: fuzz_cases.Case, folder: Path) -> str:
             elif what == "plan":
                 brachis.plan(folder / "task.yaml")
             else:
-                options = {"task_space": "x,y", "tool_frame": None, "base_frame": None, "lock": [], "changes": []}
+                options = {
+                    "task_space": "x,y",
+                    "tool_frame": None,
+                    "base_frame": None,
+                    "lock": [],
+                    "changes": [],
+                }
                 inspect_command(folder / "robot.urdf", **options, as_json=True)
         except brachis.BrachisError as error:
             outcome = type(error).__name__
@@ -91,7 +103,10 @@ def work(kinds: tuple[str, ...]) -> None:
     faulthandler.enable()
     warnings.simplefilter("ignore")
     saved = results()
-    occupied = int(re.search(r"VmSize:\s+(\d+)", Path("/proc/self/status").read_text())[1]) * 1024
+    occupied = (
+        int(re.search(r"VmSize:\s+(\d+)", Path("/proc/self/status").read_text())[1])
+        * 1024
+    )
     resource.setrlimit(resource.RLIMIT_AS, (occupied + _MEMORY, resource.RLIM_INFINITY))
     print(json.dumps("ready"), file=answers)
     for line in sys.stdin:
@@ -99,12 +114,20 @@ def work(kinds: tuple[str, ...]) -> None:
             try:
                 case = fuzz_cases.case(int(line), saved, kinds)
                 began = time.process_time()
-                answer = {"kind": case.kind, "outcome": run(case, Path(folder)), "fault": None}
+                answer = {
+                    "kind": case.kind,
+                    "outcome": run(case, Path(folder)),
+                    "fault": None,
+                }
                 answer["seconds"] = time.process_time() - began
             except Exception as error:  # noqa: BLE001  (this is what is looked for)
                 place = traceback.extract_tb(error.__traceback__)[-1]
                 where = f"{Path(place.filename).name}:{place.lineno}"
-                answer = {"kind": case.kind, "outcome": "fault", "fault": f"{type(error).__name__} at {where}: {error}"}
+                answer = {
+                    "kind": case.kind,
+                    "outcome": "fault",
+                    "fault": f"{type(error).__name__} at {where}: {error}",
+                }
         answer["peak"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
         print(json.dumps(answer), file=answers)
 
@@ -120,14 +143,18 @@ class Worker:
         self._errors = tempfile.TemporaryFile("w+")  # noqa: SIM115
         command = [sys.executable, __file__, "--worker", "--kinds", *self._kinds]
         pipe = subprocess.PIPE
-        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._errors, text=True)
+        self._process = subprocess.Popen(
+            command, stdin=pipe, stdout=pipe, stderr=self._errors, text=True
+        )
         self._process.stdout.readline()
 
     def run(self, number: int, seconds: float) -> dict[str, str | None]:
         """Run a case; a crash and a hang are faults."""
         kind = self._kinds[number % len(self._kinds)]
         print(number, file=self._process.stdin, flush=True)
-        ready, _, _ = select.select([self._process.stdout], [], [], _BUSY * seconds + _MAKING)
+        ready, _, _ = select.select(
+            [self._process.stdout], [], [], _BUSY * seconds + _MAKING
+        )
         line = self._process.stdout.readline() if ready else ""
         if line:
             answer = json.loads(line)
@@ -145,7 +172,11 @@ class Worker:
         said = " ".join(self._errors.read().split())[-300:]
         self.end()
         self._start()
-        fault = f"crash with code {code}: {said}" if ready else f"no end within {_BUSY * seconds + _MAKING:g} s"
+        fault = (
+            f"crash with code {code}: {said}"
+            if ready
+            else f"no end within {_BUSY * seconds + _MAKING:g} s"
+        )
         return {"kind": kind, "outcome": "fault", "fault": fault}
 
     def end(self) -> None:
@@ -156,7 +187,9 @@ class Worker:
         self._process.wait()
 
 
-def search(numbers: range, seconds: float, kinds: tuple[str, ...], memory: float) -> int:
+def search(
+    numbers: range, seconds: float, kinds: tuple[str, ...], memory: float
+) -> int:
     """Run cases, print what came out; 1 where a fault was found."""
     cases, first = len(numbers), numbers.start
     counts: Counter[tuple[str, str]] = Counter()
@@ -172,13 +205,19 @@ def search(numbers: range, seconds: float, kinds: tuple[str, ...], memory: float
         counts[answer["kind"], answer["outcome"]] += 1
         if answer["fault"] is not None:
             faults.append(number)
-            print(f"case {number} ({answer['kind']}): {answer['fault'][:400]}", flush=True)
+            print(
+                f"case {number} ({answer['kind']}): {answer['fault'][:400]}", flush=True
+            )
     worker.end()
     for (kind, outcome), count in sorted(counts.items()):
         print(f"{kind:13} {outcome:20} {count:5}")
-    print(f"{cases} cases in {time.perf_counter() - began:.0f} s, slowest {slowest[0]:.1f} s (case {slowest[1]})")
+    print(
+        f"{cases} cases in {time.perf_counter() - began:.0f} s, slowest {slowest[0]:.1f} s (case {slowest[1]})"
+    )
     print(f"largest process {largest / 1e6:.0f} MB")
-    print(f"{len(faults)} faults" + (f": {' '.join(map(str, faults))}" if faults else ""))
+    print(
+        f"{len(faults)} faults" + (f": {' '.join(map(str, faults))}" if faults else "")
+    )
     return 1 if faults else 0
 
 
@@ -191,16 +230,29 @@ def again(number: int, kinds: tuple[str, ...]) -> None:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description="Fuzz the reading of tasks, URDFs, CSV files and results.")
+    parser = argparse.ArgumentParser(
+        description="Fuzz the reading of tasks, URDFs, CSV files and results."
+    )
     parser.add_argument("--cases", type=int, default=5000)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", type=int)
-    parser.add_argument("--seconds", type=float, default=60.0, help="of one case, of processor time")
+    parser.add_argument(
+        "--seconds", type=float, default=60.0, help="of one case, of processor time"
+    )
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument("--memory", type=float, default=float("inf"), help="largest memory of the process, MB")
-    parser.add_argument("--kinds", nargs="+", default=[""], help="what the names of kinds begin with")
+    parser.add_argument(
+        "--memory",
+        type=float,
+        default=float("inf"),
+        help="largest memory of the process, MB",
+    )
+    parser.add_argument(
+        "--kinds", nargs="+", default=[""], help="what the names of kinds begin with"
+    )
     given = parser.parse_args()
-    kinds = tuple(kind for kind in fuzz_cases.KINDS if kind.startswith(tuple(given.kinds)))
+    kinds = tuple(
+        kind for kind in fuzz_cases.KINDS if kind.startswith(tuple(given.kinds))
+    )
     if given.worker:
         work(kinds)
     elif given.only is not None:

@@ -23,9 +23,24 @@ import numpy as np
 import yaml
 
 ROBOTS = Path(__file__).parents[1] / "robots"
-KINDS = ("task", "task bytes", "urdf", "urdf bytes", "csv", "csv bytes", "result", "result bytes", "result extreme")
+KINDS = (
+    "task",
+    "task bytes",
+    "urdf",
+    "urdf bytes",
+    "csv",
+    "csv bytes",
+    "result",
+    "result bytes",
+    "result extreme",
+)
 _DEEP = "@deep@"
-_SCARA = {"urdf": "robot.urdf", "tool_frame": "tool", "gravity": [0, 0, 0], "limits": {"torque": 10, "velocity": 8}}
+_SCARA = {
+    "urdf": "robot.urdf",
+    "tool_frame": "tool",
+    "gravity": [0, 0, 0],
+    "limits": {"torque": 10, "velocity": 8},
+}
 _START = {"joints": [0.5236, -2.0944, 2.0944]}
 _CHEAP = {
     "search": {"effort": "single", "time_limit": 3.0},
@@ -34,19 +49,43 @@ _CHEAP = {
     "refinement": {"max_rounds": 1},
 }
 _TASKS: tuple[dict[str, Any], ...] = (
-    {"start": _START, "task_space": ["x", "y"], "path": [{"line": {"length": 0.3, "angle_deg": 90}}], "end": "free"},
     {
         "start": _START,
         "task_space": ["x", "y"],
-        "path": [{"line": {"length": 0.3, "angle_deg": 90}, "blend": 0.05}, {"line": {"by": [-0.2, 0]}}],
+        "path": [{"line": {"length": 0.3, "angle_deg": 90}}],
+        "end": "free",
+    },
+    {
+        "start": _START,
+        "task_space": ["x", "y"],
+        "path": [
+            {"line": {"length": 0.3, "angle_deg": 90}, "blend": 0.05},
+            {"line": {"by": [-0.2, 0]}},
+        ],
         "redundant_joints": ["j3"],
     },
-    {"start": "free", "path_start": [0.9, 0.4], "task_space": ["x", "y"], "path": [{"line": {"to": [0.8, 0.6]}}]},
-    {"start": _START, "task_space": ["x", "y"], "path": [{"csv": {"file": "path.csv", "relative": True}}]},
+    {
+        "start": "free",
+        "path_start": [0.9, 0.4],
+        "task_space": ["x", "y"],
+        "path": [{"line": {"to": [0.8, 0.6]}}],
+    },
+    {
+        "start": _START,
+        "task_space": ["x", "y"],
+        "path": [{"csv": {"file": "path.csv", "relative": True}}],
+    },
     {
         "start": _START,
         "task_space": ["x", "y", "yaw"],
-        "path": [{"spline": {"through": [[0.05, 0.1, 0.1], [0.1, 0.2, 0.3]], "relative": True}}],
+        "path": [
+            {
+                "spline": {
+                    "through": [[0.05, 0.1, 0.1], [0.1, 0.2, 0.3]],
+                    "relative": True,
+                }
+            }
+        ],
         "redundant_joints": [],
     },
 )
@@ -59,9 +98,47 @@ _RAIL = {
 }
 _OTHER_ROBOTS = {"tx90l_rail": _RAIL}
 _WEIRD: tuple[Any, ...] = (
-    *(math.nan, math.inf, -math.inf, 1e308, -1e308, 1e-308, 1e12, 1e-12, -1, 0, -0.0, 10**400, 2**63),
-    *("1,5", "", "10 Nm", "nan", "x" * 5000, "\0", "\ud7ff\u202e", "!!python/object:os.system", "j1", "../robot.urdf"),
-    *(None, True, [], {}, [[]], {"a": 1}, [0.1] * 3000, [math.nan] * 3, ["j1"] * 50, _DEEP, "/dev/zero", "."),
+    *(
+        math.nan,
+        math.inf,
+        -math.inf,
+        1e308,
+        -1e308,
+        1e-308,
+        1e12,
+        1e-12,
+        -1,
+        0,
+        -0.0,
+        10**400,
+        2**63,
+    ),
+    *(
+        "1,5",
+        "",
+        "10 Nm",
+        "nan",
+        "x" * 5000,
+        "\0",
+        "\ud7ff\u202e",
+        "!!python/object:os.system",
+        "j1",
+        "../robot.urdf",
+    ),
+    *(
+        None,
+        True,
+        [],
+        {},
+        [[]],
+        {"a": 1},
+        [0.1] * 3000,
+        [math.nan] * 3,
+        ["j1"] * 50,
+        _DEEP,
+        "/dev/zero",
+        ".",
+    ),
 )
 _WEIRD_TEXT = (
     "nan",
@@ -93,13 +170,19 @@ class Case:
     done: tuple[str, ...]
 
 
-def case(number: int, results: tuple[bytes, ...], kinds: tuple[str, ...] = KINDS) -> Case:
+def case(
+    number: int, results: tuple[bytes, ...], kinds: tuple[str, ...] = KINDS
+) -> Case:
     """Make the files of a case, of one of the kinds in turn; `results` are valid result files."""
     rng = random.Random(f"brachis {number}")  # noqa: S311  (not for secrets)
     kind = kinds[number % len(kinds)]
     what, _, how = kind.partition(" ")
     if what == "result":
-        breaks_result = {"": broken_result, "bytes": broken_bytes, "extreme": extreme_result}
+        breaks_result = {
+            "": broken_result,
+            "bytes": broken_bytes,
+            "extreme": extreme_result,
+        }
         broken = breaks_result[how](rng.choice(results), rng)
         return Case(number, kind, {"result.npz": broken}, ("verify",))
     robot, task = _valid(rng, what)
@@ -119,7 +202,9 @@ def case(number: int, results: tuple[bytes, ...], kinds: tuple[str, ...] = KINDS
         files[name] = broken_bytes(files[name], rng)
     elif what in breaks:
         files[name] = breaks[what](files[name])
-    return Case(number, kind, files, ("inspect", "plan") if what == "urdf" else ("plan",))
+    return Case(
+        number, kind, files, ("inspect", "plan") if what == "urdf" else ("plan",)
+    )
 
 
 def _valid(rng: random.Random, what: str) -> tuple[str, dict[str, Any]]:
@@ -128,14 +213,22 @@ def _valid(rng: random.Random, what: str) -> tuple[str, dict[str, Any]]:
         return "scara3", {"brachis": 1, "robot": _SCARA, **_TASKS[3], **_CHEAP}
     if rng.random() < 0.05:
         robot = rng.choice(tuple(_OTHER_ROBOTS))
-        return robot, {"brachis": 1, **copy.deepcopy(_OTHER_ROBOTS[robot]), **copy.deepcopy(_CHEAP)}
-    return "scara3", copy.deepcopy({"brachis": 1, "robot": _SCARA, **rng.choice(_TASKS), **_CHEAP})
+        return robot, {
+            "brachis": 1,
+            **copy.deepcopy(_OTHER_ROBOTS[robot]),
+            **copy.deepcopy(_CHEAP),
+        }
+    return "scara3", copy.deepcopy(
+        {"brachis": 1, "robot": _SCARA, **rng.choice(_TASKS), **_CHEAP}
+    )
 
 
 def _bounded(task: Any) -> Any:
     """Keep the time of the search so short that a case ends."""
     search = task.get("search") if isinstance(task, dict) else None
-    if isinstance(search, dict) and isinstance(search.get("time_limit", 0.0), int | float):
+    if isinstance(search, dict) and isinstance(
+        search.get("time_limit", 0.0), int | float
+    ):
         search["time_limit"] = min(search.get("time_limit", _LONGEST), _LONGEST)
     elif isinstance(task, dict) and search is None:
         task["search"] = dict(_CHEAP["search"])
@@ -144,18 +237,31 @@ def _bounded(task: Any) -> Any:
 
 def _yaml(task: object) -> bytes:
     text = yaml.safe_dump(task, default_flow_style=None, allow_unicode=True)
-    return re.sub(f"'?{_DEEP}'?", "[" * 3000 + "]" * 3000, text).encode("utf-8", "surrogatepass")
+    return re.sub(f"'?{_DEEP}'?", "[" * 3000 + "]" * 3000, text).encode(
+        "utf-8", "surrogatepass"
+    )
 
 
 def _csv(rng: random.Random) -> bytes:
-    points = [(0.02 * i, 0.03 * i + 0.01 * math.sin(0.4 * i)) for i in range(rng.choice((3, 8, 12)))]
-    return ("# waypoints, m\nx,y\n" + "".join(f"{x:.6f},{y:.6f}\n" for x, y in points)).encode()
+    points = [
+        (0.02 * i, 0.03 * i + 0.01 * math.sin(0.4 * i))
+        for i in range(rng.choice((3, 8, 12)))
+    ]
+    return (
+        "# waypoints, m\nx,y\n" + "".join(f"{x:.6f},{y:.6f}\n" for x, y in points)
+    ).encode()
 
 
 def _places(tree: Any) -> list[tuple[Any, Any]]:
     """List all containers in a tree with each of their keys."""
     found = []
-    keys = list(tree) if isinstance(tree, dict) else range(len(tree)) if isinstance(tree, list) else ()
+    keys = (
+        list(tree)
+        if isinstance(tree, dict)
+        else range(len(tree))
+        if isinstance(tree, list)
+        else ()
+    )
     for key in keys:
         found += [(tree, key), *_places(tree[key])]
     return found
@@ -169,18 +275,29 @@ def broken_tree(tree: Any, rng: random.Random) -> Any:
         return rng.choice(_WEIRD)
     holder, key = rng.choice(places)
     value = holder[key]
-    action = rng.choice(("weird", "weird", "drop", "swap", "repeat", "rename", "scale", "copy"))
+    action = rng.choice(
+        ("weird", "weird", "drop", "swap", "repeat", "rename", "scale", "copy")
+    )
     if action == "drop":
         del holder[key]
     elif action == "swap":
         other, place = rng.choice(places)
         if not _holds(value, other) and not _holds(other[place], holder):
-            holder[key], other[place] = copy.deepcopy(other[place]), copy.deepcopy(value)
+            holder[key], other[place] = (
+                copy.deepcopy(other[place]),
+                copy.deepcopy(value),
+            )
     elif action == "repeat" and isinstance(holder, list):
-        holder[key:key] = [copy.deepcopy(value) for _ in range(rng.choice((1, 2, 30, 2000)))]
+        holder[key:key] = [
+            copy.deepcopy(value) for _ in range(rng.choice((1, 2, 30, 2000)))
+        ]
     elif action == "rename" and isinstance(holder, dict):
         holder[rng.choice((str(key)[:-1], f"{key}s", "x", "1", ""))] = holder.pop(key)
-    elif action == "scale" and isinstance(value, int | float) and not isinstance(value, bool):
+    elif (
+        action == "scale"
+        and isinstance(value, int | float)
+        and not isinstance(value, bool)
+    ):
         holder[key] = value * 10.0 ** rng.uniform(-6.0, 6.0) * rng.choice((1.0, -1.0))
     elif action == "copy":
         holder[key] = copy.deepcopy(rng.choice(places)[0])
@@ -190,17 +307,21 @@ def broken_tree(tree: Any, rng: random.Random) -> Any:
 
 
 def _holds(tree: Any, part: object) -> bool:
-    return tree is part or any(holder is part or holder[key] is part for holder, key in _places(tree))
+    return tree is part or any(
+        holder is part or holder[key] is part for holder, key in _places(tree)
+    )
 
 
 def broken_xml(text: bytes, rng: random.Random) -> bytes:
     """Drop, repeat, move, rename or change elements and attributes."""
-    root = ET.fromstring(text)  # noqa: S314  (our own files)
+    root = ET.fromstring(text)
     for _ in range(rng.choice((1, 1, 2, 4))):
         parents = {child: parent for parent in root.iter() for child in parent}
         element = rng.choice(list(parents) or [root])
         parent = parents.get(element, root)
-        action = rng.choice(("weird", "weird", "weird", "unset", "drop", "repeat", "rename", "move"))
+        action = rng.choice(
+            ("weird", "weird", "weird", "unset", "drop", "repeat", "rename", "move")
+        )
         names = list(element.attrib)
         if action == "weird" and names:
             element.set(rng.choice(names), rng.choice(_WEIRD_TEXT))
@@ -209,7 +330,9 @@ def broken_xml(text: bytes, rng: random.Random) -> bytes:
         elif action == "repeat":
             parent.append(copy.deepcopy(element))
         elif action == "rename":
-            element.tag = rng.choice(("x", "link", "joint", "mimic", "inertial", "origin"))
+            element.tag = rng.choice(
+                ("x", "link", "joint", "mimic", "inertial", "origin")
+            )
         elif element in parents:
             parent.remove(element)
             if action == "move":
@@ -222,9 +345,23 @@ def broken_csv(text: bytes, rng: random.Random) -> bytes:
     rows = [line.split(",") for line in text.decode().splitlines()]
     for _ in range(rng.choice((1, 1, 2, 5))):
         row = rng.choice(rows)
-        action = rng.choice(("weird", "weird", "drop cell", "more", "drop", "repeat", "swap", "quote", "many"))
+        action = rng.choice(
+            (
+                "weird",
+                "weird",
+                "drop cell",
+                "more",
+                "drop",
+                "repeat",
+                "swap",
+                "quote",
+                "many",
+            )
+        )
         if action == "weird" and row:
-            row[rng.randrange(len(row))] = rng.choice((*_WEIRD_TEXT, "\0", '"', "\r", "\ufeff", "z", "yaw", "1_0"))
+            row[rng.randrange(len(row))] = rng.choice(
+                (*_WEIRD_TEXT, "\0", '"', "\r", "\ufeff", "z", "yaw", "1_0")
+            )
         elif action == "drop cell" and row:
             row.pop()
         elif action == "more":
@@ -234,12 +371,18 @@ def broken_csv(text: bytes, rng: random.Random) -> bytes:
         elif action == "repeat":
             rows.insert(rng.randrange(len(rows)), list(row))
         elif action == "many":
-            rows += [[f"{0.001 * i:.4f}", "0.1"] for i in range(rng.choice((50, 20_000)))]
+            rows += [
+                [f"{0.001 * i:.4f}", "0.1"] for i in range(rng.choice((50, 20_000)))
+            ]
         elif action == "quote" and row:
             row[0] = f'"{row[0]}'
         else:
             rng.shuffle(rows)
-    return rng.choice(("\n", "\n", "\r\n", "\r")).join(",".join(row) for row in rows).encode()
+    return (
+        rng.choice(("\n", "\n", "\r\n", "\r"))
+        .join(",".join(row) for row in rows)
+        .encode()
+    )
 
 
 def broken_bytes(data: bytes, rng: random.Random) -> bytes:
@@ -248,9 +391,23 @@ def broken_bytes(data: bytes, rng: random.Random) -> bytes:
     for _ in range(rng.choice((1, 1, 3, 20))):
         at = rng.randrange(len(content) + 1)
         length = rng.choice((1, 1, 8, 200))
-        action = rng.choice(("flip", "flip", "cut", "end", "insert", "repeat", "digit", "digit", "digit"))
+        action = rng.choice(
+            (
+                "flip",
+                "flip",
+                "cut",
+                "end",
+                "insert",
+                "repeat",
+                "digit",
+                "digit",
+                "digit",
+            )
+        )
         if action == "digit":
-            digits = [place for place, byte in enumerate(content) if byte in b"0123456789.-"] or [0]
+            digits = [
+                place for place, byte in enumerate(content) if byte in b"0123456789.-"
+            ] or [0]
             at = rng.choice(digits)
             content[at : at + 1] = rng.choice(tuple(b"0123456789.-+eE ")).to_bytes()
         elif action == "flip" and at < len(content):
@@ -272,25 +429,68 @@ def broken_result(data: bytes, rng: random.Random) -> bytes:
         parts: dict[str, Any] = dict(archive)
     for _ in range(rng.choice((1, 1, 2))):
         name = rng.choice([name for name in parts if name != "meta"])
-        action = rng.choice(("meta", "meta", "meta", "urdf", "value", "value", "shape", "type", "drop", "swap"))
+        action = rng.choice(
+            (
+                "meta",
+                "meta",
+                "meta",
+                "urdf",
+                "value",
+                "value",
+                "shape",
+                "type",
+                "drop",
+                "swap",
+            )
+        )
         if action == "meta":
             meta = broken_tree(json.loads(str(parts["meta"])), rng)
-            parts["meta"] = np.array(json.dumps(meta).replace(f'"{_DEEP}"', "[" * 5000 + "]" * 5000))
+            parts["meta"] = np.array(
+                json.dumps(meta).replace(f'"{_DEEP}"', "[" * 5000 + "]" * 5000)
+            )
         elif action == "urdf":
             meta = json.loads(str(parts["meta"]))
-            if isinstance(meta, dict) and isinstance(meta.get("urdf"), str) and meta["urdf"].startswith("<"):
+            if (
+                isinstance(meta, dict)
+                and isinstance(meta.get("urdf"), str)
+                and meta["urdf"].startswith("<")
+            ):
                 meta["urdf"] = broken_xml(meta["urdf"].encode(), rng).decode()
                 parts["meta"] = np.array(json.dumps(meta))
         elif action == "value" and parts[name].dtype == float and parts[name].size:
             parts[name] = parts[name].copy()
             flat = parts[name].reshape(-1)
-            weird = (math.nan, math.inf, 1e308, -1e308, 1e-308, -1.0, 0.0, 1e6, flat[0], flat[-1])
-            flat[rng.randrange(flat.size) if rng.random() < 0.7 else slice(None)] = rng.choice(weird)
+            weird = (
+                math.nan,
+                math.inf,
+                1e308,
+                -1e308,
+                1e-308,
+                -1.0,
+                0.0,
+                1e6,
+                flat[0],
+                flat[-1],
+            )
+            flat[rng.randrange(flat.size) if rng.random() < 0.7 else slice(None)] = (
+                rng.choice(weird)
+            )
         elif action == "shape":
             array = parts[name]
-            parts[name] = rng.choice((array.T, array[:-1], array.ravel(), array[None], array[:0], np.float64(1.0)))
+            parts[name] = rng.choice(
+                (
+                    array.T,
+                    array[:-1],
+                    array.ravel(),
+                    array[None],
+                    array[:0],
+                    np.float64(1.0),
+                )
+            )
         elif action == "type":
-            parts[name] = parts[name].astype(rng.choice(("int8", "complex128", "float16", "U9", "bool")))
+            parts[name] = parts[name].astype(
+                rng.choice(("int8", "complex128", "float16", "U9", "bool"))
+            )
         elif action == "drop":
             del parts[name]
         else:
@@ -310,14 +510,30 @@ _LIMITS: tuple[dict[str, Any], ...] = (
 _TOOL_LIMITS: tuple[dict[str, Any], ...] = (
     {"speed": 0.4, "acceleration": 2.0, "angular_speed": 1.0},
     {"process_speed": [{"s": [0.3, 0.6], "speed": 0.1}]},
-    {"process_speed": [{"s": [i / 1000, (i + 0.5) / 1000], "speed": 0.1} for i in range(1000)]},
-    {"speed": {"s": [i / 30_000 for i in range(30_001)], "speed": [0.1 + i % 2 for i in range(30_001)]}},
+    {
+        "process_speed": [
+            {"s": [i / 1000, (i + 0.5) / 1000], "speed": 0.1} for i in range(1000)
+        ]
+    },
+    {
+        "speed": {
+            "s": [i / 30_000 for i in range(30_001)],
+            "speed": [0.1 + i % 2 for i in range(30_001)],
+        }
+    },
 )
 _PATHS: tuple[list[dict[str, Any]], ...] = (
     [{"line": {"by": [0.0, 0.3 / 3000]}}] * 3000,
     [{"line": {"by": [0.0, 0.3 / 30_000]}}] * 30_000,
     [{"line": {"by": [0.0, 0.1]}, "blend": 1e-9}, {"line": {"by": [0.1, 0.0]}}] * 200,
-    [{"spline": {"through": [[0.0, 0.3 * i / 20_000] for i in range(1, 20_001)], "relative": True}}],
+    [
+        {
+            "spline": {
+                "through": [[0.0, 0.3 * i / 20_000] for i in range(1, 20_001)],
+                "relative": True,
+            }
+        }
+    ],
     [{"arc": {"radius": 1e9, "angle_deg": 1e9}}],
     [{"line": {"length": 1e12, "angle_deg": 90}}],
 )
@@ -330,14 +546,23 @@ def _many_nodes(parts: _Parts, _meta: _Parts, rng: random.Random) -> None:
     old = parts["times"]
     parts["times"] = np.linspace(old[0], old[-1], rng.choice(_COUNTS))
     for name in _MOMENTS:
-        parts[name] = np.column_stack([np.interp(parts["times"], old, column) for column in parts[name].T])
+        parts[name] = np.column_stack(
+            [np.interp(parts["times"], old, column) for column in parts[name].T]
+        )
 
 
 def _many_knots(parts: _Parts, meta: _Parts, rng: random.Random) -> None:
     count, degree = rng.choice(_COUNTS), meta["degree"]
-    parts["knots"] = np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, count), np.ones(degree)])
-    places, old = np.linspace(0.0, 1.0, count + degree - 1), np.linspace(0.0, 1.0, parts["control_points"].shape[1])
-    parts["control_points"] = np.array([np.interp(places, old, row) for row in parts["control_points"]])
+    parts["knots"] = np.concatenate(
+        [np.zeros(degree), np.linspace(0.0, 1.0, count), np.ones(degree)]
+    )
+    places, old = (
+        np.linspace(0.0, 1.0, count + degree - 1),
+        np.linspace(0.0, 1.0, parts["control_points"].shape[1]),
+    )
+    parts["control_points"] = np.array(
+        [np.interp(places, old, row) for row in parts["control_points"]]
+    )
 
 
 def _far_and_fast(parts: _Parts, _meta: _Parts, rng: random.Random) -> None:
@@ -358,7 +583,9 @@ def _extreme_values(parts: _Parts, _meta: _Parts, rng: random.Random) -> None:
     name = rng.choice([name for name in parts if name != "meta" and parts[name].size])
     changed = parts[name].copy().reshape(-1)
     weird = (math.nan, math.inf, -math.inf, 1e300, -1e300, 1e-300, 1e12, -1e12, 1e6)
-    changed[rng.randrange(changed.size) if rng.random() < 0.5 else slice(None)] = rng.choice(weird)
+    changed[rng.randrange(changed.size) if rng.random() < 0.5 else slice(None)] = (
+        rng.choice(weird)
+    )
     parts[name] = changed.reshape(parts[name].shape)
 
 
@@ -369,7 +596,9 @@ def _close_nodes(parts: _Parts, _meta: _Parts, rng: random.Random) -> None:
 
 
 def _other_times(parts: _Parts, _meta: _Parts, rng: random.Random) -> None:
-    parts["times"] = parts["times"] * rng.choice((-1.0, 1e-300, 1e-9, 1e-3, 1e3, 1e9, 1e300))
+    parts["times"] = parts["times"] * rng.choice(
+        (-1.0, 1e-300, 1e-9, 1e-3, 1e3, 1e9, 1e300)
+    )
 
 
 _EXTREMES = (
@@ -414,9 +643,29 @@ def _rezipped(data: bytes, how: str, rng: random.Random) -> bytes:
     if how == "header":
         content = members[name]
         header = content[10 : 10 + int.from_bytes(content[8:10], "little")]
-        shape = rng.choice((b"(10000000000,)", b"(-1,)", b"(1" + b"0" * 40 + b",)", b"()", b"(2.5,)", b"(" * 2000))
-        broken = rng.choice((header[: rng.randrange(len(header))], re.sub(rb"\(.*?\)", shape, header), header[::-1]))
-        members[name] = content[:8] + len(broken).to_bytes(2, "little") + broken + content[10 + len(header) :]
+        shape = rng.choice(
+            (
+                b"(10000000000,)",
+                b"(-1,)",
+                b"(1" + b"0" * 40 + b",)",
+                b"()",
+                b"(2.5,)",
+                b"(" * 2000,
+            )
+        )
+        broken = rng.choice(
+            (
+                header[: rng.randrange(len(header))],
+                re.sub(rb"\(.*?\)", shape, header),
+                header[::-1],
+            )
+        )
+        members[name] = (
+            content[:8]
+            + len(broken).to_bytes(2, "little")
+            + broken
+            + content[10 + len(header) :]
+        )
     elif how == "bomb":
         members[rng.choice((name, "extra.npy"))] = bytes(200_000_000)
     else:
@@ -435,5 +684,7 @@ def _archive(parts: dict[str, Any], rng: random.Random) -> bytes:
         (np.savez_compressed if rng.random() < 0.2 else np.savez)(stream, **parts)
     if rng.random() < 0.1:
         with zipfile.ZipFile(stream, "a") as archive:
-            archive.writestr(rng.choice(("q", "extra", "../meta.npy")), rng.randbytes(100))
+            archive.writestr(
+                rng.choice(("q", "extra", "../meta.npy")), rng.randbytes(100)
+            )
     return stream.getvalue()

@@ -21,15 +21,29 @@ INTERVALS = (10, 20, 50, 100, 200)
 
 def first_point(program):
     """Start from the first joint path of numeric inverse kinematics."""
-    return starting_point(program, [next(differential_ik_paths(program.phases[0].joint_map))])
+    return starting_point(
+        program, [next(differential_ik_paths(program.phases[0].joint_map))]
+    )
 
 
 def main() -> None:
     """Print one line for every number of intervals and solver."""
     robot = Robot.from_urdf(
-        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=LimitSpec(torque=10.0, velocity=None)
+        ROOT / "robots/scara3/robot.urdf",
+        gravity=[0, 0, 0],
+        limits=LimitSpec(torque=10.0, velocity=None),
     )
-    columns = ("N", "variables", "rows", "solver", "t_E", "iterations", "evaluations", "processor time", "status")
+    columns = (
+        "N",
+        "variables",
+        "rows",
+        "solver",
+        "t_E",
+        "iterations",
+        "evaluations",
+        "processor time",
+        "status",
+    )
     print(f"| {' | '.join(columns)} |")
     table = []
     for intervals in INTERVALS:
@@ -49,8 +63,12 @@ def main() -> None:
             counts = program.phases[0].evaluations
             before = counts["states"]
             began = sum(os.times()[:4])
-            report = solver_named(name)[0].solve(program, x, SolverOptions(time_limit=120.0), None)
-            took = sum(os.times()[:4]) - began  # of other processes too: large programs are solved in one
+            report = solver_named(name)[0].solve(
+                program, x, SolverOptions(time_limit=120.0), None
+            )
+            took = (
+                sum(os.times()[:4]) - began
+            )  # of other processes too: large programs are solved in one
             sizes = (intervals, program.variables, len(program.lower))
             counted = (report.iterations, counts["states"] - before)
             table.append(

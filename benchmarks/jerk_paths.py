@@ -34,7 +34,9 @@ def case(seed: int, intervals: int) -> brachis.Task:
     content = joint_paths.case(seed, intervals).to_dict()
     rng = np.random.default_rng(seed + 10_000)
     acceleration = np.array(content["robot"]["limits"]["acceleration"])
-    content["robot"]["limits"]["jerk"] = (acceleration * rng.uniform(10.0, 30.0, len(acceleration))).round(1).tolist()
+    content["robot"]["limits"]["jerk"] = (
+        (acceleration * rng.uniform(10.0, 30.0, len(acceleration))).round(1).tolist()
+    )
     content["spline"]["rest"] = "full"
     return brachis.load_task(content)
 
@@ -53,17 +55,29 @@ def by_copp(robot: Robot, path: Path, stations: int) -> tuple[float, float]:
     theirs.append_s(s)
     q, q_ds, q_dds, q_ddds = derivatives(path, s)
     theirs.set_q(q, q_ds, q_dds, 0, dddq=q_ddds)
-    theirs.add_velocity_limits(limits.velocity, -limits.velocity, start_idx_s=0, length=stations)
-    theirs.add_acceleration_limits(limits.acceleration, -limits.acceleration, start_idx_s=0, length=stations)
-    theirs.set_inverse_dynamics(lambda *state: np.asarray(pin.rnea(robot.model, data, *state)))
-    theirs.add_torque_limits(limits.torque, -limits.torque, start_idx_s=0, length=stations)
+    theirs.add_velocity_limits(
+        limits.velocity, -limits.velocity, start_idx_s=0, length=stations
+    )
+    theirs.add_acceleration_limits(
+        limits.acceleration, -limits.acceleration, start_idx_s=0, length=stations
+    )
+    theirs.set_inverse_dynamics(
+        lambda *state: np.asarray(pin.rnea(robot.model, data, *state))
+    )
+    theirs.add_torque_limits(
+        limits.torque, -limits.torque, start_idx_s=0, length=stations
+    )
     second = copp.solver.topp2_ra
-    speed_squared = second.solve(second.Problem(theirs.constraints, (0, stations - 1)), second.Options())
+    speed_squared = second.solve(
+        second.Problem(theirs.constraints, (0, stations - 1)), second.Options()
+    )
     theirs.constraints.amax_substitute(speed_squared, 0)
     theirs.add_jerk_limits(limits.jerk, -limits.jerk, start_idx_s=0, length=stations)
     third, times, acceleration = copp.solver.topp3_socp, [np.inf], None
     for _ in range(MOST_ROUNDS):
-        problem = third.Problem(theirs.constraints, speed_squared, b_linearization=acceleration)
+        problem = third.Problem(
+            theirs.constraints, speed_squared, b_linearization=acceleration
+        )
         profile = third.solve(problem, third.Options())
         speed_squared, acceleration = np.array(profile.a), np.array(profile.b)
         times.append(float(copp.interpolation.s_to_t_topp3(s, profile, 0.0)[0]))
@@ -72,14 +86,19 @@ def by_copp(robot: Robot, path: Path, stations: int) -> tuple[float, float]:
     return times[-1], worst_between(robot, path, s, speed_squared, acceleration)
 
 
-def worst_between(robot: Robot, path: Path, s: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
+def worst_between(
+    robot: Robot, path: Path, s: np.ndarray, a: np.ndarray, b: np.ndarray
+) -> float:
     """Largest ratio to a limit where b = d2s/dt2 is linear in s between stations and a = (ds/dt)^2 its integral."""
     part = (np.arange(BETWEEN) + 0.5) / BETWEEN
     step, slope = s[1] - s[0], np.diff(b) / (s[1] - s[0])
     inner = slice(1, -1)  # at rest the profile is of another form
     at = (s[:-1, None] + part * step)[inner].ravel()
     second = (b[:-1, None] + slope[:, None] * part * step)[inner].ravel()
-    first = (a[:-1, None] + 2.0 * (b[:-1, None] * part * step + 0.5 * slope[:, None] * (part * step) ** 2))[inner]
+    first = (
+        a[:-1, None]
+        + 2.0 * (b[:-1, None] * part * step + 0.5 * slope[:, None] * (part * step) ** 2)
+    )[inner]
     speed = np.sqrt(np.maximum(first.ravel(), 0.0))[:, None]
     third = np.repeat(slope[inner], BETWEEN)[:, None] * speed
     q, q_ds, q_dds, q_ddds = derivatives(path, at)
@@ -87,9 +106,19 @@ def worst_between(robot: Robot, path: Path, s: np.ndarray, a: np.ndarray, b: np.
     qdot, qddot = q_ds * speed, q_ds * second + q_dds * speed**2
     qdddot = q_ds * third + 3.0 * q_dds * speed * second + q_ddds * speed**3
     data = robot.model.createData()
-    tau = np.array([pin.rnea(robot.model, data, *state) for state in zip(q, qdot, qddot, strict=True)])
+    tau = np.array(
+        [
+            pin.rnea(robot.model, data, *state)
+            for state in zip(q, qdot, qddot, strict=True)
+        ]
+    )
     limits = robot.limits
-    pairs = ((qdot, limits.velocity), (qddot, limits.acceleration), (qdddot, limits.jerk), (tau, limits.torque))
+    pairs = (
+        (qdot, limits.velocity),
+        (qddot, limits.acceleration),
+        (qdddot, limits.jerk),
+        (tau, limits.torque),
+    )
     return max(float((np.abs(values) / limit).max()) for values, limit in pairs)
 
 
@@ -103,10 +132,15 @@ def main() -> None:
     parser.add_argument("--save", action="store_true", help="into benchmarks/results")
     given = parser.parse_args()
     rows = []
-    print("case   brachis t_E   copp t_E   difference   copp's worst ratio   brachis     copp (processor time)")
+    print(
+        "case   brachis t_E   copp t_E   difference   copp's worst ratio   brachis     copp (processor time)"
+    )
     for seed in range(given.first, given.first + given.count):
         task = case(seed, given.intervals)
-        robot, task_map = bind(brachis.Robot.from_urdf(joint_paths.URDF, limits=task.robot.limits), task.task_space)
+        robot, task_map = bind(
+            brachis.Robot.from_urdf(joint_paths.URDF, limits=task.robot.limits),
+            task.task_space,
+        )
         began = processor_time()
         least, worst = by_copp(robot, path_of(task_map, task), given.stations)
         theirs, began = processor_time() - began, processor_time()
@@ -133,9 +167,17 @@ def summarise(rows: np.ndarray) -> None:
     span = f"{100.0 * gaps[both].min(initial=np.inf):+.2f} % to {100.0 * gaps[both].max(initial=-np.inf):+.2f} %"
     cells = [
         ("failed", f"{int(np.isinf(gaps).sum())}", "0"),
-        ("beyond a limit by more than 0.2 % between stations", "0, verified", f"{int((worst_ratios > WITHIN).sum())}"),
+        (
+            "beyond a limit by more than 0.2 % between stations",
+            "0, verified",
+            f"{int((worst_ratios > WITHIN).sum())}",
+        ),
         ("end time beside copp-py's, where both hold", span, ""),
-        ("processor time, median", f"{np.median(ours_all):.2f} s", f"{np.median(theirs_all):.2f} s"),
+        (
+            "processor time, median",
+            f"{np.median(ours_all):.2f} s",
+            f"{np.median(theirs_all):.2f} s",
+        ),
     ]
     columns = (f"{len(rows)} paths", "brachis", "copp-py")
     for cell in (columns, *cells):

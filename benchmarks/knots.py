@@ -34,7 +34,9 @@ def cell(robot: Robot, joint: str, spline: dict[str, Any]) -> str:
     }
     began = sum(os.times()[:4])
     result = plan(robot, task)
-    elapsed = sum(os.times()[:4]) - began  # of other processes too: large programs are solved in one
+    elapsed = (
+        sum(os.times()[:4]) - began
+    )  # of other processes too: large programs are solved in one
     intervals = len(set(result.trajectory.knots.tolist())) - 1
     note = "" if result.verified else ", not verified"
     return f"{result.t_end:.4f} s ({intervals}; {elapsed:.1f} s{note})"
@@ -43,14 +45,21 @@ def cell(robot: Robot, joint: str, spline: dict[str, Any]) -> str:
 def main() -> None:
     """Print one line for every kind of knots: end time (intervals; processor time) for every redundant joint."""
     limits = LimitSpec(torque=10.0, velocity=None)
-    robot = Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
+    robot = Robot.from_urdf(
+        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits
+    )
     print(f"| knots | {' | '.join(JOINTS)} |\n|---|{'---|' * len(JOINTS)}")
     rows = []
     for name, spline in SPLINES.items():
         rows.append((name, *(cell(robot, joint, spline) for joint in JOINTS)))
         print(f"| {' | '.join(rows[-1])} |", flush=True)
     about = "The paper's line at 90 degrees. In brackets: knot intervals at the end, and processor time of the plan."
-    save("What knots are worth", ("knots", *(f"q_r = {joint}" for joint in JOINTS)), rows, about)
+    save(
+        "What knots are worth",
+        ("knots", *(f"q_r = {joint}" for joint in JOINTS)),
+        rows,
+        about,
+    )
 
 
 if __name__ == "__main__":

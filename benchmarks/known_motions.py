@@ -13,7 +13,10 @@ import brachis
 from committed import processor_time
 
 ROOT = Path(__file__).parents[1]
-TASKS = {"planar arm": "01_scara_line.yaml", "TX90L on its rail": "03_tx90l_rail_line.yaml"}
+TASKS = {
+    "planar arm": "01_scara_line.yaml",
+    "TX90L on its rail": "03_tx90l_rail_line.yaml",
+}
 CHANGES: dict[str, dict[str, Any]] = {
     "the same task": {},
     "torque limits + 10 %": {"limits": {"scale": {"torque": 1.1}}},
@@ -32,7 +35,8 @@ def main() -> None:
         known = brachis.plan(ROOT / "examples" / file, redundant_joints="auto")
         for change, keywords in CHANGES.items():
             (cold, searched), (warm, continued) = (
-                timed(known.task, **keywords, start_from=motion) for motion in (None, known)
+                timed(known.task, **keywords, start_from=motion)
+                for motion in (None, known)
             )
             times = f"{cold.t_end:.4f} s in {searched:.1f} s | {warm.t_end:.4f} s in {continued:.1f} s"
             print(f"| {name} | {change} | {times} |", flush=True)

@@ -26,7 +26,11 @@ def urdf_of(robot: str, folder: Path) -> Path:
         path = folder / "planar4.urdf"
         path.write_text(planar_chain((0.9, 0.8, 0.6, 0.4)), encoding="utf-8")
         return path.absolute()
-    return random_poses.stored_urdf(STORED[robot]) if robot in STORED else ROOT / f"robots/{robot}/robot.urdf"
+    return (
+        random_poses.stored_urdf(STORED[robot])
+        if robot in STORED
+        else ROOT / f"robots/{robot}/robot.urdf"
+    )
 
 
 def planar_chain(lengths: tuple[float, ...]) -> str:

@@ -43,16 +43,22 @@ def planned(case: mixed_cases.Case, time_limit: float | None) -> dict[str, objec
     """Plan a task; what came out as a line of the results."""
     task = load_task(case.task)
     if time_limit is not None:
-        task = task.model_copy(update={"search": task.search.model_copy(update={"time_limit": time_limit})})
+        task = task.model_copy(
+            update={"search": task.search.model_copy(update={"time_limit": time_limit})}
+        )
     began, busy = time.perf_counter(), sum(os.times()[:4])
     t_end, message, search = None, "", {}
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PlausibilityWarning)  # limits are scaled at will
+            warnings.simplefilter(
+                "ignore", PlausibilityWarning
+            )  # limits are scaled at will
             result = plan(task, strict=False)
         t_end = result.t_end
         search = {"attempts": len(result.candidates), "interrupted": result.interrupted}
-        failed = [check.name for check in result.verification.checks if not check.passed]
+        failed = [
+            check.name for check in result.verification.checks if not check.passed
+        ]
         message = f"unverified: {', '.join(failed)}" if failed else ""
     except BrachisError as error:
         message = f"{type(error).__name__}: {error}"
@@ -96,7 +102,9 @@ def compare(before: list[dict[str, object]], after: list[dict[str, object]]) -> 
         old = known.get(result["task"])
         if old is None:
             continue
-        times.append([result[clock] / max(old[clock], 1e-3) for clock in ("seconds", "cpu")])
+        times.append(
+            [result[clock] / max(old[clock], 1e-3) for clock in ("seconds", "cpu")]
+        )
         if old["verified"] and result["verified"]:
             ends.append((result["t_end"] / old["t_end"], result["task"]))
         elif old["verified"] != result["verified"]:
@@ -106,14 +114,18 @@ def compare(before: list[dict[str, object]], after: list[dict[str, object]]) -> 
             print(f"  {name}: t_end times {ratio:.4f}")
     if times:
         wall, busy = np.exp(np.mean(np.log(times), axis=0))
-        print(f"compared: {len(times)} tasks; plan times times {wall:.3f} on average, processor times {busy:.3f}")
+        print(
+            f"compared: {len(times)} tasks; plan times times {wall:.3f} on average, processor times {busy:.3f}"
+        )
     if ends:
         ratios = np.array([ratio for ratio, _ in ends])
         print(
             f"end times of {len(ratios)}: times {np.exp(np.mean(np.log(ratios))):.4f} on average, "
             f"from {ratios.min():.4f} to {ratios.max():.4f}"
         )
-    print(f"verified now and not before: {', '.join(won) or 'none'}; before and not now: {', '.join(lost) or 'none'}")
+    print(
+        f"verified now and not before: {', '.join(won) or 'none'}; before and not now: {', '.join(lost) or 'none'}"
+    )
 
 
 def read(path: Path) -> list[dict[str, object]]:
@@ -128,11 +140,21 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--count", type=int, default=24, help="tasks of each robot")
     parser.add_argument("--number", type=int, help="this task alone")
-    parser.add_argument("--folder", type=Path, help="where task files go; a new one under the temporary folder")
+    parser.add_argument(
+        "--folder",
+        type=Path,
+        help="where task files go; a new one under the temporary folder",
+    )
     parser.add_argument("--out", type=Path, help="results, a line of JSON for a task")
     parser.add_argument("--compare", type=Path, help="results of an earlier run")
-    parser.add_argument("--save", action="store_true", help="the summary, into benchmarks/results")
-    parser.add_argument("--time-limit", type=float, help="search.time_limit, s; the default of the task file")
+    parser.add_argument(
+        "--save", action="store_true", help="the summary, into benchmarks/results"
+    )
+    parser.add_argument(
+        "--time-limit",
+        type=float,
+        help="search.time_limit, s; the default of the task file",
+    )
     return parser.parse_args()
 
 
@@ -142,23 +164,43 @@ def main() -> None:
     folder = given.folder or Path(tempfile.mkdtemp(prefix="mixed-tasks-"))
     print(f"task files in {folder}", flush=True)
     numbers = range(given.count) if given.number is None else [given.number]
-    plan(ROOT / "examples/01_scara_line.yaml")  # what is loaded on first use is not timed
+    plan(
+        ROOT / "examples/01_scara_line.yaml"
+    )  # what is loaded on first use is not timed
     everything, kept = [], []
     folder.mkdir(parents=True, exist_ok=True)
     with (given.out or folder / "results.jsonl").open("w", encoding="utf-8") as out:
         for robot in [given.robot] if given.robot else ROBOTS:
             results = []
             for number in numbers:
-                result = planned(mixed_cases.case(robot, given.seed, number, folder), given.time_limit)
+                result = planned(
+                    mixed_cases.case(robot, given.seed, number, folder),
+                    given.time_limit,
+                )
                 results.append(result)
                 print(json.dumps(result), file=out, flush=True)
                 if result["message"]:
-                    print(f"{result['task']} ({result['kind']}): {result['message']}", flush=True)
+                    print(
+                        f"{result['task']} ({result['kind']}): {result['message']}",
+                        flush=True,
+                    )
             kept.append(summary(robot, results))
             print(", ".join(kept[-1]), flush=True)
             everything += results
-    columns = ("robot", "verified", "plan time, median", "processor time, median", "longest", f"within {SOON:g} s")
-    save("Random tasks of mixed kinds", columns, kept, "Each task has a known solution; everything is left open.")
+    columns = (
+        "robot",
+        "verified",
+        "plan time, median",
+        "processor time, median",
+        "longest",
+        f"within {SOON:g} s",
+    )
+    save(
+        "Random tasks of mixed kinds",
+        columns,
+        kept,
+        "Each task has a known solution; everything is left open.",
+    )
     if given.compare:
         compare(read(given.compare), everything)
 

@@ -28,14 +28,25 @@ def leg(way: float, speed: float) -> float:
 
 def task(speed: float, intervals: str) -> dict[str, object]:
     """Task of a process speed, m/s."""
-    mesh = {"intervals": "auto", "tolerance": 5e-4} if intervals == "auto" else {"intervals": int(intervals)}
+    mesh = (
+        {"intervals": "auto", "tolerance": 5e-4}
+        if intervals == "auto"
+        else {"intervals": int(intervals)}
+    )
     return {
         "brachis": 1,
-        "robot": {"urdf": str(ROOT / "robots/gantry2/robot.urdf"), "limits": {"velocity": None}},
+        "robot": {
+            "urdf": str(ROOT / "robots/gantry2/robot.urdf"),
+            "limits": {"velocity": None},
+        },
         "start": {"joints": [-0.6, 0.0]},
         "task_space": ["x", "y"],
         "path": [{"line": {"by": [LENGTH, 0.0]}}],
-        "tool_limits": {"process_speed": [{"speed": speed, "s": [BEGIN, END], "tolerance": TOLERANCE}]},
+        "tool_limits": {
+            "process_speed": [
+                {"speed": speed, "s": [BEGIN, END], "tolerance": TOLERANCE}
+            ]
+        },
         "spline": {"rest": "velocity", **mesh},
         "search": {"effort": "single", "least_motion": False},
     }
@@ -43,7 +54,9 @@ def task(speed: float, intervals: str) -> dict[str, object]:
 
 def main() -> None:
     """Plan, and print how far the end times are above the optimum."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--intervals", default="auto")
     parser.add_argument("--speeds", type=float, nargs="+", default=[1.0, 0.3, 0.1])
     arguments = parser.parse_args()
@@ -51,10 +64,16 @@ def main() -> None:
         began = processor_time()
         result = brachis.plan(task(speed, arguments.intervals))
         top = (1.0 + TOLERANCE) * speed
-        fastest = leg(BEGIN * LENGTH, top) + (END - BEGIN) * LENGTH / top + leg((1.0 - END) * LENGTH, top)
+        fastest = (
+            leg(BEGIN * LENGTH, top)
+            + (END - BEGIN) * LENGTH / top
+            + leg((1.0 - END) * LENGTH, top)
+        )
         above = 100.0 * (result.t_end / fastest - 1.0)
         busy = processor_time() - began
-        print(f"{speed:g} m/s: {result.t_end:.5f} s, {above:.3f} % above {fastest:.5f} s, {busy:.1f} s processor time")
+        print(
+            f"{speed:g} m/s: {result.t_end:.5f} s, {above:.3f} % above {fastest:.5f} s, {busy:.1f} s processor time"
+        )
 
 
 if __name__ == "__main__":

@@ -14,7 +14,9 @@ PUBLISHED_S = 2.51
 def end_time(intervals: int) -> float:
     """Verified end time, s."""
     limits = LimitSpec(torque=10.0, velocity=None)
-    robot = Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
+    robot = Robot.from_urdf(
+        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits
+    )
     result = plan(
         robot,
         {
@@ -31,13 +33,21 @@ def end_time(intervals: int) -> float:
 
 def main() -> None:
     """Print one line for every number of intervals."""
-    from committed import save  # noqa: PLC0415  (a test imports this file, which is no script then)
+    from committed import save
 
-    rows = [(str(intervals), f"{end_time(intervals):.3f} s") for intervals in (10, 15, 16, 17, 18, 20, 50)]
+    rows = [
+        (str(intervals), f"{end_time(intervals):.3f} s")
+        for intervals in (10, 15, 16, 17, 18, 20, 50)
+    ]
     for intervals, t_end in rows:
         print(f"N = {intervals}: {t_end} (the paper: {PUBLISHED_S} s)")
     about = f"Line at 90 degrees, redundant joint j3, degree 3, torque limits 10 Nm; the paper prints {PUBLISHED_S} s."
-    save("The paper's published end time, by number of intervals", ("knot intervals", "end time"), rows, about)
+    save(
+        "The paper's published end time, by number of intervals",
+        ("knot intervals", "end time"),
+        rows,
+        about,
+    )
 
 
 if __name__ == "__main__":

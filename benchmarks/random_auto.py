@@ -28,15 +28,24 @@ from brachis.search.starts import lattice_starts
 def planar_arm() -> Robot:
     """Return the planar arm with the paper's limits."""
     urdf = random_lines.ROOT / "robots/scara3/robot.urdf"
-    return Robot.from_urdf(urdf, gravity=[0, 0, 0], limits=LimitSpec(torque=10.0, velocity=None))
+    return Robot.from_urdf(
+        urdf, gravity=[0, 0, 0], limits=LimitSpec(torque=10.0, velocity=None)
+    )
 
 
-def tasks(name: str, robot: Robot, seed: int, count: int) -> Iterator[dict[str, object]]:
+def tasks(
+    name: str, robot: Robot, seed: int, count: int
+) -> Iterator[dict[str, object]]:
     """Yield task mappings with everything left open."""
     if name == "scara3":
-        yield from ({**task, "redundant_joints": "auto"} for task in random_lines.random_tasks(robot, seed, count))
+        yield from (
+            {**task, "redundant_joints": "auto"}
+            for task in random_lines.random_tasks(robot, seed, count)
+        )
     else:
-        found = random_poses.random_tasks(robot, seed, count, random_poses.closed_forms(robot))
+        found = random_poses.random_tasks(
+            robot, seed, count, random_poses.closed_forms(robot)
+        )
         yield from ({**task, "redundant_joints": "auto"} for task in found)
 
 
@@ -47,14 +56,19 @@ def has_course(robot: Robot, task: dict[str, object]) -> bool:
     except BrachisError:
         return False
     return any(
-        not isinstance(lattice_starts(decomposition, SEARCH_LEVELS["fast"][0], 0), DeadEnd) for decomposition in found
+        not isinstance(
+            lattice_starts(decomposition, SEARCH_LEVELS["fast"][0], 0), DeadEnd
+        )
+        for decomposition in found
     )
 
 
 def main() -> None:
     """Print every failure with its reason, then the counts."""
     chosen = sys.argv[1] if len(sys.argv) > 1 else "all"
-    seed, count = (int(value) for value in (*sys.argv[2:4], *("0", "100")[len(sys.argv[2:4]) :]))
+    seed, count = (
+        int(value) for value in (*sys.argv[2:4], *("0", "100")[len(sys.argv[2:4]) :])
+    )
     for name, robot in {"scara3": planar_arm(), **random_poses.robots()}.items():
         if chosen not in ("all", name):
             continue
@@ -67,7 +81,10 @@ def main() -> None:
             joint_paths += exists
             planned += exists and not reason
             if reason:
-                print(f"{name} {number}, {'a' if exists else 'no'} lattice joint path: {reason}", flush=True)
+                print(
+                    f"{name} {number}, {'a' if exists else 'no'} lattice joint path: {reason}",
+                    flush=True,
+                )
         print(
             f"{name}: {joint_paths} of {count} have a lattice joint path, {planned} of these are planned and verified; "
             f"median {np.median(times):.2f} s, longest {max(times):.1f} s",

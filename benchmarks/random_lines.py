@@ -27,7 +27,9 @@ def random_tasks(robot: Robot, seed: int, count: int) -> Iterator[dict[str, obje
         while True:
             q = rng.uniform(-np.pi, np.pi, 3)
             length, angle = rng.uniform(0.2, 1.5), rng.uniform(0.0, 2.0 * np.pi)
-            end = robot.tool_placement(q).translation[:2] + length * np.array([np.cos(angle), np.sin(angle)])
+            end = robot.tool_placement(q).translation[:2] + length * np.array(
+                [np.cos(angle), np.sin(angle)]
+            )
             if np.linalg.norm(end) < 2.9:
                 break
         yield {
@@ -45,7 +47,9 @@ def main() -> None:
     arguments = [int(argument) for argument in sys.argv[1:]]
     seed, count = (*arguments, *(0, 200)[len(arguments) :])
     robot = Robot.from_urdf(
-        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=LimitSpec(torque=10.0, velocity=None)
+        ROOT / "robots/scara3/robot.urdf",
+        gravity=[0, 0, 0],
+        limits=LimitSpec(torque=10.0, velocity=None),
     )
     verified, times = 0, []
     for number, task in enumerate(random_tasks(robot, seed, count)):

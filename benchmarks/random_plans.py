@@ -75,50 +75,80 @@ class SavedMotion:
         self.powers = _powers(arrays, self.h)
         self.pieces = len(self.h)
 
-    def states(self, piece: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def states(
+        self, piece: np.ndarray, u: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Positions, velocities, accelerations at places u in pieces, (K, n) each."""
         a, h, u = self.powers[:, piece], self.h[piece], u[:, None]
-        q = self.nodes[piece] + u * (a[1] + u * (a[2] + u * (a[3] + u * (a[4] + u * a[5]))))
-        qdot = (a[1] + u * (2 * a[2] + u * (3 * a[3] + u * (4 * a[4] + u * 5 * a[5])))) / h
+        q = self.nodes[piece] + u * (
+            a[1] + u * (a[2] + u * (a[3] + u * (a[4] + u * a[5])))
+        )
+        qdot = (
+            a[1] + u * (2 * a[2] + u * (3 * a[3] + u * (4 * a[4] + u * 5 * a[5])))
+        ) / h
         qddot = (2 * a[2] + u * (6 * a[3] + u * (12 * a[4] + u * 20 * a[5]))) / h**2
         return q, qdot, qddot
 
     def excesses(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Torque, velocity, acceleration beyond their limits as parts of them, positions in rad or m, (K, 4)."""
         q, qdot, qddot = self.states(piece, u)
-        tau = np.array([pin.rnea(self.model, self.data, *state) for state in zip(q, qdot, qddot, strict=True)])
+        tau = np.array(
+            [
+                pin.rnea(self.model, self.data, *state)
+                for state in zip(q, qdot, qddot, strict=True)
+            ]
+        )
         f, lim = self.friction, self.limits
-        tau += f["armature"] * qddot + f["viscous"] * qdot + f["coulomb"] * np.tanh(qdot / f["coulomb_velocity"])
+        tau += (
+            f["armature"] * qddot
+            + f["viscous"] * qdot
+            + f["coulomb"] * np.tanh(qdot / f["coulomb_velocity"])
+        )
         beyond = np.maximum(lim["lower"] - q, q - lim["upper"])
         rates = {"torque": tau, "velocity": qdot, "acceleration": qddot}
-        ratios = [(np.abs(value) / lim[kind]).max(axis=1) - 1.0 for kind, value in rates.items()]
+        ratios = [
+            (np.abs(value) / lim[kind]).max(axis=1) - 1.0
+            for kind, value in rates.items()
+        ]
         return np.column_stack([*ratios, beyond.max(axis=1)])
 
 
 def recheck(path: Path) -> dict[str, float]:
     """Largest excess over every kind of limit of a result file."""
     motion = SavedMotion(path)
-    piece, u = (part.ravel() for part in np.broadcast_arrays(np.arange(motion.pieces)[:, None], _PLACES))
+    piece, u = (
+        part.ravel()
+        for part in np.broadcast_arrays(np.arange(motion.pieces)[:, None], _PLACES)
+    )
     close, at = _near_zeros(motion, piece, u)
     piece, u = np.concatenate([piece, close]), np.concatenate([u, at])
     excess = motion.excesses(piece, u)
     worst, reach = excess.max(axis=0), 1.5 / (len(_PLACES) - 1)
     for _ in range(_ZOOMS):
-        best = np.unique(np.argpartition(-excess, min(_PEAKS, len(excess) - 1), axis=0)[:_PEAKS])
-        piece, u = np.repeat(piece[best], 41), (u[best, None] + reach * np.linspace(-1.0, 1.0, 41)).ravel()
+        best = np.unique(
+            np.argpartition(-excess, min(_PEAKS, len(excess) - 1), axis=0)[:_PEAKS]
+        )
+        piece, u = (
+            np.repeat(piece[best], 41),
+            (u[best, None] + reach * np.linspace(-1.0, 1.0, 41)).ravel(),
+        )
         excess = motion.excesses(piece, np.clip(u, 0.0, 1.0))
         worst, reach = np.maximum(worst, excess.max(axis=0)), reach / 15.0
     return dict(zip(KINDS, worst.tolist(), strict=True))
 
 
-def _near_zeros(motion: SavedMotion, piece: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _near_zeros(
+    motion: SavedMotion, piece: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Places ever closer to where a velocity is zero or least, of joints with Coulomb friction."""
     places = len(_PLACES)
     speed = motion.states(piece, u)[1].reshape(motion.pieces, places, motion.n)
     found = [(np.empty(0, dtype=int), np.empty(0))]
     for joint in np.flatnonzero(motion.friction["coulomb"] > 0.0):
         v, width = speed[:, :, joint], motion.friction["coulomb_velocity"][joint]
-        least = np.abs(v) <= np.minimum(np.abs(np.roll(v, 1, axis=1)), np.abs(np.roll(v, -1, axis=1)))
+        least = np.abs(v) <= np.minimum(
+            np.abs(np.roll(v, 1, axis=1)), np.abs(np.roll(v, -1, axis=1))
+        )
         crossing = np.pad(v[:, 1:] * v[:, :-1] <= 0.0, ((0, 0), (0, 1)))
         least[:, [0, -1]] = True
         moving = np.abs(v).max(axis=1, keepdims=True) > 0.1 * width
@@ -155,10 +185,15 @@ def _powers(arrays: Mapping[str, np.ndarray], h: np.ndarray) -> np.ndarray:
 
 def _model(urdf: str, names: list[str], settings: Mapping[str, object]) -> pin.Model:
     """Pinocchio's model of the chain, all other joints held at zero."""
-    root = ET.fromstring(urdf)  # noqa: S314  (a file of ours)
+    root = ET.fromstring(urdf)
     for joint in root.iter("joint"):
         if joint.get("name") in names:
-            joint.set("type", {"continuous": "revolute"}.get(joint.get("type", ""), joint.get("type", "")))
+            joint.set(
+                "type",
+                {"continuous": "revolute"}.get(
+                    joint.get("type", ""), joint.get("type", "")
+                ),
+            )
             if joint.find("limit") is None:
                 ET.SubElement(joint, "limit", effort="0", velocity="0")
             joint.find("limit").attrib.update(lower="-1e9", upper="1e9")
@@ -174,22 +209,40 @@ def _model(urdf: str, names: list[str], settings: Mapping[str, object]) -> pin.M
     return model
 
 
-def _limits(urdf: str, names: list[str], settings: Mapping[str, object]) -> dict[str, np.ndarray]:
+def _limits(
+    urdf: str, names: list[str], settings: Mapping[str, object]
+) -> dict[str, np.ndarray]:
     """Limits of every joint; infinite where there is none."""
-    stated = {joint.get("name"): joint for joint in ET.fromstring(urdf).iter("joint") if joint.get("type")}  # noqa: S314
+    stated = {
+        joint.get("name"): joint
+        for joint in ET.fromstring(urdf).iter("joint")
+        if joint.get("type")
+    }
 
     def of_urdf(key: str) -> list[float]:
         found = [stated[name].find("limit") for name in names]
-        return [np.inf if limit is None else float(limit.get(key, "inf")) for limit in found]
+        return [
+            np.inf if limit is None else float(limit.get(key, "inf")) for limit in found
+        ]
 
     scale = settings["scale"]
     limits = {}
-    for kind, key in (("torque", "effort"), ("velocity", "velocity"), ("acceleration", "")):
+    for kind, key in (
+        ("torque", "effort"),
+        ("velocity", "velocity"),
+        ("acceleration", ""),
+    ):
         own = settings[kind]
         values = of_urdf(key) if key else [np.inf] * len(names)
-        limits[kind] = (np.array(values) if own == "urdf" else _spread(own, names, values)) * scale[kind]
+        limits[kind] = (
+            np.array(values) if own == "urdf" else _spread(own, names, values)
+        ) * scale[kind]
     turning = [stated[name].get("type") == "continuous" for name in names]
-    lower = np.where(turning, -np.inf, [-value if value == np.inf else value for value in of_urdf("lower")])
+    lower = np.where(
+        turning,
+        -np.inf,
+        [-value if value == np.inf else value for value in of_urdf("lower")],
+    )
     upper = np.where(turning, np.inf, of_urdf("upper"))
     own = settings["position"]
     if own is None:
@@ -205,16 +258,27 @@ def _limits(urdf: str, names: list[str], settings: Mapping[str, object]) -> dict
     return {**limits, "lower": lower, "upper": upper}
 
 
-def _friction(urdf: str, names: list[str], settings: Mapping[str, object]) -> dict[str, np.ndarray]:
+def _friction(
+    urdf: str, names: list[str], settings: Mapping[str, object]
+) -> dict[str, np.ndarray]:
     """Friction of every joint; the URDF's where the task does not say."""
-    stated = {joint.get("name"): joint.find("dynamics") for joint in ET.fromstring(urdf).iter("joint")}  # noqa: S314
+    stated = {
+        joint.get("name"): joint.find("dynamics")
+        for joint in ET.fromstring(urdf).iter("joint")
+    }
     terms = {
-        key: _spread(settings[key], names, value) for key, value in (("armature", 0.0), ("coulomb_velocity", 0.01))
+        key: _spread(settings[key], names, value)
+        for key, value in (("armature", 0.0), ("coulomb_velocity", 0.01))
     }
     for key, word in (("viscous", "damping"), ("coulomb", "friction")):
-        rubbing = [0.0 if stated[name] is None else float(stated[name].get(word, "0")) for name in names]
+        rubbing = [
+            0.0 if stated[name] is None else float(stated[name].get(word, "0"))
+            for name in names
+        ]
         own = settings[key]
-        terms[key] = _spread(rubbing if own == "urdf" else 0.0 if own is None else own, names, rubbing)
+        terms[key] = _spread(
+            rubbing if own == "urdf" else 0.0 if own is None else own, names, rubbing
+        )
     return terms
 
 
@@ -222,9 +286,13 @@ def _spread(value: object, names: list[str], missing: object) -> np.ndarray:
     """One value for every joint: of a number, a list or a mapping; infinite for null."""
     default = list(missing) if isinstance(missing, list) else [missing] * len(names)
     if isinstance(value, Mapping):
-        listed = [value.get(name, other) for name, other in zip(names, default, strict=True)]
+        listed = [
+            value.get(name, other) for name, other in zip(names, default, strict=True)
+        ]
     else:
-        listed = list(value) if isinstance(value, (list, tuple)) else [value] * len(names)
+        listed = (
+            list(value) if isinstance(value, (list, tuple)) else [value] * len(names)
+        )
     return np.array([np.inf if one is None else one for one in listed], dtype=float)
 
 
@@ -233,20 +301,32 @@ def _spread(value: object, names: list[str], missing: object) -> np.ndarray:
 
 def urdf_of(name: str) -> Path:
     """URDF of a robot."""
-    return random_poses.stored_urdf(random_poses.PANDA) if name == "panda" else ROOT / f"robots/{name}/robot.urdf"
+    return (
+        random_poses.stored_urdf(random_poses.PANDA)
+        if name == "panda"
+        else ROOT / f"robots/{name}/robot.urdf"
+    )
 
 
-def random_task(name: str, seed: int, number: int, folder: Path, time_limit: float = 15.0) -> dict[str, object]:
+def random_task(
+    name: str, seed: int, number: int, folder: Path, time_limit: float = 15.0
+) -> dict[str, object]:
     """Make a task mapping; the same for the same arguments. A CSV file that it needs goes into `folder`."""
     rng = np.random.default_rng([seed, ROBOTS.index(name), number])
     tool, space = TOOLS.get(name), SPACES.get(name, "pose")
-    gravity = _tilted(rng, np.zeros(3) if name in ("scara3", "gantry2") else np.array([0.0, 0.0, -9.81]))
+    gravity = _tilted(
+        rng,
+        np.zeros(3) if name in ("scara3", "gantry2") else np.array([0.0, 0.0, -9.81]),
+    )
     robot = Robot.from_urdf(urdf_of(name), tool_frame=tool, gravity=gravity)
     while True:
         joint_path = _joint_motion(rng, robot)
-        tau = np.abs([pin.rnea(robot.model, robot.model.createData(), q, 0.0 * q, 0.0 * q) for q in joint_path]).max(
-            axis=0
-        )
+        tau = np.abs(
+            [
+                pin.rnea(robot.model, robot.model.createData(), q, 0.0 * q, 0.0 * q)
+                for q in joint_path
+            ]
+        ).max(axis=0)
         if np.all(tau < 0.6 * robot.limits.torque) or name == "scara3":
             break
     limits, friction = _random_limits(rng, robot, joint_path, tau)
@@ -263,7 +343,9 @@ def random_task(name: str, seed: int, number: int, folder: Path, time_limit: flo
         },
         "start": {"joints": joint_path[0].tolist()},
         "task_space": space,
-        "path": _random_path(rng, robot, joint_path, space, folder / f"{name}_{number}.csv"),
+        "path": _random_path(
+            rng, robot, joint_path, space, folder / f"{name}_{number}.csv"
+        ),
         "search": {"effort": "single", "time_limit": time_limit},
         "solver": {"time_limit": 0.2 * time_limit},
         "spline": {
@@ -275,7 +357,10 @@ def random_task(name: str, seed: int, number: int, folder: Path, time_limit: flo
     }
     task["redundant_joints"] = _redundant(rng, name, joint_path, space)
     if rng.random() < 0.15:
-        task |= {"start": "free", "path_start": _coordinates(robot, joint_path[0], space)}
+        task |= {
+            "start": "free",
+            "path_start": _coordinates(robot, joint_path[0], space),
+        }
     return task
 
 
@@ -287,12 +372,17 @@ def _tilted(rng: np.random.Generator, gravity: np.ndarray) -> np.ndarray:
 def _joint_motion(rng: np.random.Generator, robot: Robot) -> np.ndarray:
     """Random smooth joint motion (50, n) within the ranges."""
     limits = robot.limits
-    lower, upper = np.maximum(limits.position_lower, -np.pi), np.minimum(limits.position_upper, np.pi)
+    lower, upper = (
+        np.maximum(limits.position_lower, -np.pi),
+        np.minimum(limits.position_upper, np.pi),
+    )
     middle, half = 0.5 * (lower + upper), 0.4 * (upper - lower)
     s = np.linspace(0.0, 1.0, 50)[:, None]
     first = middle + half * rng.uniform(-0.8, 0.8, robot.n)
     way, bow = rng.uniform(-0.4, 0.4, robot.n), rng.uniform(-0.1, 0.1, robot.n)
-    return np.clip(first + way * s + bow * np.sin(np.pi * s), middle - half, middle + half)
+    return np.clip(
+        first + way * s + bow * np.sin(np.pi * s), middle - half, middle + half
+    )
 
 
 def _random_limits(
@@ -303,40 +393,82 @@ def _random_limits(
     torque = np.maximum(rng.uniform(0.4, 1.0, n) * robot.limits.torque, 1.6 * held)
     rubbing = rng.random(n) < 0.7
     friction = {
-        "armature": dict(zip(names, (rng.uniform(0.0, 0.02, n) * torque).tolist(), strict=True)),
-        "viscous": dict(zip(names, (rng.uniform(0.0, 0.03, n) * torque).tolist(), strict=True)),
-        "coulomb": dict(zip(names, (rubbing * rng.uniform(0.0, 0.2, n) * torque).tolist(), strict=True)),
-        "coulomb_velocity": dict(zip(names, (10.0 ** rng.uniform(-5.0, -1.0, n)).tolist(), strict=True)),
+        "armature": dict(
+            zip(names, (rng.uniform(0.0, 0.02, n) * torque).tolist(), strict=True)
+        ),
+        "viscous": dict(
+            zip(names, (rng.uniform(0.0, 0.03, n) * torque).tolist(), strict=True)
+        ),
+        "coulomb": dict(
+            zip(
+                names,
+                (rubbing * rng.uniform(0.0, 0.2, n) * torque).tolist(),
+                strict=True,
+            )
+        ),
+        "coulomb_velocity": dict(
+            zip(names, (10.0 ** rng.uniform(-5.0, -1.0, n)).tolist(), strict=True)
+        ),
     }
     ranges: dict[str, list[float | None]] = {}
-    for name, low, high in zip(names, joint_path.min(axis=0), joint_path.max(axis=0), strict=True):
+    for name, low, high in zip(
+        names, joint_path.min(axis=0), joint_path.max(axis=0), strict=True
+    ):
         room = rng.uniform(0.05, 0.5, 2)
         ends = [float(low - room[0]), float(high + room[1])]
         kind = rng.integers(0, 8)
-        forms = {0: [ends[0], None], 1: [None, ends[1]], 2: [ends[0], 1e4], 3: [-1e4, ends[1]], 4: ends}
+        forms = {
+            0: [ends[0], None],
+            1: [None, ends[1]],
+            2: [ends[0], 1e4],
+            3: [-1e4, ends[1]],
+            4: ends,
+        }
         if kind in forms:
             ranges[name] = forms[kind]
-    limits: dict[str, object] = {"torque": dict(zip(names, torque.tolist(), strict=True)), "position": ranges}
+    limits: dict[str, object] = {
+        "torque": dict(zip(names, torque.tolist(), strict=True)),
+        "position": ranges,
+    }
     if rng.random() < 0.3:
-        limits["acceleration"] = dict(zip(names, rng.uniform(3.0, 30.0, n).tolist(), strict=True))
+        limits["acceleration"] = dict(
+            zip(names, rng.uniform(3.0, 30.0, n).tolist(), strict=True)
+        )
     if rng.random() < 0.3:
         limits["scale"] = {"velocity": float(rng.uniform(0.4, 1.0))}
     return limits, friction
 
 
-def _random_path(rng: np.random.Generator, robot: Robot, joint_path: np.ndarray, space: object, csv: Path) -> object:
+def _random_path(
+    rng: np.random.Generator,
+    robot: Robot,
+    joint_path: np.ndarray,
+    space: object,
+    csv: Path,
+) -> object:
     """Segments near the tool's path along the motion."""
     placements = [robot.tool_placement(q) for q in joint_path]
     rows = 3 if space == "pose" else 2
     points = np.array([placement.translation[:rows] for placement in placements])
-    quaternions = np.array([pin.Quaternion(placement.rotation).coeffs() for placement in placements])[:, [3, 0, 1, 2]]
+    quaternions = np.array(
+        [pin.Quaternion(placement.rotation).coeffs() for placement in placements]
+    )[:, [3, 0, 1, 2]]
     turn = pin.log3(placements[-1].rotation @ placements[0].rotation.T)
     angle = float(np.linalg.norm(turn))
-    turning = {"rotate": {"axis": (turn / max(angle, 1e-9)).tolist(), "angle_deg": float(np.rad2deg(angle))}}
+    turning = {
+        "rotate": {
+            "axis": (turn / max(angle, 1e-9)).tolist(),
+            "angle_deg": float(np.rad2deg(angle)),
+        }
+    }
     extra = {"orientation": turning} if space == "pose" and angle > 1e-6 else {}
-    kind = rng.choice(["line", "arc", "spline", "blend", "csv"], p=[0.3, 0.15, 0.15, 0.2, 0.2])
+    kind = rng.choice(
+        ["line", "arc", "spline", "blend", "csv"], p=[0.3, 0.15, 0.15, 0.2, 0.2]
+    )
     if kind == "arc":
-        return [{"arc": {"via": points[25].tolist(), "to": points[-1].tolist()}, **extra}]
+        return [
+            {"arc": {"via": points[25].tolist(), "to": points[-1].tolist()}, **extra}
+        ]
     if kind == "blend":
         corner = points[25] + 0.1 * (points[25] - points[0])
         sides = np.linalg.norm([corner - points[0], points[-1] - corner], axis=1)
@@ -351,7 +483,9 @@ def _random_path(rng: np.random.Generator, robot: Robot, joint_path: np.ndarray,
     if kind == "csv":
         table = np.hstack([points, quaternions]) if space == "pose" else points
         header = "x,y,z,qw,qx,qy,qz" if space == "pose" else "x,y"
-        np.savetxt(csv, table[::7], fmt="%.9f", delimiter=",", header=header, comments="")
+        np.savetxt(
+            csv, table[::7], fmt="%.9f", delimiter=",", header=header, comments=""
+        )
         return [{"csv": {"file": str(csv), "relative": True}}]
     return [{"line": {"to": points[-1].tolist()}, **extra}]
 
@@ -364,7 +498,9 @@ def _closed_forms(name: str) -> list[ik.Candidate]:
     return [c for c in found if c.solver is not None and c.solver.kind == "closed_form"]
 
 
-def _redundant(rng: np.random.Generator, name: str, joint_path: np.ndarray, space: object) -> list[str]:
+def _redundant(
+    rng: np.random.Generator, name: str, joint_path: np.ndarray, space: object
+) -> list[str]:
     """Redundant joints: of those with a closed form one of the two with the most room along the motion."""
     forms = _closed_forms(name)
     if space == "pose":
@@ -388,15 +524,26 @@ def planned(
     began = time.perf_counter()
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PlausibilityWarning)  # far ranges look like mm and degrees
-            result = plan(random_task(name, seed, number, folder, time_limit), strict=False)
+            warnings.simplefilter(
+                "ignore", PlausibilityWarning
+            )  # far ranges look like mm and degrees
+            result = plan(
+                random_task(name, seed, number, folder, time_limit), strict=False
+            )
     except BrachisError as error:
         return name, f"{type(error).__name__}: {error}", {}, time.perf_counter() - began
     seconds = time.perf_counter() - began
     path = folder / f"{name}_{number}.npz"
     result.trajectory.save(path)
-    failed = ", ".join(check.name for check in result.verification.checks if not check.passed)
-    return name, f"unverified: {failed}" if failed else "verified", recheck(path), seconds
+    failed = ", ".join(
+        check.name for check in result.verification.checks if not check.passed
+    )
+    return (
+        name,
+        f"unverified: {failed}" if failed else "verified",
+        recheck(path),
+        seconds,
+    )
 
 
 def outcomes(
@@ -405,7 +552,10 @@ def outcomes(
     """Plan `count` tasks, the robots in turn."""
     with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(jobs) as pool:
         numbered = [(names[i % len(names)], i // len(names)) for i in range(count)]
-        futures = [(name, k, pool.submit(planned, name, seed, k, Path(folder))) for name, k in numbered]
+        futures = [
+            (name, k, pool.submit(planned, name, seed, k, Path(folder)))
+            for name, k in numbered
+        ]
         for name, k, future in futures:
             yield name, k, future.result()
 
@@ -419,17 +569,28 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=1)
     chosen = parser.parse_args()
     names = (chosen.robot,) if chosen.robot else ROBOTS
-    rows: dict[str, list[tuple[str, dict[str, float], float]]] = {name: [] for name in names}
+    rows: dict[str, list[tuple[str, dict[str, float], float]]] = {
+        name: [] for name in names
+    }
     wrong = 0
-    for name, number, (_, outcome, excess, seconds) in outcomes(names, chosen.seed, chosen.count, chosen.jobs):
+    for name, number, (_, outcome, excess, seconds) in outcomes(
+        names, chosen.seed, chosen.count, chosen.jobs
+    ):
         rows[name].append((outcome, excess, seconds))
         lie = outcome == "verified" and max(excess.values()) > ALLOWED
         wrong += lie
         if lie or outcome != "verified":
             found = ", ".join(f"{kind} {value:+.2e}" for kind, value in excess.items())
-            print(f"{name} {number}: {'WRONGLY ' if lie else ''}{outcome.splitlines()[0]} [{found}]", flush=True)
+            print(
+                f"{name} {number}: {'WRONGLY ' if lie else ''}{outcome.splitlines()[0]} [{found}]",
+                flush=True,
+            )
     for name, entries in rows.items():
-        good = [max(excess.values()) for outcome, excess, _ in entries if outcome == "verified"]
+        good = [
+            max(excess.values())
+            for outcome, excess, _ in entries
+            if outcome == "verified"
+        ]
         made = sum(bool(excess) for _, excess, _ in entries)
         times = [seconds for *_, seconds in entries]
         print(

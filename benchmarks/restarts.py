@@ -33,17 +33,29 @@ from mixed_robots import ROBOTS
 BUMP = 1.5  # rad and m
 
 
-def random_wish(rng: np.random.Generator, problem: Problem, known: np.ndarray) -> np.ndarray:
+def random_wish(
+    rng: np.random.Generator, problem: Problem, known: np.ndarray
+) -> np.ndarray:
     """Joint path, (K, n), towards which a restart leans; it begins at a given start posture."""
     if problem.start is None and rng.random() < 0.5:
         return mixed_cases.random_motion(rng, problem.robot)
     s = np.linspace(0.0, 1.0, len(known))[:, None]
     sizes = rng.uniform(-1.0, 1.0, (3, problem.robot.n)) * rng.uniform(0.0, BUMP)
-    bumps = sizes[0] * s + sizes[1] * np.sin(np.pi * s) + 0.5 * sizes[2] * np.sin(2.0 * np.pi * s)
-    return known + bumps + (rng.uniform(-BUMP, BUMP, problem.robot.n) if problem.start is None else 0.0)
+    bumps = (
+        sizes[0] * s
+        + sizes[1] * np.sin(np.pi * s)
+        + 0.5 * sizes[2] * np.sin(2.0 * np.pi * s)
+    )
+    return (
+        known
+        + bumps
+        + (rng.uniform(-BUMP, BUMP, problem.robot.n) if problem.start is None else 0.0)
+    )
 
 
-def random_joint_path(rng: np.random.Generator, problem: Problem, known: np.ndarray) -> np.ndarray:
+def random_joint_path(
+    rng: np.random.Generator, problem: Problem, known: np.ndarray
+) -> np.ndarray:
     """Joint path, (K, n), near the prescribed path, from which a restart begins; it ends at a given end posture."""
     wish, limits = random_wish(rng, problem, known), problem.robot.limits
     targets = problem.path.sample(np.linspace(0.0, 1.0, len(known))).target
@@ -54,7 +66,9 @@ def random_joint_path(rng: np.random.Generator, problem: Problem, known: np.ndar
         joint_path.append(q)
     postures = np.array(joint_path)
     if problem.end is not None:
-        postures += np.linspace(0.0, 1.0, len(postures))[:, None] * (problem.end - postures[-1])
+        postures += np.linspace(0.0, 1.0, len(postures))[:, None] * (
+            problem.end - postures[-1]
+        )
     return postures
 
 
@@ -65,7 +79,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--number", type=int, default=0)
     parser.add_argument("--restarts", type=int, default=30)
-    parser.add_argument("--points", type=int, default=10, help="collocation points per knot interval")
+    parser.add_argument(
+        "--points", type=int, default=10, help="collocation points per knot interval"
+    )
     parser.add_argument("--folder", type=Path, help="where task files go, or are")
     given = parser.parse_args()
     folder = given.folder or Path(tempfile.mkdtemp(prefix="mixed-tasks-"))
@@ -74,21 +90,37 @@ def main() -> None:
     warnings.simplefilter("ignore", PlausibilityWarning)
     task = load_task(case.task)
     problem = Problem.of(robot_for(None, task.robot), task)
-    program, rng = FullSpace(problem, given.points), np.random.default_rng([given.seed, given.number])
+    program, rng = (
+        FullSpace(problem, given.points),
+        np.random.default_rng([given.seed, given.number]),
+    )
     began, found = time.perf_counter(), []
     for restart in range(given.restarts):
-        joint_path = case.joint_path if restart == 0 else random_joint_path(rng, problem, case.joint_path)
+        joint_path = (
+            case.joint_path
+            if restart == 0
+            else random_joint_path(rng, problem, case.joint_path)
+        )
         x = program.starting_point(joint_path, rng.uniform(1.0, 3.0))
-        report = ipopt.solve(program, x, SolverOptions(max_iterations=1000, time_limit=60.0), None)
+        report = ipopt.solve(
+            program, x, SolverOptions(max_iterations=1000, time_limit=60.0), None
+        )
         status = report.status.name.lower()
-        print(f"  {restart}: {report.objective:.4f} s, {status}, {report.iterations} iterations", flush=True)
+        print(
+            f"  {restart}: {report.objective:.4f} s, {status}, {report.iterations} iterations",
+            flush=True,
+        )
         if report.feasible:
             found.append((report.objective, restart, report.x))
-    print(f"{len(found)} of {given.restarts} restarts ended in a motion, {time.perf_counter() - began:.0f} s")
+    print(
+        f"{len(found)} of {given.restarts} restarts ended in a motion, {time.perf_counter() - began:.0f} s"
+    )
     if found:
         best, restart, x = min(found, key=lambda each: each[0])
         beyond, off = program.in_between(x)
-        print(f"best of all joints: {best:.4f} s (restart {restart}); limits {beyond:+.1e}, path {off:.1e} in between")
+        print(
+            f"best of all joints: {best:.4f} s (restart {restart}); limits {beyond:+.1e}, path {off:.1e} in between"
+        )
     began = time.perf_counter()
     try:
         result = plan(task)
@@ -97,7 +129,9 @@ def main() -> None:
         return
     verified = "verified" if result.verified else "not verified"
     ratio = f", {result.t_end / best:.4f} times the best of all joints" if found else ""
-    print(f"plan: {result.t_end:.4f} s, {verified}, in {time.perf_counter() - began:.1f} s{ratio}")
+    print(
+        f"plan: {result.t_end:.4f} s, {verified}, in {time.perf_counter() - began:.1f} s{ratio}"
+    )
 
 
 if __name__ == "__main__":

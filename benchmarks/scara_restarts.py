@@ -19,7 +19,9 @@ from brachis.problem.problem import Problem, decompositions_of
 from brachis.search.solving import MARGINS, continued
 
 ROOT = Path(__file__).parents[1]
-spec = importlib.util.spec_from_file_location("scara_table", ROOT / "examples/02_scara_table.py")
+spec = importlib.util.spec_from_file_location(
+    "scara_table", ROOT / "examples/02_scara_table.py"
+)
 table = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(table)
 
@@ -41,7 +43,10 @@ def restarts(problem: Problem, count: int) -> dict[str, np.ndarray]:
         program = program_of(problem, joint_map, np.linspace(0.0, 1.0, 21))
         found = []
         for _ in range(4000):
-            x = starting_point(program, [random_joint_path(rng, problem.start[decomposition.redundant[0]])])
+            x = starting_point(
+                program,
+                [random_joint_path(rng, problem.start[decomposition.redundant[0]])],
+            )
             if x is None:
                 continue
             _, reports = continued(program, x, solve, MARGINS)
@@ -53,7 +58,9 @@ def restarts(problem: Problem, count: int) -> dict[str, np.ndarray]:
 
 
 def solve(program, x):
-    return solver_named("uno")[0].solve(program, x, SolverOptions(max_iterations=100, time_limit=5.0), None)
+    return solver_named("uno")[0].solve(
+        program, x, SolverOptions(max_iterations=100, time_limit=5.0), None
+    )
 
 
 def main() -> None:
@@ -64,11 +71,20 @@ def main() -> None:
     for angle in table.ANGLES_DEG:
         robot, task = table.robot_and_task(angle, "auto")
         result = plan(robot, task)
-        coarse = min(report.objective for report in result.attempt.reports if report.status.usable)
+        coarse = min(
+            report.objective
+            for report in result.attempt.reports
+            if report.status.usable
+        )
         times = restarts(Problem.of(robot, load_task(task)), count)
         best = min(found.min() for found in times.values())
-        medians = ", ".join(f"{name} {np.median(found):.4f} s" for name, found in times.items())
-        print(f"{angle} deg: auto {coarse:.4f} s, best restart {best:.4f} s; medians: {medians}", flush=True)
+        medians = ", ".join(
+            f"{name} {np.median(found):.4f} s" for name, found in times.items()
+        )
+        print(
+            f"{angle} deg: auto {coarse:.4f} s, best restart {best:.4f} s; medians: {medians}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -36,14 +36,24 @@ CURVE = ((0.0, 1.0), (0.3, 1.0), (1.0, 0.3))
 def planar_lines() -> Iterator[tuple[str, Result]]:
     """Yield the lines of examples/02 with every joint as the redundant one."""
     limits = LimitSpec(torque=10.0, velocity=None)
-    robot = Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
+    robot = Robot.from_urdf(
+        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits
+    )
     task = load_task(ROOT / "examples/01_scara_line.yaml").to_dict()
     for angle in range(0, 360, 45):
         for joint in ("j1", "j2", "j3"):
             line = [{"line": {"length": 1.0, "angle_deg": angle}}]
             yield (
                 f"{angle} deg, {joint}",
-                plan(robot, {**task, "path": line, "redundant_joints": [joint], "search": UNHURRIED}),
+                plan(
+                    robot,
+                    {
+                        **task,
+                        "path": line,
+                        "redundant_joints": [joint],
+                        "search": UNHURRIED,
+                    },
+                ),
             )
 
 
@@ -51,27 +61,47 @@ def rail_arm() -> Iterator[tuple[str, Result]]:
     """Yield the line of examples/03 with every joint that has a closed form as the redundant one."""
     task = load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
     for joint in ("rail", "joint_1", "joint_2", "joint_3"):
-        yield f"TX90L, {joint}", plan({**task, "redundant_joints": [joint], "search": UNHURRIED})
+        yield (
+            f"TX90L, {joint}",
+            plan({**task, "redundant_joints": [joint], "search": UNHURRIED}),
+        )
 
 
 def further() -> Iterator[tuple[str, Result]]:
     """Yield examples with many active limits and with a joint that none limits."""
     for name in ("04_ur10_rail_weld", "06_free_roll"):
-        yield name, plan({**load_task(ROOT / f"examples/{name}.yaml").to_dict(), "search": UNHURRIED})
+        yield (
+            name,
+            plan(
+                {
+                    **load_task(ROOT / f"examples/{name}.yaml").to_dict(),
+                    "search": UNHURRIED,
+                }
+            ),
+        )
 
 
 def kinds() -> Iterator[tuple[str, Result]]:
     """Yield motions held back by every kind of limit that the free motion exceeds."""
     scara = load_task(ROOT / "examples/01_scara_line.yaml").to_dict()
-    lines = {f"{angle} deg": [{"line": {"length": 1.0, "angle_deg": angle}}] for angle in (0, 45, 90)}
+    lines = {
+        f"{angle} deg": [{"line": {"length": 1.0, "angle_deg": angle}}]
+        for angle in (0, 45, 90)
+    }
     tasks = {name: {**scara, "path": line} for name, line in lines.items()}
     tasks["TX90L"] = load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
     for name, task in tasks.items():
-        single = {**task, "search": {**UNHURRIED, "effort": "single", "least_motion": False}}
+        single = {
+            **task,
+            "search": {**UNHURRIED, "effort": "single", "least_motion": False},
+        }
         for kind, (joints, tool) in held_back(plan(single).trajectory).items():
             limits = {**(task["robot"].get("limits") or {}), **joints}
             robot = {**task["robot"], "limits": limits}
-            yield f"{name}, {kind}", plan({**single, "robot": robot, "tool_limits": tool})
+            yield (
+                f"{name}, {kind}",
+                plan({**single, "robot": robot, "tool_limits": tool}),
+            )
 
 
 def held_back(free: Trajectory) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
@@ -87,22 +117,38 @@ def held_back(free: Trajectory) -> dict[str, tuple[dict[str, Any], dict[str, Any
     jerk = np.abs(free.jerk(t)).max(axis=0)
     rate = np.abs(np.gradient(motion.tau, t, axis=0)).max(axis=0)
     curves = {
-        name: [[x * v, y * tau] for x, y in CURVE] for name, v, tau in zip(names, fastest, strongest, strict=True)
+        name: [[x * v, y * tau] for x, y in CURVE]
+        for name, v, tau in zip(names, fastest, strongest, strict=True)
     }
     return {
-        "acceleration": ({"acceleration": (HELD * np.abs(motion.qddot).max(axis=0)).tolist()}, {}),
+        "acceleration": (
+            {"acceleration": (HELD * np.abs(motion.qddot).max(axis=0)).tolist()},
+            {},
+        ),
         "jerk": ({"jerk": (HELD * jerk).tolist()}, {}),
         "torque rate": ({"torque_rate": (HELD * rate).tolist()}, {}),
         "power": ({"power": (HELD * power.max(axis=0)).tolist()}, {}),
-        "total power": ({"total_power": HELD * np.abs(np.sum(motion.tau * motion.qdot, axis=1)).max()}, {}),
+        "total power": (
+            {
+                "total_power": HELD
+                * np.abs(np.sum(motion.tau * motion.qdot, axis=1)).max()
+            },
+            {},
+        ),
         "torque that falls with speed": ({"torque_speed": curves}, {}),
         "rms torque": ({"rms_torque": (0.95 * rms).tolist()}, {}),
         "tool speed": ({}, {"speed": HELD * speed}),
         "tool acceleration": (
             {},
-            {"acceleration": HELD * np.linalg.norm(np.gradient(velocity, t, axis=0)[5:-5], axis=1).max()},
+            {
+                "acceleration": HELD
+                * np.linalg.norm(np.gradient(velocity, t, axis=0)[5:-5], axis=1).max()
+            },
         ),
-        "process speed": ({}, {"process_speed": {"speed": 0.4 * speed, "s": [0.3, 0.7]}}),
+        "process speed": (
+            {},
+            {"process_speed": {"speed": 0.4 * speed, "s": [0.3, 0.7]}},
+        ),
     }
 
 
@@ -118,7 +164,11 @@ class Compared:
     @property
     def kind(self) -> str:
         label = self.at_step.sensitivity.label
-        tool = "tool " if label.subject.startswith("tool") and "process" not in label.kind else ""
+        tool = (
+            "tool "
+            if label.subject.startswith("tool") and "process" not in label.kind
+            else ""
+        )
         return tool + label.kind.replace("force", "torque")
 
     @property
@@ -132,19 +182,31 @@ class Compared:
     @property
     def central(self) -> float:
         """Change for `STEP` by central differences, s."""
-        return 0.5 * (self.wider.re_solved - self.narrower.re_solved) * STEP / SMALL_STEP
+        return (
+            0.5 * (self.wider.re_solved - self.narrower.re_solved) * STEP / SMALL_STEP
+        )
 
     @property
     def off(self) -> float:
         """How far the prediction is off it, as a fraction."""
-        return abs(self.at_step.predicted - self.central) / abs(self.central) if self.central else np.inf
+        return (
+            abs(self.at_step.predicted - self.central) / abs(self.central)
+            if self.central
+            else np.inf
+        )
 
     def __str__(self) -> str:
         """Return the cells of its line."""
         entry = self.at_step
-        limit = " ".join(filter(None, (str(entry.sensitivity.label), entry.sensitivity.bound.end)))
-        marks = ["not optimal"] * (not self.optimal) + ["> 5 %"] * (self.large and self.off > REQUIRED)
-        marks += [f"other optimum {1e3 * entry.other_optimum:+.2f} ms"] * bool(entry.other_optimum)
+        limit = " ".join(
+            filter(None, (str(entry.sensitivity.label), entry.sensitivity.bound.end))
+        )
+        marks = ["not optimal"] * (not self.optimal) + ["> 5 %"] * (
+            self.large and self.off > REQUIRED
+        )
+        marks += [f"other optimum {1e3 * entry.other_optimum:+.2f} ms"] * bool(
+            entry.other_optimum
+        )
         return (
             f"{limit} | {1e3 * entry.predicted:.4f} | {1e3 * self.central:.4f} | {100 * self.off:.2f} % "
             f"| {100 * self.nearer.deviation:.2f} % "
@@ -158,11 +220,20 @@ def compared(name: str, result: Result) -> list[Compared]:
     refined = result.attempt.refined
     assert refined is not None
     found = sensitivities(refined)
-    checks = [check_sensitivities(refined, found, step=step) for step in (STEP, SMALLER_STEP, SMALL_STEP, -SMALL_STEP)]
-    limits = [Compared(*entries) for entries in zip(*(check.entries for check in checks), strict=True)]
+    checks = [
+        check_sensitivities(refined, found, step=step)
+        for step in (STEP, SMALLER_STEP, SMALL_STEP, -SMALL_STEP)
+    ]
+    limits = [
+        Compared(*entries)
+        for entries in zip(*(check.entries for check in checks), strict=True)
+    ]
     limits = [each for each in limits if each.at_step.predicted]
     for each in limits:
-        print(f"| {name} | {checks[0].t_end:.4f} | {each} | {found.residual:.0e} |", flush=True)
+        print(
+            f"| {name} | {checks[0].t_end:.4f} | {each} | {found.residual:.0e} |",
+            flush=True,
+        )
     return limits
 
 
@@ -170,16 +241,36 @@ def worst(title: str, limits: list[Compared]) -> tuple[str, ...]:
     """Line of the summary."""
     large = [each for each in limits if each.large]
     offs = [each.off for each in large]
-    further = ("nearer", "deviation"), ("at_step", "deviation"), ("at_step", "linearised_deviation")
-    solved = [[getattr(getattr(each, check), figure) for each in large] for check, figure in further]
+    further = (
+        ("nearer", "deviation"),
+        ("at_step", "deviation"),
+        ("at_step", "linearised_deviation"),
+    )
+    solved = [
+        [getattr(getattr(each, check), figure) for each in large]
+        for check, figure in further
+    ]
     cells = [max(values, default=0.0) for values in (offs, *solved)]
     within = sum(off <= REQUIRED for off in offs)
-    return title, f"{within} of {len(large)}", *(f"{100 * cell:.1f} %" for cell in cells)
+    return (
+        title,
+        f"{within} of {len(large)}",
+        *(f"{100 * cell:.1f} %" for cell in cells),
+    )
 
 
 def main() -> None:
     """Print the table and the worst deviations."""
-    columns = "case", "t_E [s]", "limit", "predicted [ms]", "central [ms]", "off", "off at +0.1 %", "at +1 % [ms]"
+    columns = (
+        "case",
+        "t_E [s]",
+        "limit",
+        "predicted [ms]",
+        "central [ms]",
+        "off",
+        "off at +0.1 %",
+        "at +1 % [ms]",
+    )
     columns += "off at +1 %", "linearised, off at +1 %", "marks", "residual"
     print(f"| {' | '.join(columns)} |\n{'|---' * len(columns)}|")
     began, by_kind = processor_time(), defaultdict[str, list[Compared]](list)
@@ -188,7 +279,9 @@ def main() -> None:
             for each in compared(name, result):
                 by_kind[each.kind].append(each)
     everything = [each for limits in by_kind.values() for each in limits]
-    rows = [worst(kind, limits) for kind, limits in by_kind.items()] + [worst("all", everything)]
+    rows = [worst(kind, limits) for kind, limits in by_kind.items()] + [
+        worst("all", everything)
+    ]
     columns = (
         "limit",
         "within 5 % of central differences",
@@ -198,7 +291,9 @@ def main() -> None:
         "worst linearised at +1 %",
     )
     print("\n" + "\n".join(" | ".join(row) for row in (columns, *rows)))
-    print(f"solved again without an optimum: {sum(not each.optimal for each in everything)} of {len(everything)}")
+    print(
+        f"solved again without an optimum: {sum(not each.optimal for each in everything)} of {len(everything)}"
+    )
     print(f"{processor_time() - began:.1f} s of processor time in all")
     about = (
         "Changes of the end time by more than 0.1 ms for a limit that is 1 % wider: the derivative from the "

@@ -53,7 +53,18 @@ def sweep_of(plans: int) -> dict:
 
 
 def command(source: Path, out: Path, jobs: int) -> list[str]:
-    return [sys.executable, "-m", "brachis", "sweep", str(source), "--out", str(out), "--jobs", str(jobs), "--json"]
+    return [
+        sys.executable,
+        "-m",
+        "brachis",
+        "sweep",
+        str(source),
+        "--out",
+        str(out),
+        "--jobs",
+        str(jobs),
+        "--json",
+    ]
 
 
 def run(source: Path, out: Path, jobs: int) -> float:
@@ -75,10 +86,19 @@ def wait_for(out: Path, plans: int) -> None:
 def same(one: Path, other: Path) -> str:
     """Say whether two tables are the same; sums depend on how memory happens to be aligned, in their last digits."""
     tables = [brachis.SweepResult.load(out).table for out in (one, other)]
-    exact = [table.drop(["wall_time_s", "iterations", "worst_ratio", "path_error", "t_end_s"]) for table in tables]
+    exact = [
+        table.drop(
+            ["wall_time_s", "iterations", "worst_ratio", "path_error", "t_end_s"]
+        )
+        for table in tables
+    ]
     times = [np.array(table.column("t_end_s").to_pylist(), float) for table in tables]
     off = np.nanmax(abs(times[0] / times[1] - 1.0))
-    alike = exact[0].equals(exact[1]) and off < 1e-9 and (np.isnan(times[0]) == np.isnan(times[1])).all()
+    alike = (
+        exact[0].equals(exact[1])
+        and off < 1e-9
+        and (np.isnan(times[0]) == np.isnan(times[1])).all()
+    )
     return f"{'the same' if alike else 'ANOTHER'} table, end times to {off:.0e}"
 
 
@@ -90,7 +110,10 @@ def cluster(folder: Path) -> Iterator[tuple[Path, list[subprocess.Popen]]]:
     commands = [[DASK, "scheduler", "--port", "0", *common]]
     commands += [[DASK, "worker", "--nthreads", "1", "--no-nanny", *common]] * 2
     with (folder / "cluster.log").open("w") as log:
-        started = [subprocess.Popen(each, cwd=folder, stdout=log, stderr=log) for each in commands]
+        started = [
+            subprocess.Popen(each, cwd=folder, stdout=log, stderr=log)
+            for each in commands
+        ]
     try:
         while not file.exists():
             time.sleep(0.05)
@@ -113,7 +136,9 @@ def speed(source: Path, folder: Path) -> str:
 def killed(source: Path, folder: Path, plans: int) -> str:
     at = int(np.random.default_rng().integers(1, plans))
     out = folder / "killed"
-    with subprocess.Popen(command(source, out, 2), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen(
+        command(source, out, 2), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
         wait_for(out, at)
         process.kill()
     left = finished(out)
@@ -135,9 +160,16 @@ def on_dask(source: Path, folder: Path, plans: int) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--plans", type=int, default=1000)
-    parser.add_argument("--only", nargs="+", choices=["speed", "killed", "dask"], default=["speed", "killed", "dask"])
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        choices=["speed", "killed", "dask"],
+        default=["speed", "killed", "dask"],
+    )
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -17,7 +17,9 @@ from brachis.search.differential_ik import differential_ik_paths
 
 def first_point(program):
     """Start from the first joint path of numeric inverse kinematics."""
-    return starting_point(program, [next(differential_ik_paths(program.phases[0].joint_map))])
+    return starting_point(
+        program, [next(differential_ik_paths(program.phases[0].joint_map))]
+    )
 
 
 @pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
@@ -27,7 +29,9 @@ def test_plan_solved_once(benchmark, robot, make_task, joint):
 
     def solve():
         program, _ = transcribe(robot, task)
-        return solver_named("uno")[0].solve(program, first_point(program), SolverOptions(), None)
+        return solver_named("uno")[0].solve(
+            program, first_point(program), SolverOptions(), None
+        )
 
     report = benchmark(solve)
     assert report.status.usable
@@ -52,7 +56,11 @@ def test_fastest_motion(benchmark, robot, make_task, angle, jobs):
 
 def test_plan_from_urdf(benchmark, robot, make_task):
     """The library call with reading the URDF."""
-    result = benchmark(plan, robot.source, {**make_task("j1").to_dict(), "robot": {"gravity": [0, 0, 0]}})
+    result = benchmark(
+        plan,
+        robot.source,
+        {**make_task("j1").to_dict(), "robot": {"gravity": [0, 0, 0]}},
+    )
     assert result.verified
 
 

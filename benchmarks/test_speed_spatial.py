@@ -24,7 +24,9 @@ POSES = 2000
 
 def first_point(program):
     """Start from the first joint path of numeric inverse kinematics."""
-    return starting_point(program, [next(differential_ik_paths(program.phases[0].joint_map))])
+    return starting_point(
+        program, [next(differential_ik_paths(program.phases[0].joint_map))]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +44,9 @@ def test_plan_solved_once(benchmark, tx90l, task):
 
     def solve():
         program, _ = transcribe(tx90l, task)
-        return solver_named("uno")[0].solve(program, first_point(program), SolverOptions(), None)
+        return solver_named("uno")[0].solve(
+            program, first_point(program), SolverOptions(), None
+        )
 
     assert benchmark(solve).status.usable
 
@@ -52,7 +56,11 @@ def test_plan_solved_once(benchmark, tx90l, task):
 def test_plan_refined_and_verified(benchmark, tx90l, task, joint, effort):
     """The library call at N = 20."""
     search = {"effort": effort}
-    given = {**task.to_dict(), "redundant_joints": "auto" if joint == "auto" else [joint], "search": search}
+    given = {
+        **task.to_dict(),
+        "redundant_joints": "auto" if joint == "auto" else [joint],
+        "search": search,
+    }
     assert benchmark.pedantic(plan, (tx90l, given), rounds=5, warmup_rounds=1).verified
 
 
@@ -68,7 +76,11 @@ def test_evaluation(benchmark, tx90l, task, part):
         if part == "Jacobian":
             program.rows(x)
 
-    benchmark.pedantic(lambda: program.rows(x) if part == "rows" else program.jacobian(x), setup=another, rounds=200)
+    benchmark.pedantic(
+        lambda: program.rows(x) if part == "rows" else program.jacobian(x),
+        setup=another,
+        rounds=200,
+    )
 
 
 def poses(robot, task_map):

@@ -31,13 +31,24 @@ def task_of(number: int) -> dict[str, Any]:
     def size(low: float, high: float) -> float:
         return float(low * (high / low) ** rng.random())
 
-    limits: dict[str, Any] = {"torque": size(3.0, 30.0), "velocity": rng.choice((None, size(0.5, 8.0)))}
-    for kind, low, high in (("torque_rate", 10.0, 5000.0), ("jerk", 5.0, 5000.0), ("acceleration", 2.0, 50.0)):
+    limits: dict[str, Any] = {
+        "torque": size(3.0, 30.0),
+        "velocity": rng.choice((None, size(0.5, 8.0))),
+    }
+    for kind, low, high in (
+        ("torque_rate", 10.0, 5000.0),
+        ("jerk", 5.0, 5000.0),
+        ("acceleration", 2.0, 50.0),
+    ):
         if rng.random() < 0.5:
             limits[kind] = size(low, high)
     tool = {
         kind: size(low, high)
-        for kind, low, high in (("speed", 0.1, 2.0), ("acceleration", 0.5, 10.0), ("angular_speed", 0.3, 3.0))
+        for kind, low, high in (
+            ("speed", 0.1, 2.0),
+            ("acceleration", 0.5, 10.0),
+            ("angular_speed", 0.3, 3.0),
+        )
         if rng.random() < 0.15
     }
     degree = rng.choice((3, 3, 4, 5))
@@ -45,10 +56,16 @@ def task_of(number: int) -> dict[str, Any]:
         "brachis": 1,
         "robot": {"urdf": str(ROBOT), "gravity": [0, 0, 0], "limits": limits},
         "start": {
-            "joints": [rng.uniform(-1.5, 1.5), rng.choice((-1, 1)) * rng.uniform(1.0, 2.0), rng.uniform(0.5, 2.0)]
+            "joints": [
+                rng.uniform(-1.5, 1.5),
+                rng.choice((-1, 1)) * rng.uniform(1.0, 2.0),
+                rng.uniform(0.5, 2.0),
+            ]
         },
         "task_space": ["x", "y"],
-        "path": [{"line": {"length": size(0.05, 0.6), "angle_deg": rng.uniform(0.0, 360.0)}}],
+        "path": [
+            {"line": {"length": size(0.05, 0.6), "angle_deg": rng.uniform(0.0, 360.0)}}
+        ],
         "redundant_joints": [rng.choice(("j1", "j3"))],
         "tool_limits": tool,
         "spline": {
@@ -72,21 +89,30 @@ def run(number: int) -> tuple[str, str]:
     if best.violation > result.trajectory.task.refinement.tolerance:
         return "not refined in time", ""
     failed = [check for check in result.verification.checks if not check.passed]
-    return "not verified", "; ".join(f"{check.name}: {check.in_words()}" for check in failed)
+    return "not verified", "; ".join(
+        f"{check.name}: {check.in_words()}" for check in failed
+    )
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description="Plan under third-order limits of every size.")
+    parser = argparse.ArgumentParser(
+        description="Plan under third-order limits of every size."
+    )
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=300)
-    parser.add_argument("--seconds", type=float, default=np.inf, help="after which no plan is begun")
+    parser.add_argument(
+        "--seconds", type=float, default=np.inf, help="after which no plan is begun"
+    )
     given = parser.parse_args()
     began, counts, refused = time.perf_counter(), Counter(), 0
     for number in range(given.first, given.first + given.count):
         if time.perf_counter() - began > given.seconds:
             break
         outcome, reason = run(number)
-        counts[outcome, "auto" if task_of(number)["spline"]["intervals"] == "auto" else "fixed"] += 1
+        counts[
+            outcome,
+            "auto" if task_of(number)["spline"]["intervals"] == "auto" else "fixed",
+        ] += 1
         if reason:
             refused += 1
             print(f"{number}: {reason}", flush=True)

@@ -33,7 +33,13 @@ from mixed_robots import ROOT
 
 ALLOWED = 1.5
 """s"""
-MIXED = {"scara3": (0, 1), "planar4": (0, 1, 2), "panda": (0, 2), "iiwa14": (0, 1, 3), "xarm7": (2,)}
+MIXED = {
+    "scara3": (0, 1),
+    "planar4": (0, 1, 2),
+    "panda": (0, 2),
+    "iiwa14": (0, 1, 3),
+    "xarm7": (2,),
+}
 MIXED |= {"tx90l_rail": (0, 2, 4), "ur10_rail": (1,)}
 """Numbers of mixed tasks."""
 POSTURES = {
@@ -66,20 +72,40 @@ def tasks(folder: Path) -> Iterator[tuple[str, Any]]:
         yield f"{robot} line", line(robot)
     yield "gen3_rails position", line("gen3_rails", task_space="position")
     downwards = {"position": [0.8, 0.5, 0.7], "quaternion_wxyz": [0.0, 1.0, 0.0, 0.0]}
-    yield "gen3_rails free start", line("gen3_rails", start="free", path_start=downwards)
-    yield "arm8 joints", line("arm8", task_space="joints", path=[{"spline": {"through": [[0.5] * 8, [0.1] * 8]}}])
+    yield (
+        "gen3_rails free start",
+        line("gen3_rails", start="free", path_start=downwards),
+    )
+    yield (
+        "arm8 joints",
+        line(
+            "arm8",
+            task_space="joints",
+            path=[{"spline": {"through": [[0.5] * 8, [0.1] * 8]}}],
+        ),
+    )
     yield "tx90l_rail 300 intervals", line("tx90l_rail", spline={"intervals": 300})
     yield (
         "tx90l_rail, rail locked",
         line(
             "tx90l_rail",
-            robot={"urdf": str(ROOT / "robots/tx90l_rail/robot.urdf"), "locked_joints": {"rail": 0.0}},
+            robot={
+                "urdf": str(ROOT / "robots/tx90l_rail/robot.urdf"),
+                "locked_joints": {"rail": 0.0},
+            },
             start={"joints": POSTURES["tx90l_rail"][1:]},
         ),
     )
-    for number in ("01_scara_line", "04_ur10_rail_weld", "06_free_roll", "09_payload_friction_jerk"):
+    for number in (
+        "01_scara_line",
+        "04_ur10_rail_weld",
+        "06_free_roll",
+        "09_payload_friction_jerk",
+    ):
         yield number, ROOT / f"examples/{number}.yaml"
-    spec = importlib.util.spec_from_file_location("seam", ROOT / "examples/08_cam_seam.py")
+    spec = importlib.util.spec_from_file_location(
+        "seam", ROOT / "examples/08_cam_seam.py"
+    )
     seam = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(seam)
     seam.write(folder / "seam.csv")
@@ -88,7 +114,11 @@ def tasks(folder: Path) -> Iterator[tuple[str, Any]]:
             "file": str(folder / "seam.csv"),
             "corner": "blend",
             "orientation": "rotation_vector",
-            "tolerance": {"position": "0.15 mm", "orientation": "0.1 deg", "corner": "5 mm"},
+            "tolerance": {
+                "position": "0.15 mm",
+                "orientation": "0.1 deg",
+                "corner": "5 mm",
+            },
         }
     }
     yield "seam", line("tx90l_rail", start="free", path=[csv])
@@ -104,12 +134,18 @@ def planned(task: Any, limit: float, jobs: int) -> str:
             warnings.simplefilter("ignore", PlausibilityWarning)
             result = brachis.plan(task.model_copy(update={"search": search}))
     except brachis.PlanningError as error:
-        return "time is up" if "within the time limit" in str(error) else f"FAULT {error}"
+        return (
+            "time is up" if "within the time limit" in str(error) else f"FAULT {error}"
+        )
     except brachis.BrachisError as error:
         return f"{type(error).__name__}: {error}"[:150]
     except Exception as error:  # noqa: BLE001  (what is looked for)
         return f"FAULT {type(error).__name__}: {error}"
-    how = "verified" if result.verified else f"unverified, {result.verification.worst_ratio:.3g}"
+    how = (
+        "verified"
+        if result.verified
+        else f"unverified, {result.verification.worst_ratio:.3g}"
+    )
     return f"{result.t_end:.3f} s, {how}{', interrupted' if result.interrupted else ''}"
 
 
@@ -126,7 +162,9 @@ def main() -> int:
     if not given.wall:
         deadline.time = types.SimpleNamespace(monotonic=clock)
         monitor.time = types.SimpleNamespace(perf_counter=clock)
-    brachis.plan(ROOT / "examples/01_scara_line.yaml")  # what is loaded on first use is not timed
+    brachis.plan(
+        ROOT / "examples/01_scara_line.yaml"
+    )  # what is loaded on first use is not timed
     faults, latest = 0, -math.inf
     with tempfile.TemporaryDirectory() as folder:
         for name, task in tasks(Path(folder)):
@@ -134,7 +172,9 @@ def main() -> int:
                 continue
             for limit in given.limits:
                 if given.where:
-                    faulthandler.dump_traceback_later(limit + 0.5 * ALLOWED, repeat=True)
+                    faulthandler.dump_traceback_later(
+                        limit + 0.5 * ALLOWED, repeat=True
+                    )
                 began, busy = time.perf_counter(), clock()
                 outcome = planned(task, limit, given.jobs)
                 late = clock() - busy - limit
@@ -143,7 +183,10 @@ def main() -> int:
                 latest = max(latest, late)
                 took = time.perf_counter() - began
                 mark = "LATE" if late > ALLOWED else ""
-                print(f"{name:45.45} {limit:4g} s {late:+6.2f} s, wall {took:6.2f} s {mark} {outcome}", flush=True)
+                print(
+                    f"{name:45.45} {limit:4g} s {late:+6.2f} s, wall {took:6.2f} s {mark} {outcome}",
+                    flush=True,
+                )
     print(f"{faults} faults; the latest answer came {latest:+.2f} s after its limit")
     return min(faults, 1)
 

@@ -36,9 +36,13 @@ def dead_links(folder: Path) -> list[str]:
             parts = urlsplit(link)
             if parts.scheme or parts.netloc:
                 continue
-            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            target = (
+                (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            )
             place = unquote(parts.fragment)
-            if not target.exists() or (place and target in pages and place not in pages[target].targets):
+            if not target.exists() or (
+                place and target in pages and place not in pages[target].targets
+            ):
                 dead.append(f"{path.relative_to(folder.resolve())}: {link}")
     return dead
 

@@ -14,7 +14,13 @@ project = "brachis"
 author = project_copyright = "The brachis authors"
 version = release = brachis.__version__
 sys.path.insert(0, str(ROOT / "docs"))
-extensions = ["sphinx.ext.autodoc", "numpydoc", "myst_nb", "sphinx_design", "docstring_links"]
+extensions = [
+    "sphinx.ext.autodoc",
+    "numpydoc",
+    "myst_nb",
+    "sphinx_design",
+    "docstring_links",
+]
 nitpicky = True
 templates_path: list[str] = []
 
@@ -46,6 +52,8 @@ def _isolated_clone(folder: Path) -> None:
     os.environ["IPYTHONDIR"] = str(folder / ".ipython")
 
 
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else every page would compile the package
+os.environ.pop(
+    "PYTHONDONTWRITEBYTECODE", None
+)  # else every page would compile the package
 _CLONE = tempfile.TemporaryDirectory(prefix="brachis-docs-")  # until Sphinx ends
 _isolated_clone(Path(_CLONE.name))

@@ -35,24 +35,44 @@ def names_in_source() -> frozenset[str]:
     return frozenset(names)
 
 
-def resolve(app: Sphinx, env: BuildEnvironment, node: pending_xref, contnode: nodes.Element) -> nodes.Element | None:
+def resolve(
+    app: Sphinx, env: BuildEnvironment, node: pending_xref, contnode: nodes.Element
+) -> nodes.Element | None:
     """Link a name by its end, as ``Trajectory.sample`` for ``brachis.Trajectory.sample``."""
     if (node.get("refdomain"), node.get("reftype")) != ("py", "obj"):
         return None
     target, objects = node["reftarget"], env.domains["py"].objects
     last = target.rsplit(".", 1)[-1]
-    ends = (f".{target}", f".{last}") if target.startswith("brachis.") else (f".{target}",)
+    ends = (
+        (f".{target}", f".{last}") if target.startswith("brachis.") else (f".{target}",)
+    )
     found = sorted((name for name in objects if name.endswith(ends)), key=len)
     if found and not last.islower():
         entry = objects[found[0]]
-        return make_refnode(app.builder, node["refdoc"], entry.docname, entry.node_id, contnode, found[0])
+        return make_refnode(
+            app.builder,
+            node["refdoc"],
+            entry.docname,
+            entry.node_id,
+            contnode,
+            found[0],
+        )
     return contnode if last in names_in_source() else None
 
 
-def without_sections(_app: Sphinx, what: str, _name: str, _obj: object, _options: object, lines: list[str]) -> None:
+def without_sections(
+    _app: Sphinx,
+    what: str,
+    _name: str,
+    _obj: object,
+    _options: object,
+    lines: list[str],
+) -> None:
     """Make headings of a module's docstring plain ones: numpydoc leaves those of modules, which would be sections."""
     if what == "module":
-        text = re.sub(r"^(\w+)\n-+$", r".. rubric:: \1\n", "\n".join(lines), flags=re.MULTILINE)
+        text = re.sub(
+            r"^(\w+)\n-+$", r".. rubric:: \1\n", "\n".join(lines), flags=re.MULTILINE
+        )
         lines[:] = text.split("\n")
 
 

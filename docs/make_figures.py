@@ -46,8 +46,8 @@ Planned = Mapping[str, brachis.Result]
 def load(path: str) -> ModuleType:
     """Import a Python file of the repository."""
     spec = importlib.util.spec_from_file_location(Path(path).stem, ROOT / path)
-    assert spec is not None  # noqa: S101
-    assert spec.loader is not None  # noqa: S101
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -83,9 +83,17 @@ def scara_line() -> Planned:
 def scara_table() -> Planned:
     """Draw the paper's table."""
     results = load("examples/02_scara_table.py").plan_all()
-    rows = [(float(angle), joint, each.t_end) for (angle, joint), each in results.items()]
-    save(plot_comparison(rows, "direction of the path", "\N{DEGREE SIGN}"), "scara_table")
-    return {f"{angle} deg, {joint}": each for (angle, joint), each in results.items() if angle == 90}  # noqa: PLR2004
+    rows = [
+        (float(angle), joint, each.t_end) for (angle, joint), each in results.items()
+    ]
+    save(
+        plot_comparison(rows, "direction of the path", "\N{DEGREE SIGN}"), "scara_table"
+    )
+    return {
+        f"{angle} deg, {joint}": each
+        for (angle, joint), each in results.items()
+        if angle == 90
+    }
 
 
 def tx90l_rail() -> Planned:
@@ -208,9 +216,14 @@ def main(names: list[str]) -> None:
         if not names or name in names:
             print(f"{name} ...", flush=True)  # noqa: T201
             results = make()
-            assert all(each.verified for each in results.values()), name  # noqa: S101
+            assert all(each.verified for each in results.values()), name
             figures[name] = {key: round(each.t_end, 4) for key, each in results.items()}
-    GALLERY.write_text(json.dumps({name: figures[name] for name in EXAMPLES if name in figures}, indent=1) + "\n")
+    GALLERY.write_text(
+        json.dumps(
+            {name: figures[name] for name in EXAMPLES if name in figures}, indent=1
+        )
+        + "\n"
+    )
     write_gallery()
 
 

@@ -68,18 +68,29 @@ def gallery() -> str:
     names = [name for name in PICTURES if name in recorded]
     cards = "\n".join(_card(name, recorded[name]) for name in names)
     grid = f"::::{{grid}} 1 2 3 3\n:gutter: 2\n\n{cards}::::\n"
-    return "\n".join([GALLERY_HEAD, grid, *(_example(name, recorded[name]) for name in names)])
+    return "\n".join(
+        [GALLERY_HEAD, grid, *(_example(name, recorded[name]) for name in names)]
+    )
 
 
 def _card(name: str, t_end: dict[str, float]) -> str:
     values = [f"{value:.3f}" for value in t_end.values()]
-    times = f"{values[0]} s" if len(values) == 1 else f"{min(values)} to {max(values)} s"
+    times = (
+        f"{values[0]} s" if len(values) == 1 else f"{min(values)} to {max(values)} s"
+    )
     return CARD.format(stem=_stem(name), picture=PICTURES[name], name=name, times=times)
 
 
 def _files(name: str) -> list[Path]:
-    patterns = (f"{name}_*.yaml", f"{name}_*.py", f"{name}/*.yaml", f"{name}/src/*/*.py")
-    return sorted(path for pattern in patterns for path in (ROOT / "examples").glob(pattern))
+    patterns = (
+        f"{name}_*.yaml",
+        f"{name}_*.py",
+        f"{name}/*.yaml",
+        f"{name}/src/*/*.py",
+    )
+    return sorted(
+        path for pattern in patterns for path in (ROOT / "examples").glob(pattern)
+    )
 
 
 def _stem(name: str) -> str:
@@ -106,22 +117,40 @@ def _about(files: list[Path]) -> str:
     """Return what an example says of itself: the docstring of its script, or the comment at the head of its task."""
     scripts = [path for path in files if path.suffix == ".py"]
     if scripts:
-        return (ast.get_docstring(ast.parse(scripts[0].read_text())) or "").split("\n\n")[0]
-    comment = [line.removeprefix("# ") for line in files[0].read_text().splitlines() if line.startswith("# ")]
+        return (ast.get_docstring(ast.parse(scripts[0].read_text())) or "").split(
+            "\n\n"
+        )[0]
+    comment = [
+        line.removeprefix("# ")
+        for line in files[0].read_text().splitlines()
+        if line.startswith("# ")
+    ]
     return " ".join(comment[:2])
 
 
 def benchmarks() -> str:
     """Return the page of all committed results."""
     return "\n".join(
-        [BENCHMARKS_HEAD, *(_benchmark(json.loads(path.read_text())) for path in sorted(RESULTS.glob("*.json")))]
+        [
+            BENCHMARKS_HEAD,
+            *(
+                _benchmark(json.loads(path.read_text()))
+                for path in sorted(RESULTS.glob("*.json"))
+            ),
+        ]
     )
 
 
 def _benchmark(result: dict[str, Any]) -> str:
-    lines = [f"## {result['title']}\n", f"`{result['command']}`, brachis {result['version']}, {result['machine']}.\n"]
+    lines = [
+        f"## {result['title']}\n",
+        f"`{result['command']}`, brachis {result['version']}, {result['machine']}.\n",
+    ]
     lines += [f"{result['about']}\n"] if result["about"] else []
-    lines += [f"| {' | '.join(result['columns'])} |", "|---" * len(result["columns"]) + "|"]
+    lines += [
+        f"| {' | '.join(result['columns'])} |",
+        "|---" * len(result["columns"]) + "|",
+    ]
     lines += [f"| {' | '.join(row)} |" for row in result["rows"]]
     return "\n".join(lines) + "\n"
 

@@ -335,14 +335,26 @@ def page() -> str:
     parts += [LIMITS_FILE, *rows(LimitsFile), PATH, *rows(MovingSegment)]
     for kind, shapes in SEGMENTS.items():
         for shape in shapes:
-            keys = ", ".join(f"{name}: ..." for name, field in shape.model_fields.items() if field.is_required())
+            keys = ", ".join(
+                f"{name}: ..."
+                for name, field in shape.model_fields.items()
+                if field.is_required()
+            )
             parts += [f"\n### `{kind}: {{{keys}}}`\n", *rows(shape)]
     parts += [TURN, ORIENTATION.rstrip()]
-    parts += [f"| `{name}` | {field.description} |" for name, field in Attitude.model_fields.items()]
+    parts += [
+        f"| `{name}` | {field.description} |"
+        for name, field in Attitude.model_fields.items()
+    ]
     parts += ["\n### `rotate: {axis: ..., angle_deg: ...}`\n", *rows(Rotation)]
     profile = Target.model_fields["profile"]
     parts += ["\n### `to: {...}`\n", "An orientation as above, and\n", *TABLE_HEAD]
-    parts += [_row("profile", profile), "\n### `tangent: {...}`\n", *rows(Tangent), CSV.rstrip()]
+    parts += [
+        _row("profile", profile),
+        "\n### `tangent: {...}`\n",
+        *rows(Tangent),
+        CSV.rstrip(),
+    ]
     for key, model in FILES.items():
         parts += [f"\n### `csv.{key}`\n", *rows(model)]
     return "\n".join(parts) + "\n"

@@ -19,10 +19,14 @@ PUBLISHED_S = {(90, "j3"): 2.51}
 """End times that the paper prints."""
 
 
-def robot_and_task(angle_deg: int, joint: str, intervals: int = 20) -> tuple[brachis.Robot, dict[str, object]]:
+def robot_and_task(
+    angle_deg: int, joint: str, intervals: int = 20
+) -> tuple[brachis.Robot, dict[str, object]]:
     """Return the paper's arm and one of its lines; `joint` is the redundant one, or auto."""
     limits = brachis.LimitSpec(torque=10.0, velocity=None)
-    robot = brachis.Robot.from_urdf(HERE.parent / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
+    robot = brachis.Robot.from_urdf(
+        HERE.parent / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits
+    )
     task = {
         "brachis": 1,
         "start": {"joints": [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]},
@@ -48,10 +52,15 @@ def markdown_table(results: dict[tuple[int, str], brachis.Result]) -> str:
     ]
     for angle in ANGLES_DEG:
         cells = [
-            f"{results[angle, joint].t_end:.3f} s" + ("" if results[angle, joint].verified else " (unverified)")
+            f"{results[angle, joint].t_end:.3f} s"
+            + ("" if results[angle, joint].verified else " (unverified)")
             for joint in JOINTS
         ]
-        published = "; ".join(f"{PUBLISHED_S[key]:.2f} s (q_r = {key[1]})" for key in PUBLISHED_S if key[0] == angle)
+        published = "; ".join(
+            f"{PUBLISHED_S[key]:.2f} s (q_r = {key[1]})"
+            for key in PUBLISHED_S
+            if key[0] == angle
+        )
         lines.append(f"| {angle} deg | {' | '.join(cells)} | {published} |")
     return "\n".join(lines)
 
@@ -62,12 +71,20 @@ def main() -> None:
     results = plan_all()
     print(markdown_table(results))
     verified = sum(result.verified for result in results.values())
-    print(f"\n{verified} of {len(results)} plans verified, {time.perf_counter() - began:.1f} s in all")
+    print(
+        f"\n{verified} of {len(results)} plans verified, {time.perf_counter() - began:.1f} s in all"
+    )
     if len(sys.argv) > 1:
-        from brachis.apps.plots import plot_comparison, save_figure  # noqa: PLC0415  (only when a figure is wanted)
+        from brachis.apps.plots import plot_comparison, save_figure
 
-        rows = [(float(angle), joint, result.t_end) for (angle, joint), result in results.items()]
-        save_figure(plot_comparison(rows, "direction of the path", "\N{DEGREE SIGN}"), sys.argv[1])
+        rows = [
+            (float(angle), joint, result.t_end)
+            for (angle, joint), result in results.items()
+        ]
+        save_figure(
+            plot_comparison(rows, "direction of the path", "\N{DEGREE SIGN}"),
+            sys.argv[1],
+        )
         print(f"wrote {sys.argv[1]}")
     if verified < len(results):
         sys.exit(1)

@@ -33,7 +33,10 @@ def markdown_table(results: dict[tuple[str, int], brachis.Result]) -> str:
     ]
     for joint in JOINTS:
         row = [results[joint, intervals] for intervals in INTERVALS]
-        cells = [f"{result.t_end:.4f} s" + ("" if result.verified else " (unverified)") for result in row]
+        cells = [
+            f"{result.t_end:.4f} s" + ("" if result.verified else " (unverified)")
+            for result in row
+        ]
         lines.append(f"| {joint} | {' | '.join(cells)} |")
     return "\n".join(lines)
 

@@ -39,7 +39,9 @@ def main() -> dict[str, brachis.Result]:
             "spline": {"intervals": 20},
         }
         result = results[joint] = brachis.plan(robot, task)
-        print(f"{joint}: {result.t_end:.3f} s, verified: {result.verified}, branch {result.trajectory.branch}")
+        print(
+            f"{joint}: {result.t_end:.3f} s, verified: {result.verified}, branch {result.trajectory.branch}"
+        )
     return results
 
 

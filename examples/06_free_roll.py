@@ -23,7 +23,9 @@ def main() -> dict[str, brachis.Result]:
         task["path"][0]["orientation"] = orientation
         result = results[name] = brachis.plan(task)
         joints = ", ".join(result.trajectory.redundant_joints)
-        print(f"{name}: {result.t_end:.3f} s, verified: {result.verified}, redundant joints {joints}")
+        print(
+            f"{name}: {result.t_end:.3f} s, verified: {result.verified}, redundant joints {joints}"
+        )
     return results
 
 

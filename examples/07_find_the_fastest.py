@@ -22,14 +22,21 @@ def variants(angle_deg: int) -> dict[str, dict[str, object]]:
     """Return the tasks of one line by name."""
     task = brachis.load_task(TASK).to_dict()
     task["path"][0]["line"]["angle_deg"] = angle_deg
-    usual = {joint: {**task, "redundant_joints": [joint], "search": USUAL} for joint in JOINTS}
+    usual = {
+        joint: {**task, "redundant_joints": [joint], "search": USUAL}
+        for joint in JOINTS
+    }
     free = {**task, "start": "free", "path_start": [3.0**0.5, 0.0]}
     return {**usual, "auto": task, "free start": free}
 
 
 def plan_all() -> dict[tuple[int, str], brachis.Result]:
     """Plan all lines in all ways; keys are angle in degrees and name."""
-    return {(angle, name): brachis.plan(task) for angle in ANGLES_DEG for name, task in variants(angle).items()}
+    return {
+        (angle, name): brachis.plan(task)
+        for angle in ANGLES_DEG
+        for name, task in variants(angle).items()
+    }
 
 
 def markdown_table(results: dict[tuple[int, str], brachis.Result]) -> str:
@@ -42,8 +49,15 @@ def markdown_table(results: dict[tuple[int, str], brachis.Result]) -> str:
         cells = []
         for name in (*JOINTS, "auto", "free start"):
             result = results[angle, name]
-            note = "" if name in JOINTS else f" ({', '.join(result.trajectory.redundant_joints) or 'chart'})"
-            cells.append(f"{result.t_end:.3f} s{note}" + ("" if result.verified else " (unverified)"))
+            note = (
+                ""
+                if name in JOINTS
+                else f" ({', '.join(result.trajectory.redundant_joints) or 'chart'})"
+            )
+            cells.append(
+                f"{result.t_end:.3f} s{note}"
+                + ("" if result.verified else " (unverified)")
+            )
         lines.append(f"| {angle} deg | {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -55,10 +69,12 @@ def main() -> None:
     print(markdown_table(results))
     verified = sum(result.verified for result in results.values())
     longest = max(results[angle, "auto"].timing["total"] for angle in ANGLES_DEG)
-    print(f"\n{verified} of {len(results)} plans verified, {time.perf_counter() - began:.1f} s in all")
+    print(
+        f"\n{verified} of {len(results)} plans verified, {time.perf_counter() - began:.1f} s in all"
+    )
     print(f"longest auto plan: {longest:.2f} s")
     if len(sys.argv) > 1:
-        from brachis.apps.plots import plot_candidates, save_figure  # noqa: PLC0415  (only when a figure is wanted)
+        from brachis.apps.plots import plot_candidates, save_figure
 
         save_figure(plot_candidates(results[180, "auto"].candidates), sys.argv[1])
         print(f"wrote {sys.argv[1]}")

@@ -26,9 +26,16 @@ def seam() -> np.ndarray:
     """Return the rows of the seam, (POINTS, 7): two waves along the rail, a corner of 40 degrees between them."""
     rng = np.random.default_rng(8)
     along = np.linspace(-1.0, 1.0, POINTS)
-    x = 800.0 + 600.0 * np.tan(CORNER) * np.abs(along) + 15.0 * np.sin(2.0 * np.pi * along)
+    x = (
+        800.0
+        + 600.0 * np.tan(CORNER) * np.abs(along)
+        + 15.0 * np.sin(2.0 * np.pi * along)
+    )
     z = 600.0 + 40.0 * np.cos(np.pi * along)
-    position = np.column_stack([x, 600.0 * along, z]) + rng.normal(size=(POINTS, 3)) * SCATTER_MM
+    position = (
+        np.column_stack([x, 600.0 * along, z])
+        + rng.normal(size=(POINTS, 3)) * SCATTER_MM
+    )
     tilt = np.column_stack([0.15 * np.sin(np.pi * along), 0.1 * along**2, 0.0 * along])
     down = Rotation.from_euler("xyz", [np.pi, 0.0, 0.0])
     turned = (Rotation.from_rotvec(tilt) * down).as_rotvec(degrees=True)
@@ -37,7 +44,9 @@ def seam() -> np.ndarray:
 
 def write(path: Path) -> None:
     """Write the seam as some controllers do."""
-    lines = [";".join(f"{value:.4f}" for value in row).replace(".", ",") for row in seam()]
+    lines = [
+        ";".join(f"{value:.4f}" for value in row).replace(".", ",") for row in seam()
+    ]
     path.write_text("\n".join([";".join(COLUMNS), *lines]) + "\n", encoding="utf-8-sig")
 
 
@@ -45,7 +54,9 @@ def main(figure: str | None = None) -> brachis.Result:
     """Write the seam, plan along it and say how near the path is to the points."""
     write(TASK.with_suffix(".csv"))
     result = brachis.plan(TASK)
-    print(f"{result.t_end:.4f} s, verified: {result.verified}, planned in {result.timing['total']:.1f} s")
+    print(
+        f"{result.t_end:.4f} s, verified: {result.verified}, planned in {result.timing['total']:.1f} s"
+    )
     for fit in result.fits:
         print(fit)
     if figure is not None:

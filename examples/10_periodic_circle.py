@@ -17,10 +17,15 @@ TASK = Path(__file__).with_suffix(".yaml")
 def plan_both() -> dict[str, brachis.Result]:
     """Plan the periodic motion, and the one from rest to rest, whose posture at the end is free."""
     task = brachis.load_task(TASK).to_dict()
-    return {"periodic": brachis.plan(task), "rest to rest": brachis.plan({**task, "boundary": {}})}
+    return {
+        "periodic": brachis.plan(task),
+        "rest to rest": brachis.plan({**task, "boundary": {}}),
+    }
 
 
-def turns(trajectory: brachis.Trajectory, count: int, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def turns(
+    trajectory: brachis.Trajectory, count: int, dt: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sample a periodic motion over several turns: times (K,), joint positions (K, n) and torques (K, n)."""
     t = np.arange(0.0, count * trajectory.t_end, dt)
     once = np.mod(t, trajectory.t_end)
@@ -34,7 +39,9 @@ def main() -> dict[str, brachis.Result]:
         print(f"{name}: {result.t_end:.3f} s a turn, verified: {result.verified}")
     t, q, tau = turns(results["periodic"].trajectory, count=3, dt=1e-4)
     steps = np.abs(np.diff(q, axis=0)).max(), np.abs(np.diff(tau, axis=0)).max()
-    print(f"three turns, {t[-1]:.2f} s, in steps of 0.1 ms: {steps[0]:.1e} rad and {steps[1]:.3f} Nm at most")
+    print(
+        f"three turns, {t[-1]:.2f} s, in steps of 0.1 ms: {steps[0]:.1e} rad and {steps[1]:.3f} Nm at most"
+    )
     return results
 
 

@@ -21,7 +21,9 @@ POINTS = 401
 """Points of the joint path through which toppra's spline runs."""
 
 
-def joint_points(robot: brachis.Robot, task: brachis.Task) -> tuple[np.ndarray, np.ndarray]:
+def joint_points(
+    robot: brachis.Robot, task: brachis.Task
+) -> tuple[np.ndarray, np.ndarray]:
     """Return dense points of a task's path of joints: s (POINTS,) and q (POINTS, n), rad."""
     s = np.linspace(0.0, 1.0, POINTS)
     robot, task_map = bind(robot, task.task_space)
@@ -29,7 +31,12 @@ def joint_points(robot: brachis.Robot, task: brachis.Task) -> tuple[np.ndarray, 
 
 
 def by_toppra(
-    robot: brachis.Robot, s: np.ndarray, q: np.ndarray, *, intervals: int = 2000, speeds: tuple[float, float] = (0, 0)
+    robot: brachis.Robot,
+    s: np.ndarray,
+    q: np.ndarray,
+    *,
+    intervals: int = 2000,
+    speeds: tuple[float, float] = (0, 0),
 ) -> float:
     """Time a path of joints with toppra; return the end time, s.
 
@@ -43,24 +50,34 @@ def by_toppra(
     speeds : tuple of float, optional
         Norms of the joint velocities at both ends, rad/s.
     """
-    import toppra  # noqa: PLC0415  (not everyone has it)
+    import toppra
 
     data = robot.model.createData()
 
-    def inverse_dynamics(q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+    def inverse_dynamics(
+        q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+    ) -> np.ndarray:
         return pin.rnea(robot.model, data, q, qdot, qddot)
 
     both_ways = np.array([-1.0, 1.0])
     path = toppra.SplineInterpolator(s, q)
     constraints = [
-        toppra.constraint.JointVelocityConstraint(robot.limits.velocity[:, None] * both_ways),
-        toppra.constraint.JointAccelerationConstraint(robot.limits.acceleration[:, None] * both_ways),
+        toppra.constraint.JointVelocityConstraint(
+            robot.limits.velocity[:, None] * both_ways
+        ),
+        toppra.constraint.JointAccelerationConstraint(
+            robot.limits.acceleration[:, None] * both_ways
+        ),
         toppra.constraint.JointTorqueConstraint(
-            inverse_dynamics, robot.limits.torque[:, None] * both_ways, np.zeros(robot.n)
+            inverse_dynamics,
+            robot.limits.torque[:, None] * both_ways,
+            np.zeros(robot.n),
         ),
     ]
     grid = np.linspace(0.0, 1.0, intervals + 1)
-    solver = toppra.algorithm.TOPPRA(constraints, path, gridpoints=grid, solver_wrapper="seidel")
+    solver = toppra.algorithm.TOPPRA(
+        constraints, path, gridpoints=grid, solver_wrapper="seidel"
+    )
     rates = speeds / np.linalg.norm(path(np.array([0.0, 1.0]), 1), axis=1)
     _, rate, _ = solver.compute_parameterization(*rates)
     return float(np.sum(2.0 * np.diff(grid) / (rate[1:] + rate[:-1])))

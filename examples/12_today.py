@@ -19,7 +19,9 @@ ROOT = Path(__file__).parents[1]
 
 def main(figure: str | None = None) -> brachis.Comparison:
     """Compare, print, and draw where a figure is named."""
-    found = brachis.compare(Path(__file__).with_suffix(".csv"), ROOT / "robots/scara3/robot.urdf")
+    found = brachis.compare(
+        Path(__file__).with_suffix(".csv"), ROOT / "robots/scara3/robot.urdf"
+    )
     print(found)
     if figure:
         save_figure(plot_today(found), figure)

@@ -34,7 +34,9 @@ def main() -> None:
     """Write every URDF that can be made here."""
     for path, make in MAKERS.items():
         if make is ur10_rail and example_robot_data() is None:
-            sys.stdout.write(f"{path}: left as it is, example-robot-data is not installed\n")
+            sys.stdout.write(
+                f"{path}: left as it is, example-robot-data is not installed\n"
+            )
             continue
         (ROBOTS / path).write_text(make(), encoding="utf-8")
         sys.stdout.write(f"{path}: written\n")
@@ -81,24 +83,35 @@ def ur10_rail() -> str:
         mass=given["carriage_mass"],
     )
     text = on_rail(folder / figures["arm"], rail, meshes=False)
-    element = etree.fromstring(text, etree.XMLParser(remove_blank_text=True, remove_comments=True))
+    element = etree.fromstring(
+        text, etree.XMLParser(remove_blank_text=True, remove_comments=True)
+    )
     element.set("name", figures["robot"])
     for tag in ("gazebo", "transmission"):
         for each in element.findall(tag):
             element.remove(each)
     for name in figures["drop"]:
-        joint = next(each for each in element.findall("joint") if each.find("child").get("link") == name)
+        joint = next(
+            each
+            for each in element.findall("joint")
+            if each.find("child").get("link") == name
+        )
         element.remove(joint)
         element.remove(element.find(f"link[@name='{name}']"))
     for name, visuals in figures["visuals"].items():
-        element.find(f"link[@name='{name}']").extend(visual_of(each) for each in visuals)
+        element.find(f"link[@name='{name}']").extend(
+            visual_of(each) for each in visuals
+        )
     return commented(element)
 
 
 MAKERS: dict[str, Callable[[], str]] = {
     "tx90l_rail/robot.urdf": tx90l_rail,
     "tx90l_rail/arm.urdf": tx90l,
-    **{f"{name}/robot.urdf": partial(alone, name) for name in ("iiwa14", "gen3", "arm8")},
+    **{
+        f"{name}/robot.urdf": partial(alone, name)
+        for name in ("iiwa14", "gen3", "arm8")
+    },
     "gen3_rails/robot.urdf": gen3_rails,
     "ur10_rail/robot.urdf": ur10_rail,
 }
@@ -113,17 +126,26 @@ def example_robot_data() -> Path | None:
 
 def read_figures(name: str) -> dict[str, Any]:
     """Figures of one robot."""
-    content: dict[str, Any] = yaml.safe_load((ROBOTS / name / "figures.yaml").read_text(encoding="utf-8"))
+    content: dict[str, Any] = yaml.safe_load(
+        (ROBOTS / name / "figures.yaml").read_text(encoding="utf-8")
+    )
     return content
 
 
-def robot(figures: Mapping[str, Any], name: str, joints: Sequence[Mapping[str, Any]]) -> str:
+def robot(
+    figures: Mapping[str, Any], name: str, joints: Sequence[Mapping[str, Any]]
+) -> str:
     """Text of the URDF with the links and visuals of `figures` and the given joints."""
     element = etree.Element("robot", name=name)
     for link, inertial in figures["links"].items():
         parts = [visual_of(each) for each in figures["visuals"].get(link, [])]
         if inertial:
-            parts.insert(0, elements.inertial(inertial["mass"], inertial["com"], inertial["inertia"]))
+            parts.insert(
+                0,
+                elements.inertial(
+                    inertial["mass"], inertial["com"], inertial["inertia"]
+                ),
+            )
         element.append(elements.link(link, *parts))
     element.extend(joint_of(each) for each in joints)
     return commented(element)
@@ -140,13 +162,21 @@ def joint_of(figures: Mapping[str, Any]) -> Element:
     kind = figures["type"]
     limit = None
     if kind in ("revolute", "continuous"):
-        limit = {"velocity": math.radians(figures["max_speed_deg_s"]), "effort": figures["torque_nm"]}
+        limit = {
+            "velocity": math.radians(figures["max_speed_deg_s"]),
+            "effort": figures["torque_nm"],
+        }
         if kind == "revolute":
             low, high = (math.radians(angle) for angle in figures["range_deg"])
             limit = {"lower": low, "upper": high, **limit}
     elif kind == "prismatic":
         low, high = figures["range_m"]
-        limit = {"lower": low, "upper": high, "velocity": figures["max_speed_m_s"], "effort": figures["max_force_n"]}
+        limit = {
+            "lower": low,
+            "upper": high,
+            "velocity": figures["max_speed_m_s"],
+            "effort": figures["max_force_n"],
+        }
     return elements.joint(
         figures["name"],
         kind,
@@ -162,7 +192,11 @@ def joint_of(figures: Mapping[str, Any]) -> Element:
 def visual_of(figures: Mapping[str, Any]) -> Element:
     """Primitive from its figures: ``box``, ``cylinder`` (radius, length) or ``sphere`` (radius)."""
     shape = next(kind for kind in SIZES if kind in figures)
-    size = {"size": figures[shape]} if shape == "box" else dict(zip(SIZES[shape], figures[shape], strict=True))
+    size = (
+        {"size": figures[shape]}
+        if shape == "box"
+        else dict(zip(SIZES[shape], figures[shape], strict=True))
+    )
     return elements.visual(
         shape,
         size,

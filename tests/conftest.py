@@ -17,7 +17,13 @@ import hypothesis
 import pytest
 
 _TESTS = Path(__file__).resolve().parent
-_LONG = ("test_readme.py", "test_random_poses.py", "test_random_lines.py", "test_fuzz.py", "test_auto_on_robots.py")
+_LONG = (
+    "test_readme.py",
+    "test_random_poses.py",
+    "test_random_lines.py",
+    "test_fuzz.py",
+    "test_auto_on_robots.py",
+)
 """Tests of these files take up to a minute each: they come first, so that no worker is left alone with one at last."""
 _CHROMIUM = (
     "--headless",
@@ -30,7 +36,11 @@ _CHROMIUM = (
     "--disable-sync",
     "--enable-unsafe-swiftshader",
 )
-_WITH_DEADLINES = ("brachis.common.deadline", "brachis.optimise.backends.monitor", "brachis.apps.bottleneck.reference")
+_WITH_DEADLINES = (
+    "brachis.common.deadline",
+    "brachis.optimise.backends.monitor",
+    "brachis.apps.bottleneck.reference",
+)
 """Modules that look at the clock to see whether the time is up."""
 if str(_TESTS) not in sys.path:
     sys.path.append(str(_TESTS))
@@ -84,7 +94,7 @@ def wall_clock(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def rough_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures of few pixels and with no layout, which take a third of the time; tests of plots have the real ones."""
-    from brachis.apps.plots import style  # noqa: PLC0415
+    from brachis.apps.plots import style
 
     honest = style.new_figure
 
@@ -106,8 +116,8 @@ def scara_urdf() -> Path:
 @pytest.fixture(scope="session")
 def line_result() -> Any:
     """The first example, planned from one start."""
-    import brachis  # noqa: PLC0415
-    from support.effort import QUICK  # noqa: PLC0415  (importable from here on)
+    import brachis
+    from support.effort import QUICK
 
     return brachis.plan(brachis.examples.scara_line, **QUICK)
 
@@ -120,8 +130,15 @@ def line_trajectory(line_result: Any) -> Any:
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
     """A Chromium that is installed here, without a window; one for all tests, as its driver allows."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="playwright is not installed"
+    )
+    chromium = next(
+        filter(
+            None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
+        ),
+        None,
+    )
     if chromium is None:
         pytest.skip("there is no Chromium: apt-get install chromium")
     with playwright.sync_playwright() as driver:

@@ -54,7 +54,17 @@ ORDER = (
 )
 VERIFY_MUST_NOT_REACH = {"ik", "kinematics", "limits", "problem", "optimise", "search"}
 MAY_NAME_KINDS = ("limits", "verify/limits", "task", "robot")
-HEAVY = {"matplotlib", "viser", "yourdfpy", "unopy", "ipyopt", "pyarrow", "pandas", "dask", "ray"}
+HEAVY = {
+    "matplotlib",
+    "viser",
+    "yourdfpy",
+    "unopy",
+    "ipyopt",
+    "pyarrow",
+    "pandas",
+    "dask",
+    "ray",
+}
 MOST_LINES = 500
 
 
@@ -65,7 +75,9 @@ def module_of(path: Path) -> str:
 
 FILES = {module_of(path): path for path in sorted(SOURCE.rglob("*.py"))}
 STAGED = {
-    module: path for module, path in FILES.items() if module not in {"brachis", "brachis.__main__", "brachis.apps"}
+    module: path
+    for module, path in FILES.items()
+    if module not in {"brachis", "brachis.__main__", "brachis.apps"}
 }
 
 
@@ -81,12 +93,18 @@ def tree_of(module: str) -> ast.Module:
 
 def only_for_types(tree: ast.Module) -> set[ast.AST]:
     """Nodes under ``if TYPE_CHECKING``."""
-    tests = [node for node in ast.walk(tree) if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
+    tests = [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    ]
     return {inner for node in tests for inner in ast.walk(node)}
 
 
 @cache
-def imports_of(module: str, *, top_level: bool = False, types: bool = False) -> frozenset[str]:
+def imports_of(
+    module: str, *, top_level: bool = False, types: bool = False
+) -> frozenset[str]:
     """Dotted names of the modules that a module imports; of a package's names the package."""
     tree, names = tree_of(module), set()
     skipped = set() if types else only_for_types(tree)
@@ -107,14 +125,22 @@ def modules_named(module: str) -> frozenset[str]:
     """Modules that a module imports by a string."""
     calls = [node for node in ast.walk(tree_of(module)) if isinstance(node, ast.Call)]
     importing = [call for call in calls if "import_module" in ast.unparse(call.func)]
-    return frozenset(name for name in FILES for call in importing if f"'{name}'" in ast.unparse(call))
+    return frozenset(
+        name for name in FILES for call in importing if f"'{name}'" in ast.unparse(call)
+    )
 
 
 @cache
 def stages_imported(module: str, *, types: bool = False) -> frozenset[str]:
     """Stages of what a module imports; with types, what it imports for types alone or by a string too."""
-    names = imports_of(module, types=types) | (modules_named(module) if types else frozenset())
-    return frozenset(stage_of(name) for name in names if name.startswith("brachis.") and name in STAGED)
+    names = imports_of(module, types=types) | (
+        modules_named(module) if types else frozenset()
+    )
+    return frozenset(
+        stage_of(name)
+        for name in names
+        if name.startswith("brachis.") and name in STAGED
+    )
 
 
 def test_every_module_belongs_to_a_stage():
@@ -137,7 +163,16 @@ def test_verification_shares_no_code_with_the_optimiser():
     while waiting:
         stage = waiting.pop()
         reached.add(stage)
-        waiting |= set().union(*(stages_imported(module) for module in STAGED if stage_of(module) == stage)) - reached
+        waiting |= (
+            set().union(
+                *(
+                    stages_imported(module)
+                    for module in STAGED
+                    if stage_of(module) == stage
+                )
+            )
+            - reached
+        )
     assert {"robot", "path", "trajectory"} <= reached
     assert not reached & VERIFY_MUST_NOT_REACH
 
@@ -150,13 +185,18 @@ def in_circles(graph: Mapping[str, AbstractSet[str]]) -> list[str]:
         starts = set(left) - set().union(*left.values())
         if not ends | starts:
             break
-        left = {node: others for node, others in left.items() if node not in ends | starts}
+        left = {
+            node: others for node, others in left.items() if node not in ends | starts
+        }
     return sorted(left)
 
 
 def test_circles_are_found():
     assert in_circles({"a": {"b"}, "b": {"c"}, "c": set()}) == []
-    assert in_circles({"a": {"b"}, "b": {"c"}, "c": {"b", "d"}, "d": set()}) == ["b", "c"]
+    assert in_circles({"a": {"b"}, "b": {"c"}, "c": {"b", "d"}, "d": set()}) == [
+        "b",
+        "c",
+    ]
 
 
 def test_no_package_has_an_import_circle_between_its_files():
@@ -164,7 +204,9 @@ def test_no_package_has_an_import_circle_between_its_files():
     found = []
     for stage in ORDER:
         own = {module for module in STAGED if stage_of(module) == stage}
-        found += in_circles({module: imports_of(module, types=True) & own - {module} for module in own})
+        found += in_circles(
+            {module: imports_of(module, types=True) & own - {module} for module in own}
+        )
     assert found == []
 
 
@@ -179,19 +221,33 @@ def words_compared(tree: ast.Module) -> Iterator[tuple[int, object]]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Compare):
             for side in (node.left, *node.comparators):
-                listed = side.elts if isinstance(side, ast.Tuple | ast.List | ast.Set) else [side]
-                yield from ((node.lineno, each.value) for each in listed if isinstance(each, ast.Constant))
+                listed = (
+                    side.elts
+                    if isinstance(side, ast.Tuple | ast.List | ast.Set)
+                    else [side]
+                )
+                yield from (
+                    (node.lineno, each.value)
+                    for each in listed
+                    if isinstance(each, ast.Constant)
+                )
         elif isinstance(node, ast.MatchValue) and isinstance(node.value, ast.Constant):
             yield node.value.lineno, node.value.value
 
 
 def test_nobody_asks_for_a_kind_of_limit():
-    kinds = {name for kind in brachis.limits.TABLE for name in (kind, kind.replace("_", " "))}
-    assert (1, "torque") in words_compared(ast.parse("limit.kind in ('jerk', 'torque')"))
+    kinds = {
+        name for kind in brachis.limits.TABLE for name in (kind, kind.replace("_", " "))
+    }
+    assert (1, "torque") in words_compared(
+        ast.parse("limit.kind in ('jerk', 'torque')")
+    )
     assert [
         f"{path.relative_to(SOURCE)}:{line}: {word!r}"
         for module, path in FILES.items()
-        if not path.relative_to(SOURCE).as_posix().startswith(tuple(f"{folder}/" for folder in MAY_NAME_KINDS))
+        if not path.relative_to(SOURCE)
+        .as_posix()
+        .startswith(tuple(f"{folder}/" for folder in MAY_NAME_KINDS))
         for line, word in words_compared(tree_of(module))
         if word in kinds
     ] == []
@@ -208,7 +264,9 @@ def test_heavy_libraries_are_imported_where_used():
 
 def test_importing_loads_no_heavy_library():
     code = f"from brachis import plan, Robot, Trajectory, Task\nimport sys\nprint(sorted({HEAVY!r} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
     assert done.stdout.strip() == "[]"
 
 
@@ -222,5 +280,9 @@ def test_public_names_exist():
 
 
 def test_modules_stay_small():
-    lines = {module: len(path.read_text().splitlines()) for module, path in FILES.items()}
-    assert {module: count for module, count in lines.items() if count > MOST_LINES} == {}
+    lines = {
+        module: len(path.read_text().splitlines()) for module, path in FILES.items()
+    }
+    assert {
+        module: count for module, count in lines.items() if count > MOST_LINES
+    } == {}

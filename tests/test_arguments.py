@@ -13,28 +13,66 @@ SCARA = brachis.robots.path_of("scara3")
 
 @pytest.fixture(scope="module")
 def motion():
-    return brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=6).trajectory
+    return brachis.plan(
+        brachis.examples.scara_line,
+        redundant_joints=["j1"],
+        effort="single",
+        intervals=6,
+    ).trajectory
 
 
 @pytest.mark.parametrize(
     ("make", "told"),
     [
-        (lambda: brachis.Line(bye=[0.1, 0.0]), "Line: there is no keyword named 'bye'; allowed: to, by, length, "),
+        (
+            lambda: brachis.Line(bye=[0.1, 0.0]),
+            "Line: there is no keyword named 'bye'; allowed: to, by, length, ",
+        ),
         (lambda: brachis.Arc(centre=[0.1, 0.0]), r"'centre'.* Did you mean 'center'\?"),
-        (lambda: brachis.Helix([0.1, 0.0, 0.0]), r"Helix: missing a required argument: 'pitch'.*pitch= \(needed\)"),
-        (lambda: brachis.Line([0.1, 0.0]), "Line: too many positional arguments; allowed: to=, by=, "),
-        (lambda: brachis.compare("today.csv", SCARA, unit="deg"), "compare: there is no keyword named 'unit'.*'units'"),
+        (
+            lambda: brachis.Helix([0.1, 0.0, 0.0]),
+            r"Helix: missing a required argument: 'pitch'.*pitch= \(needed\)",
+        ),
+        (
+            lambda: brachis.Line([0.1, 0.0]),
+            "Line: too many positional arguments; allowed: to=, by=, ",
+        ),
+        (
+            lambda: brachis.compare("today.csv", SCARA, unit="deg"),
+            "compare: there is no keyword named 'unit'.*'units'",
+        ),
         (
             lambda: brachis.import_motion("a.csv", SCARA, units="deg"),
             r"units: wrong type; found 'deg'; allowed: {.angle",
         ),
-        (lambda: brachis.import_motion("a.csv", SCARA, units={"angles": "deg"}), "Did you mean 'angle'"),
-        (lambda: brachis.import_motion("a.csv", SCARA, tolerance="1 mm"), "tolerance: wrong type; found '1 mm'"),
-        (lambda: brachis.import_motion("a.csv"), "robot: the robot is missing; allowed: a URDF file, the name of"),
-        (lambda: brachis.plan("scara4", path=brachis.Line(by=[0.1, 0.0])), "no robot named 'scara4'.* mean 'scara3'"),
-        (lambda: brachis.plan_many([], jobs="two"), "jobs: wrong type; found 'two'; allowed: a whole number >= 1"),
-        (lambda: brachis.plan_many([], jobs=0), "jobs: out of range; found 0; allowed: a whole number >= 1"),
-        (lambda: brachis.verify_trajectory(5), "trajectory: no motion; found int; allowed: a Trajectory, a Result, or"),
+        (
+            lambda: brachis.import_motion("a.csv", SCARA, units={"angles": "deg"}),
+            "Did you mean 'angle'",
+        ),
+        (
+            lambda: brachis.import_motion("a.csv", SCARA, tolerance="1 mm"),
+            "tolerance: wrong type; found '1 mm'",
+        ),
+        (
+            lambda: brachis.import_motion("a.csv"),
+            "robot: the robot is missing; allowed: a URDF file, the name of",
+        ),
+        (
+            lambda: brachis.plan("scara4", path=brachis.Line(by=[0.1, 0.0])),
+            "no robot named 'scara4'.* mean 'scara3'",
+        ),
+        (
+            lambda: brachis.plan_many([], jobs="two"),
+            "jobs: wrong type; found 'two'; allowed: a whole number >= 1",
+        ),
+        (
+            lambda: brachis.plan_many([], jobs=0),
+            "jobs: out of range; found 0; allowed: a whole number >= 1",
+        ),
+        (
+            lambda: brachis.verify_trajectory(5),
+            "trajectory: no motion; found int; allowed: a Trajectory, a Result, or",
+        ),
     ],
 )
 def test_what_is_asked_for_is_named(make, told):
@@ -51,9 +89,18 @@ def test_what_is_asked_for_is_named(make, told):
         ),
         ({"torque": 5.0}, "It is a key of others: limits={'torque': ...}"),
         ({"mass": 5.0}, "It is a key of others: payload={'mass': ...}"),
-        ({"payload": 500}, "allowed: a mapping with keys out of mass, com, inertia. payload: Rigid body held to"),
-        ({"gravity": 9.81}, "allowed: a list. gravity: Gravity [x, y, z], m/s^2, world frame"),
-        ({"tool_limits": 0.5}, "allowed: a mapping with keys out of speed, feed, acceleration, angular_speed, "),
+        (
+            {"payload": 500},
+            "allowed: a mapping with keys out of mass, com, inertia. payload: Rigid body held to",
+        ),
+        (
+            {"gravity": 9.81},
+            "allowed: a list. gravity: Gravity [x, y, z], m/s^2, world frame",
+        ),
+        (
+            {"tool_limits": 0.5},
+            "allowed: a mapping with keys out of speed, feed, acceleration, angular_speed, ",
+        ),
     ],
 )
 def test_the_form_of_a_key_is_named(keywords, told):
@@ -70,7 +117,10 @@ def test_a_key_of_a_section_is_found_in_a_file():
 @pytest.mark.parametrize(
     ("use", "told"),
     [
-        (lambda motion: motion.position("a"), "t: wrong type; found 'a'; allowed: a number, s"),
+        (
+            lambda motion: motion.position("a"),
+            "t: wrong type; found 'a'; allowed: a number, s",
+        ),
         (lambda motion: motion.at([0.0, "b"]), "t: wrong type"),
         (lambda motion: motion.sample("a"), "dt: wrong type; found 'a'"),
         (lambda motion: motion.sample([0.1]), r"dt: wrong type; found an array \(1,\)"),
@@ -79,7 +129,10 @@ def test_a_key_of_a_section_is_found_in_a_file():
             lambda motion: motion.save("x.txt"),
             r"x.txt: the suffix is that of another format; found .txt; allowed: .npz",
         ),
-        (lambda _: brachis.robots.scara3.with_payload("5 kg"), "allowed: a number. mass: kg"),
+        (
+            lambda _: brachis.robots.scara3.with_payload("5 kg"),
+            "allowed: a number. mass: kg",
+        ),
     ],
 )
 def test_wrong_types_on_a_motion(use, told, motion):
@@ -89,15 +142,23 @@ def test_wrong_types_on_a_motion(use, told, motion):
 
 def test_files_of_motions_are_taken_as_motions(motion, tmp_path):
     motion.save(tmp_path / "result.npz")
-    assert brachis.verify_trajectory(tmp_path / "result.npz") == brachis.verify_trajectory(motion)
+    assert brachis.verify_trajectory(
+        tmp_path / "result.npz"
+    ) == brachis.verify_trajectory(motion)
     export.write(str(tmp_path / "result.npz"), tmp_path / "motion.csv", dt=0.1)
     assert (tmp_path / "motion.csv").read_text().startswith("t,q_j1")
-    with pytest.raises(ResultFileError, match="the file is of another kind; found a task file"):
+    with pytest.raises(
+        ResultFileError, match="the file is of another kind; found a task file"
+    ):
         brachis.verify_trajectory(brachis.examples.scara_line)
 
 
 @pytest.mark.parametrize(
-    ("module", "name", "meant"), [(brachis.robots, "scara4", "scara3"), (brachis.examples, "scara_lin", "scara_line")]
+    ("module", "name", "meant"),
+    [
+        (brachis.robots, "scara4", "scara3"),
+        (brachis.examples, "scara_lin", "scara_line"),
+    ],
 )
 def test_misspelt_names_of_what_comes_along(module, name, meant):
     with pytest.raises(AttributeError, match=f"Did you mean '{meant}'"):

@@ -25,7 +25,9 @@ START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
 
 def scara_line(angle: float, **changes: Any) -> brachis.Result:
     limits = brachis.LimitSpec(torque=10.0, velocity=None)
-    robot = brachis.Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
+    robot = brachis.Robot.from_urdf(
+        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits
+    )
     task = {
         "brachis": 1,
         "start": {"joints": START},
@@ -75,8 +77,13 @@ def test_an_arm_without_a_closed_form():
     result = brachis.plan(robot, task)
     assert result.verified
     assert result.trajectory.branch == "chart"
-    begin, end = (robot.tool_placement(q) for q in result.trajectory.position(np.array([0.0, result.t_end])))
-    np.testing.assert_allclose(end.translation - begin.translation, [0.0, 0.15, 0.05], atol=1e-9)
+    begin, end = (
+        robot.tool_placement(q)
+        for q in result.trajectory.position(np.array([0.0, result.t_end]))
+    )
+    np.testing.assert_allclose(
+        end.translation - begin.translation, [0.0, 0.15, 0.05], atol=1e-9
+    )
     np.testing.assert_allclose(end.rotation, begin.rotation, atol=1e-9)
     np.testing.assert_allclose(result.trajectory.position(0.0), start, atol=1e-9)
 
@@ -91,10 +98,16 @@ def test_an_end_posture_may_be_rounded(result, redundant):
     assert reached.verified
     assert 1e-9 < np.abs(reached.trajectory.position(reached.t_end) - end).max() < 1e-6
     robot = reached.trajectory.robot
-    self_motion = null_space(jacobian(task_map_of(robot, ["x", "y"]), end[None])[0])[:, 0]
-    other = reached.task.to_dict() | {"end": {"joints": (end + 1e-5 * self_motion).tolist()}}
+    self_motion = null_space(jacobian(task_map_of(robot, ["x", "y"]), end[None])[0])[
+        :, 0
+    ]
+    other = reached.task.to_dict() | {
+        "end": {"joints": (end + 1e-5 * self_motion).tolist()}
+    }
     aside = brachis.load_task(other)
-    checks = verify_trajectory(dataclasses.replace(reached.trajectory, task=aside)).checks
+    checks = verify_trajectory(
+        dataclasses.replace(reached.trajectory, task=aside)
+    ).checks
     assert [check.name for check in checks if not check.passed] == ["end posture"]
 
 
@@ -105,7 +118,9 @@ def test_a_saved_motion_is_loaded_and_verified(result, saved):
     np.testing.assert_array_equal(loaded.chart_rows, result.trajectory.chart_rows)
     np.testing.assert_array_equal(loaded.chart_knots, result.trajectory.chart_knots)
     t = np.linspace(0.0, loaded.t_end, 50)
-    np.testing.assert_allclose(loaded.position(t), result.trajectory.position(t), atol=1e-14)
+    np.testing.assert_allclose(
+        loaded.position(t), result.trajectory.position(t), atol=1e-14
+    )
     assert verify_trajectory(loaded).passed
     # The curves of the chart describe the motion: sigma = C q - p.
     rows = ChartRows.of_arrays(loaded.chart_rows, loaded.chart_knots)
@@ -113,7 +128,9 @@ def test_a_saved_motion_is_loaded_and_verified(result, saved):
     np.testing.assert_allclose(loaded.redundant_spline(loaded.times), sigma, atol=1e-8)
 
 
-def test_bottlenecks_of_a_saved_motion_are_those_that_solving_again_finds(result, saved):
+def test_bottlenecks_of_a_saved_motion_are_those_that_solving_again_finds(
+    result, saved
+):
     fresh = brachis.bottleneck.report(result)
     report = brachis.bottleneck.report(Trajectory.load(saved), check=True)
     assert report.sensitivities.reliable
@@ -123,14 +140,19 @@ def test_bottlenecks_of_a_saved_motion_are_those_that_solving_again_finds(result
         assert entry.optimal
         assert entry.predicted == pytest.approx(entry.re_solved, rel=0.05)
     for entry in fresh.sensitivities.limits:
-        other = report.sensitivities.of(entry.label.subject, entry.label.kind, entry.bound.end)
+        other = report.sensitivities.of(
+            entry.label.subject, entry.label.kind, entry.bound.end
+        )
         assert other.change(0.1) == pytest.approx(entry.change(0.1), rel=1e-2, abs=1e-5)
 
 
 def with_arrays(path: Path, **changed: Any) -> None:
     with np.load(path) as archive:
         arrays = dict(archive)
-    arrays |= {name: change(arrays[name]) if callable(change) else change for name, change in changed.items()}
+    arrays |= {
+        name: change(arrays[name]) if callable(change) else change
+        for name, change in changed.items()
+    }
     np.savez(path, **arrays)
 
 
@@ -145,7 +167,10 @@ BROKEN = {
     "no rows": {"chart_rows": lambda a: a[:0]},
     "several rows without knots": {"chart_rows": lambda a: np.repeat(a, 8, axis=0)},
     "knots of constant rows": {"chart_knots": np.linspace(0.0, 1.0, 7)},
-    "knots without rows": {"chart_rows": np.empty((0, 0, 0)), "chart_knots": np.linspace(0.0, 1.0, 7)},
+    "knots without rows": {
+        "chart_rows": np.empty((0, 0, 0)),
+        "chart_knots": np.linspace(0.0, 1.0, 7),
+    },
     "knots a number": {"chart_knots": np.array(0.5)},
     "knots text": {"chart_knots": np.array(["a", "b"])},
     "knots descending": {
@@ -170,7 +195,9 @@ BROKEN = {
 @pytest.mark.parametrize("case", BROKEN)
 def test_a_broken_chart_is_refused(case, saved):
     with_arrays(saved, **BROKEN[case])
-    with pytest.raises(ResultFileError, match=r"the result file is broken|not a brachis result") as caught:
+    with pytest.raises(
+        ResultFileError, match=r"the result file is broken|not a brachis result"
+    ) as caught:
         Trajectory.load(saved)
     assert caught.value.where == str(saved)
 
@@ -190,14 +217,24 @@ def test_a_chart_that_is_not_broken_is_read(saved):
     ],
 )
 def test_a_singular_start_is_refused(urdf, start, space, line):
-    task = {"brachis": 1, "start": {"joints": start}, "task_space": space, "path": [{"line": {"by": line}}]}
+    task = {
+        "brachis": 1,
+        "start": {"joints": start},
+        "task_space": space,
+        "path": [{"line": {"by": line}}],
+    }
     with pytest.raises(StartError, match="singular"):
         brachis.plan(ROOT / "robots" / urdf / "robot.urdf", task)
 
 
 def test_directions_that_the_arm_lacks_are_refused():
     line = {"line": {"by": [-0.1, 0.1, 0.0]}}
-    task = {"brachis": 1, "start": {"joints": [0.2, 0.6, 0.4]}, "task_space": "position", "path": [line]}
+    task = {
+        "brachis": 1,
+        "start": {"joints": [0.2, 0.6, 0.4]},
+        "task_space": "position",
+        "path": [line],
+    }
     with pytest.raises(DecompositionError):
         brachis.plan(ROOT / "robots" / "scara3/robot.urdf", task)
 

@@ -27,8 +27,12 @@ def pages():
 
 
 def test_generated_pages_are_up_to_date(pages):
-    assert (DOCS / "gallery.md").read_text() == pages.gallery(), "run python docs/make_pages.py"
-    assert (DOCS / "benchmarks.md").read_text() == pages.benchmarks(), "run python docs/make_pages.py"
+    assert (DOCS / "gallery.md").read_text() == pages.gallery(), (
+        "run python docs/make_pages.py"
+    )
+    assert (DOCS / "benchmarks.md").read_text() == pages.benchmarks(), (
+        "run python docs/make_pages.py"
+    )
 
 
 def test_every_example_has_its_picture(pages):
@@ -41,7 +45,10 @@ def test_every_example_has_its_picture(pages):
 
 def test_every_public_name_is_in_the_reference():
     page = "\n".join(path.read_text() for path in (DOCS / "reference").glob("*.md"))
-    named = {"__version__", *re.findall(r":: (?:brachis\.)?(\w+)", page)}  # of modules: the package itself
+    named = {
+        "__version__",
+        *re.findall(r":: (?:brachis\.)?(\w+)", page),
+    }  # of modules: the package itself
     for module in re.findall(r"automodule:: (\S+)", page):
         named |= set(importlib.import_module(module).__dict__)
     assert set(brachis.__all__) - named == set()
@@ -50,7 +57,9 @@ def test_every_public_name_is_in_the_reference():
 def test_links_to_files_lead_somewhere():
     for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *DOCS.rglob("*.md")):
         for link in re.findall(r"\]\(([^)#\s]+)", page.read_text()):
-            assert "://" in link or (page.parent / link).exists(), f"{page.name}: {link}"
+            assert "://" in link or (page.parent / link).exists(), (
+                f"{page.name}: {link}"
+            )
 
 
 def test_parts_of_the_readme_that_pages_include():
@@ -58,12 +67,20 @@ def test_parts_of_the_readme_that_pages_include():
     parts = set(re.findall(r":start-after: (<!-- .* -->)", site))
     assert len(parts) >= 4
     for begin in parts:
-        assert README.index(begin) < README.index(begin.replace("<!-- ", "<!-- end of "))
+        assert README.index(begin) < README.index(
+            begin.replace("<!-- ", "<!-- end of ")
+        )
 
 
 def test_citation_is_that_of_this_version():
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
-    assert {"cff-version", "message", "title", "authors"} <= set(citation)  # what its schema requires
-    assert citation["version"] == citation["preferred-citation"]["version"] == brachis.__version__
+    assert {"cff-version", "message", "title", "authors"} <= set(
+        citation
+    )  # what its schema requires
+    assert (
+        citation["version"]
+        == citation["preferred-citation"]["version"]
+        == brachis.__version__
+    )
     assert isinstance(citation["preferred-citation"]["year"], int)
     assert citation["references"][0]["title"] in README

@@ -14,11 +14,17 @@ from brachis.task import task_with
 
 ROOT = Path(__file__).parents[1]
 NAMES = [name for name in brachis.__all__ if name != "__version__"]
-FURTHER = {"with_limits": Robot.with_limits, "with_payload": Robot.with_payload, "task_with": task_with}
+FURTHER = {
+    "with_limits": Robot.with_limits,
+    "with_payload": Robot.with_payload,
+    "task_with": task_with,
+}
 
 
 def examples_of(subject):
-    (found,) = doctest.DocTestFinder(recurse=False).find(subject, getattr(subject, "__name__", ""), globs={})
+    (found,) = doctest.DocTestFinder(recurse=False).find(
+        subject, getattr(subject, "__name__", ""), globs={}
+    )
     return found
 
 
@@ -28,7 +34,9 @@ def test_examples_run(name, monkeypatch, capsys):
     example = examples_of(FURTHER.get(name) or getattr(brachis, name))
     assert example.examples, "a name without an example"
     assert not any(doctest.SKIP in each.options for each in example.examples)
-    outcome = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE).run(example)
+    outcome = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE).run(
+        example
+    )
     assert outcome.failed == 0, capsys.readouterr().out
 
 
@@ -41,6 +49,8 @@ def test_help_tells_what_there_is_for_what():
 
 def test_names_are_found_by_completion():
     assert set(dir(brachis)) == set(brachis.__all__)
-    assert {"plots", "export", "ik", "errors", "robots", "examples"} <= set(dir(brachis))
+    assert {"plots", "export", "ik", "errors", "robots", "examples"} <= set(
+        dir(brachis)
+    )
     assert "scara3" in dir(brachis.robots)
     assert "scara_line" in dir(brachis.examples)

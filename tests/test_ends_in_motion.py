@@ -30,23 +30,35 @@ def circle():
 
 
 def failed(trajectory):
-    return {check.name for check in verify_trajectory(trajectory).checks if not check.passed}
+    return {
+        check.name for check in verify_trajectory(trajectory).checks if not check.passed
+    }
 
 
 def test_periodic_circle_is_faster_than_from_rest_to_rest(circle):
-    at_rest = brachis.plan(variant(boundary={}, search=QUICK))  # and its end posture is free
+    at_rest = brachis.plan(
+        variant(boundary={}, search=QUICK)
+    )  # and its end posture is free
     assert circle.verified
     assert circle.t_end < 0.85 * at_rest.t_end
 
 
 def test_everything_closes_over_the_seam(circle):
     trajectory, ends = circle.trajectory, np.array([0.0, circle.t_end])
-    for part in (trajectory.position, trajectory.velocity, trajectory.acceleration, trajectory.torque):
+    for part in (
+        trajectory.position,
+        trajectory.velocity,
+        trajectory.acceleration,
+        trajectory.torque,
+    ):
         first, last = part(ends)
         np.testing.assert_allclose(last, first, atol=1e-9)
     assert np.abs(trajectory.velocity(0.0)).max() > 0.1
     names = {check.name for check in circle.verification.checks}
-    assert {f"{name} over the seam" for name in ("position", "velocity", "acceleration", "torque")} <= names
+    assert {
+        f"{name} over the seam"
+        for name in ("position", "velocity", "acceleration", "torque")
+    } <= names
     assert not {"start velocity", "end velocity", "start acceleration"} & names
 
 
@@ -58,40 +70,61 @@ def test_three_turns_in_mujoco_without_drift(circle):
     model.opt.timestep, model.opt.integrator = STEP, mujoco.mjtIntegrator.mjINT_RK4
     data = mujoco.MjData(model)
     data.qpos[order], data.qvel[order] = trajectory.q[0], trajectory.qdot[0]
-    inertia = np.diag(pin.crba(trajectory.robot.model, trajectory.robot.model.createData(), trajectory.q[0]))
+    inertia = np.diag(
+        pin.crba(
+            trajectory.robot.model, trajectory.robot.model.createData(), trajectory.q[0]
+        )
+    )
     stiffness, damping = BANDWIDTH**2 * inertia, 2.0 * BANDWIDTH * inertia
     t = np.arange(0.0, TURNS * trajectory.t_end, STEP)
     once = np.mod(t, trajectory.t_end)
     away = np.empty(len(t))
-    planned = trajectory.position(once), trajectory.velocity(once), trajectory.torque(once)
+    planned = (
+        trajectory.position(once),
+        trajectory.velocity(once),
+        trajectory.torque(once),
+    )
     for k, (q, v, tau) in enumerate(zip(*planned, strict=True)):
         error = q - data.qpos[order]
         away[k] = np.abs(error).max()
-        data.qfrc_applied[order] = tau + stiffness * error + damping * (v - data.qvel[order])
+        data.qfrc_applied[order] = (
+            tau + stiffness * error + damping * (v - data.qvel[order])
+        )
         mujoco.mj_step(model, data)
     by_turn = [
-        away[(t >= turn * trajectory.t_end) & (t < (turn + 1) * trajectory.t_end)].max() for turn in range(TURNS)
+        away[(t >= turn * trajectory.t_end) & (t < (turn + 1) * trajectory.t_end)].max()
+        for turn in range(TURNS)
     ]
     assert max(by_turn) < 1e-4
     assert by_turn[-1] < 1.1 * by_turn[1] + 1e-7, "it drifts"
 
 
 def test_closed_forms_close_too(circle):
-    result = brachis.plan(variant(redundant_joints=["j1"], search=QUICK, spline={"intervals": 20}))
+    result = brachis.plan(
+        variant(redundant_joints=["j1"], search=QUICK, spline={"intervals": 20})
+    )
     assert result.verified
     assert result.t_end == pytest.approx(circle.t_end, rel=0.02)
 
 
 def test_a_free_start_posture_is_the_end_posture():
     place = [3.0**0.5, 0.0]
-    result = brachis.plan(variant(start="free", path_start=place, search=QUICK, spline={"intervals": 12}))
+    result = brachis.plan(
+        variant(start="free", path_start=place, search=QUICK, spline={"intervals": 12})
+    )
     assert result.verified
-    np.testing.assert_allclose(result.trajectory.q[0], result.trajectory.q[-1], atol=1e-9)
+    np.testing.assert_allclose(
+        result.trajectory.q[0], result.trajectory.q[-1], atol=1e-9
+    )
 
 
 def test_tampered_seams_are_found(circle):
     trajectory = circle.trajectory
-    for name, what in (("q", "position"), ("qdot", "velocity"), ("qddot_before", "acceleration")):
+    for name, what in (
+        ("q", "position"),
+        ("qdot", "velocity"),
+        ("qddot_before", "acceleration"),
+    ):
         array = np.array(getattr(trajectory, name))
         array[-1] += 1e-3
         assert f"{what} over the seam" in failed(replace(trajectory, **{name: array}))
@@ -101,7 +134,15 @@ def test_closed_path_of_joints():
     """Around an ellipse of two joints: the timing alone closes."""
 
     def ellipse(angle):
-        return [0.3 * np.cos(angle), 0.5, 0.2 * np.sin(angle), -1.2, 0.0, 0.6 + 0.1 * np.sin(angle), 0.0]
+        return [
+            0.3 * np.cos(angle),
+            0.5,
+            0.2 * np.sin(angle),
+            -1.2,
+            0.0,
+            0.6 + 0.1 * np.sin(angle),
+            0.0,
+        ]
 
     task = {
         "brachis": 1,
@@ -121,31 +162,54 @@ def test_speeds_at_both_ends_with_redundancy(rest):
     speeds = {"start_speed": 0.2, "end_speed": 0.5}
     path = [{"line": {"length": 0.6, "angle_deg": 90}}]
     spline = {"intervals": 12, "rest": rest}
-    task = variant(path=path, boundary=speeds, spline=spline, redundant_joints=["j1"], search=QUICK)
+    task = variant(
+        path=path, boundary=speeds, spline=spline, redundant_joints=["j1"], search=QUICK
+    )
     result = brachis.plan(task)
     assert result.verified
     model, trajectory = result.trajectory.robot.model, result.trajectory
     data, frame = model.createData(), result.trajectory.robot.frame_id
     for time, speed in zip((0.0, result.t_end), speeds.values(), strict=True):
-        pin.forwardKinematics(model, data, trajectory.position(time), trajectory.velocity(time))
-        found = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).linear
+        pin.forwardKinematics(
+            model, data, trajectory.position(time), trajectory.velocity(time)
+        )
+        found = pin.getFrameVelocity(
+            model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        ).linear
         np.testing.assert_allclose(found, [0.0, speed, 0.0], atol=1e-9)
     assert result.t_end < brachis.plan({**task, "boundary": {}}).t_end
-    faster = replace(trajectory, task=brachis.load_task({**task, "boundary": {**speeds, "end_speed": 0.501}}))
+    faster = replace(
+        trajectory,
+        task=brachis.load_task({**task, "boundary": {**speeds, "end_speed": 0.501}}),
+    )
     assert failed(faster) == {"end speed"}
 
 
 def test_a_turn_on_the_spot_ends_at_an_angular_speed():
     path, boundary = [{"line": {"by": [0.0, 0.0, 0.5]}}], {"end_speed": 0.3}
-    task = variant(task_space=["x", "y", "yaw"], path=path, boundary=boundary, search=QUICK, spline={"intervals": 12})
+    task = variant(
+        task_space=["x", "y", "yaw"],
+        path=path,
+        boundary=boundary,
+        search=QUICK,
+        spline={"intervals": 12},
+    )
     result = brachis.plan(task)
     assert result.verified
-    assert result.trajectory.velocity(result.t_end).sum() == pytest.approx(0.3, abs=1e-9)
+    assert result.trajectory.velocity(result.t_end).sum() == pytest.approx(
+        0.3, abs=1e-9
+    )
 
 
 def test_a_speed_that_no_limit_allows_is_told():
     path, spline = [{"line": {"length": 0.6, "angle_deg": 90}}], {"intervals": 8}
-    task = variant(path=path, boundary={"end_speed": 20.0}, redundant_joints=["j1"], search=QUICK, spline=spline)
+    task = variant(
+        path=path,
+        boundary={"end_speed": 20.0},
+        redundant_joints=["j1"],
+        search=QUICK,
+        spline=spline,
+    )
     with pytest.raises(
         brachis.PlanningError,
         match=r"boundary\.end_speed: .* found 20 m/s, where one joint path was estimated to allow about \d",
@@ -173,22 +237,43 @@ def test_path_of_joints_with_speeds_takes_as_long_as_in_toppra():
 
 
 def toppra_time(result):
-    import importlib.util  # noqa: PLC0415
+    import importlib.util
 
-    spec = importlib.util.spec_from_file_location("from_toppra", ROOT / "examples/11_from_toppra.py")
+    spec = importlib.util.spec_from_file_location(
+        "from_toppra", ROOT / "examples/11_from_toppra.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     robot = result.trajectory.robot
     ends = result.task.boundary
-    return module.by_toppra(robot, *module.joint_points(robot, result.task), speeds=(ends.start_speed, ends.end_speed))
+    return module.by_toppra(
+        robot,
+        *module.joint_points(robot, result.task),
+        speeds=(ends.start_speed, ends.end_speed),
+    )
 
 
 REFUSED = [
-    ({"path": [{"line": {"length": 0.6, "angle_deg": 90}}]}, "the path does not close; found 0.6 m off in y"),
-    ({"path": [{"circle": {"center": [1.4, 0.0], "turns": 1.25}}]}, "the path does not close"),
-    ({"boundary": {"periodic": True, "end_speed": 0.1}}, r"boundary.end_speed: a periodic motion has no ends"),
-    ({"end": {"joints": [0, 0, 0]}}, "end: the end posture of a periodic motion is its start posture"),
-    ({"spline": {"knots": "free", "intervals": 10}}, "spline.knots: ends in motion tie control points"),
+    (
+        {"path": [{"line": {"length": 0.6, "angle_deg": 90}}]},
+        "the path does not close; found 0.6 m off in y",
+    ),
+    (
+        {"path": [{"circle": {"center": [1.4, 0.0], "turns": 1.25}}]},
+        "the path does not close",
+    ),
+    (
+        {"boundary": {"periodic": True, "end_speed": 0.1}},
+        r"boundary.end_speed: a periodic motion has no ends",
+    ),
+    (
+        {"end": {"joints": [0, 0, 0]}},
+        "end: the end posture of a periodic motion is its start posture",
+    ),
+    (
+        {"spline": {"knots": "free", "intervals": 10}},
+        "spline.knots: ends in motion tie control points",
+    ),
     ({"boundary": {"start_speed": -0.1}}, "boundary.start_speed"),
 ]
 
@@ -200,8 +285,13 @@ def test_what_is_refused(changes, words):
 
 
 def test_a_corner_at_the_seam_is_refused():
-    corners = [{"line": {"by": [0.2, 0.0]}, "blend": 0.05}, {"line": {"by": [0.0, 0.2]}, "blend": 0.05}]
-    with pytest.raises(brachis.BrachisError, match=r"the path's tangent jumps where it closes"):
+    corners = [
+        {"line": {"by": [0.2, 0.0]}, "blend": 0.05},
+        {"line": {"by": [0.0, 0.2]}, "blend": 0.05},
+    ]
+    with pytest.raises(
+        brachis.BrachisError, match=r"the path's tangent jumps where it closes"
+    ):
         brachis.plan(variant(path=[*corners, {"line": {"by": [-0.2, -0.2]}}]))
 
 

@@ -13,7 +13,9 @@ ERRORS = [
     errors.UnknownNameError("joint", "j9", ["j1", "j2"], where="start"),
     errors.LimitError("is missing", joint="j1", key="robot.limits.torque.j1"),
     errors.PathError("out of reach", s_interval=(0.2, 1.0)),
-    errors.DecompositionError("none", redundant_joints=["j1"], reasons={"planar": "no"}, available=[("j2",)]),
+    errors.DecompositionError(
+        "none", redundant_joints=["j1"], reasons={"planar": "no"}, available=[("j2",)]
+    ),
     errors.PlausibilityError(["one remark", "another one"]),
 ]
 
@@ -26,6 +28,8 @@ def test_errors_survive_pickling(error):
     assert vars(again) == vars(error)
 
 
-@pytest.mark.parametrize(("count", "text"), [(0, "0 rows"), (1, "1 row"), (2, "2 rows")])
+@pytest.mark.parametrize(
+    ("count", "text"), [(0, "0 rows"), (1, "1 row"), (2, "2 rows")]
+)
 def test_counts_are_written_with_their_noun(count, text):
     assert errors.write_count(count, "row") == text

@@ -27,7 +27,9 @@ def test_a_file_is_read(tmp_path):
     assert read_file(tmp_path / "file") == b"a\r\nb"
 
 
-def test_a_file_of_the_kernel_that_has_nothing_to_say_yet_is_empty(tmp_path, monkeypatch):
+def test_a_file_of_the_kernel_that_has_nothing_to_say_yet_is_empty(
+    tmp_path, monkeypatch
+):
     """Such as /proc/kmsg: read without waiting it gives None, and not bytes."""
 
     class Silent(io.BytesIO):
@@ -35,7 +37,9 @@ def test_a_file_of_the_kernel_that_has_nothing_to_say_yet_is_empty(tmp_path, mon
             return None
 
     (tmp_path / "kmsg").touch()
-    monkeypatch.setattr(files.os, "fdopen", lambda descriptor, *_: os.close(descriptor) or Silent())
+    monkeypatch.setattr(
+        files.os, "fdopen", lambda descriptor, *_: os.close(descriptor) or Silent()
+    )
     assert read_file(tmp_path / "kmsg") == b""
     with pytest.raises(ResultFileError, match="the file is not a brachis result"):
         Trajectory.load(tmp_path / "kmsg")
@@ -64,11 +68,16 @@ def endless(request, tmp_path):
     return path, r"it is 1000000.0 MB long, at most 16 MB are read"
 
 
-@pytest.mark.parametrize("name", ["circle", "circle/file", "file/file", "a" * 5000, "a\0b"])
+@pytest.mark.parametrize(
+    "name", ["circle", "circle/file", "file/file", "a" * 5000, "a\0b"]
+)
 def test_what_the_system_refuses_is_not_written(name, tmp_path):
     (tmp_path / "circle").symlink_to("circle")
     (tmp_path / "file").write_text("old")
-    with pytest.raises(InputError, match="cannot be written"), atomic_write(tmp_path / name):
+    with (
+        pytest.raises(InputError, match="cannot be written"),
+        atomic_write(tmp_path / name),
+    ):
         pytest.fail("nothing can be written there")
     assert (tmp_path / "circle").is_symlink()
     assert not is_file(tmp_path / name)
@@ -82,7 +91,9 @@ def test_what_would_not_end_is_refused(endless):
     assert re.search(words, caught.value.strerror)
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="only Linux has /proc")
+@pytest.mark.skipif(
+    not Path("/proc/self/status").exists(), reason="only Linux has /proc"
+)
 def test_a_file_without_a_size_is_read_so_far_and_no_farther():
     assert read_file("/proc/self/status").startswith(b"Name")
     with pytest.raises(OSError, match="longer than"):
@@ -109,7 +120,10 @@ def dead_process() -> int:
 def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path):
     host, dead = files._host(), dead_process()
     tail = "0123456789abcdef"
-    ours = [f".brachis-{host}-{dead}-{tail}.part", f".brachis-{host}-{dead}-{tail[::-1]}.part"]
+    ours = [
+        f".brachis-{host}-{dead}-{tail}.part",
+        f".brachis-{host}-{dead}-{tail[::-1]}.part",
+    ]
     others = [
         f".brachis-{host}-{os.getpid()}-{tail}.part",  # of a process that runs
         f".brachis-00000000-{dead}-{tail}.part",  # of another host
@@ -142,11 +156,18 @@ write_files(Path(sys.argv[1]), {"result.json": slow}, {})
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_a_process_that_is_ended_while_it_writes(number, tmp_path):
     (tmp_path / "result.json").write_text("old")
-    with subprocess.Popen([sys.executable, "-c", WRITING, tmp_path], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", WRITING, tmp_path], stdout=subprocess.PIPE, text=True
+    ) as process:
         assert process.stdout.readline() == "writing\n"
         assert len(list(tmp_path.iterdir())) == 2
         process.send_signal(number)
-    assert process.returncode == {signal.SIGTERM: 128 + signal.SIGTERM, signal.SIGKILL: -signal.SIGKILL}[number]
+    assert (
+        process.returncode
+        == {signal.SIGTERM: 128 + signal.SIGTERM, signal.SIGKILL: -signal.SIGKILL}[
+            number
+        ]
+    )
     assert (tmp_path / "result.json").read_text() == "old"
     if number == signal.SIGKILL:  # nobody can clean up after that but the next one
         assert len(list(tmp_path.iterdir())) == 2
@@ -173,11 +194,25 @@ print(*written.files, *written.failures, sep="\\n")
 def test_figures_that_are_too_large_for_the_disk_leave_the_result(tmp_path):
     for name in ("result.json", "overview.png", "candidates.png"):
         (tmp_path / name).write_text("old")
-    done = subprocess.run([sys.executable, "-c", FULL, tmp_path], capture_output=True, text=True, check=True)
-    result, small, large = (tmp_path / name for name in ("result.json", "candidates.png", "overview.png"))
-    assert done.stdout.splitlines() == [str(result), str(small), f"{large}: cannot be written; found File too large"]
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, tmp_path],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    result, small, large = (
+        tmp_path / name for name in ("result.json", "candidates.png", "overview.png")
+    )
+    assert done.stdout.splitlines() == [
+        str(result),
+        str(small),
+        f"{large}: cannot be written; found File too large",
+    ]
     assert (result.read_text(), small.read_text()) == (500 * "x", 50 * "x")
-    assert {path.name for path in tmp_path.iterdir()} == {"result.json", "candidates.png"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "result.json",
+        "candidates.png",
+    }
 
 
 def test_results_that_are_too_large_for_the_disk_leave_the_folder_as_it_was(tmp_path):
@@ -185,8 +220,19 @@ def test_results_that_are_too_large_for_the_disk_leave_the_folder_as_it_was(tmp_
         (tmp_path / name).write_text("old")
 
     def full(path):
-        raise InputError("cannot be written", where=str(path), found="No space left on device")
+        raise InputError(
+            "cannot be written", where=str(path), found="No space left on device"
+        )
 
-    with pytest.raises(InputError, match=r"result.json: cannot be written; found No space left"):
-        write_files(tmp_path, {"result.json": full}, {"overview.png": lambda path: write_text("new", path)})
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"result.json": "old", "overview.png": "old"}
+    with pytest.raises(
+        InputError, match=r"result.json: cannot be written; found No space left"
+    ):
+        write_files(
+            tmp_path,
+            {"result.json": full},
+            {"overview.png": lambda path: write_text("new", path)},
+        )
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
+        "result.json": "old",
+        "overview.png": "old",
+    }

@@ -31,7 +31,12 @@ from brachis.task import (
 ROOT = Path(__file__).parents[1]
 Q0 = [0.5236, -2.0944, 2.0944]
 QUICK = {"redundant_joints": ["j1"], "intervals": 8, "effort": "single"}
-LINE = {"path": brachis.Line(by=[0.0, 0.3]), "start": Q0, "task_space": ["x", "y"], **QUICK}
+LINE = {
+    "path": brachis.Line(by=[0.0, 0.3]),
+    "start": Q0,
+    "task_space": ["x", "y"],
+    **QUICK,
+}
 
 
 def test_the_script_of_a_new_user_runs(tmp_path, capsys):
@@ -63,7 +68,12 @@ def test_all_forms_of_a_plan_are_the_same_plan(tmp_path):
 
 
 def test_keywords_change_a_task():
-    task = task_with(brachis.examples.payload_friction_jerk, payload={"mass": 2.0}, intervals=7, periodic=False)
+    task = task_with(
+        brachis.examples.payload_friction_jerk,
+        payload={"mass": 2.0},
+        intervals=7,
+        periodic=False,
+    )
     file = brachis.load_task(brachis.examples.payload_friction_jerk)
     assert task.robot.payload.mass == 2.0
     assert task.robot.limits == file.robot.limits
@@ -88,7 +98,11 @@ def test_segments_are_those_of_the_task_file():
         "start": {"joints": [0.0]},
         "task_space": "pose",
         "path": [
-            {"line": {"to": [0.5, 0.0, 0.3]}, "orientation": {"to": {"quaternion_wxyz": [1, 0, 0, 0]}}, "blend": 0.01},
+            {
+                "line": {"to": [0.5, 0.0, 0.3]},
+                "orientation": {"to": {"quaternion_wxyz": [1, 0, 0, 0]}},
+                "blend": 0.01,
+            },
             {"arc": {"center": [0.4, 0.0, 0.3], "angle_deg": 90, "normal": [0, 0, 1]}},
             {"circle": {"center": [0.4, 0.0, 0.3], "turns": 2, "normal": [0, 0, 1]}},
             {"helix": {"center": [0.4, 0.0, 0.3], "pitch": 0.01, "normal": [0, 0, 1]}},
@@ -111,8 +125,18 @@ def test_segments_are_those_of_the_task_file():
     )
     assert joined == brachis.load_task(content).path
     assert brachis.Spline(through=[pose.homogeneous for pose in poses]) == joined[-1]
-    assert brachis.Spline(through=np.stack([pose.homogeneous for pose in poses])) == joined[-1]
-    assert brachis.load_task({**content, "path": joined[0].model_copy(update={"blend": None})}).path[0].kind == "line"
+    assert (
+        brachis.Spline(through=np.stack([pose.homogeneous for pose in poses]))
+        == joined[-1]
+    )
+    assert (
+        brachis.load_task(
+            {**content, "path": joined[0].model_copy(update={"blend": None})}
+        )
+        .path[0]
+        .kind
+        == "line"
+    )
 
 
 @pytest.mark.parametrize(
@@ -136,11 +160,17 @@ def test_wrong_segments_are_refused(make, parts):
 
 def test_a_robot_with_other_limits_keeps_the_rest():
     robot = brachis.robots.tx90l_rail
-    changed = robot.with_limits(torque={"joint_1": 100.0}, velocity=1.0, scale={"torque": 0.5})
+    changed = robot.with_limits(
+        torque={"joint_1": 100.0}, velocity=1.0, scale={"torque": 0.5}
+    )
     assert changed.limits.torque[1] == 50.0
-    np.testing.assert_array_equal(changed.limits.torque[2:], 0.5 * robot.limits.torque[2:])
+    np.testing.assert_array_equal(
+        changed.limits.torque[2:], 0.5 * robot.limits.torque[2:]
+    )
     np.testing.assert_array_equal(changed.limits.velocity, 1.0)
-    np.testing.assert_array_equal(changed.limits.position_lower, robot.limits.position_lower)
+    np.testing.assert_array_equal(
+        changed.limits.position_lower, robot.limits.position_lower
+    )
     again = changed.with_limits(torque={"joint_2": 20.0}).with_payload(2.0).limits
     assert again.torque[1:3].tolist() == [50.0, 20.0]
     assert robot.limits.torque[1] == 318.0
@@ -163,10 +193,16 @@ def test_a_robot_whose_tool_rolls_may_have_other_limits():
 def test_a_payload_is_carried():
     robot = brachis.robots.scara3
     heavy = robot.with_payload(1.5, com=(0.0, 0.0, 0.1)).with_limits(velocity=3.0)
-    assert sum(body.mass for body in heavy.model.inertias) - sum(body.mass for body in robot.model.inertias) == 1.5
+    assert (
+        sum(body.mass for body in heavy.model.inertias)
+        - sum(body.mass for body in robot.model.inertias)
+        == 1.5
+    )
     assert heavy.with_payload(None).settings.payload is None
     given = brachis.plan(heavy, **LINE)
-    same = brachis.plan(robot, **LINE, payload=heavy.settings.payload, limits={"velocity": 3.0})
+    same = brachis.plan(
+        robot, **LINE, payload=heavy.settings.payload, limits={"velocity": 3.0}
+    )
     assert given.t_end == pytest.approx(same.t_end, rel=1e-6)
     assert given.t_end > brachis.plan(robot, **LINE, limits={"velocity": 3.0}).t_end
 
@@ -175,29 +211,52 @@ def test_samples_carry_the_tool():
     result = brachis.plan("scara3", **LINE)
     samples = result.sample(0.01)
     placement = result.trajectory.robot.tool_placement(samples.q[30])
-    np.testing.assert_allclose(samples.tool_position[30], placement.translation, atol=1e-12)
+    np.testing.assert_allclose(
+        samples.tool_position[30], placement.translation, atol=1e-12
+    )
     rotation = pin.Quaternion(*samples.tool_quaternion[30]).matrix()
     np.testing.assert_allclose(rotation, placement.rotation, atol=1e-12)
     step = 1e-6
     before, behind = result.trajectory.at([0.3 - step, 0.3 + step]).tool_position
     speed = result.trajectory.at(0.3).tool_speed
-    np.testing.assert_allclose(speed, np.linalg.norm(behind - before) / (2 * step), rtol=1e-6)
+    np.testing.assert_allclose(
+        speed, np.linalg.norm(behind - before) / (2 * step), rtol=1e-6
+    )
     held = result.sample(0.01, last="hold")
     assert held.tool_speed[-1] == 0.0
 
 
 def test_many_plans_keep_their_order_and_failures_are_values():
-    tasks = [{"brachis": 1}, ("scara3", task_with(**LINE)), (None, brachis.examples.scara_line)]
+    tasks = [
+        {"brachis": 1},
+        ("scara3", task_with(**LINE)),
+        (None, brachis.examples.scara_line),
+    ]
     told = []
-    outcomes = brachis.plan_many(tasks, jobs=2, progress=lambda done, total, _: told.append((done, total)), **QUICK)
-    assert [type(outcome).__name__ for outcome in outcomes] == ["TaskError", "Result", "Result"]
+    outcomes = brachis.plan_many(
+        tasks,
+        jobs=2,
+        progress=lambda done, total, _: told.append((done, total)),
+        **QUICK,
+    )
+    assert [type(outcome).__name__ for outcome in outcomes] == [
+        "TaskError",
+        "Result",
+        "Result",
+    ]
     assert told == [(1, 3), (2, 3), (3, 3)]
-    assert outcomes[1].t_end == pytest.approx(brachis.plan("scara3", **LINE).t_end, rel=1e-9)
+    assert outcomes[1].t_end == pytest.approx(
+        brachis.plan("scara3", **LINE).t_end, rel=1e-9
+    )
     assert outcomes[2].bottleneck().sensitivities.limits
 
 
 def test_one_task_is_no_list_of_tasks():
-    for one in (brachis.examples.scara_line, str(brachis.examples.scara_line), {"brachis": 1}):
+    for one in (
+        brachis.examples.scara_line,
+        str(brachis.examples.scara_line),
+        {"brachis": 1},
+    ):
         with pytest.raises(InputError, match="a list of tasks"):
             brachis.plan_many(one)
 
@@ -218,10 +277,20 @@ def test_every_key_of_a_task_is_a_keyword():
         "search": SearchSettings,
     }
     keys = {key for model in (Task, *sections.values()) for key in model.model_fields}
-    left = {"brachis", "urdf", "limits_file", "tolerance", "shortest_interval", "guesses", "jobs"}
+    left = {
+        "brachis",
+        "urdf",
+        "limits_file",
+        "tolerance",
+        "shortest_interval",
+        "guesses",
+        "jobs",
+    }
     assert keys - set(TaskKeywords.__annotations__) == left, "in whole sections alone"
     assert set(TaskKeywords.__annotations__) <= keys
-    assert set(LimitKeywords.__annotations__) == {each.name for each in fields(LimitSpec)}
+    assert set(LimitKeywords.__annotations__) == {
+        each.name for each in fields(LimitSpec)
+    }
 
 
 def test_a_misspelt_robot_is_told_from_a_missing_file():
@@ -234,7 +303,14 @@ def test_a_misspelt_robot_is_told_from_a_missing_file():
 
 
 FIRST = [0.0, 0.3, 0.0, -1.2, 0.0, 0.6, 0.0]
-JOINTS = np.add(FIRST, [[0.0] * 7, [0.2, 0.1, 0.1, 0.2, 0.1, -0.1, 0.2], [0.3, 0.3, 0.2, 0.1, 0.0, -0.2, 0.1]])
+JOINTS = np.add(
+    FIRST,
+    [
+        [0.0] * 7,
+        [0.2, 0.1, 0.1, 0.2, 0.1, -0.1, 0.2],
+        [0.3, 0.3, 0.2, 0.1, 0.0, -0.2, 0.1],
+    ],
+)
 SHORT = {"effort": "single", "intervals": 8, "least_motion": False}
 ARM = {"task_space": "joints", **SHORT}
 POINTS = np.array([[1.73205, 0.0], [1.72, 0.1], [1.7, 0.2]])
@@ -242,12 +318,20 @@ NAMED = {"j1": Q0[0], "j2": Q0[1], "j3": Q0[2]}
 WORKS = {
     "an array of joints": lambda: brachis.plan("iiwa14", path=JOINTS, **ARM),
     "an array of points": lambda: brachis.plan("scara3", **{**LINE, "path": POINTS}),
-    "a spline through all waypoints": lambda: brachis.plan("iiwa14", path=brachis.Spline(JOINTS), **ARM),
-    "a mapping for a segment": lambda: brachis.plan("scara3", **{**LINE, "path": {"line": {"by": [0.0, 0.3]}}}),
+    "a spline through all waypoints": lambda: brachis.plan(
+        "iiwa14", path=brachis.Spline(JOINTS), **ARM
+    ),
+    "a mapping for a segment": lambda: brachis.plan(
+        "scara3", **{**LINE, "path": {"line": {"by": [0.0, 0.3]}}}
+    ),
     "a tuple": lambda: brachis.plan("scara3", **{**LINE, "start": tuple(Q0)}),
     "joints by name": lambda: brachis.plan("scara3", **{**LINE, "start": NAMED}),
-    "the task by name": lambda: brachis.plan("scara3", task=brachis.examples.scara_line, **QUICK),
-    "limits as a mapping": lambda: brachis.plan("scara3", **LINE, limits={"torque": 12}),
+    "the task by name": lambda: brachis.plan(
+        "scara3", task=brachis.examples.scara_line, **QUICK
+    ),
+    "limits as a mapping": lambda: brachis.plan(
+        "scara3", **LINE, limits={"torque": 12}
+    ),
     "a solver's name": lambda: brachis.plan("scara3", **LINE, solver="slsqp"),
 }
 
@@ -265,25 +349,46 @@ ANSWERS = {
     'brachis.Robot("a.urdf")': (InputError, "from_urdf"),
     'brachis.plan("a.urdf")': (brachis.errors.UrdfError, "does not exist"),
     "brachis.plan()": (TaskError, "task_space: What the path prescribes"),
-    'brachis.plan(robot="scara3", path=SEGMENT, **SCARA)': (InputError, "brachis.plan('scara3', path=...)"),
+    'brachis.plan(robot="scara3", path=SEGMENT, **SCARA)': (
+        InputError,
+        "brachis.plan('scara3', path=...)",
+    ),
     'brachis.plan("scara3", path=SEGMENT, q0=Q0)': (UnknownNameError, "'start'"),
     'brachis.plan("scara3", start=Q0, goal=Q0)': (UnknownNameError, "'end'"),
     'brachis.plan("scara3", waypoints=POINTS)': (UnknownNameError, "'path'"),
     'brachis.plan("scara3", timeout=3)': (UnknownNameError, "'time_limit'"),
     'brachis.plan("scara3", verbose=True)': (UnknownNameError, "'progress'"),
     'brachis.plan("scara3", torque=12)': (UnknownNameError, "limits={'torque': ...}"),
-    'brachis.plan("scara3", velocity_limits=2)': (UnknownNameError, "limits={'velocity': ...}"),
+    'brachis.plan("scara3", velocity_limits=2)': (
+        UnknownNameError,
+        "limits={'velocity': ...}",
+    ),
     'brachis.plan("scara3", n_intervals=12)': (UnknownNameError, "'intervals'"),
     "brachis.plan_many([], workers=2)": (UnknownNameError, "'jobs'"),
-    'brachis.plan("scara3", path=SEGMENT, **SCARA, solver="IPOPT")': (UnknownNameError, "Did you mean 'ipopt'"),
-    'brachis.plan("scara3", path=SEGMENT, **SCARA, spline=30)': (TaskError, "keys out of degree, intervals"),
-    'brachis.plan("scara3", path=np.sin, **SCARA)': (TaskError, "brachis.bspline_segment"),
+    'brachis.plan("scara3", path=SEGMENT, **SCARA, solver="IPOPT")': (
+        UnknownNameError,
+        "Did you mean 'ipopt'",
+    ),
+    'brachis.plan("scara3", path=SEGMENT, **SCARA, spline=30)': (
+        TaskError,
+        "keys out of degree, intervals",
+    ),
+    'brachis.plan("scara3", path=np.sin, **SCARA)': (
+        TaskError,
+        "brachis.bspline_segment",
+    ),
     'brachis.plan("gen3", path=[pin.SE3.Identity()] * 2, task_space="pose", start="free")': (
         TaskError,
         "brachis.Spline",
     ),
-    'brachis.plan("iiwa14", path=[0.1] * 7, task_space="joints")': (TaskError, "two points or more"),
-    'brachis.plan("iiwa14", path=brachis.Line(by=[0.1] * 7), task_space="joints")': (TaskError, "start posture"),
+    'brachis.plan("iiwa14", path=[0.1] * 7, task_space="joints")': (
+        TaskError,
+        "two points or more",
+    ),
+    'brachis.plan("iiwa14", path=brachis.Line(by=[0.1] * 7), task_space="joints")': (
+        TaskError,
+        "start posture",
+    ),
     'brachis.plan("<robot>\\n</robot>")': (TaskError, "urdf_text"),
     "brachis.Line(end=[0, 1])": (UnknownNameError, "'to'"),
     "brachis.load": (AttributeError, "'load_task'"),
@@ -321,15 +426,27 @@ def test_what_is_there_is_not_hidden_by_answers(result):
     assert not hasattr(result, "_repr_png_")
     assert pickle.loads(pickle.dumps(result.trajectory.task)) == result.trajectory.task  # noqa: S301
     assert copy.deepcopy(result.task).path == result.task.path
-    assert brachis.Robot.from_urdf(result.trajectory.robot.source, limits={"torque": 12}).limits.torque[0] == 12
+    assert (
+        brachis.Robot.from_urdf(
+            result.trajectory.robot.source, limits={"torque": 12}
+        ).limits.torque[0]
+        == 12
+    )
     with pytest.raises(AttributeError, match=r"no attribute 'nothing_like_it'$"):
         _ = result.nothing_like_it
 
 
 def test_a_solvers_name_keeps_the_solvers_other_settings():
     file = {**LINE, "solver": {"tolerance": 1e-7}}
-    assert task_with(task_with(**file), solver="slsqp").solver.model_dump(exclude_defaults=True) == {
+    assert task_with(task_with(**file), solver="slsqp").solver.model_dump(
+        exclude_defaults=True
+    ) == {
         "name": "slsqp",
         "tolerance": 1e-7,
     }
-    assert brachis.load_task({**task_with(**LINE).to_dict(), "solver": "slsqp"}).solver.name == "slsqp"
+    assert (
+        brachis.load_task(
+            {**task_with(**LINE).to_dict(), "solver": "slsqp"}
+        ).solver.name
+        == "slsqp"
+    )

@@ -11,9 +11,16 @@ import pytest
 SCRIPT = Path(__file__).parents[1] / "benchmarks/fuzz.py"
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the memory limit is read off /proc")
+@pytest.mark.skipif(
+    not Path("/proc/self/status").exists(), reason="the memory limit is read off /proc"
+)
 def test_broken_inputs():
-    done = subprocess.run([sys.executable, SCRIPT, "--cases", "50"], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, SCRIPT, "--cases", "50"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "50 cases" in done.stdout
     assert done.stdout.count("valid") >= 3  # not everything is refused

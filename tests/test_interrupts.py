@@ -90,7 +90,11 @@ def test_what_was_heard_is_forgotten(presses):
 
 @pytest.mark.parametrize("listening", [True, False])
 def test_a_press_waits_for_the_end_of_a_block(request, listening):
-    handler = request.getfixturevalue("presses") if listening else signal.getsignal(signal.SIGINT)
+    handler = (
+        request.getfixturevalue("presses")
+        if listening
+        else signal.getsignal(signal.SIGINT)
+    )
     done = []
 
     def work():
@@ -132,7 +136,9 @@ def test_processes_begun_in_a_blocked_block_do_not_hear_a_press():
     code = "import signal; print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))"
     for block in (True, False):
         with interrupts.blocked() if block else interrupts.postponed():
-            done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+            done = subprocess.run(
+                [sys.executable, "-c", code], capture_output=True, text=True, check=True
+            )
         assert done.stdout.strip() == str(block)
 
 

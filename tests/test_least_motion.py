@@ -26,12 +26,19 @@ def reversals(trajectory: Trajectory) -> list[int]:
     velocity = trajectory.velocity(np.linspace(0.0, trajectory.t_end, 4001))
     limits = trajectory.robot.limits.velocity
     scale = np.where(np.isfinite(limits), limits, np.abs(velocity).max(axis=0))
-    kept = [v[np.abs(v) > NOTEWORTHY * most] for v, most in zip(velocity.T, scale, strict=True)]
+    kept = [
+        v[np.abs(v) > NOTEWORTHY * most]
+        for v, most in zip(velocity.T, scale, strict=True)
+    ]
     return [int((np.diff(np.sign(v)) != 0.0).sum()) for v in kept]
 
 
 def rms(trajectory: Trajectory) -> np.ndarray:
-    return np.sqrt((trajectory.acceleration(np.linspace(0.0, trajectory.t_end, 4001)) ** 2).mean(axis=0))
+    return np.sqrt(
+        (trajectory.acceleration(np.linspace(0.0, trajectory.t_end, 4001)) ** 2).mean(
+            axis=0
+        )
+    )
 
 
 def free_roll() -> brachis.Task:
@@ -90,10 +97,17 @@ def test_no_joint_swings_to_and_fro_and_the_motion_is_as_fast(result):
 
 
 def test_bottlenecks_are_those_of_the_fastest_motion(result):
-    assert result.attempt.refined.program.objective(result.attempt.refined.x) == result.attempt.refined.t_end
-    assert result.attempt.refined.t_end == pytest.approx(result.attempt.trajectory.t_end, rel=1e-9)
+    assert (
+        result.attempt.refined.program.objective(result.attempt.refined.x)
+        == result.attempt.refined.t_end
+    )
+    assert result.attempt.refined.t_end == pytest.approx(
+        result.attempt.trajectory.t_end, rel=1e-9
+    )
     fastest = dataclasses.replace(result, trajectory=result.attempt.trajectory)
-    ours, theirs = (brachis.bottleneck.report(each).sensitivities for each in (result, fastest))
+    ours, theirs = (
+        brachis.bottleneck.report(each).sensitivities for each in (result, fastest)
+    )
     assert len(ours.limits) == len(theirs.limits) > 0
     for entry in ours.limits:
         other = theirs.of(entry.label.subject, entry.label.kind, entry.bound.end)
@@ -121,7 +135,9 @@ def test_a_slower_motion_is_calmer(tmp_path):
     assert 1.005 < result.t_end / result.attempt.t_end <= 1.01
     assert np.all(rms(result.trajectory) < 0.9 * rms(result.attempt.trajectory))
     result.trajectory.save(tmp_path / "result.npz")
-    again = brachis.bottleneck.report(Trajectory.load(tmp_path / "result.npz")).sensitivities
+    again = brachis.bottleneck.report(
+        Trajectory.load(tmp_path / "result.npz")
+    ).sensitivities
     for entry in brachis.bottleneck.report(result).sensitivities.limits:
         found = again.of(entry.label.subject, entry.label.kind, entry.bound.end)
         assert found.derivative == pytest.approx(entry.derivative, rel=0.05, abs=1e-3)
@@ -136,7 +152,11 @@ def test_without_time_or_a_verified_motion_the_fastest_stays():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("brachis.planner.calmest", keep)
-        brachis.plan(task.model_copy(update={"search": task.search.model_copy(update={"least_motion": True})}))
+        brachis.plan(
+            task.model_copy(
+                update={"search": task.search.model_copy(update={"least_motion": True})}
+            )
+        )
     (fastest,) = kept
     over = least_motion.calmest(fastest, Deadline(0.0), lambda _text: None)
     assert over.trajectory is fastest.trajectory
@@ -162,7 +182,9 @@ def test_joints_count_in_proportion_to_their_velocity_limits():
     x = next(starting_points(program))
     objective = least_motion.least_acceleration(program, x, 0.01)
     limits = program.phases[0].joint_map.robot.limits.velocity
-    np.testing.assert_allclose(objective.weights[:-1] * limits[:-1], objective.weights[0] * limits[0])
+    np.testing.assert_allclose(
+        objective.weights[:-1] * limits[:-1], objective.weights[0] * limits[0]
+    )
     assert objective.weights[-1] == 0.0, "the virtual roll is no joint"
     assert program.minimising(objective).objective(x) == pytest.approx(1.0)
     np.testing.assert_allclose(objective.longest, 1.01 * x[0])

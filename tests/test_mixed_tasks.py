@@ -17,7 +17,11 @@ from brachis.robot.from_task import robot_for
 from brachis.task import load_task
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
-CASES = [*(("tx90l_rail", number) for number in range(6)), ("planar4", 1), ("scara3", 2)]
+CASES = [
+    *(("tx90l_rail", number) for number in range(6)),
+    ("planar4", 1),
+    ("scara3", 2),
+]
 
 
 @pytest.fixture(scope="module")
@@ -40,27 +44,46 @@ def problem_of(case):
 
 
 @pytest.mark.parametrize(("robot", "number"), CASES)
-def test_the_known_joint_path_is_on_the_path_within_ranges_from_start_to_end(bench, robot, number, folder):
+def test_the_known_joint_path_is_on_the_path_within_ranges_from_start_to_end(
+    bench, robot, number, folder
+):
     case = bench("mixed_cases").case(robot, 0, number, folder)
     problem, joint_path = problem_of(case), case.joint_path
     targets = problem.path.sample(np.linspace(0.0, 1.0, len(joint_path))).target
-    assert np.abs(problem.task_map.difference(targets, problem.task_map.values(joint_path))).max() < 1e-8
+    assert (
+        np.abs(
+            problem.task_map.difference(targets, problem.task_map.values(joint_path))
+        ).max()
+        < 1e-8
+    )
     limits = problem.robot.limits
-    assert np.all((joint_path >= limits.position_lower) & (joint_path <= limits.position_upper))
+    assert np.all(
+        (joint_path >= limits.position_lower) & (joint_path <= limits.position_upper)
+    )
     for given, own in ((problem.start, joint_path[0]), (problem.end, joint_path[-1])):
         assert given is None or np.allclose(given, own, rtol=0.0, atol=1e-9)
 
 
 def test_the_same_arguments_make_the_same_task(bench, tmp_path):
     make = bench("mixed_cases").case
-    first, again = (make("tx90l_rail", 3, 5, tmp_path / folder).task for folder in ("one", "two"))
+    first, again = (
+        make("tx90l_rail", 3, 5, tmp_path / folder).task for folder in ("one", "two")
+    )
     assert first.read_bytes() == again.read_bytes()
-    assert first.with_suffix(".csv").read_bytes() == again.with_suffix(".csv").read_bytes()
+    assert (
+        first.with_suffix(".csv").read_bytes() == again.with_suffix(".csv").read_bytes()
+    )
 
 
 def test_a_comparison_tells_what_became_faster_and_what_was_lost(bench, capsys):
-    before = [{"task": name, "verified": True, "t_end": 2.0, "seconds": 8.0, "cpu": 4.0} for name in ("a", "b")]
-    after = [{**before[0], "t_end": 1.0, "cpu": 1.0}, {**before[1], "verified": False, "t_end": None}]
+    before = [
+        {"task": name, "verified": True, "t_end": 2.0, "seconds": 8.0, "cpu": 4.0}
+        for name in ("a", "b")
+    ]
+    after = [
+        {**before[0], "t_end": 1.0, "cpu": 1.0},
+        {**before[1], "verified": False, "t_end": None},
+    ]
     bench("mixed_tasks").compare(before, after)
     said = capsys.readouterr().out
     assert "a: t_end times 0.5000" in said
@@ -77,7 +100,11 @@ def test_derivatives_of_the_plain_transcription(bench, robot, number, folder):
     step = rng.normal(size=len(x))
     slope = (program.rows(x + 1e-6 * step) - program.rows(x - 1e-6 * step)) / 2e-6
     entries = program.jacobian(x) * step[program.jacobian_columns]
-    exact = np.bincount(program.jacobian_rows, weights=entries, minlength=len(program.lower))
+    exact = np.bincount(
+        program.jacobian_rows, weights=entries, minlength=len(program.lower)
+    )
     assert np.abs(slope - exact).max() < 1e-6 * np.abs(exact).max()
     ahead, behind = (program.objective(x + sign * 1e-6 * step) for sign in (1.0, -1.0))
-    assert program.gradient(x) @ step == pytest.approx((ahead - behind) / 2e-6, rel=1e-6)
+    assert program.gradient(x) @ step == pytest.approx(
+        (ahead - behind) / 2e-6, rel=1e-6
+    )

@@ -44,7 +44,12 @@ def test_inverse_dynamics_agree(motion):
     t = np.linspace(0.0, trajectory.t_end, 501)
     found = np.empty((len(t), len(order)))
     for k, (q, v, a) in enumerate(
-        zip(trajectory.position(t), trajectory.velocity(t), trajectory.acceleration(t), strict=True)
+        zip(
+            trajectory.position(t),
+            trajectory.velocity(t),
+            trajectory.acceleration(t),
+            strict=True,
+        )
     ):
         data.qpos[order], data.qvel[order], data.qacc[order] = q, v, a
         mujoco.mj_inverse(model, data)
@@ -62,7 +67,11 @@ def test_the_planned_torque_follows_the_path(motion):
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     data = mujoco.MjData(model)
     data.qpos[order] = trajectory.q[0]
-    inertia = np.diag(pin.crba(trajectory.robot.model, trajectory.robot.model.createData(), trajectory.q[0]))
+    inertia = np.diag(
+        pin.crba(
+            trajectory.robot.model, trajectory.robot.model.createData(), trajectory.q[0]
+        )
+    )
     stiffness, damping = BANDWIDTH**2 * inertia, 2.0 * BANDWIDTH * inertia
     tool = model.body(trajectory.robot.tool_frame).id
     worst, t = 0.0, np.arange(0.0, trajectory.t_end, model.opt.timestep)

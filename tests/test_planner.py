@@ -53,7 +53,9 @@ def test_saved_result_keeps_the_robot_that_was_planned_for(tmp_path):
         again = brachis.Trajectory.load(tmp_path / "result.npz")
         np.testing.assert_array_equal(again.robot.limits.torque, torque)
         assert np.isinf(again.robot.limits.velocity).all()
-        assert brachis.verify_trajectory(again).worst_ratio == pytest.approx(result.verification.worst_ratio, rel=1e-9)
+        assert brachis.verify_trajectory(again).worst_ratio == pytest.approx(
+            result.verification.worst_ratio, rel=1e-9
+        )
 
 
 def test_task_of_the_result_repeats_the_plan():
@@ -62,7 +64,9 @@ def test_task_of_the_result_repeats_the_plan():
 
 
 def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_refined_one_does_not():
-    program, _ = brachis.transcribe(robot(), brachis.load_task(task(redundant_joints=["j1"])))
+    program, _ = brachis.transcribe(
+        robot(), brachis.load_task(task(redundant_joints=["j1"]))
+    )
     first = solve_with_uno(program, next(starting_points(program)))
     (phase,) = program.phases
     dense = phase.resampled(np.linspace(0.0, 1.0, 2001))
@@ -74,7 +78,9 @@ def test_unrefined_motion_exceeds_a_limit_between_collocation_points_and_the_ref
 
 
 def test_without_refinement_the_answer_is_left_as_it_is():
-    result = brachis.plan(robot(), task(redundant_joints=["j1"], refinement={"max_rounds": 0}))
+    result = brachis.plan(
+        robot(), task(redundant_joints=["j1"], refinement={"max_rounds": 0})
+    )
     assert not result.verified
     assert result.verification.worst_ratio > 1.01
     assert result.attempt.time_scaled == 1.0
@@ -83,23 +89,35 @@ def test_without_refinement_the_answer_is_left_as_it_is():
 
 def test_margins_that_change_nothing_are_not_solved_again():
     gantry = brachis.Robot.from_urdf(ROOT / "robots/gantry2/robot.urdf")
-    line = {"path": [{"line": {"by": [0.5, 0.2]}}], "start": {"joints": [0.0, 0.0]}, "redundant_joints": []}
+    line = {
+        "path": [{"line": {"by": [0.5, 0.2]}}],
+        "start": {"joints": [0.0, 0.0]},
+        "redundant_joints": [],
+    }
     program, _ = brachis.transcribe(gantry, brachis.load_task(task(**line)))
     solves = []
 
     def fail(tried, x):
         solves.append(tried)
-        return solver_named("uno")[0].solve(tried, x, SolverOptions(max_iterations=1), None)
+        return solver_named("uno")[0].solve(
+            tried, x, SolverOptions(max_iterations=1), None
+        )
 
     continued(program, next(starting_points(program)), fail, MARGINS)
     assert len(solves) == 1
 
 
 def test_every_solve_is_reported():
-    result = brachis.plan(robot(), task(path=[{"line": {"length": 1.0, "angle_deg": 0}}]))
+    result = brachis.plan(
+        robot(), task(path=[{"line": {"length": 1.0, "angle_deg": 0}}])
+    )
     reports = result.attempt.reports
-    assert len(reports) > 1 + result.attempt.refinement_rounds, "the branch margin holds this motion back"
-    assert result.to_dict()["iterations"] == sum(report.iterations for report in reports)
+    assert len(reports) > 1 + result.attempt.refinement_rounds, (
+        "the branch margin holds this motion back"
+    )
+    assert result.to_dict()["iterations"] == sum(
+        report.iterations for report in reports
+    )
 
 
 def test_missing_solver_is_said_and_the_next_one_taken(monkeypatch):
@@ -107,14 +125,20 @@ def test_missing_solver_is_said_and_the_next_one_taken(monkeypatch):
     result = brachis.plan(robot(), task(spline={"intervals": 8}))
     assert result.verified
     assert result.solver_report.solver == "ipopt"
-    assert any("uno: not installed" in candidate.status for candidate in result.candidates)
+    assert any(
+        "uno: not installed" in candidate.status for candidate in result.candidates
+    )
 
 
 def test_path_start_is_checked():
     assert brachis.plan(robot(), task(path_start=[np.sqrt(3.0), 0.0])).verified
-    with pytest.raises(StartError, match=r"the start posture is off the path; found 0.01 m off in y"):
+    with pytest.raises(
+        StartError, match=r"the start posture is off the path; found 0.01 m off in y"
+    ):
         brachis.plan(robot(), task(path_start=[np.sqrt(3.0), 0.01]))
-    with pytest.raises(brachis.InputError, match="path_start: has the wrong number of coordinates"):
+    with pytest.raises(
+        brachis.InputError, match="path_start: has the wrong number of coordinates"
+    ):
         brachis.plan(robot(), task(path_start=[1.0, 0.0, 0.0]))
 
 
@@ -126,7 +150,9 @@ def test_end_posture_on_another_branch_is_refused():
     elbow = np.array([np.cos(end[0]), np.sin(end[0])])
     wrist = elbow + np.array([np.cos(end[0] + end[1]), np.sin(end[0] + end[1])])
     bearing = np.arctan2(wrist[1], wrist[0])
-    mirrored = np.array([2 * bearing - end[0], -end[1], end[2] + 2 * (end[0] + end[1] - bearing)])
+    mirrored = np.array(
+        [2 * bearing - end[0], -end[1], end[2] + 2 * (end[0] + end[1] - bearing)]
+    )
     with pytest.raises(StartError, match="the end posture is on another branch"):
         brachis.plan(robot(), task(end={"joints": mirrored}))
 
@@ -142,10 +168,14 @@ def test_full_turns_are_counted_even_between_few_points():
     times = []
     for position in (None, {"j1": [-50.0, 50.0]}, {"j1": [-1.0, 50.0]}):
         limits = brachis.LimitSpec(torque=100.0, velocity=None, position=position)
-        arm = brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=limits, locked_joints={"j3": 0.4})
+        arm = brachis.Robot.from_urdf(
+            SCARA, gravity=[0, 0, 0], limits=limits, locked_joints={"j3": 0.4}
+        )
         result = brachis.plan(arm, circles)
         assert result.verified
-        turned = result.trajectory.position(result.t_end) - result.trajectory.position(0.0)
+        turned = result.trajectory.position(result.t_end) - result.trajectory.position(
+            0.0
+        )
         assert turned[0] == pytest.approx(6 * np.pi, abs=1e-6)
         times.append(result.t_end)
     assert times == pytest.approx(times[:1] * 3, rel=1e-3)
@@ -154,7 +184,9 @@ def test_full_turns_are_counted_even_between_few_points():
 @pytest.mark.parametrize("name", ["uno", "ipopt", "slsqp"])
 def test_ctrl_c_reaches_the_user(name):
     """A real signal while the solver works."""
-    program, _ = brachis.transcribe(robot(), brachis.load_task(task(spline={"intervals": 60})))
+    program, _ = brachis.transcribe(
+        robot(), brachis.load_task(task(spline={"intervals": 60}))
+    )
     x = next(starting_points(program))
     solver = solver_named(name)[0]
     handler = signal.getsignal(signal.SIGINT)
@@ -178,7 +210,10 @@ def test_statuses_carry_advice():
 @pytest.mark.parametrize("size", [0.01, 0.004])
 def test_a_blend_of_millimetres_is_not_stepped_over(scara_urdf, size):
     """The torque peak inside a blend lies between the points of any even grid."""
-    corner = [{"line": {"by": [-0.3, 0.3]}, "blend": size}, {"line": {"by": [-0.3, -0.2]}}]
+    corner = [
+        {"line": {"by": [-0.3, 0.3]}, "blend": size},
+        {"line": {"by": [-0.3, -0.2]}},
+    ]
     task = {
         "brachis": 1,
         "start": {"joints": [0.3, 0.8, -0.9]},
@@ -190,5 +225,9 @@ def test_a_blend_of_millimetres_is_not_stepped_over(scara_urdf, size):
     }
     result = brachis.plan(scara_urdf, task)
     assert result.verified
-    breaks = brachis.transcribe(result.trajectory.robot, result.task)[0].phases[0].joint_map.path.breaks
+    breaks = (
+        brachis.transcribe(result.trajectory.robot, result.task)[0]
+        .phases[0]
+        .joint_map.path.breaks
+    )
     assert np.diff(breaks).min() < size / 0.3

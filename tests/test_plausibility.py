@@ -14,7 +14,13 @@ from scipy.spatial.transform import Rotation
 
 import brachis
 from brachis import LimitSpec
-from brachis.errors import BrachisError, PathError, PlausibilityError, StartError, UrdfError
+from brachis.errors import (
+    BrachisError,
+    PathError,
+    PlausibilityError,
+    StartError,
+    UrdfError,
+)
 from brachis.problem.plausibility import of_end_time, of_robot, of_task
 from brachis.robot import Robot
 from brachis.robot.limb import first_limb
@@ -25,14 +31,22 @@ ROOT = Path(__file__).parents[1]
 SCARA = ROOT / "robots/scara3/robot.urdf"
 RAIL = ROOT / "robots/tx90l_rail/robot.urdf"
 PACKAGE = "cmeel.prefix/share/example-robot-data/robots"
-FOREIGN = sorted(file for folder in map(Path, sys.path) for file in (folder / PACKAGE).rglob("*.urdf"))
+FOREIGN = sorted(
+    file
+    for folder in map(Path, sys.path)
+    for file in (folder / PACKAGE).rglob("*.urdf")
+)
 OWN = sorted((ROOT / "robots").rglob("*.urdf"))
 
 
 def task(**changes: object) -> dict:
     base = {
         "brachis": 1,
-        "robot": {"urdf": str(SCARA), "gravity": [0, 0, 0], "limits": {"torque": 10, "velocity": None}},
+        "robot": {
+            "urdf": str(SCARA),
+            "gravity": [0, 0, 0],
+            "limits": {"torque": 10, "velocity": None},
+        },
         "start": {"joints": [np.pi / 6, -2 * np.pi / 3, 2 * np.pi / 3]},
         "task_space": ["x", "y"],
         "path": [{"line": {"length": 0.5, "angle_deg": 90}}],
@@ -44,15 +58,25 @@ def task(**changes: object) -> dict:
 
 
 def with_limits(**limits: object) -> dict:
-    return task(robot={**task()["robot"], "limits": {"torque": 10, "velocity": None, **limits}})
+    return task(
+        robot={**task()["robot"], "limits": {"torque": 10, "velocity": None, **limits}}
+    )
 
 
-def arm(*, length: float = 0.4, mass: float = 2.0, inertia: float = 0.01, slide: bool = False) -> Robot:
+def arm(
+    *,
+    length: float = 0.4,
+    mass: float = 2.0,
+    inertia: float = 0.01,
+    slide: bool = False,
+) -> Robot:
     matrix = " ".join(f'{key}="{inertia}"' for key in ("ixx", "iyy", "izz"))
     inertial = f'<inertial><mass value="{mass}"/><inertia {matrix} ixy="0" ixz="0" iyz="0"/></inertial>'
     kinds = ("prismatic" if slide else "revolute", "revolute", "revolute")
     joints = [Joint(kind, xyz=(length, 0.0, 0.0), inertial=inertial) for kind in kinds]
-    return Robot.from_urdf("file.urdf", urdf_text=chain_urdf(joints, tool=(length, 0.0, 0.0)))
+    return Robot.from_urdf(
+        "file.urdf", urdf_text=chain_urdf(joints, tool=(length, 0.0, 0.0))
+    )
 
 
 def told(robot: Robot) -> list[tuple[str, str]]:
@@ -66,14 +90,23 @@ def with_stated_speeds(file: Path) -> Robot | None:
     """The robot with the URDF's limits but for torques; None for files that hold no arm."""
     try:
         limb = first_limb(read_file(file), file.name)
-        robot = Robot.from_urdf(file, tool_frame=limb.tool, base_frame=limb.base, limits=UNLIMITED)
+        robot = Robot.from_urdf(
+            file, tool_frame=limb.tool, base_frame=limb.base, limits=UNLIMITED
+        )
     except BrachisError:
         return None
-    speeds = [np.inf if limit.velocity is None else limit.velocity for limit in robot.stated_limits]
-    return replace(robot, limits=robot.limits.with_magnitudes(velocity=np.array(speeds)))
+    speeds = [
+        np.inf if limit.velocity is None else limit.velocity
+        for limit in robot.stated_limits
+    ]
+    return replace(
+        robot, limits=robot.limits.with_magnitudes(velocity=np.array(speeds))
+    )
 
 
-@pytest.mark.parametrize("file", [*OWN, *FOREIGN], ids=lambda file: f"{file.parent.name}/{file.name}")
+@pytest.mark.parametrize(
+    "file", [*OWN, *FOREIGN], ids=lambda file: f"{file.parent.name}/{file.name}"
+)
 def test_real_robots_are_plausible(file):
     robot = with_stated_speeds(file)
     assert robot is None or of_robot(robot) == ()
@@ -87,8 +120,12 @@ def test_velocities_and_ranges_in_degrees():
     robot = arm()
     assert told(robot) == []
     limits = robot.limits
-    fast = replace(robot, limits=limits.with_magnitudes(velocity=np.array([180.0, 29.0, 1000.0])))
-    assert told(fast) == [("robot.limits.velocity.j1", "the velocity limit looks like degrees per second")]
+    fast = replace(
+        robot, limits=limits.with_magnitudes(velocity=np.array([180.0, 29.0, 1000.0]))
+    )
+    assert told(fast) == [
+        ("robot.limits.velocity.j1", "the velocity limit looks like degrees per second")
+    ]
     wide = replace(
         robot,
         limits=replace(
@@ -97,16 +134,26 @@ def test_velocities_and_ranges_in_degrees():
             position_upper=np.array([180.0, 1e4, 12.0]),
         ),
     )
-    assert told(wide) == [("robot.limits.position.j1", "the position range looks like degrees")]
+    assert told(wide) == [
+        ("robot.limits.position.j1", "the position range looks like degrees")
+    ]
 
 
 def test_damping_that_stands_for_a_simulator():
-    joints = [Joint("revolute", xyz=(0.4, 0.0, 0.0), extra=f"<dynamics damping='{damping}'/>") for damping in (19, 21)]
+    joints = [
+        Joint("revolute", xyz=(0.4, 0.0, 0.0), extra=f"<dynamics damping='{damping}'/>")
+        for damping in (19, 21)
+    ]
     text = chain_urdf(joints, tool=(0.4, 0.0, 0.0))  # 60 Nm at 3 rad/s
     message = "the damping of the URDF takes more than the largest torque at the largest speed"
-    assert told(Robot.from_urdf("x", urdf_text=text)) == [("robot.friction.viscous.j2", message)]
+    assert told(Robot.from_urdf("x", urdf_text=text)) == [
+        ("robot.friction.viscous.j2", message)
+    ]
     for chosen in (None, 21.5):  # the task's own figure is meant
-        assert told(Robot.from_urdf("x", urdf_text=text, friction={"viscous": chosen})) == []
+        assert (
+            told(Robot.from_urdf("x", urdf_text=text, friction={"viscous": chosen}))
+            == []
+        )
 
 
 def test_rails_in_mm():
@@ -126,7 +173,9 @@ def test_rails_in_mm():
 
 
 def test_a_placeholder_that_is_scaled_stays_one():
-    robot = Robot.from_urdf(SCARA, limits=LimitSpec(velocity=100.0, scale={"velocity": 0.7}))
+    robot = Robot.from_urdf(
+        SCARA, limits=LimitSpec(velocity=100.0, scale={"velocity": 0.7})
+    )
     assert told(robot) == []
 
 
@@ -141,8 +190,12 @@ def test_lengths_in_mm():
 
 
 def test_masses_in_g_and_inertias_in_kg_mm2():
-    assert {message for _, message in told(arm(mass=2000.0, inertia=10.0))} == {"the mass looks like g"}
-    assert {message for _, message in told(arm(mass=2.0, inertia=1e4))} == {"the inertia looks like kg mm^2"}
+    assert {message for _, message in told(arm(mass=2000.0, inertia=10.0))} == {
+        "the mass looks like g"
+    }
+    assert {message for _, message in told(arm(mass=2.0, inertia=1e4))} == {
+        "the inertia looks like kg mm^2"
+    }
 
 
 @pytest.mark.parametrize(
@@ -151,7 +204,10 @@ def test_masses_in_g_and_inertias_in_kg_mm2():
         ({"mass": 500.0}, "robot.payload.mass"),
         ({"mass": 5000.0}, "robot.payload.mass"),
         ({"mass": 2.0, "com": [0.0, 0.0, 120.0]}, "robot.payload.com"),
-        ({"mass": 2.0, "inertia": {"ixx": 3000, "iyy": 3000, "izz": 3000}}, "robot.payload.inertia"),
+        (
+            {"mass": 2.0, "inertia": {"ixx": 3000, "iyy": 3000, "izz": 3000}},
+            "robot.payload.inertia",
+        ),
     ],
 )
 def test_a_payload_in_g_and_mm(payload, where):
@@ -164,14 +220,26 @@ def test_a_payload_in_g_and_mm(payload, where):
 @pytest.mark.parametrize(
     ("limits", "remark"),
     [
-        ({"speed": 250.0}, "tool_limits.speed: the limit looks like mm/s; found 250 m/s; usual: below 50 m/s, or null"),
+        (
+            {"speed": 250.0},
+            "tool_limits.speed: the limit looks like mm/s; found 250 m/s; usual: below 50 m/s, or null",
+        ),
         (
             {"speed": {"s": [0.0, 1.0], "speed": [0.2, 200.0]}},
             "tool_limits.speed: the limit looks like mm/s; found 200",
         ),
-        ({"process_speed": {"speed": 100.0, "s": [0.2, 0.8]}}, "tool_limits.process_speed: the limit looks like mm/s"),
-        ({"acceleration": 1000.0}, "tool_limits.acceleration: the limit looks like mm/s^2; found 1000 m/s^2"),
-        ({"angular_speed": 90.0}, "tool_limits.angular_speed: the limit looks like degrees per second; found 90 rad/s"),
+        (
+            {"process_speed": {"speed": 100.0, "s": [0.2, 0.8]}},
+            "tool_limits.process_speed: the limit looks like mm/s",
+        ),
+        (
+            {"acceleration": 1000.0},
+            "tool_limits.acceleration: the limit looks like mm/s^2; found 1000 m/s^2",
+        ),
+        (
+            {"angular_speed": 90.0},
+            "tool_limits.angular_speed: the limit looks like degrees per second; found 90 rad/s",
+        ),
     ],
 )
 def test_limits_of_the_tool_in_mm_and_degrees(limits, remark):
@@ -179,7 +247,9 @@ def test_limits_of_the_tool_in_mm_and_degrees(limits, remark):
     assert str(found).startswith(remark)
     usual = {"speed": 2.0, "acceleration": 20.0, "angular_speed": 3.0}
     assert not of_task(brachis.load_task(task(tool_limits=usual)))
-    assert not of_task(brachis.load_task(task(tool_limits={"speed": 1e6})))  # written for "no limit"
+    assert not of_task(
+        brachis.load_task(task(tool_limits={"speed": 1e6}))
+    )  # written for "no limit"
 
 
 def test_the_least_end_time():
@@ -187,14 +257,19 @@ def test_the_least_end_time():
     assert of_end_time(1e-3, 1e-4) == ()
     limits = {"torque": 1e12}
     content = task(robot={**task()["robot"], "limits": {**limits, "velocity": None}})
-    with pytest.warns(brachis.PlausibilityWarning, match="the end time is the least that the planner knows"):
+    with pytest.warns(
+        brachis.PlausibilityWarning,
+        match="the end time is the least that the planner knows",
+    ):
         result = brachis.plan(content)
     assert [remark.where for remark in result.warnings] == ["t_end"]
 
 
 def test_warnings_are_emitted_and_kept_in_the_result():
     content = with_limits(scale={"velocity": 50})
-    with pytest.warns(brachis.PlausibilityWarning, match=r"robot\.limits\.scale\.velocity.*found 50") as caught:
+    with pytest.warns(
+        brachis.PlausibilityWarning, match=r"robot\.limits\.scale\.velocity.*found 50"
+    ) as caught:
         result = brachis.plan(content)
     assert len(caught) == 1
     assert caught[0].filename == __file__
@@ -217,7 +292,9 @@ def test_a_plausible_plan_has_no_warnings():
 
 
 def test_strict_refuses_before_anything_is_planned(monkeypatch):
-    monkeypatch.setattr("brachis.planner.find_fastest", lambda *_: pytest.fail("planned"))
+    monkeypatch.setattr(
+        "brachis.planner.find_fastest", lambda *_: pytest.fail("planned")
+    )
     with pytest.raises(PlausibilityError, match=r"scale\.velocity") as caught:
         brachis.plan(with_limits(scale={"velocity": 50}), strict=True)
     assert caught.value.exit_code == 2
@@ -230,7 +307,9 @@ def test_a_posture_in_degrees_where_joints_turn_without_end():
     with pytest.raises(PlausibilityError) as caught:
         brachis.plan(task(**degrees))
     (remark,) = caught.value.remarks
-    assert remark.startswith("start.joints: the position looks like degrees; found j1 30 rad, j2 -120 rad, j3 120 rad;")
+    assert remark.startswith(
+        "start.joints: the position looks like degrees; found j1 30 rad, j2 -120 rad, j3 120 rad;"
+    )
     assert "30 degrees are 0.523599 rad" in remark
     for way_out in ("strict: false", "strict=False", "--no-strict"):
         assert way_out in caught.value.hint
@@ -243,15 +322,29 @@ def test_a_posture_in_degrees_where_joints_turn_without_end():
 
 
 def test_only_the_start_posture_is_refused_where_nothing_is_said():
-    content = task(task_space="joints", redundant_joints="auto", path=[{"spline": {"through": [[33.0, -2.0, 2.0]]}}])
-    with pytest.warns(brachis.PlausibilityWarning, match=r"path\.j1: the position looks like degrees; found 33 rad"):
+    content = task(
+        task_space="joints",
+        redundant_joints="auto",
+        path=[{"spline": {"through": [[33.0, -2.0, 2.0]]}}],
+    )
+    with pytest.warns(
+        brachis.PlausibilityWarning,
+        match=r"path\.j1: the position looks like degrees; found 33 rad",
+    ):
         assert brachis.plan(content).verified
 
 
 def test_yaw_of_the_path_start_in_degrees():
-    content = task(start="free", path_start=[1.7, 0.0, 90.0], task_space=["x", "y", "yaw"], redundant_joints=[])
+    content = task(
+        start="free",
+        path_start=[1.7, 0.0, 90.0],
+        task_space=["x", "y", "yaw"],
+        redundant_joints=[],
+    )
     content["path"] = [{"line": {"by": [0.0, 0.2, 0.0]}}]
-    with pytest.raises(PlausibilityError, match="path_start: yaw looks like degrees; found 90 rad"):
+    with pytest.raises(
+        PlausibilityError, match="path_start: yaw looks like degrees; found 90 rad"
+    ):
         brachis.plan(content, strict=True)
 
 
@@ -260,12 +353,23 @@ def test_yaw_of_the_path_start_in_degrees():
     [
         ([0, 17, 11, 86, 11, 69, 6], "It looks like degrees: 17 deg are 0.296706 rad"),
         ([300, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1], "It looks like mm: 300 mm are 0.3 m"),
-        ([2.5, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1], "Change the posture, or the range with robot.limits.position.rail"),
-        ([0, 4.0, 0.2, 1.5, 0.2, 1.2, 0.1], "Change the posture, or the range with robot.limits.position.joint_1"),
+        (
+            [2.5, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1],
+            "Change the posture, or the range with robot.limits.position.rail",
+        ),
+        (
+            [0, 4.0, 0.2, 1.5, 0.2, 1.2, 0.1],
+            "Change the posture, or the range with robot.limits.position.joint_1",
+        ),
     ],
 )
 def test_the_hint_of_a_posture_out_of_range(joints, hint):
-    content = task(robot={"urdf": str(RAIL)}, start={"joints": joints}, task_space="pose", redundant_joints=["rail"])
+    content = task(
+        robot={"urdf": str(RAIL)},
+        start={"joints": joints},
+        task_space="pose",
+        redundant_joints=["rail"],
+    )
     content["path"] = [{"line": {"by": [0, 0.2, 0]}}]
     with pytest.raises(StartError) as caught:
         brachis.plan(content)
@@ -277,13 +381,20 @@ def test_the_hint_of_a_posture_out_of_range(joints, hint):
     [
         {"path": [{"line": {"length": 500.0, "angle_deg": 90}}]},
         {"path": [{"line": {"to": [1500.0, 300.0]}}]},
-        {"path": [{"line": {"length": 500.0, "angle_deg": 90}}], "start": "free", "path_start": [1732.05, 0.0]},
+        {
+            "path": [{"line": {"length": 500.0, "angle_deg": 90}}],
+            "start": "free",
+            "path_start": [1732.05, 0.0],
+        },
     ],
 )
 def test_a_path_in_mm_is_out_of_reach_and_the_hint_says_why(changes):
     with pytest.raises(PathError, match="out of reach") as caught:
         brachis.plan(task(**changes))
-    assert re.match(r"The path looks like mm: divided by 1000 it is [\d.]+ m away", caught.value.hint)
+    assert re.match(
+        r"The path looks like mm: divided by 1000 it is [\d.]+ m away",
+        caught.value.hint,
+    )
 
 
 def test_a_path_that_is_too_long_in_metres_has_no_such_hint():
@@ -295,7 +406,10 @@ def test_a_path_that_is_too_long_in_metres_has_no_such_hint():
 def test_a_path_start_in_mm():
     with pytest.raises(StartError, match="off the path") as caught:
         brachis.plan(task(path_start=[1732.05, 0.0]))
-    assert caught.value.hint == "The path looks like mm: divided by 1000 it is where the tool is"
+    assert (
+        caught.value.hint
+        == "The path looks like mm: divided by 1000 it is where the tool is"
+    )
     with pytest.raises(StartError, match="off the path") as caught:
         brachis.plan(task(path_start=[1.7, 0.0]))
     assert "mm" not in caught.value.hint
@@ -306,7 +420,10 @@ def test_a_robot_in_mm_is_told_before_its_posture_fails():
     assert text != SCARA.read_text()
     robot = Robot.from_urdf("mm.urdf", urdf_text=text, gravity=[0, -9.81, 0])
     content = task(robot={})
-    with pytest.warns(brachis.PlausibilityWarning, match="looks like mm"), pytest.raises(StartError, match="gravity"):
+    with (
+        pytest.warns(brachis.PlausibilityWarning, match="looks like mm"),
+        pytest.raises(StartError, match="gravity"),
+    ):
         brachis.plan(robot, content)
 
 
@@ -319,10 +436,26 @@ def test_errors_stay_errors_of_ours():
 @pytest.mark.parametrize(
     ("limits", "told_of", "sound"),
     [
-        ({"torque": 320000.0}, "torque.joint_1: the torque limit looks like mNm", {"torque": 320.0}),
-        ({"torque": 10000.0}, "torque.joint_6: the torque limit looks like mNm", {"torque": 1000.0}),
-        ({"velocity": 50.0}, "velocity.joint_1: the velocity limit looks like degrees", {"velocity": 10.0}),
-        ({"acceleration": 573.0}, "acceleration.joint_1: the acceleration limit looks like", {"acceleration": 50.0}),
+        (
+            {"torque": 320000.0},
+            "torque.joint_1: the torque limit looks like mNm",
+            {"torque": 320.0},
+        ),
+        (
+            {"torque": 10000.0},
+            "torque.joint_6: the torque limit looks like mNm",
+            {"torque": 1000.0},
+        ),
+        (
+            {"velocity": 50.0},
+            "velocity.joint_1: the velocity limit looks like degrees",
+            {"velocity": 10.0},
+        ),
+        (
+            {"acceleration": 573.0},
+            "acceleration.joint_1: the acceleration limit looks like",
+            {"acceleration": 50.0},
+        ),
         (
             {"position": {"joint_1": [-45.0, 45.0]}},
             "position.joint_1: the position range looks like degrees",
@@ -342,36 +475,57 @@ def test_errors_stay_errors_of_ours():
 )
 def test_limits_beside_those_of_the_urdf(limits, told_of, sound):
     robot = brachis.robots.iiwa14
-    assert any(str(remark).startswith(f"robot.limits.{told_of}") for remark in of_robot(robot.with_limits(**limits)))
+    assert any(
+        str(remark).startswith(f"robot.limits.{told_of}")
+        for remark in of_robot(robot.with_limits(**limits))
+    )
     assert of_robot(robot.with_limits(**sound)) == ()
 
 
-@pytest.mark.parametrize("file", [*OWN, *FOREIGN], ids=lambda file: f"{file.parent.name}/{file.name}")
+@pytest.mark.parametrize(
+    "file", [*OWN, *FOREIGN], ids=lambda file: f"{file.parent.name}/{file.name}"
+)
 def test_torques_that_urdfs_state_are_plausible(file):
     try:
         limb = first_limb(read_file(file), file.name)
-        robot = Robot.from_urdf(file, tool_frame=limb.tool, base_frame=limb.base, limits=UNLIMITED)
+        robot = Robot.from_urdf(
+            file, tool_frame=limb.tool, base_frame=limb.base, limits=UNLIMITED
+        )
     except BrachisError:
         return
     stated = np.array([limit.effort or np.inf for limit in robot.stated_limits])
-    assert of_robot(replace(robot, limits=robot.limits.with_magnitudes(torque=stated))) == ()
+    assert (
+        of_robot(replace(robot, limits=robot.limits.with_magnitudes(torque=stated)))
+        == ()
+    )
 
 
-@pytest.mark.parametrize(("name", "mass"), [("scara3", 300.0), ("iiwa14", 100.0), ("tx90l_rail", 300.0)])
+@pytest.mark.parametrize(
+    ("name", "mass"), [("scara3", 300.0), ("iiwa14", 100.0), ("tx90l_rail", 300.0)]
+)
 def test_a_payload_in_g_that_an_arm_of_this_size_could_carry(name, mass):
     robot = getattr(brachis.robots, name)
-    assert told(robot.with_payload(mass)) == [("robot.payload.mass", "the mass looks like g")]
+    assert told(robot.with_payload(mass)) == [
+        ("robot.payload.mass", "the mass looks like g")
+    ]
     assert told(robot.with_payload(15.0)) == []
 
 
 def test_the_tool_offset_and_the_mounting_in_mm():
-    made = Robot.from_urdf(RAIL, tool_offset={"xyz": [0, 0, 120.0]}, mounting={"xyz": [0, 0, 3000.0]})
-    assert [where for where, _ in told(made)] == ["robot.tool_offset.xyz", "robot.mounting.xyz"]
+    made = Robot.from_urdf(
+        RAIL, tool_offset={"xyz": [0, 0, 120.0]}, mounting={"xyz": [0, 0, 3000.0]}
+    )
+    assert [where for where, _ in told(made)] == [
+        "robot.tool_offset.xyz",
+        "robot.mounting.xyz",
+    ]
 
 
 def test_speeds_of_the_ends_in_mm():
     (found,) = of_task(brachis.load_task(task(boundary={"end_speed": 100.0})))
-    assert str(found).startswith("boundary.end_speed: the speed looks like mm/s; found 100 m/s")
+    assert str(found).startswith(
+        "boundary.end_speed: the speed looks like mm/s; found 100 m/s"
+    )
 
 
 WAYPOINTS = {
@@ -384,24 +538,39 @@ WAYPOINTS = {
 
 
 def test_waypoints_in_degrees_leave_the_range_and_the_hint_says_why():
-    with pytest.raises(PathError, match="joint 'joint_1' is out of its range; found 35 rad at s = 1") as caught:
+    with pytest.raises(
+        PathError, match="joint 'joint_1' is out of its range; found 35 rad at s = 1"
+    ) as caught:
         brachis.plan(task(**WAYPOINTS))
     assert caught.value.hint == "It looks like degrees: 35 deg are 0.610865 rad"
 
 
 def test_waypoints_in_degrees_of_joints_without_a_range():
-    content = task(task_space="joints", redundant_joints="auto", path=[{"spline": {"through": [[90.0, -60.0, 45.0]]}}])
+    content = task(
+        task_space="joints",
+        redundant_joints="auto",
+        path=[{"spline": {"through": [[90.0, -60.0, 45.0]]}}],
+    )
     with pytest.raises(PlausibilityError) as caught:
         brachis.plan(content, strict=True)
     (remark,) = caught.value.remarks
-    assert remark.startswith("path: the position looks like degrees; found j1 90 rad, j2 -60 rad, j3 45 rad;")
+    assert remark.startswith(
+        "path: the position looks like degrees; found j1 90 rad, j2 -60 rad, j3 45 rad;"
+    )
 
 
 def test_a_path_of_joints_may_wind_and_its_end_speeds_are_in_rad(recwarn):
-    wind = {"task_space": "joints", "redundant_joints": "auto", "path": [{"line": {"by": [4.0 * np.pi, 1.0, 0.5]}}]}
+    wind = {
+        "task_space": "joints",
+        "redundant_joints": "auto",
+        "path": [{"line": {"by": [4.0 * np.pi, 1.0, 0.5]}}],
+    }
     assert brachis.plan(task(**wind)).warnings == ()
     assert not recwarn.list
-    with pytest.raises(PlausibilityError, match=r"end_speed: .* degrees per second; found 90 rad/s \(m/s\)"):
+    with pytest.raises(
+        PlausibilityError,
+        match=r"end_speed: .* degrees per second; found 90 rad/s \(m/s\)",
+    ):
         brachis.plan(task(**wind, boundary={"end_speed": 90.0}), strict=True)
 
 
@@ -412,9 +581,14 @@ def test_lengths_of_a_gantry_in_mm():
         "start": {"joints": [0.0, 0.0]},
         "task_space": ["x", "y"],
     }
-    with pytest.raises(PathError, match=r"out of reach from s = .* at most 1\.6 m") as caught:
+    with pytest.raises(
+        PathError, match=r"out of reach from s = .* at most 1\.6 m"
+    ) as caught:
         brachis.plan({**content, "path": [{"line": {"by": [500.0, 200.0]}}]})
-    assert caught.value.hint == "The path looks like mm: divided by 1000 it is 0.539 m away"
+    assert (
+        caught.value.hint
+        == "The path looks like mm: divided by 1000 it is 0.539 m away"
+    )
     corner = [{"line": {"by": [0.5, 0.0]}, "blend": 50.0}, {"line": {"by": [0.0, 0.3]}}]
     with pytest.raises(PathError, match="longer than half") as caught:
         brachis.plan({**content, "path": corner})
@@ -424,11 +598,20 @@ def test_lengths_of_a_gantry_in_mm():
 def test_points_in_mm_or_in_another_order_do_not_start_where_the_tool_is():
     points = np.array([[1.7320508, 0.0], [1.7, 0.2], [1.6, 0.4], [1.4, 0.6]])
     for given, hint in (
-        (1000.0 * points, "The path looks like mm: divided by 1000 it is where the tool is"),
-        (points[:, ::-1], "It looks like the order y, x: the tool is there if they are read so"),
+        (
+            1000.0 * points,
+            "The path looks like mm: divided by 1000 it is where the tool is",
+        ),
+        (
+            points[:, ::-1],
+            "It looks like the order y, x: the tool is there if they are read so",
+        ),
     ):
         content = brachis.load_task(task(path=brachis.fit_path(given)))
-        with warnings.catch_warnings(action="ignore"), pytest.raises(PathError, match="starts elsewhere") as caught:
+        with (
+            warnings.catch_warnings(action="ignore"),
+            pytest.raises(PathError, match="starts elsewhere") as caught,
+        ):
             brachis.plan(content)
         assert caught.value.hint == hint
 
@@ -439,18 +622,28 @@ def test_a_quaternion_with_its_scalar_last():
     placed = robot.tool_placement(np.array(posture))
     turn = Rotation.from_matrix(placed.rotation).as_quat()
     place = {"position": placed.translation, "quaternion_wxyz": turn}
-    ways = {"start": posture, "task_space": "pose", "path": brachis.Line(by=[0.0, 0.1, 0.0])}
+    ways = {
+        "start": posture,
+        "task_space": "pose",
+        "path": brachis.Line(by=[0.0, 0.1, 0.0]),
+    }
     with pytest.raises(StartError, match="off the path") as caught:
         brachis.plan(robot, path_start=place, **ways)
-    assert caught.value.hint == "If it is a quaternion x, y, z, w: write quaternion_xyzw"
+    assert (
+        caught.value.hint == "If it is a quaternion x, y, z, w: write quaternion_xyzw"
+    )
 
 
 @pytest.mark.parametrize("angle", [1.57, 3.14, -0.785, np.pi])
 def test_an_angle_in_rad_where_degrees_belong(angle):
-    (found,) = of_task(brachis.load_task(task(path=[{"line": {"length": 0.5, "angle_deg": angle}}])))
+    (found,) = of_task(
+        brachis.load_task(task(path=[{"line": {"length": 0.5, "angle_deg": angle}}]))
+    )
     assert str(found).startswith("path[0].line.angle_deg: the angle looks like rad")
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, 5.5, 11.0, 45.0])
 def test_small_angles_in_degrees_are_plausible(angle):
-    assert not of_task(brachis.load_task(task(path=[{"line": {"length": 0.5, "angle_deg": angle}}])))
+    assert not of_task(
+        brachis.load_task(task(path=[{"line": {"length": 0.5, "angle_deg": angle}}]))
+    )

@@ -26,9 +26,16 @@ def test_nothing_is_said_unless_asked_for(capfd):
 def test_the_log_has_stages_at_info_and_iterations_at_debug(caplog):
     with caplog.at_level(logging.DEBUG, logger="brachis"):
         result = brachis.plan(brachis.examples.scara_line, **QUICK)
-    stages = [record.message for record in caplog.records if record.levelno == logging.INFO]
-    details = [record.message for record in caplog.records if record.levelno == logging.DEBUG]
-    assert stages[0] == "planning for 3 joints along a path of 1 segment, task space [x, y]"
+    stages = [
+        record.message for record in caplog.records if record.levelno == logging.INFO
+    ]
+    details = [
+        record.message for record in caplog.records if record.levelno == logging.DEBUG
+    ]
+    assert (
+        stages[0]
+        == "planning for 3 joints along a path of 1 segment, task space [x, y]"
+    )
     assert stages[-1].startswith(f"planned: t_E = {result.t_end:.4f} s, verified")
     assert details
     assert all("iteration" in text for text in details)
@@ -38,7 +45,9 @@ def test_the_log_has_stages_at_info_and_iterations_at_debug(caplog):
 
 def test_progress_is_a_line_for_every_stage_where_there_is_no_terminal(capsys):
     heard = []
-    brachis.plan(brachis.examples.scara_line, **QUICK, progress=True, listener=heard.append)
+    brachis.plan(
+        brachis.examples.scara_line, **QUICK, progress=True, listener=heard.append
+    )
     lines = capsys.readouterr().err.splitlines()
     assert lines == [text for text in heard if "iteration" not in text]
     assert len(heard) > len(lines) > 2
@@ -47,7 +56,9 @@ def test_progress_is_a_line_for_every_stage_where_there_is_no_terminal(capsys):
 def test_on_a_terminal_the_line_is_wiped(monkeypatch, capsys):
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     with pytest.raises(brachis.PlanningError):
-        brachis.plan(brachis.examples.scara_line, **QUICK, time_limit=1e-3, progress=True)
+        brachis.plan(
+            brachis.examples.scara_line, **QUICK, time_limit=1e-3, progress=True
+        )
     text = capsys.readouterr().err
     assert "\n" not in text
     assert text.startswith("\rplanning for 3 joints")
@@ -55,11 +66,16 @@ def test_on_a_terminal_the_line_is_wiped(monkeypatch, capsys):
 
 
 def test_in_a_notebook_progress_is_shown_and_leaves_nothing():
-    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    nbformat, nbclient = (
+        pytest.importorskip("nbformat"),
+        pytest.importorskip("nbclient"),
+    )
     pytest.importorskip("ipykernel")
     plan = f"brachis.plan(brachis.examples.scara_line, **{QUICK!r}"
     cells = ["import brachis", f"{plan}).verified", f"{plan}, progress=False).verified"]
-    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
+    notebook = nbformat.v4.new_notebook(
+        cells=[nbformat.v4.new_code_cell(cell) for cell in cells]
+    )
     shown = []
 
     class Client(nbclient.NotebookClient):
@@ -72,11 +88,15 @@ def test_in_a_notebook_progress_is_shown_and_leaves_nothing():
     assert {index for index, _ in shown} == {1}
     assert shown[0][1].startswith("planning for 3 joints")
     assert shown[-1][1] == ""
-    assert [output.get("data") for output in notebook.cells[2].outputs] == [{"text/plain": "True"}]
+    assert [output.get("data") for output in notebook.cells[2].outputs] == [
+        {"text/plain": "True"}
+    ]
 
 
 def test_processes_need_no_main_guard(tmp_path):
     (tmp_path / "script.py").write_text(SCRIPT)
     command = [sys.executable, str(tmp_path / "script.py")]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    run = subprocess.run(
+        command, capture_output=True, text=True, timeout=120, check=False
+    )
     assert run.stdout.strip() == "[True, True]", run.stderr

@@ -39,7 +39,8 @@ def made(bench, tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    ("name", "number"), [("scara3", 1), ("gantry2", 1), ("gantry2", 2), ("gantry2", 3), ("gantry2", 4)]
+    ("name", "number"),
+    [("scara3", 1), ("gantry2", 1), ("gantry2", 2), ("gantry2", 3), ("gantry2", 4)],
 )
 def test_a_verified_plan_is_within_its_limits(bench, name, number, tmp_path):
     _, outcome, excess, _ = bench.planned(name, 0, number, tmp_path, PATIENCE)
@@ -55,12 +56,16 @@ def test_the_second_look_agrees_with_the_verification(bench, made):
     limits = trajectory.robot.limits
     torque = (np.abs(trajectory.torque(t)) / limits.torque).max() - 1.0
     assert torque - 1e-9 <= excess["torque"] < torque + 1e-3
-    beyond = np.maximum(limits.position_lower - trajectory.position(t), trajectory.position(t) - limits.position_upper)
+    beyond = np.maximum(
+        limits.position_lower - trajectory.position(t),
+        trajectory.position(t) - limits.position_upper,
+    )
     assert excess["position"] == pytest.approx(beyond.max(), abs=1e-6)
 
 
 @pytest.mark.parametrize(
-    ("name", "by", "kind"), [("q", 1e-4, "torque"), ("qddot", 5.0, "torque"), ("q", 3.0, "position")]
+    ("name", "by", "kind"),
+    [("q", 1e-4, "torque"), ("qddot", 5.0, "torque"), ("q", 3.0, "position")],
 )
 def test_the_second_look_finds_what_is_wrong(bench, made, tmp_path, name, by, kind):
     trajectory = Trajectory.load(made[0])

@@ -19,7 +19,9 @@ COUNT, SEED = 2, 1
 
 @pytest.fixture(scope="module")
 def bench():
-    spec = importlib.util.spec_from_file_location("random_poses", ROOT / "benchmarks/random_poses.py")
+    spec = importlib.util.spec_from_file_location(
+        "random_poses", ROOT / "benchmarks/random_poses.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -30,5 +32,8 @@ def test_random_reachable_pose_lines(bench, name):
     robot = brachis.Robot.from_urdf(ROOT / f"robots/{name}/robot.urdf")
     choices = bench.closed_forms(robot)
     assert len(choices) >= 4
-    reasons = [bench.tried(robot, task) for task in bench.random_tasks(robot, SEED, COUNT, choices)]
+    reasons = [
+        bench.tried(robot, task)
+        for task in bench.random_tasks(robot, SEED, COUNT, choices)
+    ]
     assert reasons == [""] * COUNT

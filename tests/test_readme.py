@@ -33,7 +33,9 @@ def clone(tmp_path):
 
 
 def blocks(page: Path, language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+    return re.findall(
+        rf"^```{language}\n(.*?)^```", page.read_text(), flags=re.DOTALL | re.MULTILINE
+    )
 
 
 def load(path: Path):
@@ -43,11 +45,21 @@ def load(path: Path):
     return module
 
 
-PAGES = [page for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))) if blocks(page, "python")]
+PAGES = [
+    page
+    for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+    if blocks(page, "python")
+]
 
 
 def test_there_are_snippets():
-    assert {page.name for page in PAGES} == {"README.md", "closed_forms.md", "from_toppra.md", "index.md", "python.md"}
+    assert {page.name for page in PAGES} == {
+        "README.md",
+        "closed_forms.md",
+        "from_toppra.md",
+        "index.md",
+        "python.md",
+    }
 
 
 @pytest.mark.usefixtures("rough_figures")
@@ -55,13 +67,20 @@ def test_there_are_snippets():
 def test_python_snippets_run(page, clone, monkeypatch):
     """Those of a page in order, as one program."""
     monkeypatch.chdir(clone)
-    exec(compile("\n".join(blocks(page, "python")), str(page), "exec"), {"__name__": "__main__"})  # noqa: S102
+    exec(  # noqa: S102
+        compile("\n".join(blocks(page, "python")), str(page), "exec"),
+        {"__name__": "__main__"},
+    )
 
 
 @pytest.mark.usefixtures("rough_figures")
 def test_commands_run(clone, monkeypatch, capfd):
     """Every brachis command of the README, in order."""
-    lines = [line.split("#")[0].strip() for line in README.splitlines() if re.match(r"brachis \w", line)]
+    lines = [
+        line.split("#")[0].strip()
+        for line in README.splitlines()
+        if re.match(r"brachis \w", line)
+    ]
     assert len(lines) >= 6
     monkeypatch.chdir(clone)
     for line in lines:
@@ -98,7 +117,13 @@ def test_task_file_of_the_readme_is_planned(clone):
     result = brachis.plan(clone / "task.yaml")
     assert result.verified
     # The corner of 90 degrees is rounded: the path is shorter than its two legs.
-    assert 0.9 < brachis.transcribe(result.trajectory.robot, result.task)[0].phases[0].joint_map.path.length < 1.0
+    assert (
+        0.9
+        < brachis.transcribe(result.trajectory.robot, result.task)[0]
+        .phases[0]
+        .joint_map.path.length
+        < 1.0
+    )
 
 
 def test_example_01_python(capsys):
@@ -113,7 +138,9 @@ def test_example_02(monkeypatch):
     results = module.plan_all()
     assert len(results) == 6
     assert all(result.verified for result in results.values())
-    assert max(result.verification.worst_ratio for result in results.values()) <= 1 + 1e-4
+    assert (
+        max(result.verification.worst_ratio for result in results.values()) <= 1 + 1e-4
+    )
     assert max(result.verification.path_error for result in results.values()) <= 1e-9
     assert results[90, "j1"].t_end <= 2.260
     assert results[90, "j2"].t_end <= 2.267
@@ -123,20 +150,30 @@ def test_example_02(monkeypatch):
 
 def check_table(name: str, made: str) -> None:
     """Compare lines of a table in the README with those that an example makes; last digits differ between machines."""
-    table = README.split(f"<!-- table: {name} -->")[1].split("<!-- end of table -->")[0].strip()
+    table = (
+        README.split(f"<!-- table: {name} -->")[1]
+        .split("<!-- end of table -->")[0]
+        .strip()
+    )
     asked = {line.split("|")[1] for line in made.splitlines()}
-    printed = "\n".join(line for line in table.splitlines() if line.split("|")[1] in asked)
+    printed = "\n".join(
+        line for line in table.splitlines() if line.split("|")[1] in asked
+    )
     number = re.compile(r"\d+\.\d+")
     # In whose coordinates one of several equally fast solves ended is rounding's to say.
     coordinates = re.compile(r"\((?:j\d|chart)\)")
     texts = (coordinates.sub("", number.sub("#", text)) for text in (printed, made))
     assert len(set(texts)) == 1
-    ours, theirs = ([float(value) for value in number.findall(text)] for text in (printed, made))
+    ours, theirs = (
+        [float(value) for value in number.findall(text)] for text in (printed, made)
+    )
     assert ours == pytest.approx(theirs, abs=0.003)
 
 
 def test_robot_part_of_the_readme_is_one(clone):
-    (text,) = [block for block in blocks(ROOT / "README.md", "yml") if "payload" in block]
+    (text,) = [
+        block for block in blocks(ROOT / "README.md", "yml") if "payload" in block
+    ]
     robot = yaml.safe_load(text)["robot"]
     assert (clone / "robots" / robot["limits_file"]).is_file()
     settings = check_robot_settings(robot)
@@ -147,7 +184,9 @@ def test_robot_part_of_the_readme_is_one(clone):
 
 def test_example_03(monkeypatch):
     module = load(ROOT / "examples/03_tx90l_rail_line.py")
-    monkeypatch.setattr(module, "JOINTS", ("rail", "joint_2"))  # half of the lines, for time
+    monkeypatch.setattr(
+        module, "JOINTS", ("rail", "joint_2")
+    )  # half of the lines, for time
     results = module.plan_all()
     assert len(results) == 6
     assert all(result.verified for result in results.values())
@@ -162,12 +201,16 @@ def test_example_04():
     assert result.verified
     turned = result.trajectory.robot.tool_placements(result.trajectory.q[[0, -1]])[1]
     angle = np.arccos((np.trace(turned[0].T @ turned[1]) - 1.0) / 2.0)
-    assert np.rad2deg(angle) == pytest.approx(25.0, abs=1.0)  # 20 and 15 degrees about perpendicular axes
+    assert np.rad2deg(angle) == pytest.approx(
+        25.0, abs=1.0
+    )  # 20 and 15 degrees about perpendicular axes
 
 
 def test_example_05(monkeypatch):
     module = load(ROOT / "examples/05_panda_circle.py")
-    monkeypatch.setattr(module, "JOINTS", module.JOINTS[:2])  # of both families, for time
+    monkeypatch.setattr(
+        module, "JOINTS", module.JOINTS[:2]
+    )  # of both families, for time
     try:
         module.panda()
     except SystemExit:
@@ -186,16 +229,22 @@ def test_example_06():
 
 def test_example_07(monkeypatch):
     module = load(ROOT / "examples/07_find_the_fastest.py")
-    monkeypatch.setattr(module, "ANGLES_DEG", (45, 180, 315))  # some of the lines, for time
+    monkeypatch.setattr(
+        module, "ANGLES_DEG", (45, 180, 315)
+    )  # some of the lines, for time
     results = module.plan_all()
     assert all(result.verified for result in results.values())
     for angle in module.ANGLES_DEG:
         one_guess = min(results[angle, joint].t_end for joint in module.JOINTS)
         assert results[angle, "auto"].t_end <= one_guess * (1.0 + 1e-3)
-        assert results[angle, "free start"].t_end <= results[angle, "auto"].t_end * (1.0 + 1e-3)
+        assert results[angle, "free start"].t_end <= results[angle, "auto"].t_end * (
+            1.0 + 1e-3
+        )
     assert results[180, "auto"].t_end <= 2.10
     # The path begins on the x axis: a line and its mirror image only differ by the start posture.
-    assert results[45, "free start"].t_end == pytest.approx(results[315, "free start"].t_end, rel=2e-3)
+    assert results[45, "free start"].t_end == pytest.approx(
+        results[315, "free start"].t_end, rel=2e-3
+    )
     check_table("examples/07_find_the_fastest.py", module.markdown_table(results))
 
 
@@ -222,7 +271,9 @@ def test_example_10():
     module = load(ROOT / "examples/10_periodic_circle.py")
     results = module.main()
     assert all(result.verified for result in results.values())
-    printed = re.search(r"10_periodic_circle.py`: ([0-9.]+) s a turn, and ([0-9.]+) s", README)
+    printed = re.search(
+        r"10_periodic_circle.py`: ([0-9.]+) s a turn, and ([0-9.]+) s", README
+    )
     ours = [results[name].t_end for name in ("periodic", "rest to rest")]
     assert [float(each) for each in printed.groups()] == pytest.approx(ours, abs=0.006)
 
@@ -234,16 +285,22 @@ def test_example_11():
     assert result.verification.worst_ratio <= 1 + 1e-4
     assert result.t_end == pytest.approx(least, rel=2e-3)
     printed = re.findall(
-        r"^    (?:brachis|toppra): +([0-9.]+) s", (ROOT / "docs/from_toppra.md").read_text(), re.MULTILINE
+        r"^    (?:brachis|toppra): +([0-9.]+) s",
+        (ROOT / "docs/from_toppra.md").read_text(),
+        re.MULTILINE,
     )
-    assert [float(each) for each in printed] == pytest.approx([result.t_end, least], abs=5e-4)
+    assert [float(each) for each in printed] == pytest.approx(
+        [result.t_end, least], abs=5e-4
+    )
 
 
 def test_example_12(tmp_path):
     found = load(ROOT / "examples/12_today.py").main(tmp_path / "today.png")
     assert found.result.verified
     page = (ROOT / "docs/today.md").read_text()
-    printed = re.search(r"# ([0-9.]+) % faster: ([0-9.]+) s instead of ([0-9.]+) s", page).groups()
+    printed = re.search(
+        r"# ([0-9.]+) % faster: ([0-9.]+) s instead of ([0-9.]+) s", page
+    ).groups()
     ours = [100 * found.saved, found.result.t_end, found.today.t_end]
     assert [float(each) for each in printed] == pytest.approx(ours, abs=0.1)
     assert (tmp_path / "today.png").stat().st_size > 1000
@@ -256,7 +313,9 @@ def test_published_figure_lies_between_16_and_17_intervals():
 
 def test_task_reference_is_up_to_date():
     reference = load(ROOT / "docs/make_task_reference.py")
-    assert reference.PAGE.read_text() == reference.page(), "run python docs/make_task_reference.py"
+    assert reference.PAGE.read_text() == reference.page(), (
+        "run python docs/make_task_reference.py"
+    )
 
 
 def test_robots_say_where_their_figures_come_from():
@@ -277,7 +336,9 @@ def test_the_quick_start_plans_the_task_of_its_file():
     planned = names["result"].task.to_dict()
     for task in (file, planned):
         del task["robot"]["urdf"]
-    np.testing.assert_allclose(planned["start"].pop("joints"), file["start"].pop("joints"), rtol=1e-15)
+    np.testing.assert_allclose(
+        planned["start"].pop("joints"), file["start"].pop("joints"), rtol=1e-15
+    )
     assert planned == file
 
 
@@ -290,11 +351,15 @@ def test_what_the_commands_need_is_installed_by_what_the_readme_says():
         extra
         for path in (ROOT / "src").rglob("*.py")
         for extra in re.findall(
-            r'(?:NotInstalledError\(.*|_EXTRA = )"(\w+)"\)?(?: from .*)?$', path.read_text(), re.MULTILINE
+            r'(?:NotInstalledError\(.*|_EXTRA = )"(\w+)"\)?(?: from .*)?$',
+            path.read_text(),
+            re.MULTILINE,
         )
     }
     assert asked >= {"export", "report", "sweep", "view"}
-    assert asked - named <= {"cluster", "pandas"}, "no command of the README needs these"
+    assert asked - named <= {"cluster", "pandas"}, (
+        "no command of the README needs these"
+    )
     assert asked <= set(extras)
     assert load(ROOT / "tasks.py").INSTALL["demo"] == ".[all]"
     assert 'pip install ".[all]"' in README
@@ -304,4 +369,8 @@ def test_files_that_the_readme_writes_into_a_clone_are_ignored():
     ignored = (ROOT / ".gitignore").read_text().splitlines()
     files = re.findall(r'(?:--out |save\(")([\w.]+)', README)
     assert "first.yaml" in files
-    assert {name for name in files if f"/{name}" not in ignored and f"{name}/" not in ignored} == set()
+    assert {
+        name
+        for name in files
+        if f"/{name}" not in ignored and f"{name}/" not in ignored
+    } == set()

@@ -27,14 +27,21 @@ PUBLIC = {
     "stated": lambda result: result.trajectory.robot.stated,
     "task map": lambda result: brachis.task_map_of(result.trajectory.robot, ["x", "y"]),
     "limit spec": lambda result: result.task.robot.limits,
-    "spline": lambda _result: brachis.Spline(through=np.random.default_rng(0).normal(size=(5000, 2))),
+    "spline": lambda _result: brachis.Spline(
+        through=np.random.default_rng(0).normal(size=(5000, 2))
+    ),
     "path": lambda result: result.task.path,
 }
 
 
 @pytest.fixture(scope="module")
 def result():
-    return brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], intervals=8, effort="single")
+    return brachis.plan(
+        brachis.examples.scara_line,
+        redundant_joints=["j1"],
+        intervals=8,
+        effort="single",
+    )
 
 
 @pytest.mark.parametrize("name", PUBLIC)
@@ -43,7 +50,9 @@ def test_reprs_fit_on_a_screen(name, result):
     assert "0x" not in text
     lines = text.splitlines()
     assert len(lines) <= LINES + 2
-    assert sum(1 + len(line) // (COLUMNS + 20) for line in lines) <= LINES + 2, "where a terminal breaks them, too"
+    assert sum(1 + len(line) // (COLUMNS + 20) for line in lines) <= LINES + 2, (
+        "where a terminal breaks them, too"
+    )
 
 
 def test_figures_have_units(result):
@@ -88,7 +97,9 @@ def test_a_table_has_the_samples(result):
     table, samples = result.to_dataframe(0.1), result.sample(0.1)
     assert isinstance(table, pandas.DataFrame)
     np.testing.assert_array_equal(table[["qd_j1", "qd_j2", "qd_j3"]], samples.qdot)
-    np.testing.assert_array_equal(table[["tool_x", "tool_y", "tool_z"]], samples.tool_position)
+    np.testing.assert_array_equal(
+        table[["tool_x", "tool_y", "tool_z"]], samples.tool_position
+    )
 
 
 def test_a_missing_pandas_is_said(result, monkeypatch):

@@ -39,9 +39,15 @@ def test_nodes_are_met(trajectory):
     t = trajectory.times
     scale = np.abs(trajectory.qddot).max()
     np.testing.assert_array_equal(trajectory.position(t[:-1]), trajectory.q[:-1])
-    np.testing.assert_allclose(trajectory.position(t), trajectory.q, rtol=0.0, atol=1e-15)
-    np.testing.assert_allclose(trajectory.velocity(t), trajectory.qdot, rtol=0.0, atol=1e-13)
-    np.testing.assert_allclose(trajectory.acceleration(t), trajectory.qddot, rtol=0.0, atol=1e-11 * scale)
+    np.testing.assert_allclose(
+        trajectory.position(t), trajectory.q, rtol=0.0, atol=1e-15
+    )
+    np.testing.assert_allclose(
+        trajectory.velocity(t), trajectory.qdot, rtol=0.0, atol=1e-13
+    )
+    np.testing.assert_allclose(
+        trajectory.acceleration(t), trajectory.qddot, rtol=0.0, atol=1e-11 * scale
+    )
 
 
 @pytest.mark.parametrize("order", [0, 1])
@@ -50,7 +56,12 @@ def test_derivatives_against_differences(order, trajectory):
     h = 1e-6
     t = np.random.default_rng(1).uniform(h, trajectory.t_end - h, 200)
     difference = (curves[order](t + h) - curves[order](t - h)) / (2.0 * h)
-    np.testing.assert_allclose(difference, curves[order + 1](t), rtol=0.0, atol=2e-8 * np.abs(trajectory.qddot).max())
+    np.testing.assert_allclose(
+        difference,
+        curves[order + 1](t),
+        rtol=0.0,
+        atol=2e-8 * np.abs(trajectory.qddot).max(),
+    )
 
 
 @pytest.mark.parametrize("length", [1e-3, 1e-5])
@@ -59,7 +70,13 @@ def test_derivatives_of_a_very_short_motion_are_precise(length):
     # the rounding of positions alone would be a jerk of 30 or 3e7 rad/s^3.
     times = np.linspace(0.0, length, 101)
     q = (2.0 + 0.5 * 3.0 * times**2)[:, None]
-    nodes = times, q, (3.0 * times)[:, None], np.full((101, 1), 3.0), np.full((101, 1), 3.0)
+    nodes = (
+        times,
+        q,
+        (3.0 * times)[:, None],
+        np.full((101, 1), 3.0),
+        np.full((101, 1), 3.0),
+    )
     pieces = BPoly(relative_coefficients(*nodes), times)
     inside = 0.5 * (times[1:] + times[:-1])
     np.testing.assert_allclose(pieces(inside, nu=2), 3.0, rtol=1e-10)
@@ -71,7 +88,9 @@ def test_derivatives_of_a_very_short_motion_are_precise(length):
 def test_the_jerk_is_the_third_derivative_of_the_positions(trajectory):
     t = np.random.default_rng(3).uniform(0.0, trajectory.t_end, 300)
     jerk = trajectory.jerk(t)
-    np.testing.assert_allclose(trajectory.pieces(t, nu=3), jerk, rtol=0.0, atol=1e-8 * np.abs(jerk).max())
+    np.testing.assert_allclose(
+        trajectory.pieces(t, nu=3), jerk, rtol=0.0, atol=1e-8 * np.abs(jerk).max()
+    )
 
 
 @pytest.mark.parametrize("length", [1e-6, 1e-5, 1e-4])
@@ -91,8 +110,12 @@ def test_positions_say_what_they_can_and_no_more(length):
 def test_very_short_lines_are_verified(length):
     result = plan(task_of_length(length))
     assert result.t_end < 0.06
-    assert result.verified, [check for check in result.verification.checks if not check.passed]
-    torque_jump = next(check for check in result.verification.checks if check.name == "torque jump")
+    assert result.verified, [
+        check for check in result.verification.checks if not check.passed
+    ]
+    torque_jump = next(
+        check for check in result.verification.checks if check.name == "torque jump"
+    )
     assert torque_jump.value < 1e-10
 
 
@@ -114,7 +137,9 @@ def test_headers_of_arrays_that_are_broken(header, trajectory, tmp_path):
     trajectory.save(path)
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
-    members["times.npy"] = members["times.npy"][:8] + len(header).to_bytes(2, "little") + header
+    members["times.npy"] = (
+        members["times.npy"][:8] + len(header).to_bytes(2, "little") + header
+    )
     with zipfile.ZipFile(path, "w") as archive:
         for name, member in members.items():
             archive.writestr(name, member)
@@ -124,10 +149,17 @@ def test_headers_of_arrays_that_are_broken(header, trajectory, tmp_path):
 
 def test_numbers_and_arrays_of_times(trajectory):
     t = np.linspace(0.0, trajectory.t_end, 7)
-    for curve in (trajectory.position, trajectory.velocity, trajectory.acceleration, trajectory.torque):
+    for curve in (
+        trajectory.position,
+        trajectory.velocity,
+        trajectory.acceleration,
+        trajectory.torque,
+    ):
         assert curve(t).shape == (7, 3)
         assert curve(float(t[3])).shape == (3,)
-        np.testing.assert_allclose(curve(t)[3], curve(float(t[3])), rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(
+            curve(t)[3], curve(float(t[3])), rtol=1e-12, atol=1e-12
+        )
     assert trajectory.path_coordinate(t).shape == (7,)
 
 
@@ -136,7 +168,9 @@ def test_samples(trajectory):
     assert samples.t[-1] == trajectory.t_end
     np.testing.assert_array_equal(samples.t[:-1], 0.01 * np.arange(len(samples.t) - 1))
     np.testing.assert_array_equal(samples.q, trajectory.position(samples.t))
-    np.testing.assert_allclose(samples.tau, trajectory.torque(samples.t), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        samples.tau, trajectory.torque(samples.t), rtol=1e-12, atol=1e-12
+    )
     assert samples.s[0] == 0.0
     assert samples.s[-1] == pytest.approx(1.0, abs=1e-12)
     assert np.abs(samples.tau).max() == pytest.approx(10.0, rel=1e-3)
@@ -150,7 +184,9 @@ def test_periods_that_divide_the_end_time(divisor, trajectory):
 
 
 @pytest.mark.parametrize("periods", [0.4, 1.0, 2.5, 3.0, 999.7])
-def test_the_end_posture_is_held_at_the_first_period_that_is_not_before_the_end(periods, trajectory):
+def test_the_end_posture_is_held_at_the_first_period_that_is_not_before_the_end(
+    periods, trajectory
+):
     dt = trajectory.t_end / periods
     exact, held = trajectory.sample(dt), trajectory.sample(dt, last="hold")
     assert len(held.t) == int(np.ceil(periods)) + 1
@@ -160,7 +196,9 @@ def test_the_end_posture_is_held_at_the_first_period_that_is_not_before_the_end(
         before, same = getattr(held, field.name)[:-1], getattr(exact, field.name)[:-1]
         np.testing.assert_allclose(before, same, rtol=1e-12, atol=1e-12)
     assert held.s[-1] == 1.0
-    np.testing.assert_allclose(held.q[-1], trajectory.position(trajectory.t_end), atol=1e-14)
+    np.testing.assert_allclose(
+        held.q[-1], trajectory.position(trajectory.t_end), atol=1e-14
+    )
     assert not held.qdot[-1].any()
     assert not held.qddot[-1].any()
 
@@ -168,13 +206,18 @@ def test_the_end_posture_is_held_at_the_first_period_that_is_not_before_the_end(
 def test_the_torque_that_holds_the_end_posture_is_the_static_one(trajectory):
     heavy = replace(trajectory, robot=Robot.from_urdf(SCARA, gravity=[0.0, -9.81, 0.0]))
     held = heavy.sample(0.3, last="hold")
-    lever = dynamics.rigid_torque(heavy.robot, held.q[-1:], np.zeros((1, 3)), np.zeros((1, 3)))[0]
+    lever = dynamics.rigid_torque(
+        heavy.robot, held.q[-1:], np.zeros((1, 3)), np.zeros((1, 3))
+    )[0]
     assert np.abs(lever).max() > 10.0
     np.testing.assert_allclose(held.tau[-1], lever, rtol=1e-12)
 
 
 def test_unknown_ending(trajectory):
-    with pytest.raises(InputError, match=r"no ending named 'held'.*allowed: exact, hold.*Did you mean 'hold'"):
+    with pytest.raises(
+        InputError,
+        match=r"no ending named 'held'.*allowed: exact, hold.*Did you mean 'hold'",
+    ):
         trajectory.sample(0.1, last="held")
 
 
@@ -185,7 +228,9 @@ def test_unusable_period(dt, trajectory):
 
 
 @pytest.mark.parametrize("beyond", [-1e-3, 1e-3, np.nan])
-@pytest.mark.parametrize("curve", ["position", "velocity", "acceleration", "torque", "path_coordinate", "at"])
+@pytest.mark.parametrize(
+    "curve", ["position", "velocity", "acceleration", "torque", "path_coordinate", "at"]
+)
 def test_times_outside_are_refused(curve, beyond, trajectory):
     t = np.array([0.1, beyond if beyond < 0.0 else trajectory.t_end + beyond])
     with pytest.raises(InputError, match="time outside the trajectory") as caught:
@@ -195,7 +240,9 @@ def test_times_outside_are_refused(curve, beyond, trajectory):
 
 def test_rounding_at_the_ends_is_forgiven(trajectory):
     t = np.array([-1e-13, trajectory.t_end * (1.0 + 1e-13)])
-    np.testing.assert_array_equal(trajectory.position(t), trajectory.position(np.array([0.0, trajectory.t_end])))
+    np.testing.assert_array_equal(
+        trajectory.position(t), trajectory.position(np.array([0.0, trajectory.t_end]))
+    )
 
 
 def test_arrays_are_frozen_copies(trajectory):
@@ -233,7 +280,9 @@ def test_round_trip(trajectory, tmp_path):
             assert one == other, field.name
     assert again.joint_names == trajectory.joint_names
     t = np.linspace(0.0, trajectory.t_end, 50)
-    np.testing.assert_allclose(trajectory.at(t).tau, again.at(t).tau, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        trajectory.at(t).tau, again.at(t).tau, rtol=1e-12, atol=1e-12
+    )
 
 
 def test_file_does_not_need_the_urdf_file(trajectory, tmp_path):
@@ -267,16 +316,28 @@ BROKEN = {
     "degree huge": ({"degree": 10**9}, "knots of a spline"),
     "urdf missing": ({"urdf": None}, "urdf: wrong type"),
     "urdf broken": ({"urdf": "<robot"}, "not well-formed XML"),
-    "urdf of another robot": ({"urdf": lambda text: text.replace('"j2"', '"elbow"')}, "joint_names: other joints"),
+    "urdf of another robot": (
+        {"urdf": lambda text: text.replace('"j2"', '"elbow"')},
+        "joint_names: other joints",
+    ),
     "task missing": ({"task": None}, "task: wrong type"),
     "task the name of a file": ({"task": "task.yaml"}, "task: wrong type; found str"),
     "task wrong": ({"task__spline__degree": "three"}, "spline.degree"),
     "task of another robot": ({"task__start__joints": [0.1, 0.2]}, "task.start.joints"),
     "task space that there is not": ({"task__task_space": ["x", "w"]}, "task_space"),
     "limit unusable": ({"task__robot__limits__torque": -1}, "torque"),
-    "redundant joint unknown": ({"redundant_joints": ["j9"]}, "redundant_joints: unknown joints"),
-    "redundant joint a number": ({"redundant_joints": [3]}, "redundant_joints: unknown joints"),
-    "more redundant joints": ({"redundant_joints": ["j1", "j3"]}, "control_points: wrong shape"),
+    "redundant joint unknown": (
+        {"redundant_joints": ["j9"]},
+        "redundant_joints: unknown joints",
+    ),
+    "redundant joint a number": (
+        {"redundant_joints": [3]},
+        "redundant_joints: unknown joints",
+    ),
+    "more redundant joints": (
+        {"redundant_joints": ["j1", "j3"]},
+        "control_points: wrong shape",
+    ),
     "branch a number": ({"branch": 1}, "branch: wrong type"),
     "times descending": ({"times": lambda a: a[::-1]}, "times: not times"),
     "times equal": ({"times": put(3, 0.0)}, "times: not times"),
@@ -286,23 +347,44 @@ BROKEN = {
     "times a number": ({"times": np.array(1.0)}, "times: not times"),
     "one time": ({"times": np.zeros(1)}, "times: not times"),
     "times words": ({"times": np.array(["a", "b"])}, "times: not all are finite"),
-    "times objects": ({"times": np.array([None, {}], dtype=object)}, "not a brachis result"),
+    "times objects": (
+        {"times": np.array([None, {}], dtype=object)},
+        "not a brachis result",
+    ),
     "knots descending": ({"knots": lambda a: a[::-1]}, "knots: not the knots"),
     "knots infinite": ({"knots": put(5, np.inf)}, "knots: not all are finite"),
     "knots beyond one": ({"knots": lambda a: 2.0 * a}, "knots: not the knots"),
     "times too close": ({"times": put(1, 1e-14)}, "times: not times"),
-    "knots too close": ({"knots": lambda a: np.sort(put(5, a[4] + 1e-14)(a))}, "knots: internal knots are repeated"),
-    "q too large": ({"q": put((3, 1), 1e300)}, "q: not all are finite numbers of a usable size"),
-    "too many times": ({"times": np.linspace(0.0, 1.0, 50_001)}, "times: the motion has too many nodes; found 50001"),
+    "knots too close": (
+        {"knots": lambda a: np.sort(put(5, a[4] + 1e-14)(a))},
+        "knots: internal knots are repeated",
+    ),
+    "q too large": (
+        {"q": put((3, 1), 1e300)},
+        "q: not all are finite numbers of a usable size",
+    ),
+    "too many times": (
+        {"times": np.linspace(0.0, 1.0, 50_001)},
+        "times: the motion has too many nodes; found 50001",
+    ),
     "no knots": ({"knots": np.zeros(0)}, "knots: not the knots"),
     "q of fewer nodes": ({"q": lambda a: a[1:]}, "q: wrong shape"),
     "q of fewer joints": ({"qdot": lambda a: a[:, 1:]}, "qdot: wrong shape"),
     "q flat": ({"qddot_before": lambda a: a.ravel()}, "qddot_before: wrong shape"),
     "q complex": ({"q": lambda a: a + 1j}, "q: not all are finite"),
     "q NaN": ({"q": put((3, 1), np.nan)}, "q: not all are finite"),
-    "fewer control points": ({"control_points": lambda a: a[:, 1:]}, "control_points: wrong shape"),
-    "fewer splines": ({"control_points": lambda a: a[:1]}, "control_points: wrong shape"),
-    "control points infinite": ({"control_points": put((0, 0), -np.inf)}, "control_points: not all are finite"),
+    "fewer control points": (
+        {"control_points": lambda a: a[:, 1:]},
+        "control_points: wrong shape",
+    ),
+    "fewer splines": (
+        {"control_points": lambda a: a[:1]},
+        "control_points: wrong shape",
+    ),
+    "control points infinite": (
+        {"control_points": put((0, 0), -np.inf)},
+        "control_points: not all are finite",
+    ),
 }
 
 
@@ -325,7 +407,12 @@ def test_a_file_of_schema_2_has_its_quaternions_renamed(tmp_path):
         schema=2,
         task__path_start=[0.5, 0.0, 0.6, 0.0, 1.0, 0.0, 0.0],
         task__path=lambda path: [
-            {**path[0], "orientation": {"rotate": {**path[0]["orientation"]["rotate"], "frame": "world"}}}
+            {
+                **path[0],
+                "orientation": {
+                    "rotate": {**path[0]["orientation"]["rotate"], "frame": "world"}
+                },
+            }
         ],
     )
     assert Trajectory.load(old).task == made.task

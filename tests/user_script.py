@@ -36,7 +36,9 @@ def main(folder: Path) -> None:
     # What came out.
     samples = result.sample(dt=0.004)
     fastest = float(samples.tool_speed.max())
-    print(f"{len(samples)} samples, the tool at {fastest:.3f} m/s at most, ends at {samples.tool_position[-1]} m")
+    print(
+        f"{len(samples)} samples, the tool at {fastest:.3f} m/s at most, ends at {samples.tool_position[-1]} m"
+    )
     position: np.ndarray = result.trajectory.position(0.1)
     assert position.shape == (3,)
     assert result.trajectory.at(0.1).tool_quaternion.shape == (1, 4)
@@ -49,7 +51,9 @@ def main(folder: Path) -> None:
 
     # Many at a time; failures are values.
     tasks = [brachis.examples.scara_line, folder / "missing.yaml"]
-    for outcome in brachis.plan_many(tasks, redundant_joints=["j1"], intervals=8, effort="single"):
+    for outcome in brachis.plan_many(
+        tasks, redundant_joints=["j1"], intervals=8, effort="single"
+    ):
         if isinstance(outcome, brachis.Result):
             print(f"{outcome.t_end:.3f} s")
         else:
@@ -58,12 +62,22 @@ def main(folder: Path) -> None:
     # Paths of all kinds.
     angle = np.linspace(0.1, 1.0, 50)
     arc = Arc(center=[0.5, 0.0, 0.3], angle_deg=30, normal=[0, 0, 1])
-    path = arc + Circle([0.5, 0.0, 0.3], normal=(0, 0, 1)) + Helix([0.5, 0.0, 0.3], pitch=0.02, turns=2)
-    path += (Spline(through=np.column_stack([np.cos(angle), np.sin(angle), 0.3 + 0.0 * angle])),)
+    path = (
+        arc
+        + Circle([0.5, 0.0, 0.3], normal=(0, 0, 1))
+        + Helix([0.5, 0.0, 0.3], pitch=0.02, turns=2)
+    )
+    path += (
+        Spline(
+            through=np.column_stack([np.cos(angle), np.sin(angle), 0.3 + 0.0 * angle])
+        ),
+    )
     print([segment.kind for segment in path])
 
     try:
-        brachis.plan("scara3", path=Line(by=[9.0, 0.0]), start=q0, task_space=["x", "y"])
+        brachis.plan(
+            "scara3", path=Line(by=[9.0, 0.0]), start=q0, task_space=["x", "y"]
+        )
     except brachis.BrachisError as error:
         print(error)
 

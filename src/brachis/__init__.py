@@ -132,9 +132,11 @@ def __getattr__(name: str) -> object:
     if name in _MODULES:
         return importlib.import_module(f"brachis.{_MODULES[name]}")
     if name not in _HOME:
-        from brachis.errors import nearest  # noqa: PLC0415
+        from brachis.errors import nearest
 
-        near = None if name.startswith("_") else nearest(name, __all__, is_attribute=True)
+        near = (
+            None if name.startswith("_") else nearest(name, __all__, is_attribute=True)
+        )
         hint = f". Did you mean {near!r}?" if near else ""
         message = f"module 'brachis' has no attribute {name!r}{hint}"
         raise AttributeError(message)

@@ -8,7 +8,7 @@ from brachis.common import interrupts
 def main() -> None:
     """Run the command line."""
     interrupts.listen()
-    from brachis.apps.cli.main import main as run  # noqa: PLC0415  (a third of a second in which Ctrl-C may come)
+    from brachis.apps.cli.main import main as run
 
     run()
 

@@ -143,7 +143,11 @@ class BrachisError(Exception):
 
     def put_advice(self, advice: str) -> None:
         """Put advice before the hint."""
-        self.hint = f"{advice}, or {self.hint[:1].lower()}{self.hint[1:]}" if self.hint else advice
+        self.hint = (
+            f"{advice}, or {self.hint[:1].lower()}{self.hint[1:]}"
+            if self.hint
+            else advice
+        )
         self.args = (self._message(),)
 
     def _message(self) -> str:
@@ -157,7 +161,9 @@ class BrachisError(Exception):
         return text
 
 
-def _restored(kind: type[BrachisError], args: tuple[object, ...], data: dict[str, object]) -> BrachisError:
+def _restored(
+    kind: type[BrachisError], args: tuple[object, ...], data: dict[str, object]
+) -> BrachisError:
     """Make an error again that another process raised."""
     error = kind.__new__(kind, *args)
     error.__dict__.update(data)
@@ -209,7 +215,9 @@ class PlausibilityError(InputError):
 
     def __init__(self, remarks: Sequence[str]) -> None:
         self.remarks = tuple(remarks)
-        super().__init__("not plausible:\n  " + "\n  ".join(self.remarks), hint=_NOT_STRICT)
+        super().__init__(
+            "not plausible:\n  " + "\n  ".join(self.remarks), hint=_NOT_STRICT
+        )
 
 
 class UnknownNameError(InputError):
@@ -226,7 +234,13 @@ class UnknownNameError(InputError):
     """
 
     def __init__(
-        self, kind: str, name: str, valid: Iterable[str], *, where: str | None = None, hint: str | None = None
+        self,
+        kind: str,
+        name: str,
+        valid: Iterable[str],
+        *,
+        where: str | None = None,
+        hint: str | None = None,
     ) -> None:
         self.kind = kind
         self.name = name
@@ -251,11 +265,23 @@ class LimitError(InputError):
         The task key that supplies the limit, for example ``robot.limits.torque.j1``.
     """
 
-    def __init__(self, problem: str, *, joint: str, key: str, found: object = None, allowed: object = None) -> None:
+    def __init__(
+        self,
+        problem: str,
+        *,
+        joint: str,
+        key: str,
+        found: object = None,
+        allowed: object = None,
+    ) -> None:
         self.joint = joint
         self.key = key
         super().__init__(
-            problem, found=found, allowed=allowed, where=f"joint {joint!r}", hint=f"Set {key} in the task file"
+            problem,
+            found=found,
+            allowed=allowed,
+            where=f"joint {joint!r}",
+            hint=f"Set {key} in the task file",
         )
 
 
@@ -315,7 +341,9 @@ class DecompositionError(InputError):
         self.reasons = dict(reasons or {})
         self.available = tuple(available)
         if self.reasons:
-            problem += "; tried " + "; ".join(f"{family}: {why}" for family, why in self.reasons.items())
+            problem += "; tried " + "; ".join(
+                f"{family}: {why}" for family, why in self.reasons.items()
+            )
         choices = " | ".join("[" + ", ".join(names) + "]" for names in self.available)
         super().__init__(
             problem,
@@ -365,7 +393,13 @@ class PlanningError(BrachisError):
     """
 
 
-def nearest(name: str, valid: Iterable[str], likeness: float = 0.5, *, is_attribute: bool = False) -> str | None:
+def nearest(
+    name: str,
+    valid: Iterable[str],
+    likeness: float = 0.5,
+    *,
+    is_attribute: bool = False,
+) -> str | None:
     """Suggest a valid name: one for a word of other libraries, else the longest beginning of `name`, else the nearest.
 
     Names with a likeness of 1 are the same, but for capitals. Where an attribute is asked for, functions that stand
@@ -373,7 +407,11 @@ def nearest(name: str, valid: Iterable[str], likeness: float = 0.5, *, is_attrib
     """
     by_small = {one.lower(): one for one in valid}
     small = name.lower()
-    known = [one for one in _NAMES_HERE.get(small, ()) if one in by_small.values() or (is_attribute and "." in one)]
+    known = [
+        one
+        for one in _NAMES_HERE.get(small, ())
+        if one in by_small.values() or (is_attribute and "." in one)
+    ]
     begun = [one for one in by_small if small.startswith(f"{one}_")]
     if known and small not in by_small:
         return known[0]
@@ -397,8 +435,14 @@ class MissingAttributeError(AttributeError):
 
     def __str__(self) -> str:
         """Look for the name that may be meant; most such errors are caught, and nobody reads them."""
-        meant = None if self._name.startswith("_") else _attribute_meant(self._thing, self._name)
-        message = f"{type(self._thing).__name__!r} object has no attribute {self._name!r}"
+        meant = (
+            None
+            if self._name.startswith("_")
+            else _attribute_meant(self._thing, self._name)
+        )
+        message = (
+            f"{type(self._thing).__name__!r} object has no attribute {self._name!r}"
+        )
         return message + (f". Did you mean {meant!r}?" if meant else "")
 
 
@@ -409,7 +453,11 @@ def _attribute_meant(thing: object, name: str) -> str | None:
     for word in (name, *_NAMES_HERE.get(name.lower(), ())):
         if word in own or "." in word:
             return word
-        within = [f"{part}.{word}" for part, value in parts if hasattr(type(value), word) or word in _contents(value)]
+        within = [
+            f"{part}.{word}"
+            for part, value in parts
+            if hasattr(type(value), word) or word in _contents(value)
+        ]
         if within:
             return within[0]
     return nearest(name, own, is_attribute=True)
@@ -423,7 +471,10 @@ def write_apart(value: float, *others: float, digits: int = 4) -> tuple[str, ...
     """Write a number and others with as many significant digits as tell it from them, at least `digits`."""
     for count in range(digits, 18):
         text, *texts = (f"{each:.{count}g}" for each in (value, *others))
-        if all(text != other or value == each for other, each in zip(texts, others, strict=True)):
+        if all(
+            text != other or value == each
+            for other, each in zip(texts, others, strict=True)
+        ):
             break
     return (text, *texts)
 
@@ -433,8 +484,12 @@ def write_count(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def no_attribute(module: str, kind: str, name: str, valid: Sequence[str]) -> AttributeError:
+def no_attribute(
+    module: str, kind: str, name: str, valid: Sequence[str]
+) -> AttributeError:
     """Return what a module raises that has things of one kind, such as robots, by their names."""
     near = nearest(name, valid)
     hint = f". Did you mean {near!r}?" if near else ""
-    return AttributeError(f"module {module!r} has no attribute {name!r}; {kind}: {', '.join(valid)}{hint}")
+    return AttributeError(
+        f"module {module!r} has no attribute {name!r}; {kind}: {', '.join(valid)}{hint}"
+    )

@@ -19,7 +19,10 @@ from brachis.errors import no_attribute
 
 def names() -> tuple[str, ...]:
     """Return the names of the examples, from the easiest on."""
-    return tuple(path.stem.split("_", 1)[1] for path in sorted(shipped("examples").glob("[0-9]*_*.yaml")))
+    return tuple(
+        path.stem.split("_", 1)[1]
+        for path in sorted(shipped("examples").glob("[0-9]*_*.yaml"))
+    )
 
 
 def __getattr__(name: str) -> Path:

@@ -36,7 +36,13 @@ from brachis.optimise.mesh import adapt_mesh, coarsest
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, Solve
 from brachis.optimise.transcription import breaks_of, phase_in, program_of
-from brachis.problem.plausibility import check_within_reach, of_end_time, of_places, of_robot, of_task
+from brachis.problem.plausibility import (
+    check_within_reach,
+    of_end_time,
+    of_places,
+    of_robot,
+    of_task,
+)
 from brachis.problem.problem import Decomposition, Problem, decompositions_of
 from brachis.result import Result
 from brachis.robot import Robot
@@ -70,7 +76,14 @@ Given = Source | Robot | None
 """A robot, or a task; both may be the name of a file."""
 _MANY_VARIABLES = 150
 """Above this a cold solve takes seconds, and the program is first solved over some of its knots."""
-_OWN_KEYWORDS = ("start_from", "families", "own_limits", "listener", "progress", "check_advice")
+_OWN_KEYWORDS = (
+    "start_from",
+    "families",
+    "own_limits",
+    "listener",
+    "progress",
+    "check_advice",
+)
 _KNOT_TIME = 0.4
 """Part of the remaining time that may go into the knots."""
 
@@ -154,7 +167,10 @@ def plan(
     """
     # Batches are small: a second BLAS thread costs up to twenty times what it gives where cores are busy.
     check_callable(listener, "listener")
-    with ThreadpoolController().limit(limits=1, user_api="blas"), report_progress(listener, progress) as tell:
+    with (
+        ThreadpoolController().limit(limits=1, user_api="blas"),
+        report_progress(listener, progress) as tell,
+    ):
         began = time.perf_counter()
         check_list(families, "families", "closed forms")
         robot, asked = _read(robot_or_task, task, keywords)
@@ -162,11 +178,22 @@ def plan(
         loaded = time.perf_counter()
         deadline = Deadline.after(asked.search.time_limit - (loaded - began))
 
-        def is_task_planned(changed: Task, limit: Deadline, most: int | None) -> bool | None:
+        def is_task_planned(
+            changed: Task, limit: Deadline, most: int | None
+        ) -> bool | None:
             return _is_planned(robot, asked, changed, families, own_limits, limit, most)
 
         try:
-            return _plan(robot, asked, families, own_limits, known, tell, (began, loaded), deadline)
+            return _plan(
+                robot,
+                asked,
+                families,
+                own_limits,
+                known,
+                tell,
+                (began, loaded),
+                deadline,
+            )
         except BrachisError as error:
             until = deadline if check_advice else Deadline(0.0)
             try:
@@ -176,13 +203,26 @@ def plan(
             raise
 
 
-def _read(first: Given, task: Source | None, keywords: TaskKeywords) -> tuple[Robot, Task]:
+def _read(
+    first: Given, task: Source | None, keywords: TaskKeywords
+) -> tuple[Robot, Task]:
     """Return the robot, and the task with all that the robot was made with."""
     check_keywords(keywords, "plan", _OWN_KEYWORDS)
     if is_robot(keywords.get("robot")):
-        allowed = "a robot comes first, without a name: brachis.plan('scara3', path=...)"
-        found = repr(keywords["robot"]) if isinstance(keywords["robot"], str) else type(keywords["robot"]).__name__
-        raise InputError("this is the section of a task, a mapping", where="robot", found=found, allowed=allowed)
+        allowed = (
+            "a robot comes first, without a name: brachis.plan('scara3', path=...)"
+        )
+        found = (
+            repr(keywords["robot"])
+            if isinstance(keywords["robot"], str)
+            else type(keywords["robot"]).__name__
+        )
+        raise InputError(
+            "this is the section of a task, a mapping",
+            where="robot",
+            found=found,
+            allowed=allowed,
+        )
     # Everything else than a robot is a task.
     alone = task is None and first is not None and not is_robot(first)
     given, source = (None, first) if alone else (first, task)
@@ -208,19 +248,28 @@ def _plan(
     began, loaded = times
     remarks = of_robot(robot) + of_task(task)
     remarks = tell(remarks, strict=task.strict, stacklevel=4)
-    joints, segments = write_count(robot.n, "joint"), write_count(len(task.path), "segment")
-    listener(f"planning for {joints} along a path of {segments}, task space {_space(task)}")
+    joints, segments = (
+        write_count(robot.n, "joint"),
+        write_count(len(task.path), "segment"),
+    )
+    listener(
+        f"planning for {joints} along a path of {segments}, task space {_space(task)}"
+    )
     problem = Problem.of(robot, task, own_limits)
-    places = of_places(problem.task_map, problem.path, problem.start, problem.end, task.path_start)
+    places = of_places(
+        problem.task_map, problem.path, problem.start, problem.end, task.path_start
+    )
     remarks += tell(places, strict=task.strict, stacklevel=4)
     decompositions = decompositions_of(problem, families)
     check_within_reach(problem.task_map, problem.path)
     first = None if known is None else _first(problem, decompositions, known)
     warm = first if isinstance(first, Start) else None
-    found = find_fastest(problem, decompositions, Stages(solved, finished), deadline, listener, warm)
+    found = find_fastest(
+        problem, decompositions, Stages(solved, finished), deadline, listener, warm
+    )
     best = found.best
-    assert best is not None and best.start is not None  # noqa: PT018, S101  (else nothing would have come back)
-    assert best.trajectory is not None and best.verification is not None  # noqa: PT018, S101
+    assert best is not None and best.start is not None
+    assert best.trajectory is not None and best.verification is not None
     searched = time.perf_counter()
     over = Deadline(0.0) if found.interrupted else deadline
     if task.search.least_motion:
@@ -264,16 +313,30 @@ def _is_planned(
     changed = task_with(changed, effort="single") if most else changed
     same = changed.robot == task.robot
     problem = Problem.of(
-        robot if same else robot_from_settings(changed.robot, urdf_text=robot.urdf), changed, own_limits
+        robot if same else robot_from_settings(changed.robot, urdf_text=robot.urdf),
+        changed,
+        own_limits,
     )
-    return is_planned(problem, decompositions_of(problem, families), Stages(solved, finished), deadline, most)
+    return is_planned(
+        problem,
+        decompositions_of(problem, families),
+        Stages(solved, finished),
+        deadline,
+        most,
+    )
 
 
 def _space(task: Task) -> str:
-    return task.task_space if isinstance(task.task_space, str) else f"[{', '.join(task.task_space)}]"
+    return (
+        task.task_space
+        if isinstance(task.task_space, str)
+        else f"[{', '.join(task.task_space)}]"
+    )
 
 
-def _first(problem: Problem, decompositions: Sequence[Decomposition], known: Trajectory) -> Start | str:
+def _first(
+    problem: Problem, decompositions: Sequence[Decomposition], known: Trajectory
+) -> Start | str:
     """Make a start of a known motion, for the solver that is tried first; or say why there is none."""
     curved = any(limit.where == "whole" for limit in problem.limits)
     solver = solver_named(problem.task.solver.name, curved=curved)[0]
@@ -286,7 +349,9 @@ def _not_used(first: Start | str | None, best: Attempt) -> tuple[str, ...]:
     if first is None or best.origin == GIVEN:
         return ()
     reason = first if isinstance(first, str) else "it led to no verified plan"
-    return (f"the plan does not start from the given motion: {reason}; it was searched for as usual",)
+    return (
+        f"the plan does not start from the given motion: {reason}; it was searched for as usual",
+    )
 
 
 def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
@@ -307,21 +372,32 @@ def solved(start: Start, deadline: Deadline, listener: Listener) -> Attempt:
     program = coarsest(target) if target.variables > _MANY_VARIABLES else target
     x = first_point(program, start)
     if x is None:
-        return Attempt.of(start, "the splines through the joint path leave the branch, or the chart")
+        return Attempt.of(
+            start, "the splines through the joint path leave the branch, or the chart"
+        )
     solve = _solver(start, deadline, listener)
     try:
         x, before = eased(program, x, solve, MARGINS[0])
         if start.in_chart and not start.timed:
             program, reports = solved_in_chart(problem, program, x, solve)
             joint_map = program.phases[0].joint_map
-            target = target.with_phases(phase_in(problem, joint_map, phase.grid) for phase in target.phases)
+            target = target.with_phases(
+                phase_in(problem, joint_map, phase.grid) for phase in target.phases
+            )
         else:
             program, reports = continued(program, x, solve, MARGINS)
     except ImportError as error:
         return Attempt.of(start, f"{start.solver}: not installed ({error})")
     reports, last = (*before, *reports), reports[-1]
     coarse = last.objective if last.status.usable else np.inf
-    return Attempt.of(start, _in_words(last.status), program=program, target=target, reports=reports, coarse=coarse)
+    return Attempt.of(
+        start,
+        _in_words(last.status),
+        program=program,
+        target=target,
+        reports=reports,
+        coarse=coarse,
+    )
 
 
 def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attempt:
@@ -339,18 +415,28 @@ def finished(attempt: Attempt, deadline: Deadline, listener: Listener) -> Attemp
     Attempt
     """
     start, program = attempt.start, attempt.program
-    assert start is not None and program is not None  # noqa: PT018, S101  (it is usable)
+    assert start is not None and program is not None
     task = start.problem.task
     settings, soon = task.refinement, deadline.part(_KNOT_TIME)
-    options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, soon)
+    options = RefinementOptions(
+        settings.tolerance, settings.density, settings.max_rounds, soon
+    )
     solve = _solver(start, soon, listener)
     reports, target = attempt.reports, attempt.target
-    if attempt.keeps_knots and start.in_chart and not start.timed and not deadline.passed:
+    if (
+        attempt.keeps_knots
+        and start.in_chart
+        and not start.timed
+        and not deadline.passed
+    ):
         program, further = best_of_joints(start.problem, program, reports[-1], solve)
         reports, target = (*reports[:-1], *further), program
     adapted = adapt_mesh(program, reports, solve, task.spline, options, target=target)
     attempt = dataclasses.replace(attempt, undone=adapted.undone)
-    options, solve = dataclasses.replace(options, deadline=deadline), _solver(start, deadline, listener)
+    options, solve = (
+        dataclasses.replace(options, deadline=deadline),
+        _solver(start, deadline, listener),
+    )
     return completed(attempt, adapted.program, adapted.reports, solve, options)
 
 
@@ -364,7 +450,9 @@ def _in_words(status: SolveStatus) -> str:
 def _solver(start: Start, deadline: Deadline, listener: Listener) -> Solve:
     """Make a function that solves with the start's solver."""
     (solver,) = solver_named(start.solver)
-    return solve_with(solver, start.problem.task.solver, start.joint_map, deadline, listener)
+    return solve_with(
+        solver, start.problem.task.solver, start.joint_map, deadline, listener
+    )
 
 
 def transcribe(
@@ -465,9 +553,16 @@ def plan_many(
     ['Result', 'PathError']
     """
     if isinstance(tasks, str | os.PathLike | Mapping):
-        raise InputError("is one task", where="tasks", found=type(tasks).__name__, allowed="a list of tasks")
+        raise InputError(
+            "is one task",
+            where="tasks",
+            found=type(tasks).__name__,
+            allowed="a list of tasks",
+        )
     if not isinstance(tasks, Iterable):
-        raise InputError("wrong type", where="tasks", found=repr(tasks), allowed="a list of tasks")
+        raise InputError(
+            "wrong type", where="tasks", found=repr(tasks), allowed="a list of tasks"
+        )
     check_keywords(keywords, "plan_many", ("jobs", "progress"))
     given, jobs = list(tasks), processes(count(jobs, "jobs"))
     outcomes: list[Outcome] = []
@@ -476,7 +571,10 @@ def plan_many(
         heard, progress = progress, False
     else:
         heard = None
-    with report_progress(None, progress) as tell, closing(each(*work, jobs=jobs, listener=_deaf)) as made:
+    with (
+        report_progress(None, progress) as tell,
+        closing(each(*work, jobs=jobs, listener=_deaf)) as made,
+    ):
         for outcome in made:
             outcomes.append(outcome)
             tell(f"planned {len(outcomes)} of {write_count(len(given), 'task')}")
@@ -489,10 +587,19 @@ def _deaf(_text: str) -> None:
     """Listen to nothing."""
 
 
-def _outcome(given: Any, keywords: TaskKeywords, listener: Callable[[str], None]) -> Outcome:  # noqa: ANN401
+def _outcome(
+    given: Any, keywords: TaskKeywords, listener: Callable[[str], None]
+) -> Outcome:
     """Plan one task."""
     robot, task = given if isinstance(given, tuple) else (None, given)
     try:
-        return plan(robot, task, listener=listener, progress=False, check_advice=False, **keywords)
+        return plan(
+            robot,
+            task,
+            listener=listener,
+            progress=False,
+            check_advice=False,
+            **keywords,
+        )
     except BrachisError as error:
         return error

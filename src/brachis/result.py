@@ -79,10 +79,14 @@ class Result(PlannedMotion):
         if kind == CANDIDATES:
             return plots.plot_candidates(self.candidates)
         if kind not in plots.PLOTS:
-            raise UnknownNameError("plot", kind, (*plots.PLOTS, CANDIDATES), where="kind")
+            raise UnknownNameError(
+                "plot", kind, (*plots.PLOTS, CANDIDATES), where="kind"
+            )
         return plots.PLOTS[kind](self.trajectory)
 
-    def report(self, path: str | os.PathLike[str] | None = None, *, degrees: bool = False) -> Report:
+    def report(
+        self, path: str | os.PathLike[str] | None = None, *, degrees: bool = False
+    ) -> Report:
         """Make a page from which a person decides whether to run the motion; see `brachis.report.make_report`.
 
         Parameters
@@ -102,7 +106,9 @@ class Result(PlannedMotion):
             page.save(path)
         return page
 
-    def bottleneck(self, *, check: bool = False, reference: bool = False) -> BottleneckReport:
+    def bottleneck(
+        self, *, check: bool = False, reference: bool = False
+    ) -> BottleneckReport:
         """Find out what holds the motion back; see `brachis.bottleneck.report`."""
         return bottleneck.report(self, check=check, reference=reference)
 
@@ -117,7 +123,13 @@ class Result(PlannedMotion):
         """Show the motion and the list of candidates in the browser; see `brachis.view`."""
         candidates = [candidate.to_dict() for candidate in self.candidates]
         return view(
-            self.trajectory, candidates, verified=self.verified, degrees=degrees, host=host, port=port, block=block
+            self.trajectory,
+            candidates,
+            verified=self.verified,
+            degrees=degrees,
+            host=host,
+            port=port,
+            block=block,
         )
 
     def _repr_html_(self) -> str:

@@ -26,7 +26,9 @@ _MISSPELT = 0.75
 
 def names() -> tuple[str, ...]:
     """Return the names of the robots, in alphabetical order."""
-    return tuple(sorted(path.parent.name for path in shipped("robots").glob("*/robot.urdf")))
+    return tuple(
+        sorted(path.parent.name for path in shipped("robots").glob("*/robot.urdf"))
+    )
 
 
 def path_of(name: str) -> Path:
@@ -46,10 +48,14 @@ def is_robot(given: object) -> bool:
     """Tell whether something is a robot: a `Robot`, the file name of a URDF, or a name from `names` or like one."""
     if isinstance(given, Robot):
         return True
-    return isinstance(given, str | os.PathLike) and (Path(given).suffix.lower() == ".urdf" or _is_name(given))
+    return isinstance(given, str | os.PathLike) and (
+        Path(given).suffix.lower() == ".urdf" or _is_name(given)
+    )
 
 
-def located(robot: str | os.PathLike[str] | Robot | None) -> str | os.PathLike[str] | Robot | None:
+def located(
+    robot: str | os.PathLike[str] | Robot | None,
+) -> str | os.PathLike[str] | Robot | None:
     """Return the URDF file where a robot is given by its name, and everything else as it is.
 
     Raises
@@ -67,7 +73,9 @@ def _is_name(given: str | os.PathLike[str]) -> bool:
     path = Path(given)
     bare = not path.suffix and len(path.parts) == 1 and not is_file(path)
     begun = any(name.startswith(str(given)) for name in names())
-    return bare and (begun or bool(difflib.get_close_matches(str(given), names(), cutoff=_MISSPELT)))
+    return bare and (
+        begun or bool(difflib.get_close_matches(str(given), names(), cutoff=_MISSPELT))
+    )
 
 
 @cache

@@ -20,9 +20,23 @@ MASS, FORCE, LENGTH = 2.0, 50.0, 1.2
 def slide():
     """Plan a straight motion of two slides, the lower of which carries both masses."""
 
-    def plan(axes=(X, Y), rows=("x", "y"), by=(LENGTH, 0.0), *, intervals=20, rest="velocity", degree=3, **extra):
+    def plan(
+        axes=(X, Y),
+        rows=("x", "y"),
+        by=(LENGTH, 0.0),
+        *,
+        intervals=20,
+        rest="velocity",
+        degree=3,
+        **extra,
+    ):
         limit = {"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": FORCE}
-        joints = [Joint("prismatic", axis=axis, limit=limit, inertial=INERTIAL.format(mass=MASS)) for axis in axes]
+        joints = [
+            Joint(
+                "prismatic", axis=axis, limit=limit, inertial=INERTIAL.format(mass=MASS)
+            )
+            for axis in axes
+        ]
         task = {
             "brachis": 1,
             "robot": {"gravity": [0, 0, 0], **extra.pop("robot", {})},
@@ -37,7 +51,9 @@ def slide():
         settings = task["robot"]
         limits = brachis.LimitSpec(**settings.get("limits", {}))
         text = chain_urdf(joints, tool=(0.1, 0.2, 0.3))
-        robot = brachis.Robot.from_urdf("slides", urdf_text=text, gravity=settings["gravity"], limits=limits)
+        robot = brachis.Robot.from_urdf(
+            "slides", urdf_text=text, gravity=settings["gravity"], limits=limits
+        )
         return brachis.plan(robot, task)
 
     return plan
@@ -47,7 +63,9 @@ def slide():
 def scara():
     """Plan the paper's line at 90 degrees with one joint redundant; every plan is made once."""
     limits = brachis.LimitSpec(torque=10.0, velocity=None)
-    robot = brachis.Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
+    robot = brachis.Robot.from_urdf(
+        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits
+    )
     made = {}
 
     def plan(joint, solver="auto"):

@@ -37,21 +37,39 @@ def test_planar_line(scara, joint):
 
 def test_arm_on_a_rail():
     task = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
-    found = holds(brachis.plan({**task, "redundant_joints": ["rail"], "search": QUICK}), 3)
-    assert {entry.sensitivity.label.kind for entry in found.entries[:3]} == {"torque", "force", "velocity"}
+    found = holds(
+        brachis.plan({**task, "redundant_joints": ["rail"], "search": QUICK}), 3
+    )
+    assert {entry.sensitivity.label.kind for entry in found.entries[:3]} == {
+        "torque",
+        "force",
+        "velocity",
+    }
 
 
 def test_range_of_a_joint(slide):
     limits = {"torque": {"j1": 30.0}, "position": {"j1": [-0.05, 0.05]}}
-    result = slide(((1.0, 0.0, 0.0),) * 2, ("x",), (1.2,), redundant=["j1"], robot={"limits": limits})
+    result = slide(
+        ((1.0, 0.0, 0.0),) * 2,
+        ("x",),
+        (1.2,),
+        redundant=["j1"],
+        robot={"limits": limits},
+    )
     found = holds(result, 2)
-    assert any(entry.sensitivity.label.kind == "position" and entry.re_solved < -LARGE for entry in found.entries)
+    assert any(
+        entry.sensitivity.label.kind == "position" and entry.re_solved < -LARGE
+        for entry in found.entries
+    )
 
 
 def test_a_wrong_prediction_is_found(scara):
     refined = scara("j3").attempt.refined
     honest = sensitivities(refined)
-    doubled = tuple(dataclasses.replace(entry, derivative=2.0 * entry.derivative) for entry in honest.limits)
+    doubled = tuple(
+        dataclasses.replace(entry, derivative=2.0 * entry.derivative)
+        for entry in honest.limits
+    )
     found = check_sensitivities(refined, dataclasses.replace(honest, limits=doubled))
     assert found.worst_deviation(LARGE) == pytest.approx(1.0, abs=0.05)
 
@@ -64,8 +82,13 @@ def test_a_relaxed_limit_leaves_all_others_as_they_are(scara):
     np.testing.assert_allclose(other.rows(x), program.rows(x), atol=1e-10)
     count = program.collocation_points
     torque = slice(0, 3 * count)
-    for mine, theirs, bound in ((program.lower, other.lower, -1.0), (program.upper, other.upper, 1.0)):
-        np.testing.assert_allclose(theirs[torque].reshape(-1, 3) / bound, [[1.0, 1.25, 1.0]] * count)
+    for mine, theirs, bound in (
+        (program.lower, other.lower, -1.0),
+        (program.upper, other.upper, 1.0),
+    ):
+        np.testing.assert_allclose(
+            theirs[torque].reshape(-1, 3) / bound, [[1.0, 1.25, 1.0]] * count
+        )
         np.testing.assert_array_equal(theirs[torque.stop :], mine[torque.stop :])
     assert other.safeguard_bounds == program.safeguard_bounds
     assert program.upper[torque].max() == 1.0, "the program itself keeps its limits"
@@ -73,7 +96,9 @@ def test_a_relaxed_limit_leaves_all_others_as_they_are(scara):
 
 def test_report_needs_the_solved_problem(scara):
     result = scara("j3")
-    bare = dataclasses.replace(result, attempt=dataclasses.replace(result.attempt, refined=None))
+    bare = dataclasses.replace(
+        result, attempt=dataclasses.replace(result.attempt, refined=None)
+    )
     with pytest.raises(InputError, match="no solved problem"):
         brachis.bottleneck.report(bare)
 
@@ -82,7 +107,9 @@ def test_another_limit_that_takes_over_within_the_step(slide):
     free = slide()
     fastest = np.abs(free.trajectory.velocity(np.linspace(0.0, free.t_end, 4001))).max()
     result = slide(robot={"limits": {"velocity": 1.002 * fastest}})
-    assert result.t_end == pytest.approx(free.t_end, rel=1e-6), "the velocity limit does not hold it back yet"
+    assert result.t_end == pytest.approx(free.t_end, rel=1e-6), (
+        "the velocity limit does not hold it back yet"
+    )
     found = check_sensitivities(result.attempt.refined, step=0.05)
     (entry,) = [entry for entry in found.entries if entry.predicted]
     assert entry.predicted == pytest.approx(-0.025 * found.t_end, rel=1e-4)
@@ -94,7 +121,9 @@ def test_another_limit_that_takes_over_within_the_step(slide):
 @pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
 def test_linearised_changes_promise_no_more_than_multipliers(scara, joint):
     for step, rel in ((0.01, 0.05), (1e-5, 1e-3)):
-        for entry in check_sensitivities(scara(joint).attempt.refined, step=step).entries:
+        for entry in check_sensitivities(
+            scara(joint).attempt.refined, step=step
+        ).entries:
             assert entry.predicted * (1.0 + 1e-4) <= entry.linearised <= 0.0
             assert entry.linearised == pytest.approx(entry.predicted, rel=rel, abs=1e-8)
 
@@ -111,12 +140,17 @@ def test_a_step_into_another_valley_is_no_change_by_the_limit(scara, monkeypatch
             answer[0] -= valley
         return answer, optimal
 
-    expected = {entry.sensitivity: entry.re_solved for entry in check_sensitivities(refined).entries}
+    expected = {
+        entry.sensitivity: entry.re_solved
+        for entry in check_sensitivities(refined).entries
+    }
     monkeypatch.setattr(check, "_solved_again", wandering)
     for entry in check_sensitivities(refined).entries:
         if entry.predicted:
             assert entry.other_optimum == pytest.approx(-valley, rel=1e-3)
-            assert entry.re_solved == pytest.approx(expected[entry.sensitivity], abs=1e-6)
+            assert entry.re_solved == pytest.approx(
+                expected[entry.sensitivity], abs=1e-6
+            )
 
 
 def test_a_raised_limit_that_no_solver_copes_with_leaves_the_answer(scara, monkeypatch):
@@ -140,5 +174,10 @@ def test_a_raised_limit_that_no_solver_copes_with_leaves_the_answer(scara, monke
         assert entry.re_solved == pytest.approx(0.0, abs=1e-6)
     large = [entry for entry in found if entry.predicted < -LARGE]
     assert answers.larger(LARGE) == tuple(large)
-    told = str(dataclasses.replace(brachis.bottleneck.report(scara("j3")), check=answers))
-    assert "no solver brought the changes that are larger than 0.1 ms to an optimum" in told
+    told = str(
+        dataclasses.replace(brachis.bottleneck.report(scara("j3")), check=answers)
+    )
+    assert (
+        "no solver brought the changes that are larger than 0.1 ms to an optimum"
+        in told
+    )

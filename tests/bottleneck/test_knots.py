@@ -45,9 +45,19 @@ def test_a_refined_mesh_costs_next_to_nothing():
     assert "the knots cost" not in str(report)
 
 
-@pytest.mark.parametrize("limits", [{"friction": {"viscous": 0.5}}, {"limits": {"torque": 10, "jerk": 100}}], ids=str)
+@pytest.mark.parametrize(
+    "limits",
+    [{"friction": {"viscous": 0.5}}, {"limits": {"torque": 10, "jerk": 100}}],
+    ids=str,
+)
 def test_nothing_is_said_if_the_phase_plane_leaves_out_what_holds_the_motion(limits):
-    result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], intervals=10, **limits, **QUICK)
+    result = brachis.plan(
+        brachis.examples.scara_line,
+        redundant_joints=["j1"],
+        intervals=10,
+        **limits,
+        **QUICK,
+    )
     report = result.bottleneck()
     assert report.knots is None
     assert report.to_dict()["knots"] is None

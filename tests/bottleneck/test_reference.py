@@ -16,7 +16,9 @@ def test_the_slide_comes_to_bang_bang_itself(slide):
     result = slide(intervals=10, rest="full")
     best = 2.0 * np.sqrt(2.0 * MASS * LENGTH / FORCE)
     reference = find_reference(result.attempt.refined, intervals=40)
-    assert reference.degree == 2, "parabolas alone can jump from full force forwards to full force back"
+    assert reference.degree == 2, (
+        "parabolas alone can jump from full force forwards to full force back"
+    )
     assert reference.t_end == pytest.approx(best, rel=2e-4)
     assert reference.distance == pytest.approx(result.t_end / reference.t_end - 1.0)
     assert reference.distance > 0.1
@@ -50,10 +52,18 @@ def test_nothing_faster_is_said(slide):
 
 def test_end_posture_is_kept(slide):
     limits = {"torque": {"j1": 30.0}}
-    from brachis.apps.bottleneck.reference import _on_mesh  # noqa: PLC0415
+    from brachis.apps.bottleneck.reference import _on_mesh
 
-    free = slide(((1.0, 0.0, 0.0),) * 2, ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits})
-    np.testing.assert_array_equal(free.attempt.refined.program.phases[0].boundary.end, [1.0, np.nan])
+    free = slide(
+        ((1.0, 0.0, 0.0),) * 2,
+        ("x",),
+        (LENGTH,),
+        redundant=["j1"],
+        robot={"limits": limits},
+    )
+    np.testing.assert_array_equal(
+        free.attempt.refined.program.phases[0].boundary.end, [1.0, np.nan]
+    )
     task = free.task.to_dict()
     task["end"] = {"joints": [0.1, LENGTH - 0.1]}
     given, _ = brachis.transcribe(free.trajectory.robot, brachis.load_task(task))

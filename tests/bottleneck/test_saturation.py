@@ -20,14 +20,20 @@ def made(slide):
     base = slide(degree=2, intervals=4).trajectory
 
     def make(times, after, before):
-        times, after, before = (np.array(part, dtype=float) for part in (times, after, before))
+        times, after, before = (
+            np.array(part, dtype=float) for part in (times, after, before)
+        )
         h = np.diff(times)
         first, last = after[:-1], before[1:]
         qdot = np.concatenate([[0.0], np.cumsum(h * 0.5 * (first + last))])
-        q = np.concatenate([[0.0], np.cumsum(h * qdot[:-1] + h**2 * (first / 3.0 + last / 6.0))])
+        q = np.concatenate(
+            [[0.0], np.cumsum(h * qdot[:-1] + h**2 * (first / 3.0 + last / 6.0))]
+        )
         still = np.zeros_like(q)
         columns = {"q": q, "qdot": qdot, "qddot": after, "qddot_before": before}
-        stacked = {name: np.stack([column, still], axis=1) for name, column in columns.items()}
+        stacked = {
+            name: np.stack([column, still], axis=1) for name, column in columns.items()
+        }
         return dataclasses.replace(base, times=times, **stacked)
 
     return make
@@ -46,13 +52,21 @@ def test_full_force_for_a_part_of_the_time(made):
     entry = of(saturations(trajectory), "j1", "force")
     assert entry.share == pytest.approx(0.3, abs=1e-12)
     (stretch,) = entry.active
-    assert (stretch.begin, stretch.end, stretch.side) == (0.0, pytest.approx(0.3 * T), "upper")
+    assert (stretch.begin, stretch.end, stretch.side) == (
+        0.0,
+        pytest.approx(0.3 * T),
+        "upper",
+    )
     assert entry.peak == pytest.approx(1.0)
 
 
 def test_both_directions_count(made):
     turn = [0.0, 0.25 * T, 0.75 * T, T]
-    entry = of(saturations(made(turn, [0.0, LIMIT, -LIMIT, 0.0], [0.0, 0.0, LIMIT, -LIMIT])), "j1", "force")
+    entry = of(
+        saturations(made(turn, [0.0, LIMIT, -LIMIT, 0.0], [0.0, 0.0, LIMIT, -LIMIT])),
+        "j1",
+        "force",
+    )
     assert entry.share == pytest.approx(0.75, abs=1e-12)
     assert [stretch.side for stretch in entry.active] == ["upper", "lower"]
     assert entry.active[1].begin == entry.active[0].end == pytest.approx(0.75 * T)
@@ -75,7 +89,10 @@ def test_below_the_threshold_nothing_is_active(made):
 
 def rippling(made, lowest):
     """A force at its limit with one dip in the middle of the motion."""
-    times, forces = [0.0, 0.4 * T, 0.5 * T, 0.6 * T, T], np.array([1.0, 1.0, lowest, 1.0, 1.0]) * LIMIT
+    times, forces = (
+        [0.0, 0.4 * T, 0.5 * T, 0.6 * T, T],
+        np.array([1.0, 1.0, lowest, 1.0, 1.0]) * LIMIT,
+    )
     return of(saturations(made(times, forces, forces)), "j1", "force")
 
 
@@ -88,7 +105,9 @@ def test_ripple_interrupts_no_stretch(made):
 def test_a_deeper_dip_does(made):
     entry = rippling(made, 0.9)
     assert len(entry.active) == 2
-    below = 2.0 * 0.1 * 0.9  # each flank is 0.1 of the time long and below the threshold for nine tenths of it
+    below = (
+        2.0 * 0.1 * 0.9
+    )  # each flank is 0.1 of the time long and below the threshold for nine tenths of it
     assert entry.share == pytest.approx(1.0 - below)
 
 
@@ -100,20 +119,28 @@ def test_a_motion_near_its_limit_that_never_reaches_it_does_not_count(made):
 def test_positions_are_measured_by_their_place_in_the_range(made):
     trajectory = made([0.0, T], [1.0, 1.0], [1.0, 1.0])  # from 0 to 2 m
     limits = dataclasses.replace(
-        trajectory.robot.limits, position_lower=np.array([-4.0, -np.inf]), position_upper=np.array([2.0, 0.25])
+        trajectory.robot.limits,
+        position_lower=np.array([-4.0, -np.inf]),
+        position_upper=np.array([2.0, 0.25]),
     )
-    trajectory = dataclasses.replace(trajectory, robot=dataclasses.replace(trajectory.robot, limits=limits))
+    trajectory = dataclasses.replace(
+        trajectory, robot=dataclasses.replace(trajectory.robot, limits=limits)
+    )
     ratios = limit_ratios(trajectory)
     column = dict(zip(map(str, ratios.labels), ratios.values.T, strict=True))
     q = 0.5 * ratios.t**2
-    np.testing.assert_allclose(column["j1 position"], (q + 1.0) / 3.0, atol=1e-12)  # 0 in the middle, at -1 m
+    np.testing.assert_allclose(
+        column["j1 position"], (q + 1.0) / 3.0, atol=1e-12
+    )  # 0 in the middle, at -1 m
     np.testing.assert_allclose(column["j2 position"], 0.75)  # one end: 0.25 m away
 
 
 def test_unlimited_joints_are_left_out(made):
     trajectory = made([0.0, T], [1.0, 1.0], [1.0, 1.0])
     limits = trajectory.robot.limits.with_magnitudes(torque=np.array([FORCE, np.inf]))
-    trajectory = dataclasses.replace(trajectory, robot=dataclasses.replace(trajectory.robot, limits=limits))
+    trajectory = dataclasses.replace(
+        trajectory, robot=dataclasses.replace(trajectory.robot, limits=limits)
+    )
     names = [str(label) for label in limit_ratios(trajectory).labels]
     assert "j1 force" in names
     assert "j2 force" not in names
@@ -125,6 +152,10 @@ def test_a_saved_motion_will_do(scara, tmp_path):
     trajectory.save(tmp_path / "motion.npz")
     found = saturations(type(trajectory).load(tmp_path / "motion.npz"))
     shares = {str(each.label): each.share for each in saturations(trajectory)}
-    assert {str(each.label): each.share for each in found} == pytest.approx(shares, abs=1e-3)
+    assert {str(each.label): each.share for each in found} == pytest.approx(
+        shares, abs=1e-3
+    )
     assert 0.05 < found[0].share < 1.0
-    assert [entry.share for entry in found] == sorted((entry.share for entry in found), reverse=True)
+    assert [entry.share for entry in found] == sorted(
+        (entry.share for entry in found), reverse=True
+    )

@@ -19,39 +19,57 @@ def loaded(result, folder):
 def assert_same(saved, fresh):
     assert saved.t_end == fresh.t_end
     shares = {str(each.label): each.share for each in fresh.saturations}
-    assert {str(each.label): each.share for each in saved.saturations} == pytest.approx(shares, abs=1e-3)
+    assert {str(each.label): each.share for each in saved.saturations} == pytest.approx(
+        shares, abs=1e-3
+    )
     assert saved.sensitivities.reliable
-    costly = [entry for entry in fresh.sensitivities.limits if entry.change(0.1) < -1e-5]
+    costly = [
+        entry for entry in fresh.sensitivities.limits if entry.change(0.1) < -1e-5
+    ]
     assert costly
     for entry in fresh.sensitivities.limits:
-        other = saved.sensitivities.of(entry.label.subject, entry.label.kind, entry.bound.end)
+        other = saved.sensitivities.of(
+            entry.label.subject, entry.label.kind, entry.bound.end
+        )
         assert other.change(0.1) == pytest.approx(entry.change(0.1), rel=1e-3, abs=1e-6)
 
 
 @pytest.mark.parametrize("joint", ["j1", "j3"])
 def test_the_same_report(joint, scara, tmp_path):
     result = scara(joint)
-    assert_same(brachis.bottleneck.report(loaded(result, tmp_path)), brachis.bottleneck.report(result))
+    assert_same(
+        brachis.bottleneck.report(loaded(result, tmp_path)),
+        brachis.bottleneck.report(result),
+    )
 
 
 def test_other_knots_and_boundary_conditions(slide, tmp_path):
     result = slide(intervals=12, rest="velocity", degree=2)
-    assert_same(brachis.bottleneck.report(loaded(result, tmp_path)), brachis.bottleneck.report(result))
+    assert_same(
+        brachis.bottleneck.report(loaded(result, tmp_path)),
+        brachis.bottleneck.report(result),
+    )
 
 
 def test_check_and_reference(slide, tmp_path):
     result = slide(intervals=10, rest="full")
     fresh = brachis.bottleneck.report(result, check=True, reference=True)
-    saved = brachis.bottleneck.report(loaded(result, tmp_path), check=True, reference=True)
+    saved = brachis.bottleneck.report(
+        loaded(result, tmp_path), check=True, reference=True
+    )
     assert_same(saved, fresh)
     assert saved.reference.t_end == pytest.approx(fresh.reference.t_end, rel=1e-3)
-    assert saved.check.worst_deviation() == pytest.approx(fresh.check.worst_deviation(), abs=1e-3)
+    assert saved.check.worst_deviation() == pytest.approx(
+        fresh.check.worst_deviation(), abs=1e-3
+    )
 
 
 def test_a_motion_that_is_no_optimum_is_refused(slide, tmp_path):
     trajectory = loaded(slide(intervals=10, rest="full"), tmp_path)
     slow = dataclasses.replace(trajectory, times=2.0 * trajectory.times)
-    with pytest.raises(PlanningError, match="does not come back to the saved motion") as caught:
+    with pytest.raises(
+        PlanningError, match="does not come back to the saved motion"
+    ) as caught:
         brachis.bottleneck.report(slow)
     assert f"{trajectory.t_end:.3f}"[:4] in caught.value.found
 

@@ -33,8 +33,12 @@ def test_time_falls_with_the_root_of_the_force(slide, rest, degree):
     result = slide(rest=rest, degree=degree)
     found, answer = found_of(result), result.solver_report.objective
     assert found.of("j1", "force").change(1.0) == pytest.approx(-0.5 * answer, rel=1e-5)
-    assert found.of("j1", "force").derivative == pytest.approx(-0.5 * answer / FORCE, rel=1e-5)
-    assert [entry.change(1.0) for entry in found.limits if str(entry.label) != "j1 force"] == [0.0] * 7
+    assert found.of("j1", "force").derivative == pytest.approx(
+        -0.5 * answer / FORCE, rel=1e-5
+    )
+    assert [
+        entry.change(1.0) for entry in found.limits if str(entry.label) != "j1 force"
+    ] == [0.0] * 7
     assert found.limits[0].label.subject == "j1"
     assert found.reliable
 
@@ -43,19 +47,28 @@ def test_trapezoid(slide):
     limit = 2.0
     result = slide(intervals=40, robot={"limits": {"velocity": limit}})
     found = found_of(result)
-    ramp = limit * CARRIED / FORCE  # t = L / v + v m / F, but for the corners that a spline rounds
-    force, speed = found.of("j1", "force").change(1.0), found.of("j1", "velocity").change(1.0)
+    ramp = (
+        limit * CARRIED / FORCE
+    )  # t = L / v + v m / F, but for the corners that a spline rounds
+    force, speed = (
+        found.of("j1", "force").change(1.0),
+        found.of("j1", "velocity").change(1.0),
+    )
     assert force == pytest.approx(-ramp, rel=0.1)
     assert speed == pytest.approx(ramp - LENGTH / limit, rel=0.1)
     # The same motion k times as fast needs k times the velocity and k^2 times the force.
-    assert 2.0 * force + speed == pytest.approx(-result.solver_report.objective, rel=1e-4)
+    assert 2.0 * force + speed == pytest.approx(
+        -result.solver_report.objective, rel=1e-4
+    )
     assert found.of("j1", "velocity").label.unit == "m/s"
 
 
 def test_acceleration_limit(slide):
     result = slide(robot={"limits": {"acceleration": 6.0, "torque": None}})
     found = found_of(result)
-    assert found.of("j1", "acceleration").change(1.0) == pytest.approx(-0.5 * result.solver_report.objective, rel=1e-5)
+    assert found.of("j1", "acceleration").change(1.0) == pytest.approx(
+        -0.5 * result.solver_report.objective, rel=1e-5
+    )
     assert found.of("j1", "acceleration").label.unit == "m/s^2"
 
 
@@ -63,7 +76,9 @@ def test_lifting_against_gravity(slide):
     # From rest to rest t^2 = 2 L (a + b) / (a b) with a = F / m - g, b = F / m + g: no mere scaling of time.
     force, g = 30.0, 9.81
     robot = {"gravity": [0, 0, -g], "limits": {"torque": {"j1": 200.0, "j2": force}}}
-    found = found_of(slide((X, Z), ("x", "z"), (0.0, LENGTH), intervals=40, robot=robot))
+    found = found_of(
+        slide((X, Z), ("x", "z"), (0.0, LENGTH), intervals=40, robot=robot)
+    )
 
     def best(force):
         up, down = force / MASS - g, force / MASS + g
@@ -86,13 +101,23 @@ def test_ends_of_a_range(slide):
     found = found_of(result)
     ends = {end: found.of("j1", "position", end) for end in ("lower", "upper")}
     assert ends["lower"].derivative >= 0.0 >= ends["upper"].derivative
-    assert min(entry.change(1.0) for entry in ends.values()) < -1e-3, "a wider range saves time"
+    assert min(entry.change(1.0) for entry in ends.values()) < -1e-3, (
+        "a wider range saves time"
+    )
     assert ends["lower"].bound.whole == pytest.approx(2.0 * half)
     assert ends["lower"].label.unit == "m"
     for entry in ends.values():
-        wider, column = entry.limit.relaxed(entry.bound, 0.5 * entry.bound.whole), entry.bound.column
-        ends_now = half * wider.lower[column], half * wider.upper[column]  # the rows count half ranges
-        assert ends_now == pytest.approx((-2.0 * half, half) if entry.bound.end == "lower" else (-half, 2.0 * half))
+        wider, column = (
+            entry.limit.relaxed(entry.bound, 0.5 * entry.bound.whole),
+            entry.bound.column,
+        )
+        ends_now = (
+            half * wider.lower[column],
+            half * wider.upper[column],
+        )  # the rows count half ranges
+        assert ends_now == pytest.approx(
+            (-2.0 * half, half) if entry.bound.end == "lower" else (-half, 2.0 * half)
+        )
 
 
 @pytest.mark.parametrize("joint", ["j1", "j2", "j3"])
@@ -101,7 +126,9 @@ def test_no_limit_costs_less_than_nothing(scara, joint):
     assert all(entry.change(1.0) <= 0.0 for entry in found.limits)
     # Torque limits and nothing else: were all torques f times as large, the time would fall with the root of f.
     expected = -0.5 * scara(joint).solver_report.objective
-    assert sum(entry.change(1.0) for entry in found.limits) == pytest.approx(expected, rel=2e-3)
+    assert sum(entry.change(1.0) for entry in found.limits) == pytest.approx(
+        expected, rel=2e-3
+    )
 
 
 def test_control_points_near_zero_on_a_fine_mesh_do_not_press(scara):
@@ -113,7 +140,9 @@ def test_control_points_near_zero_on_a_fine_mesh_do_not_press(scara):
     program, x = refined.program, refined.reports[-1].x
     assert 0.0 < x[program.phases[0].slices[0]][0] < 1e-5, "else this tests nothing"
     found = sensitivities(refined)
-    assert sum(entry.change(1.0) for entry in found.limits) == pytest.approx(-0.5 * x[0], rel=1e-4)
+    assert sum(entry.change(1.0) for entry in found.limits) == pytest.approx(
+        -0.5 * x[0], rel=1e-4
+    )
 
 
 @pytest.mark.parametrize("end", [1, -1])
@@ -121,11 +150,16 @@ def test_rows_that_nothing_can_change_do_not_press(slide, end):
     # The first slide begins at an end of its range, which holds whatever x.
     lower, upper = sorted((0.0, end * 0.5))
     limits = {"torque": {"j1": 30.0}, "position": {"j1": [lower, upper]}}
-    refined = slide((X, X), ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits}).attempt.refined
+    refined = slide(
+        (X, X), ("x",), (LENGTH,), redundant=["j1"], robot={"limits": limits}
+    ).attempt.refined
     program, x = refined.program, refined.reports[-1].x
     active_set = ActiveSet.at(program, x, 1e-5)
     assert np.abs(active_set.slopes).max(axis=1).min() > 0.0
-    at_start = np.flatnonzero(np.minimum(program.rows(x) - program.lower, program.upper - program.rows(x)) == 0.0)
+    at_start = np.flatnonzero(
+        np.minimum(program.rows(x) - program.lower, program.upper - program.rows(x))
+        == 0.0
+    )
     assert set(at_start) - set(active_set.rows), "some row should hold without pressing"
 
 
@@ -133,11 +167,16 @@ def test_rows_that_nothing_can_change_do_not_press(slide, end):
 def test_least_squares_agree_with_the_solver(scara, joint):
     refined = scara(joint).attempt.refined
     program, report = refined.program, refined.reports[-1]
-    own, fitted = multipliers_of(program, report.x, report.multipliers), multipliers_of(program, report.x)
+    own, fitted = (
+        multipliers_of(program, report.x, report.multipliers),
+        multipliers_of(program, report.x),
+    )
     assert (own.source, fitted.source) == ("solver", "least squares")
     assert max(own.residual, fitted.residual) < 1e-5
     for entry in sensitivities_at(program, own).limits:
-        other = sensitivities_at(program, fitted).of(entry.label.subject, entry.label.kind, entry.bound.end)
+        other = sensitivities_at(program, fitted).of(
+            entry.label.subject, entry.label.kind, entry.bound.end
+        )
         assert other.change(1.0) == pytest.approx(entry.change(1.0), rel=1e-4, abs=1e-6)
 
 
@@ -146,7 +185,9 @@ def test_a_solver_without_multipliers(slide):
     assert not result.solver_report.multipliers.any()
     found = found_of(result)
     assert found.source == "least squares"
-    assert found.of("j1", "force").change(1.0) == pytest.approx(-0.5 * result.solver_report.objective, rel=1e-3)
+    assert found.of("j1", "force").change(1.0) == pytest.approx(
+        -0.5 * result.solver_report.objective, rel=1e-3
+    )
 
 
 def test_an_answer_that_is_no_optimum_is_told(scara):
@@ -169,7 +210,9 @@ def test_multipliers_of_wrong_sign_are_not_believed(scara):
 
 def test_two_rows_that_hold_alike_give_way_together_only():
     # min t over t >= b1, t >= b2 with b1 = b2: relaxation of one alone saves nothing.
-    active_set = ActiveSet(np.array([[1.0], [1.0]]), np.array([0, 1]), np.array([1.0, 1.0]))
+    active_set = ActiveSet(
+        np.array([[1.0], [1.0]]), np.array([0, 1]), np.array([1.0, 1.0])
+    )
     assert active_set.dependent
     for weights in ([1.0, 0.0], [0.3, 0.7]):
         both = Multipliers(active_set, np.array(weights), "solver", 0.0, unique=False)
@@ -187,6 +230,15 @@ def test_branch_boundary_is_told_apart(scara):
     assert answer.objective > report.objective + 1e-4
     found = sensitivities_at(tight, multipliers_of(tight, answer.x, answer.multipliers))
     (boundary,) = found.boundaries
-    wider = solver_named("uno")[0].solve(program.with_margin(0.198), answer.x, SolverOptions(), None)
-    assert boundary.derivative * 0.002 == pytest.approx(answer.objective - wider.objective, rel=0.1)
-    assert {entry.label.kind for entry in found.limits} <= {"torque", "velocity", "acceleration", "position"}
+    wider = solver_named("uno")[0].solve(
+        program.with_margin(0.198), answer.x, SolverOptions(), None
+    )
+    assert boundary.derivative * 0.002 == pytest.approx(
+        answer.objective - wider.objective, rel=0.1
+    )
+    assert {entry.label.kind for entry in found.limits} <= {
+        "torque",
+        "velocity",
+        "acceleration",
+        "position",
+    }

@@ -8,7 +8,11 @@ from scipy.interpolate import BSpline
 
 from brachis.optimise.bspline import basis_matrix, clamped_uniform_knots, local_basis
 
-CASES = [(degree, derivative) for degree in range(2, 7) for derivative in range(min(degree, 3) + 1)]
+CASES = [
+    (degree, derivative)
+    for degree in range(2, 7)
+    for derivative in range(min(degree, 3) + 1)
+]
 
 
 def knots_of(degree: int, *, uniform: bool) -> np.ndarray:
@@ -33,7 +37,11 @@ def test_any_spline_and_its_derivatives(degree, derivative, uniform):
     assert scale > 0.0
     first, values = local_basis(knots, degree, t_norm)
     assert values.shape == (4, len(t_norm), degree + 1)
-    mine = np.einsum("kw,kwc->kc", values[derivative], coefficients[first[:, None] + np.arange(degree + 1)])
+    mine = np.einsum(
+        "kw,kwc->kc",
+        values[derivative],
+        coefficients[first[:, None] + np.arange(degree + 1)],
+    )
     np.testing.assert_allclose(mine, expected, atol=1e-12 * scale)
     if derivative == 0:
         matrix = basis_matrix(knots, degree, t_norm)
@@ -50,7 +58,9 @@ def test_partition_of_unity_and_its_vanishing_derivatives(degree):
     np.testing.assert_allclose(values.sum(axis=1), 1.0, atol=1e-13)
     for slopes in derivatives[:degree]:
         assert np.abs(slopes).max() > 1.0
-        np.testing.assert_allclose(slopes.sum(axis=1), 0.0, atol=1e-12 * np.abs(slopes).max())
+        np.testing.assert_allclose(
+            slopes.sum(axis=1), 0.0, atol=1e-12 * np.abs(slopes).max()
+        )
 
 
 @pytest.mark.parametrize("degree", range(2, 7))
@@ -60,11 +70,19 @@ def test_clamped_ends(degree):
     np.testing.assert_allclose(np.unique(knots), np.arange(8) / 7, atol=1e-15)
     coefficients = np.random.default_rng(0).normal(size=7 + degree)
     ends = np.array([0.0, 1.0])
-    np.testing.assert_allclose(basis_matrix(knots, degree, ends) @ coefficients, coefficients[[0, -1]], atol=1e-14)
+    np.testing.assert_allclose(
+        basis_matrix(knots, degree, ends) @ coefficients,
+        coefficients[[0, -1]],
+        atol=1e-14,
+    )
     # De Boor: the end slope is degree times the first control difference over the first interval.
     first, values = local_basis(knots, degree, ends)
-    slope = np.sum(values[1] * coefficients[first[:, None] + np.arange(degree + 1)], axis=1)
-    steps = np.array([coefficients[1] - coefficients[0], coefficients[-1] - coefficients[-2]])
+    slope = np.sum(
+        values[1] * coefficients[first[:, None] + np.arange(degree + 1)], axis=1
+    )
+    steps = np.array(
+        [coefficients[1] - coefficients[0], coefficients[-1] - coefficients[-2]]
+    )
     np.testing.assert_allclose(slope, degree * steps * 7, rtol=1e-12)
 
 

@@ -27,7 +27,12 @@ def around(lengths: np.ndarray, degree: int, interval: int) -> np.ndarray:
 
 
 @settings(max_examples=60)
-@given(degree=st.integers(1, 6), old=st.integers(1, 8), new=st.integers(0, 12), seed=st.integers(0, 99))
+@given(
+    degree=st.integers(1, 6),
+    old=st.integers(1, 8),
+    new=st.integers(0, 12),
+    seed=st.integers(0, 99),
+)
 def test_the_same_curves(degree, old, new, seed):
     rng = np.random.default_rng(seed)
     breaks = np.unique(np.concatenate([[0.0, 1.0], rng.uniform(0.0, 1.0, old - 1)]))
@@ -37,14 +42,22 @@ def test_the_same_curves(degree, old, new, seed):
     inserted = insert_knots(points, knots, fine_knots, degree)
     assert inserted.shape == (3, len(finer) - 1 + degree)
     t_norm = np.linspace(0.0, 1.0, 101)
-    before, after = BSpline(knots, points.T, degree)(t_norm), BSpline(fine_knots, inserted.T, degree)(t_norm)
+    before, after = (
+        BSpline(knots, points.T, degree)(t_norm),
+        BSpline(fine_knots, inserted.T, degree)(t_norm),
+    )
     np.testing.assert_allclose(after, before, atol=1e-13)
 
 
 def test_one_knot_by_boehm():
     """Boehm's rule: new points divide the old legs in the ratio of the new knot."""
     points = np.array([[0.0, 1.0, 3.0, -2.0]])
-    inserted = insert_knots(points, clamped_uniform_knots(3, 1), clamped_knots(3, np.array([0.0, 0.25, 1.0])), 3)
+    inserted = insert_knots(
+        points,
+        clamped_uniform_knots(3, 1),
+        clamped_knots(3, np.array([0.0, 0.25, 1.0])),
+        3,
+    )
     np.testing.assert_allclose(inserted, [[0.0, 0.25, 1.5, 1.75, -2.0]], atol=1e-15)
 
 
@@ -59,32 +72,48 @@ def test_basis_functions_of_lengths_are_scipys(degree):
             t_norm = breaks[interval] + fraction * length
             assert local_basis(knots, degree, np.array([t_norm]))[0][0] == interval
             for order in range(4):
-                expected = BSpline(knots, np.eye(len(knots) - degree - 1), degree)(t_norm, nu=order)
+                expected = BSpline(knots, np.eye(len(knots) - degree - 1), degree)(
+                    t_norm, nu=order
+                )
                 own = expected[interval : interval + degree + 1]
-                np.testing.assert_allclose(mine[order], own, atol=1e-12 * max(1.0, np.abs(own).max()))
+                np.testing.assert_allclose(
+                    mine[order], own, atol=1e-12 * max(1.0, np.abs(own).max())
+                )
                 assert np.count_nonzero(expected) <= degree + 1
 
 
 @pytest.mark.parametrize("degree", range(2, 7))
 def test_basis_derivatives_are_differences(degree):
-    lengths = np.array([around(LENGTHS, degree, interval) for interval in range(len(LENGTHS))])
+    lengths = np.array(
+        [around(LENGTHS, degree, interval) for interval in range(len(LENGTHS))]
+    )
     fraction = np.linspace(0.05, 1.0, len(LENGTHS))
     exact = basis_derivatives(lengths, fraction)
     assert exact.shape == (4, 2 * degree - 1, len(LENGTHS), degree + 1)
     h = 1e-5
     for i, unit in enumerate(np.eye(2 * degree - 1)):
-        ahead, behind = (basis_functions(lengths + step * unit, fraction) for step in (h, -h))
+        ahead, behind = (
+            basis_functions(lengths + step * unit, fraction) for step in (h, -h)
+        )
         expected = (ahead - behind) / (2.0 * h)
         for order in range(4):
             scale = np.abs(exact[order]).max()
             assert (scale > 0.0) == (order <= degree)
-            np.testing.assert_allclose(exact[order, i], expected[order], atol=1e-4 * scale)
+            np.testing.assert_allclose(
+                exact[order, i], expected[order], atol=1e-4 * scale
+            )
     # Twice the lengths: the same values, half the slopes, a quarter of the bends (Euler's theorem).
     for order, values in enumerate(basis_functions(lengths, fraction)):
         turned = np.einsum("ikw,ki->kw", exact[order], lengths)
-        np.testing.assert_allclose(turned, -order * values, atol=1e-12 * max(1.0, np.abs(values).max()))
+        np.testing.assert_allclose(
+            turned, -order * values, atol=1e-12 * max(1.0, np.abs(values).max())
+        )
 
 
 def test_spread():
-    np.testing.assert_allclose(spread(np.array([0.0, 0.2, 1.0]), 2), [0.0, 0.1, 0.2, 0.6, 1.0])
-    np.testing.assert_allclose(spread(np.array([0.0, 0.3, 1.0]), np.array([3, 1])), [0.0, 0.1, 0.2, 0.3, 1.0])
+    np.testing.assert_allclose(
+        spread(np.array([0.0, 0.2, 1.0]), 2), [0.0, 0.1, 0.2, 0.6, 1.0]
+    )
+    np.testing.assert_allclose(
+        spread(np.array([0.0, 0.3, 1.0]), np.array([3, 1])), [0.0, 0.1, 0.2, 0.3, 1.0]
+    )

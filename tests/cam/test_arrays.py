@@ -28,7 +28,9 @@ def test_wrong_speeds_are_named(speed, message):
 
 def test_no_speed_may_be_prescribed_in_places():
     speed = np.where(np.arange(20) < 5, np.nan, 0.1)
-    np.testing.assert_array_equal(points_from(POINTS, None, speed, Units(), "points").speed, speed)
+    np.testing.assert_array_equal(
+        points_from(POINTS, None, speed, Units(), "points").speed, speed
+    )
 
 
 def test_empty_arrays_are_refused():
@@ -37,5 +39,7 @@ def test_empty_arrays_are_refused():
 
 
 def test_feed_rates_without_a_tolerance_are_refused_not_lost():
-    with pytest.raises(TaskError, match="feed rates are read along a fitted path alone"):
+    with pytest.raises(
+        TaskError, match="feed rates are read along a fitted path alone"
+    ):
         brachis.fit_path(POINTS, speed=np.full(20, 0.01))

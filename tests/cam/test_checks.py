@@ -26,7 +26,10 @@ def test_a_spike_is_named(scatter):
     position = wave(2_000, scatter * MM)
     spikes(position)
     position[1_234] += [0.0, 5.0 * MM, 0.0]
-    with pytest.raises(TaskError, match=r"row 1234: the point is a spike, .* 4.78\d* mm off .*remove the row"):
+    with pytest.raises(
+        TaskError,
+        match=r"row 1234: the point is a spike, .* 4.78\d* mm off .*remove the row",
+    ):
         spikes(position)
 
 
@@ -44,11 +47,15 @@ def test_a_factor_of_a_thousand_is_named():
     position = wave(100) + away
     position[60] *= 1e3
     with pytest.raises(
-        TaskError, match=r"row 60: the coordinates are a thousand times larger than in row 59.*mm and m"
+        TaskError,
+        match=r"row 60: the coordinates are a thousand times larger than in row 59.*mm and m",
     ):
         spikes(position)
     position[60:] = (wave(100) + away)[60:] / 1e3
-    with pytest.raises(TaskError, match=r"row 60: the coordinates are a thousand times smaller than in row 59"):
+    with pytest.raises(
+        TaskError,
+        match=r"row 60: the coordinates are a thousand times smaller than in row 59",
+    ):
         spikes(position)
 
 
@@ -68,7 +75,10 @@ def test_repeated_rows_are_left_out_and_listed():
 
 def test_a_turn_on_the_spot_is_refused():
     position, yaw = np.repeat(wave(4)[:, :2], 2, axis=0), np.arange(8.0)[:, None] / 10.0
-    with pytest.raises(TaskError, match=r"row 1: the position stands still from row 0 on while the tool turns"):
+    with pytest.raises(
+        TaskError,
+        match=r"row 1: the position stands still from row 0 on while the tool turns",
+    ):
         without_repetitions(points(position, yaw))
     with pytest.raises(TaskError, match="the position does not move"):
         without_repetitions(points(np.zeros((5, 2))))
@@ -81,7 +91,9 @@ def test_scatter_is_estimated(scatter, count):
     assert 0.6 * scatter * MM < found < 1.3 * scatter * MM
 
 
-@pytest.mark.parametrize("position", [wave(200), bent(60)[0], wave(12, 1.0), wave(3_000)[:, :1]])
+@pytest.mark.parametrize(
+    "position", [wave(200), bent(60)[0], wave(12, 1.0), wave(3_000)[:, :1]]
+)
 def test_smooth_and_few_points_do_not_scatter(position):
     assert scatter_of(points(position)).deviation < 1e-12
 
@@ -99,11 +111,19 @@ def test_rounding_is_told_from_scatter():
     with pytest.raises(TaskError) as caught:
         interpolated(points(rounded))
     message = str(caught.value)
-    for text in ("too rough", "its curvature would be noise", "rounded to 1e-06 m at 0.", "tolerance: {position:"):
+    for text in (
+        "too rough",
+        "its curvature would be noise",
+        "rounded to 1e-06 m at 0.",
+        "tolerance: {position:",
+    ):
         assert text in message
     interpolated(points(np.round(wave(2_000), 12)))
     interpolated(points(wave(2_000)))
-    with pytest.raises(TaskError, match=r"scatter by 0.02\d* mm \(standard deviation\) at 0.5\d* mm spacing"):
+    with pytest.raises(
+        TaskError,
+        match=r"scatter by 0.02\d* mm \(standard deviation\) at 0.5\d* mm spacing",
+    ):
         interpolated(points(wave(2_000, 0.02 * MM)))
 
 
@@ -111,8 +131,14 @@ def test_orientations_that_scatter_are_told_from_smooth_ones():
     position, t = wave(1_000), np.linspace(0.0, 1.0, 1_000)
     noise = np.random.default_rng(6).normal(size=(1_000, 3)) * 1e-3
     turns = Rotation.from_rotvec(np.column_stack([np.sin(t), t, 3.0 * t]))
-    for turned, least, most in ((turns, 0.0, 1e-12), (turns * Rotation.from_rotvec(noise), 0.8e-3, 1.2e-3)):
+    for turned, least, most in (
+        (turns, 0.0, 1e-12),
+        (turns * Rotation.from_rotvec(noise), 0.8e-3, 1.2e-3),
+    ):
         given = points(position, with_like_signs(np.roll(turned.as_quat(), 1, axis=1)))
         assert least <= scatter_of(given).turning <= most
-    with pytest.raises(TaskError, match=r"tolerance of orientation; .*orientations that scatter by 0.05\d* deg"):
+    with pytest.raises(
+        TaskError,
+        match=r"tolerance of orientation; .*orientations that scatter by 0.05\d* deg",
+    ):
         fit_curves(given, Tolerance(0.05 * MM, 1e-3, 0.05 * MM))

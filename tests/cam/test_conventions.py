@@ -10,7 +10,9 @@ from brachis.path.rotations import rotation_from
 from brachis.task.orientation import Attitude
 from brachis.task.points.units import CONVENTIONS, rotation_by
 
-X, Y, Z = (lambda angle, axis=axis: Rotation.from_rotvec(angle * axis) for axis in np.eye(3))
+X, Y, Z = (
+    lambda angle, axis=axis: Rotation.from_rotvec(angle * axis) for axis in np.eye(3)
+)
 ANGLES = np.radians([20.0, -35.0, 110.0])
 A, B, C = ANGLES
 EXPECTED = {
@@ -21,10 +23,19 @@ EXPECTED = {
 }
 # First 90 degrees about one axis, then 90 degrees about another one: columns are where x, y and z of the tool point.
 QUARTERS = {
-    "rpy": ([90, 0, 90], [[0, 0, 1], [1, 0, 0], [0, 1, 0]]),  # x of the tool to y, its y to z
+    "rpy": (
+        [90, 0, 90],
+        [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
+    ),  # x of the tool to y, its y to z
     "fanuc_wpr": ([90, 0, 90], [[0, 0, 1], [1, 0, 0], [0, 1, 0]]),
-    "kuka_abc": ([90, 90, 0], [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]),  # x of the tool to -z, its y to -x
-    "staubli_xyz": ([90, 0, 90], [[0, -1, 0], [0, 0, -1], [1, 0, 0]]),  # x of the tool to z, its y to -x
+    "kuka_abc": (
+        [90, 90, 0],
+        [[0, -1, 0], [0, 0, 1], [-1, 0, 0]],
+    ),  # x of the tool to -z, its y to -x
+    "staubli_xyz": (
+        [90, 0, 90],
+        [[0, -1, 0], [0, 0, -1], [1, 0, 0]],
+    ),  # x of the tool to z, its y to -x
 }
 
 
@@ -38,17 +49,31 @@ def test_angles_are_turns_about_single_axes(name):
 @pytest.mark.parametrize("name", QUARTERS)
 def test_quarters_by_hand(name):
     angles, matrix = QUARTERS[name]
-    np.testing.assert_allclose(rotation_by(name, np.radians(angles)).as_matrix(), matrix, atol=1e-15)
+    np.testing.assert_allclose(
+        rotation_by(name, np.radians(angles)).as_matrix(), matrix, atol=1e-15
+    )
 
 
 def test_quaternions_and_rotation_vectors():
-    quarter = [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]  # read with w first a quarter about z, with w last one about x
-    np.testing.assert_allclose(rotation_by("quaternion_wxyz", np.array(quarter)).as_rotvec(), [0, 0, np.pi / 2])
-    np.testing.assert_allclose(rotation_by("quaternion_xyzw", np.array(quarter)).as_rotvec(), [np.pi / 2, 0, 0])
+    quarter = [
+        np.sqrt(0.5),
+        0.0,
+        0.0,
+        np.sqrt(0.5),
+    ]  # read with w first a quarter about z, with w last one about x
     np.testing.assert_allclose(
-        rotation_by("rotation_vector", np.array([0.0, 0.3, 0.0])).as_matrix(), Y(0.3).as_matrix()
+        rotation_by("quaternion_wxyz", np.array(quarter)).as_rotvec(), [0, 0, np.pi / 2]
+    )
+    np.testing.assert_allclose(
+        rotation_by("quaternion_xyzw", np.array(quarter)).as_rotvec(), [np.pi / 2, 0, 0]
+    )
+    np.testing.assert_allclose(
+        rotation_by("rotation_vector", np.array([0.0, 0.3, 0.0])).as_matrix(),
+        Y(0.3).as_matrix(),
     )
 
 
 def test_every_convention_is_a_key_of_an_orientation():
-    assert [name + "_deg" * bool(each.euler) for name, each in CONVENTIONS.items()] == list(Attitude.model_fields)
+    assert [
+        name + "_deg" * bool(each.euler) for name, each in CONVENTIONS.items()
+    ] == list(Attitude.model_fields)

@@ -19,11 +19,19 @@ from support.seams import bent, brute_distances, points, wave
 MM = 1e-3
 
 
-def tolerance(position: float, orientation: float = 1e-3, corner: float | None = None) -> Tolerance:
+def tolerance(
+    position: float, orientation: float = 1e-3, corner: float | None = None
+) -> Tolerance:
     return Tolerance(position, orientation, position if corner is None else corner)
 
 
-CASES = [(12, 0.0, 0.05), (300, 0.0, 0.05), (2_000, 0.0, 0.001), (1_000, 0.005, 0.05), (5_000, 0.05, 0.3)]
+CASES = [
+    (12, 0.0, 0.05),
+    (300, 0.0, 0.05),
+    (2_000, 0.0, 0.001),
+    (1_000, 0.005, 0.05),
+    (5_000, 0.05, 0.3),
+]
 
 
 @pytest.mark.parametrize(("count", "scatter", "allowed"), CASES)
@@ -36,11 +44,15 @@ def test_all_points_are_within_the_tolerance(count, scatter, allowed):
     assert distances.max() <= allowed * MM
     assert report.position_error <= allowed * MM
     assert report.position_error >= distances.max() - 1e-7
-    np.testing.assert_allclose(drawn[[0, -1]], position[[0, -1]], rtol=1e-15, atol=1e-15)
+    np.testing.assert_allclose(
+        drawn[[0, -1]], position[[0, -1]], rtol=1e-15, atol=1e-15
+    )
     assert curve.spline.k == 5
     assert np.diff(np.unique(curve.spline.t)).min() > 0.0
     assert report.intervals == len(np.unique(curve.spline.t)) - 1
-    speed = np.linalg.norm(curve.spline(np.linspace(0.0, report.length, 500), nu=1), axis=1)
+    speed = np.linalg.norm(
+        curve.spline(np.linspace(0.0, report.length, 500), nu=1), axis=1
+    )
     assert np.abs(speed - 1.0).max() < 0.1
 
 
@@ -51,22 +63,36 @@ def test_few_knots_are_taken():
     scattered = line + np.random.default_rng(1).normal(size=line.shape) * 0.02 * MM
     assert fit_curves(points(scattered), tolerance(0.15 * MM))[1].intervals == 1
     looser, tighter = (
-        fit_curves(points(wave(3_000)), tolerance(allowed * MM))[1].intervals for allowed in (0.5, 0.005)
+        fit_curves(points(wave(3_000)), tolerance(allowed * MM))[1].intervals
+        for allowed in (0.5, 0.005)
     )
     assert looser < tighter <= 30
 
 
 def test_orientations_are_fitted_too():
     position, t = wave(800, 0.01 * MM), np.linspace(0.0, 1.0, 800)
-    turned = Rotation.from_rotvec(np.column_stack([np.sin(2.0 * t), 0.5 * t, 3.0 + 0.0 * t]))
-    turned *= Rotation.from_rotvec(np.random.default_rng(2).normal(size=(800, 3)) * 2e-4)
+    turned = Rotation.from_rotvec(
+        np.column_stack([np.sin(2.0 * t), 0.5 * t, 3.0 + 0.0 * t])
+    )
+    turned *= Rotation.from_rotvec(
+        np.random.default_rng(2).normal(size=(800, 3)) * 2e-4
+    )
     quaternions = np.roll(turned.as_quat(canonical=True), 1, axis=1)
-    signs = np.cumprod(np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0, -1.0, 1.0))
+    signs = np.cumprod(
+        np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0, -1.0, 1.0)
+    )
     quaternions[1:] *= signs[:, None]
-    (curve,), report = fit_curves(points(position, quaternions), tolerance(0.1 * MM, 2e-3))
+    (curve,), report = fit_curves(
+        points(position, quaternions), tolerance(0.1 * MM, 2e-3)
+    )
     assert 1e-4 < report.orientation_error <= 2e-3
     drawn = curve.spline(np.linspace(0.0, report.length, 5_000))
-    nearest = np.array([np.argmin(np.linalg.norm(drawn[:, :3] - point, axis=1)) for point in position[::20]])
+    nearest = np.array(
+        [
+            np.argmin(np.linalg.norm(drawn[:, :3] - point, axis=1))
+            for point in position[::20]
+        ]
+    )
     fitted = Rotation.from_quat(np.roll(drawn[nearest, 3:], -1, axis=1))
     assert (fitted.inv() * turned[::20]).magnitude().max() <= 2.1e-3
 
@@ -80,14 +106,19 @@ def test_yaw_is_fitted_too():
 
 
 @pytest.mark.parametrize(
-    ("count", "scatter", "allowed"), [(31, 0.0, 0.05), (300, 0.0, 0.05), (2_000, 0.005, 0.05), (10_000, 0.05, 0.3)]
+    ("count", "scatter", "allowed"),
+    [(31, 0.0, 0.05), (300, 0.0, 0.05), (2_000, 0.005, 0.05), (10_000, 0.05, 0.3)],
 )
 def test_corners_are_found_where_they_are(count, scatter, allowed):
     position, places = bent(count, scatter * MM)
     curves, report = fit_curves(points(position), tolerance(allowed * MM))
     assert len(curves) == 3
-    np.testing.assert_allclose(np.rad2deg([corner.angle for corner in report.corners]), [90.0, 40.0], atol=7.0)
-    for corner, place, curve, following in zip(report.corners, places, curves, curves[1:], strict=False):
+    np.testing.assert_allclose(
+        np.rad2deg([corner.angle for corner in report.corners]), [90.0, 40.0], atol=7.0
+    )
+    for corner, place, curve, following in zip(
+        report.corners, places, curves, curves[1:], strict=False
+    ):
         end = curve.spline(curve.spline.t[-1])
         assert np.linalg.norm(end - place) < max(4.0 * scatter, 1e-6) * MM
         np.testing.assert_allclose(end, following.spline(0.0), rtol=1e-14)
@@ -100,12 +131,23 @@ def test_smooth_points_have_no_corners():
     angle = np.linspace(0.0, 2.0 * np.pi, 13)
     circle = 0.3 * np.column_stack([np.cos(angle), np.sin(angle)])
     assert fit_curves(points(circle), tolerance(0.05 * MM))[1].corners == ()
-    assert fit_curves(points(wave(20_000, 0.05 * MM)), tolerance(0.3 * MM))[1].corners == ()
+    assert (
+        fit_curves(points(wave(20_000, 0.05 * MM)), tolerance(0.3 * MM))[1].corners
+        == ()
+    )
 
 
 def test_a_path_that_turns_back_is_refused():
-    back = np.concatenate([np.linspace([0.0, 0.0], [0.2, 0.0], 100), np.linspace([0.199, 0.0005], [0.0, 0.03], 99)])
-    with pytest.raises(TaskError, match=r"row 99: the path turns back, by 15\d.* degrees; .*corners up to 150 degrees"):
+    back = np.concatenate(
+        [
+            np.linspace([0.0, 0.0], [0.2, 0.0], 100),
+            np.linspace([0.199, 0.0005], [0.0, 0.03], 99),
+        ]
+    )
+    with pytest.raises(
+        TaskError,
+        match=r"row 99: the path turns back, by 15\d.* degrees; .*corners up to 150 degrees",
+    ):
         fit_curves(points(back), tolerance(0.05 * MM))
 
 
@@ -115,21 +157,28 @@ def test_long_straight_ways_are_straight():
     arc = np.column_stack([0.5 + 0.1 * np.sin(angle), 0.1 - 0.1 * np.cos(angle)])
     position = np.concatenate([[[0.0, 0.0]], arc, [[0.0, 0.2]]])
     (curve,), report = fit_curves(points(position), tolerance(0.2 * MM))
-    assert any("taken as straight: 2 ways longer than 5 times the usual spacing" in told for told in report.told)
+    assert any(
+        "taken as straight: 2 ways longer than 5 times the usual spacing" in told
+        for told in report.told
+    )
     on_line = curve.spline(np.linspace(0.02, 0.48, 100))
     assert np.abs(on_line[:, 1]).max() < 0.3 * MM
 
 
 def test_scatter_that_is_wider_than_the_tolerance_is_said():
     with pytest.raises(
-        TaskError, match=r"row \d+: no smooth curve .*scatter by 0.05\d* mm .*tolerance of 0.3 mm or more"
+        TaskError,
+        match=r"row \d+: no smooth curve .*scatter by 0.05\d* mm .*tolerance of 0.3 mm or more",
     ):
         fit_curves(points(wave(2_000, 0.05 * MM)), tolerance(0.02 * MM))
 
 
 def test_what_there_is_too_little_room_for_is_said():
     position, _ = bent(2_000, 0.05 * MM)
-    with pytest.raises(TaskError, match=r"row \d+: the corner of .* cannot be rounded .*larger tolerance.corner"):
+    with pytest.raises(
+        TaskError,
+        match=r"row \d+: the corner of .* cannot be rounded .*larger tolerance.corner",
+    ):
         fit_curves(points(position), tolerance(0.3 * MM, corner=0.1 * MM))
 
 
@@ -150,7 +199,9 @@ def test_every_round_is_compared_with_its_own(count):
 
 def test_a_round_that_is_left_out_is_seen():
     position, yaw = rounds(1)
-    ((curve,), _) = fit_curves(points(position, yaw), tolerance(0.1 * MM, np.deg2rad(1.0)))
+    ((curve,), _) = fit_curves(
+        points(position, yaw), tolerance(0.1 * MM, np.deg2rad(1.0))
+    )
     twice, turned = rounds(2, 4_000)
     distances, _ = deviations(points(twice, turned), curve.spline)
     assert distances.max() > 0.1
@@ -158,11 +209,17 @@ def test_a_round_that_is_left_out_is_seen():
 
 def test_a_curve_that_does_not_pass_its_points_is_refused(monkeypatch):
     position = wave(500)[:, :2]
-    monkeypatch.setattr(curves, "fit_points", lambda given, *rest: shifted(fit_points(given, *rest)))
-    with pytest.raises(TaskError, match=r"does not pass the points within the tolerance.* mm off"):
+    monkeypatch.setattr(
+        curves, "fit_points", lambda given, *rest: shifted(fit_points(given, *rest))
+    )
+    with pytest.raises(
+        TaskError, match=r"does not pass the points within the tolerance.* mm off"
+    ):
         fit_curves(points(position), tolerance(0.05 * MM))
 
 
 def shifted(fit):
     """The same fit with a curve a millimetre away, which its own errors do not show."""
-    return dataclasses.replace(fit, spline=BSpline(fit.spline.t, fit.spline.c + MM, fit.spline.k))
+    return dataclasses.replace(
+        fit, spline=BSpline(fit.spline.t, fit.spline.c + MM, fit.spline.k)
+    )

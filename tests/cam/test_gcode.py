@@ -32,11 +32,20 @@ def test_lines_and_arcs():
     points, told = points_of(PROGRAM)
     assert told == ("G-code", "skipped G54, M30")
     np.testing.assert_allclose(points.position[0], [0.1, 0.0, 0.05])
-    for line, end in ((5, [0.1, 0.0, 0.01]), (6, [0.2, 0.0, 0.01]), (7, [0.25, 0.05, 0.01]), (8, [0.3, 0.1, 0.01])):
-        np.testing.assert_allclose(points.position[points.rows == line][-1], end, atol=1e-12)
+    for line, end in (
+        (5, [0.1, 0.0, 0.01]),
+        (6, [0.2, 0.0, 0.01]),
+        (7, [0.25, 0.05, 0.01]),
+        (8, [0.3, 0.1, 0.01]),
+    ):
+        np.testing.assert_allclose(
+            points.position[points.rows == line][-1], end, atol=1e-12
+        )
     for line, centre in ((7, [0.2, 0.05]), (8, [0.3, 0.05])):
         on_arc = points.position[points.rows == line]
-        np.testing.assert_allclose(np.linalg.norm(on_arc[:, :2] - centre, axis=1), 0.05, atol=1e-12)
+        np.testing.assert_allclose(
+            np.linalg.norm(on_arc[:, :2] - centre, axis=1), 0.05, atol=1e-12
+        )
         chord = np.linalg.norm(np.diff(on_arc, axis=0), axis=1).max()
         assert chord**2 / (8.0 * 0.05) < 1.1e-6
     assert np.isnan(points.speed[0])
@@ -48,7 +57,9 @@ def test_units_planes_and_increments():
     np.testing.assert_allclose(points.position[-1], [0.0508, 0.0, 0.0508], atol=1e-12)
     np.testing.assert_allclose(points.speed[-1], 0.0254)
     half = points.position[points.rows == 4]
-    np.testing.assert_allclose(np.hypot(half[:, 0] - 0.0508, half[:, 2] - 0.0254), 0.0254, atol=1e-12)
+    np.testing.assert_allclose(
+        np.hypot(half[:, 0] - 0.0508, half[:, 2] - 0.0254), 0.0254, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize(("motion", "side"), [("G2", 1.0), ("G3", -1.0)])
@@ -60,7 +71,9 @@ def test_whole_circles_and_long_arcs(motion, side):
     short, _ = points_of(f"G0 X0 Y0 Z0\n{motion} X10 Y0 R10 F100\n")
     long, _ = points_of(f"G0 X0 Y0 Z0\n{motion} X10 Y0 R-10 F100\n")
     heights = [np.abs(points.position[:, 1]).max() for points in (short, long)]
-    np.testing.assert_allclose(heights, [0.01 - np.sqrt(75.0) / 1e3, 0.01 + np.sqrt(75.0) / 1e3], rtol=1e-3)
+    np.testing.assert_allclose(
+        heights, [0.01 - np.sqrt(75.0) / 1e3, 0.01 + np.sqrt(75.0) / 1e3], rtol=1e-3
+    )
     assert side * short.position[len(short) // 2, 1] > 0.0
     assert side * long.position[len(long) // 2, 1] > 0.0
 
@@ -76,15 +89,27 @@ def test_a_program_is_fitted_with_its_corners():
 
 MISTAKES = [
     ("G0 X1 Y1 Z1\nG81 X2", r"line 2: this code is not read; found G81"),
-    ("G0 X1 Y1 Z1\nG1 X2 A5 F10", r"line 2: axes other than X, Y, Z are not read; found A5"),
+    (
+        "G0 X1 Y1 Z1\nG1 X2 A5 F10",
+        r"line 2: axes other than X, Y, Z are not read; found A5",
+    ),
     ("X1 Y1 Z1", r"line 1: a move before G0"),
-    ("G0 X1 Y1 Z1\nG2 X5 Y1 I1 J1 F10", r"line 2: the arc is none; found radius 1.41421 mm at its start"),
-    ("G0 X1 Y1 Z1\nG2 X5 Y1 R1 F10", r"line 2: the arc is none; found R 1 mm for ends 4 mm apart"),
+    (
+        "G0 X1 Y1 Z1\nG2 X5 Y1 I1 J1 F10",
+        r"line 2: the arc is none; found radius 1.41421 mm at its start",
+    ),
+    (
+        "G0 X1 Y1 Z1\nG2 X5 Y1 R1 F10",
+        r"line 2: the arc is none; found R 1 mm for ends 4 mm apart",
+    ),
     ("G0 X1 Y1 Z1\nG1 X#1 F10", r"line 2: not understood; found 'X#1'"),
     ("G0 X1 Y1 Z1\nG1 X2 F0", r"line 2: a feed rate must be positive; found F0"),
     ("G0 X1 Y1", r"a.nc: no motion; found 0 places.*Z is never stated"),
     ("G0 X1 Y1 Z1\nM98 P1000", r"line 2: subprograms are not read; found M98"),
-    ("G54 G0 X1 Y1 Z1\nG1 X2 F10\nG55\nG1 X3", r"line 3: the work offset changes within the program"),
+    (
+        "G54 G0 X1 Y1 Z1\nG1 X2 F10\nG55\nG1 X3",
+        r"line 3: the work offset changes within the program",
+    ),
 ]
 
 
@@ -95,7 +120,9 @@ def test_mistakes_are_named(text, message):
 
 
 def test_positions_alone_are_given():
-    with pytest.raises(TaskError, match=r"G-code gives positions alone; found x, y, yaw"):
+    with pytest.raises(
+        TaskError, match=r"G-code gives positions alone; found x, y, yaw"
+    ):
         points_of(PROGRAM, ("x", "y", "yaw"))
 
 
@@ -114,5 +141,7 @@ def test_an_arc_that_begins_backwards_is_told_with_its_line(end):
     """Three quarters of a turn, or one, on from a line that comes the other way."""
     program = f"G21 G90 G17\nG0 X1700 Y0\nG1 X1600 Y0\nG3 {end} I0 J50\n"
     points, *_ = points_of(program, rows=("x", "y"))
-    with pytest.raises(TaskError, match=r"line 3: the path turns back, by 17.* degrees"):
+    with pytest.raises(
+        TaskError, match=r"line 3: the path turns back, by 17.* degrees"
+    ):
         fit_curves(points, Tolerance(5e-5, 1.0, 5e-3))

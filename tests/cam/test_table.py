@@ -8,13 +8,23 @@ import numpy as np
 import pytest
 
 from brachis.errors import TaskError
-from brachis.task.points.tables import allowed_columns, points_of, read_table, understood
+from brachis.task.points.tables import (
+    allowed_columns,
+    points_of,
+    read_table,
+    understood,
+)
 from brachis.task.points.units import Units
 
 
 def read(text, rows="pose", units=None, orientation=None):
     allowed = allowed_columns(rows)
-    table = read_table(text, "a.csv", allowed, lambda header, where: understood(header, where, rows, orientation))
+    table = read_table(
+        text,
+        "a.csv",
+        allowed,
+        lambda header, where: understood(header, where, rows, orientation),
+    )
     return points_of(table, rows, units or Units(), "a.csv", orientation), table.told
 
 
@@ -22,9 +32,18 @@ def read(text, rows="pose", units=None, orientation=None):
     ("text", "told"),
     [
         ("x,y,z\n1.5,2,3\n4,5,6\n", ()),
-        ("x;y;z\n1,5;2;3\n4;5;6\n", ("columns separated by semicolons", "decimal commas")),
-        ("\ufeffX\tY\tZ\r\n1.5\t2\t3\r\n4\t5\t6\r\n", ("a byte order mark", "columns separated by tabs")),
-        ("# made by hand\n\nx y z\n 1.5   2 3 \n4 5 6", ("columns separated by spaces",)),
+        (
+            "x;y;z\n1,5;2;3\n4;5;6\n",
+            ("columns separated by semicolons", "decimal commas"),
+        ),
+        (
+            "\ufeffX\tY\tZ\r\n1.5\t2\t3\r\n4\t5\t6\r\n",
+            ("a byte order mark", "columns separated by tabs"),
+        ),
+        (
+            "# made by hand\n\nx y z\n 1.5   2 3 \n4 5 6",
+            ("columns separated by spaces",),
+        ),
         ('"z","y","x"\n"3","2","1.5"\n6,5,4\n', ()),
     ],
 )
@@ -34,25 +53,35 @@ def test_forms_are_found_out(text, told):
     assert found == told
 
 
-@pytest.mark.parametrize("header", ["x_mm,y_mm,z_mm", "X [mm],Y [mm],Z [mm]", "x (mm),y(mm),z mm"])
+@pytest.mark.parametrize(
+    "header", ["x_mm,y_mm,z_mm", "X [mm],Y [mm],Z [mm]", "x (mm),y(mm),z mm"]
+)
 def test_units_in_the_header(header):
     (points, told), _ = read(f"{header}\n1,2,3\n4,5,6\n")
-    np.testing.assert_allclose(points.position, np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]) / 1e3)
+    np.testing.assert_allclose(
+        points.position, np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]) / 1e3
+    )
     assert told == ("length in mm, as the header says",)
 
 
 def test_units_of_the_task():
     text = "x,y,z,rx,ry,rz,f\n1,2,3,0,0,90,600\n4,5,6,0,0,45,1200\n"
-    (points, told), _ = read(text, units=Units("mm", "deg", "mm/min"), orientation="rotation_vector")
+    (points, told), _ = read(
+        text, units=Units("mm", "deg", "mm/min"), orientation="rotation_vector"
+    )
     np.testing.assert_allclose(points.position[1], [4e-3, 5e-3, 6e-3])
-    np.testing.assert_allclose(points.turning[0], [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], atol=1e-15)
+    np.testing.assert_allclose(
+        points.turning[0], [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], atol=1e-15
+    )
     np.testing.assert_allclose(points.speed, [0.01, 0.02])
     assert told == ("orientations: axis times angle",)
     assert points.rows.tolist() == [2, 3]
 
 
 def test_quaternions_get_like_signs():
-    (points, _), _ = read("x,y,z,qw,qx,qy,qz\n0,0,0,1,0,0,0\n1,0,0,-1,0,0,0\n2,0,0,1,0,0,0\n")
+    (points, _), _ = read(
+        "x,y,z,qw,qx,qy,qz\n0,0,0,1,0,0,0\n1,0,0,-1,0,0,0\n2,0,0,1,0,0,0\n"
+    )
     np.testing.assert_allclose(points.turning, [[1.0, 0.0, 0.0, 0.0]] * 3, atol=1e-15)
 
 
@@ -62,32 +91,65 @@ MISTAKES = [
         Units(length="m"),
         r"line 1: the header contradicts .* found mm for x; allowed: m",
     ),
-    ("x_ft,y,z\n1,2,3\n4,5,6", Units(), r"line 1: unknown unit of length; found ft for x; allowed: m, cm, mm"),
-    ("x,y,z,feed\n1,2,3,4\n4,5,6,7", Units(), r"the unit of feed is not stated; allowed: m/s, mm/s.*feed_mm/min"),
-    ("x,y,z,feed_mm/s\n1,2,3,4\n4,5,6,0", Units(), r"line 3: a feed rate must be positive; found 0 m/s"),
-    ("x,y,z\n1,5,2,5,3,5\n4,5,6", Units(), r"line 2: wrong number of values; found 6; .*Decimal commas need"),
-    ("x;y;z\n1.000,5;2;3\n4;5;6", Units(), r"line 2: decimal points and commas in one line; found '1.000,5;2;3'"),
-    ("x;y;z\n1,5;2;3\n4;NaN;6", Units(), r"line 3: the value of column y is not a finite number; found 'NaN'"),
+    (
+        "x_ft,y,z\n1,2,3\n4,5,6",
+        Units(),
+        r"line 1: unknown unit of length; found ft for x; allowed: m, cm, mm",
+    ),
+    (
+        "x,y,z,feed\n1,2,3,4\n4,5,6,7",
+        Units(),
+        r"the unit of feed is not stated; allowed: m/s, mm/s.*feed_mm/min",
+    ),
+    (
+        "x,y,z,feed_mm/s\n1,2,3,4\n4,5,6,0",
+        Units(),
+        r"line 3: a feed rate must be positive; found 0 m/s",
+    ),
+    (
+        "x,y,z\n1,5,2,5,3,5\n4,5,6",
+        Units(),
+        r"line 2: wrong number of values; found 6; .*Decimal commas need",
+    ),
+    (
+        "x;y;z\n1.000,5;2;3\n4;5;6",
+        Units(),
+        r"line 2: decimal points and commas in one line; found '1.000,5;2;3'",
+    ),
+    (
+        "x;y;z\n1,5;2;3\n4;NaN;6",
+        Units(),
+        r"line 3: the value of column y is not a finite number; found 'NaN'",
+    ),
 ]
 
 
 @pytest.mark.parametrize(("text", "units", "message"), MISTAKES)
 def test_mistakes_are_named(text, units, message):
-    with pytest.raises(TaskError, match=f"a.csv: {message}" if message.startswith("line") else message):
+    with pytest.raises(
+        TaskError, match=f"a.csv: {message}" if message.startswith("line") else message
+    ):
         read(text, units=units)
 
 
 def test_the_example_is_read_as_it_is_written(tmp_path):
     """The seam of the example, through its own writer."""
-    import importlib.util  # noqa: PLC0415
+    import importlib.util
 
     place = Path(__file__).parents[2] / "examples/08_cam_seam.py"
     spec = importlib.util.spec_from_file_location(place.stem, place)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     module.write(tmp_path / "seam.csv")
-    (points, _), told = read((tmp_path / "seam.csv").read_text(encoding="utf-8"), orientation="rotation_vector")
+    (points, _), told = read(
+        (tmp_path / "seam.csv").read_text(encoding="utf-8"),
+        orientation="rotation_vector",
+    )
     rows = module.seam()
     np.testing.assert_allclose(points.position, rows[:, :3] / 1e3, atol=5.1e-8)
     np.testing.assert_allclose(points.speed, rows[:, 6] / 6e4)
-    assert told == ("a byte order mark", "columns separated by semicolons", "decimal commas")
+    assert told == (
+        "a byte order mark",
+        "columns separated by semicolons",
+        "decimal commas",
+    )

@@ -89,7 +89,10 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Planned:
     folder, printed = tmp_path_factory.mktemp("planned"), io.StringIO()
     (folder / "task.yaml").write_text(yaml.safe_dump(quick_task()))
     with interrupts_kept(), contextlib.redirect_stdout(printed):
-        assert code_of("plan", folder / "task.yaml", "--out", folder / "out", "--json") == 0
+        assert (
+            code_of("plan", folder / "task.yaml", "--out", folder / "out", "--json")
+            == 0
+        )
     return Planned(json.loads(printed.getvalue()), folder / "out")
 
 

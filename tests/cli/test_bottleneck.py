@@ -21,13 +21,17 @@ def test_in_plain_words(run, task, write):
     assert outcome.code == 0, outcome.err
     assert outcome.err == ""
     assert "end time t_E: 2.47" in outcome.out
-    savings = re.findall(r"10 % more torque at (j\d) \(1 Nm\) saves (\S+) % \((\S+) ms\)", outcome.out)
+    savings = re.findall(
+        r"10 % more torque at (j\d) \(1 Nm\) saves (\S+) % \((\S+) ms\)", outcome.out
+    )
     assert [joint for joint, *_ in savings] == ["j1", "j2"]
     percent, milliseconds = float(savings[0][1]), float(savings[0][2])
     assert percent == pytest.approx(3.8, abs=0.2)
     assert milliseconds == pytest.approx(10.0 * percent * 2.475, rel=0.05)
     assert "no other limit costs time" in outcome.out
-    assert re.search(r"j2 is at its torque limit for \d+\.\d % of the time", outcome.out)
+    assert re.search(
+        r"j2 is at its torque limit for \d+\.\d % of the time", outcome.out
+    )
     assert "reference" not in outcome.out
     assert "checked" not in outcome.out
 
@@ -36,12 +40,16 @@ def test_check_and_reference(run, task, write):
     task["spline"]["intervals"] = 10
     outcome = run("bottleneck", write(task), "--check", "--reference")
     assert outcome.code == 0, outcome.err
-    checked = re.findall(r"checked, (\S+) torque \+1 %: predicted (\S+) ms, solved again (\S+) ms", outcome.out)
+    checked = re.findall(
+        r"checked, (\S+) torque \+1 %: predicted (\S+) ms, solved again (\S+) ms",
+        outcome.out,
+    )
     assert {joint for joint, *_ in checked} >= {"j1", "j2"}
     for _, predicted, found in checked:
         assert float(predicted) == pytest.approx(float(found), rel=0.05)
     assert re.search(
-        r"reference 2\.\d+ s \(.*not a proven bound.*\): the motion takes \d+\.\d+ % \(.* ms\) longer", outcome.out
+        r"reference 2\.\d+ s \(.*not a proven bound.*\): the motion takes \d+\.\d+ % \(.* ms\) longer",
+        outcome.out,
     )
 
 
@@ -53,7 +61,9 @@ def test_json(run, task, write):
     assert found["t_end_s"] == data["t_end"]
     first = found["sensitivities"]["limits"][0]
     assert (first["subject"], first["kind"], first["unit"]) == ("j1", "torque", "Nm")
-    assert first["change_for_1_percent_s"] == pytest.approx(0.01 * first["derivative_s_per_unit"] * first["limit"])
+    assert first["change_for_1_percent_s"] == pytest.approx(
+        0.01 * first["derivative_s_per_unit"] * first["limit"]
+    )
     assert found["sensitivities"]["multipliers"] == "solver"
     assert {entry["subject"] for entry in found["saturations"]} == {"j1", "j2", "j3"}
     assert found["check"] is None
@@ -64,9 +74,17 @@ def test_files(run, task, write, tmp_path):
     out = tmp_path / "out"
     outcome = run("bottleneck", write(task), "--out", out)
     assert outcome.code == 0, outcome.err
-    assert sorted(path.name for path in out.iterdir()) == ["bottleneck.json", "timeline.png"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        "bottleneck.json",
+        "timeline.png",
+    ]
     assert f"wrote {out / 'timeline.png'}" in outcome.out
-    assert json.loads((out / "bottleneck.json").read_text())["bottleneck"]["sensitivities"]["reliable"] is True
+    assert (
+        json.loads((out / "bottleneck.json").read_text())["bottleneck"][
+            "sensitivities"
+        ]["reliable"]
+        is True
+    )
     assert (out / "timeline.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -77,22 +95,33 @@ def test_unverified_motion(run, task, write, tmp_path, request):
     outcome = run("bottleneck", write(task), "--out", out)
     assert outcome.code == 1
     assert "did not pass the verification" in outcome.err
-    assert sorted(path.name for path in out.iterdir()) == ["unverified_bottleneck.json", "unverified_timeline.png"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        "unverified_bottleneck.json",
+        "unverified_timeline.png",
+    ]
 
 
 def test_a_search_ended_early_is_told(run, task, write, monkeypatch):
     honest = planner.plan
     monkeypatch.setattr(
-        planner, "plan", lambda *given, **more: dataclasses.replace(honest(*given, **more), interrupted=True)
+        planner,
+        "plan",
+        lambda *given, **more: dataclasses.replace(
+            honest(*given, **more), interrupted=True
+        ),
     )
     outcome = run("bottleneck", write(task))
     assert outcome.code == 0
     assert "ended early" in outcome.err
 
 
-def test_figures_survive_a_drawing_that_cannot_be_written(run, task, write, tmp_path, monkeypatch):
+def test_figures_survive_a_drawing_that_cannot_be_written(
+    run, task, write, tmp_path, monkeypatch
+):
     def full(_figure, path):
-        raise InputError("cannot be written", where=str(path), found="No space left on device")
+        raise InputError(
+            "cannot be written", where=str(path), found="No space left on device"
+        )
 
     monkeypatch.setattr(plots, "save_figure", full)
     outcome = run("bottleneck", write(task), "--out", tmp_path / "out")
@@ -110,14 +139,27 @@ def test_a_saved_motion(run, task, write, tmp_path):
     saved = json.loads(outcome.out)
     assert saved["verified"] is True
     assert saved["t_end"] == pytest.approx(fresh["t_end"], rel=1e-6)
-    for one, other in zip(*(d["bottleneck"]["saturations"] for d in (saved, fresh)), strict=True):
+    for one, other in zip(
+        *(d["bottleneck"]["saturations"] for d in (saved, fresh)), strict=True
+    ):
         assert (one["subject"], one["kind"]) == (other["subject"], other["kind"])
         assert one["share"] == pytest.approx(other["share"], abs=1e-3)
-    for one, other in zip(*(d["bottleneck"]["sensitivities"]["limits"] for d in (saved, fresh)), strict=True):
+    for one, other in zip(
+        *(d["bottleneck"]["sensitivities"]["limits"] for d in (saved, fresh)),
+        strict=True,
+    ):
         assert one["subject"] == other["subject"]
-        assert one["change_for_10_percent_s"] == pytest.approx(other["change_for_10_percent_s"], rel=1e-3, abs=1e-6)
-    assert {path.name for path in out.iterdir()} >= {"result.npz", "bottleneck.json", "timeline.png"}
-    assert run("bottleneck", out / "result.npz").out.startswith(f"end time t_E: {fresh['t_end']:.4f} s")
+        assert one["change_for_10_percent_s"] == pytest.approx(
+            other["change_for_10_percent_s"], rel=1e-3, abs=1e-6
+        )
+    assert {path.name for path in out.iterdir()} >= {
+        "result.npz",
+        "bottleneck.json",
+        "timeline.png",
+    }
+    assert run("bottleneck", out / "result.npz").out.startswith(
+        f"end time t_E: {fresh['t_end']:.4f} s"
+    )
 
 
 def test_a_saved_motion_keeps_its_urdf(run, tmp_path):

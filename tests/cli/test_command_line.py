@@ -35,17 +35,26 @@ def test_help_of_every_command_has_an_example(command, option, run):
 
 def test_examples_work_in_this_order(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("brachis.apps.view.Viewer.wait", lambda _viewer: None)  # for Ctrl-C
+    monkeypatch.setattr(
+        "brachis.apps.view.Viewer.wait", lambda _viewer: None
+    )  # for Ctrl-C
     (tmp_path / "out").mkdir()
     fixed = "fixed: {search.effort: single, spline.intervals: 6}"
-    (tmp_path / "lines.yaml").write_text(f"sweep: 1\ntask: task.yaml\n{fixed}\ngrid: {{spline.degree: [3, 4]}}\n")
+    (tmp_path / "lines.yaml").write_text(
+        f"sweep: 1\ntask: task.yaml\n{fixed}\ngrid: {{spline.degree: [3, 4]}}\n"
+    )
     assert set(EXAMPLES) == {"", *COMMANDS}
-    assert {line.split("  #")[0].strip() for line in EXAMPLES[""]} <= {*EXAMPLES["new"], *EXAMPLES["plan"]}
+    assert {line.split("  #")[0].strip() for line in EXAMPLES[""]} <= {
+        *EXAMPLES["new"],
+        *EXAMPLES["plan"],
+    }
     for command, lines in EXAMPLES.items():
         for line in lines if command else ():
             outcome = run(*shlex.split(line, comments=True)[1:])
             assert outcome.code == 0, f"{line}: {outcome.err}"
-        if command == "new":  # what follows is about commands: with a plan that takes less time
+        if (
+            command == "new"
+        ):  # what follows is about commands: with a plan that takes less time
             content = (tmp_path / "task.yaml").read_text()
             content = content.replace("{effort: fast}", str(QUICK)).replace(
                 "# spline: {intervals: 20}", "spline: {intervals: 8}"
@@ -68,33 +77,67 @@ def test_help_of_the_program(run):
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_script(shell):
     environment = {**os.environ, "_BRACHIS_COMPLETE": f"source_{shell}"}
-    done = subprocess.run(COMMAND, env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        COMMAND, env=environment, capture_output=True, text=True, check=True
+    )
     assert f"_BRACHIS_COMPLETE=complete_{shell}" in done.stdout
 
 
 @pytest.mark.parametrize(
-    ("words", "expected"), [("brachis pl", ["plan", "plot"]), ("brachis plan --s", ["--set", "--strict"])]
+    ("words", "expected"),
+    [("brachis pl", ["plan", "plot"]), ("brachis plan --s", ["--set", "--strict"])],
 )
 def test_completion(words, expected):
     last = str(len(words.split()) - 1)
-    environment = {**os.environ, "_BRACHIS_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": last}
-    done = subprocess.run(COMMAND, env=environment, capture_output=True, text=True, check=True)
+    environment = {
+        **os.environ,
+        "_BRACHIS_COMPLETE": "complete_bash",
+        "COMP_WORDS": words,
+        "COMP_CWORD": last,
+    }
+    done = subprocess.run(
+        COMMAND, env=environment, capture_output=True, text=True, check=True
+    )
     assert done.stdout.split() == expected
 
 
 WRONG = {
-    "a typo": (("plna", "task.yaml"), ["no such command 'plna'", "Did you mean 'plan'?", "see brachis --help"]),
-    "no command": ((ROOT / "examples/01_scara_line.yaml",), ["a command comes before a file: brachis plan "]),
+    "a typo": (
+        ("plna", "task.yaml"),
+        ["no such command 'plna'", "Did you mean 'plan'?", "see brachis --help"],
+    ),
+    "no command": (
+        (ROOT / "examples/01_scara_line.yaml",),
+        ["a command comes before a file: brachis plan "],
+    ),
     "a URDF alone": ((SCARA,), ["a command comes before a file: brachis inspect "]),
-    "an option's typo": (("plan", "task.yaml", "--outt"), ["--outt", "--out", "see brachis plan --help"]),
+    "an option's typo": (
+        ("plan", "task.yaml", "--outt"),
+        ["--outt", "--out", "see brachis plan --help"],
+    ),
     "no argument": (("plan",), ["missing argument 'TASK'"]),
     "a robot's typo": (("new", "scara4"), ["'scara4'", "Did you mean 'scara3'?"]),
     "no robot": (("inspect", "gone.urdf"), ["gone.urdf: the URDF file does not exist"]),
-    "a URDF for a task": (("plan", SCARA), ["found a URDF; allowed: a task file", f"brachis new {SCARA}"]),
-    "a URDF for a result": (("verify", SCARA), ["found a URDF; allowed: a result", f"brachis new {SCARA}"]),
-    "a task for a URDF": (("new", ROOT / "examples/01_scara_line.yaml"), ["a task file; allowed: a URDF"]),
-    "a task for a result": (("verify", ROOT / "examples/01_scara_line.yaml"), ["found a task file", "brachis plan "]),
-    "no assignment": (("plan", ROOT / "examples/01_scara_line.yaml", "--set", "spline"), ["key=value", "'spline'"]),
+    "a URDF for a task": (
+        ("plan", SCARA),
+        ["found a URDF; allowed: a task file", f"brachis new {SCARA}"],
+    ),
+    "a URDF for a result": (
+        ("verify", SCARA),
+        ["found a URDF; allowed: a result", f"brachis new {SCARA}"],
+    ),
+    "a task for a URDF": (
+        ("new", ROOT / "examples/01_scara_line.yaml"),
+        ["a task file; allowed: a URDF"],
+    ),
+    "a task for a result": (
+        ("verify", ROOT / "examples/01_scara_line.yaml"),
+        ["found a task file", "brachis plan "],
+    ),
+    "no assignment": (
+        ("plan", ROOT / "examples/01_scara_line.yaml", "--set", "spline"),
+        ["key=value", "'spline'"],
+    ),
 }
 
 
@@ -114,23 +157,42 @@ def test_wrong_command_lines(case, more, run, tmp_path, monkeypatch):
 
 
 def test_results_are_told_from_tasks(run, tmp_path):
-    for content, expected in ((b"PK\x03\x04", "found a result"), (b'{\n  "t_end": 1.0\n}', "the figures of a plan")):
+    for content, expected in (
+        (b"PK\x03\x04", "found a result"),
+        (b'{\n  "t_end": 1.0\n}', "the figures of a plan"),
+    ):
         (tmp_path / "file").write_bytes(content)
         outcome = run("plan", tmp_path / "file")
         assert outcome.code == 2
         assert expected in outcome.err
 
 
-SMALL = ("--set", "spline.intervals=6", "--set", "search={effort: single, least_motion: false}")
+SMALL = (
+    "--set",
+    "spline.intervals=6",
+    "--set",
+    "search={effort: single, least_motion: false}",
+)
 
 
 def test_set_changes_the_task(run, task, write, tmp_path):
     path = write(task)
-    outcome = run("plan", path, *SMALL, "--set", "path.0.line.length=0.3", "--set", "robot.limits.torque=8", "--json")
+    outcome = run(
+        "plan",
+        path,
+        *SMALL,
+        "--set",
+        "path.0.line.length=0.3",
+        "--set",
+        "robot.limits.torque=8",
+        "--json",
+    )
     assert outcome.code == 0, outcome.err
     data = json.loads(outcome.out)
     assert 1.0 < data["t_end"] < 2.4
-    shown = json.loads(run("inspect", path, "--set", "robot.limits.torque=8", "--json").out)
+    shown = json.loads(
+        run("inspect", path, "--set", "robot.limits.torque=8", "--json").out
+    )
     assert [joint["torque"] for joint in shown["joints"]] == ["8 Nm"] * 3
     assert "torque" in run("bottleneck", path, *SMALL).out
     outcome = run("bottleneck", tmp_path / "result.npz", "--set", "spline.intervals=6")
@@ -142,7 +204,12 @@ def test_set_changes_the_task(run, task, write, tmp_path):
 def test_set_names_the_key_and_its_alternatives(command, run, task, write):
     outcome = run(command, write(task), "--set", "robot.limits.torqe=8")
     assert outcome.code == 2
-    for part in ("with robot.limits.torqe set: ", "unknown key", "velocity, acceleration", "Did you mean 'torque'"):
+    for part in (
+        "with robot.limits.torqe set: ",
+        "unknown key",
+        "velocity, acceleration",
+        "Did you mean 'torque'",
+    ):
         assert part in outcome.err
 
 
@@ -156,7 +223,9 @@ def test_how_much_is_said(run, task, write):
     steps = verbose.err.splitlines()
     assert len(steps) > 3
     assert all(" s: " in line and line.startswith("brachis: ") for line in steps)
-    assert run("plan", path, *SMALL).err == "", "what one command is told does not hold for the next one"
+    assert run("plan", path, *SMALL).err == "", (
+        "what one command is told does not hold for the next one"
+    )
     assert json.loads(run("plan", path, *SMALL, "--json", "--quiet").out)["verified"]
     assert "gone.yaml" in run("plan", "gone.yaml", "--quiet").err
 
@@ -176,7 +245,11 @@ def test_tracebacks_are_for_those_who_ask(run, task, write, monkeypatch):
 def test_new_and_robots(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     listed = json.loads(run("robots", "--json").out)["robots"]
-    assert {"name": "gantry2", "what": "two linear axes", "joints": ["x_axis", "y_axis"]}.items() <= listed[1].items()
+    assert {
+        "name": "gantry2",
+        "what": "two linear axes",
+        "joints": ["x_axis", "y_axis"],
+    }.items() <= listed[1].items()
     data = json.loads(run("new", listed[1]["urdf"], "--json").out)
     assert data["verified"]
     assert data["file"] == "task.yaml"

@@ -61,7 +61,13 @@ def test_plan_for_people(run, task, write):
     task["spline"]["intervals"] = 20
     outcome = run("plan", write(task))
     assert outcome.code == 0
-    for part in ("end time t_E", "2.47", "verification: passed", "torque ratio", "torque jump"):
+    for part in (
+        "end time t_E",
+        "2.47",
+        "verification: passed",
+        "torque ratio",
+        "torque jump",
+    ):
         assert part in outcome.out
     assert outcome.err == ""  # no progress display in a pipe
 
@@ -72,28 +78,51 @@ def test_unverified_plan_says_so(run, task, write, tmp_path):
     assert outcome.code == 1
     assert json.loads(outcome.out)["verified"] is False
     assert "unverified" in outcome.err
-    names = ["unverified.json", "unverified.npz", "unverified.png", "unverified_candidates.png"]
+    names = [
+        "unverified.json",
+        "unverified.npz",
+        "unverified.png",
+        "unverified_candidates.png",
+    ]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names
 
 
-def test_two_motions_do_not_mix_in_one_folder(run, task, write, planned, tmp_path, request):
+def test_two_motions_do_not_mix_in_one_folder(
+    run, task, write, planned, tmp_path, request
+):
     out = planned.copied(tmp_path / "out")
     (out / "notes.txt").write_text("mine")
     request.getfixturevalue("too_strict")
     assert run("plan", write(task), "--out", out).code == 1
     names = {path.name for path in out.iterdir()}
-    assert names == {"unverified.npz", "unverified.json", "unverified.png", "unverified_candidates.png", "notes.txt"}
+    assert names == {
+        "unverified.npz",
+        "unverified.json",
+        "unverified.png",
+        "unverified_candidates.png",
+        "notes.txt",
+    }
     request.getfixturevalue("monkeypatch").undo()
     assert run("plan", write(task), "--out", out).code == 0
     names = {path.name for path in out.iterdir()}
-    assert names == {"result.npz", "result.json", "overview.png", "candidates.png", "notes.txt"}
+    assert names == {
+        "result.npz",
+        "result.json",
+        "overview.png",
+        "candidates.png",
+        "notes.txt",
+    }
 
 
 def no_space(path):
-    return InputError("cannot be written", where=str(path), found="No space left on device")
+    return InputError(
+        "cannot be written", where=str(path), found="No space left on device"
+    )
 
 
-def test_a_result_survives_a_full_disk_while_figures_are_written(run, task, write, planned, tmp_path, monkeypatch):
+def test_a_result_survives_a_full_disk_while_figures_are_written(
+    run, task, write, planned, tmp_path, monkeypatch
+):
     out = planned.copied(tmp_path / "out")
     before = {path.name: path.read_bytes() for path in out.iterdir()}
     honest = plots.save_figure
@@ -111,14 +140,20 @@ def test_a_result_survives_a_full_disk_while_figures_are_written(run, task, writ
     assert words in outcome.err
     data = json.loads(outcome.out)
     assert data["verified"] is True
-    assert {path.name for path in out.iterdir()} == {"result.npz", "result.json", "candidates.png"}
+    assert {path.name for path in out.iterdir()} == {
+        "result.npz",
+        "result.json",
+        "candidates.png",
+    }
     assert sorted(data["files"]) == sorted(str(path) for path in out.iterdir())
     for path in out.iterdir():
         assert path.read_bytes() != before[path.name], path.name
     assert Trajectory.load(out / "result.npz").t_end == data["t_end"]
 
 
-def test_failure_while_writing_the_result_leaves_the_earlier_one(run, task, write, planned, tmp_path, monkeypatch):
+def test_failure_while_writing_the_result_leaves_the_earlier_one(
+    run, task, write, planned, tmp_path, monkeypatch
+):
     out = planned.copied(tmp_path / "out")
     before = {path.name: path.read_bytes() for path in out.iterdir()}
 
@@ -128,7 +163,10 @@ def test_failure_while_writing_the_result_leaves_the_earlier_one(run, task, writ
     monkeypatch.setattr(planning, "write_text", full)
     outcome = run("plan", write(task), "--out", out)
     assert outcome.code == 2
-    assert f"{out / 'result.json'}: cannot be written; found No space left on device" in outcome.err
+    assert (
+        f"{out / 'result.json'}: cannot be written; found No space left on device"
+        in outcome.err
+    )
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 
@@ -144,7 +182,9 @@ def test_json_knows_no_nan(run, task, write, tmp_path, monkeypatch):
     honest = completion.verify_trajectory
 
     def endless(trajectory, **more):
-        return replace(honest(trajectory, **more), worst_ratio=math.inf, path_error=math.nan)
+        return replace(
+            honest(trajectory, **more), worst_ratio=math.inf, path_error=math.nan
+        )
 
     monkeypatch.setattr(completion, "verify_trajectory", endless)
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
@@ -163,15 +203,23 @@ def test_lengthened_end_time_is_said(run, task, write, monkeypatch):
         return replace(result, attempt=replace(result.attempt, refined=refined))
 
     for time_scaled, expected in ((1.0, False), (1.00004, True)):
-        monkeypatch.setattr(planner, "plan", partial(lengthened, time_scaled=time_scaled))
+        monkeypatch.setattr(
+            planner, "plan", partial(lengthened, time_scaled=time_scaled)
+        )
         text = run("plan", write(task)).out
         assert ("end time lengthened by" in text) is expected
-        assert ("0.004 % to meet the limits between collocation points" in text) is expected
+        assert (
+            "0.004 % to meet the limits between collocation points" in text
+        ) is expected
 
 
 CHOICES = {
     "in charts": ({"search": {"effort": "fast"}}, {()}, "chart"),
-    "of every choice": ({"search": {"guesses": "numeric", "least_motion": False}}, {("j1",), ("j2",), ("j3",)}, "j2"),
+    "of every choice": (
+        {"search": {"guesses": "numeric", "least_motion": False}},
+        {("j1",), ("j2",), ("j3",)},
+        "j2",
+    ),
 }
 
 
@@ -179,10 +227,14 @@ CHOICES = {
 def test_candidates_are_listed(run, task, write, case):
     more, choices, name = CHOICES[case]
     outcome = run("plan", write({**task, "redundant_joints": "auto", **more}))
-    data = json.loads(run("plan", write({**task, "redundant_joints": "auto", **more}), "--json").out)
+    data = json.loads(
+        run("plan", write({**task, "redundant_joints": "auto", **more}), "--json").out
+    )
     assert f"candidates ({len(data['candidates'])}" in outcome.out
     found = {tuple(candidate["redundant_joints"]) for candidate in data["candidates"]}
-    assert choices <= found <= choices | {tuple(data["redundant_joints"])}, "the fastest one in its last coordinates"
+    assert choices <= found <= choices | {tuple(data["redundant_joints"])}, (
+        "the fastest one in its last coordinates"
+    )
     rows = outcome.out[outcome.out.index("candidates (") :]
     assert f"│ {name} " in rows
     assert "none" not in rows
@@ -213,18 +265,28 @@ def test_what_a_time_limit_left_undone_is_told(run, task, write, tmp_path, monke
 
     monkeypatch.setattr(planner, "solved", slow)
     monkeypatch.setattr("brachis.common.deadline.time.monotonic", lambda: now[0])
-    task |= {"spline": {"intervals": 10, "points_per_interval": 1}, "search": {"effort": "fast"}}
+    task |= {
+        "spline": {"intervals": 10, "points_per_interval": 1},
+        "search": {"effort": "fast"},
+    }
     outcome = run("plan", write(task), "--out", tmp_path / "out", "--json")
     assert outcome.code == 1
     assert (tmp_path / "out/unverified.npz").exists()
     data = json.loads(outcome.out)
     assert data["interrupted"]
     assert data["undone"][-1] == "what search.effort asks for was not tried to its end"
-    assert "brachis: the search was ended early; this is the best motion so far\n" in outcome.err
-    assert all(f"brachis: left undone: {undone}\n" in outcome.err for undone in data["undone"])
+    assert (
+        "brachis: the search was ended early; this is the best motion so far\n"
+        in outcome.err
+    )
+    assert all(
+        f"brachis: left undone: {undone}\n" in outcome.err for undone in data["undone"]
+    )
 
 
-@pytest.mark.parametrize("command", [("verify", "gone.npz"), ("plan", "gone.yaml"), ("inspect", "gone.urdf")])
+@pytest.mark.parametrize(
+    "command", [("verify", "gone.npz"), ("plan", "gone.yaml"), ("inspect", "gone.urdf")]
+)
 def test_interrupt_while_importing(command, run, monkeypatch):
     def interrupt(name, *_arguments):
         if name == "brachis.apps.cli":
@@ -240,17 +302,26 @@ def test_interrupt_while_importing(command, run, monkeypatch):
 
 def test_help_loads_neither_pinocchio_nor_numpy():
     code = "import sys, brachis.apps.cli.main\nprint(sorted({'pinocchio', 'numpy', 'scipy'} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
     assert done.stdout.strip() == "[]"
 
 
 def test_the_folder_of_a_motion_stands_for_it(run, planned, tmp_path):
-    for words in (["verify"], ["plot", "--out", tmp_path / "x.png"], ["export", "--out", tmp_path / "x.csv"]):
+    for words in (
+        ["verify"],
+        ["plot", "--out", tmp_path / "x.png"],
+        ["export", "--out", tmp_path / "x.csv"],
+    ):
         assert run(words[0], planned.out, *words[1:]).code == 0
     (tmp_path / "empty").mkdir()
     outcome = run("verify", tmp_path / "empty")
     assert outcome.code == 2
-    assert "is a folder in which there is no motion; allowed: result.npz or unverified.npz" in outcome.err
+    assert (
+        "is a folder in which there is no motion; allowed: result.npz or unverified.npz"
+        in outcome.err
+    )
 
 
 def test_verify(run, planned):
@@ -274,25 +345,43 @@ def test_verify_against_a_weaker_robot_fails(run, task, write, tmp_path):
 
 def test_export(run, planned, tmp_path):
     table = tmp_path / "motion.csv"
-    assert run("export", planned.out / "result.npz", "--out", table, "--dt", 0.01).code == 0
+    assert (
+        run("export", planned.out / "result.npz", "--out", table, "--dt", 0.01).code
+        == 0
+    )
     with table.open() as stream:
         rows = list(csv.reader(stream))
     names = ["j1", "j2", "j3"]
-    assert rows[0] == ["t", *(f"{kind}_{name}" for kind in ("q", "qd", "qdd", "tau") for name in names)]
+    assert rows[0] == [
+        "t",
+        *(f"{kind}_{name}" for kind in ("q", "qd", "qdd", "tau") for name in names),
+    ]
     times = np.array([float(row[0]) for row in rows[1:]])
     assert times[-1] == planned.data["t_end"]
     np.testing.assert_allclose(np.diff(times)[:-1], 0.01)
 
 
-@pytest.mark.parametrize("kind", ["torques", "postures", "motion", "overview", "timeline", "limits"])
+@pytest.mark.parametrize(
+    "kind", ["torques", "postures", "motion", "overview", "timeline", "limits"]
+)
 def test_plot(kind, run, planned, tmp_path):
     figure = tmp_path / f"{kind}.svg"
-    assert run("plot", planned.out / "result.npz", "--kind", kind, "--out", figure).code == 0
+    assert (
+        run("plot", planned.out / "result.npz", "--kind", kind, "--out", figure).code
+        == 0
+    )
     assert b"<svg" in figure.read_bytes()
 
 
 def test_plot_of_unknown_kind(run, planned, tmp_path):
-    outcome = run("plot", planned.out / "result.npz", "--kind", "torque", "--out", tmp_path / "x.png")
+    outcome = run(
+        "plot",
+        planned.out / "result.npz",
+        "--kind",
+        "torque",
+        "--out",
+        tmp_path / "x.png",
+    )
     assert outcome.code == 2
     assert "Did you mean 'torques'?" in outcome.err
 
@@ -319,16 +408,26 @@ def test_inspect(run):
     assert outcome.out.count("closed_form") == 3
     data = json.loads(run("inspect", SCARA, "--task-space", "x,y", "--json").out)
     assert data["degree_of_redundancy"] == 1
-    assert [row["redundant joints"] for row in data["decompositions"]] == ["j1", "j2", "j3"]
+    assert [row["redundant joints"] for row in data["decompositions"]] == [
+        "j1",
+        "j2",
+        "j3",
+    ]
     assert {row["branches"] for row in data["decompositions"]} == {2}
     assert data["joints"][0]["torque"] == "10 Nm"
 
 
 def test_inspect_of_a_task_shows_what_is_in_use(run, tmp_path):
-    task = yaml.safe_load((SCARA.parents[2] / "examples/01_scara_line.yaml").read_text())
+    task = yaml.safe_load(
+        (SCARA.parents[2] / "examples/01_scara_line.yaml").read_text()
+    )
     task["robot"] |= {
         "urdf": str(SCARA),
-        "limits": {"torque": {"j1": [-5, 7]}, "velocity": 4, "acceleration": {"j2": 30}},
+        "limits": {
+            "torque": {"j1": [-5, 7]},
+            "velocity": 4,
+            "acceleration": {"j2": 30},
+        },
         "friction": {"viscous": {"j3": 0.25}, "rotor_inertia": 1e-4, "gear_ratio": 100},
         "payload": {"mass": 2.5},
         "mounting": "ceiling",
@@ -337,15 +436,29 @@ def test_inspect_of_a_task_shows_what_is_in_use(run, tmp_path):
     path = tmp_path / "task.yaml"
     path.write_text(yaml.safe_dump(task))
     data = json.loads(run("inspect", path, "--json").out)
-    keys = ("velocity", "acceleration", "torque", "mass", "viscous", "coulomb", "armature")
+    keys = (
+        "velocity",
+        "acceleration",
+        "torque",
+        "mass",
+        "viscous",
+        "coulomb",
+        "armature",
+    )
     assert [[row[key] for key in keys] for row in data["joints"]] == [
         ["2 rad/s", "none", "-5 to 7 Nm", "10 kg", "none", "none", "1 kg m^2"],
         ["2 rad/s", "30 rad/s^2", "10 Nm", "10 kg", "none", "none", "1 kg m^2"],
         ["2 rad/s", "none", "10 Nm", "12.5 kg", "0.25 Nm s/rad", "none", "1 kg m^2"],
     ]
-    assert data["in_use"]["payload"] == "2.5 kg at [0, 0, 0] m in the tool frame, a point mass"
+    assert (
+        data["in_use"]["payload"]
+        == "2.5 kg at [0, 0, 0] m in the tool frame, a point mass"
+    )
     assert data["in_use"]["speed override"] == "50 % of the joint velocity limits"
-    assert "mounting: at [0, 0, 0] m, roll, pitch, yaw [180, 0, 0] deg" in run("inspect", path).out
+    assert (
+        "mounting: at [0, 0, 0] m, roll, pitch, yaw [180, 0, 0] deg"
+        in run("inspect", path).out
+    )
     outcome = run("inspect", path, "--lock", "j3=0.5")
     assert outcome.code == 2
     assert "--lock" in outcome.err
@@ -360,7 +473,9 @@ def test_inspect_says_why_not(run):
 
 
 def test_inspect_with_locked_joint(run):
-    data = json.loads(run("inspect", SCARA, "--task-space", "x,y", "--lock", "j3=0.5", "--json").out)
+    data = json.loads(
+        run("inspect", SCARA, "--task-space", "x,y", "--lock", "j3=0.5", "--json").out
+    )
     assert data["degree_of_redundancy"] == 0
     assert run("inspect", SCARA, "--lock", "j3").code == 2
 
@@ -373,7 +488,7 @@ def test_schema(run, tmp_path):
 
 
 def test_module_runs(capfd, monkeypatch):
-    import runpy  # noqa: PLC0415
+    import runpy
 
     monkeypatch.setattr(sys, "argv", ["brachis", "--help"])
     with pytest.raises(SystemExit):
@@ -390,6 +505,11 @@ def test_every_command_shows_angles_in_degrees_and_json_stays_in_rad(run, task, 
     verified, plain = run("verify", result, "--degrees").out, run("verify", result).out
     assert (" deg/s " in verified, " rad/s " in verified) == (True, False)
     assert (" deg/s " in plain, " rad/s " in plain) == (False, True)
-    found = re.findall(r"\((.*?) deg/s\) saves", run("bottleneck", result, "--degrees").out)
+    found = re.findall(
+        r"\((.*?) deg/s\) saves", run("bottleneck", result, "--degrees").out
+    )
     assert found[0] == f"{np.rad2deg(0.05):.3g}"
-    assert run("verify", result, "--degrees", "--json").out == run("verify", result, "--json").out
+    assert (
+        run("verify", result, "--degrees", "--json").out
+        == run("verify", result, "--json").out
+    )

@@ -17,13 +17,40 @@ from brachis.apps.compose import Rail, on_rail
 from .conftest import ROOT, SCARA
 
 FIGURES = ("--range", "-2", "2", "--velocity", "2", "--force", "1500", "--mass", "80")
-READMES = [ROOT / "robots" / name / "README.md" for name in ("tx90l_rail", "ur10_rail", "iiwa14")]
+READMES = [
+    ROOT / "robots" / name / "README.md"
+    for name in ("tx90l_rail", "ur10_rail", "iiwa14")
+]
 
 
 def test_writes_what_the_library_makes(run, tmp_path):
     out = tmp_path / "on_rail.urdf"
-    options = ("--axis", "0", "0", "1", "--mount-xyz", "0.1", "-0.2", "0.3", "--mount-rpy-deg", "180", "0", "-90")
-    outcome = run("compose", SCARA, *FIGURES, *options, "--name", "lift", "--root", "floor", "--out", out)
+    options = (
+        "--axis",
+        "0",
+        "0",
+        "1",
+        "--mount-xyz",
+        "0.1",
+        "-0.2",
+        "0.3",
+        "--mount-rpy-deg",
+        "180",
+        "0",
+        "-90",
+    )
+    outcome = run(
+        "compose",
+        SCARA,
+        *FIGURES,
+        *options,
+        "--name",
+        "lift",
+        "--root",
+        "floor",
+        "--out",
+        out,
+    )
     assert (outcome.code, outcome.out, outcome.err) == (0, f"wrote {out}\n", "")
     rail = Rail(
         axis=(0, 0, 1),
@@ -70,10 +97,17 @@ def test_json(run, tmp_path):
     out = tmp_path / "on_rail.urdf"
     outcome = run("compose", SCARA, *FIGURES, "--out", out, "--json")
     assert outcome.code == 0
-    assert json.loads(outcome.out) == {"urdf": str(out), "arm": str(SCARA), "joint": "rail", "root": "world"}
+    assert json.loads(outcome.out) == {
+        "urdf": str(out),
+        "arm": str(SCARA),
+        "joint": "rail",
+        "root": "world",
+    }
 
 
-@pytest.mark.parametrize("missing", ["--range", "--velocity", "--force", "--mass", "--out"])
+@pytest.mark.parametrize(
+    "missing", ["--range", "--velocity", "--force", "--mass", "--out"]
+)
 def test_no_figure_is_guessed(run, tmp_path, missing):
     words = [*FIGURES, "--out", str(tmp_path / "on_rail.urdf")]
     place = words.index(missing)
@@ -87,10 +121,19 @@ def test_no_figure_is_guessed(run, tmp_path, missing):
 
 WRONG = {
     "zero axis": (("--axis", "0,0,0"), ["axis: has no direction"]),
-    "range upside down": (("--range", "2", "-2"), ["range: is empty; found [2, -2] m; allowed: low < high"]),
+    "range upside down": (
+        ("--range", "2", "-2"),
+        ["range: is empty; found [2, -2] m; allowed: low < high"],
+    ),
     "negative mass": (("--mass", "-1"), ["mass: is not positive; found -1.0 kg"]),
-    "angle not a number": (("--mount-rpy-deg", "nan", "0", "0"), ["mount_rpy: is wrong"]),
-    "taken name": (("--name", "j1"), ["name: the name 'j1' is taken", "Choose another name"]),
+    "angle not a number": (
+        ("--mount-rpy-deg", "nan", "0", "0"),
+        ["mount_rpy: is wrong"],
+    ),
+    "taken name": (
+        ("--name", "j1"),
+        ["name: the name 'j1' is taken", "Choose another name"],
+    ),
     "two numbers": (("--axis", "0,1"), ["'--axis'"]),
     "words": (("--axis", "up"), ["'--axis'"]),
 }
@@ -99,7 +142,9 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_wrong_figure(run, tmp_path, case):
     options, words = WRONG[case]
-    outcome = run("compose", SCARA, *FIGURES, "--out", tmp_path / "on_rail.urdf", *options)
+    outcome = run(
+        "compose", SCARA, *FIGURES, "--out", tmp_path / "on_rail.urdf", *options
+    )
     assert outcome.code == 2
     assert outcome.out == ""
     for word in words:
@@ -130,7 +175,9 @@ def test_wrong_files(run, tmp_path):
 def test_command_of_the_readme(run, readme, tmp_path, monkeypatch):
     (line,) = re.findall(r"^brachis compose .*", readme.read_text(), flags=re.MULTILINE)
     (tmp_path / "robots").symlink_to(ROOT / "robots")
-    (tmp_path / "ur10_robot.urdf").symlink_to(ROOT / "robots/tx90l_rail/arm.urdf")  # stands for the UR10
+    (tmp_path / "ur10_robot.urdf").symlink_to(
+        ROOT / "robots/tx90l_rail/arm.urdf"
+    )  # stands for the UR10
     monkeypatch.chdir(tmp_path)
     words = shlex.split(line)
     outcome = run(*words[1:])

@@ -42,25 +42,37 @@ def inspected(run, urdf: Path, *options: str) -> tuple[dict[str, str], list[str]
         assert (row["kind"] == "-") == (row["branches"] == 0)
     text = run("inspect", urdf, *options)
     assert text.code == 0
-    return {row["redundant joints"]: row["kind"] for row in data["decompositions"]}, data["remarks"], text.out
+    return (
+        {row["redundant joints"]: row["kind"] for row in data["decompositions"]},
+        data["remarks"],
+        text.out,
+    )
 
 
 def decompositions(run, urdf: Path, *options: str) -> dict[str, str]:
     return inspected(run, urdf, *options)[0]
 
 
-@pytest.mark.parametrize("urdf", OWN, ids=lambda path: f"{path.parent.name}/{path.name}")
+@pytest.mark.parametrize(
+    "urdf", OWN, ids=lambda path: f"{path.parent.name}/{path.name}"
+)
 def test_every_robot_of_the_repository(run, urdf):
     choices = WITHOUT_CLOSED_FORM.get(urdf.parent.name)
     kinds, remarks, text = inspected(run, urdf)
     assert ("closed_form" in kinds.values()) == (choices is None)
-    assert (ik.NO_CLOSED_FORM in remarks) == (ik.NO_CLOSED_FORM in text) == (choices is not None)
+    assert (
+        (ik.NO_CLOSED_FORM in remarks)
+        == (ik.NO_CLOSED_FORM in text)
+        == (choices is not None)
+    )
     if choices is not None:
         assert (len(kinds), set(kinds.values())) == (choices, {"-"})
 
 
 def test_all_robots_without_a_closed_form_are_looked_at():
-    assert set(WITHOUT_CLOSED_FORM) <= {urdf.parent.name for urdf in OWN if urdf.name == "robot.urdf"}
+    assert set(WITHOUT_CLOSED_FORM) <= {
+        urdf.parent.name for urdf in OWN if urdf.name == "robot.urdf"
+    }
 
 
 def test_no_closed_form_is_missed_where_there_is_nothing_to_choose(run):
@@ -77,7 +89,11 @@ def test_tx90l_on_its_rail(run):
         "joint_2",
         "joint_3",
     ]
-    assert [joint for joint, kind in kinds.items() if kind == "polynomial"] == ["joint_4", "joint_5", "joint_6"]
+    assert [joint for joint, kind in kinds.items() if kind == "polynomial"] == [
+        "joint_4",
+        "joint_5",
+        "joint_6",
+    ]
 
 
 def test_ur10_on_its_rail(run):
@@ -90,7 +106,9 @@ def test_ur10_on_its_rail(run):
 def test_iiwa_has_none_for_its_elbow(run):
     kinds = decompositions(run, ROOT / "robots/iiwa14/robot.urdf")
     assert [joint for joint, kind in kinds.items() if kind == "-"] == ["joint_4"]
-    row = json.loads(run("inspect", ROOT / "robots/iiwa14/robot.urdf", "--json").out)["decompositions"][3]
+    row = json.loads(run("inspect", ROOT / "robots/iiwa14/robot.urdf", "--json").out)[
+        "decompositions"
+    ][3]
     assert "J_nr is singular everywhere" in row["why not"]
 
 
@@ -112,19 +130,31 @@ def test_kinds_of_published_robots(run):
 def test_without_eaik_it_is_said_what_is_missing(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "eaik.pybindings.EAIK", None)
     panda = decompositions(run, published("Panda"))
-    assert [joint for joint, kind in panda.items() if kind == "closed_form"] == ["panda_joint4", "panda_joint7"]
+    assert [joint for joint, kind in panda.items() if kind == "closed_form"] == [
+        "panda_joint4",
+        "panda_joint7",
+    ]
     remarks = json.loads(run("inspect", published("Panda"), "--json").out)["remarks"]
-    assert remarks[-1].startswith("EAIK is not installed (pip install EAIK); it might add the redundant joints [")
-    assert "[panda_joint5], [panda_joint6]; installing it takes a C++ compiler except on" in remarks[-1]
+    assert remarks[-1].startswith(
+        "EAIK is not installed (pip install EAIK); it might add the redundant joints ["
+    )
+    assert (
+        "[panda_joint5], [panda_joint6]; installing it takes a C++ compiler except on"
+        in remarks[-1]
+    )
     assert remarks[-1] in run("inspect", published("Panda")).out.replace("\n", " ")
 
 
 def test_the_chosen_tool_frame_is_named(run):
     out = run("inspect", published("Panda"), "--json").out
     (tool, space) = json.loads(out)["remarks"]
-    assert tool.startswith("tool frame: panda_hand, the last link before the chains to panda_leftfinger")
+    assert tool.startswith(
+        "tool frame: panda_hand, the last link before the chains to panda_leftfinger"
+    )
     assert space.startswith("task space: pose")
-    named = run("inspect", published("Panda"), "--tool-frame", "panda_link8", "--json").out
+    named = run(
+        "inspect", published("Panda"), "--tool-frame", "panda_link8", "--json"
+    ).out
     assert json.loads(named)["remarks"] == [space]
 
 
@@ -133,25 +163,38 @@ LIMB = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
 
 def test_of_several_arms_the_first_one_is_shown(run):
     data = json.loads(run("inspect", published("Baxter"), "--json").out)
-    assert [joint["joint"] for joint in data["joints"]] == [f"left_{part}" for part in LIMB]
-    assert data["remarks"][0].endswith("from which several limbs part; --base-frame names another one")
+    assert [joint["joint"] for joint in data["joints"]] == [
+        f"left_{part}" for part in LIMB
+    ]
+    assert data["remarks"][0].endswith(
+        "from which several limbs part; --base-frame names another one"
+    )
     assert "--tool-frame names another one" in data["remarks"][1]
     kinds = decompositions(run, published("Baxter"), "--tool-frame", "left_gripper")
     assert set(kinds.values()) == {"-"}  # offsets at the shoulder and the wrist
 
 
 def test_free_roll_and_unknown_words(run):
-    kinds = decompositions(run, ROOT / "robots/tx90l_rail/arm.urdf", "--task-space", "pose_free_roll")
+    kinds = decompositions(
+        run, ROOT / "robots/tx90l_rail/arm.urdf", "--task-space", "pose_free_roll"
+    )
     assert kinds["tool_roll"] == "closed_form"
-    outcome = run("inspect", ROOT / "robots/tx90l_rail/arm.urdf", "--task-space", "poses")
+    outcome = run(
+        "inspect", ROOT / "robots/tx90l_rail/arm.urdf", "--task-space", "poses"
+    )
     assert outcome.code == 2
     assert "pose_free_roll" in outcome.err
 
 
 def test_where_the_tool_is(run):
     urdf = ROOT / "robots/tx90l_rail/robot.urdf"
-    remark = json.loads(run("inspect", urdf, "--posture", "0, 0, 0, 0, 0, 0, 0", "--json").out)["remarks"][-1]
-    assert remark == "the tool is at {position: [0.05, 0.05, 1.628], quaternion_wxyz: [1, 0, 0, 0]}, m"
+    remark = json.loads(
+        run("inspect", urdf, "--posture", "0, 0, 0, 0, 0, 0, 0", "--json").out
+    )["remarks"][-1]
+    assert (
+        remark
+        == "the tool is at {position: [0.05, 0.05, 1.628], quaternion_wxyz: [1, 0, 0, 0]}, m"
+    )
     assert run("inspect", urdf, "--posture", "0 0").code == 2
     assert "--posture" in run("inspect", urdf, "--posture", "a").err
 
@@ -159,7 +202,21 @@ def test_where_the_tool_is(run):
 def test_rails_leave_the_arm_s_tool_frame_alone(run, tmp_path):
     """Frames half way up the arm, which a rail moves as well, are no tools."""
     out = tmp_path / "ur5.urdf"
-    options = ("--axis", "0", "1", "0", "--range", "-2", "2", "--velocity", "2", "--force", "2000", "--mass", "60")
+    options = (
+        "--axis",
+        "0",
+        "1",
+        "0",
+        "--range",
+        "-2",
+        "2",
+        "--velocity",
+        "2",
+        "--force",
+        "2000",
+        "--mass",
+        "60",
+    )
     assert run("compose", published("UR5"), *options, "--out", out).code == 0
     assert decompositions(run, out)["rail"] == "closed_form"
 
@@ -172,4 +229,7 @@ def test_tables_may_be_in_degrees_and_json_stays_in_rad(run):
     assert "-180 to 180 deg" in text
     assert " m/s" in text
     assert "deg" not in plain.partition("task space")[0]
-    assert run("inspect", robot, "--degrees", "--json").out == run("inspect", robot, "--json").out
+    assert (
+        run("inspect", robot, "--degrees", "--json").out
+        == run("inspect", robot, "--json").out
+    )

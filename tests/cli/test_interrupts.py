@@ -38,7 +38,9 @@ main()
 """
 
 
-def brachis(where: str, how: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+def brachis(
+    where: str, how: str, *arguments: object
+) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-c", SCRIPT, where, how, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
@@ -62,7 +64,9 @@ def test_a_press_before_anything_is_planned(where, how, write, task, tmp_path):
 
 
 def test_a_press_while_files_are_written(write, task, tmp_path):
-    done = brachis("matplotlib", "swallowed", "plan", write(task), "--out", tmp_path / "out")
+    done = brachis(
+        "matplotlib", "swallowed", "plan", write(task), "--out", tmp_path / "out"
+    )
     assert done.returncode == 130, done.stderr
     assert done.stderr == "brachis: interrupted\n"
 
@@ -75,4 +79,8 @@ def test_a_press_is_told_in_json(write, task):
 
 def test_a_second_press_ends_at_once(write, task):
     done = brachis("numpy", "twice", "plan", write(task))
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "brachis: interrupted\n")
+    assert (done.returncode, done.stdout, done.stderr) == (
+        130,
+        "",
+        "brachis: interrupted\n",
+    )

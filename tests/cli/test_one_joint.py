@@ -14,7 +14,10 @@ from support.chains import Joint, chain_urdf
 from support.effort import QUICK
 
 LIMIT = {"lower": -1.0, "upper": 1.0, "velocity": 3.0, "effort": 20.0}
-ROBOTS = {"prismatic": ((1.0, 0.0, 0.0), "x", 0.5), "revolute": ((0.0, 0.0, 1.0), "y", 0.2)}
+ROBOTS = {
+    "prismatic": ((1.0, 0.0, 0.0), "x", 0.5),
+    "revolute": ((0.0, 0.0, 1.0), "y", 0.2),
+}
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
@@ -49,13 +52,17 @@ def test_plan(run, files, tmp_path):
 
 @pytest.mark.parametrize("kind", PLOTS)
 def test_plot(kind, run, files, tmp_path):
-    outcome = run("plot", files / "result.npz", "--kind", kind, "--out", tmp_path / "figure.svg")
+    outcome = run(
+        "plot", files / "result.npz", "--kind", kind, "--out", tmp_path / "figure.svg"
+    )
     assert outcome.code == 0, outcome.err
     assert b"<svg" in (tmp_path / "figure.svg").read_bytes()
 
 
 def test_export_verify_inspect(run, files, tmp_path):
-    outcome = run("export", files / "result.npz", "--out", tmp_path / "motion.csv", "--dt", 0.01)
+    outcome = run(
+        "export", files / "result.npz", "--out", tmp_path / "motion.csv", "--dt", 0.01
+    )
     assert outcome.code == 0, outcome.err
     with (tmp_path / "motion.csv").open() as stream:
         rows = list(csv.reader(stream))

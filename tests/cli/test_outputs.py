@@ -77,7 +77,10 @@ def test_nothing_is_written_over_other_files(case, run, saved, monkeypatch):
     command = OVER[case]
     outcome = run(*command, *(RAIL if command[0] == "compose" else ()))
     assert outcome.code == 2, outcome.err
-    assert any(part in outcome.err for part in ("over an input", "of another kind", "not written by", "the format"))
+    assert any(
+        part in outcome.err
+        for part in ("over an input", "of another kind", "not written by", "the format")
+    )
     assert contents(saved) == before
 
 
@@ -86,7 +89,10 @@ def test_a_link_to_an_input_is_that_input(run, saved, tmp_path):
     (tmp_path / "new.urdf").symlink_to(saved / "robot.urdf")
     before = contents(saved)
     assert run("export", saved / "result.npz", "--out", tmp_path / "new.csv").code == 2
-    assert run("compose", saved / "robot.urdf", *RAIL, "--out", tmp_path / "new.urdf").code == 2
+    assert (
+        run("compose", saved / "robot.urdf", *RAIL, "--out", tmp_path / "new.urdf").code
+        == 2
+    )
     assert contents(saved) == before
 
 
@@ -94,10 +100,38 @@ def test_older_files_of_the_same_kind_are_written_over(run, saved, tmp_path):
     (tmp_path / "empty.csv").touch()  # as mktemp makes it
     for _ in range(2):
         for command in (
-            ("export", saved / "result.npz", "--out", tmp_path / "motion.csv", "--dt", 0.1),
-            ("export", saved / "result.npz", "--out", tmp_path / "empty.csv", "--dt", 0.1),
-            ("plot", saved / "result.npz", "--kind", "torques", "--out", tmp_path / "figure.svg"),
-            ("plot", saved / "result.npz", "--kind", "torques", "--out", tmp_path / "figure.pdf"),
+            (
+                "export",
+                saved / "result.npz",
+                "--out",
+                tmp_path / "motion.csv",
+                "--dt",
+                0.1,
+            ),
+            (
+                "export",
+                saved / "result.npz",
+                "--out",
+                tmp_path / "empty.csv",
+                "--dt",
+                0.1,
+            ),
+            (
+                "plot",
+                saved / "result.npz",
+                "--kind",
+                "torques",
+                "--out",
+                tmp_path / "figure.svg",
+            ),
+            (
+                "plot",
+                saved / "result.npz",
+                "--kind",
+                "torques",
+                "--out",
+                tmp_path / "figure.pdf",
+            ),
             ("schema", "--out", tmp_path / "schema.json"),
             ("compose", saved / "robot.urdf", *RAIL, "--out", tmp_path / "cell.urdf"),
         ):
@@ -107,13 +141,28 @@ def test_older_files_of_the_same_kind_are_written_over(run, saved, tmp_path):
 
 @pytest.mark.skipif(not FULL.exists(), reason="only Linux has /dev/full")
 @pytest.mark.parametrize(
-    "arguments", [("schema",), ("--help",), ("inspect", SCARA, "--json"), ("verify", "gone", "--json")]
+    "arguments",
+    [
+        ("schema",),
+        ("--help",),
+        ("inspect", SCARA, "--json"),
+        ("verify", "gone", "--json"),
+    ],
 )
 def test_a_full_disk_behind_standard_output_is_no_fault(arguments):
     with FULL.open("w") as full:
-        done = subprocess.run([*COMMAND, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        done = subprocess.run(
+            [*COMMAND, *arguments],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
     assert done.returncode == 1
-    assert "brachis: standard output cannot be written: No space left on device\n" in done.stderr
+    assert (
+        "brachis: standard output cannot be written: No space left on device\n"
+        in done.stderr
+    )
     assert "fault of brachis" not in done.stderr
     assert "Exception ignored" not in done.stderr
 
@@ -121,7 +170,13 @@ def test_a_full_disk_behind_standard_output_is_no_fault(arguments):
 def test_a_closed_pipe_is_quiet():
     reading, writing = os.pipe()
     os.close(reading)
-    done = subprocess.run([*COMMAND, "schema"], stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
+    done = subprocess.run(
+        [*COMMAND, "schema"],
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
     os.close(writing)
     assert done.returncode == 1
     assert done.stderr == ""
@@ -129,7 +184,10 @@ def test_a_closed_pipe_is_quiet():
 
 def test_closed_standard_output_is_no_fault():
     done = subprocess.run(
-        ["/bin/sh", "-c", 'exec "$0" "$@" >&-', *COMMAND, "schema"], stderr=subprocess.PIPE, text=True, check=False
+        ["/bin/sh", "-c", 'exec "$0" "$@" >&-', *COMMAND, "schema"],
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -139,21 +197,32 @@ def test_the_last_row(end, run, saved, tmp_path):
     table = tmp_path / "motion.csv"
     trajectory = brachis.Trajectory.load(saved / "result.npz")
     dt = trajectory.t_end / 7.5
-    assert run("export", saved / "result.npz", "--out", table, "--dt", dt, "--last", end).code == 0
+    assert (
+        run(
+            "export", saved / "result.npz", "--out", table, "--dt", dt, "--last", end
+        ).code
+        == 0
+    )
     with table.open() as stream:
         rows = [[float(cell) for cell in row] for row in list(csv.reader(stream))[1:]]
     assert len(rows) == 9
     assert rows[-1][0] == (trajectory.t_end if end == "exact" else 8 * dt)
-    np.testing.assert_allclose(rows[-1][1:4], trajectory.position(trajectory.t_end), atol=1e-14)
+    np.testing.assert_allclose(
+        rows[-1][1:4], trajectory.position(trajectory.t_end), atol=1e-14
+    )
     if end == "hold":
-        np.testing.assert_array_equal(rows[-1][4:], np.zeros(9))  # no gravity: nothing holds the posture
+        np.testing.assert_array_equal(
+            rows[-1][4:], np.zeros(9)
+        )  # no gravity: nothing holds the posture
     outcome = run("export", saved / "result.npz", "--out", table, "--last", "held")
     assert outcome.code == 2
     assert "Did you mean 'hold'?" in outcome.err
 
 
 def test_a_period_longer_than_the_motion_is_warned_of(run, saved, tmp_path):
-    outcome = run("export", saved / "result.npz", "--out", tmp_path / "motion.csv", "--dt", 4)
+    outcome = run(
+        "export", saved / "result.npz", "--out", tmp_path / "motion.csv", "--dt", 4
+    )
     assert outcome.code == 0
     assert "the period of 4 s is longer than the motion, which takes" in outcome.err
     assert len((tmp_path / "motion.csv").read_text().splitlines()) == 3
@@ -192,12 +261,23 @@ def test_outputs_that_the_system_refuses(name, run, saved, tmp_path):
         assert len(found.err.splitlines()) == 1, command
 
 
-@pytest.mark.parametrize("name", ["a" * 5000, "circle", "[/red]:x:[bold]", "result.npz/x"])
+@pytest.mark.parametrize(
+    "name", ["a" * 5000, "circle", "[/red]:x:[bold]", "result.npz/x"]
+)
 def test_inputs_that_the_system_refuses(name, run, saved, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("circle").symlink_to("circle")
     given = saved / name if name.startswith("result") else name
-    for command in ("plan", "inspect", "verify", "view", "report", "bottleneck", "new", "sweep"):
+    for command in (
+        "plan",
+        "inspect",
+        "verify",
+        "view",
+        "report",
+        "bottleneck",
+        "new",
+        "sweep",
+    ):
         found = run(command, given)
         assert found.code == 2, command
         assert name in found.err, command
@@ -218,7 +298,9 @@ def test_endless_inputs_are_refused(endless, run, saved, tmp_path):
     by_csv = {**task, "path": [{"csv": {"file": str(endless), "relative": True}}]}
     by_urdf = {**task, "robot": {"urdf": str(endless)}}
     (tmp_path / "csv.yaml").write_text(yaml.safe_dump(by_csv))
-    (tmp_path / "urdf.yaml").write_text(yaml.safe_dump({**by_urdf, "path": [{"line": {"by": [0.1, 0.0]}}]}))
+    (tmp_path / "urdf.yaml").write_text(
+        yaml.safe_dump({**by_urdf, "path": [{"line": {"by": [0.1, 0.0]}}]})
+    )
     for command in (
         ("plan", endless),
         ("plan", tmp_path / "csv.yaml"),
@@ -230,4 +312,6 @@ def test_endless_inputs_are_refused(endless, run, saved, tmp_path):
         outcome = run(*command)
         assert outcome.code == 2, command
         assert str(endless) in outcome.err
-        assert any(what in outcome.err for what in ("a pipe", "a folder", "a device", "MB"))
+        assert any(
+            what in outcome.err for what in ("a pipe", "a folder", "a device", "MB")
+        )

@@ -49,7 +49,10 @@ def test_a_start_posture_in_degrees_is_refused_and_the_way_out_works(run, task, 
     path = write(task)
     refused = run("plan", path)
     assert refused.code == 2
-    assert "start.joints: the position looks like degrees; found j1 30 rad, j2 -120 rad, j3 120 rad" in refused.err
+    assert (
+        "start.joints: the position looks like degrees; found j1 30 rad, j2 -120 rad, j3 120 rad"
+        in refused.err
+    )
     assert "--no-strict" in " ".join(refused.err.split())
     for words in (("--no-strict",), ("--set", "strict=false")):
         outcome = run("plan", path, *words)
@@ -75,5 +78,11 @@ def test_inspect_shows_them_as_remarks(run, tmp_path):
     outcome = run("inspect", urdf, "--json")
     assert outcome.code == 0, outcome.err
     remarks = json.loads(outcome.out)["remarks"]
-    assert any("warning: robot.limits.velocity.j1" in remark and "180 rad/s" in remark for remark in remarks)
-    assert not any("warning" in remark for remark in json.loads(run("inspect", SCARA, "--json").out)["remarks"])
+    assert any(
+        "warning: robot.limits.velocity.j1" in remark and "180 rad/s" in remark
+        for remark in remarks
+    )
+    assert not any(
+        "warning" in remark
+        for remark in json.loads(run("inspect", SCARA, "--json").out)["remarks"]
+    )

@@ -23,7 +23,10 @@ def seam(task, write, tmp_path):
     y = np.linspace(0.0, 600.0, 1_500)
     x = 1732.0508 + 20.0 * np.sin(y / 100.0)
     scatter = np.random.default_rng(5).normal(size=(2, 1_500)) * 0.02
-    rows = (f"{a:.4f};{b:.4f}".replace(".", ",") for a, b in zip(x + scatter[0], y + scatter[1], strict=True))
+    rows = (
+        f"{a:.4f};{b:.4f}".replace(".", ",")
+        for a, b in zip(x + scatter[0], y + scatter[1], strict=True)
+    )
     (tmp_path / "seam.csv").write_text("\n".join(["x_mm;y_mm", *rows]))
     task["path"] = [{"csv": {"file": "seam.csv", "tolerance": {"position": "0.12 mm"}}}]
     return write({**task, "start": "free", "redundant_joints": ["j1"], "search": QUICK})
@@ -32,15 +35,28 @@ def seam(task, write, tmp_path):
 def test_inspect_says_what_was_found(seam):
     done = RUNNER.invoke(app, ["inspect", str(seam)])
     assert done.exit_code == 0
-    for text in ("seam.csv", "1500 along", "decimal commas", "semicolons", "length in mm", "scatter by", "0.12 mm"):
+    for text in (
+        "seam.csv",
+        "1500 along",
+        "decimal commas",
+        "semicolons",
+        "length in mm",
+        "scatter by",
+        "0.12 mm",
+    ):
         assert text in done.stdout
-    (fit,) = json.loads(RUNNER.invoke(app, ["inspect", str(seam), "--json"]).stdout)["fits"]
+    (fit,) = json.loads(RUNNER.invoke(app, ["inspect", str(seam), "--json"]).stdout)[
+        "fits"
+    ]
     assert fit["position_error"] <= 0.12e-3
     assert fit["corners"] == []
 
 
 def test_inspect_of_a_path_without_points(task, write):
-    assert "no part of the path comes from points" in RUNNER.invoke(app, ["inspect", str(write(task))]).stdout
+    assert (
+        "no part of the path comes from points"
+        in RUNNER.invoke(app, ["inspect", str(write(task))]).stdout
+    )
 
 
 def test_plan_reports_and_draws_the_fit(seam, tmp_path):
@@ -50,7 +66,14 @@ def test_plan_reports_and_draws_the_fit(seam, tmp_path):
     (fit,) = json.loads((tmp_path / "out/result.json").read_text())["fits"]
     assert 0.0 < fit["position_rms"] < fit["position_error"] <= 0.12e-3
     assert (tmp_path / "out/fit.png").stat().st_size > 1000
-    arguments = ["plot", str(tmp_path / "out/result.npz"), "--kind", "fit", "--out", str(tmp_path / "again.svg")]
+    arguments = [
+        "plot",
+        str(tmp_path / "out/result.npz"),
+        "--kind",
+        "fit",
+        "--out",
+        str(tmp_path / "again.svg"),
+    ]
     assert RUNNER.invoke(app, arguments).exit_code == 0
 
 

@@ -20,11 +20,21 @@ def recorded(tmp_path_factory):
     folder, task = tmp_path_factory.mktemp("recorded"), yaml.safe_load(TASK.read_text())
     task["robot"]["urdf"] = str(SCARA)
     task |= {"spline": {"intervals": 6}, "search": QUICK}
-    slow = {**task, "robot": {**task["robot"], "limits": {"torque": 5.0, "velocity": None}}}
+    slow = {
+        **task,
+        "robot": {**task["robot"], "limits": {"torque": 5.0, "velocity": None}},
+    }
     trajectory = brachis.plan(slow).trajectory
     samples = trajectory.sample(0.01)
     table = np.column_stack([samples.t, np.rad2deg(samples.q)])
-    np.savetxt(folder / "today.csv", table, delimiter=",", header="t,j1,j2,j3", comments="", fmt="%.17g")
+    np.savetxt(
+        folder / "today.csv",
+        table,
+        delimiter=",",
+        header="t,j1,j2,j3",
+        comments="",
+        fmt="%.17g",
+    )
     (folder / "cell.yaml").write_text(yaml.safe_dump(task))
     return folder / "today.csv", folder / "cell.yaml", trajectory
 
@@ -32,7 +42,9 @@ def recorded(tmp_path_factory):
 def test_import(run, recorded, tmp_path):
     file, cell, trajectory = recorded
     out = tmp_path / "today.npz"
-    outcome = run("import", file, "--robot", cell, "--angle", "deg", "--out", out, "--degrees")
+    outcome = run(
+        "import", file, "--robot", cell, "--angle", "deg", "--out", out, "--degrees"
+    )
     assert outcome.code == 0, outcome.err
     assert " deg/s " in outcome.out
     assert f"end time t_E: {trajectory.t_end:.4f} s" in outcome.out
@@ -43,13 +55,25 @@ def test_import(run, recorded, tmp_path):
     assert outcome.code == 0, outcome.err
     assert "the motion was not planned: what a limit costs is not known" in outcome.out
     assert run("export", out, "--out", tmp_path / "again.json").code == 0
-    assert run("import", file, "--robot", cell, "--angle", "deg", "--out", cell).code == 2
+    assert (
+        run("import", file, "--robot", cell, "--angle", "deg", "--out", cell).code == 2
+    )
 
 
 def test_import_of_a_urdf_alone(run, recorded, tmp_path):
     file, _, trajectory = recorded
     urdf = trajectory.task.robot.urdf
-    outcome = run("import", file, "--robot", urdf, "--angle", "deg", "--out", tmp_path / "today.npz", "--json")
+    outcome = run(
+        "import",
+        file,
+        "--robot",
+        urdf,
+        "--angle",
+        "deg",
+        "--out",
+        tmp_path / "today.npz",
+        "--json",
+    )
     assert outcome.code == 0, outcome.err
     data = json.loads(outcome.out)
     assert data["t_end"] == pytest.approx(trajectory.t_end)
@@ -65,16 +89,27 @@ def test_compare(run, recorded, tmp_path):
     assert data["t_end_today"] == pytest.approx(trajectory.t_end)
     assert outcome.out.startswith(f"{100 * data['saved']:.1f} % faster: ")
     assert "kept and verified" in outcome.out
-    assert {path.name for path in out.iterdir()} == {"today.npz", "result.npz", "comparison.json", "comparison.png"}
+    assert {path.name for path in out.iterdir()} == {
+        "today.npz",
+        "result.npz",
+        "comparison.json",
+        "comparison.png",
+    }
     assert run("verify", out / "result.npz").code == 0
 
 
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        (("--angle", "grad"), "unknown unit of angle; found grad; allowed: rad, mrad, deg"),
+        (
+            ("--angle", "grad"),
+            "unknown unit of angle; found grad; allowed: rad, mrad, deg",
+        ),
         (("--task-space", "x,z,y,yaw"), "yaw"),
-        (("--tolerance", "0.1"), "no tolerance of a path; found 0.1; allowed: 2e-07 to 0.001"),
+        (
+            ("--tolerance", "0.1"),
+            "no tolerance of a path; found 0.1; allowed: 2e-07 to 0.001",
+        ),
         (("--tolerance", "0"), "no tolerance of a path; found 0.0"),
         (("--noise", "-1"), "noise"),
         ((), 'Degrees? Say so: units={"angle": "deg"}, or --angle deg'),
@@ -83,7 +118,16 @@ def test_compare(run, recorded, tmp_path):
 def test_wrong_options(run, recorded, tmp_path, options, told):
     file, cell, _ = recorded
     degrees = () if not options or "--angle" in options else ("--angle", "deg")
-    outcome = run("import", file, "--robot", cell, *degrees, *options, "--out", tmp_path / "today.npz")
+    outcome = run(
+        "import",
+        file,
+        "--robot",
+        cell,
+        *degrees,
+        *options,
+        "--out",
+        tmp_path / "today.npz",
+    )
     assert outcome.code == 2, outcome.err
     assert told in outcome.err
     assert not (tmp_path / "today.npz").exists()

@@ -20,14 +20,18 @@ def saved(folder, torque=None):
         settings = trajectory.task.robot
         limits = dataclasses.replace(settings.limits, torque=torque)
         robot = settings.model_copy(update={"limits": limits})
-        trajectory = dataclasses.replace(trajectory, task=trajectory.task.model_copy(update={"robot": robot}))
+        trajectory = dataclasses.replace(
+            trajectory, task=trajectory.task.model_copy(update={"robot": robot})
+        )
     trajectory.save(folder / "motion.npz")
     return folder / "motion.npz"
 
 
 def test_a_report_lies_beside_its_motion_and_keeps_to_its_own_files(run, tmp_path):
     result, page = saved(tmp_path), tmp_path / "motion.html"
-    page.write_text("<!doctype html>\n<!-- brachis report -->\nan older one", encoding="utf-8")
+    page.write_text(
+        "<!doctype html>\n<!-- brachis report -->\nan older one", encoding="utf-8"
+    )
     outcome = run("report", result, "--title", "the first line")
     assert outcome.code == 0, outcome.err
     assert str(page) in outcome.out
@@ -47,8 +51,12 @@ def test_an_unverified_motion_is_reported_with_its_exit_code(run, tmp_path):
     assert "NOT VERIFIED" in (tmp_path / "bad.html").read_text(encoding="utf-8")
 
 
-def test_a_robot_without_a_name_leaves_the_title_to_the_file(run, tmp_path, monkeypatch):
+def test_a_robot_without_a_name_leaves_the_title_to_the_file(
+    run, tmp_path, monkeypatch
+):
     result = saved(tmp_path)
     monkeypatch.setattr(Robot, "name", "")
     assert run("report", result).code == 0
-    assert "<title>motion.npz: verified</title>" in (tmp_path / "motion.html").read_text(encoding="utf-8")
+    assert "<title>motion.npz: verified</title>" in (
+        tmp_path / "motion.html"
+    ).read_text(encoding="utf-8")

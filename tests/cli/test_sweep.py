@@ -19,12 +19,34 @@ def sweep_file(tmp_path, write, task, monkeypatch):
         for plan in plans:
             length = plan.task.path[0].line.length
             if length > 3.0:
-                yield plan, Outcome({"status": "failed", "error": "PathError", "message": "out of reach"})
+                yield (
+                    plan,
+                    Outcome(
+                        {
+                            "status": "failed",
+                            "error": "PathError",
+                            "message": "out of reach",
+                        }
+                    ),
+                )
             else:
-                yield plan, Outcome({"status": "verified", "t_end_s": length / 2.0, "wall_time_s": 40.0})
+                yield (
+                    plan,
+                    Outcome(
+                        {
+                            "status": "verified",
+                            "t_end_s": length / 2.0,
+                            "wall_time_s": 40.0,
+                        }
+                    ),
+                )
 
     monkeypatch.setattr(sweeps_run, "pool_for", lambda *_settings: pool)
-    content = {"sweep": 1, "task": str(write(task)), "grid": {"path.0.line.length": [1.0, 2.0, 3.0, 4.0]}}
+    content = {
+        "sweep": 1,
+        "task": str(write(task)),
+        "grid": {"path.0.line.length": [1.0, 2.0, 3.0, 4.0]},
+    }
     path = tmp_path / "lengths.yaml"
     path.write_text(yaml.safe_dump(content))
     return path
@@ -36,7 +58,11 @@ def test_a_sweep_is_shown(run, sweep_file, tmp_path, monkeypatch):
     assert done.code == 0
     lines = done.out.splitlines()
     assert lines[0].strip() == "sweep: 4 plans, 3 verified, 0 unverified, 1 failed"
-    cells = [[cell.strip() for cell in line.strip("│").split("│")] for line in lines if line.startswith("│")]
+    cells = [
+        [cell.strip() for cell in line.strip("│").split("│")]
+        for line in lines
+        if line.startswith("│")
+    ]
     assert cells == [
         ["t_end [s]", "0.5", "1", "1.5"],
         ["plan", "0", "1", "2"],
@@ -58,7 +84,11 @@ def test_a_sweep_as_json(run, sweep_file, tmp_path):
     assert (told["plans"], told["verified"], told["failed"]) == (4, 3, 1)
     assert told["best"] == {"plan": 0, "path.0.line.length": 1.0, "t_end_s": 0.5}
     assert told["failures"] == {"PathError": {"plans": 1, "message": "out of reach"}}
-    assert [name.rsplit("/")[-1] for name in told["files"]] == ["table.parquet", "table.csv", "sweep.png"]
+    assert [name.rsplit("/")[-1] for name in told["files"]] == [
+        "table.parquet",
+        "table.csv",
+        "sweep.png",
+    ]
 
 
 def test_no_verified_plan_is_exit_code_1(run, sweep_file, tmp_path):

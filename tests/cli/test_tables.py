@@ -25,7 +25,11 @@ def printed(width, columns, rows, **options):
 
 COLUMNS = ("what", *(Column(f"value {i} [s]", number=True) for i in range(6)), "remark")
 ROWS = [
-    ("first thing", *(f"{-1.23456 * 10**i:.5f}" for i in range(6)), "a remark of many words that has to be wrapped"),
+    (
+        "first thing",
+        *(f"{-1.23456 * 10**i:.5f}" for i in range(6)),
+        "a remark of many words that has to be wrapped",
+    ),
     ("second thing", *("1.2e-13" for _ in range(6)), ""),
 ]
 
@@ -47,14 +51,24 @@ def test_a_table_has_lines_where_they_fit_and_parts_where_nothing_else_does():
 
 
 def test_long_words_of_text_are_broken_not_lost():
-    text = printed(30, ("", ""), [("branch", "shoulder_front_elbow_up_wrist_flipped")], header=False)
+    text = printed(
+        30,
+        ("", ""),
+        [("branch", "shoulder_front_elbow_up_wrist_flipped")],
+        header=False,
+    )
     assert "shoulder_front_elbow_up_wrist_flipped" in re.sub(r"\s|│|branch", "", text)
     assert max(map(len, text.splitlines())) <= 30
 
 
 @pytest.fixture(scope="module")
 def result():
-    return brachis.plan(ROOT / "examples/01_scara_line.yaml", effort="single", intervals=6, least_motion=False)
+    return brachis.plan(
+        ROOT / "examples/01_scara_line.yaml",
+        effort="single",
+        intervals=6,
+        least_motion=False,
+    )
 
 
 @pytest.fixture
@@ -62,9 +76,13 @@ def points(task, write, tmp_path):
     """A task along points with a corner that is rounded."""
     there = [(1.8, 0.004 * i) for i in range(100)]
     back = [(1.8 - 0.004 * i, 0.396) for i in range(1, 100)]
-    (tmp_path / "points.csv").write_text("\n".join(["x;y", *(f"{x};{y}" for x, y in there + back)]))
+    (tmp_path / "points.csv").write_text(
+        "\n".join(["x;y", *(f"{x};{y}" for x, y in there + back)])
+    )
     tolerance = {"position": "0.1 mm", "corner": "5 mm"}
-    task["path"] = [{"csv": {"file": "points.csv", "tolerance": tolerance, "corner": "blend"}}]
+    task["path"] = [
+        {"csv": {"file": "points.csv", "tolerance": tolerance, "corner": "blend"}}
+    ]
     return write({**task, "start": "free"})
 
 
@@ -88,4 +106,8 @@ def test_no_command_cuts_numbers(case, run, result, points, tmp_path, monkeypatc
     assert len(numbers) > 5
     for width in WIDTHS:
         assert numbers <= set(NUMBER.findall(texts[width])), width
-        assert all(len(line) <= width for line in texts[width].splitlines() if "━" in line or "│" in line)
+        assert all(
+            len(line) <= width
+            for line in texts[width].splitlines()
+            if "━" in line or "│" in line
+        )

@@ -52,7 +52,9 @@ def test_a_plan_is_shown(run, write, task, looked_at):
 
 
 @pytest.mark.parametrize("folder", [False, True])
-def test_a_saved_motion_is_shown_by_its_file_or_its_folder(run, saved, looked_at, folder):
+def test_a_saved_motion_is_shown_by_its_file_or_its_folder(
+    run, saved, looked_at, folder
+):
     shown = run("view", saved.parent if folder else saved, "--port", 0)
     assert shown.code == 0, shown.err
     assert f"look at {looked_at.pop()}" in shown.out
@@ -63,7 +65,12 @@ def test_the_candidates_are_those_of_the_json_beside_the_motion(saved, tmp_path)
     beside = saved.with_suffix(".json")
     data = json.loads(beside.read_text())
     assert _candidates_beside(saved, trajectory) == data["candidates"] != []
-    for other in ("nonsense", json.dumps({**data, "t_end": 9.0}), json.dumps({"t_end": trajectory.t_end}), "[1]"):
+    for other in (
+        "nonsense",
+        json.dumps({**data, "t_end": 9.0}),
+        json.dumps({"t_end": trajectory.t_end}),
+        "[1]",
+    ):
         (tmp_path / "result.json").write_text(other)
         assert _candidates_beside(tmp_path / "result.npz", trajectory) == []
 
@@ -71,7 +78,10 @@ def test_the_candidates_are_those_of_the_json_beside_the_motion(saved, tmp_path)
 def test_a_folder_without_a_motion_is_refused(run, tmp_path):
     refused = run("view", tmp_path)
     assert refused.code == 2
-    assert "is a folder in which there is no motion; allowed: result.npz or unverified.npz" in refused.err
+    assert (
+        "is a folder in which there is no motion; allowed: result.npz or unverified.npz"
+        in refused.err
+    )
 
 
 def test_a_port_in_use_is_refused(run, saved, looked_at, monkeypatch):
@@ -94,7 +104,9 @@ def test_other_machines_are_let_in_with_a_warning(run, saved, looked_at):
 
 def test_ctrl_c_stops_the_viewer(saved):
     command = [sys.executable, "-m", "brachis", "view", str(saved), "--port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as viewer:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as viewer:
         assert "look at http://127.0.0.1:" in viewer.stdout.readline()
         os.kill(viewer.pid, signal.SIGINT)
         _, told = viewer.communicate(timeout=60)

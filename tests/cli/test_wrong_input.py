@@ -22,23 +22,67 @@ WRONG_TASKS = {
     "unknown key": ("robot.limits.torqe", 10, ["robot.limits.torqe", "torque"]),
     "wrong type": ("spline.degree", "three", ["spline.degree", "three"]),
     "NaN": ("start.joints", [0.1, math.nan, 0.2], ["start.joints", "nan"]),
-    "infinity": ("path", [{"line": {"length": math.inf, "angle_deg": 0}}], ["path[0].line", "inf"]),
-    "number of joints": ("start.joints", [0.1, 0.2], ["start.joints", "found 2", "j1, j2, j3"]),
+    "infinity": (
+        "path",
+        [{"line": {"length": math.inf, "angle_deg": 0}}],
+        ["path[0].line", "inf"],
+    ),
+    "number of joints": (
+        "start.joints",
+        [0.1, 0.2],
+        ["start.joints", "found 2", "j1, j2, j3"],
+    ),
     "unknown redundant joint": ("redundant_joints", ["j9"], ["'j9'", "j1, j2, j3"]),
-    "too many redundant joints": ("redundant_joints", ["j1", "j2"], ["found 2", "allowed: 1", "3 joints less 2 rows"]),
+    "too many redundant joints": (
+        "redundant_joints",
+        ["j1", "j2"],
+        ["found 2", "allowed: 1", "3 joints less 2 rows"],
+    ),
     "too few redundant joints": ("redundant_joints", [], ["found 0", "allowed: 1"]),
-    "zero-length path": ("path", [{"line": {"length": 0.0, "angle_deg": 0}}], ["path[0].line", "zero"]),
-    "out of reach": ("path", [{"line": {"length": 5.0, "angle_deg": 0}}], ["out of reach from s = 0.2"]),
-    "out of limits": ("robot.limits.position", {"j2": [-1.0, 1.0]}, ["'j2'", "-2.0944 rad", "-1 rad to 1 rad"]),
-    "end off the path": ("end", {"joints": [0.0, 0.0, 0.0]}, ["end.joints", "off the path", "m off in"]),
-    "unknown branch": ("branch", "elbow_up", ["'elbow_up'", "elbow_positive, elbow_negative"]),
+    "zero-length path": (
+        "path",
+        [{"line": {"length": 0.0, "angle_deg": 0}}],
+        ["path[0].line", "zero"],
+    ),
+    "out of reach": (
+        "path",
+        [{"line": {"length": 5.0, "angle_deg": 0}}],
+        ["out of reach from s = 0.2"],
+    ),
+    "out of limits": (
+        "robot.limits.position",
+        {"j2": [-1.0, 1.0]},
+        ["'j2'", "-2.0944 rad", "-1 rad to 1 rad"],
+    ),
+    "end off the path": (
+        "end",
+        {"joints": [0.0, 0.0, 0.0]},
+        ["end.joints", "off the path", "m off in"],
+    ),
+    "unknown branch": (
+        "branch",
+        "elbow_up",
+        ["'elbow_up'", "elbow_positive, elbow_negative"],
+    ),
     "other branch": ("branch", "elbow_positive", ["another branch", "elbow_negative"]),
     "unknown solver": ("solver.name", "snopt", ["'snopt'", "uno", "ipopt", "slsqp"]),
     "unknown tool frame": ("robot.tool_frame", "tol", ["'tol'", "Did you mean 'tool'"]),
     "missing URDF": ("robot.urdf", "nowhere.urdf", ["nowhere.urdf", "does not exist"]),
-    "no limit at all": ("robot.limits.torque", None, ["'j1'", "robot.limits.torque.j1"]),
-    "torque limit not positive": ("robot.limits.torque", -1, ["robot.limits.torque", "-1"]),
-    "singular start": ("start.joints", [0.3, 0.0, 0.0], ["start.joints", "branches of the closed form meet"]),
+    "no limit at all": (
+        "robot.limits.torque",
+        None,
+        ["'j1'", "robot.limits.torque.j1"],
+    ),
+    "torque limit not positive": (
+        "robot.limits.torque",
+        -1,
+        ["robot.limits.torque", "-1"],
+    ),
+    "singular start": (
+        "start.joints",
+        [0.3, 0.0, 0.0],
+        ["start.joints", "branches of the closed form meet"],
+    ),
 }
 
 
@@ -89,7 +133,9 @@ def test_no_closed_form(run, task, write, tmp_path):
     urdf = tmp_path / "crooked.urdf"
     urdf.write_text(
         text.replace(
-            '<origin xyz="1 0 0"/>\n    <axis xyz="0 0 1"/>', '<origin xyz="1 0 0"/>\n    <axis xyz="0 1 0"/>', 1
+            '<origin xyz="1 0 0"/>\n    <axis xyz="0 0 1"/>',
+            '<origin xyz="1 0 0"/>\n    <axis xyz="0 1 0"/>',
+            1,
         )
     )
     task["robot"]["urdf"] = str(urdf)
@@ -128,11 +174,16 @@ def test_missing_task_file(run, tmp_path):
     assert "nothing.yaml" in outcome.err
 
 
-@pytest.mark.parametrize("command", [("verify",), ("export", "--out", "x.csv"), ("plot", "--out", "x.png")])
+@pytest.mark.parametrize(
+    "command", [("verify",), ("export", "--out", "x.csv"), ("plot", "--out", "x.png")]
+)
 def test_result_that_is_none(command, run, tmp_path):
     broken = tmp_path / "result.npz"
     broken.write_bytes(b"PK no archive")
-    for path, expected in ((broken, "not a brachis result"), (tmp_path / "gone.npz", "does not exist")):
+    for path, expected in (
+        (broken, "not a brachis result"),
+        (tmp_path / "gone.npz", "does not exist"),
+    ):
         outcome = run(command[0], path, *command[1:])
         assert outcome.code == 2
         assert expected in outcome.err
@@ -149,14 +200,23 @@ def test_unusable_output_folder(run, task, write, tmp_path):
 
 def test_error_as_json(run, task, write, tmp_path, monkeypatch):
     task["robot"]["limits"]["torque"] = -1
-    cases = [("plan", write(task)), ("verify", tmp_path / "gone.npz"), ("inspect", tmp_path / "gone.urdf")]
+    cases = [
+        ("plan", write(task)),
+        ("verify", tmp_path / "gone.npz"),
+        ("inspect", tmp_path / "gone.urdf"),
+    ]
     for arguments in cases:
         outcome = run(*arguments, "--json")
         assert outcome.code == 2
         data = json.loads(outcome.out)
         assert outcome.err == f"brachis: {data['error']}\n"
         del data["error"]
-        assert data == {"verified": False, "status": "error", "t_end": None, "exit_code": 2}
+        assert data == {
+            "verified": False,
+            "status": "error",
+            "t_end": None,
+            "exit_code": 2,
+        }
 
     def no_plan(*_arguments, **_options):
         raise PlanningError("no motion")
@@ -164,7 +224,11 @@ def test_error_as_json(run, task, write, tmp_path, monkeypatch):
     monkeypatch.setattr("brachis.planner.plan", no_plan)
     task["robot"]["limits"]["torque"] = 10
     outcome = run("plan", write(task), "--json")
-    assert (outcome.code, json.loads(outcome.out)["exit_code"], json.loads(outcome.out)["error"]) == (1, 1, "no motion")
+    assert (
+        outcome.code,
+        json.loads(outcome.out)["exit_code"],
+        json.loads(outcome.out)["error"],
+    ) == (1, 1, "no motion")
 
 
 def test_fault_of_our_own_is_not_a_traceback(run, task, write, monkeypatch):
@@ -183,13 +247,28 @@ def test_suggestions_come_from_the_valid_names():
 @pytest.mark.parametrize(
     ("command", "told"),
     [
-        (("plan", "scara3"), "scara3: is a robot; allowed: a task file. brachis new scara3 writes a first task for it"),
+        (
+            ("plan", "scara3"),
+            "scara3: is a robot; allowed: a task file. brachis new scara3 writes a first task for it",
+        ),
         (("plan", "scara4"), "there is no robot named 'scara4'"),
-        (("plan", "sweep.yaml"), "found a sweep file; allowed: a task file. brachis sweep sweep.yaml plans it"),
-        (("plan", "README.md"), "README.md: the file is not a task; found README.md: line 1, column 1: not valid YAML"),
-        (("inspect", "p.csv"), "p.csv: the file is not a URDF; found 't,j1\\n0,1\\n' at its beginning"),
+        (
+            ("plan", "sweep.yaml"),
+            "found a sweep file; allowed: a task file. brachis sweep sweep.yaml plans it",
+        ),
+        (
+            ("plan", "README.md"),
+            "README.md: the file is not a task; found README.md: line 1, column 1: not valid YAML",
+        ),
+        (
+            ("inspect", "p.csv"),
+            "p.csv: the file is not a URDF; found 't,j1\\n0,1\\n' at its beginning",
+        ),
         (("sweep", "task.yaml"), "found a task file; allowed: a sweep file"),
-        (("import", "task.yaml", "--robot", "scara3", "--out", "x.npz"), "found a task file; allowed: a CSV file"),
+        (
+            ("import", "task.yaml", "--robot", "scara3", "--out", "x.npz"),
+            "found a task file; allowed: a CSV file",
+        ),
     ],
 )
 def test_other_things_than_are_asked_for(run, tmp_path, monkeypatch, command, told):
@@ -203,11 +282,16 @@ def test_other_things_than_are_asked_for(run, tmp_path, monkeypatch, command, to
     assert told in outcome.err
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="no such files of the kernel")
+@pytest.mark.skipif(
+    not Path("/proc/self/status").exists(), reason="no such files of the kernel"
+)
 @pytest.mark.parametrize("command", ["verify", "export", "plot", "report", "view"])
 @pytest.mark.parametrize("name", ["/proc/self/status", "/proc/self/mem", "/dev/zero"])
 def test_files_of_the_kernel_are_no_results(name, command, run, tmp_path):
-    out = {"export": ["--out", tmp_path / "a.csv"], "plot": ["--out", tmp_path / "a.png"]}.get(command, [])
+    out = {
+        "export": ["--out", tmp_path / "a.csv"],
+        "plot": ["--out", tmp_path / "a.png"],
+    }.get(command, [])
     ended = run(command, name, *out)
     assert ended.code == 2
     assert "the file is not a brachis result" in ended.err

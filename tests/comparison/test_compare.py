@@ -50,7 +50,12 @@ def file(today, tmp_path_factory):
 @pytest.fixture(scope="module")
 def task(today):
     quick = {"spline": {"intervals": 12}, "search": QUICK}
-    return {**today.content, **quick, "start": {"joints": [0.0]}, "path": [{"line": {"by": [1.0]}}]}
+    return {
+        **today.content,
+        **quick,
+        "start": {"joints": [0.0]},
+        "path": [{"line": {"by": [1.0]}}],
+    }
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +75,9 @@ def test_both_begin_in_one_posture_and_end_in_one_place(found):
     planned, given = found.result.trajectory, found.today
     np.testing.assert_allclose(planned.q[0], given.q[0], atol=1e-9)
     _, task_map = bind(given.robot, given.task.task_space)
-    off = task_map.difference(task_map.value(planned.q[-1]), task_map.value(given.q[-1]))
+    off = task_map.difference(
+        task_map.value(planned.q[-1]), task_map.value(given.q[-1])
+    )
     assert np.abs(off).max() < 1e-6
     assert np.abs(planned.q[-1] - given.q[-1]).max() > 0.01
 
@@ -79,7 +86,9 @@ def test_the_limits_are_the_same_and_what_todays_motion_exceeds_is_said(found, t
     assert [use.limit for use in found.uses] == ["torque", "velocity", "acceleration"]
     assert all(use.planned <= 1.0 + 1e-4 for use in found.uses)
     worst = max(use.today for use in found.uses)
-    assert worst == pytest.approx(today.largest_ratio(), abs=1e-3)  # what the rows prove
+    assert worst == pytest.approx(
+        today.largest_ratio(), abs=1e-3
+    )  # what the rows prove
     assert all(use.today <= use.today_up_to for use in found.uses)
     *exceeded, jumps = found.remarks  # as toppra's accelerations do at both ends
     assert "the plan may do so as well" in jumps
@@ -91,13 +100,30 @@ def test_the_limits_are_the_same_and_what_todays_motion_exceeds_is_said(found, t
     assert found.verdict in str(found)
 
 
-def test_what_may_be_between_rows_of_few_digits_is_no_fact(found, today, task, tmp_path):
+def test_what_may_be_between_rows_of_few_digits_is_no_fact(
+    found, today, task, tmp_path
+):
     t = np.append(np.arange(0.0, today.motion.duration, 0.008), today.motion.duration)
-    table, header = np.column_stack([t, today.motion(t)]), ",".join(["t", *today.robot.joint_names])
-    np.savetxt(tmp_path / "today.csv", table, delimiter=",", header=header, comments="", fmt="%.4f")
+    table, header = (
+        np.column_stack([t, today.motion(t)]),
+        ",".join(["t", *today.robot.joint_names]),
+    )
+    np.savetxt(
+        tmp_path / "today.csv",
+        table,
+        delimiter=",",
+        header=header,
+        comments="",
+        fmt="%.4f",
+    )
     rough = brachis.import_motion(tmp_path / "today.csv", task=task)
-    proven, verification = comparison.bound_ratios(rough), brachis.verify_trajectory(rough)
-    coarse = dataclasses.replace(found, today=rough, proven=proven, verification=verification)
+    proven, verification = (
+        comparison.bound_ratios(rough),
+        brachis.verify_trajectory(rough),
+    )
+    coarse = dataclasses.replace(
+        found, today=rough, proven=proven, verification=verification
+    )
     assert verification.worst_ratio > 1.02  # the overshoot of a smoothing spline
     assert not coarse.exceeded
     assert not any("exceeds" in remark for remark in coarse.remarks)
@@ -107,7 +133,9 @@ def test_what_may_be_between_rows_of_few_digits_is_no_fact(found, today, task, t
     assert words in str(coarse)
     *_, ratio = plot_today(coarse).axes
     (band,) = ratio.collections
-    assert band.get_paths()[0].vertices[:, 1].max() == pytest.approx(use.today_up_to, rel=0.02)
+    assert band.get_paths()[0].vertices[:, 1].max() == pytest.approx(
+        use.today_up_to, rel=0.02
+    )
     assert ratio.lines[0].get_ydata().max() <= 1.0 + 1e-4
 
 
@@ -121,13 +149,17 @@ def test_the_figure_shows_both(found):
     t, speeds = speed.lines[1].get_data()
     trajectory = found.result.trajectory
     places = trajectory.robot.tool_placements(trajectory.position(t))[0]
-    assert np.trapezoid(speeds, t) == pytest.approx(np.linalg.norm(np.diff(places, axis=0), axis=1).sum(), rel=1e-3)
+    assert np.trapezoid(speeds, t) == pytest.approx(
+        np.linalg.norm(np.diff(places, axis=0), axis=1).sum(), rel=1e-3
+    )
     assert max(ratio.lines[1].get_ydata()) == pytest.approx(1.0, abs=1e-3)
 
 
 def test_the_end_posture_may_be_kept(found):
     kept = compare(found.today, keep_end=True)
-    np.testing.assert_allclose(kept.result.trajectory.q[-1], found.today.q[-1], atol=1e-6)
+    np.testing.assert_allclose(
+        kept.result.trajectory.q[-1], found.today.q[-1], atol=1e-6
+    )
     assert kept.saved <= found.saved + 1e-3
 
 
@@ -149,7 +181,7 @@ def test_where_the_first_plan_is_slower_others_are_made(found, monkeypatch):
 
 
 def test_the_joint_path_of_today_is_timed(found):
-    from brachis.apps.comparison.planned import _tasks  # noqa: PLC0415
+    from brachis.apps.comparison.planned import _tasks
 
     *_, last = _tasks(found.today, keep_end=False)
     result = brachis.plan(found.today.robot, last)

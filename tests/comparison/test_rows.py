@@ -22,13 +22,18 @@ def imported(folder, digits, dt, kind, share):
     if kind == "jerk":
         edges = np.array([0.0, 0.5, 1.5, 2.0])  # jerk 1, -1, 1
         way = sum(
-            jump * np.clip(t - edge, 0.0, None) ** 3 / 6.0 for jump, edge in zip((1, -2, 2, -1), edges, strict=True)
+            jump * np.clip(t - edge, 0.0, None) ** 3 / 6.0
+            for jump, edge in zip((1, -2, 2, -1), edges, strict=True)
         )
     else:
         way = np.where(t < 1.0, 0.5 * t**2, 1.0 - 0.5 * (2.0 - t) ** 2)
     file = folder / "today.csv"
     np.savetxt(
-        file, np.column_stack([t, np.outer(way, SHARES)]), delimiter=",", header="t,j1,j2,j3", fmt=f"%.{digits}f"
+        file,
+        np.column_stack([t, np.outer(way, SHARES)]),
+        delimiter=",",
+        header="t,j1,j2,j3",
+        fmt=f"%.{digits}f",
     )
     file.write_text(file.read_text().removeprefix("# "))
     limits = {"torque": 1e3, "velocity": None, kind: 1.0 / share}
@@ -43,14 +48,22 @@ def imported(folder, digits, dt, kind, share):
 
 
 def worst(trajectory, kind):
-    return next(proven.worst for proven in bound_ratios(trajectory) if proven.limit == kind)
+    return next(
+        proven.worst for proven in bound_ratios(trajectory) if proven.limit == kind
+    )
 
 
 def check(trajectory, kind):
-    return next(check for check in verify_trajectory(trajectory).checks if check.name == f"{kind} ratio")
+    return next(
+        check
+        for check in verify_trajectory(trajectory).checks
+        if check.name == f"{kind} ratio"
+    )
 
 
-@pytest.mark.parametrize(("digits", "dt"), [(4, 0.008), (5, 0.004), (4, 0.02), (12, 0.004)])
+@pytest.mark.parametrize(
+    ("digits", "dt"), [(4, 0.008), (5, 0.004), (4, 0.02), (12, 0.004)]
+)
 def test_rows_of_a_motion_at_its_limit_prove_no_more(digits, dt, tmp_path):
     """The spline through rounded rows overshoots, and fails its verification; that proves nothing."""
     trajectory = imported(tmp_path, digits, dt, "acceleration", 1.0)
@@ -70,14 +83,20 @@ def test_rows_of_a_motion_beyond_its_limit_prove_it(digits, dt, tmp_path):
 @pytest.mark.parametrize("kind", ["velocity", "jerk"])
 def test_velocity_is_a_mean_over_a_period_and_jerk_one_over_three(kind, tmp_path):
     trajectory = imported(tmp_path, 15, 1.0 / 30.0, kind, 1.0)
-    largest = {"velocity": 1.0 - 0.5 / 30.0, "jerk": 1.0}[kind]  # the velocity has its peak at a row
+    largest = {"velocity": 1.0 - 0.5 / 30.0, "jerk": 1.0}[
+        kind
+    ]  # the velocity has its peak at a row
     assert worst(trajectory, kind)[0] == pytest.approx(largest, abs=1e-9)
 
 
 def test_torques_are_those_of_the_mean_motion(tmp_path):
     trajectory = imported(tmp_path, 15, 0.008, "acceleration", 1.0)
     t = np.linspace(0.0, 1.0, 1001)
-    q, qdot, qddot = (np.outer(part, SHARES) for part in (0.5 * t**2, t, np.ones_like(t)))
+    q, qdot, qddot = (
+        np.outer(part, SHARES) for part in (0.5 * t**2, t, np.ones_like(t))
+    )
     speeding = np.abs(dynamics.torque(trajectory.robot, q, qdot, qddot)).max()
     braking = np.abs(dynamics.torque(trajectory.robot, SHARES - q, qdot, -qddot)).max()
-    assert worst(trajectory, "torque")[0] == pytest.approx(max(speeding, braking) / 1e3, rel=0.01)
+    assert worst(trajectory, "torque")[0] == pytest.approx(
+        max(speeding, braking) / 1e3, rel=0.01
+    )

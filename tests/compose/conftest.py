@@ -23,7 +23,9 @@ def arm_text(*, more: str = "") -> str:
     """Text of three joints about unlike axes, 4 kg + 3 kg + 2 kg, on a base of 7 kg below ``world``."""
     joints = [
         Joint("revolute", axis=(0.0, 0.0, 1.0), xyz=(0.0, 0.1, 0.4)),
-        Joint("revolute", axis=(0.0, 1.0, 0.0), xyz=(0.1, 0.0, 0.2), rpy=(0.1, 0.2, -0.3)),
+        Joint(
+            "revolute", axis=(0.0, 1.0, 0.0), xyz=(0.1, 0.0, 0.2), rpy=(0.1, 0.2, -0.3)
+        ),
         Joint("revolute", axis=(1.0, 0.0, 0.2), xyz=(0.3, 0.0, 0.05)),
     ]
     text = chain_urdf(joints, tool=(0.2, 0.1, 0.0), more=more)
@@ -42,7 +44,9 @@ def arm(tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def maker() -> ModuleType:
     """The script robots/make_robots.py, imported without leaving compiled files in its folder."""
-    spec = importlib.util.spec_from_file_location("make_robots", ROOT / "robots/make_robots.py")
+    spec = importlib.util.spec_from_file_location(
+        "make_robots", ROOT / "robots/make_robots.py"
+    )
     module = importlib.util.module_from_spec(spec)
     before, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:

@@ -62,13 +62,21 @@ def test_relative_meshes_are_found_from_the_new_file(meshed, tmp_path, folder):
     assert output.read_text() == text
     a, wood, package, absolute, d = files(text)
     assert (package, absolute) == ("package://arm_description/b.dae", "/opt/c.dae")
-    for name, expected in ((a, "arm/meshes/a.stl"), (wood, "wood.png"), (d, "arm/d.stl")):
+    for name, expected in (
+        (a, "arm/meshes/a.stl"),
+        (wood, "wood.png"),
+        (d, "arm/d.stl"),
+    ):
         assert not Path(name).is_absolute()
-        assert (output.parent.resolve() / name).resolve() == (tmp_path / expected).resolve()
+        assert (output.parent.resolve() / name).resolve() == (
+            tmp_path / expected
+        ).resolve()
 
 
 @pytest.mark.parametrize("ros", [False, True])
-def test_meshes_of_a_package_are_found_from_another_folder(meshed, tmp_path, monkeypatch, ros):
+def test_meshes_of_a_package_are_found_from_another_folder(
+    meshed, tmp_path, monkeypatch, ros
+):
     (tmp_path / "arm_description").mkdir()
     (tmp_path / "arm_description/b.dae").touch()
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path) if ros else "")
@@ -84,7 +92,10 @@ def test_meshes_of_a_package_are_found_from_another_folder(meshed, tmp_path, mon
 def test_relative_meshes_become_absolute_without_a_file(meshed, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     a, wood, *_, d = files(on_rail(meshed.relative_to(tmp_path), Rail(**RAIL)))
-    assert [a, wood, d] == [str(tmp_path.resolve() / name) for name in ("arm/meshes/a.stl", "wood.png", "arm/d.stl")]
+    assert [a, wood, d] == [
+        str(tmp_path.resolve() / name)
+        for name in ("arm/meshes/a.stl", "wood.png", "arm/d.stl")
+    ]
 
 
 def test_meshes_can_be_dropped(meshed):
@@ -101,12 +112,24 @@ def test_the_rest_of_the_arm_is_kept_as_written(arm):
     robot = parsed(on_rail(arm, Rail(**RAIL)))
     before = parsed(arm.read_text())
     assert robot.get("name") == "chain_rail"
-    for place in ("transmission", "ros2_control", "material", "gazebo[@reference='link1']", "joint[@name='grip']"):
-        kept, written = (etree.tostring(each.find(place), method="c14n").split() for each in (robot, before))
+    for place in (
+        "transmission",
+        "ros2_control",
+        "material",
+        "gazebo[@reference='link1']",
+        "joint[@name='grip']",
+    ):
+        kept, written = (
+            etree.tostring(each.find(place), method="c14n").split()
+            for each in (robot, before)
+        )
         assert b"".join(kept) == b"".join(written)
     assert [each.text for each in robot.iter(etree.Comment)] == [" a remark "]
     # The arm's own world has become the frame that stands on the carriage.
-    assert [each.get("reference") for each in robot.findall("gazebo")] == ["rail_base", "link1"]
+    assert [each.get("reference") for each in robot.findall("gazebo")] == [
+        "rail_base",
+        "link1",
+    ]
     assert robot.find("joint[@name='mount']/parent").get("link") == "rail_base"
     assert robot.find("joint[@name='rail_mount']/child").get("link") == "rail_base"
 
@@ -135,12 +158,36 @@ def test_text_in_other_scripts(arm):
 
 CLASHES = {
     "joint": ("'j2'", "'rail'", {}, "name", {"name": "slide"}),
-    "joint called as a link": ("'j2'", "'rail_carriage'", {}, "name", {"name": "slide"}),
+    "joint called as a link": (
+        "'j2'",
+        "'rail_carriage'",
+        {},
+        "name",
+        {"name": "slide"},
+    ),
     "link": ("'link2'", "'rail_mount'", {}, "name", {"name": "slide"}),
-    "new name of the root link": ("'link2'", "'rail_base'", {}, "name", {"name": "slide"}),
+    "new name of the root link": (
+        "'link2'",
+        "'rail_base'",
+        {},
+        "name",
+        {"name": "slide"},
+    ),
     "root": ("'base'", "'floor'", {"root": "floor"}, "root", {"root": "ground"}),
-    "name taken from the arm": ("'j2'", "'j2'", {"name": "j3"}, "name", {"name": "rail"}),
-    "both new names": ("'j2'", "'j2'", {"name": "slide", "root": "slide"}, "name", {"name": "rail", "root": "world"}),
+    "name taken from the arm": (
+        "'j2'",
+        "'j2'",
+        {"name": "j3"},
+        "name",
+        {"name": "rail"},
+    ),
+    "both new names": (
+        "'j2'",
+        "'j2'",
+        {"name": "slide", "root": "slide"},
+        "name",
+        {"name": "rail", "root": "world"},
+    ),
 }
 
 

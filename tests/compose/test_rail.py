@@ -28,7 +28,12 @@ MOUNTS = {
     "on a wall": ((0.0, 0.0, 0.5), (0.0, pi / 2, 0.0)),
     "anyhow": ((0.3, -0.1, 0.2), (0.4, -0.7, 2.1)),
 }
-AXES = {"y": (0, 1, 0), "against x": (-1, 0, 0), "vertical": (0, 0, 2), "tilted": (0.5, -1.0, 0.3)}
+AXES = {
+    "y": (0, 1, 0),
+    "against x": (-1, 0, 0),
+    "vertical": (0, 0, 2),
+    "tilted": (0.5, -1.0, 0.3),
+}
 
 
 def robots(path, **options) -> tuple[Robot, Robot]:
@@ -50,7 +55,9 @@ def check_kinematics(path, axis, xyz, rpy) -> None:
     for q in np.random.default_rng(0).uniform(-2.0, 2.0, (5, 4)):
         mounted = pin.SE3(rotation(rpy), np.array(xyz) + q[0] * direction)
         expected = mounted * arm.tool_placement(q[1:])
-        np.testing.assert_allclose(composed.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-14)
+        np.testing.assert_allclose(
+            composed.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-14
+        )
 
 
 @pytest.mark.parametrize("mount", MOUNTS)
@@ -74,7 +81,12 @@ def test_tool_is_shifted_along_any_rail(tmp_path_factory, axis, xyz, rpy):
 def test_limits_are_those_given(arm):
     lonely, composed = robots(arm)
     assert composed.position_units == ("m", "rad", "rad", "rad")
-    for name, figure in (("position_lower", -2.0), ("position_upper", 1.5), ("velocity", 2.0), ("torque", 1500.0)):
+    for name, figure in (
+        ("position_lower", -2.0),
+        ("position_upper", 1.5),
+        ("velocity", 2.0),
+        ("torque", 1500.0),
+    ):
         expected = [figure, *getattr(lonely.limits, name)]
         np.testing.assert_array_equal(getattr(composed.limits, name), expected)
 
@@ -82,9 +94,13 @@ def test_limits_are_those_given(arm):
 def test_everything_moves_with_the_rail(arm):
     """Also the base of the arm, which no joint of its own moves."""
     _, composed = robots(arm)
-    assert sum(inertia.mass for inertia in composed.model.inertias) == pytest.approx(80.0 + ARM_MASS)
+    assert sum(inertia.mass for inertia in composed.model.inertias) == pytest.approx(
+        80.0 + ARM_MASS
+    )
     zero = np.zeros((1, 4))
-    accelerated = dynamics.torque(composed, zero, zero, np.array([[3.0, 0.0, 0.0, 0.0]]))
+    accelerated = dynamics.torque(
+        composed, zero, zero, np.array([[3.0, 0.0, 0.0, 0.0]])
+    )
     assert accelerated[0, 0] == pytest.approx(3.0 * (80.0 + ARM_MASS))
 
 
@@ -93,11 +109,15 @@ def test_rail_carries_its_share_of_the_weight(arm, axis):
     _, composed = robots(arm, axis=AXES[axis])
     still = np.zeros((1, 4))
     share = np.array(AXES[axis])[2] / np.linalg.norm(AXES[axis])
-    assert dynamics.torque(composed, still, still, still)[0, 0] == pytest.approx((80.0 + ARM_MASS) * 9.81 * share)
+    assert dynamics.torque(composed, still, still, still)[0, 0] == pytest.approx(
+        (80.0 + ARM_MASS) * 9.81 * share
+    )
 
 
 @pytest.mark.parametrize(("mount", "up"), [("upright", 1.0), ("inverted", -1.0)])
-def test_gravity_asks_the_same_of_an_upright_arm_and_the_contrary_of_an_inverted_one(arm, mount, up):
+def test_gravity_asks_the_same_of_an_upright_arm_and_the_contrary_of_an_inverted_one(
+    arm, mount, up
+):
     xyz, rpy = MOUNTS[mount]
     _, composed = robots(arm, mount_xyz=xyz, mount_rpy=rpy)
     alone = Robot.from_urdf(arm, gravity=(0.0, 0.0, -9.81 * up))
@@ -105,12 +125,20 @@ def test_gravity_asks_the_same_of_an_upright_arm_and_the_contrary_of_an_inverted
     still = np.zeros_like(q)
     expected = dynamics.torque(alone, q[:, 1:], still[:, 1:], still[:, 1:])
     assert np.abs(expected).max() > 5.0
-    np.testing.assert_allclose(dynamics.torque(composed, q, still, still)[:, 1:], expected, atol=1e-13)
+    np.testing.assert_allclose(
+        dynamics.torque(composed, q, still, still)[:, 1:], expected, atol=1e-13
+    )
 
 
 def test_carriage_is_a_solid_box_below_the_arm(arm):
     text = on_rail(
-        arm, Rail(**RAIL, mount_xyz=(1.0, 0.0, 0.5), mount_rpy=(pi, 0.0, 0.0), carriage_size=(0.6, 0.2, 0.1))
+        arm,
+        Rail(
+            **RAIL,
+            mount_xyz=(1.0, 0.0, 0.5),
+            mount_rpy=(pi, 0.0, 0.0),
+            carriage_size=(0.6, 0.2, 0.1),
+        ),
     )
     model = pin.buildModelFromXML(text)
     # Pinocchio joins the base to the carriage; taken away, the box is left.
@@ -119,7 +147,9 @@ def test_carriage_is_a_solid_box_below_the_arm(arm):
     box = model.inertias[1] - placed
     assert box.mass == pytest.approx(80.0)
     np.testing.assert_allclose(box.lever, [1.0, 0.0, 0.55], atol=1e-12)
-    expected = np.diag([0.2**2 + 0.1**2, 0.6**2 + 0.1**2, 0.6**2 + 0.2**2]) * 80.0 / 12.0
+    expected = (
+        np.diag([0.2**2 + 0.1**2, 0.6**2 + 0.1**2, 0.6**2 + 0.2**2]) * 80.0 / 12.0
+    )
     np.testing.assert_allclose(box.inertia, expected, atol=1e-10)
 
 
@@ -127,7 +157,9 @@ def test_carriage_is_a_solid_box_below_the_arm(arm):
 def test_axis_may_have_any_length(arm, length):
     text = on_rail(arm, Rail(**RAIL, axis=(0.0, 0.6 * length, -0.8 * length)))
     axis = etree.fromstring(text.encode()).find("joint[@name='rail']/axis").get("xyz")
-    np.testing.assert_allclose([float(word) for word in axis.split()], [0.0, 0.6, -0.8], rtol=1e-15)
+    np.testing.assert_allclose(
+        [float(word) for word in axis.split()], [0.0, 0.6, -0.8], rtol=1e-15
+    )
 
 
 def test_rail_on_a_rail(arm, tmp_path):
@@ -137,7 +169,9 @@ def test_rail_on_a_rail(arm, tmp_path):
     robot, alone = Robot.from_urdf("two", urdf_text=text), Robot.from_urdf(arm)
     assert robot.joint_names == ("y_axis", "x_axis", "j1", "j2", "j3")
     placement = robot.tool_placement(np.array([0.3, 0.7, 0.1, 0.2, 0.3])).translation
-    expected = alone.tool_placement(np.array([0.1, 0.2, 0.3])).translation + np.array([0.7, 0.3, 0.0])
+    expected = alone.tool_placement(np.array([0.1, 0.2, 0.3])).translation + np.array(
+        [0.7, 0.3, 0.0]
+    )
     np.testing.assert_allclose(placement, expected, atol=1e-14)
 
 

@@ -35,7 +35,9 @@ def gravity_torque(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 def anywhere(robot: Robot, count: int = 2000) -> np.ndarray:
     limits = robot.limits
-    return np.random.default_rng(0).uniform(limits.position_lower, limits.position_upper, (count, robot.n))
+    return np.random.default_rng(0).uniform(
+        limits.position_lower, limits.position_upper, (count, robot.n)
+    )
 
 
 def turn(axis: str, angle: float) -> pin.SE3:
@@ -47,7 +49,11 @@ def shift(x: float, y: float, z: float) -> pin.SE3:
 
 
 def test_there_are_robots():
-    assert {path.parent.name for path in URDFS} >= {"scara3", "gantry2", *(Path(path).parent.name for path in MADE)}
+    assert {path.parent.name for path in URDFS} >= {
+        "scara3",
+        "gantry2",
+        *(Path(path).parent.name for path in MADE),
+    }
 
 
 @pytest.mark.parametrize("path", URDFS, ids=lambda path: "/".join(path.parts[-2:]))
@@ -55,7 +61,9 @@ def test_robot_is_read_by_brachis_and_yourdfpy(path):
     robot = Robot.from_urdf(path)
     assert robot.n >= 2
     assert np.all(np.isfinite(robot.limits.torque))
-    urdf = yourdfpy.URDF.load(path)  # with its geometry: nothing is missing outside of the file
+    urdf = yourdfpy.URDF.load(
+        path
+    )  # with its geometry: nothing is missing outside of the file
     assert urdf.validate()
     assert len(urdf.actuated_joint_names) == robot.n
     assert len(urdf.scene.geometry) >= 2
@@ -66,7 +74,9 @@ def test_robot_is_read_by_brachis_and_yourdfpy(path):
 def test_robot_is_what_the_script_makes_of_its_figures(maker, name):
     if name.startswith("ur10") and maker.example_robot_data() is None:
         pytest.skip("example-robot-data is not installed")
-    assert maker.MAKERS[name]() == (ROBOTS / name).read_text(), "run python robots/make_robots.py"
+    assert maker.MAKERS[name]() == (ROBOTS / name).read_text(), (
+        "run python robots/make_robots.py"
+    )
 
 
 def test_script_makes_every_composed_robot(maker, monkeypatch, tmp_path, capsys):
@@ -74,11 +84,18 @@ def test_script_makes_every_composed_robot(maker, monkeypatch, tmp_path, capsys)
     monkeypatch.setattr(maker, "example_robot_data", lambda: None)
     for name in {Path(path).parent.name for path in MADE}:
         (tmp_path / name).mkdir()
-        (tmp_path / name / "figures.yaml").write_text((ROBOTS / name / "figures.yaml").read_text())
+        (tmp_path / name / "figures.yaml").write_text(
+            (ROBOTS / name / "figures.yaml").read_text()
+        )
     monkeypatch.setattr(maker, "ROBOTS", tmp_path)
     maker.main()
-    assert "ur10_rail/robot.urdf: left as it is, example-robot-data is not installed" in capsys.readouterr().out
-    assert {str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*.urdf")} == set(MADE[:-1])
+    assert (
+        "ur10_rail/robot.urdf: left as it is, example-robot-data is not installed"
+        in capsys.readouterr().out
+    )
+    assert {
+        str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*.urdf")
+    } == set(MADE[:-1])
 
 
 @pytest.fixture(scope="module")
@@ -89,12 +106,18 @@ def tx90l() -> Robot:
 def test_tx90l_figures(tx90l):
     assert tx90l.joint_names == ("rail", *(f"joint_{i}" for i in range(1, 7)))
     assert (tx90l.base_frame, tx90l.tool_frame) == ("world", "tool")
-    degrees = [[-180, -130, -145, -270, -115, -270], [180, 147.5, 145, 270, 140, 270], [400, 390, 420, 540, 475, 760]]
+    degrees = [
+        [-180, -130, -145, -270, -115, -270],
+        [180, 147.5, 145, 270, 140, 270],
+        [400, 390, 420, 540, 475, 760],
+    ]
     lower, upper, speed = (np.radians(row) for row in degrees)
     np.testing.assert_array_equal(tx90l.limits.position_lower, [-2.0, *lower])
     np.testing.assert_array_equal(tx90l.limits.position_upper, [2.0, *upper])
     np.testing.assert_array_equal(tx90l.limits.velocity, [2.0, *speed])
-    np.testing.assert_array_equal(tx90l.limits.torque, [1500.0, 318.0, 130.0, 65.0, 34.0, 29.0, 11.0])
+    np.testing.assert_array_equal(
+        tx90l.limits.torque, [1500.0, 318.0, 130.0, 65.0, 34.0, 29.0, 11.0]
+    )
 
 
 def test_tx90l_forward_kinematics_are_those_of_an_ortho_parallel_wrist_arm(tx90l):
@@ -104,17 +127,29 @@ def test_tx90l_forward_kinematics_are_those_of_an_ortho_parallel_wrist_arm(tx90l
         rail, q1, q2, q3, q4, q5, q6 = q
         reach = a1 + c2 * math.sin(q2) + c3 * math.sin(q2 + q3)
         height = c1 + c2 * math.cos(q2) + c3 * math.cos(q2 + q3)
-        wrist = np.array([reach * math.cos(q1) - b * math.sin(q1), reach * math.sin(q1) + b * math.cos(q1), height])
+        wrist = np.array(
+            [
+                reach * math.cos(q1) - b * math.sin(q1),
+                reach * math.sin(q1) + b * math.cos(q1),
+                height,
+            ]
+        )
         forearm = turn("z", q1) * turn("y", q2 + q3)
         hand = (forearm * turn("z", q4) * turn("y", q5) * turn("z", q6)).rotation
         placement = tx90l.tool_placement(q)
         np.testing.assert_allclose(placement.rotation, hand, atol=1e-14)
-        np.testing.assert_allclose(placement.translation, wrist + [0.0, rail, 0.0] + c4 * hand[:, 2], atol=1e-14)
+        np.testing.assert_allclose(
+            placement.translation,
+            wrist + [0.0, rail, 0.0] + c4 * hand[:, 2],
+            atol=1e-14,
+        )
 
 
 def test_tx90l_can_be_held_at_the_start_of_the_reference_task(tx90l):
     start = np.array([TX90L_START])
-    assert np.all((tx90l.limits.position_lower < start) & (start < tx90l.limits.position_upper))
+    assert np.all(
+        (tx90l.limits.position_lower < start) & (start < tx90l.limits.position_upper)
+    )
     assert np.all(np.abs(gravity_torque(tx90l, start)) < tx90l.limits.torque)
 
 
@@ -128,7 +163,9 @@ def test_tx90l_gravity_asks_121_of_130_newton_metres(tx90l):
 def test_tx90l_rail_moves_the_whole_arm_and_no_other_carriage(tx90l, tmp_path):
     q, still = np.array([TX90L_START]), np.zeros((1, 7))
     force = dynamics.torque(tx90l, q, still, np.eye(7)[:1])[0, 0]
-    assert force == pytest.approx(10.733459 + 16.934564 + 14.350897 + 7.501506 + 6.420429 + 0.568760 + 0.030977)
+    assert force == pytest.approx(
+        10.733459 + 16.934564 + 14.350897 + 7.501506 + 6.420429 + 0.568760 + 0.030977
+    )
     # With the rail alone 0.8 m take longer than the reference task does: there the arm has to help.
     assert 0.8 / 2.0 + 2.0 / (1500.0 / force) == pytest.approx(0.475, abs=1e-3)
     # A carriage of its own is added by composing.
@@ -138,39 +175,64 @@ def test_tx90l_rail_moves_the_whole_arm_and_no_other_carriage(tx90l, tmp_path):
         output=tmp_path / "new.urdf",
     )
     heavy = Robot.from_urdf("heavy", urdf_text=text)
-    assert dynamics.torque(heavy, q, still, np.eye(7)[:1])[0, 0] == pytest.approx(force + 50.0)
+    assert dynamics.torque(heavy, q, still, np.eye(7)[:1])[0, 0] == pytest.approx(
+        force + 50.0
+    )
     assert heavy.joint_names == tx90l.joint_names
     for name in ("position_lower", "position_upper", "velocity", "torque"):
-        np.testing.assert_array_equal(getattr(heavy.limits, name), getattr(tx90l.limits, name))
+        np.testing.assert_array_equal(
+            getattr(heavy.limits, name), getattr(tx90l.limits, name)
+        )
     for posture in anywhere(tx90l, 5):
         expected = tx90l.tool_placement(posture).homogeneous
-        np.testing.assert_allclose(heavy.tool_placement(posture).homogeneous, expected, atol=1e-15)
+        np.testing.assert_allclose(
+            heavy.tool_placement(posture).homogeneous, expected, atol=1e-15
+        )
 
 
 def test_iiwa14_is_the_published_arm():
     robot = Robot.from_urdf(ROBOTS / "iiwa14/robot.urdf")
     assert robot.joint_names == tuple(f"joint_{i}" for i in range(1, 8))
     assert (robot.base_frame, robot.tool_frame) == ("link_0", "tool")
-    np.testing.assert_array_equal(robot.limits.position_upper, np.radians([170, 120, 170, 120, 170, 120, 175]))
-    np.testing.assert_array_equal(robot.limits.position_lower, -robot.limits.position_upper)
-    np.testing.assert_array_equal(robot.limits.velocity, np.radians([85, 85, 100, 75, 130, 135, 135]))
-    np.testing.assert_array_equal(robot.limits.torque, [320, 320, 176, 176, 110, 40, 40])
+    np.testing.assert_array_equal(
+        robot.limits.position_upper, np.radians([170, 120, 170, 120, 170, 120, 175])
+    )
+    np.testing.assert_array_equal(
+        robot.limits.position_lower, -robot.limits.position_upper
+    )
+    np.testing.assert_array_equal(
+        robot.limits.velocity, np.radians([85, 85, 100, 75, 130, 135, 135])
+    )
+    np.testing.assert_array_equal(
+        robot.limits.torque, [320, 320, 176, 176, 110, 40, 40]
+    )
     assert np.all(np.abs(gravity_torque(robot, anywhere(robot))) < robot.limits.torque)
     # Denavit-Hartenberg: turns about z and x by turns, d_bs, d_se, d_ew, d_wf along z.
-    lengths, twists = (0.36, 0.0, 0.42, 0.0, 0.40, 0.0, 0.126), np.radians([-90, 90, 90, -90, -90, 90, 0])
+    lengths, twists = (
+        (0.36, 0.0, 0.42, 0.0, 0.40, 0.0, 0.126),
+        np.radians([-90, 90, 90, -90, -90, 90, 0]),
+    )
     for q in anywhere(robot, 50):
         expected = pin.SE3.Identity()
         for angle, d, alpha in zip(q, lengths, twists, strict=True):
-            expected = expected * turn("z", angle) * shift(0.0, 0.0, d) * turn("x", alpha)
-        np.testing.assert_allclose(robot.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-14)
+            expected = (
+                expected * turn("z", angle) * shift(0.0, 0.0, d) * turn("x", alpha)
+            )
+        np.testing.assert_allclose(
+            robot.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-14
+        )
 
 
 def test_ur10_rail_is_the_published_arm():
     robot = Robot.from_urdf(ROBOTS / "ur10_rail/robot.urdf")
     assert (robot.base_frame, robot.tool_frame) == ("world", "tool0")
     assert robot.joint_names[0] == "rail"
-    assert sum(inertia.mass for inertia in robot.model.inertias) == pytest.approx(60.0 + 32.7)
-    np.testing.assert_array_equal(robot.limits.torque, [2000.0, 330.0, 330.0, 150.0, 54.0, 54.0, 54.0])
+    assert sum(inertia.mass for inertia in robot.model.inertias) == pytest.approx(
+        60.0 + 32.7
+    )
+    np.testing.assert_array_equal(
+        robot.limits.torque, [2000.0, 330.0, 330.0, 150.0, 54.0, 54.0, 54.0]
+    )
     # Denavit-Hartenberg as the maker publishes it; its base frame is turned by 180 degrees about z.
     rows = (
         (0.1273, 0.0, math.pi / 2),
@@ -185,22 +247,32 @@ def test_ur10_rail_is_the_published_arm():
         for angle, (d, a, alpha) in zip(q[1:], rows, strict=True):
             expected = expected * turn("z", angle) * shift(a, 0.0, d) * turn("x", alpha)
         # The source writes right angles with twelve digits.
-        np.testing.assert_allclose(robot.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-10)
+        np.testing.assert_allclose(
+            robot.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-10
+        )
 
 
 def test_ur10_rail_carries_the_arm_of_example_robot_data(maker):
     folder = maker.example_robot_data()
     if folder is None:
         pytest.skip("example-robot-data is not installed")
-    arm = Robot.from_urdf(folder / "ur_description/urdf/ur10_robot.urdf", tool_frame="tool0")
+    arm = Robot.from_urdf(
+        folder / "ur_description/urdf/ur10_robot.urdf", tool_frame="tool0"
+    )
     robot = Robot.from_urdf(ROBOTS / "ur10_rail/robot.urdf")
     for name in ("position_lower", "position_upper", "velocity", "torque"):
-        np.testing.assert_array_equal(getattr(robot.limits, name)[1:], getattr(arm.limits, name))
+        np.testing.assert_array_equal(
+            getattr(robot.limits, name)[1:], getattr(arm.limits, name)
+        )
     q = anywhere(robot, 20)
-    np.testing.assert_allclose(gravity_torque(robot, q)[:, 1:], gravity_torque(arm, q[:, 1:]), atol=1e-10)
+    np.testing.assert_allclose(
+        gravity_torque(robot, q)[:, 1:], gravity_torque(arm, q[:, 1:]), atol=1e-10
+    )
     for posture in q:
         expected = shift(0.0, posture[0], 0.0) * arm.tool_placement(posture[1:])
-        np.testing.assert_allclose(robot.tool_placement(posture).homogeneous, expected.homogeneous, atol=1e-14)
+        np.testing.assert_allclose(
+            robot.tool_placement(posture).homogeneous, expected.homogeneous, atol=1e-14
+        )
 
 
 PUBLIC = {
@@ -221,13 +293,20 @@ def test_public_arm_on_a_tilted_rail(maker, name, tmp_path):
     output = tmp_path / "composed.urdf"
     rail = Rail(axis=(0.6, 0.8, 1.0), range=(0, 3), velocity=1, force=3000, mass=50)
     on_rail(folder / path, rail, output=output)
-    arm, robot = (Robot.from_urdf(each, tool_frame=tool) for each in (folder / path, output))
+    arm, robot = (
+        Robot.from_urdf(each, tool_frame=tool) for each in (folder / path, output)
+    )
     assert robot.n == 1 + joints
     assert robot.joint_names == ("rail", *arm.joint_names)
     q = np.random.default_rng(2).uniform(-1.0, 1.0, robot.n)
     step = q[0] * np.array([0.6, 0.8, 1.0]) / math.sqrt(2.0)
     expected = shift(*step) * arm.tool_placement(q[1:])
-    np.testing.assert_allclose(robot.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-14)
-    files = [each.get("filename") for each in etree.fromstring(output.read_bytes()).iter("mesh")]
+    np.testing.assert_allclose(
+        robot.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-14
+    )
+    files = [
+        each.get("filename")
+        for each in etree.fromstring(output.read_bytes()).iter("mesh")
+    ]
     assert files
     assert all((output.parent / each).is_file() for each in files)

@@ -14,7 +14,9 @@ from brachis.robot import dynamics
 from .conftest import ROOT
 
 JOINTS = {"gen3": 7, "arm8": 8, "gen3_rails": 9}
-COMPILER = '<mujoco><compiler discardvisual="true" fusestatic="false"/></mujoco></robot>'
+COMPILER = (
+    '<mujoco><compiler discardvisual="true" fusestatic="false"/></mujoco></robot>'
+)
 
 
 def urdf(name: str):
@@ -33,7 +35,10 @@ def gen3() -> Robot:
 def anywhere(robot: Robot, count: int) -> np.ndarray:
     """Joints without end are turned once around."""
     limits = robot.limits
-    lower, upper = np.maximum(limits.position_lower, -math.pi), np.minimum(limits.position_upper, math.pi)
+    lower, upper = (
+        np.maximum(limits.position_lower, -math.pi),
+        np.minimum(limits.position_upper, math.pi),
+    )
     return np.random.default_rng(0).uniform(lower, upper, (count, robot.n))
 
 
@@ -43,13 +48,17 @@ def test_their_drives_can_hold_them(name, joints):
     assert robot.n == joints
     q = anywhere(robot, 2000)
     still = np.zeros_like(q)
-    assert np.all(np.abs(dynamics.torque(robot, q, still, still)) < 0.7 * robot.limits.torque)
+    assert np.all(
+        np.abs(dynamics.torque(robot, q, still, still)) < 0.7 * robot.limits.torque
+    )
 
 
 @pytest.mark.parametrize("name", JOINTS)
 def test_mujoco_agrees_with_torques_and_tool(name):
     mujoco, robot = pytest.importorskip("mujoco"), load(name)
-    model = mujoco.MjModel.from_xml_string(urdf(name).read_text().replace("</robot>", COMPILER))
+    model = mujoco.MjModel.from_xml_string(
+        urdf(name).read_text().replace("</robot>", COMPILER)
+    )
     order = [model.joint(name).qposadr[0] for name in robot.joint_names]
     data, rng = mujoco.MjData(model), np.random.default_rng(1)
     for q in anywhere(robot, 50):
@@ -57,19 +66,31 @@ def test_mujoco_agrees_with_torques_and_tool(name):
         data.qpos[order], data.qvel[order], data.qacc[order] = q, v, a
         mujoco.mj_inverse(model, data)
         torque = dynamics.torque(robot, q[None], v[None], a[None])[0]
-        assert np.all(np.abs(data.qfrc_inverse[order] - torque) < 1e-6 * robot.limits.torque)
+        assert np.all(
+            np.abs(data.qfrc_inverse[order] - torque) < 1e-6 * robot.limits.torque
+        )
         placement = robot.tool_placement(q)
-        np.testing.assert_allclose(data.body(robot.tool_frame).xpos, placement.translation, atol=1e-9)
-        np.testing.assert_allclose(data.body(robot.tool_frame).xmat.reshape(3, 3), placement.rotation, atol=1e-9)
+        np.testing.assert_allclose(
+            data.body(robot.tool_frame).xpos, placement.translation, atol=1e-9
+        )
+        np.testing.assert_allclose(
+            data.body(robot.tool_frame).xmat.reshape(3, 3),
+            placement.rotation,
+            atol=1e-9,
+        )
 
 
 def test_gen3_limits_and_masses(gen3):
     ranges = np.radians([math.inf, 128.9, math.inf, 147.8, math.inf, 120.3, math.inf])
     np.testing.assert_array_equal(gen3.limits.position_upper, ranges)
     np.testing.assert_array_equal(gen3.limits.position_lower, -ranges)
-    np.testing.assert_allclose(gen3.limits.velocity, [1.3963] * 4 + [1.2218] * 3, atol=1e-4)
+    np.testing.assert_allclose(
+        gen3.limits.velocity, [1.3963] * 4 + [1.2218] * 3, atol=1e-4
+    )
     np.testing.assert_array_equal(gen3.limits.torque, [39] * 4 + [9] * 3)
-    assert sum(body.mass for body in gen3.model.inertias) == pytest.approx(8.2, abs=0.02)
+    assert sum(body.mass for body in gen3.model.inertias) == pytest.approx(
+        8.2, abs=0.02
+    )
 
 
 def test_gen3_stands_upright_at_zero(gen3):
@@ -77,7 +98,9 @@ def test_gen3_stands_upright_at_zero(gen3):
     placement = gen3.tool_placement(np.zeros(7))
     np.testing.assert_allclose(placement.rotation, np.eye(3), atol=1e-15)
     offset = 0.005375 + 3 * 0.006375 + 2 * 0.00017505
-    np.testing.assert_allclose(placement.translation, [0.0, -offset, 0.28481 + 0.902575], atol=1e-12)
+    np.testing.assert_allclose(
+        placement.translation, [0.0, -offset, 0.28481 + 0.902575], atol=1e-12
+    )
 
 
 def test_gen3_is_the_published_chain(gen3):
@@ -88,23 +111,43 @@ def test_gen3_is_the_published_chain(gen3):
     for q in anywhere(gen3, 50):
         expected = pin.SE3(pin.exp3(np.array([math.pi, 0.0, 0.0])), np.zeros(3))
         for angle, along, twist in zip(q + turns, d, twists, strict=True):
-            turn = pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), np.array([0.0, 0.0, along]))
-            expected = expected * turn * pin.SE3(pin.exp3(np.array([twist, 0.0, 0.0])), np.zeros(3))
-        np.testing.assert_allclose(gen3.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-12)
+            turn = pin.SE3(
+                pin.exp3(np.array([0.0, 0.0, angle])), np.array([0.0, 0.0, along])
+            )
+            expected = (
+                expected
+                * turn
+                * pin.SE3(pin.exp3(np.array([twist, 0.0, 0.0])), np.zeros(3))
+            )
+        np.testing.assert_allclose(
+            gen3.tool_placement(q).homogeneous, expected.homogeneous, atol=1e-12
+        )
 
 
 def test_gen3_rails_carry_the_same_arm_upside_down(gen3):
     robot = load("gen3_rails")
     hanging = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 1.6]))
     for q in anywhere(robot, 20):
-        moved = pin.SE3(np.eye(3), np.array([*q[:2], 0.0])) * hanging * gen3.tool_placement(q[2:])
-        np.testing.assert_allclose(robot.tool_placement(q).homogeneous, moved.homogeneous, atol=1e-12)
+        moved = (
+            pin.SE3(np.eye(3), np.array([*q[:2], 0.0]))
+            * hanging
+            * gen3.tool_placement(q[2:])
+        )
+        np.testing.assert_allclose(
+            robot.tool_placement(q).homogeneous, moved.homogeneous, atol=1e-12
+        )
     for name in ("position_lower", "position_upper", "velocity", "torque"):
-        np.testing.assert_array_equal(getattr(robot.limits, name)[2:], getattr(gen3.limits, name))
+        np.testing.assert_array_equal(
+            getattr(robot.limits, name)[2:], getattr(gen3.limits, name)
+        )
 
 
 def test_arm8_stands_upright_at_zero_and_no_neighbouring_axes_meet():
     robot = load("arm8")
-    np.testing.assert_allclose(robot.tool_placement(np.zeros(8)).translation, [0.04, 0.0, 1.4], atol=1e-12)
+    np.testing.assert_allclose(
+        robot.tool_placement(np.zeros(8)).translation, [0.04, 0.0, 1.4], atol=1e-12
+    )
     placements = robot.model.jointPlacements[2:]
-    assert [abs(placement.translation[0]) for placement in placements] == pytest.approx([0.04] * 7)
+    assert [abs(placement.translation[0]) for placement in placements] == pytest.approx(
+        [0.04] * 7
+    )

@@ -14,22 +14,40 @@ from .conftest import RAIL, arm_text
 
 FIGURES = {
     "zero axis": ({"axis": (0, 0, 0)}, "axis: has no direction; found [0, 0, 0]"),
-    "short axis": ({"axis": (0, 1)}, "axis: is wrong; found (0, 1); allowed: a direction [x, y, z]"),
+    "short axis": (
+        {"axis": (0, 1)},
+        "axis: is wrong; found (0, 1); allowed: a direction [x, y, z]",
+    ),
     "axis of words": ({"axis": "abc"}, "axis: is wrong; found abc"),
     "axis not a number": ({"axis": (0, math.nan, 0)}, "axis: is wrong"),
-    "range upside down": ({"range": (2, -2)}, "range: is empty; found [2, -2] m; allowed: low < high"),
+    "range upside down": (
+        {"range": (2, -2)},
+        "range: is empty; found [2, -2] m; allowed: low < high",
+    ),
     "empty range": ({"range": (1, 1)}, "range: is empty"),
-    "endless range": ({"range": (-math.inf, 1)}, "range: is wrong; found (-inf, 1); allowed: [low, high] in m"),
+    "endless range": (
+        {"range": (-math.inf, 1)},
+        "range: is wrong; found (-inf, 1); allowed: [low, high] in m",
+    ),
     "one number as range": ({"range": 2.0}, "range: is wrong; found 2.0"),
-    "no velocity": ({"velocity": 0.0}, "velocity: is not positive; found 0.0 m/s; allowed: a finite number > 0 m/s"),
+    "no velocity": (
+        {"velocity": 0.0},
+        "velocity: is not positive; found 0.0 m/s; allowed: a finite number > 0 m/s",
+    ),
     "negative force": ({"force": -5}, "force: is not positive; found -5 N"),
     "infinite force": ({"force": math.inf}, "force: is not positive; found inf N"),
     "no mass": ({"mass": 0}, "mass: is not positive; found 0 kg"),
     "mass not stated": ({"mass": None}, "mass: is not positive; found None kg"),
     "mass not a number": ({"mass": math.nan}, "mass: is not positive; found nan kg"),
-    "mount": ({"mount_xyz": (0, 0)}, "mount_xyz: is wrong; found (0, 0); allowed: [x, y, z] in m"),
+    "mount": (
+        {"mount_xyz": (0, 0)},
+        "mount_xyz: is wrong; found (0, 0); allowed: [x, y, z] in m",
+    ),
     "turned mount": ({"mount_rpy": (0, 0, math.inf)}, "mount_rpy: is wrong"),
-    "flat carriage": ({"carriage_size": (1, 1, 0)}, "carriage_size: is wrong; found (1, 1, 0); allowed: three lengths"),
+    "flat carriage": (
+        {"carriage_size": (1, 1, 0)},
+        "carriage_size: is wrong; found (1, 1, 0); allowed: three lengths",
+    ),
     "empty name": ({"name": ""}, "name: is not a name; found ''"),
     "name with a space": ({"name": "my rail"}, "name: is not a name; found 'my rail'"),
     "name with a null": ({"name": "rail\0"}, "name: is not a name"),
@@ -49,7 +67,9 @@ def test_wrong_figure(arm, tmp_path, case):
 
 @pytest.mark.parametrize("figure", RAIL)
 def test_no_figure_of_the_rail_is_guessed(figure):
-    with pytest.raises(TypeError, match=f"missing 1 required keyword-only argument: '{figure}'"):
+    with pytest.raises(
+        TypeError, match=f"missing 1 required keyword-only argument: '{figure}'"
+    ):
         Rail(**{key: value for key, value in RAIL.items() if key != figure})
 
 
@@ -57,15 +77,29 @@ BASE = "<robot name='x'><link name='base'><inertial><mass value='1'/>{}</inertia
 URDFS = {
     "not XML": ("<robot name='x'><link", ["not well-formed XML"]),
     "empty": ("", ["not a URDF"]),
-    "not a URDF": ("<sdf/>", ["the file is not a URDF", "root element <sdf>", "<robot>"]),
+    "not a URDF": (
+        "<sdf/>",
+        ["the file is not a URDF", "root element <sdf>", "<robot>"],
+    ),
     "no links": ("<robot name='x'/>", ["the URDF has no links"]),
-    "nameless link": ("<robot name='x'>\n<link/></robot>", ["line 2", "a <link> has no name"]),
+    "nameless link": (
+        "<robot name='x'>\n<link/></robot>",
+        ["line 2", "a <link> has no name"],
+    ),
     "links of one name": (
         "<robot name='x'><link name='a'/><link name='a'/></robot>",
         ["links share a name", "found a"],
     ),
-    "two roots": ("<robot name='x'><link name='a'/><link name='b'/></robot>", ["one tree", "root links: a, b"]),
-    "loop": (arm_text().replace("<link name='world'/>", "").replace("link='world'", "link='tool'"), ["none"]),
+    "two roots": (
+        "<robot name='x'><link name='a'/><link name='b'/></robot>",
+        ["one tree", "root links: a, b"],
+    ),
+    "loop": (
+        arm_text()
+        .replace("<link name='world'/>", "")
+        .replace("link='world'", "link='tool'"),
+        ["none"],
+    ),
     "loop beside a tree": (
         arm_text(
             more="<link name='p'/><link name='q'/>"
@@ -75,12 +109,18 @@ URDFS = {
         ["do not form one tree", "a loop of links: p, q"],
     ),
     "closed chain": (
-        arm_text(more="<joint name='z' type='fixed'><parent link='base'/><child link='tool'/></joint>"),
+        arm_text(
+            more="<joint name='z' type='fixed'><parent link='base'/><child link='tool'/></joint>"
+        ),
         ["do not form one tree", "link 'tool' is the child of two joints"],
     ),
     "joint to nowhere": (
         arm_text().replace("<child link='tool'/>", "<child link='tol'/>"),
-        ["the child of joint 'tool_mount' is not a link", "found tol", "world, base, tool"],
+        [
+            "the child of joint 'tool_mount' is not a link",
+            "found tol",
+            "world, base, tool",
+        ],
     ),
     "joint without a parent": (
         arm_text().replace("<parent link='link3'/>", ""),
@@ -90,12 +130,18 @@ URDFS = {
         arm_text(more="<xacro:arm xmlns:xacro='http://www.ros.org/wiki/xacro'/>"),
         ["xacro macros", "<xacro:arm>", "Expand the file with xacro first"],
     ),
-    "xacro property": (arm_text().replace("'tool'", "'${prefix}tool'"), ["xacro macros", "line"]),
+    "xacro property": (
+        arm_text().replace("'tool'", "'${prefix}tool'"),
+        ["xacro macros", "line"],
+    ),
     "figure that is no number": (
         arm_text().replace('mass value="2.0"', "mass value='heavy'"),
         ["link 'link1': <mass value> is wrong", 'value="heavy"'],
     ),
-    "vector too short": (arm_text().replace("xyz='0.0 0.1 0.4'", "xyz='0.0 0.1'"), ["3 finite numbers"]),
+    "vector too short": (
+        arm_text().replace("xyz='0.0 0.1 0.4'", "xyz='0.0 0.1'"),
+        ["3 finite numbers"],
+    ),
     "base without inertia": (
         BASE.format(""),
         ["link 'base' has a mass but no <inertia>"],
@@ -129,7 +175,9 @@ def test_arm_is_never_overwritten(arm, tmp_path, monkeypatch):
     alias.symlink_to(arm)
     monkeypatch.chdir(arm.parent)
     for output in (arm, alias, Path("arm.urdf"), Path("../arm/arm.urdf")):
-        with pytest.raises(InputError, match=r"output .*: is the arm's own file; allowed: another file"):
+        with pytest.raises(
+            InputError, match=r"output .*: is the arm's own file; allowed: another file"
+        ):
             on_rail(arm, Rail(**RAIL), output=output)
     assert arm.read_text() == before
 

@@ -43,7 +43,10 @@ def test_whoever_reads_the_old_file_keeps_it(tmp_path):
         assert reader.read() == b"old"
 
 
-@pytest.mark.parametrize("error", [ValueError("bug"), KeyboardInterrupt(), FileNotFoundError("of another file")])
+@pytest.mark.parametrize(
+    "error",
+    [ValueError("bug"), KeyboardInterrupt(), FileNotFoundError("of another file")],
+)
 def test_an_error_in_the_block_keeps_the_old_file_and_is_passed_on(tmp_path, error):
     path = tmp_path / "file"
     path.write_bytes(b"old")
@@ -57,7 +60,9 @@ def test_permissions_are_those_of_any_new_file(tmp_path):
     (tmp_path / "plain").write_bytes(b"")
     with atomic_write(tmp_path / "atomic") as stream:
         stream.write(b"content")
-    assert stat.S_IMODE((tmp_path / "atomic").stat().st_mode) == stat.S_IMODE((tmp_path / "plain").stat().st_mode)
+    assert stat.S_IMODE((tmp_path / "atomic").stat().st_mode) == stat.S_IMODE(
+        (tmp_path / "plain").stat().st_mode
+    )
 
 
 def test_a_symbolic_link_is_followed(tmp_path):
@@ -86,7 +91,10 @@ def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
 @pytest.mark.parametrize("name", ["nowhere/file", "."])
 def test_what_cannot_be_written_is_named(tmp_path, name):
     path = tmp_path / name
-    with pytest.raises(InputError, match="cannot be written") as caught, atomic_write(path):
+    with (
+        pytest.raises(InputError, match="cannot be written") as caught,
+        atomic_write(path),
+    ):
         pytest.fail("the block must not run")
     assert caught.value.where == str(path)
     assert caught.value.found
@@ -95,7 +103,9 @@ def test_what_cannot_be_written_is_named(tmp_path, name):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has /dev/full")
 def test_a_full_disk_is_named():
     with (
-        pytest.raises(InputError, match="/dev/full: cannot be written; found No space left"),
+        pytest.raises(
+            InputError, match="/dev/full: cannot be written; found No space left"
+        ),
         atomic_write("/dev/full") as stream,
     ):
         stream.write(b"content")

@@ -20,7 +20,12 @@ def table(line_trajectory, tmp_path_factory):
 
 
 def numbers(path):
-    return np.array([[float(cell) for cell in line.split(",")] for line in path.read_text().splitlines()[1:]])
+    return np.array(
+        [
+            [float(cell) for cell in line.split(",")]
+            for line in path.read_text().splitlines()[1:]
+        ]
+    )
 
 
 def test_header_names_every_column(table):
@@ -33,7 +38,9 @@ def test_values_read_back_equal_the_trajectory_exactly(table, line_trajectory):
     assert np.array_equal(values[:, 1:], np.hstack([at.q, at.qdot, at.qddot, at.tau]))
 
 
-def test_rows_are_at_multiples_of_the_period_and_at_the_end_time_exactly(table, line_trajectory):
+def test_rows_are_at_multiples_of_the_period_and_at_the_end_time_exactly(
+    table, line_trajectory
+):
     t = numbers(table)[:, 0]
     assert np.array_equal(t[:-1], np.arange(len(t) - 1) * DT)
     assert t[-1] == line_trajectory.t_end
@@ -47,7 +54,9 @@ def test_lines_end_with_one_newline(table):
     assert not content.endswith(b"\n\n")
 
 
-def test_joint_names_with_commas_stay_one_column(line_trajectory, tmp_path, monkeypatch):
+def test_joint_names_with_commas_stay_one_column(
+    line_trajectory, tmp_path, monkeypatch
+):
     monkeypatch.setattr(type(line_trajectory), "joint_names", ("a,b", 'c"d', "e"))
     export_csv(line_trajectory, tmp_path / "motion.csv", 0.5)
     with (tmp_path / "motion.csv").open(newline="", encoding="utf-8") as stream:
@@ -86,11 +95,18 @@ except InputError as error:
 """
 
 
-def test_a_file_that_cannot_be_written_whole_leaves_the_old_one_and_nothing_else(line_trajectory, tmp_path):
+def test_a_file_that_cannot_be_written_whole_leaves_the_old_one_and_nothing_else(
+    line_trajectory, tmp_path
+):
     path, saved = tmp_path / "motion.csv", tmp_path / "result.npz"
     path.write_text("old")
     line_trajectory.save(saved)
-    done = subprocess.run([sys.executable, "-c", TOO_LARGE, saved, path], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", TOO_LARGE, saved, path],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert done.stdout == f"{path}: cannot be written; found File too large\n"
     assert path.read_text() == "old"
     assert sorted(tmp_path.iterdir()) == [path, saved]

@@ -43,7 +43,12 @@ def written(line_trajectory, tmp_path_factory):
 
 def equals_the_motion(trajectory, t, q, qdot, qddot):
     motion = trajectory.sample(DT)
-    for found, expected in ((t, motion.t), (q, motion.q), (qdot, motion.qdot), (qddot, motion.qddot)):
+    for found, expected in (
+        (t, motion.t),
+        (q, motion.q),
+        (qdot, motion.qdot),
+        (qddot, motion.qddot),
+    ):
         np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
     assert len(t) > 100
 
@@ -51,19 +56,31 @@ def equals_the_motion(trajectory, t, q, qdot, qddot):
 def test_parquet(line_trajectory, written):
     table = pyarrow.parquet.read_table(written(".parquet", dt=DT))
     frame = {name: table[name].to_numpy() for name in table.column_names}
-    parts = (np.column_stack([frame[f"{kind}_{name}"] for name in NAMES]) for kind in ("q", "qd", "qdd"))
+    parts = (
+        np.column_stack([frame[f"{kind}_{name}"] for name in NAMES])
+        for kind in ("q", "qd", "qdd")
+    )
     equals_the_motion(line_trajectory, frame["t"], *parts)
     about = json.loads(table.schema.metadata[b"brachis"])
-    assert about == {"joints": dict.fromkeys(NAMES, "rad"), "t_end_s": line_trajectory.t_end, "left_out": []}
+    assert about == {
+        "joints": dict.fromkeys(NAMES, "rad"),
+        "t_end_s": line_trajectory.t_end,
+        "left_out": [],
+    }
 
 
 def test_json_names_its_schema_and_fulfils_it(line_trajectory, written):
-    content, schema = json.loads(written(".json", dt=DT).read_text()), export.samples_schema()
+    content, schema = (
+        json.loads(written(".json", dt=DT).read_text()),
+        export.samples_schema(),
+    )
     assert content["$schema"] == schema["$id"]
     jsonschema.Draft202012Validator.check_schema(schema)
     jsonschema.validate(content, schema)
     samples = content["samples"]
-    equals_the_motion(line_trajectory, samples["t"], samples["q"], samples["qdot"], samples["qddot"])
+    equals_the_motion(
+        line_trajectory, samples["t"], samples["q"], samples["qdot"], samples["qddot"]
+    )
     assert content["joint_names"] == list(NAMES)
     del samples["q"]
     with pytest.raises(jsonschema.ValidationError, match="'q' is a required property"):
@@ -78,7 +95,10 @@ def equals_the_message(trajectory, message):
     assert message.joint_names == list(NAMES)
     points = message.points
     t = [ros_duration(point.time_from_start) for point in points]
-    parts = ([getattr(point, name) for point in points] for name in ("positions", "velocities", "accelerations"))
+    parts = (
+        [getattr(point, name) for point in points]
+        for name in ("positions", "velocities", "accelerations")
+    )
     equals_the_motion(trajectory, t, *parts)
 
 
@@ -96,7 +116,7 @@ def test_the_bag_defines_its_messages_as_ros_does(written):
     reader.open()
     (schema,) = reader.schemas.values()
     reader.close()
-    from rosbags.typesys import get_types_from_msg  # noqa: PLC0415
+    from rosbags.typesys import get_types_from_msg
 
     found = get_types_from_msg(schema.data, schema.name)
     assert MESSAGE in found
@@ -130,43 +150,66 @@ def test_ros2_yaml(line_trajectory, written):
 @pytest.fixture(scope="module")
 def ur10(line_trajectory):
     """A motion of an arm of six joints on a rail, at rest in between."""
-    from pathlib import Path  # noqa: PLC0415
+    from pathlib import Path
 
     robot = Robot.from_urdf(Path(__file__).parents[2] / "robots/ur10_rail/robot.urdf")
     times, q = np.array([0.0, 1.0]), np.array([np.zeros(7), np.linspace(0.6, 0.7, 7)])
     rest = np.zeros((2, 7))
-    parts = {name: getattr(line_trajectory, name) for name in ("task", "knots", "degree", "control_points")}
-    parts |= {"urdf": robot.urdf, "robot": robot, "redundant_joints": (), "branch": "", "times": times, "q": q}
+    parts = {
+        name: getattr(line_trajectory, name)
+        for name in ("task", "knots", "degree", "control_points")
+    }
+    parts |= {
+        "urdf": robot.urdf,
+        "robot": robot,
+        "redundant_joints": (),
+        "branch": "",
+        "times": times,
+        "q": q,
+    }
     none = {"chart_rows": np.empty((0, 0, 0)), "chart_knots": np.empty(0)}
     return Trajectory(**parts, **none, qdot=rest, qddot=rest, qddot_before=rest)
 
 
 def test_urscript(ur10, tmp_path):
     path, joints = tmp_path / "motion.script", ur10.joint_names[1:]
-    with pytest.raises(InputError, match=r"six joints; found rail \(m\), .*Name the arm's six"):
+    with pytest.raises(
+        InputError, match=r"six joints; found rail \(m\), .*Name the arm's six"
+    ):
         export.write(ur10, path)
     with pytest.warns(BrachisWarning, match="rail"):
         export.write(ur10, path, joints=joints, dt=0.008)
     text = path.read_text()
     postures = [json.loads(found) for found in re.findall(r"servoj\((\[.*?\])", text)]
-    times = [float(found) for found in re.findall(r"servoj\(\[.*?\], 0, 0, ([0-9.e-]+),", text)]
+    times = [
+        float(found)
+        for found in re.findall(r"servoj\(\[.*?\], 0, 0, ([0-9.e-]+),", text)
+    ]
     assert times == [0.008] * 125
-    np.testing.assert_allclose(postures, ur10.position(np.cumsum(times))[:, 1:], atol=1e-9)
+    np.testing.assert_allclose(
+        postures, ur10.position(np.cumsum(times))[:, 1:], atol=1e-9
+    )
     (start,) = re.findall(r"start = (\[.*\])", text)
     np.testing.assert_array_equal(json.loads(start), ur10.q[0, 1:])
-    assert [line.split()[0] for line in text.splitlines()].count("end") == 3  # of def, while and if
+    assert [line.split()[0] for line in text.splitlines()].count(
+        "end"
+    ) == 3  # of def, while and if
 
 
 SENTENCE = "joint rail moves by 0.6 m (0 to 0.6 m) and is not in this file"
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".json", ".yaml", ".script"])
-def test_a_rail_that_moves_and_is_left_out_is_warned_of_and_named_in_the_file(ur10, tmp_path, suffix):
+def test_a_rail_that_moves_and_is_left_out_is_warned_of_and_named_in_the_file(
+    ur10, tmp_path, suffix
+):
     path = tmp_path / f"motion{suffix}"
     with pytest.warns(BrachisWarning) as caught:
         export.write(ur10, path, joints=ur10.joint_names[1:], dt=0.1)
     (warning,) = caught
-    assert str(warning.message).startswith(f"{SENTENCE}. Move what is missing by its own controller")
+    assert str(warning.message).startswith(
+        f"{SENTENCE}. Move what is missing by its own controller"
+    )
     text = path.read_text()
     if suffix == ".json":
         content = json.loads(text)
@@ -178,11 +221,13 @@ def test_a_rail_that_moves_and_is_left_out_is_warned_of_and_named_in_the_file(ur
 
 
 def test_metadata_name_a_rail_that_is_left_out(ur10, tmp_path):
-    from mcap.reader import make_reader  # noqa: PLC0415
+    from mcap.reader import make_reader
 
     for suffix in (".parquet", ".mcap"):
         with pytest.warns(BrachisWarning):
-            export.write(ur10, tmp_path / f"motion{suffix}", joints=ur10.joint_names[1:], dt=0.1)
+            export.write(
+                ur10, tmp_path / f"motion{suffix}", joints=ur10.joint_names[1:], dt=0.1
+            )
     table = pyarrow.parquet.read_table(tmp_path / "motion.parquet")
     assert json.loads(table.schema.metadata[b"brachis"])["left_out"] == [SENTENCE]
     with (tmp_path / "motion.mcap").open("rb") as stream:
@@ -208,11 +253,17 @@ def test_gif(line_trajectory, written):
             pictures.append(np.asarray(film.convert("RGB"), dtype=int))
     assert durations == [1200, 1200, 1200, 1000]
     assert len(pictures) == len(times)
-    for (figure, _), t, picture in zip(frames(line_trajectory, times), times, pictures, strict=True):
+    for (figure, _), t, picture in zip(
+        frames(line_trajectory, times), times, pictures, strict=True
+    ):
         ax, *beside = figure.axes
-        place = line_trajectory.robot.tool_placement(line_trajectory.position(t)).translation[:2]
+        place = line_trajectory.robot.tool_placement(
+            line_trajectory.position(t)
+        ).translation[:2]
         x, y = ax.transData.transform(place)
-        assert picture[picture.shape[0] - round(y), round(x)].max() < 80  # the tool, black
+        assert (
+            picture[picture.shape[0] - round(y), round(x)].max() < 80
+        )  # the tool, black
         (torques,) = beside
         assert "tau" in torques.get_ylabel()
         (now,) = (line for line in torques.lines if line.get_gid() == "now")
@@ -226,9 +277,14 @@ def test_an_animation_may_be_slower_and_nothing_else_may(line_trajectory, tmp_pa
         assert film.n_frames == len(frame_times(line_trajectory, 0.4))
     (figure, _), *_ = frames(line_trajectory, np.zeros(1), 3.0)
     assert figure._suptitle.get_text().endswith("3 times slower")
-    with pytest.raises(InputError, match=r"only animations may be slower; found 2.0; allowed: 1, or .gif, .mp4"):
+    with pytest.raises(
+        InputError,
+        match=r"only animations may be slower; found 2.0; allowed: 1, or .gif, .mp4",
+    ):
         export.write(line_trajectory, tmp_path / "motion.csv", slower=2.0)
-    with pytest.raises(InputError, match=r"slower: out of range; found 0.0; allowed: > 0"):
+    with pytest.raises(
+        InputError, match=r"slower: out of range; found 0.0; allowed: > 0"
+    ):
         export.write(line_trajectory, path, slower=0.0)
 
 
@@ -245,7 +301,10 @@ def test_mp4(line_trajectory, written):
         "json",
     ]
     done = subprocess.run(
-        [shutil.which("ffprobe"), "-v", "error", *asked, path], capture_output=True, text=True, check=True
+        [shutil.which("ffprobe"), "-v", "error", *asked, path],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     (stream,) = json.loads(done.stdout)["streams"]
     assert stream["nb_read_frames"] == str(len(frame_times(line_trajectory, 0.5)))
@@ -254,11 +313,16 @@ def test_mp4(line_trajectory, written):
 
 def test_without_ffmpeg_a_film_is_refused(line_trajectory, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(InputError, match=r"needs ffmpeg, which is not installed\. Install ffmpeg, or write a GIF"):
+    with pytest.raises(
+        InputError,
+        match=r"needs ffmpeg, which is not installed\. Install ffmpeg, or write a GIF",
+    ):
         export.write(line_trajectory, tmp_path / "motion.mp4", dt=0.5)
 
 
-def test_without_its_library_a_format_is_refused(line_trajectory, tmp_path, monkeypatch):
+def test_without_its_library_a_format_is_refused(
+    line_trajectory, tmp_path, monkeypatch
+):
     for module, suffix in (("pyarrow", ".parquet"), ("mcap_ros2.writer", ".mcap")):
         monkeypatch.setitem(__import__("sys").modules, module, None)
         with pytest.raises(InputError, match=r'pip install "brachis\[export\]"'):
@@ -268,10 +332,14 @@ def test_without_its_library_a_format_is_refused(line_trajectory, tmp_path, monk
 
 def test_some_joints_in_an_order_of_ones_own(line_trajectory, tmp_path):
     with pytest.warns(BrachisWarning, match="joint j2 moves by"):
-        export.write(line_trajectory, tmp_path / "motion.csv", joints=["j3", "j1"], dt=0.5)
+        export.write(
+            line_trajectory, tmp_path / "motion.csv", joints=["j3", "j1"], dt=0.5
+        )
     _, header, first, *_ = (tmp_path / "motion.csv").read_text().splitlines()
     assert header == "t,q_j3,q_j1,qd_j3,qd_j1,qdd_j3,qdd_j1,tau_j3,tau_j1"
-    assert [float(cell) for cell in first.split(",")[1:3]] == line_trajectory.q[0, [2, 0]].tolist()
+    assert [float(cell) for cell in first.split(",")[1:3]] == line_trajectory.q[
+        0, [2, 0]
+    ].tolist()
     with pytest.raises(UnknownNameError, match="there is no joint named 'j4'"):
         export.write(line_trajectory, tmp_path / "motion.csv", joints=["j4"])
 
@@ -279,11 +347,23 @@ def test_some_joints_in_an_order_of_ones_own(line_trajectory, tmp_path):
 @pytest.mark.parametrize(
     ("name", "parameters", "told"),
     [
-        ("motion.txt", {}, r"cannot tell the format of the file; found suffix .txt; allowed: .csv, .parquet, .json"),
+        (
+            "motion.txt",
+            {},
+            r"cannot tell the format of the file; found suffix .txt; allowed: .csv, .parquet, .json",
+        ),
         ("motion", {"form": "parkuet"}, "Did you mean 'parquet'"),
-        ("motion.gif", {"dt": 0.005}, r"no period of an animation; found 0.005 s; allowed: a multiple of 0.01 s"),
+        (
+            "motion.gif",
+            {"dt": 0.005},
+            r"no period of an animation; found 0.005 s; allowed: a multiple of 0.01 s",
+        ),
         ("motion.gif", {"dt": 0.0}, "no period of an animation"),
-        ("motion.gif", {"joints": ["j1"]}, "an animation shows the whole robot; found j1"),
+        (
+            "motion.gif",
+            {"joints": ["j1"]},
+            "an animation shows the whole robot; found j1",
+        ),
         ("motion.json", {"last": "held"}, "Did you mean 'hold'"),
     ],
 )
@@ -302,5 +382,7 @@ def test_animations_in_space(ur10):
     ax = figure.axes[0]
     place = pin.SE3(ur10.robot.tool_placement(ur10.q[1])).translation
     (tool,) = (line for line in ax.lines if line.get_gid() == "tool")
-    np.testing.assert_allclose([part[0] for part in tool.get_data_3d()], place, atol=1e-12)
+    np.testing.assert_allclose(
+        [part[0] for part in tool.get_data_3d()], place, atol=1e-12
+    )
     assert pixels.shape[2] == 4

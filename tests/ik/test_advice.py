@@ -34,8 +34,14 @@ def candidates(robot):
     ],
 )
 def test_it_is_required_where_it_has_wheels(python, system, machine, wheels):
-    (required,) = (Requirement(text) for text in PROJECT["dependencies"] if text.startswith("EAIK"))
-    here = {"python_version": python, "sys_platform": system, "platform_machine": machine}
+    (required,) = (
+        Requirement(text) for text in PROJECT["dependencies"] if text.startswith("EAIK")
+    )
+    here = {
+        "python_version": python,
+        "sys_platform": system,
+        "platform_machine": machine,
+    }
     assert required.marker.evaluate(here) is (wheels and python != "3.14")
 
 
@@ -59,7 +65,9 @@ def test_nothing_is_promised_where_no_closed_form_can_be(monkeypatch):
     """Joint 4 of this arm fixes the distance of shoulder and wrist; the others do without EAIK."""
     monkeypatch.setitem(sys.modules, "eaik.pybindings.EAIK", None)
     found = candidates(iiwa())
-    assert [candidate.solver is None for candidate in found] == [i == 3 for i in range(7)]
+    assert [candidate.solver is None for candidate in found] == [
+        i == 3 for i in range(7)
+    ]
     assert ik.missing_eaik(found) == ""
 
 

@@ -11,7 +11,13 @@ import numpy as np
 import pytest
 
 from brachis.errors import DecompositionError
-from brachis.ik import ChainGeometry, NotApplicableError, check_answers, find, margin_gradient
+from brachis.ik import (
+    ChainGeometry,
+    NotApplicableError,
+    check_answers,
+    find,
+    margin_gradient,
+)
 from brachis.ik.eaik import eaik, exact_axes
 from brachis.ik.idealised import Polished
 from brachis.robot import task_map_of
@@ -63,7 +69,9 @@ class Bench:
         """Distance (K,) of each posture from the nearest answer with the label of the posture's own sign."""
         sign = (self.margin(q) < 0.0).astype(int)
         own = answers[np.arange(len(q)), sign]
-        gap = np.abs(wrapped(own - q[:, None, self.rest], np.ones(6, dtype=bool))).max(axis=2)
+        gap = np.abs(wrapped(own - q[:, None, self.rest], np.ones(6, dtype=bool))).max(
+            axis=2
+        )
         return np.where(np.isnan(gap), np.inf, gap).min(axis=1)
 
 
@@ -77,7 +85,9 @@ CASES = {
     "telescope": (telescope, [(2, 3)]),
     "rounded": (functools.partial(iiwa_by_angles, 1.57079633), [(0,), (2,)]),
 }
-CASES |= {f"family {kind}": (functools.partial(family, kind), [()]) for kind in FAMILIES}
+CASES |= {
+    f"family {kind}": (functools.partial(family, kind), [()]) for kind in FAMILIES
+}
 PARAMETERS = [
     pytest.param(robot, redundant, id=f"{name}-{redundant}")
     for name, (robot, choices) in CASES.items()
@@ -95,71 +105,98 @@ def test_all_postures_are_found_and_all_answers_right(robot, redundant):
     answers = bench.solve(q)
     assert answers.shape == (len(q), 2, PER_SIGN, 6)
     finite = np.isfinite(answers).all(axis=3)
-    assert np.array_equal(finite, np.isfinite(answers).any(axis=3)), "an answer is NaN in part"
+    assert np.array_equal(finite, np.isfinite(answers).any(axis=3)), (
+        "an answer is NaN in part"
+    )
     assert np.nanmax(answers) <= np.pi
     assert np.nanmin(answers) > -np.pi
 
     sample, branch, _ = np.nonzero(finite)
     postures = q[sample]
     postures[:, rest] = answers[finite]
-    assert np.abs(bench.space.difference(bench.poses(postures), bench.poses(q)[sample])).max() < 1e-8
+    assert (
+        np.abs(
+            bench.space.difference(bench.poses(postures), bench.poses(q)[sample])
+        ).max()
+        < 1e-8
+    )
 
     margin = bench.margin(postures)
-    assert np.array_equal(margin > 0.0, branch == 0), "an answer has the other sign's label"
+    assert np.array_equal(margin > 0.0, branch == 0), (
+        "an answer has the other sign's label"
+    )
     assert 0.5 < np.abs(margin).max() < 20.0, "margins are of the order of one"
-    determinant = np.linalg.det(bench.space.jacobian(bench.space.twists(postures))[:, :, rest])
+    determinant = np.linalg.det(
+        bench.space.jacobian(bench.space.twists(postures))[:, :, rest]
+    )
     clear = np.abs(margin) > 1e-5
     ratio = margin[clear] / determinant[clear]
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-6)
 
     own = np.abs(bench.margin(q))
-    clear = own > 1e-5  # nearer to the boundary an URDF's rounding decides whether there is an answer
+    clear = (
+        own > 1e-5
+    )  # nearer to the boundary an URDF's rounding decides whether there is an answer
     assert np.mean(clear) > 0.98
     assert np.all(bench.own_gap(q, answers)[clear] < 1e-9 / own[clear])
     regular = np.ones(len(q), dtype=bool)
     regular[sample[np.abs(margin) < 1e-5]] = False
     by_sign = finite.sum(axis=2)
-    assert np.array_equal(by_sign[regular, 0], by_sign[regular, 1]), "answers of either sign are equally many"
+    assert np.array_equal(by_sign[regular, 0], by_sign[regular, 1]), (
+        "answers of either sign are equally many"
+    )
     check_answers(bench.robot, bench.space, tuple(redundant), solver)
 
 
-@pytest.mark.parametrize(("robot", "redundant"), [(ur, ()), (iiwa, (4,)), (panda_lengths, (4,))])
+@pytest.mark.parametrize(
+    ("robot", "redundant"), [(ur, ()), (iiwa, (4,)), (panda_lengths, (4,))]
+)
 def test_answers_of_a_sign_differ_and_stand_in_ascending_order(robot, redundant):
     bench = Bench(robot(), redundant, 500)
     answers = bench.solve(bench.q).reshape(-1, PER_SIGN, 6)
     count = np.isfinite(answers).all(axis=2).sum(axis=1)
-    assert np.array_equal(np.isfinite(answers[:, :, 0]), np.arange(PER_SIGN) < count[:, None]), (
-        "no gaps between alternatives"
-    )
+    assert np.array_equal(
+        np.isfinite(answers[:, :, 0]), np.arange(PER_SIGN) < count[:, None]
+    ), "no gaps between alternatives"
     for first in range(PER_SIGN):
         assert not np.any(np.diff(answers[:, first:, 0], axis=1) < -0.01)
         for second in range(first):
             both = count > first
-            gap = np.abs(wrapped(answers[both, first] - answers[both, second], np.ones(6, dtype=bool)))
+            gap = np.abs(
+                wrapped(
+                    answers[both, first] - answers[both, second], np.ones(6, dtype=bool)
+                )
+            )
             assert np.all(gap.max(axis=1) > 1e-4)
     assert count.max() == 4
 
 
 @pytest.mark.parametrize(
-    ("robot", "redundant"), [(ur, ()), (iiwa, (2,)), (panda_lengths, (5,)), (much_redundant, (0, 1, 4, 9))]
+    ("robot", "redundant"),
+    [(ur, ()), (iiwa, (2,)), (panda_lengths, (5,)), (much_redundant, (0, 1, 4, 9))],
 )
 def test_margin_gradient(robot, redundant):
     bench = Bench(robot(), redundant, 20)
     for branch in (0, 1):
         exact = margin_gradient(bench.solver, bench.q, branch)
         for joint, step in enumerate(1e-6 * np.eye(bench.robot.n)):
-            change = bench.solver.branch_margins(bench.q + step, branch) - bench.solver.branch_margins(
-                bench.q - step, branch
-            )
+            change = bench.solver.branch_margins(
+                bench.q + step, branch
+            ) - bench.solver.branch_margins(bench.q - step, branch)
             np.testing.assert_allclose(exact[:, :, joint], change / 2e-6, atol=1e-8)
 
 
-@pytest.mark.parametrize(("robot", "redundant", "elbow"), [(ur, (), 2), (iiwa, (2,), 3), (telescope, (2, 3), 4)])
+@pytest.mark.parametrize(
+    ("robot", "redundant", "elbow"),
+    [(ur, (), 2), (iiwa, (2,), 3), (telescope, (2, 3), 4)],
+)
 def test_margins_vanish_where_answers_merge(robot, redundant, elbow):
     bench = Bench(robot(), redundant, 200)
     bent = bench.q.copy()
     bent[:, elbow] = 0.1
-    straight = bench.q[np.abs(bench.margin(bent)) > 0.02]  # nothing but the elbow is stretched
+    straight = bench.q[
+        np.abs(bench.margin(bent)) > 0.02
+    ]  # nothing but the elbow is stretched
     assert len(straight) > 50
     margins, distances = [], []
     for bend in (1e-3, 1e-4):
@@ -167,7 +204,9 @@ def test_margins_vanish_where_answers_merge(robot, redundant, elbow):
         q[:, elbow] = bend
         margin, answers = bench.margin(q), bench.solve(q)
         other = answers[np.arange(len(q)), (margin > 0.0).astype(int)]
-        gap = np.abs(wrapped(other - q[:, None, bench.rest], np.ones(6, dtype=bool))).max(axis=2)
+        gap = np.abs(
+            wrapped(other - q[:, None, bench.rest], np.ones(6, dtype=bool))
+        ).max(axis=2)
         margins.append(np.abs(margin) / bend)
         distances.append(np.nanmin(gap, axis=1) / bend)
     for ratios in (margins, distances):
@@ -175,7 +214,10 @@ def test_margins_vanish_where_answers_merge(robot, redundant, elbow):
         assert 1e-2 < ratios[1].min() < ratios[1].max() < 100.0
 
 
-@pytest.mark.parametrize(("robot", "redundant"), [(ur, ()), (iiwa, (1,)), (panda_lengths, (3,)), (rail_arm, (0,))])
+@pytest.mark.parametrize(
+    ("robot", "redundant"),
+    [(ur, ()), (iiwa, (1,)), (panda_lengths, (3,)), (rail_arm, (0,))],
+)
 def test_continuity_follows_a_posture_among_answers_of_its_label(robot, redundant):
     bench = Bench(robot(), redundant, 150)
     t = np.linspace(0.0, 1.0, 301)[:, None]
@@ -189,21 +231,34 @@ def test_continuity_follows_a_posture_among_answers_of_its_label(robot, redundan
         joint_path = [q[0, bench.rest]]
         for choice in answers:
             gap = wrapped(choice - joint_path[-1], np.ones(6, dtype=bool))
-            joint_path.append(joint_path[-1] + gap[np.nanargmin(np.abs(gap).max(axis=1))])
+            joint_path.append(
+                joint_path[-1] + gap[np.nanargmin(np.abs(gap).max(axis=1))]
+            )
         np.testing.assert_allclose(joint_path[1:], q[:, bench.rest], atol=1e-8)
         followed += 1
     assert followed >= 5
 
 
 @pytest.mark.parametrize(
-    ("robot", "redundant"), [(iiwa, (2,)), (iiwa, (4,)), (iiwa, (1,)), (panda_lengths, (4,)), (panda_lengths, (5,))]
+    ("robot", "redundant"),
+    [
+        (iiwa, (2,)),
+        (iiwa, (4,)),
+        (iiwa, (1,)),
+        (panda_lengths, (4,)),
+        (panda_lengths, (5,)),
+    ],
 )
 def test_held_values_at_which_axes_become_almost_parallel(robot, redundant):
     bench = Bench(robot(), redundant)
     rng = np.random.default_rng(6)
     q, count = bench.q, len(bench.q)
-    off = np.where(rng.uniform(size=count) < 0.1, 0.0, 10.0 ** rng.uniform(-16.0, -3.0, count))
-    q[:, redundant[0]] = rng.choice([0.0, 0.5 * np.pi, np.pi], count) + off * rng.choice([-1.0, 1.0], count)
+    off = np.where(
+        rng.uniform(size=count) < 0.1, 0.0, 10.0 ** rng.uniform(-16.0, -3.0, count)
+    )
+    q[:, redundant[0]] = rng.choice(
+        [0.0, 0.5 * np.pi, np.pi], count
+    ) + off * rng.choice([-1.0, 1.0], count)
     q = q[np.abs(bench.margin(q)) > 5e-3]
     assert len(q) > count / 5
     answers = bench.solve(q)
@@ -212,11 +267,21 @@ def test_held_values_at_which_axes_become_almost_parallel(robot, redundant):
     sample = np.nonzero(exists)[0]
     postures = q[sample]
     postures[:, bench.rest] = answers[exists]
-    assert np.abs(bench.space.difference(bench.poses(postures), bench.poses(q)[sample])).max() < 1e-8
+    assert (
+        np.abs(
+            bench.space.difference(bench.poses(postures), bench.poses(q)[sample])
+        ).max()
+        < 1e-8
+    )
 
 
 def test_postures_with_joints_at_quarter_turns():
-    for robot, redundant in ((ur, ()), (iiwa, (2,)), (panda_lengths, (6,)), (rail_arm, (0,))):
+    for robot, redundant in (
+        (ur, ()),
+        (iiwa, (2,)),
+        (panda_lengths, (6,)),
+        (rail_arm, (0,)),
+    ):
         bench = Bench(robot(), redundant, 3000)
         rng = np.random.default_rng(7)
         quarters = rng.choice([-0.5 * np.pi, 0.0, 0.5 * np.pi, np.pi], bench.q.shape)
@@ -226,7 +291,9 @@ def test_postures_with_joints_at_quarter_turns():
         assert bench.own_gap(q, bench.solve(q)).max() < 1e-7
 
 
-@pytest.mark.parametrize(("robot", "redundant"), [(ur, ()), (iiwa, (4,)), (much_redundant, (0, 1, 4, 9))])
+@pytest.mark.parametrize(
+    ("robot", "redundant"), [(ur, ()), (iiwa, (4,)), (much_redundant, (0, 1, 4, 9))]
+)
 def test_what_cannot_be_solved_is_nan_and_disturbs_nothing(robot, redundant):
     bench = Bench(robot(), redundant, 30)
     targets, q_r = bench.poses(bench.q), bench.q[:, bench.redundant]
@@ -247,7 +314,9 @@ def test_what_cannot_be_solved_is_nan_and_disturbs_nothing(robot, redundant):
     assert np.isnan(bench.solver.solve(targets[[3]], q_r[[3]])).all()
 
 
-def test_values_that_recur_and_values_that_are_dropped_give_the_same_answers(monkeypatch):
+def test_values_that_recur_and_values_that_are_dropped_give_the_same_answers(
+    monkeypatch,
+):
     bench = Bench(iiwa(), (2,), 200)
     q = bench.q
     q[:, 2] = np.tile(np.linspace(-1.0, 1.0, 20), 10)
@@ -266,7 +335,9 @@ def test_solvers_can_be_pickled_after_use(robot, redundant):
     answers = bench.solve(bench.q)
     bench.solver = pickle.loads(pickle.dumps(bench.solver))  # noqa: S301  (our own)
     np.testing.assert_allclose(bench.solve(bench.q), answers, atol=1e-12)
-    np.testing.assert_allclose(bench.margin(bench.q), eaik_margin(robot(), redundant, bench.q), atol=1e-12)
+    np.testing.assert_allclose(
+        bench.margin(bench.q), eaik_margin(robot(), redundant, bench.q), atol=1e-12
+    )
 
 
 def eaik_margin(robot, redundant, q):
@@ -280,7 +351,12 @@ def rows(robot, *names):
 @pytest.mark.parametrize(
     ("robot", "redundant", "names", "reason"),
     [
-        (iiwa, (3,), (), "J_nr is singular everywhere: there is always a motion of the tool that needs j4"),
+        (
+            iiwa,
+            (3,),
+            (),
+            "J_nr is singular everywhere: there is always a motion of the tool that needs j4",
+        ),
         (iiwa, (0, 1, 2, 3), ("x", "y", "z"), "no whole pose is prescribed"),
         (rail_arm, (1,), (), "j1 would be left over and not revolute"),
         *((panda_lengths, (i,), (), "EAIK knows no decomposition") for i in (0, 1, 2)),
@@ -322,7 +398,12 @@ assert answers.installed()
 assert "eaik.pybindings.EAIK" in sys.modules
 print(sorted({"urchin", "trimesh", "pyglet", "eaik.IK_Robot"} & set(sys.modules)))
 """
-    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert done.stdout.strip() == "[]"
 
 
@@ -332,13 +413,22 @@ def test_the_registry_takes_it_and_lists_what_it_can_do():
     assert found.family == "eaik"
     with pytest.raises(DecompositionError, match="singular everywhere") as caught:
         find(robot, rows(robot), ["j4"], families=[eaik])
-    assert [names for (names,) in caught.value.available] == ["j1", "j2", "j3", "j5", "j6", "j7"]
+    assert [names for (names,) in caught.value.available] == [
+        "j1",
+        "j2",
+        "j3",
+        "j5",
+        "j6",
+        "j7",
+    ]
 
 
 def lines_apart(axes, points, first, second):
     """Distance of two straight lines that are not parallel."""
     normal = np.cross(axes[:, first, 0], axes[:, second, 0])
-    return abs(normal @ (points[:, second, 0] - points[:, first, 0])) / np.linalg.norm(normal)
+    return abs(normal @ (points[:, second, 0] - points[:, first, 0])) / np.linalg.norm(
+        normal
+    )
 
 
 def test_exact_axes():
@@ -350,7 +440,11 @@ def test_exact_axes():
     axes /= np.linalg.norm(axes, axis=0)
     # The first two meet in one place, the last three in the centre, each given by some point along it.
     places = (
-        centre[:, None] + frame @ np.array([[0, 0, -2], [0, 0, -2], [1, 0, -1], [0, 0, 0], [0, 0, 0], [0, 0, 0.0]]).T
+        centre[:, None]
+        + frame
+        @ np.array(
+            [[0, 0, -2], [0, 0, -2], [1, 0, -1], [0, 0, 0], [0, 0, 0], [0, 0, 0.0]]
+        ).T
     )
     points = places + exact * rng.normal(size=6) + 1e-9 * rng.normal(size=(3, 6))
     axes, points = axes[:, :, None], points[:, :, None]

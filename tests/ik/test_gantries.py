@@ -23,7 +23,9 @@ def macro_mini(first, second, turn, plane_rows):
         Joint("revolute", axis=turn, xyz=(0.05, 0.0, 0.1)),
         Joint("revolute", axis=turn, xyz=(0.4, 0.03, 0.02)),
     ]
-    robot = Robot.from_urdf("macro-mini", urdf_text=chain_urdf(joints, tool=(0.3, 0.02, 0.05)))
+    robot = Robot.from_urdf(
+        "macro-mini", urdf_text=chain_urdf(joints, tool=(0.3, 0.02, 0.05))
+    )
     return Bench(robot, plane_rows, 2000)
 
 

@@ -31,15 +31,32 @@ def scratch(tmp_path_factory):
     scheme = {"base": str(folder), "platbase": str(folder)}
     own = Path(sysconfig.get_path("purelib", "venv", vars=scheme))
     here = {sysconfig.get_path(name) for name in ("purelib", "platlib")}
-    own.joinpath("shared.pth").write_text("".join(f"import site; site.addsitedir({path!r})\n" for path in here))
+    own.joinpath("shared.pth").write_text(
+        "".join(f"import site; site.addsitedir({path!r})\n" for path in here)
+    )
     # Nothing is fetched: the build backend and all dependencies are there already.
-    install = [sys.executable, "-m", "pip", "--python", python, "install", "--no-index", "--no-deps"]
-    subprocess.run([*install, "--no-build-isolation", "--quiet", PLUGIN], check=True, capture_output=True)
+    install = [
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        python,
+        "install",
+        "--no-index",
+        "--no-deps",
+    ]
+    subprocess.run(
+        [*install, "--no-build-isolation", "--quiet", PLUGIN],
+        check=True,
+        capture_output=True,
+    )
     return python
 
 
 def test_the_installed_family_plans(scratch):
-    done = subprocess.run([scratch, "-c", LOOK, TASK], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [scratch, "-c", LOOK, TASK], capture_output=True, text=True, check=True
+    )
     family, verified, t_end, branch = json.loads(done.stdout)
     assert (family, verified, branch) == ("polar", True, "forwards")
     assert 0.2 < t_end < 2.0
@@ -51,8 +68,20 @@ def test_without_the_plugin_there_is_no_closed_form():
 
 
 def test_inspect_names_the_plugin(scratch):
-    command = [scratch, "-m", "brachis", "inspect", PLUGIN / "crane.urdf", "--task-space", "position", "--json"]
+    command = [
+        scratch,
+        "-m",
+        "brachis",
+        "inspect",
+        PLUGIN / "crane.urdf",
+        "--task-space",
+        "position",
+        "--json",
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    found = {row["redundant joints"]: row for row in json.loads(done.stdout)["decompositions"]}
+    found = {
+        row["redundant joints"]: row
+        for row in json.loads(done.stdout)["decompositions"]
+    }
     assert found["rail"]["solver"] == "polar"
     assert "come before" in found["turn"]["why not"]

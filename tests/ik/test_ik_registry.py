@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from brachis.errors import DecompositionError, UnknownNameError
-from brachis.ik import IKSolver, NotApplicableError, check_answers, find, find_all, ik_family
+from brachis.ik import (
+    IKSolver,
+    NotApplicableError,
+    check_answers,
+    find,
+    find_all,
+    ik_family,
+)
 from brachis.robot import Robot, task_map_of
 from brachis.robot.task_map import RowsAndYaw
 from support.chains import Joint, chain_urdf, planar_robot
@@ -29,7 +36,9 @@ def spatial_robot() -> Robot:
         Joint("revolute", axis=(0.0, 1.0, 0.0), xyz=(0.1, 0.0, 0.4)),
         Joint("revolute", axis=(0.0, 0.6, 0.8), xyz=(0.5, 0.1, 0.0)),
     ]
-    return Robot.from_urdf("spatial", urdf_text=chain_urdf(joints, tool=(0.4, 0.0, 0.0)))
+    return Robot.from_urdf(
+        "spatial", urdf_text=chain_urdf(joints, tool=(0.4, 0.0, 0.0))
+    )
 
 
 @pytest.mark.parametrize("names", [[], ["j1", "j2"], ["j1", "j1"]], ids=str)
@@ -43,7 +52,9 @@ def test_wrong_number_of_redundant_joints(arm, plane, names):
 
 def test_more_rows_than_joints():
     robot = planar_robot("RR")
-    with pytest.raises(DecompositionError, match="fewer joints than the task space has rows"):
+    with pytest.raises(
+        DecompositionError, match="fewer joints than the task space has rows"
+    ):
         find(robot, task_map_of(robot, ["x", "y", "yaw"]), [])
     assert find_all(robot, task_map_of(robot, ["x", "y", "yaw"])) == []
 
@@ -64,14 +75,21 @@ def test_no_closed_form_names_every_reason():
     reasons = caught.value.reasons
     assert "j1, j2, j3 would be left over and not prismatic" in reasons["prismatic"]
     assert "the axes of j1 and j2 are not parallel" in reasons["planar"]
-    assert "no closed form moves the tool by j1, j2, j3: the axes of j1 and j2 are not" in reasons["positioning"]
+    assert (
+        "no closed form moves the tool by j1, j2, j3: the axes of j1 and j2 are not"
+        in reasons["positioning"]
+    )
     assert all(reason in str(caught.value) for reason in reasons.values())
     assert caught.value.available == ()
 
 
 def test_no_closed_form_lists_the_choices_that_have_one():
     # Joint 1 slides along the normal: with joint 2 or 3 redundant, x and y hang on one turning joint alone.
-    joints = [Joint("prismatic"), Joint("revolute"), Joint("revolute", xyz=(0.4, 0.0, 0.0))]
+    joints = [
+        Joint("prismatic"),
+        Joint("revolute"),
+        Joint("revolute", xyz=(0.4, 0.0, 0.0)),
+    ]
     robot = Robot.from_urdf("scara", urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0)))
     space = task_map_of(robot, ["x", "y"])
     with pytest.raises(DecompositionError) as caught:
@@ -83,7 +101,9 @@ def test_no_closed_form_lists_the_choices_that_have_one():
 
 def test_yaw_in_another_plane_than_the_joints_is_refused():
     robot = planar_robot("RRR", "tilted")
-    with pytest.raises(DecompositionError, match="yaw turns in another plane than the joints"):
+    with pytest.raises(
+        DecompositionError, match="yaw turns in another plane than the joints"
+    ):
         find(robot, RowsAndYaw(robot, ("x", "y", "yaw"), tool_axis=0), [])
 
 
@@ -149,12 +169,21 @@ def test_a_third_party_family_comes_first_where_it_fits(arm, plane):
     ("change", "reason"),
     [
         (lambda answers: answers + 1e-4, "leave out postures"),
-        (lambda answers: answers[:, ::-1] * np.array([1.0, np.nan])[:, None, None], "leave out postures"),
+        (
+            lambda answers: answers[:, ::-1] * np.array([1.0, np.nan])[:, None, None],
+            "leave out postures",
+        ),
         (lambda answers: answers + 3e-7, "miss the target by"),
         (lambda answers: np.concatenate([answers, answers], axis=1), "have the shape"),
         (lambda answers: np.full_like(answers, np.nan), "leave out postures"),
     ],
-    ids=["off by 1e-4", "one branch lost", "near misses", "more answers than labels", "no answers"],
+    ids=[
+        "off by 1e-4",
+        "one branch lost",
+        "near misses",
+        "more answers than labels",
+        "no answers",
+    ],
 )
 def test_a_wrong_family_is_rejected_and_the_next_one_taken(arm, plane, change, reason):
     family = third_party(arm, plane, change)
@@ -162,13 +191,17 @@ def test_a_wrong_family_is_rejected_and_the_next_one_taken(arm, plane, change, r
     assert candidate.family == "planar"
     assert reason in candidate.reasons["third_party"]
     with pytest.raises(NotApplicableError, match=reason):
-        check_answers(arm, plane, (2,), Wrapped(find(arm, plane, ["j3"]).solver, change))
+        check_answers(
+            arm, plane, (2,), Wrapped(find(arm, plane, ["j3"]).solver, change)
+        )
 
 
 def test_branches_that_share_a_label_are_rejected(arm, plane):
     solver = Wrapped(find(arm, plane, ["j3"]).solver, lambda answers: answers)
     solver.branches = ("elbow", "elbow")
-    with pytest.raises(NotApplicableError, match="its branches share labels: elbow, elbow"):
+    with pytest.raises(
+        NotApplicableError, match="its branches share labels: elbow, elbow"
+    ):
         check_answers(arm, plane, (2,), solver)
 
 

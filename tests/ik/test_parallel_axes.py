@@ -87,9 +87,17 @@ CASES = {
     "generic": (generic().robot(MOUNT), (), SIX),
     "generic with a slide": (generic("PRRRRR").robot(MOUNT), (), SLID),
     "generic with a slide and a turn": (generic("PRRRRR", 2).robot(MOUNT), (), SLID),
-    "generic with a turn and a slide": (generic("RPRRRR", 2).mirrored.robot(MOUNT), (), SLID),
+    "generic with a turn and a slide": (
+        generic("RPRRRR", 2).mirrored.robot(MOUNT),
+        (),
+        SLID,
+    ),
     **{
-        f"random senses and zeros {seed}": (on_random_rail(UR, seed), (j,), SIX if j == 0 else TURNED)
+        f"random senses and zeros {seed}": (
+            on_random_rail(UR, seed),
+            (j,),
+            SIX if j == 0 else TURNED,
+        )
         for seed, j in enumerate((0, 1, 5, 6))
     },
 }
@@ -105,13 +113,17 @@ def test_every_branch_is_right(name):
     bench = bench_of(name)
     words = CASES[name][2]
     assert bench.solver.kind == "closed_form"
-    assert bench.solver.branches == tuple("_".join(label) for label in itertools.product(*words))
+    assert bench.solver.branches == tuple(
+        "_".join(label) for label in itertools.product(*words)
+    )
     solved = bench.answers(bench.q)
     sample, branch, postures = bench.check_answers(solved)
 
     margins = bench.margins(bench.q)
     assert np.all(np.abs(margins).max(axis=(0, 1)) > 0.8)
-    assert np.all(np.abs(margins).max(axis=(0, 1)) < 3.0), "margins are of the order of one"
+    assert np.all(np.abs(margins).max(axis=(0, 1)) < 3.0), (
+        "margins are of the order of one"
+    )
     inside = (margins > 0.0).all(axis=2)
     assert np.all(inside.sum(axis=1) == 1), "a posture is in exactly one branch"
     own = np.argmax(inside, axis=1)
@@ -129,7 +141,9 @@ def test_every_branch_is_right(name):
     bench.check_gradient()
 
 
-@pytest.mark.parametrize("name", ["UR10", "rail", "pan", "wrist 2", "wrist 3", "skew rail, wrist 2"])
+@pytest.mark.parametrize(
+    "name", ["UR10", "rail", "pan", "wrist 2", "wrist 3", "skew rail, wrist 2"]
+)
 def test_labels_follow_the_branch_along_smooth_curves(name):
     bench = bench_of(name)
     followed, changes = 0, 0
@@ -139,7 +153,9 @@ def test_labels_follow_the_branch_along_smooth_curves(name):
         margins = bench.margins(q)
         own = np.argmax((margins > 0.0).all(axis=2), axis=1)
         regular = np.abs(margins[:, 0]).min(axis=1) > 1e-3
-        assert bench.distance(solved[np.arange(len(q)), own], q)[regular].max() < 1e-8, "the curve loses its branch"
+        assert (
+            bench.distance(solved[np.arange(len(q)), own], q)[regular].max() < 1e-8
+        ), "the curve loses its branch"
         # The branch of the curve changes where a margin changes its sign and nowhere else.
         changed = np.any(np.diff(np.sign(margins[:, 0]), axis=0) != 0.0, axis=1)
         np.testing.assert_array_equal(np.diff(own) != 0, changed)
@@ -149,7 +165,9 @@ def test_labels_follow_the_branch_along_smooth_curves(name):
             postures[:, bench.rest] = solved[:, b]
             exists = np.isfinite(postures).all(axis=1)
             margin = np.full(len(q), -1.0)
-            margin[exists] = bench.solver.branch_margins(postures[exists], b).prod(axis=1)
+            margin[exists] = bench.solver.branch_margins(postures[exists], b).prod(
+                axis=1
+            )
             inside = (margin[1:] > 0.1) & (margin[:-1] > 0.1)
             steps = bench.distance(solved[1:, b], postures[:-1])
             assert steps[inside].max(initial=0.0) < 0.1, "the branch jumps"
@@ -164,8 +182,13 @@ def test_branches_meet_where_a_margin_vanishes(name):
     labels = [label.split("_") for label in bench.solver.branches]
     met = set()
     for seed, (place, pair) in itertools.product(range(8), enumerate(words)):
-        found = zero_crossing(lambda q, place=place: bench.margins(q)[:, 0, place], bench.curve(seed))
-        if found is None or np.abs(np.delete(bench.margins(found[0][None])[0, 0], place)).min() < 0.1:
+        found = zero_crossing(
+            lambda q, place=place: bench.margins(q)[:, 0, place], bench.curve(seed)
+        )
+        if (
+            found is None
+            or np.abs(np.delete(bench.margins(found[0][None])[0, 0], place)).min() < 0.1
+        ):
             continue
         gaps = []
         for share in (0.01, 0.001):
@@ -184,7 +207,9 @@ def test_branches_meet_where_a_margin_vanishes(name):
 def test_rail_answers_change_sides_where_the_rail_stops_helping():
     # The pan joint turns the parallel axes to -y cos + ..., and the rail runs along y: one side or the other.
     bench = bench_of("pan")
-    sides = np.isfinite(bench.answers(bench.q)).all(axis=2).reshape(-1, 4, 2).any(axis=1)
+    sides = (
+        np.isfinite(bench.answers(bench.q)).all(axis=2).reshape(-1, 4, 2).any(axis=1)
+    )
     right = np.cos(bench.q[:, 1]) > 0.0
     np.testing.assert_array_equal(sides, np.stack([~right, right], axis=1))
 
@@ -194,7 +219,9 @@ def test_out_of_reach_is_nan_without_a_warning():
     far = bench.poses(bench.q[:5])
     far[:, :3] += 10.0
     assert np.isnan(bench.solver.solve(far, np.empty((5, 0)))).all()
-    assert np.isnan(bench.solver.solve(np.full((2, 12), np.nan), np.empty((2, 0)))).all()
+    assert np.isnan(
+        bench.solver.solve(np.full((2, 12), np.nan), np.empty((2, 0)))
+    ).all()
 
 
 @pytest.mark.parametrize("name", ["ur3", "ur5", "ur10"])
@@ -229,13 +256,20 @@ def test_slide_that_never_helps_is_refused(arm, redundant):
 
 def refusal(robot, redundant, rows="pose"):
     with pytest.raises(NotApplicableError) as caught:
-        parallel_axes.build(ChainGeometry.of(robot), task_map_of(robot, rows), redundant)
+        parallel_axes.build(
+            ChainGeometry.of(robot), task_map_of(robot, rows), redundant
+        )
     return str(caught.value)
 
 
 def test_reasons():
-    assert refusal(ON_RAIL.robot(), (2,)) == "no three successive joints have parallel axes"
-    assert refusal(tx90l().robot(), ()) == "no three successive joints have parallel axes"
+    assert (
+        refusal(ON_RAIL.robot(), (2,))
+        == "no three successive joints have parallel axes"
+    )
+    assert (
+        refusal(tx90l().robot(), ()) == "no three successive joints have parallel axes"
+    )
     assert refusal(ON_RAIL.robot(), ()) == "7 joints would be left over, not six"
     assert refusal(UR.robot(), (0, 1, 2), ["x", "y", "z"]) == "only for poses"
     steps = list(UR.steps)
@@ -243,9 +277,16 @@ def test_reasons():
     assert "j2, j3, j4 are parallel, but the others are neither" in refusal(
         Arm(UR.letters, UR.axes, tuple(steps)).robot(), ()
     )
-    four = Arm("RRRRRR", (Z, Y, Y, Y, Y, X), tuple(placement((0.1 * i, 0.0, 0.2)) for i in range(7)))
+    four = Arm(
+        "RRRRRR",
+        (Z, Y, Y, Y, Y, X),
+        tuple(placement((0.1 * i, 0.0, 0.2)) for i in range(7)),
+    )
     assert refusal(four.robot(), ()) == "J_nr is singular everywhere"
     axes, steps = (Z, Y, Y, Y, Y, X), [placement((0.3, 0.1 * i, 0.2)) for i in range(7)]
     steps[5] = placement((0.2, 0.0, 0.0))
     meaning = "the axes of j5, j6, j2 always are parallel to one plane"
-    assert refusal(Arm("RRRRRR", axes, tuple(steps)).robot(), ()) == f"J_nr is singular everywhere: {meaning}"
+    assert (
+        refusal(Arm("RRRRRR", axes, tuple(steps)).robot(), ())
+        == f"J_nr is singular everywhere: {meaning}"
+    )

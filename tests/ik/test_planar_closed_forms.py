@@ -14,7 +14,9 @@ from brachis.ik.planar import planar
 from support.chains import planar_robot
 from support.closed_forms import Bench, wrapped
 
-PATTERNS = ["".join(letters) for n in (2, 3, 4) for letters in itertools.product("RP", repeat=n)]
+PATTERNS = [
+    "".join(letters) for n in (2, 3, 4) for letters in itertools.product("RP", repeat=n)
+]
 ROWS = {
     "xy": (["x", "y"], ["x", "y", "yaw"], ["x"]),
     "xz": (["x", "z"], ["x", "z", "yaw"], ["z"]),
@@ -43,13 +45,18 @@ def test_every_decomposition_that_exists_is_found_and_right(pattern, plane, rows
     bench = Bench(planar_robot(pattern, plane), rows, POSTURES[plane])
     for redundant, exists in bench.decompositions():
         if exists:
-            candidate = bench.check(redundant, distinct_roots=roots(pattern, rows, redundant))
+            candidate = bench.check(
+                redundant, distinct_roots=roots(pattern, rows, redundant)
+            )
             bench.check_margin_gradient(candidate)
         else:
             with pytest.raises(DecompositionError) as caught:
                 bench.find(redundant)
             reasons = " ".join(caught.value.reasons.values())
-            assert "singular everywhere" in reasons or "prismatic joints do not change yaw" in reasons
+            assert (
+                "singular everywhere" in reasons
+                or "prismatic joints do not change yaw" in reasons
+            )
 
 
 @pytest.mark.parametrize("rows", [["x", "y"], ["y"], ["x", "y", "yaw"]], ids="+".join)
@@ -59,13 +66,17 @@ def test_slides_that_the_linear_family_would_take_first(pattern, rows):
     tried = 0
     for redundant, exists in bench.decompositions():
         if exists:
-            candidate = bench.check(redundant, (planar,), distinct_roots=roots(pattern, rows, redundant))
+            candidate = bench.check(
+                redundant, (planar,), distinct_roots=roots(pattern, rows, redundant)
+            )
             assert candidate.family == "planar"
             tried += 1
     assert tried
 
 
-@pytest.mark.parametrize(("rows", "plane"), [(["y", "x", "yaw"], "xy"), (["z", "x", "yaw"], "xz")], ids=str)
+@pytest.mark.parametrize(
+    ("rows", "plane"), [(["y", "x", "yaw"], "xy"), (["z", "x", "yaw"], "xz")], ids=str
+)
 def test_rows_in_reversed_order_with_yaw(rows, plane):
     for pattern in ("RRR", "RPR", "PRRR"):
         bench = Bench(planar_robot(pattern, plane), rows, 300)
@@ -82,10 +93,14 @@ def test_two_links_reach_the_annulus_between_them_and_nothing_else():
     shoulder = np.array([0.1, -0.2]) + np.array([0.0, 0.05])
     rng = np.random.default_rng(3)
     distance, angle = rng.uniform(0.0, 1.2, 2000), rng.uniform(-np.pi, np.pi, 2000)
-    targets = shoulder + distance[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    targets = shoulder + distance[:, None] * np.stack(
+        [np.cos(angle), np.sin(angle)], axis=1
+    )
     inside = (distance > abs(first - second)) & (distance < first + second)
     assert 0.2 < inside.mean() < 0.8
-    finite = np.isfinite(solver.solve(targets, np.empty((2000, 0)))[:, :, 0]).all(axis=2)
+    finite = np.isfinite(solver.solve(targets, np.empty((2000, 0)))[:, :, 0]).all(
+        axis=2
+    )
     np.testing.assert_array_equal(finite, np.repeat(inside[:, None], 2, axis=1))
 
 
@@ -103,19 +118,27 @@ def test_a_finite_answer_reaches_any_target_and_none_is_left_out(pattern, far, f
     answers = solver.solve(np.array([far]), q_r)[0, :, 0]
     for answer in answers[np.isfinite(answers).all(axis=1)]:
         posture = np.concatenate([q_r[0], answer])
-        assert bench.miss(posture[None], np.array([far]))[0] < 1e-8 * (1.0 + np.abs(posture).max())
+        assert bench.miss(posture[None], np.array([far]))[0] < 1e-8 * (
+            1.0 + np.abs(posture).max()
+        )
     if not np.isfinite(answers).any():
         # Nothing comes nearer than the two joints' own reach: the gap is real, not an oversight.
-        grid = np.stack(np.meshgrid(*[np.linspace(-np.pi, np.pi, 61)] * 2), axis=-1).reshape(-1, 2)
+        grid = np.stack(
+            np.meshgrid(*[np.linspace(-np.pi, np.pi, 61)] * 2), axis=-1
+        ).reshape(-1, 2)
         turning = bench.turning[len(redundant) :]
         grid = np.where(turning, grid, grid * 4.0)
         postures = np.concatenate([np.repeat(q_r, len(grid), axis=0), grid], axis=1)
         distance = np.linalg.norm(bench.space.values(postures) - np.array(far), axis=1)
         best = postures[int(np.argmin(distance))]
         for _ in range(60):
-            jacobian = bench.space.jacobian(bench.space.twists(best[None]))[0][:, len(redundant) :]
+            jacobian = bench.space.jacobian(bench.space.twists(best[None]))[0][
+                :, len(redundant) :
+            ]
             gap = np.array(far) - bench.space.values(best[None])[0]
-            best[len(redundant) :] += np.linalg.solve(jacobian.T @ jacobian + 1e-6 * np.eye(2), jacobian.T @ gap)
+            best[len(redundant) :] += np.linalg.solve(
+                jacobian.T @ jacobian + 1e-6 * np.eye(2), jacobian.T @ gap
+            )
         assert np.linalg.norm(bench.space.values(best[None])[0] - np.array(far)) > 1e-7
 
 
@@ -127,7 +150,9 @@ def test_labels_follow_the_branch_along_smooth_curves(pattern, rows):
     n, changes, followed = bench.robot.n, 0, 0
     for (redundant, _), _ in itertools.product(bench.decompositions(), range(4)):
         solver, rest = bench.find(redundant).solver, bench.rest(redundant)
-        q = rng.uniform(-2.0, 2.0, n) + rng.uniform(0.5, 2.0, n) * np.sin(2.0 * np.pi * t * rng.uniform(0.3, 1.0, n))
+        q = rng.uniform(-2.0, 2.0, n) + rng.uniform(0.5, 2.0, n) * np.sin(
+            2.0 * np.pi * t * rng.uniform(0.3, 1.0, n)
+        )
         answers = solver.solve(bench.space.values(q), q[:, list(redundant)])[:, :, 0]
         for branch in range(2):
             postures = q.copy()
@@ -136,13 +161,19 @@ def test_labels_follow_the_branch_along_smooth_curves(pattern, rows):
             margin = np.full(len(t), -1.0)
             margin[exists] = solver.branch_margins(postures[exists], branch)[:, 0]
             assert np.all(margin[exists] > 0.0), "an answer lies outside its own branch"
-            steps = np.abs(wrapped(np.diff(postures, axis=0), bench.turning)).max(axis=1)
+            steps = np.abs(wrapped(np.diff(postures, axis=0), bench.turning)).max(
+                axis=1
+            )
             inside = (margin[1:] > 0.05) & (margin[:-1] > 0.05)
             assert steps[inside].max(initial=0.0) < 0.1, "the branch jumps"
             followed += np.count_nonzero(inside)
         sign = np.sign(solver.branch_margins(q, 0)[:, 0])
-        determinant = np.linalg.det(bench.space.jacobian(bench.space.twists(q))[:, :, rest])
-        np.testing.assert_array_equal(np.flatnonzero(np.diff(sign)), np.flatnonzero(np.diff(np.sign(determinant))))
+        determinant = np.linalg.det(
+            bench.space.jacobian(bench.space.twists(q))[:, :, rest]
+        )
+        np.testing.assert_array_equal(
+            np.flatnonzero(np.diff(sign)), np.flatnonzero(np.diff(np.sign(determinant)))
+        )
         changes += np.count_nonzero(np.diff(sign))
     assert changes >= 2, "no curve crossed a boundary: the test shows nothing"
     assert followed > 4000

@@ -12,26 +12,78 @@ from brachis.ik.polynomial import polynomial
 from brachis.ik.polynomial_equations import Equations
 from brachis.ik.trigonometric import real_roots, sample_angles
 from brachis.robot import task_map_of
-from support.arms import MOUNT, SKEW, TOOL, PoseBench, X, Y, Z, on_random_rail, rolling, tx90l, ur10, zero_crossing
+from support.arms import (
+    MOUNT,
+    SKEW,
+    TOOL,
+    PoseBench,
+    X,
+    Y,
+    Z,
+    on_random_rail,
+    rolling,
+    tx90l,
+    ur10,
+    zero_crossing,
+)
 
 UR, TX = (arm.with_tool(TOOL) for arm in (ur10(), tx90l()))
 
 
 CASES = {
     **{f"UR10 on a rail, {j}": (UR.with_slide(0, Y).robot(), (j,)) for j in (2, 3, 4)},
-    **{f"UR10 on a skew rail, {j}": (UR.with_slide(0, SKEW).robot(MOUNT), (j,)) for j in (2, 3, 4)},
-    **{f"UR10 with a slide after pan, {j}": (UR.with_slide(1, SKEW).robot(MOUNT), (j,)) for j in (2, 3, 4)},
-    **{f"UR10 with a rail at its tool, {j}": (UR.with_slide(0, Y).mirrored.robot(MOUNT), (j,)) for j in (4, 3, 2)},
+    **{
+        f"UR10 on a skew rail, {j}": (UR.with_slide(0, SKEW).robot(MOUNT), (j,))
+        for j in (2, 3, 4)
+    },
+    **{
+        f"UR10 with a slide after pan, {j}": (UR.with_slide(1, SKEW).robot(MOUNT), (j,))
+        for j in (2, 3, 4)
+    },
+    **{
+        f"UR10 with a rail at its tool, {j}": (
+            UR.with_slide(0, Y).mirrored.robot(MOUNT),
+            (j,),
+        )
+        for j in (4, 3, 2)
+    },
     **{f"TX90L on a rail, {j}": (TX.with_slide(0, Y).robot(), (j,)) for j in (4, 5, 6)},
-    **{f"TX90L on a skew rail, {j}": (TX.with_slide(0, SKEW).robot(MOUNT), (j,)) for j in (4, 5, 6)},
-    **{f"TX90L with a slide after joint 1, {j}": (TX.with_slide(1, SKEW).robot(MOUNT), (j,)) for j in (4, 5, 6)},
-    **{f"TX90L with a rail at its tool, {j}": (TX.with_slide(0, SKEW).mirrored.robot(MOUNT), (j,)) for j in (2, 1, 0)},
+    **{
+        f"TX90L on a skew rail, {j}": (TX.with_slide(0, SKEW).robot(MOUNT), (j,))
+        for j in (4, 5, 6)
+    },
+    **{
+        f"TX90L with a slide after joint 1, {j}": (
+            TX.with_slide(1, SKEW).robot(MOUNT),
+            (j,),
+        )
+        for j in (4, 5, 6)
+    },
+    **{
+        f"TX90L with a rail at its tool, {j}": (
+            TX.with_slide(0, SKEW).mirrored.robot(MOUNT),
+            (j,),
+        )
+        for j in (2, 1, 0)
+    },
     "UR10 that rolls, 3": (rolling(UR.with_slide(0, Y)), (3, 7)),
     "TX90L that rolls, 5": (rolling(TX.with_slide(0, Y)), (5, 7)),
-    **{f"UR10 with random senses and zeros, {j}": (on_random_rail(UR, j), (j,)) for j in (2, 3, 4)},
-    **{f"TX90L with random senses and zeros, {j}": (on_random_rail(TX, j), (j,)) for j in (4, 5, 6)},
+    **{
+        f"UR10 with random senses and zeros, {j}": (on_random_rail(UR, j), (j,))
+        for j in (2, 3, 4)
+    },
+    **{
+        f"TX90L with random senses and zeros, {j}": (on_random_rail(TX, j), (j,))
+        for j in (4, 5, 6)
+    },
 }
-FEW = ["UR10 on a rail, 3", "TX90L on a rail, 4", "TX90L on a rail, 5", "TX90L on a rail, 6", "UR10 on a skew rail, 2"]
+FEW = [
+    "UR10 on a rail, 3",
+    "TX90L on a rail, 4",
+    "TX90L on a rail, 5",
+    "TX90L on a rail, 6",
+    "UR10 on a skew rail, 2",
+]
 
 
 def bench_of(name, **options):
@@ -43,7 +95,9 @@ def own_class(bench, solved, q):
     """Distances of postures from the nearest answer of their determinant's sign, and the margins of this sign."""
     margin = bench.solver.branch_margins(q, 0)[:, 0]
     distance = bench.distance(solved, q)
-    nearest = np.where(margin > 0.0, distance[:, :6].min(axis=1), distance[:, 6:].min(axis=1))
+    nearest = np.where(
+        margin > 0.0, distance[:, :6].min(axis=1), distance[:, 6:].min(axis=1)
+    )
     return nearest, np.abs(margin)
 
 
@@ -82,7 +136,9 @@ def test_answers_of_a_sign_are_distinct_and_in_ascending_order(name):
     steps = np.diff(angle, axis=1)
     assert not np.any(steps < -0.01)
     finite = np.isfinite(angle)
-    assert np.all(np.diff(finite.astype(int), axis=1) <= 0), "the first alternatives are filled"
+    assert np.all(np.diff(finite.astype(int), axis=1) <= 0), (
+        "the first alternatives are filled"
+    )
     assert np.nanmin(np.abs(np.diff(solved, axis=1)).max(axis=2)) > 1e-6
 
 
@@ -96,7 +152,9 @@ def test_the_nearest_answer_of_the_sign_follows_smooth_curves(name):
         nearest, margin = own_class(bench, solved, q)
         assert nearest[margin > 1e-4].max() < 1e-6, "the curve loses its answer"
         sign = np.sign(bench.solver.branch_margins(q, 0)[:, 0])
-        np.testing.assert_array_equal(np.diff(sign) != 0.0, np.diff(np.sign(bench.determinant(q))) != 0.0)
+        np.testing.assert_array_equal(
+            np.diff(sign) != 0.0, np.diff(np.sign(bench.determinant(q))) != 0.0
+        )
         changes += np.count_nonzero(np.diff(sign))
     assert changes >= 1, "no curve crossed a boundary: the test shows nothing"
 
@@ -106,7 +164,9 @@ def test_the_nearest_answer_of_the_sign_follows_smooth_curves(name):
 def test_answers_of_both_signs_meet_where_the_margin_vanishes(name):
     bench, met = bench_of(name), 0
     for seed in range(6):
-        found = zero_crossing(lambda q: bench.solver.branch_margins(q, 0)[:, 0], bench.curve(seed))
+        found = zero_crossing(
+            lambda q: bench.solver.branch_margins(q, 0)[:, 0], bench.curve(seed)
+        )
         if found is None:
             continue
         gaps = []
@@ -127,23 +187,37 @@ def test_postures_with_right_angles(name, noise):
     bench = bench_of(name)
     rng = np.random.default_rng(3)
     special = rng.choice(np.pi * np.array([-0.5, 0.0, 0.25, 0.5, 1.0]), bench.q.shape)
-    q = np.where(rng.random(bench.q.shape) < 0.5, special, bench.q) + noise * rng.normal(size=bench.q.shape)
+    q = np.where(
+        rng.random(bench.q.shape) < 0.5, special, bench.q
+    ) + noise * rng.normal(size=bench.q.shape)
     nearest, margin = own_class(bench, bench.answers(q), q)
     regular = margin > 1e-3
     assert np.mean(regular) > 0.5
-    assert np.count_nonzero(nearest[regular] > 1e-6) <= 1  # yet more answers coincide there
+    assert (
+        np.count_nonzero(nearest[regular] > 1e-6) <= 1
+    )  # yet more answers coincide there
 
 
 def test_resultant_is_of_degree_six_and_vanishes_at_the_posture():
     for name in FEW:
         bench = bench_of(name, postures=200)
-        equation = Displacement.of(bench.geometry, bench.redundant, bench.poses(bench.q), bench.q[:, bench.redundant])
+        equation = Displacement.of(
+            bench.geometry,
+            bench.redundant,
+            bench.poses(bench.q),
+            bench.q[:, bench.redundant],
+        )
         equations = Equations.of(equation, turn=1, slide=0)
         samples = equations.resultant(2.0 * np.pi * np.arange(32) / 32)
         spectrum = np.abs(np.fft.rfft(samples, axis=0))
         assert np.all(spectrum[7:] < 1e-12 * spectrum.max(axis=0))
         assert np.all(spectrum[6].max() > 1e-6 * spectrum.max())
-        own = np.array([equations[np.array([k])].resultant(bench.q[k, 1:2])[0, 0] for k in range(200)])
+        own = np.array(
+            [
+                equations[np.array([k])].resultant(bench.q[k, 1:2])[0, 0]
+                for k in range(200)
+            ]
+        )
         assert np.all(np.abs(own) < 1e-11 * np.abs(samples).max(axis=0))
 
 
@@ -155,10 +229,23 @@ def test_real_roots_of_known_polynomials():
         return np.prod([np.sin(q - root) for root in known], axis=0)
 
     wild = product(angles) * (2.0 + np.cos(angles))
-    rows = np.stack([wild, np.zeros(16), np.full(16, np.nan), np.ones(16), 1.5 + np.cos(2.0 * angles)], axis=1)
+    rows = np.stack(
+        [
+            wild,
+            np.zeros(16),
+            np.full(16, np.nan),
+            np.ones(16),
+            1.5 + np.cos(2.0 * angles),
+        ],
+        axis=1,
+    )
     roots = real_roots(rows, 6)
     found = np.sort(np.mod(roots[np.isfinite(roots[:, 0]), 0], 2.0 * np.pi))
-    np.testing.assert_allclose(found, np.sort(np.mod(np.concatenate([known, known + np.pi]), 2.0 * np.pi)), atol=1e-8)
+    np.testing.assert_allclose(
+        found,
+        np.sort(np.mod(np.concatenate([known, known + np.pi]), 2.0 * np.pi)),
+        atol=1e-8,
+    )
     assert np.isnan(roots[:, 1:]).all()
 
 
@@ -167,7 +254,9 @@ def test_out_of_reach_is_nan_without_a_warning():
     far = bench.poses(bench.q)
     far[:, 2] += 10.0
     assert np.isnan(bench.solver.solve(far, bench.q[:, [5]])).all()
-    assert np.isnan(bench.solver.solve(np.full((2, 12), np.nan), np.zeros((2, 1)))).all()
+    assert np.isnan(
+        bench.solver.solve(np.full((2, 12), np.nan), np.zeros((2, 1)))
+    ).all()
     assert bench.solver.solve(far[:0], np.empty((0, 1))).shape == (0, 2, 6, 6)
 
 
@@ -182,7 +271,10 @@ def test_rail_that_never_helps_is_refused(j):
     robot = UR.with_slide(0, Z).robot(MOUNT)
     with pytest.raises(DecompositionError) as caught:
         find(robot, task_map_of(robot, "pose"), [j], families=[polynomial])
-    assert caught.value.reasons["polynomial"] == "j1 never moves the arm along the parallel axes"
+    assert (
+        caught.value.reasons["polynomial"]
+        == "j1 never moves the arm along the parallel axes"
+    )
 
 
 def refusal(robot, redundant, rows="pose"):
@@ -196,8 +288,14 @@ def test_reasons():
     assert refusal(rail, (0,)) == "one slide is needed among the six joints, not 0"
     two = UR.with_slide(0, Y).with_slide(0, X).robot()
     assert refusal(two, (3, 4)) == "one slide is needed among the six joints, not 2"
-    assert refusal(rail, (1,)) == "three successive axes are parallel: that is closed form"
-    assert refusal(rail, (6,)) == "three successive axes are parallel: that is closed form"
-    assert refusal(TX.with_slide(0, Y).robot(), (2,)).startswith("not j1 and a revolute joint before two with parallel")
+    assert (
+        refusal(rail, (1,)) == "three successive axes are parallel: that is closed form"
+    )
+    assert (
+        refusal(rail, (6,)) == "three successive axes are parallel: that is closed form"
+    )
+    assert refusal(TX.with_slide(0, Y).robot(), (2,)).startswith(
+        "not j1 and a revolute joint before two with parallel"
+    )
     assert refusal(rail, (1, 2)) == "5 joints would be left over, not six"
     assert refusal(rail, (0, 1, 2, 3), ["x", "y", "z"]) == "only for poses"

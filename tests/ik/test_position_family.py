@@ -19,7 +19,16 @@ from support.chains import Joint, chain_urdf
 from support.effort import QUICK
 from support.factored_bench import Bench
 from support.pose_arms import panda as panda_urdf
-from support.screw_arms import BASES, SLIDE, Axis, extra, panda, screw_robot, seven_joints, unit
+from support.screw_arms import (
+    BASES,
+    SLIDE,
+    Axis,
+    extra,
+    panda,
+    screw_robot,
+    seven_joints,
+    unit,
+)
 from support.spatial import rail_arm, rail_arm_joints
 
 X, Y, Z = np.eye(3)
@@ -36,14 +45,22 @@ def built(name):
 
 def three_joints():
     """An industrial arm without its wrist."""
-    return Robot.from_urdf("arm", urdf_text=chain_urdf(rail_arm_joints()[1:4], tool=(0.3, 0.1, 0.4)))
+    return Robot.from_urdf(
+        "arm", urdf_text=chain_urdf(rail_arm_joints()[1:4], tool=(0.3, 0.1, 0.4))
+    )
 
 
 def scara(tool=(0.1, 0.05, 0.0)):
     """Three parallel axes and a quill."""
-    joints = [Joint("revolute", xyz=xyz) for xyz in ((0.0, 0.0, 0.5), (0.4, 0.0, 0.1), (0.3, 0.0, 0.0))]
+    joints = [
+        Joint("revolute", xyz=xyz)
+        for xyz in ((0.0, 0.0, 0.5), (0.4, 0.0, 0.1), (0.3, 0.0, 0.0))
+    ]
     return Robot.from_urdf(
-        "scara", urdf_text=chain_urdf([*joints, Joint("prismatic", axis=(0.0, 0.0, -1.0), limit=SLIDE)], tool=tool)
+        "scara",
+        urdf_text=chain_urdf(
+            [*joints, Joint("prismatic", axis=(0.0, 0.0, -1.0), limit=SLIDE)], tool=tool
+        ),
     )
 
 
@@ -59,20 +76,28 @@ def crane():
 
 
 @pytest.mark.parametrize("name", BASES)
-@pytest.mark.parametrize("arrangement", ["alone", "backwards", "carried", "carried backwards"])
+@pytest.mark.parametrize(
+    "arrangement", ["alone", "backwards", "carried", "carried backwards"]
+)
 def test_every_recipe(name, arrangement):
     rng = np.random.default_rng(len(name))
     axes, redundant = [*BASES[name]], ()
     if "backwards" in arrangement:
         axes.reverse()
     if "carried" in arrangement:  # redundant joints before and behind the three
-        axes, redundant = [extra(rng, "R"), *axes, extra(rng, "P"), extra(rng, "R")], (0, 4, 5)
+        axes, redundant = (
+            [extra(rng, "R"), *axes, extra(rng, "P"), extra(rng, "R")],
+            (0, 4, 5),
+        )
     checked = bench(screw_robot(axes), redundant).check()
     assert len(set(checked.solver.branches)) == len(checked.solver.branches)
 
 
 def test_every_recipe_is_tried():
-    used = {RECIPES.index(bench(screw_robot(base), (), 1).solver._structure.recipe) for base in BASES.values()}
+    used = {
+        RECIPES.index(bench(screw_robot(base), (), 1).solver._structure.recipe)
+        for base in BASES.values()
+    }
     assert used == set(range(len(RECIPES)))
     backwards = bench(screw_robot(BASES["cylinder"][::-1]), (), 1).solver._structure
     assert backwards.joints.mirrored
@@ -105,7 +130,8 @@ def test_built_arms_with_all_choices_of_redundant_joints(name):
             bench(robot, redundant, 500).check()
         except NotApplicableError as reason:
             named = all(robot.joint_names[i] in str(reason) for i in rest)
-            assert str(reason).startswith("J_nr is singular everywhere") if singular else named  # noqa: PT017
+            says_so = str(reason).startswith("J_nr is singular everywhere")
+            assert says_so if singular else named
         else:
             assert not singular
             served += 1
@@ -122,11 +148,19 @@ def test_labels_say_where_the_arm_is():
     checked = bench(rail_arm(), (0, 4, 5, 6), 1)
     bend_forwards = np.array([[0.2, 0.3, 0.4, 1.2, 0.5, 0.8, -0.3]])
     labels = checked.solver.branches
-    assert labels[np.argmax((checked.margins(bend_forwards) > 0.0).all(axis=2))] == "front_up"
+    assert (
+        labels[np.argmax((checked.margins(bend_forwards) > 0.0).all(axis=2))]
+        == "front_up"
+    )
     other = bend_forwards * np.array([1.0, 1.0, -4.0, -1.0, 1.0, 1.0, 1.0])
     assert labels[np.argmax((checked.margins(other) > 0.0).all(axis=2))] == "back_down"
     # The rail moves the tool across the plane of the links to one side or, turned round, to the other.
-    assert bench(rail_arm(), (1, 4, 5, 6), 1).solver.branches == ("left_up", "left_down", "right_up", "right_down")
+    assert bench(rail_arm(), (1, 4, 5, 6), 1).solver.branches == (
+        "left_up",
+        "left_down",
+        "right_up",
+        "right_down",
+    )
     # A quill has one answer, and so have three slides.
     assert bench(scara(), (0,), 1).solver.branches == ("front", "back")
     assert bench(screw_robot(BASES["P|PP"]), (), 1).solver.branches == ("slides",)
@@ -160,14 +194,25 @@ def test_margins_vanish_where_two_answers_meet(name):
 def test_refusals():
     robot = built("tx90l_rail")
     geometry, position = ChainGeometry.of(robot), task_map_of(robot, "position")
-    for space in (task_map_of(robot, "pose"), task_map_of(robot, ["x", "y"]), RowsAndYaw(robot, ("x", "y", "yaw"), 0)):
-        with pytest.raises(NotApplicableError, match="only for the position: x, y and z"):
+    for space in (
+        task_map_of(robot, "pose"),
+        task_map_of(robot, ["x", "y"]),
+        RowsAndYaw(robot, ("x", "y", "yaw"), 0),
+    ):
+        with pytest.raises(
+            NotApplicableError, match="only for the position: x, y and z"
+        ):
             positioning.build(geometry, space, (0, 4, 5, 6))
-    with pytest.raises(NotApplicableError, match="4 joints would be left over, not three"):
+    with pytest.raises(
+        NotApplicableError, match="4 joints would be left over, not three"
+    ):
         positioning.build(geometry, position, (0, 4, 5))
     with pytest.raises(NotApplicableError) as caught:
         positioning.build(geometry, position, (0, 1, 2, 3))
-    assert str(caught.value) == "J_nr is singular everywhere: joint_6 does not move the tool"
+    assert (
+        str(caught.value)
+        == "J_nr is singular everywhere: joint_6 does not move the tool"
+    )
 
 
 def test_refusals_say_what_the_joints_cannot_do():
@@ -185,8 +230,14 @@ def test_refusals_say_what_the_joints_cannot_do():
     assert str(caught.value) == (
         f"no closed form moves the tool by j1, j2, j3: the axes of j1 and j2 {apart}, and the axes of j2 and j3 {apart}"
     )
-    askew = [Axis("R", Z, np.zeros(3)), Axis("R", Y, X), Axis("P", unit(X + Y), np.zeros(3))]
-    with pytest.raises(NotApplicableError, match="and j3 slides at an angle to the axis of j2"):
+    askew = [
+        Axis("R", Z, np.zeros(3)),
+        Axis("R", Y, X),
+        Axis("P", unit(X + Y), np.zeros(3)),
+    ]
+    with pytest.raises(
+        NotApplicableError, match="and j3 slides at an angle to the axis of j2"
+    ):
         bench(screw_robot(askew), (), 1)
 
 
@@ -194,7 +245,9 @@ def test_solvers_can_be_sent_to_other_processes():
     checked = bench(rail_arm(), (0, 4, 5, 6), 5)
     solver = pickle.loads(pickle.dumps(checked.solver))  # noqa: S301
     targets, q_r = checked.targets(checked.q), checked.q[:, [0, 4, 5, 6]]
-    np.testing.assert_allclose(solver.solve(targets, q_r), checked.solver.solve(targets, q_r), atol=1e-12)
+    np.testing.assert_allclose(
+        solver.solve(targets, q_r), checked.solver.solve(targets, q_r), atol=1e-12
+    )
 
 
 def test_no_targets_have_no_answers():
@@ -204,22 +257,35 @@ def test_no_targets_have_no_answers():
 
 def test_out_of_reach_is_nan():
     solver = bench(three_joints(), (), 1).solver
-    assert np.isnan(solver.solve(np.array([[9.0, 0.0, 0.0], [0.0, 0.0, 0.478]]), np.empty((2, 0)))).all()
+    assert np.isnan(
+        solver.solve(np.array([[9.0, 0.0, 0.0], [0.0, 0.0, 0.478]]), np.empty((2, 0)))
+    ).all()
 
 
 def test_it_is_found_by_geometry():
     robot = rail_arm()
     space = task_map_of(robot, "position")
     assert find(robot, space, ["j1", "j5", "j6", "j7"]).family == "positioning"
-    families = {candidate.redundant_joints: candidate.family for candidate in find_all(robot, space)}
+    families = {
+        candidate.redundant_joints: candidate.family
+        for candidate in find_all(robot, space)
+    }
     assert families["j2", "j5", "j6", "j7"] == "positioning"
     slides = screw_robot(BASES["P|PP"])
     assert find(slides, task_map_of(slides, "position"), []).family == "prismatic"
 
 
 PLANS = {
-    "tx90l_rail": ((0.0, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1), ("rail", "joint_4", "joint_5", "joint_6"), "front_up"),
-    "iiwa14": ((0.3, 0.6, 0.2, -1.4, 0.3, 0.9, 0.1), ("joint_3", "joint_5", "joint_6", "joint_7"), "back_down"),
+    "tx90l_rail": (
+        (0.0, 0.3, 0.2, 1.5, 0.2, 1.2, 0.1),
+        ("rail", "joint_4", "joint_5", "joint_6"),
+        "front_up",
+    ),
+    "iiwa14": (
+        (0.3, 0.6, 0.2, -1.4, 0.3, 0.9, 0.1),
+        ("joint_3", "joint_5", "joint_6", "joint_7"),
+        "back_down",
+    ),
 }
 
 
@@ -235,12 +301,16 @@ def test_four_redundant_joints_are_faster_than_one(name):
         "solver": {"max_iterations": 600},
         "search": QUICK,
     }
-    result = brachis.plan(urdf, {**task, "task_space": "position", "redundant_joints": redundant})
+    result = brachis.plan(
+        urdf, {**task, "task_space": "position", "redundant_joints": redundant}
+    )
     assert (result.family, result.trajectory.branch) == ("positioning", branch)
     assert result.verified
     ends = result.trajectory.robot.tool_placements(result.trajectory.q[[0, -1]])[0]
     np.testing.assert_allclose(ends[1] - ends[0], by, atol=1e-8)
     # The motion that keeps the orientation as well is one of those that keep the position.
-    pose = brachis.plan(urdf, {**task, "task_space": "pose", "redundant_joints": redundant[:1]})
+    pose = brachis.plan(
+        urdf, {**task, "task_space": "pose", "redundant_joints": redundant[:1]}
+    )
     assert pose.verified
     assert result.t_end < 0.97 * pose.t_end

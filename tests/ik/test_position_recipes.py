@@ -26,7 +26,10 @@ def test_every_recipe(name, arrangement):
     if arrangement == "backwards":
         axes.reverse()
     elif arrangement == "carried":  # redundant joints before, within and behind the six
-        axes, redundant = [extra(rng, "R"), *axes[:3], extra(rng, "P"), *axes[3:], extra(rng, "R")], (0, 4, 8)
+        axes, redundant = (
+            [extra(rng, "R"), *axes[:3], extra(rng, "P"), *axes[3:], extra(rng, "R")],
+            (0, 4, 8),
+        )
     bench = Bench(screw_robot(axes), redundant).check()
     assert len(bench.solver.branches) == 2 * alternatives(name)
     assert len(set(bench.solver.branches)) == len(bench.solver.branches)
@@ -35,10 +38,23 @@ def test_every_recipe(name, arrangement):
 def test_every_recipe_is_tried_by_a_case_of_its_own():
     used = {}
     for name, base in BASES.items():
-        bench = Bench(screw_robot([*base, *wrist(np.random.default_rng(0))]), (), postures=1)
+        bench = Bench(
+            screw_robot([*base, *wrist(np.random.default_rng(0))]), (), postures=1
+        )
         used.setdefault(RECIPES.index(bench.solver._structure.recipe), []).append(name)
     # Two slides behind a third joint move in one plane as well.
-    assert set(used[0]) == {"R|RR", "P|RR", "R|RP", "RP|P", "P|RP", "R|PR", "P|PR", "R|PP", "PP|P", "P|PP"}
+    assert set(used[0]) == {
+        "R|RR",
+        "P|RR",
+        "R|RP",
+        "RP|P",
+        "P|RP",
+        "R|PR",
+        "P|PR",
+        "R|PP",
+        "PP|P",
+        "P|PP",
+    }
     assert set(used[1]) == {"RR|R", "RR|P", "RP|R", "PR|R", "PR|P", "PP|R"}
     assert used[2] == ["RxR R", "RxR P"]
     assert used[3] == ["R RxR", "P RxR"]

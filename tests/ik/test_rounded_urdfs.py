@@ -59,7 +59,9 @@ def test_the_same_decompositions_are_found_as_for_the_exact_arm(name, seed):
     _, exact = candidates(name, EXACT, seed)
     _, rounded = candidates(name, ROUNDED, seed)
     assert [c.family for c in rounded] == [c.family for c in exact]
-    assert sum(c.solver is not None for c in exact) == {"UR10": 1, "iiwa": 6}.get(name, 7)
+    assert sum(c.solver is not None for c in exact) == {"UR10": 1, "iiwa": 6}.get(
+        name, 7
+    )
     for candidate in exact:
         assert candidate.remark == ""
         assert not isinstance(candidate.solver, Polished)
@@ -78,7 +80,11 @@ def test_the_same_decompositions_are_found_as_for_the_exact_arm(name, seed):
 
 def test_with_a_tool_that_rolls_freely():
     joints = [
-        [c.redundant_joints for c in find_all(*bind(by_angles(tx90l(), digits), "pose_free_roll")) if c.solver]
+        [
+            c.redundant_joints
+            for c in find_all(*bind(by_angles(tx90l(), digits), "pose_free_roll"))
+            if c.solver
+        ]
         for digits in (EXACT, ROUNDED)
     ]
     assert joints[0] == joints[1] != []
@@ -95,11 +101,16 @@ def test_all_answers_are_right_and_one_is_the_posture(name, joints):
     targets = bench.space.values(bench.q)
     reached = bench.space.values(postures)
     size = 1.0 + np.abs(np.where(bench.geometry.revolute, 0.0, postures)).max(axis=1)
-    assert (np.abs(bench.space.difference(reached, targets[sample])).max(axis=1) / size).max() < 1e-8
+    assert (
+        np.abs(bench.space.difference(reached, targets[sample])).max(axis=1) / size
+    ).max() < 1e-8
 
     branch //= bench.solver.alternatives
     for b in range(len(bench.solver.branches)):
-        assert bench.solver.branch_margins(postures[branch == b], b).min(initial=1.0) > -1e-3
+        assert (
+            bench.solver.branch_margins(postures[branch == b], b).min(initial=1.0)
+            > -1e-3
+        )
     margins = bench.margins(bench.q)
     # Alternatives are told apart by continuity alone.
     inside = (margins > 0.0).all(axis=2).repeat(bench.solver.alternatives, axis=1)
@@ -108,7 +119,9 @@ def test_all_answers_are_right_and_one_is_the_posture(name, joints):
     regular = (np.abs(margins[:, 0]).min(axis=1) > 5e-3) & (product > 1e-2)
     assert np.mean(regular) > 0.5
     assert (gap * product)[regular].max() < 1e-8
-    assert np.mean(gap > 1e-6) < 0.01, "answers are missing but beside the branches' boundaries"
+    assert np.mean(gap > 1e-6) < 0.01, (
+        "answers are missing but beside the branches' boundaries"
+    )
 
 
 @pytest.mark.parametrize(("name", "joints"), CASES, ids=str)
@@ -116,7 +129,9 @@ def test_no_answer_is_given_twice(name, joints):
     bench = bench_of(name, joints, 500)
     solved = bench.answers(bench.q)
     for first, second in itertools.combinations(range(solved.shape[1]), 2):
-        gap = np.abs(wrapped(solved[:, first] - solved[:, second], bench.turning)).max(axis=1)
+        gap = np.abs(wrapped(solved[:, first] - solved[:, second], bench.turning)).max(
+            axis=1
+        )
         assert np.nanmin(gap, initial=1.0) > 1e-6
 
 
@@ -129,17 +144,28 @@ def test_labels_are_continuous_along_smooth_curves(name, joints):
     for seed in range(3):
         q = bench.curve(seed)
         solved = bench.answers(q)
-        ideal = bench.solver._solver.solve(bench.poses(q), q[:, bench.redundant])[:, :, 0]
+        ideal = bench.solver._solver.solve(bench.poses(q), q[:, bench.redundant])[
+            :, :, 0
+        ]
         for branch in range(8):
             postures, margin = q.copy(), np.full(len(q), -1.0)
             exists = np.isfinite(ideal[:, branch]).all(axis=1)
             postures[:, bench.rest] = ideal[:, branch]
-            margin[exists] = bench.solver.branch_margins(postures[exists], branch).min(axis=1)
-            assert np.isfinite(solved[margin > 0.02, branch]).all(), "the branch ends in its midst"
+            margin[exists] = bench.solver.branch_margins(postures[exists], branch).min(
+                axis=1
+            )
+            assert np.isfinite(solved[margin > 0.02, branch]).all(), (
+                "the branch ends in its midst"
+            )
             clear = margin > 0.15
-            assert np.abs(solved[clear, branch] - ideal[clear, branch]).max(initial=0.0) < 0.01
+            assert (
+                np.abs(solved[clear, branch] - ideal[clear, branch]).max(initial=0.0)
+                < 0.01
+            )
             steps = np.abs(wrapped(np.diff(solved[:, branch], axis=0), bench.turning))
-            assert steps[clear[1:] & clear[:-1]].max(initial=0.0) < 0.5, "the branch jumps"
+            assert steps[clear[1:] & clear[:-1]].max(initial=0.0) < 0.5, (
+                "the branch jumps"
+            )
             followed += np.count_nonzero(clear)
     assert followed > 2000
 
@@ -182,7 +208,9 @@ def test_ideal_arm(name):
     given, made = geometry.posed(q), ideal.geometry.posed(q)
     assert np.abs(given.tool_position - made.tool_position).max() < 2e-4
     assert np.abs(given.tool_rotation - made.tool_rotation).max() < 1e-4
-    np.testing.assert_allclose(np.linalg.norm(ideal.geometry.axes, axis=1), 1.0, atol=1e-15)
+    np.testing.assert_allclose(
+        np.linalg.norm(ideal.geometry.axes, axis=1), 1.0, atol=1e-15
+    )
 
 
 def test_small_offsets_of_a_measured_arm_count_as_rounding():
@@ -197,18 +225,34 @@ def test_small_offsets_of_a_measured_arm_count_as_rounding():
 
 
 @pytest.mark.parametrize(
-    ("name", "joint"), [("iiwa", 6), ("UR10", 2), ("UR10", 3), ("UR10 on a rail", 3), ("TX90L on a rail", 6)]
+    ("name", "joint"),
+    [
+        ("iiwa", 6),
+        ("UR10", 2),
+        ("UR10", 3),
+        ("UR10 on a rail", 3),
+        ("TX90L on a rail", 6),
+    ],
 )
 def test_what_is_farther_off_is_refused_and_the_reason_named(name, joint):
-    near, far = (by_angles(ARMS[name], EXACT, bent=bent, bent_joint=joint) for bent in (5e-5, 1e-3))
+    near, far = (
+        by_angles(ARMS[name], EXACT, bent=bent, bent_joint=joint)
+        for bent in (5e-5, 1e-3)
+    )
     redundant = ["j1"] * (near.n - 6)
     match = find(near, task_map_of(near, "pose"), redundant)
     assert re.search(r"axes within [57]\.\de-05 rad", match.remark)
     with pytest.raises(DecompositionError) as caught:
         find(far, task_map_of(far, "pose"), redundant)
-    reasons = [reason for reason in caught.value.reasons.values() if "fits an ideal arm only" in reason]
+    reasons = [
+        reason
+        for reason in caught.value.reasons.values()
+        if "fits an ideal arm only" in reason
+    ]
     assert re.search(r"its axes are up to 1\.\de-03 rad", reasons[0])
-    assert "at most 1e-04 is taken for rounding. If the URDF rounds angles" in reasons[0]
+    assert (
+        "at most 1e-04 is taken for rounding. If the URDF rounds angles" in reasons[0]
+    )
 
 
 def test_offsets_that_are_meant_are_no_rounding():
@@ -225,8 +269,14 @@ def test_offsets_that_are_meant_are_no_rounding():
 def planar(quarter):
     """Three joints in the xz-plane, on a rail."""
     limit = {"lower": -1.0, "upper": 1.0, "velocity": 1.0, "effort": 50.0}
-    joints = [Joint("prismatic", axis=(1.0, 0.0, 0.0), limit=limit), Joint("revolute", rpy=(quarter, 0.0, 0.0))]
-    joints += [Joint("revolute", xyz=(0.5, 0.0, 0.1), rpy=(0.0, 0.0, 0.2)), Joint("revolute", xyz=(0.4, 0.0, 0.0))]
+    joints = [
+        Joint("prismatic", axis=(1.0, 0.0, 0.0), limit=limit),
+        Joint("revolute", rpy=(quarter, 0.0, 0.0)),
+    ]
+    joints += [
+        Joint("revolute", xyz=(0.5, 0.0, 0.1), rpy=(0.0, 0.0, 0.2)),
+        Joint("revolute", xyz=(0.4, 0.0, 0.0)),
+    ]
     return Robot.from_urdf("planar", urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0)))
 
 
@@ -236,7 +286,10 @@ def test_rows_and_yaw_of_a_plane_that_is_almost_upright(redundant):
     space = task_map_of(robot, ["x", "z", "yaw"])
     match = find(robot, space, [robot.joint_names[redundant]])
     assert match.family == "planar"
-    assert match.remark == "axes within 3.7e-06 rad of an ideal arm's: answers are polished"
+    assert (
+        match.remark
+        == "axes within 3.7e-06 rad of an ideal arm's: answers are polished"
+    )
     q = np.random.default_rng(3).uniform(-1.0, 1.0, (2000, 4))
     rest = [i for i in range(4) if i != redundant]
     targets = space.values(q)
@@ -247,11 +300,18 @@ def test_rows_and_yaw_of_a_plane_that_is_almost_upright(redundant):
     reached = space.values(postures)
     assert np.abs(space.difference(reached, targets[sample])).max() < 1e-8
     turning = np.array([i > 0 for i in rest])
-    gap = np.nanmin(np.abs(wrapped(solved - q[:, None, rest], turning)).max(axis=2), axis=1)
+    gap = np.nanmin(
+        np.abs(wrapped(solved - q[:, None, rest], turning)).max(axis=2), axis=1
+    )
     margin = np.abs(match.solver.branch_margins(q, 0)[:, 0])
     assert gap[margin > 5e-3].max() < 1e-8
     exact = planar(np.pi / 2)
-    assert find(exact, task_map_of(exact, space.rows), [exact.joint_names[redundant]]).remark == ""
+    assert (
+        find(
+            exact, task_map_of(exact, space.rows), [exact.joint_names[redundant]]
+        ).remark
+        == ""
+    )
 
 
 def test_positions():
@@ -263,9 +323,16 @@ def test_positions():
     for candidate, expected in zip(find_all(rounded, space), ideal, strict=True):
         assert candidate.family == expected.family
         assert expected.remark == ""
-        assert ("polished" in candidate.remark) == isinstance(candidate.solver, Polished)
+        assert ("polished" in candidate.remark) == isinstance(
+            candidate.solver, Polished
+        )
         if candidate.solver is not None:
-            check_answers(rounded, space, (rounded.joint_names.index(*candidate.redundant_joints),), candidate.solver)
+            check_answers(
+                rounded,
+                space,
+                (rounded.joint_names.index(*candidate.redundant_joints),),
+                candidate.solver,
+            )
     assert any(candidate.remark for candidate in find_all(rounded, space))
 
 
@@ -283,7 +350,9 @@ def test_newton_goes_nowhere_but_to_the_answer_beside_its_start():
     assert np.isnan(far).all(axis=1).mean() > 0.9
     straight = np.zeros((2, 6))
     straight[1] = q[0]
-    assert np.isnan(polished(geometry, range(6), straight, goal[np.array([1, 0])])[0]).all(), "J is singular"
+    assert np.isnan(
+        polished(geometry, range(6), straight, goal[np.array([1, 0])])[0]
+    ).all(), "J is singular"
 
 
 def xarm():
@@ -296,7 +365,10 @@ def xarm():
 
 def test_xarm7_of_example_robot_data_has_decompositions():
     robot = Robot.from_urdf(xarm(), tool_frame="link_eef")
-    families = {c.redundant_joints[0]: c.family for c in find_all(robot, task_map_of(robot, "pose"))}
+    families = {
+        c.redundant_joints[0]: c.family
+        for c in find_all(robot, task_map_of(robot, "pose"))
+    }
     assert families == {
         **dict.fromkeys(("joint1", "joint2", "joint3"), None),
         **dict.fromkeys(("joint4", "joint7"), "spherical_wrist"),
@@ -306,13 +378,22 @@ def test_xarm7_of_example_robot_data_has_decompositions():
 
 def test_inspect_says_what_is_polished(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "240")
-    options = {"task_space": "pose", "tool_frame": None, "base_frame": None, "lock": [], "changes": []}
+    options = {
+        "task_space": "pose",
+        "tool_frame": None,
+        "base_frame": None,
+        "lock": [],
+        "changes": [],
+    }
     inspect = functools.partial(inspect_command, xarm(), **options)
     inspect(as_json=True)
     data = json.loads(capsys.readouterr().out)
     assert data["tool_frame"] == "link_eef"
     remarks = {row["redundant joints"]: row["remark"] for row in data["decompositions"]}
-    assert remarks["joint4"] == "axes within 3.7e-06 rad and 1.1e-06 m of an ideal arm's: answers are polished"
+    assert (
+        remarks["joint4"]
+        == "axes within 3.7e-06 rad and 1.1e-06 m of an ideal arm's: answers are polished"
+    )
     assert remarks["joint1"] == ""
     inspect(as_json=False)
     assert capsys.readouterr().out.count("answers are polished") == 4
@@ -331,7 +412,9 @@ def test_xarm7_plans_as_the_ideal_arm_does(joint):
     }
     text = xarm().read_text()
     results = [
-        brachis.plan(Robot.from_urdf("xarm7", urdf_text=given, tool_frame="link_eef"), task)
+        brachis.plan(
+            Robot.from_urdf("xarm7", urdf_text=given, tool_frame="link_eef"), task
+        )
         for given in (text, text.replace("1.5708", repr(np.pi / 2)))
     ]
     assert all(result.verified for result in results)

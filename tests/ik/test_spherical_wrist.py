@@ -15,7 +15,16 @@ from brachis.robot import Robot, bind, task_map_of
 from brachis.robot.task_map import Pose
 from support.chains import Joint, chain_urdf
 from support.factored_bench import Bench
-from support.screw_arms import BASES, Axis, extra, panda, screw_robot, seven_joints, unit, wrist
+from support.screw_arms import (
+    BASES,
+    Axis,
+    extra,
+    panda,
+    screw_robot,
+    seven_joints,
+    unit,
+    wrist,
+)
 from support.spatial import rail_arm, rail_arm_joints
 
 X, Y, Z = np.eye(3)
@@ -28,16 +37,31 @@ def ortho_parallel(rng):
     """
     a1, a2, b = rng.uniform(-0.2, 0.2, 3)
     c1, c2, c3, c4 = rng.uniform(0.2, 0.7, 4)
-    places = [(0, 0, 0), (a1, 0, c1), (a1, 0, c1 + c2), (a1 + a2, b, c1 + c2), (a1 + a2, b, c1 + c2 + c3)]
+    places = [
+        (0, 0, 0),
+        (a1, 0, c1),
+        (a1, 0, c1 + c2),
+        (a1 + a2, b, c1 + c2),
+        (a1 + a2, b, c1 + c2 + c3),
+    ]
     places.append((a1 + a2, b, c1 + c2 + c3 + c4))
     senses = rng.choice([-1.0, 1.0], 6)
-    directions = [axis * sense for axis, sense in zip((Z, Y, Y, Z, Y, Z), senses, strict=True)]
+    directions = [
+        axis * sense for axis, sense in zip((Z, Y, Y, Z, Y, Z), senses, strict=True)
+    ]
     angle = rng.uniform(-np.pi, np.pi)
     axes = [Axis("P", np.array([np.cos(angle), np.sin(angle), 0.0]), np.zeros(3))]
-    axes += [Axis("R", axis, np.array(place, dtype=float)) for axis, place in zip(directions, places, strict=True)]
+    axes += [
+        Axis("R", axis, np.array(place, dtype=float))
+        for axis, place in zip(directions, places, strict=True)
+    ]
     posed = ChainGeometry.of(screw_robot(axes)).posed(rng.uniform(-2.0, 2.0, (1, 7)))
     moved = [
-        Axis(a.letter, posed.axes[:, i, 0], posed.points[:, i, 0] if a.letter == "R" else np.zeros(3))
+        Axis(
+            a.letter,
+            posed.axes[:, i, 0],
+            posed.points[:, i, 0] if a.letter == "R" else np.zeros(3),
+        )
         for i, a in enumerate(axes)
     ]
     return screw_robot(moved, tool=rng.uniform(-0.5, 1.5, 3))
@@ -53,11 +77,17 @@ def test_arms_with_ortho_parallel_base_on_a_rail(redundant):
         assert len(bench.solver.branches) == 8
 
 
-RAILS = {"across": (0.8, -0.6, 0.0), "along": (0.0, 0.0, 1.0), "at an angle to": (0.6, 0.0, 0.8)}
+RAILS = {
+    "across": (0.8, -0.6, 0.0),
+    "along": (0.0, 0.0, 1.0),
+    "at an angle to": (0.6, 0.0, 0.8),
+}
 
 
 @pytest.mark.parametrize(
-    ("rail", "exist"), [("across", {0, 1, 2, 3}), ("along", {0, 2, 3}), ("at an angle to", {0, 1})], ids=str
+    ("rail", "exist"),
+    [("across", {0, 1, 2, 3}), ("along", {0, 2, 3}), ("at an angle to", {0, 1})],
+    ids=str,
 )
 def test_which_joints_may_be_redundant_on_which_rail(rail, exist):
     robot = rail_arm(RAILS[rail])
@@ -69,7 +99,9 @@ def test_which_joints_may_be_redundant_on_which_rail(rail, exist):
             Bench(robot, (redundant,), postures=1)
         reason = str(caught.value)
         if redundant == 1:  # the rail and the links all move in one plane
-            assert reason.startswith("J_nr is singular everywhere: j1 does not move the point where the axes of j5, ")
+            assert reason.startswith(
+                "J_nr is singular everywhere: j1 does not move the point where the axes of j5, "
+            )
             assert reason.endswith("out of the plane in which j3 and j4 do")
         elif redundant < 4:
             assert "j1 slides at an angle to the axis of j2" in reason
@@ -82,9 +114,14 @@ def test_labels_say_where_the_arm_is():
     bench = Bench(rail_arm(), (0,), postures=1)
     bend_forwards = np.array([[0.2, 0.3, 0.4, 1.2, 0.5, 0.8, -0.3]])
     labels = bench.solver.branches
-    assert labels[np.argmax((bench.margins(bend_forwards) > 0.0).all(axis=2))] == "front_up_noflip"
+    assert (
+        labels[np.argmax((bench.margins(bend_forwards) > 0.0).all(axis=2))]
+        == "front_up_noflip"
+    )
     other = bend_forwards * np.array([1.0, 1.0, -4.0, -1.0, 1.0, -1.0, 1.0])
-    assert labels[np.argmax((bench.margins(other) > 0.0).all(axis=2))] == "back_down_flip"
+    assert (
+        labels[np.argmax((bench.margins(other) > 0.0).all(axis=2))] == "back_down_flip"
+    )
 
 
 def test_a_rail_answers_on_the_side_to_which_it_moves_the_arm():
@@ -101,8 +138,15 @@ def test_a_rail_answers_on_the_side_to_which_it_moves_the_arm():
 def test_gantry_of_three_slides_of_which_a_turntable_turns_the_last(turntable):
     axes = [Axis("P", axis, np.zeros(3)) for axis in (X, Y, Z)]
     axes.insert(turntable, Axis("R", unit(X + Y if turntable == 2 else Z), np.zeros(3)))
-    bench = Bench(screw_robot([*axes, *wrist(np.random.default_rng(3))]), (turntable,)).check()
-    assert bench.solver.branches == ("left_noflip", "left_flip", "right_noflip", "right_flip")
+    bench = Bench(
+        screw_robot([*axes, *wrist(np.random.default_rng(3))]), (turntable,)
+    ).check()
+    assert bench.solver.branches == (
+        "left_noflip",
+        "left_flip",
+        "right_noflip",
+        "right_flip",
+    )
 
 
 @pytest.mark.parametrize("redundant", [0, 1, 2, 4, 5, 6])
@@ -131,9 +175,18 @@ def test_spherical_shoulder_and_wrist_on_a_rail():
             continue
         found.append(redundant)
     elbow = 4
-    assert [pair for pair in found if 0 in pair] == [(0, j) for j in range(1, 8) if j != elbow]
+    assert [pair for pair in found if 0 in pair] == [
+        (0, j) for j in range(1, 8) if j != elbow
+    ]
     # The rail changes the distance of the wrist from the shoulder; it has to move it across the axes that are left.
-    assert [pair for pair in found if 0 not in pair] == [(1, 2), (1, 4), (2, 3), (2, 4), (3, 4), (6, 7)]
+    assert [pair for pair in found if 0 not in pair] == [
+        (1, 2),
+        (1, 4),
+        (2, 3),
+        (2, 4),
+        (3, 4),
+        (6, 7),
+    ]
 
 
 def test_panda():
@@ -157,7 +210,12 @@ def test_free_roll_takes_the_place_of_a_wrist_joint():
     joints = rail_arm_joints()[1:]
     arm = Robot.from_urdf(
         "arm",
-        urdf_text=chain_urdf([*joints, Joint("fixed", xyz=(0.0, 0.0, -0.1), rpy=(0.5, 0.0, 0.0), limit=None)]),
+        urdf_text=chain_urdf(
+            [
+                *joints,
+                Joint("fixed", xyz=(0.0, 0.0, -0.1), rpy=(0.5, 0.0, 0.0), limit=None),
+            ]
+        ),
     )
     robot, space = bind(arm, "pose_free_roll")
     assert isinstance(space, Pose)
@@ -168,45 +226,76 @@ def test_free_roll_takes_the_place_of_a_wrist_joint():
 def test_a_slide_that_moves_the_centre_along_one_axis_of_the_wrist():
     arm = rail_arm_joints()
     telescope = Joint("prismatic", axis=(0.0, 0.0, 1.0), limit=arm[0].limit)
-    robot = Robot.from_urdf("telescope", urdf_text=chain_urdf([*arm[:5], telescope, *arm[5:]], tool=(0.1, 0.0, 0.2)))
+    robot = Robot.from_urdf(
+        "telescope",
+        urdf_text=chain_urdf([*arm[:5], telescope, *arm[5:]], tool=(0.1, 0.0, 0.2)),
+    )
     Bench(robot, (0, 5)).check()
     askew = Joint("prismatic", axis=(1.0, 0.0, 0.0), limit=arm[0].limit)
-    robot = Robot.from_urdf("askew", urdf_text=chain_urdf([*arm[:5], askew, *arm[5:]], tool=(0.1, 0.0, 0.2)))
+    robot = Robot.from_urdf(
+        "askew", urdf_text=chain_urdf([*arm[:5], askew, *arm[5:]], tool=(0.1, 0.0, 0.2))
+    )
     with pytest.raises(NotApplicableError, match="j5, j7, j8 do not meet in a point"):
         Bench(robot, (0, 5), postures=1)
 
 
 def test_refusals():
     with pytest.raises(NotApplicableError, match="only for poses"):
-        spherical_wrist.build(ChainGeometry.of(rail_arm()), task_map_of(rail_arm(), ["x", "y", "z"]), (0, 1, 2, 3))
+        spherical_wrist.build(
+            ChainGeometry.of(rail_arm()),
+            task_map_of(rail_arm(), ["x", "y", "z"]),
+            (0, 1, 2, 3),
+        )
     rng = np.random.default_rng(8)
     general = [extra(rng, "R") for _ in range(3)]
     with pytest.raises(NotApplicableError) as caught:
         Bench(screw_robot([*general, *wrist(rng)]), (), postures=1)
-    assert "no closed form moves the point where the axes of j4, j5, j6 meet by j1, j2, j3" in str(caught.value)
-    assert "the axes of j1 and j2 are not parallel and do not meet in a fixed point of one of them" in str(caught.value)
-    skew = [Axis("P", Z, np.zeros(3)), Axis("R", Z, np.zeros(3)), Axis("R", unit(Y + Z), X)]
+    assert (
+        "no closed form moves the point where the axes of j4, j5, j6 meet by j1, j2, j3"
+        in str(caught.value)
+    )
+    assert (
+        "the axes of j1 and j2 are not parallel and do not meet in a fixed point of one of them"
+        in str(caught.value)
+    )
+    skew = [
+        Axis("P", Z, np.zeros(3)),
+        Axis("R", Z, np.zeros(3)),
+        Axis("R", unit(Y + Z), X),
+    ]
     with pytest.raises(
-        NotApplicableError, match="j1 slides along the axis of j2, and the axes of j2 and j3 are not par"
+        NotApplicableError,
+        match="j1 slides along the axis of j2, and the axes of j2 and j3 are not par",
     ):
         Bench(screw_robot([*skew, *wrist(rng)]), (), postures=1)
     coaxial = [Axis("R", Z, np.zeros(3)), Axis("R", Z, Z), Axis("R", X, Y)]
-    with pytest.raises(NotApplicableError, match=r"everywhere: j1 and j2 move the point .* along one line"):
+    with pytest.raises(
+        NotApplicableError,
+        match=r"everywhere: j1 and j2 move the point .* along one line",
+    ):
         Bench(screw_robot([*coaxial, *wrist(rng)]), (), postures=1)
     flat = [Axis("R", axis, np.array([0.3, 0.5, -0.2])) for axis in (X, Y, unit(X + Y))]
     with pytest.raises(NotApplicableError, match=r"^J_nr is singular everywhere"):
-        Bench(screw_robot([*BASES["R|RR"], *flat[:1], *flat[:1], *flat[1:2]]), (), postures=1)
+        Bench(
+            screw_robot([*BASES["R|RR"], *flat[:1], *flat[:1], *flat[1:2]]),
+            (),
+            postures=1,
+        )
 
 
 def test_solvers_can_be_sent_to_other_processes():
     bench = Bench(rail_arm(), (2,), postures=5)
     solver = pickle.loads(pickle.dumps(bench.solver))  # noqa: S301
     targets, q_r = bench.targets(bench.q), bench.q[:, [2]]
-    np.testing.assert_allclose(solver.solve(targets, q_r), bench.solver.solve(targets, q_r), atol=1e-12)
+    np.testing.assert_allclose(
+        solver.solve(targets, q_r), bench.solver.solve(targets, q_r), atol=1e-12
+    )
 
 
 def test_no_targets_have_no_answers():
-    assert Bench(rail_arm(), (0,), 1).solver.solve(np.empty((0, 12)), np.empty((0, 1))).shape == (0, 8, 1, 6)
+    assert Bench(rail_arm(), (0,), 1).solver.solve(
+        np.empty((0, 12)), np.empty((0, 1))
+    ).shape == (0, 8, 1, 6)
 
 
 def test_it_is_found_by_geometry():
@@ -214,6 +303,13 @@ def test_it_is_found_by_geometry():
     match = find(robot, task_map_of(robot, "pose"), ["j1"], families=[spherical_wrist])
     assert match.family == "spherical_wrist"
     assert "placing" in spherical_wrist.source
-    with pytest.raises(DecompositionError, match="j1 slides at an angle to the axis of j2") as caught:
-        find(rail_arm(RAILS["at an angle to"]), task_map_of(robot, "pose"), ["j3"], families=[spherical_wrist])
+    with pytest.raises(
+        DecompositionError, match="j1 slides at an angle to the axis of j2"
+    ) as caught:
+        find(
+            rail_arm(RAILS["at an angle to"]),
+            task_map_of(robot, "pose"),
+            ["j3"],
+            families=[spherical_wrist],
+        )
     assert ("j1",) in caught.value.available

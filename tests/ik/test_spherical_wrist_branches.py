@@ -19,7 +19,11 @@ SMOOTH = {
     "seven joints": (seven_joints, (2,), (1, 3, 5)),
     "backwards": (panda, (6,), (4, 3, 1)),
     "meeting of the last": (panda, (3,), (4, 6, 1)),
-    "slides": (lambda: screw_robot([*BASES["PR|P"], *wrist(np.random.default_rng(1))]), (), (0, 4)),
+    "slides": (
+        lambda: screw_robot([*BASES["PR|P"], *wrist(np.random.default_rng(1))]),
+        (),
+        (0, 4),
+    ),
 }
 
 

@@ -21,7 +21,13 @@ PLANAR = {
     "r = 0, 3R with yaw": ("RRR", "xy", ["x", "y", "yaw"], [0.4, 1.8, 0.5], []),
     "r = 1, 3R": ("RRR", "xy", ["x", "y"], [0.4, 1.0, 0.5], ["j2"]),
     "r = 1, RPR": ("RPR", "tilted", ["x", "y"], [0.4, 0.2, 0.9], ["j1"]),
-    "r = 1, 4R with yaw": ("RRRR", "xz", ["x", "z", "yaw"], [0.4, -0.6, 1.4, 0.8], ["j1"]),
+    "r = 1, 4R with yaw": (
+        "RRRR",
+        "xz",
+        ["x", "z", "yaw"],
+        [0.4, -0.6, 1.4, 0.8],
+        ["j1"],
+    ),
     "r = 2, 4R": ("RRRR", "xz", ["x", "z"], [0.4, 0.8, 0.7, 0.5], ["j1", "j4"]),
     "r = 2, PPRR": ("PPRR", "xy", ["x", "y"], [0.1, 0.2, 0.7, -0.1], ["j1", "j3"]),
 }
@@ -36,7 +42,9 @@ SPATIAL = {
 
 def curved(robot, rows, start):
     """An arc about a point near the tool, with yaw along the tangent: all derivatives of the path differ from zero."""
-    tool = robot.tool_placement(np.array(start, dtype=float)).translation[["xyz".index(row) for row in rows[:2]]]
+    tool = robot.tool_placement(np.array(start, dtype=float)).translation[
+        ["xyz".index(row) for row in rows[:2]]
+    ]
     arc = {"center": (tool + np.array([0.12, -0.1])).tolist(), "angle_deg": 35.0}
     return [{"arc": {**arc, "yaw": "tangent"} if "yaw" in rows else arc}]
 
@@ -59,8 +67,13 @@ def given(name):
     return robot, rows, bent(robot, start), start, redundant
 
 
-CASES = [(name, kind) for name in (*PLANAR, *SPATIAL) for kind in ("constant", "following")]
-CASES += [(name, "swinging") for name in ("r = 1, 3R", "r = 2, PPRR", "r = 1, 7R, pose", "r = 4, 7R, position")]
+CASES = [
+    (name, kind) for name in (*PLANAR, *SPATIAL) for kind in ("constant", "following")
+]
+CASES += [
+    (name, "swinging")
+    for name in ("r = 1, 3R", "r = 2, PPRR", "r = 1, 7R, pose", "r = 4, 7R, position")
+]
 T = np.linspace(0.02, 0.97, 25)  # not at the knots of rows that follow
 
 
@@ -76,7 +89,10 @@ def test_path_is_met_exactly(motion):
     y, *_ = motion(T)
     q = chart.postures(y)
     targets = chart.path.sample(y[:, 0]).target
-    assert np.abs(chart.task_map.difference(targets, chart.task_map.values(q))).max() < 1e-12
+    assert (
+        np.abs(chart.task_map.difference(targets, chart.task_map.values(q))).max()
+        < 1e-12
+    )
     np.testing.assert_allclose(chart.curves(y[:, 0], q), y, atol=1e-12)
 
 
@@ -86,12 +102,20 @@ def test_motion_is_the_time_derivative_of_the_postures(motion):
 
 def test_derivatives(motion):
     exact = check_derivatives(motion, T)
-    assert min(np.abs(part).max() for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot)) > 0.05
+    assert (
+        min(
+            np.abs(part).max()
+            for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot)
+        )
+        > 0.05
+    )
 
 
 def least_singular(chart, q, s):
     """Least singular value of J over C, (K,), from Pinocchio's Jacobian."""
-    augmented = np.concatenate([jacobian(chart.task_map, q), chart.rows.at(s)[0]], axis=1)
+    augmented = np.concatenate(
+        [jacobian(chart.task_map, q), chart.rows.at(s)[0]], axis=1
+    )
     return np.linalg.svd(augmented, compute_uv=False)[:, -1]
 
 
@@ -106,13 +130,19 @@ def test_margins(motion):
 
     s, q = state.y[:, 0], state.q
     np.testing.assert_allclose(chart.margins(state)[:, 0], expected(q, s), rtol=1e-9)
-    np.testing.assert_allclose(chart.start_margins(), along[:1] / np.median(along), rtol=1e-9)
+    np.testing.assert_allclose(
+        chart.start_margins(), along[:1] / np.median(along), rtol=1e-9
+    )
     by_q, by_s = chart.margin_gradient(state)
     for joint, step in enumerate(h * np.eye(chart.robot.n)):
         difference = (expected(q + step, s) - expected(q - step, s)) / (2.0 * h)
-        np.testing.assert_allclose(by_q[:, 0, joint], difference, atol=2e-7 * max(1.0, np.abs(by_q).max()))
+        np.testing.assert_allclose(
+            by_q[:, 0, joint], difference, atol=2e-7 * max(1.0, np.abs(by_q).max())
+        )
     difference = (expected(q, s + h) - expected(q, s - h)) / (2.0 * h)
-    np.testing.assert_allclose(by_s[:, 0], difference, atol=2e-7 * max(1.0, np.abs(by_s).max()))
+    np.testing.assert_allclose(
+        by_s[:, 0], difference, atol=2e-7 * max(1.0, np.abs(by_s).max())
+    )
 
 
 def test_history_does_not_matter(motion):
@@ -120,16 +150,26 @@ def test_history_does_not_matter(motion):
     used = motion.joint_map
     rng = np.random.default_rng(7)
     for amplitude in (0.05, 0.15, 0.3):
-        y = np.column_stack([rng.uniform(0.0, 1.0, 60), rng.normal(0.0, amplitude, (60, used.r))])
+        y = np.column_stack(
+            [rng.uniform(0.0, 1.0, 60), rng.normal(0.0, amplitude, (60, used.r))]
+        )
         y[:, 1:] += used.coordinates(0.0, used.start)[1:]
-        fresh = ChartMap(used.task_map, used.path, used.rows, used.s, used.reference).postures(y)
+        fresh = ChartMap(
+            used.task_map, used.path, used.rows, used.s, used.reference
+        ).postures(y)
         good = np.isfinite(fresh).all(axis=1)
         good[good] = least_singular(used, fresh[good], y[good, 0]) > 0.05
         y, fresh = y[good], fresh[good]
         assert len(y) > 20
         zero = np.zeros_like(y)
-        for order in (rng.permutation(len(y)), rng.permutation(len(y)), np.arange(len(y))):
-            np.testing.assert_allclose(used.state(y[order], zero, zero, zero).q, fresh[order], atol=1e-11)
+        for order in (
+            rng.permutation(len(y)),
+            rng.permutation(len(y)),
+            np.arange(len(y)),
+        ):
+            np.testing.assert_allclose(
+                used.state(y[order], zero, zero, zero).q, fresh[order], atol=1e-11
+            )
 
 
 def test_a_copy_by_pickle_answers_alike(motion):
@@ -138,7 +178,9 @@ def test_a_copy_by_pickle_answers_alike(motion):
     copy = pickle.loads(pickle.dumps(chart))  # noqa: S301  (our own)
     first, second = chart.state(*parts), copy.state(*parts)
     for name in ("q", "qdot", "qddot", "gradient"):
-        np.testing.assert_allclose(getattr(second, name), getattr(first, name), atol=1e-10)
+        np.testing.assert_allclose(
+            getattr(second, name), getattr(first, name), atol=1e-10
+        )
     np.testing.assert_array_equal(copy.start, chart.start)
 
 
@@ -149,22 +191,35 @@ def test_rows_that_select_joints_are_the_closed_form_of_these(name):
     sway = Sway(closed, amplitude=0.1)
     s = np.linspace(0.0, 1.0, PLACES)
     reference = closed.postures(
-        np.column_stack([s, np.broadcast_to(closed.start[list(closed.redundant)], (PLACES, closed.r))])
+        np.column_stack(
+            [
+                s,
+                np.broadcast_to(
+                    closed.start[list(closed.redundant)], (PLACES, closed.r)
+                ),
+            ]
+        )
     )
     select = ChartRows.constant(np.eye(robot.n)[list(closed.redundant)])
     chart = ChartMap(closed.task_map, closed.path, select, s, reference)
     assert chart.redundant_joints == closed.redundant_joints
-    own, selected = (each.coordinates(0.3, reference[5])[1:] for each in (chart, closed))
+    own, selected = (
+        each.coordinates(0.3, reference[5])[1:] for each in (chart, closed)
+    )
     np.testing.assert_allclose(own, selected, atol=1e-12)
     parts = sway(T)
     expected, found = closed.state(*parts), chart.state(*parts)
     for part in ("q", "qdot", "qddot", "gradient"):
         size = max(1.0, np.abs(getattr(expected, part)).max())
-        np.testing.assert_allclose(getattr(found, part), getattr(expected, part), atol=1e-10 * size)
+        np.testing.assert_allclose(
+            getattr(found, part), getattr(expected, part), atol=1e-10 * size
+        )
     exact, derived = closed.derivatives(expected), chart.derivatives(found)
     for part in ("qdot_y", "qddot_y", "qddot_ydot"):
         size = max(1.0, np.abs(getattr(exact, part)).max())
-        np.testing.assert_allclose(getattr(derived, part), getattr(exact, part), atol=1e-10 * size)
+        np.testing.assert_allclose(
+            getattr(derived, part), getattr(exact, part), atol=1e-10 * size
+        )
 
 
 @pytest.mark.parametrize("turns", [-3, 0, 2])
@@ -172,17 +227,23 @@ def test_angles_stay_in_the_turns_of_the_reference(scara_urdf, turns):
     """Joint 1 follows a circle about the base three times, from any turn on."""
     robot = Robot.from_urdf(scara_urdf)
     start = np.array([0.2 + 2.0 * np.pi * turns, 1.0, 0.6])
-    task_map, path = path_from(robot, ["x", "y"], [{"circle": {"center": [0.0, 0.0], "turns": 3}}], start)
+    task_map, path = path_from(
+        robot, ["x", "y"], [{"circle": {"center": [0.0, 0.0], "turns": 3}}], start
+    )
     s = np.linspace(0.0, 1.0, 200)
     reference = start + np.outer(6.0 * np.pi * s, [1.0, 0.0, 0.0])
-    chart = ChartMap(task_map, path, ChartRows.constant(np.array([[0.3, 0.6, 0.7]])), s, reference)
+    chart = ChartMap(
+        task_map, path, ChartRows.constant(np.array([[0.3, 0.6, 0.7]])), s, reference
+    )
     fine = np.linspace(0.0, 1.0, 777)
     expected = start + np.outer(6.0 * np.pi * fine, [1.0, 0.0, 0.0])
     y = chart.curves(fine, expected)
     np.testing.assert_allclose(chart.postures(y), expected, atol=1e-9)
     np.testing.assert_allclose(chart.postures(y[::-1]), expected[::-1], atol=1e-9)
     np.testing.assert_allclose(chart.coordinates(1.0, expected[-1]), y[-1], atol=1e-12)
-    assert chart.coordinates(1.0, expected[-1])[1] != pytest.approx(chart.coordinates(1.0, expected[0])[1], abs=1.0)
+    assert chart.coordinates(1.0, expected[-1])[1] != pytest.approx(
+        chart.coordinates(1.0, expected[0])[1], abs=1.0
+    )
 
 
 def test_coordinates_of_what_is_not_known_are_not_known():
@@ -191,7 +252,9 @@ def test_coordinates_of_what_is_not_known_are_not_known():
     assert np.isnan(chart.coordinates(0.4, np.full(4, np.nan))[1:]).all()
     assert chart.coordinates(0.4, np.full(4, np.nan))[0] == 0.4
     # Rows that follow the reference measure the way aside from it.
-    np.testing.assert_allclose(chart.curves(chart.s, chart.reference)[:, 1:], 0.0, atol=1e-12)
+    np.testing.assert_allclose(
+        chart.curves(chart.s, chart.reference)[:, 1:], 0.0, atol=1e-12
+    )
 
 
 def test_no_posture_beyond_reach_nor_beyond_the_self_motion(scara_urdf):
@@ -200,9 +263,13 @@ def test_no_posture_beyond_reach_nor_beyond_the_self_motion(scara_urdf):
     task_map, path = path_from(robot, ["x", "y"], [{"line": {"by": [3.0, 0.0]}}], start)
     s = np.linspace(0.0, 0.1, 9)
     reference = least_motion(task_map, path, start, s)
-    chart = ChartMap(task_map, path, ChartRows.constant(np.array([[0.0, 0.0, 1.0]])), s, reference)
+    chart = ChartMap(
+        task_map, path, ChartRows.constant(np.array([[0.0, 0.0, 1.0]])), s, reference
+    )
     y = np.array([[0.0, 0.6], [1.0, 0.6], [0.05, 9.0]])
-    np.testing.assert_array_equal(np.isfinite(chart.postures(y)).all(axis=1), [True, False, False])
+    np.testing.assert_array_equal(
+        np.isfinite(chart.postures(y)).all(axis=1), [True, False, False]
+    )
     zero = np.zeros((1, 2))
     chart.state(y[:1], zero, zero, zero)
     for beyond in (y[1:2], y[2:]):

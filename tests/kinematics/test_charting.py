@@ -36,7 +36,9 @@ def once_around(scara):
     Tool and base of three links of 1 m are sqrt(3) m apart: no joint turns all around, so each of them turns back
     somewhere, and so does every linear function of them: no constant row stays transversal.
     """
-    task_map, path = path_from(scara, ["x", "y"], [{"line": {"by": [0.0, 0.05]}}], START)
+    task_map, path = path_from(
+        scara, ["x", "y"], [{"line": {"by": [0.0, 0.05]}}], START
+    )
     q, direction = [np.array(START)], None
     while len(q) < 600 and (len(q) < 20 or np.linalg.norm(q[-1] - q[0]) > 0.05):
         null = null_space(jacobian(task_map, q[-1][None])[0])[:, 0]
@@ -49,18 +51,26 @@ def once_around(scara):
     s = np.linspace(0.0, 1.0, len(q))
     for k, target in enumerate(path.sample(s).target):
         for _ in range(5):
-            q[k] = q[k] + np.linalg.pinv(jacobian(task_map, q[k][None])[0]) @ (target - task_map.value(q[k]))
+            q[k] = q[k] + np.linalg.pinv(jacobian(task_map, q[k][None])[0]) @ (
+                target - task_map.value(q[k])
+            )
     return task_map, path, s, np.array(q)
 
 
 @pytest.mark.parametrize(
     ("rows", "start", "make"),
-    [(["x", "y"], START, None), ("pose", SEVEN, seven_joints), ("position", SEVEN, seven_joints)],
+    [
+        (["x", "y"], START, None),
+        ("pose", SEVEN, seven_joints),
+        ("position", SEVEN, seven_joints),
+    ],
     ids=["3R", "7R, pose", "7R, position, r = 4"],
 )
 def test_constant_rows_where_they_do(rows, start, make, scara):
     by = [0.0, 0.3] if make is None else [0.1, 0.1, -0.1]
-    task_map, path = path_from(make() if make else scara, rows, [{"line": {"by": by}}], start)
+    task_map, path = path_from(
+        make() if make else scara, rows, [{"line": {"by": by}}], start
+    )
     s = np.linspace(0.0, 1.0, 50)
     chart = chart_around(task_map, path, s, least_motion(task_map, path, start, s))
     coefficients, knots = chart.rows.arrays()
@@ -71,7 +81,9 @@ def test_constant_rows_where_they_do(rows, start, make, scara):
     assert chart.redundant_joints == ()
     null = np.swapaxes(turned_null_spaces(task_map, chart.reference), 1, 2)
     assert transversality(own[None], null).min() > 0.35
-    np.testing.assert_allclose(chart.postures(chart.curves(s, chart.reference)), chart.reference, atol=1e-9)
+    np.testing.assert_allclose(
+        chart.postures(chart.curves(s, chart.reference)), chart.reference, atol=1e-9
+    )
 
 
 def test_rows_follow_the_null_space_where_it_turns(once_around):
@@ -89,7 +101,9 @@ def test_rows_follow_the_null_space_where_it_turns(once_around):
     # Between the places, and aside of them.
     t = np.linspace(0.02, 0.98, 200)
     state = chart.state(*Sway(chart, amplitude=0.05)(t))
-    np.testing.assert_allclose(task_map.values(state.q), path.sample(state.y[:, 0]).target, atol=1e-12)
+    np.testing.assert_allclose(
+        task_map.values(state.q), path.sample(state.y[:, 0]).target, atol=1e-12
+    )
     assert chart.margins(state).min() > 0.1
 
 
@@ -97,7 +111,11 @@ def test_given_rows_are_kept_and_name_the_joints_that_they_select(scara):
     task_map, path = path_from(scara, ["x", "y"], [{"line": {"by": [0.0, 0.2]}}], START)
     s = np.linspace(0.0, 1.0, 20)
     q = least_motion(task_map, path, START, s)
-    for rows, names in (([[0.0, 1.0, 0.0]], ("j2",)), ([[0.0, 1.0, 1.0]], ()), ([[0.0, 2.0, 0.0]], ())):
+    for rows, names in (
+        ([[0.0, 1.0, 0.0]], ("j2",)),
+        ([[0.0, 1.0, 1.0]], ()),
+        ([[0.0, 2.0, 0.0]], ()),
+    ):
         given = ChartRows.constant(np.array(rows))
         chart = chart_around(task_map, path, s, q, given)
         assert chart.rows is given
@@ -106,7 +124,10 @@ def test_given_rows_are_kept_and_name_the_joints_that_they_select(scara):
 
 def test_rows_come_back_from_their_arrays(once_around):
     task_map, path, s, q = once_around
-    for rows in (chart_around(task_map, path, s, q).rows, ChartRows.constant(np.array([[0.1, 0.2, 0.3]]))):
+    for rows in (
+        chart_around(task_map, path, s, q).rows,
+        ChartRows.constant(np.array([[0.1, 0.2, 0.3]])),
+    ):
         again = ChartRows.of_arrays(*rows.arrays())
         for first, second in zip(rows.orders(s, q), again.orders(s, q), strict=True):
             np.testing.assert_allclose(first, second, atol=1e-12)
@@ -118,13 +139,19 @@ def test_transversality_is_the_cosine_of_the_angle_to_the_self_motion(angle, sca
     null = null_spaces(jacobian(task_map, np.array([START])))
     aside = null_space(null[0].T)[:, 0]
     row = np.cos(angle) * null[0, :, 0] + np.sin(angle) * aside
-    np.testing.assert_allclose(transversality(row[None, None], null), [np.cos(angle)], atol=1e-12)
+    np.testing.assert_allclose(
+        transversality(row[None, None], null), [np.cos(angle)], atol=1e-12
+    )
 
 
 def test_transversality_of_several_rows_is_that_of_the_worst_direction():
-    task_map, _ = path_from(seven_joints(), "position", [{"line": {"by": [0.0, 0.0, 0.1]}}], SEVEN)
+    task_map, _ = path_from(
+        seven_joints(), "position", [{"line": {"by": [0.0, 0.0, 0.1]}}], SEVEN
+    )
     null = null_spaces(jacobian(task_map, np.array([SEVEN])))
-    np.testing.assert_allclose(jacobian(task_map, np.array([SEVEN])) @ null, 0.0, atol=1e-12)
+    np.testing.assert_allclose(
+        jacobian(task_map, np.array([SEVEN])) @ null, 0.0, atol=1e-12
+    )
     rows = null[0].T.copy()
     np.testing.assert_allclose(transversality(rows[None], null), [1.0], atol=1e-12)
     aside = null_space(null[0].T)[:, 0]
@@ -134,10 +161,15 @@ def test_transversality_of_several_rows_is_that_of_the_worst_direction():
 
 def test_without_redundancy_there_is_nothing_to_be_transversal_to(scara):
     start = [0.2, 1.6, 0.5]
-    task_map, path = path_from(scara, ["x", "y", "yaw"], [{"line": {"by": [0.0, 0.2, 0.3]}}], start)
+    task_map, path = path_from(
+        scara, ["x", "y", "yaw"], [{"line": {"by": [0.0, 0.2, 0.3]}}], start
+    )
     s = np.linspace(0.0, 1.0, 20)
     q = least_motion(task_map, path, start, s)
-    assert np.all(transversality(np.zeros((20, 0, 3)), null_spaces(jacobian(task_map, q))) == np.inf)
+    assert np.all(
+        transversality(np.zeros((20, 0, 3)), null_spaces(jacobian(task_map, q)))
+        == np.inf
+    )
     chart = chart_around(task_map, path, s, q)
     assert chart.r == 0
     np.testing.assert_allclose(chart.postures(s[:, None]), q, atol=1e-12)
@@ -166,8 +198,12 @@ def test_no_chart_where_the_null_space_turns_too_fast(scara):
     turns, places = 60, 900
     s = np.linspace(0.0, 1.0, places)
     angle = 2.0 * np.pi * turns * s
-    q = np.column_stack([np.full(places, 0.3), 0.02 * np.cos(angle), 0.02 * np.sin(angle)])
-    task_map, path = path_from(scara, ["x", "y"], [{"line": {"by": [0.001, 0.0]}}], q[0])
+    q = np.column_stack(
+        [np.full(places, 0.3), 0.02 * np.cos(angle), 0.02 * np.sin(angle)]
+    )
+    task_map, path = path_from(
+        scara, ["x", "y"], [{"line": {"by": [0.001, 0.0]}}], q[0]
+    )
     assert np.linalg.svd(jacobian(task_map, q), compute_uv=False)[:, -1].max() < 0.02
     with pytest.raises(UnreachableError, match="too near a singularity"):
         chart_around(task_map, path, s, q)

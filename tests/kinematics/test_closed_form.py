@@ -15,7 +15,13 @@ CASES = {
     "r = 0, 3R with yaw": ("RRR", "xy", ["x", "y", "yaw"], [0.4, 1.8, 0.5], []),
     "r = 1, 3R": ("RRR", "xy", ["x", "y"], [0.4, 1.0, 0.5], ["j2"]),
     "r = 1, RPR": ("RPR", "tilted", ["x", "y"], [0.4, 0.2, 0.9], ["j1"]),
-    "r = 1, 4R with yaw": ("RRRR", "xz", ["x", "z", "yaw"], [0.4, -0.6, 1.4, 0.8], ["j1"]),
+    "r = 1, 4R with yaw": (
+        "RRRR",
+        "xz",
+        ["x", "z", "yaw"],
+        [0.4, -0.6, 1.4, 0.8],
+        ["j1"],
+    ),
     "r = 2, 4R": ("RRRR", "xz", ["x", "z"], [0.4, 0.8, 0.7, 0.5], ["j1", "j4"]),
     "r = 2, PPRR": ("PPRR", "xy", ["x", "y"], [0.1, 0.2, 0.7, -0.1], ["j1", "j3"]),
 }
@@ -23,7 +29,9 @@ CASES = {
 
 def curved(robot, rows, start):
     """An arc about a point near the tool, with yaw along the tangent: all derivatives of the path differ from zero."""
-    tool = robot.tool_placement(np.array(start, dtype=float)).translation[["xyz".index(row) for row in rows[:2]]]
+    tool = robot.tool_placement(np.array(start, dtype=float)).translation[
+        ["xyz".index(row) for row in rows[:2]]
+    ]
     arc = {"center": (tool + np.array([0.12, -0.1])).tolist(), "angle_deg": 25.0}
     return [{"arc": {**arc, "yaw": "tangent"} if "yaw" in rows else arc}]
 
@@ -32,7 +40,10 @@ def curved(robot, rows, start):
 def motion(request):
     pattern, plane, rows, start, redundant = CASES[request.param]
     robot = planar_robot(pattern, plane)
-    return Sway(joint_map(robot, rows, curved(robot, rows, start), start, redundant), amplitude=0.1)
+    return Sway(
+        joint_map(robot, rows, curved(robot, rows, start), start, redundant),
+        amplitude=0.1,
+    )
 
 
 T = np.linspace(0.02, 0.98, 25)
@@ -42,7 +53,9 @@ def test_path_is_met_exactly(motion):
     y, *_ = motion(T)
     chain = motion.joint_map
     targets = chain.path.sample(y[:, 0]).target
-    np.testing.assert_allclose(chain.task_map.values(chain.postures(y)), targets, atol=1e-12)
+    np.testing.assert_allclose(
+        chain.task_map.values(chain.postures(y)), targets, atol=1e-12
+    )
 
 
 def test_motion_is_the_time_derivative_of_the_postures(motion):
@@ -51,20 +64,30 @@ def test_motion_is_the_time_derivative_of_the_postures(motion):
 
 def test_derivatives(motion):
     exact = check_derivatives(motion, T)
-    assert min(np.abs(part).max() for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot)) > 0.1
+    assert (
+        min(
+            np.abs(part).max()
+            for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot)
+        )
+        > 0.1
+    )
 
 
 def test_rows_of_redundant_joints_are_constant(motion):
     chain = motion.joint_map
     state = chain.state(*motion(T))
     exact = chain.derivatives(state)
-    np.testing.assert_allclose(state.q[:, chain.redundant], motion(T)[0][:, 1:], atol=1e-14)
+    np.testing.assert_allclose(
+        state.q[:, chain.redundant], motion(T)[0][:, 1:], atol=1e-14
+    )
     for part in (exact.qdot_y, exact.qddot_y, exact.qddot_ydot):
         np.testing.assert_array_equal(part[:, chain.redundant], 0.0)
 
 
 @pytest.mark.parametrize("turns", [-3, 0, 2])
-def test_angles_are_lifted_from_the_start_posture_on_and_stay_continuous_over_many_turns(scara_urdf, turns):
+def test_angles_are_lifted_from_the_start_posture_on_and_stay_continuous_over_many_turns(
+    scara_urdf, turns
+):
     # Joint 1 follows a circle about the base three times: it must reach 6 pi, not jump back.
     robot = Robot.from_urdf(scara_urdf)
     start = np.array([0.2 + 2.0 * np.pi * turns, 1.0, 0.6])
@@ -74,7 +97,9 @@ def test_angles_are_lifted_from_the_start_posture_on_and_stay_continuous_over_ma
     q = chain.postures(np.stack([s, np.full(400, 0.6)], axis=1))
     np.testing.assert_allclose(q[0], start, atol=1e-12)
     np.testing.assert_allclose(q[:, 0], start[0] + 6.0 * np.pi * s, atol=1e-9)
-    np.testing.assert_allclose(q[:, 1:], np.broadcast_to(start[1:], (400, 2)), atol=1e-9)
+    np.testing.assert_allclose(
+        q[:, 1:], np.broadcast_to(start[1:], (400, 2)), atol=1e-9
+    )
 
 
 def test_slides_are_never_wrapped():
@@ -84,12 +109,16 @@ def test_slides_are_never_wrapped():
     s = np.linspace(0.0, 1.0, 4)  # steps far beyond 2 pi
     q = chain.postures(np.stack([s, np.full(4, 0.4)], axis=1))
     np.testing.assert_allclose(q[0], start, atol=1e-9)
-    np.testing.assert_allclose(chain.task_map.values(q), chain.path.sample(s).target, atol=1e-9)
+    np.testing.assert_allclose(
+        chain.task_map.values(q), chain.path.sample(s).target, atol=1e-9
+    )
 
 
 def test_target_out_of_reach(scara_urdf):
     robot = Robot.from_urdf(scara_urdf)
-    chain = joint_map(robot, ["x", "y"], [{"line": {"by": [3.0, 0.0]}}], [0.2, 1.0, 0.6], ["j3"])
+    chain = joint_map(
+        robot, ["x", "y"], [{"line": {"by": [3.0, 0.0]}}], [0.2, 1.0, 0.6], ["j3"]
+    )
     y = np.array([[0.0, 0.6], [1.0, 0.6]])
     postures = chain.postures(y)
     assert np.isfinite(postures[0]).all()

@@ -14,7 +14,13 @@ def test_every_joint_is_a_curve():
     free = DirectJointMap(planar_robot("RRP"), start)
     y, ydot, yddot, ydddot = np.random.default_rng(0).normal(size=(4, 5, 3))
     state = free.state(y, ydot, yddot, ydddot, t=np.linspace(0.0, 1.0, 5), near=y + 7.0)
-    pairs = (state.q, y), (state.qdot, ydot), (state.qddot, yddot), (state.qdddot, ydddot), (free.postures(y), y)
+    pairs = (
+        (state.q, y),
+        (state.qdot, ydot),
+        (state.qddot, yddot),
+        (state.qdddot, ydddot),
+        (free.postures(y), y),
+    )
     for mine, given in pairs:
         np.testing.assert_allclose(mine, given, atol=1e-14)
     np.testing.assert_array_equal(state.gradient, [np.eye(3)] * 5)

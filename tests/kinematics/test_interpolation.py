@@ -16,15 +16,27 @@ from support.motions import Sway, joint_map
 
 def pieces(nodes) -> BPoly:
     """SciPy's quintic pieces from the nodes' values and derivatives."""
-    return BPoly.from_derivatives(nodes.times, np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1))
+    return BPoly.from_derivatives(
+        nodes.times, np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1)
+    )
 
 
 @pytest.mark.parametrize(
     ("pattern", "start", "redundant"),
-    [("RRR", [0.4, 1.0, 0.5], ["j2"]), ("RPR", [0.4, 0.2, 0.9], ["j1"]), ("RRRR", [0.4, 0.8, 0.7, 0.5], ["j1", "j4"])],
+    [
+        ("RRR", [0.4, 1.0, 0.5], ["j2"]),
+        ("RPR", [0.4, 0.2, 0.9], ["j1"]),
+        ("RRRR", [0.4, 0.8, 0.7, 0.5], ["j1", "j4"]),
+    ],
 )
 def test_pieces_agree_with_the_closed_form_at_random_times(pattern, start, redundant):
-    chain = joint_map(planar_robot(pattern), ["x", "y"], [{"line": {"by": [-0.15, 0.1]}}], start, redundant)
+    chain = joint_map(
+        planar_robot(pattern),
+        ["x", "y"],
+        [{"line": {"by": [-0.15, 0.1]}}],
+        start,
+        redundant,
+    )
     motion = Sway(chain)
     nodes = interpolate(chain, motion, np.linspace(0.0, 1.0, 6), jumps=False)
     assert nodes.position_error <= 1e-11
@@ -33,17 +45,27 @@ def test_pieces_agree_with_the_closed_form_at_random_times(pattern, start, redun
     assert np.abs(curve(t) - state.q).max() < 1e-10
     assert np.abs(curve(t, nu=1) - state.qdot).max() < 1e-8
     assert np.abs(curve(t, nu=2) - state.qddot).max() < 1e-5 * np.abs(state.qddot).max()
-    assert np.abs(curve(t, nu=3) - state.qdddot).max() < 1e-5 * np.abs(state.qdddot).max()
+    assert (
+        np.abs(curve(t, nu=3) - state.qdddot).max() < 1e-5 * np.abs(state.qdddot).max()
+    )
 
 
 @pytest.mark.parametrize("gap", [1e-4, 2e-5])
 def test_the_jerk_of_short_pieces_is_that_of_the_closed_form(gap):
     """Positions that are 1e-15 rad off would be a jerk of 60 rad/s^3 over 1e-5 s."""
-    chain = joint_map(planar_robot("RRR"), ["x", "y"], [{"line": {"by": [-0.15, 0.1]}}], [0.4, 1.0, 0.5], ["j2"])
+    chain = joint_map(
+        planar_robot("RRR"),
+        ["x", "y"],
+        [{"line": {"by": [-0.15, 0.1]}}],
+        [0.4, 1.0, 0.5],
+        ["j2"],
+    )
     motion = Sway(chain)
     breaks = np.union1d(np.linspace(0.0, 1.0, 6), 0.5 + gap * np.arange(8))
     nodes = interpolate(chain, motion, breaks, jumps=False)
-    jerk = jerk_coefficients(nodes.times, nodes.q, nodes.qdot, nodes.qddot, nodes.qddot_before)
+    jerk = jerk_coefficients(
+        nodes.times, nodes.q, nodes.qdot, nodes.qddot, nodes.qddot_before
+    )
     short = np.diff(nodes.times) <= gap
     assert short.sum() >= 14
     state = chain.state(*motion(nodes.times))
@@ -57,7 +79,9 @@ def test_nodes_contain_the_breaks_and_are_denser_where_the_motion_bends(scara_ur
     # A line that passes the base closely: joint 1 turns quickly in the middle of it.
     start = [np.deg2rad(-40.0), np.deg2rad(100.0), np.deg2rad(65.0)]
     tool = robot.tool_placement(np.array(start)).translation[:2]
-    chain = joint_map(robot, ["x", "y"], [{"line": {"to": [-tool[0], tool[1]]}}], start, ["j2"])
+    chain = joint_map(
+        robot, ["x", "y"], [{"line": {"to": [-tool[0], tool[1]]}}], start, ["j2"]
+    )
     motion = Sway(chain, amplitude=0.0)
     breaks = np.linspace(0.0, 1.0, 5)
     nodes = interpolate(chain, motion, breaks, jumps=False)
@@ -70,7 +94,9 @@ def test_nodes_contain_the_breaks_and_are_denser_where_the_motion_bends(scara_ur
 
 def test_motion_that_leaves_the_branch_between_the_breaks(scara_urdf):
     robot = Robot.from_urdf(scara_urdf)
-    chain = joint_map(robot, ["x", "y"], [{"line": {"by": [0.0, 0.1]}}], [0.2, 1.0, 0.6], ["j3"])
+    chain = joint_map(
+        robot, ["x", "y"], [{"line": {"by": [0.0, 0.1]}}], [0.2, 1.0, 0.6], ["j3"]
+    )
 
     def excursion(t):
         s = np.sin(4.0 * np.pi * t) ** 2 * 60.0  # far off at all times but the quarters

@@ -19,8 +19,14 @@ H = 1e-5
 @pytest.fixture(scope="module")
 def along():
     robot = planar_robot("RRP")
-    waypoints = SplineThrough(through=((0.5, 0.8, -0.3), (1.0, -0.2, 0.2), (0.2, 0.1, 0.5)))
-    path = build_path([SplineSegment(spline=waypoints)], [0.1, 0.2, 0.3], joint_rows(robot.joint_names))
+    waypoints = SplineThrough(
+        through=((0.5, 0.8, -0.3), (1.0, -0.2, 0.2), (0.2, 0.1, 0.5))
+    )
+    path = build_path(
+        [SplineSegment(spline=waypoints)],
+        [0.1, 0.2, 0.3],
+        joint_rows(robot.joint_names),
+    )
     return JointSpaceMap(robot, path)
 
 
@@ -46,8 +52,12 @@ def test_the_motion_is_that_of_the_path(along, states):
         ).qddot
 
     np.testing.assert_allclose(state.q, along.postures(y), atol=1e-12)
-    np.testing.assert_allclose(state.qdot, (moved(H) - moved(-H)) / (2.0 * H), atol=1e-8)
-    np.testing.assert_allclose(state.qddot, (moved(1e-3) - 2.0 * moved(0) + moved(-1e-3)) / 1e-6, atol=1e-4)
+    np.testing.assert_allclose(
+        state.qdot, (moved(H) - moved(-H)) / (2.0 * H), atol=1e-8
+    )
+    np.testing.assert_allclose(
+        state.qddot, (moved(1e-3) - 2.0 * moved(0) + moved(-1e-3)) / 1e-6, atol=1e-4
+    )
     jerk = (accelerated(H) - accelerated(-H)) / (2.0 * H)
     np.testing.assert_allclose(state.qdddot, jerk, atol=1e-5 * np.abs(jerk).max())
 
@@ -58,7 +68,12 @@ def test_derivatives_equal_differences(along, states):
 
     def difference(part, *, of_y, of_ydot):
         ahead, behind = (
-            getattr(along.state(y + sign * H * of_y, ydot + sign * H * of_ydot, yddot, ydddot), part)
+            getattr(
+                along.state(
+                    y + sign * H * of_y, ydot + sign * H * of_ydot, yddot, ydddot
+                ),
+                part,
+            )
             for sign in (1.0, -1.0)
         )
         return (ahead - behind) / (2.0 * H)
@@ -70,7 +85,9 @@ def test_derivatives_equal_differences(along, states):
     ):
         expected = difference(part, of_y=by[0], of_ydot=by[1])
         assert np.abs(expected).max() > 0.1
-        np.testing.assert_allclose(found[:, :, 0], expected, atol=1e-6 * np.abs(expected).max())
+        np.testing.assert_allclose(
+            found[:, :, 0], expected, atol=1e-6 * np.abs(expected).max()
+        )
 
 
 def test_nothing_is_chosen_and_nothing_guards_it(along, states):

@@ -17,13 +17,19 @@ ARMS = {
     "RPRC, one row": (lambda: planar_robot("RPRC", "tilted"), ["z"]),
     "4R with yaw": (lambda: planar_robot("RRRR", "xz"), ["x", "z", "yaw"]),
     "3R with yaw, r = 0": (lambda: planar_robot("RRR"), ["y", "x", "yaw"]),
-    "gantry": (lambda: gantry_robot([(1.0, 0.0, 0.0), (0.0, 1.0, 0.3), (0.2, 0.0, 1.0)]), ["x", "z"]),
+    "gantry": (
+        lambda: gantry_robot([(1.0, 0.0, 0.0), (0.0, 1.0, 0.3), (0.2, 0.0, 1.0)]),
+        ["x", "z"],
+    ),
     "rail, pose": (rail_arm, "pose"),
     "rail, position": (rail_arm, "position"),
     "rail, free roll": (rail_arm, "pose_free_roll"),
     "7R, pose": (seven_joints, "pose"),
     "7R, position": (panda, "position"),
-    "8R on a tilted rail, pose": (lambda: seven_joints(rail=np.array([0.6, 0.8, 0.0])), "pose"),
+    "8R on a tilted rail, pose": (
+        lambda: seven_joints(rail=np.array([0.6, 0.8, 0.0])),
+        "pose",
+    ),
 }
 COUNT = 40
 
@@ -39,7 +45,9 @@ def arm(request):
 def test_placed_is_what_pinocchio_says(arm):
     task_map, q = arm
     values, found = Newton(task_map).placed(q)
-    np.testing.assert_allclose(values, task_map.of_placements(*task_map.robot.tool_placements(q)), atol=1e-13)
+    np.testing.assert_allclose(
+        values, task_map.of_placements(*task_map.robot.tool_placements(q)), atol=1e-13
+    )
     expected = jacobian(task_map, q)
     assert np.abs(expected).max() > 0.1
     np.testing.assert_allclose(found, expected, atol=1e-13)
@@ -77,7 +85,10 @@ def test_far_targets_are_met_where_the_search_ends():
     assert np.isnan(found[~met]).all()
     assert met.mean() > 0.3
     assert np.abs(task_map.values(found[met]) - targets[met]).max() < 1e-12
-    assert np.abs(np.einsum("kij,kj->ki", rows[met], found[met]) - levels[met]).max() < 1e-12
+    assert (
+        np.abs(np.einsum("kij,kj->ki", rows[met], found[met]) - levels[met]).max()
+        < 1e-12
+    )
 
 
 def test_no_answer_out_of_reach_nor_from_nowhere():
@@ -95,7 +106,9 @@ def test_no_answer_out_of_reach_nor_from_nowhere():
 
 def test_singular_matrices_do_not_raise_and_leave_the_others_alone():
     """Two slides along x beside a slide along y: rows that ask for what the path already says have no answer."""
-    _, task_map = bind(gantry_robot([(1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]), ["x", "y"])
+    _, task_map = bind(
+        gantry_robot([(1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]), ["x", "y"]
+    )
     q = np.zeros((3, 3))
     targets = task_map.values(q) + 0.1
     rows = np.array([[[1.0, 1.0, 0.0]], [[1.0, -1.0, 0.0]], [[0.0, 0.0, 0.0]]])
@@ -109,11 +122,15 @@ def test_without_redundancy_there_are_no_rows():
     there = np.array([[0.5, 1.1], [0.3, 1.3]])
     q, none = there + 0.05, np.zeros((2, 0, 2))
     np.testing.assert_allclose(
-        Newton(task_map).solve(task_map.values(there), q, none, np.zeros((2, 0))), there, atol=1e-12
+        Newton(task_map).solve(task_map.values(there), q, none, np.zeros((2, 0))),
+        there,
+        atol=1e-12,
     )
 
 
 def test_no_postures_at_all():
     _, task_map = bind(planar_robot("RRR"), ["x", "y"])
-    found = Newton(task_map).solve(np.zeros((0, 2)), np.zeros((0, 3)), np.zeros((0, 1, 3)), np.zeros((0, 1)))
+    found = Newton(task_map).solve(
+        np.zeros((0, 2)), np.zeros((0, 3)), np.zeros((0, 1, 3)), np.zeros((0, 1))
+    )
     assert found.shape == (0, 3)

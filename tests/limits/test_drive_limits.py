@@ -27,8 +27,19 @@ def slide(tmp_path):
     """Plan a slide, or one slide that carries another along the same line, over LENGTH from rest to rest."""
 
     def plan(*forces, limits=None, tool=None, intervals=40, **spline):
-        ends = [{"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": force} for force in forces]
-        joints = [Joint("prismatic", axis=(1, 0, 0), limit=end, inertial=INERTIAL.format(mass=MASS)) for end in ends]
+        ends = [
+            {"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": force}
+            for force in forces
+        ]
+        joints = [
+            Joint(
+                "prismatic",
+                axis=(1, 0, 0),
+                limit=end,
+                inertial=INERTIAL.format(mass=MASS),
+            )
+            for end in ends
+        ]
         file = tmp_path / "slides.urdf"
         file.write_text(chain_urdf(joints), encoding="utf-8")
         task = {
@@ -50,7 +61,9 @@ def slide(tmp_path):
 
 
 def ratio(result, kind) -> float:
-    return {check.name: check.value for check in result.verification.checks}[f"{kind} ratio"]
+    return {check.name: check.value for check in result.verification.checks}[
+        f"{kind} ratio"
+    ]
 
 
 def test_power_limited_slide(slide):
@@ -67,7 +80,10 @@ def test_power_limited_slide(slide):
 
 CURVES = {
     "concave": [[0.0, FORCE], [1.5, FORCE], [5.0, 10.0]],
-    "constant power": [[0.0, FORCE], *([v, FORCE / v] for v in np.geomspace(1.0, 5.0, 8).tolist())],
+    "constant power": [
+        [0.0, FORCE],
+        *([v, FORCE / v] for v in np.geomspace(1.0, 5.0, 8).tolist()),
+    ],
     "to no torque": [[0.0, FORCE], [1.0, 30.0], [2.4, 6.0]],
 }
 
@@ -79,12 +95,22 @@ def test_torque_that_falls_with_speed(slide, curve):
 
     def allowed(v):
         last = (force[-1] - force[-2]) / (speed[-1] - speed[-2])
-        return np.maximum(np.interp(v, speed, force) + last * np.maximum(v - speed[-1], 0.0), 0.0)
+        return np.maximum(
+            np.interp(v, speed, force) + last * np.maximum(v - speed[-1], 0.0), 0.0
+        )
 
     def motion(_t, state):
         return [state[1], allowed(state[1]) / MASS]
 
-    found = solve_ivp(motion, (0.0, 1.0), [0.0, 0.0], dense_output=True, rtol=1e-10, atol=1e-12, max_step=1e-3)
+    found = solve_ivp(
+        motion,
+        (0.0, 1.0),
+        [0.0, 0.0],
+        dense_output=True,
+        rtol=1e-10,
+        atol=1e-12,
+        max_step=1e-3,
+    )
     expected = 2.0 * brentq(lambda t: found.sol(t)[0] - LENGTH / 2.0, 0.0, 1.0)
     result = slide(FORCE, limits={"torque_speed": {"j1": curve}}, intervals=80)
     assert result.t_end == pytest.approx(expected, rel=NEAR)
@@ -93,7 +119,9 @@ def test_torque_that_falls_with_speed(slide, curve):
 
     def excess(planned):
         dense = planned.trajectory.at(np.linspace(0.0, planned.t_end, 20_001))
-        return (np.abs(dense.tau[:, 0]) - allowed(np.abs(dense.qdot[:, 0]))).max() / FORCE
+        return (
+            np.abs(dense.tau[:, 0]) - allowed(np.abs(dense.qdot[:, 0]))
+        ).max() / FORCE
 
     assert excess(result) <= 1e-4
     unaware = slide(FORCE)
@@ -109,7 +137,9 @@ def test_rms_force_makes_a_parabola_of_the_speed(slide):
     """The least mean square of the force over a time T is that of F = F0 (1 - 2 t / T): F0^2 / 3."""
     rms = 20.0
     result = slide(FORCE, limits={"rms_torque": rms}, intervals=12)
-    assert result.t_end == pytest.approx(np.sqrt(6.0 * MASS * LENGTH / (np.sqrt(3.0) * rms)), rel=NEAR)
+    assert result.t_end == pytest.approx(
+        np.sqrt(6.0 * MASS * LENGTH / (np.sqrt(3.0) * rms)), rel=NEAR
+    )
     assert ratio(result, "rms torque") == pytest.approx(1.0, abs=1e-5)
     check = brachis.bottleneck.report(result, check=True).check
     (entry,) = check.larger()
@@ -126,7 +156,9 @@ def test_a_macro_slide_spares_the_power_of_the_mini_slide(slide):
     """The mini slide's force moves the tool; a strong macro slide takes all the speed, so that no power is needed."""
     expected = 2.0 * np.sqrt(LENGTH * MASS / FORCE)
     limits = {"power": {"j2": 40.0}}
-    assert slide(5.0 * FORCE, FORCE, limits=limits).t_end == pytest.approx(expected, rel=NEAR)
+    assert slide(5.0 * FORCE, FORCE, limits=limits).t_end == pytest.approx(
+        expected, rel=NEAR
+    )
     assert slide(FORCE, limits={"power": 40.0}).t_end > 1.3 * expected
 
 
@@ -134,9 +166,15 @@ def test_a_speed_table_is_a_staircase_of_cruises(slide):
     a, fast, slow, step = FORCE / MASS, 1.5, 0.5, 0.6
     table = {"s": [0.0, step, step, 1.0], "speed": [fast, fast, slow, slow]}
     way = step * LENGTH - (fast**2 + fast**2 - slow**2) / (2.0 * a)
-    expected = (2.0 * fast) / a + way / fast + ((1.0 - step) * LENGTH - slow**2 / (2.0 * a)) / slow
+    expected = (
+        (2.0 * fast) / a
+        + way / fast
+        + ((1.0 - step) * LENGTH - slow**2 / (2.0 * a)) / slow
+    )
     result = slide(FORCE, tool={"speed": table}, intervals=60, degree=2)
-    assert result.t_end == pytest.approx(expected, rel=5e-3)  # the speed changes at three places, off the knots
+    assert result.t_end == pytest.approx(
+        expected, rel=5e-3
+    )  # the speed changes at three places, off the knots
     motion = result.trajectory.at(np.linspace(0.0, result.t_end, 20_001))
     speed, s = np.abs(motion.qdot[:, 0]), motion.s
     assert speed[s >= step].max() <= slow * (1.0 + 1e-4)
@@ -164,7 +202,9 @@ def peaks(trajectory) -> dict[str, np.ndarray | float]:
         "angular_speed": np.abs(motion.qdot.sum(axis=1)).max(),
         "power": np.abs(powers).max(axis=0),
         "total_power": np.abs(powers.sum(axis=1)).max(),
-        "rms_torque": np.sqrt(np.trapezoid(motion.tau**2, motion.t, axis=0) / trajectory.t_end),
+        "rms_torque": np.sqrt(
+            np.trapezoid(motion.tau**2, motion.t, axis=0) / trajectory.t_end
+        ),
         "qdot": np.abs(motion.qdot).max(axis=0),
         "tau": np.abs(motion.tau).max(axis=0),
     }
@@ -177,16 +217,28 @@ def limited(task, kind, free):
         tool = {kind: 0.7 * free[kind]}
     elif kind == "speed":
         tool = {
-            "speed": {"s": [0.0, 0.4, 0.6, 1.0], "speed": (free["speed"] * np.array([1.0, 0.5, 0.6, 1.0])).tolist()}
+            "speed": {
+                "s": [0.0, 0.4, 0.6, 1.0],
+                "speed": (free["speed"] * np.array([1.0, 0.5, 0.6, 1.0])).tolist(),
+            }
         }
     elif kind == "torque_speed":
         at_rest, fastest = free["tau"], free["qdot"]
-        points = zip(("j1", "j2", "j3"), fastest.tolist(), at_rest.tolist(), strict=True)
+        points = zip(
+            ("j1", "j2", "j3"), fastest.tolist(), at_rest.tolist(), strict=True
+        )
         joints = {
-            kind: {name: [[0, tau], [0.3 * v, tau], [0.5 * v, 0.6 * tau], [v, 0.3 * tau]] for name, v, tau in points}
+            kind: {
+                name: [[0, tau], [0.3 * v, tau], [0.5 * v, 0.6 * tau], [v, 0.3 * tau]]
+                for name, v, tau in points
+            }
         }
     else:
-        joints = {kind: 0.7 * free[kind] if kind == "total_power" else (0.7 * free[kind]).tolist()}
+        joints = {
+            kind: 0.7 * free[kind]
+            if kind == "total_power"
+            else (0.7 * free[kind]).tolist()
+        }
     robot = {**task["robot"], "limits": {**task["robot"]["limits"], **joints}}
     return {**task, "robot": robot, "tool_limits": tool}
 
@@ -202,7 +254,9 @@ def limited(task, kind, free):
         ("torque_speed", "torque speed", "j1 positive"),
     ],
 )
-def test_an_arm_without_it_violates_it_and_with_it_meets_it_and_is_slower(arm, kind, check, label):
+def test_an_arm_without_it_violates_it_and_with_it_meets_it_and_is_slower(
+    arm, kind, check, label
+):
     task, free = arm
     result = brachis.plan(limited(task, kind, peaks(free.trajectory)))
     assert result.verified, result.verification
@@ -215,40 +269,81 @@ def test_an_arm_without_it_violates_it_and_with_it_meets_it_and_is_slower(arm, k
     assert [each.name for each in failed] == [f"{check} ratio"]
     assert failed[0].value > 1.2
     report = brachis.bottleneck.report(result, check=True)
-    own = [entry for entry in report.check.entries if str(entry.sensitivity.label).startswith(label)]
+    own = [
+        entry
+        for entry in report.check.entries
+        if str(entry.sensitivity.label).startswith(label)
+    ]
     (entry,) = own[:1]
     assert entry.re_solved < -1e-4
     assert entry.deviation < 0.05
-    assert any(label.split()[0] in str(line.label) and line.share > 0.01 for line in report.saturations)
+    assert any(
+        label.split()[0] in str(line.label) and line.share > 0.01
+        for line in report.saturations
+    )
 
 
 def test_an_arm_keeps_the_rms_torques_of_its_motors(arm):
     task, free = arm
     figures = 0.95 * peaks(free.trajectory)["rms_torque"]
-    joints = {**task["robot"]["limits"], "rms_torque": {"j1": figures[0], "j2": figures[1]}}
+    joints = {
+        **task["robot"]["limits"],
+        "rms_torque": {"j1": figures[0], "j2": figures[1]},
+    }
     result = brachis.plan({**task, "robot": {**task["robot"], "limits": joints}})
     assert result.verified, result.verification
     assert result.t_end > free.t_end * 1.001
     assert 0.999 < peaks(result.trajectory)["rms_torque"][0] / figures[0] < 1.0 + 1e-4
     residual = brachis.apps.bottleneck.sensitivities(result.attempt.refined).residual
-    assert residual < 1e-4, "the gradient is balanced, flat though the end time is around the optimum"
+    assert residual < 1e-4, (
+        "the gradient is balanced, flat though the end time is around the optimum"
+    )
     unaware = dataclasses.replace(free.trajectory, task=result.task)
     verification = verify_trajectory(unaware, robot=result.trajectory.robot)
-    assert [each.name for each in verification.checks if not each.passed] == ["rms torque ratio"]
+    assert [each.name for each in verification.checks if not each.passed] == [
+        "rms torque ratio"
+    ]
 
 
 def test_what_is_a_torque_of_revolute_joints_is_a_force_of_prismatic_ones():
     limits = brachis.LimitSpec(
-        torque=9.0, rms_torque=8.0, torque_rate=7.0, torque_speed={"j1": [[0, 9], [1, 8], [2, 5]]}
+        torque=9.0,
+        rms_torque=8.0,
+        torque_rate=7.0,
+        torque_speed={"j1": [[0, 9], [1, 8], [2, 5]]},
     )
     for kind, unit, word in (("revolute", "Nm", "torque"), ("prismatic", "N", "force")):
         limit = {"lower": -1.0, "upper": 1.0, "velocity": 5.0, "effort": 9.0}
-        joint = Joint(kind, axis=(0.0, 0.0, 1.0), limit=limit, inertial=INERTIAL.format(mass=1.0))
-        robot = brachis.Robot.from_urdf("one.urdf", urdf_text=chain_urdf([joint]), limits=limits)
-        task = brachis.load_task(
-            {"brachis": 1, "start": {"joints": [0.0]}, "task_space": ["x"], "path": [{"line": {"by": [0.1]}}]}
+        joint = Joint(
+            kind, axis=(0.0, 0.0, 1.0), limit=limit, inertial=INERTIAL.format(mass=1.0)
         )
-        labels = {label for found in limits_of(robot, task) for label in found.labels if label.unit.startswith("N")}
-        assert {label.kind for label in labels} == {word, f"rms {word}", f"{word} rate", f"{word} at speed"}
+        robot = brachis.Robot.from_urdf(
+            "one.urdf", urdf_text=chain_urdf([joint]), limits=limits
+        )
+        task = brachis.load_task(
+            {
+                "brachis": 1,
+                "start": {"joints": [0.0]},
+                "task_space": ["x"],
+                "path": [{"line": {"by": [0.1]}}],
+            }
+        )
+        labels = {
+            label
+            for found in limits_of(robot, task)
+            for label in found.labels
+            if label.unit.startswith("N")
+        }
+        assert {label.kind for label in labels} == {
+            word,
+            f"rms {word}",
+            f"{word} rate",
+            f"{word} at speed",
+        }
         assert {label.unit for label in labels} == {unit, f"{unit}/s"}
-        assert {label.key.split(".")[2] for label in labels} == {"torque", "rms_torque", "torque_rate", "torque_speed"}
+        assert {label.key.split(".")[2] for label in labels} == {
+            "torque",
+            "rms_torque",
+            "torque_rate",
+            "torque_speed",
+        }

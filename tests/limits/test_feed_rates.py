@@ -22,7 +22,9 @@ FREE = range(120, 180)
 def line(speed: np.ndarray | None) -> dict:
     """A gantry's task along 1 m."""
     points = np.column_stack([np.linspace(0.0, 1.0, 300), np.zeros(300)])
-    path = brachis.fit_path(points, tolerance={"position": "0.01 mm"}, speed=speed, relative=True)
+    path = brachis.fit_path(
+        points, tolerance={"position": "0.01 mm"}, speed=speed, relative=True
+    )
     return {
         "brachis": 1,
         "start": {"joints": [0.0, 0.0]},
@@ -62,24 +64,39 @@ def test_speeds_are_held_where_they_are_prescribed_and_nowhere_else(robot, rates
     between = (sample.s > first.s[-1]) & (sample.s < second.s[0])
     assert speed[between].max() > 1.1 * FAST
     # The plan without feed rates is no motion for the task with them.
-    found = brachis.verify_trajectory(dataclasses.replace(free.trajectory, task=held.task))
+    found = brachis.verify_trajectory(
+        dataclasses.replace(free.trajectory, task=held.task)
+    )
     (ratio,) = (check.value for check in found.checks if "tool speed" in check.name)
     assert ratio > 2.0
 
 
 def test_feed_rates_stand_beside_the_speed_of_the_task(robot, rates):
     task = Task.model_validate({**line(rates), "tool_limits": {"speed": 0.5}})
-    (limit,) = (each for each in Problem.of(robot, task).limits if each.kind == "tool_speed")
+    (limit,) = (
+        each for each in Problem.of(robot, task).limits if each.kind == "tool_speed"
+    )
     assert [bound.figure for bound in limit.bounds] == pytest.approx([0.5, SLOW, FAST])
     s = np.array([0.2, 0.5, 0.8])
     moving = np.tile([1.0, 0.0], (3, 1))
-    values = limit.values(Moments(np.zeros((3, 2)), moving, 0.0 * moving, 0.0 * moving, s))
-    np.testing.assert_allclose(values, [[2.0, 1.0 / SLOW, 0.0], [2.0, 0.0, 0.0], [2.0, 0.0, 1.0 / FAST]], rtol=1e-9)
+    values = limit.values(
+        Moments(np.zeros((3, 2)), moving, 0.0 * moving, 0.0 * moving, s)
+    )
+    np.testing.assert_allclose(
+        values,
+        [[2.0, 1.0 / SLOW, 0.0], [2.0, 0.0, 0.0], [2.0, 0.0, 1.0 / FAST]],
+        rtol=1e-9,
+    )
 
 
 def test_partials_of_tables_over_parts_of_the_path(robot):
-    feed = (SpeedTable(s=[0.2, 0.4], speed=[0.3, 0.5]), SpeedTable(s=[0.6, 0.9], speed=[0.7, 0.2]))
-    task = Task.model_validate({**line(None), "tool_limits": {"speed": 0.5, "feed": feed}})
+    feed = (
+        SpeedTable(s=[0.2, 0.4], speed=[0.3, 0.5]),
+        SpeedTable(s=[0.6, 0.9], speed=[0.7, 0.2]),
+    )
+    task = Task.model_validate(
+        {**line(None), "tool_limits": {"speed": 0.5, "feed": feed}}
+    )
     (limit,) = (each for each in limits_of(robot, task) if each.kind == "tool_speed")
     s, h = np.array([0.197, 0.3, 0.403, 0.5, 0.7, 0.902]), 1e-6
     q, qdot = np.random.default_rng(2).normal(size=(2, 6, 2))
@@ -88,5 +105,7 @@ def test_partials_of_tables_over_parts_of_the_path(robot):
         return Moments(q, qdot, 0.0 * q, 0.0 * q, places)
 
     expected = (limit.values(at(s + h)) - limit.values(at(s - h))) / (2.0 * h)
-    np.testing.assert_allclose(limit.partials(at(s)).s, expected, atol=1e-6 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        limit.partials(at(s)).s, expected, atol=1e-6 * np.abs(expected).max()
+    )
     assert np.count_nonzero(np.abs(expected) > 1e-3) == 5

@@ -41,13 +41,20 @@ def plugin():
 @pytest.fixture
 def installed(plugin, monkeypatch):
     """The entry point as the plug-in's pyproject.toml names it."""
-    import tomllib  # noqa: PLC0415
+    import tomllib
 
-    points = tomllib.loads((PLUGIN / "pyproject.toml").read_text())["project"]["entry-points"]["brachis.limits"]
-    found = [importlib.metadata.EntryPoint(name, value, "brachis.limits") for name, value in points.items()]
+    points = tomllib.loads((PLUGIN / "pyproject.toml").read_text())["project"][
+        "entry-points"
+    ]["brachis.limits"]
+    found = [
+        importlib.metadata.EntryPoint(name, value, "brachis.limits")
+        for name, value in points.items()
+    ]
     own = importlib.metadata.entry_points
     monkeypatch.setattr(
-        importlib.metadata, "entry_points", lambda group: found if group == "brachis.limits" else own(group=group)
+        importlib.metadata,
+        "entry_points",
+        lambda group: found if group == "brachis.limits" else own(group=group),
     )
     return plugin
 
@@ -69,7 +76,9 @@ def test_an_object_limits_the_motion(plugin):
     assert result.verified
     assert sums(result.trajectory).max() == pytest.approx(UPPER, abs=1e-4)
     assert result.t_end > free.t_end
-    check = {each.name: each for each in result.verification.checks}["coupled range ratio"]
+    check = {each.name: each for each in result.verification.checks}[
+        "coupled range ratio"
+    ]
     assert check.remark == "checked by its own formula"
     assert (check.subject, check.value) == ("j2 + j3", pytest.approx(1.0, abs=1e-4))
     report = brachis.bottleneck.report(result, check=True)
@@ -86,18 +95,31 @@ def test_a_task_file_names_it():
     result = brachis.plan(TASK, **QUICK)
     assert result.verified
     assert sums(result.trajectory).max() <= UPPER + 1e-4
-    assert "coupled range ratio" in [check.name for check in verify_trajectory(result.trajectory).checks]
-    assert json.loads(json.dumps(result.task.to_dict()))["custom_limits"]["coupled_range"]["upper"] == UPPER
+    assert "coupled range ratio" in [
+        check.name for check in verify_trajectory(result.trajectory).checks
+    ]
+    assert (
+        json.loads(json.dumps(result.task.to_dict()))["custom_limits"]["coupled_range"][
+            "upper"
+        ]
+        == UPPER
+    )
 
 
 def test_a_check_of_its_own_takes_the_marks_place(plugin):
     class Checked(plugin.CoupledRange):
         def check(self, robot, q, qdot, qddot, tau):
-            assert q.shape == qdot.shape == qddot.shape == tau.shape == (len(q), robot.n)
+            assert (
+                q.shape == qdot.shape == qddot.shape == tau.shape == (len(q), robot.n)
+            )
             return np.abs(q[:, 1:].sum(axis=1))[:, None] / UPPER
 
-    result = brachis.plan(LINE, own_limits=[Checked(("j2", "j3"), -UPPER, UPPER)], **QUICK)
-    check = {each.name: each for each in result.verification.checks}["coupled range ratio"]
+    result = brachis.plan(
+        LINE, own_limits=[Checked(("j2", "j3"), -UPPER, UPPER)], **QUICK
+    )
+    check = {each.name: each for each in result.verification.checks}[
+        "coupled range ratio"
+    ]
     assert check.remark == ""
     assert check.value == pytest.approx(1.0, abs=1e-3)
 
@@ -110,7 +132,10 @@ def test_a_kind_that_is_not_installed():
 @pytest.mark.parametrize(
     ("parameters", "said"),
     [
-        ({"joints": ["j2", "j3"], "lower": 1.0, "upper": 0.0}, "lower must be below upper"),
+        (
+            {"joints": ["j2", "j3"], "lower": 1.0, "upper": 0.0},
+            "lower must be below upper",
+        ),
         ({"joints": ["j2", "j3"]}, "missing"),
         ({"joints": ["j2", "elbow"], "lower": -1.0, "upper": 1.0}, "elbow"),
     ],
@@ -145,7 +170,9 @@ class Rate(Limit):
         return motion.qdot @ self._row.T
 
     def partials(self, motion):
-        return Partials(qdot=np.broadcast_to(self._row, (len(motion.q), *self._row.shape)))
+        return Partials(
+            qdot=np.broadcast_to(self._row, (len(motion.q), *self._row.shape))
+        )
 
 
 class Given:
@@ -170,14 +197,38 @@ LINE = ROOT / "examples/01_scara_line.yaml"
         ({"labels": ()}, "own_limits[0].lower", "found (1,); allowed: (0,)"),
         ({"lower": np.ones(2)}, "own_limits[0].lower", "(2,)"),
         ({"lower": np.ones(1)}, "own_limits[0]", "lower is not below upper"),
-        ({"values": lambda motion: motion.qdot[:, 2]}, "own_limits[0].values", "found (2,) for 2 moments"),
-        ({"values": lambda motion: np.full((len(motion.q), 1), np.nan)}, "own_limits[0].values", "not finite"),
-        ({"partials": lambda motion: Partials(qdot=motion.q)}, "own_limits[0].partials.qdot", "(2, 1, 3)"),
-        ({"partials": lambda _motion: Partials()}, "own_limits[0].partials", "all None"),
-        ({"partials": lambda _motion: None}, "own_limits[0].partials", "is no brachis.limits.Partials"),
+        (
+            {"values": lambda motion: motion.qdot[:, 2]},
+            "own_limits[0].values",
+            "found (2,) for 2 moments",
+        ),
+        (
+            {"values": lambda motion: np.full((len(motion.q), 1), np.nan)},
+            "own_limits[0].values",
+            "not finite",
+        ),
+        (
+            {"partials": lambda motion: Partials(qdot=motion.q)},
+            "own_limits[0].partials.qdot",
+            "(2, 1, 3)",
+        ),
+        (
+            {"partials": lambda _motion: Partials()},
+            "own_limits[0].partials",
+            "all None",
+        ),
+        (
+            {"partials": lambda _motion: None},
+            "own_limits[0].partials",
+            "is no brachis.limits.Partials",
+        ),
         ({"labels": (Label("j1", "torque", "Nm"),)}, "own_limits[0].labels", "taken"),
         ({"labels": ("j3",)}, "own_limits[0].labels", "Label"),
-        ({"labels": (), "lower": np.empty(0), "upper": np.empty(0)}, "own_limits[0].labels", "no values"),
+        (
+            {"labels": (), "lower": np.empty(0), "upper": np.empty(0)},
+            "own_limits[0].labels",
+            "no values",
+        ),
     ],
 )
 def test_a_limit_whose_parts_do_not_fit_is_refused(parts, where, said):
@@ -207,10 +258,14 @@ def test_two_processes_take_it_as_well():
         "result = brachis.plan(task, own_limits=[CoupledRange(('j2', 'j3'), -0.5, 0.7)]);"
         "print(result.verified, 'coupled range ratio' in [check.name for check in result.verification.checks])"
     )
-    search = os.pathsep.join([str(PLUGIN / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
+    search = os.pathsep.join(
+        [str(PLUGIN / "src"), *filter(None, [os.environ.get("PYTHONPATH")])]
+    )
     environment = {**os.environ, "PYTHONPATH": search}
     command = [sys.executable, "-c", code, LINE]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        command, env=environment, capture_output=True, text=True, check=True
+    )
     assert done.stdout.split() == ["True", "True"]
 
 
@@ -226,6 +281,8 @@ def test_a_limit_of_ones_own_knows_how_speeds_are_reached(plugin):
         def bind(self, robot):
             return Bound(self, robot)
 
-    brachis.transcribe(brachis.examples.scara_line, own_limits=[Model(("j2", "j3"), -0.5, UPPER)])
+    brachis.transcribe(
+        brachis.examples.scara_line, own_limits=[Model(("j2", "j3"), -0.5, UPPER)]
+    )
     assert ways[0][1] == pytest.approx(4.0 * ways[0][0])
     assert ways[0][0] > 0.0

@@ -14,14 +14,26 @@ from brachis.task import LimitSpec, SpeedTable, ToolLimits
 from support.chains import planar_robot
 from support.phases import FRICTION
 
-FALLING = {"j1": [[0, 90], [1, 80], [2, 40]], "j2": [[0, 90], [0.5, 30], [1, 20]], "j3": [[0, 100], [1, 100], [2, 20]]}
+FALLING = {
+    "j1": [[0, 90], [1, 80], [2, 40]],
+    "j2": [[0, 90], [0.5, 30], [1, 20]],
+    "j3": [[0, 100], [1, 100], [2, 20]],
+}
 ROBOT = planar_robot(
     "RRP",
     "xz",
     friction={**FRICTION, "viscous": 1.0},
-    limits=LimitSpec(power=[40, None, 60], total_power=70, rms_torque=[30, 20, None], torque_speed=FALLING),
+    limits=LimitSpec(
+        power=[40, None, 60],
+        total_power=70,
+        rms_torque=[30, 20, None],
+        torque_speed=FALLING,
+    ),
 )
-PARTS = [{"speed": 0.3, "s": [0.1, 0.3]}, {"speed": 0.8, "s": [0.6, 0.9], "tolerance": "20 %"}]
+PARTS = [
+    {"speed": 0.3, "s": [0.1, 0.3]},
+    {"speed": 0.8, "s": [0.6, 0.9], "tolerance": "20 %"},
+]
 TOOL = ToolLimits(
     speed=SpeedTable(s=[0.0, 0.5, 0.5, 1.0], speed=[0.7, 1.0, 0.9, 1.1]),
     acceleration=2.0,
@@ -31,7 +43,10 @@ TOOL = ToolLimits(
 TASK = SimpleNamespace(tool_limits=TOOL, custom_limits={})
 RNG = np.random.default_rng(3)
 # The path coordinates lie off all kinks.
-STATES = Moments(*(RNG.normal(size=(6, 3)) for _ in range(4)), s=np.array([0.085, 0.15, 0.315, 0.59, 0.7, 0.93]))
+STATES = Moments(
+    *(RNG.normal(size=(6, 3)) for _ in range(4)),
+    s=np.array([0.085, 0.15, 0.315, 0.59, 0.7, 0.93]),
+)
 ORDERS = ("q", "qdot", "qddot", "qdddot")
 BY = (*ORDERS, "s")
 
@@ -39,7 +54,9 @@ BY = (*ORDERS, "s")
 @pytest.fixture(params=sorted(TABLE))
 def limit(request):
     some = np.array([5.0, np.inf, 7.0])
-    limits = dataclasses.replace(ROBOT.limits, acceleration=some, jerk=10.0 * some, torque_rate=100.0 * some)
+    limits = dataclasses.replace(
+        ROBOT.limits, acceleration=some, jerk=10.0 * some, torque_rate=100.0 * some
+    )
     built = TABLE[request.param](dataclasses.replace(ROBOT, limits=limits), TASK)
     assert built.kind == request.param
     return built
@@ -57,9 +74,19 @@ def test_partials_equal_differences(limit):
                 arrays = {name: getattr(STATES, name).copy() for name in BY}
                 arrays[part][which] += step * h
                 moved.append(limit.values(Moments(**arrays)))
-            expected = (-moved[0] + 8.0 * moved[1] - 8.0 * moved[2] + moved[3]) / (12.0 * h)
-            mine = np.zeros_like(expected) if exact is None else exact if part == "s" else exact[:, :, column]
-            np.testing.assert_allclose(mine, expected, atol=1e-6 * max(1.0, np.abs(expected).max()))
+            expected = (-moved[0] + 8.0 * moved[1] - 8.0 * moved[2] + moved[3]) / (
+                12.0 * h
+            )
+            mine = (
+                np.zeros_like(expected)
+                if exact is None
+                else exact
+                if part == "s"
+                else exact[:, :, column]
+            )
+            np.testing.assert_allclose(
+                mine, expected, atol=1e-6 * max(1.0, np.abs(expected).max())
+            )
 
 
 def test_every_value_has_a_label_and_a_figure(limit):
@@ -67,19 +94,31 @@ def test_every_value_has_a_label_and_a_figure(limit):
     assert limit.values(STATES).shape == (6, count)
     assert len(limit.labels) == len(limit.upper) == count
     assert len({str(label) for label in limit.labels}) == count
-    assert all(label.unit and label.key.split(".")[0] in ("robot", "tool_limits") for label in limit.labels)
+    assert all(
+        label.unit and label.key.split(".")[0] in ("robot", "tool_limits")
+        for label in limit.labels
+    )
     assert {bound.column for bound in limit.bounds} == set(range(count))
 
 
 def test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit):
     for bound in limit.bounds:
         other = limit.relaxed(bound, 0.1 * bound.whole)
-        np.testing.assert_allclose(other.values(STATES), limit.values(STATES), rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(
+            other.values(STATES), limit.values(STATES), rtol=1e-12, atol=1e-12
+        )
         with np.errstate(invalid="ignore"):  # inf - inf
-            low, high = np.nan_to_num(limit.lower - other.lower), np.nan_to_num(other.upper - limit.upper)
+            low, high = (
+                np.nan_to_num(limit.lower - other.lower),
+                np.nan_to_num(other.upper - limit.upper),
+            )
         for moves, end in ((low, "upper"), (high, "lower")):
             assert not np.delete(moves, bound.column).any()
-            assert moves[bound.column] == pytest.approx(0.0) if bound.end == end else moves[bound.column] >= 0.0
+            assert (
+                moves[bound.column] == pytest.approx(0.0)
+                if bound.end == end
+                else moves[bound.column] >= 0.0
+            )
         assert max(low[bound.column], high[bound.column]) > 5e-4
 
 
@@ -91,12 +130,22 @@ def test_ratios_are_one_at_the_bounds_and_violations_begin_there(limit):
         np.testing.assert_allclose(limit.violation(values)[0, on], 0.0, atol=1e-12)
 
 
-NO_LINES = {"position", "power", "total_power", "torque_speed", "rms_torque", "jerk", "torque_rate"}
+NO_LINES = {
+    "position",
+    "power",
+    "total_power",
+    "torque_speed",
+    "rms_torque",
+    "jerk",
+    "torque_rate",
+}
 
 
 def test_lines_of_the_phase_plane_are_the_limit_along_a_path(limit):
     """Without velocity friction: values (or, for ceilings, their squares) are a u + b x + c."""
-    free = dataclasses.replace(ROBOT, friction=planar_robot("RRP", "xz").friction, limits=limit_source(limit))
+    free = dataclasses.replace(
+        ROBOT, friction=planar_robot("RRP", "xz").friction, limits=limit_source(limit)
+    )
     limit = TABLE[limit.kind](free, TASK)
     q, q_ds, q_dds = (RNG.normal(size=(5, 3)) for _ in range(3))
     s, u, speed = np.array([0.1, 0.2, 0.5, 0.65, 0.95]), 0.7, 1.3
@@ -104,13 +153,27 @@ def test_lines_of_the_phase_plane_are_the_limit_along_a_path(limit):
     if lines is None:
         assert limit.kind in NO_LINES
         return
-    values = limit.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, np.zeros_like(q), s))
-    found = (0.0 if lines.u is None else lines.u * u) + lines.x * speed**2 + lines.constant
+    values = limit.values(
+        Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, np.zeros_like(q), s)
+    )
+    found = (
+        (0.0 if lines.u is None else lines.u * u) + lines.x * speed**2 + lines.constant
+    )
     if limit.kind == "tool_acceleration":  # components of it
         found = np.linalg.norm(found, axis=1)[:, None]
-    elif "process_speed" in limit.kind:  # within the parts alone, from 1 at the tolerance
+    elif (
+        "process_speed" in limit.kind
+    ):  # within the parts alone, from 1 at the tolerance
         side = 1.0 if limit.kind == "process_speed" else -1.0
-        inside = np.array([[True, False], [True, False], [False, False], [False, True], [False, False]])
+        inside = np.array(
+            [
+                [True, False],
+                [True, False],
+                [False, False],
+                [False, True],
+                [False, False],
+            ]
+        )
         tolerance = np.array([0.01, 0.2])
         values = np.where(inside, (1.0 + values) / (1.0 + side * tolerance), 0.0)
         found = np.where(inside & (side < 0.0), 2.0 - found, found)
@@ -120,20 +183,27 @@ def test_lines_of_the_phase_plane_are_the_limit_along_a_path(limit):
 
 def limit_source(limit):
     given = {
-        kind: np.array([5.0, np.inf, 7.0]) for kind in ("acceleration", "jerk", "torque_rate") if kind == limit.kind
+        kind: np.array([5.0, np.inf, 7.0])
+        for kind in ("acceleration", "jerk", "torque_rate")
+        if kind == limit.kind
     }
     return dataclasses.replace(ROBOT.limits, **given)
 
 
 def test_limits_come_in_the_order_of_the_table_and_only_where_there_is_one():
     kinds = [limit.kind for limit in limits_of(ROBOT, TASK)]
-    assert kinds == [kind for kind in TABLE if kind not in ("acceleration", "jerk", "torque_rate")]
+    assert kinds == [
+        kind for kind in TABLE if kind not in ("acceleration", "jerk", "torque_rate")
+    ]
     open_task = SimpleNamespace(tool_limits=ToolLimits(), custom_limits={})
     kinds = [limit.kind for limit in limits_of(planar_robot("RRP", "xz"), open_task)]
     assert kinds == ["torque", "velocity", "position"]
 
 
-@pytest.mark.parametrize(("lower", "upper"), [(0.0, 0.3), (-0.1, -0.05), (-np.inf, 0.2), (0.5, np.inf), (-3.0, 4.0)])
+@pytest.mark.parametrize(
+    ("lower", "upper"),
+    [(0.0, 0.3), (-0.1, -0.05), (-np.inf, 0.2), (0.5, np.inf), (-3.0, 4.0)],
+)
 def test_a_ratio_is_above_one_exactly_where_a_bound_is_violated(lower, upper):
     """However narrow the bounds are, or far from zero."""
 
@@ -159,11 +229,16 @@ def test_a_ratio_is_above_one_exactly_where_a_bound_is_violated(lower, upper):
             assert limit.ratio(np.array([[bound]]))[0, 0] == sign
 
 
-PAIRS = {"torque": {"j1": [-20.0, 60.0], "j2": [-70.0, 5.0]}, "velocity": {"j2": [-1.0, 4.0], "j3": 3.0}}
+PAIRS = {
+    "torque": {"j1": [-20.0, 60.0], "j2": [-70.0, 5.0]},
+    "velocity": {"j2": [-1.0, 4.0], "j3": 3.0},
+}
 
 
 def pairs(kind: str) -> Limit:
-    robot = planar_robot("RRP", "xz", friction={**FRICTION, "viscous": 1.0}, limits=LimitSpec(**PAIRS))
+    robot = planar_robot(
+        "RRP", "xz", friction={**FRICTION, "viscous": 1.0}, limits=LimitSpec(**PAIRS)
+    )
     return TABLE[kind](robot, TASK)
 
 
@@ -172,20 +247,32 @@ def test_pairs_of_limits_are_the_bounds_of_what_is_limited(kind):
     limit, same = pairs(kind), TABLE[kind](ROBOT, TASK)
     test_partials_equal_differences(limit)
     test_relaxing_a_figure_lets_its_own_bounds_out_and_no_others(limit)
-    figures = {(str(limit.labels[bound.column]), bound.end): bound.figure for bound in limit.bounds}
-    first = {"torque": ("j1 torque", -20.0, 60.0), "velocity": ("j2 velocity", -1.0, 4.0)}[kind]
+    figures = {
+        (str(limit.labels[bound.column]), bound.end): bound.figure
+        for bound in limit.bounds
+    }
+    first = {
+        "torque": ("j1 torque", -20.0, 60.0),
+        "velocity": ("j2 velocity", -1.0, 4.0),
+    }[kind]
     assert (figures[first[0], "lower"], figures[first[0], "upper"]) == first[1:]
     assert figures["j3 force" if kind == "torque" else "j3 velocity", None] > 0.0
     column = [str(label) for label in limit.labels].index(first[0])
     quantity = same.values(STATES)[:, column] * same.bounds[column].figure
     middle, half = 0.5 * (first[1] + first[2]), 0.5 * (first[2] - first[1])
-    np.testing.assert_allclose(limit.values(STATES)[:, column], (quantity - middle) / half)
-    beyond = np.maximum(quantity - first[2], first[1] - quantity) / min(first[2], -first[1])
+    np.testing.assert_allclose(
+        limit.values(STATES)[:, column], (quantity - middle) / half
+    )
+    beyond = np.maximum(quantity - first[2], first[1] - quantity) / min(
+        first[2], -first[1]
+    )
     np.testing.assert_allclose(limit.violation(limit.values(STATES))[:, column], beyond)
     share = quantity / np.where(quantity > 0.0, first[2], -first[1])
     inside = beyond <= 0.0
     assert inside.sum() > 0
-    np.testing.assert_allclose(limit.ratio(limit.values(STATES))[inside, column], share[inside], atol=1e-12)
+    np.testing.assert_allclose(
+        limit.ratio(limit.values(STATES))[inside, column], share[inside], atol=1e-12
+    )
 
 
 def test_pairs_of_limits_bound_the_phase_plane_by_the_direction_of_motion():
@@ -193,22 +280,37 @@ def test_pairs_of_limits_bound_the_phase_plane_by_the_direction_of_motion():
     s = np.linspace(0.0, 1.0, 5)
     q, q_ds, q_dds = (RNG.normal(size=(5, 3)) for _ in range(3))
     squares = velocity.lines(s, q, q_ds, q_dds).x[:, 1]
-    np.testing.assert_allclose(np.sqrt(squares), np.maximum(q_ds[:, 1] / 4.0, -q_ds[:, 1] / 1.0))
+    np.testing.assert_allclose(
+        np.sqrt(squares), np.maximum(q_ds[:, 1] / 4.0, -q_ds[:, 1] / 1.0)
+    )
     still = planar_robot("RRP", "xz", limits=LimitSpec(**PAIRS))
     torque, u, speed = TABLE["torque"](still, TASK), 0.7, 1.3
     lines = torque.lines(s, q, q_ds, q_dds)
-    values = torque.values(Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, 0.0 * q, s))
-    np.testing.assert_allclose(lines.u * u + lines.x * speed**2 + lines.constant, values, atol=1e-9)
+    values = torque.values(
+        Moments(q, q_ds * speed, q_ds * u + q_dds * speed**2, 0.0 * q, s)
+    )
+    np.testing.assert_allclose(
+        lines.u * u + lines.x * speed**2 + lines.constant, values, atol=1e-9
+    )
 
 
 def test_torques_of_a_motion_are_computed_once(monkeypatch):
-    robot = dataclasses.replace(ROBOT, limits=dataclasses.replace(ROBOT.limits, torque_rate=np.full(3, 100.0)))
-    built = [TABLE[kind](robot, TASK) for kind in ("torque", "power", "total_power", "torque_speed", "rms_torque")]
+    robot = dataclasses.replace(
+        ROBOT, limits=dataclasses.replace(ROBOT.limits, torque_rate=np.full(3, 100.0))
+    )
+    built = [
+        TABLE[kind](robot, TASK)
+        for kind in ("torque", "power", "total_power", "torque_speed", "rms_torque")
+    ]
     motion = Moments(STATES.q, STATES.qdot, STATES.qddot, STATES.qdddot, STATES.s)
     calls = []
     for name in ("torque", "torque_derivatives"):
         own = getattr(dynamics, name)
-        monkeypatch.setattr(dynamics, name, lambda *given, own=own, name=name: calls.append(name) or own(*given))
+        monkeypatch.setattr(
+            dynamics,
+            name,
+            lambda *given, own=own, name=name: calls.append(name) or own(*given),
+        )
     for limit in built:
         limit.values(motion)
         limit.partials(motion)

@@ -52,9 +52,13 @@ def rates(trajectory, kind, count=20_000):
 
 
 def test_the_limit_holds_everywhere_and_is_used(kind, free, result):
-    assert rates(free.trajectory, kind).max() > 2.0 * FIGURES[kind], "without the limit it is exceeded"
+    assert rates(free.trajectory, kind).max() > 2.0 * FIGURES[kind], (
+        "without the limit it is exceeded"
+    )
     assert result.verified
-    assert rates(result.trajectory, kind).max() == pytest.approx(FIGURES[kind], rel=5e-4)
+    assert rates(result.trajectory, kind).max() == pytest.approx(
+        FIGURES[kind], rel=5e-4
+    )
     assert rates(result.trajectory, kind).max() < FIGURES[kind] * 1.0002
     assert result.t_end > 1.01 * free.t_end
 
@@ -65,14 +69,20 @@ def test_verification_finds_what_is_too_fast(kind, result):
     assert check.value == pytest.approx(1.0, abs=2e-4)
     robot = result.trajectory.robot
     tighter = replace(robot.limits, **{kind: getattr(robot.limits, kind) / 1.001})
-    verification = verify_trajectory(result.trajectory, robot=replace(robot, limits=tighter))
+    verification = verify_trajectory(
+        result.trajectory, robot=replace(robot, limits=tighter)
+    )
     failed = [each for each in verification.checks if not each.passed]
     assert [each.name for each in failed] == [name]
     assert failed[0].value == pytest.approx(1.001 * check.value, rel=1e-6)
     joint = result.trajectory.joint_names.index(failed[0].subject)
     near = failed[0].time + np.array([-1e-6, 0.0, 1e-6])
-    values = result.trajectory.acceleration if kind == "jerk" else result.trajectory.torque
-    steps = np.abs(np.diff(values(near)[:, joint])) / 1e-6  # at a knot either side may be the worst
+    values = (
+        result.trajectory.acceleration if kind == "jerk" else result.trajectory.torque
+    )
+    steps = (
+        np.abs(np.diff(values(near)[:, joint])) / 1e-6
+    )  # at a knot either side may be the worst
     assert steps.max() == pytest.approx(FIGURES[kind], rel=1e-3)
 
 
@@ -88,19 +98,39 @@ def test_verification_finds_a_rate_within_a_microsecond(kind, result, follows, f
     assert trajectory.times[place] > t[1]
     at = trajectory.at(t)
     later = np.array([[0.0], [1.0]]) * change
-    q, qdot, qddot = at.q + follows * h**2 / 6.0 * later, at.qdot + follows * h / 2.0 * later, at.qddot + later
+    q, qdot, qddot = (
+        at.q + follows * h**2 / 6.0 * later,
+        at.qdot + follows * h / 2.0 * later,
+        at.qddot + later,
+    )
     new = {"times": at.t, "q": q, "qdot": qdot, "qddot": qddot, "qddot_before": qddot}
-    arrays = {name: np.insert(getattr(trajectory, name), place, values, axis=0) for name, values in new.items()}
-    checks = {each.name: each for each in verify_trajectory(replace(trajectory, **arrays)).checks}
+    arrays = {
+        name: np.insert(getattr(trajectory, name), place, values, axis=0)
+        for name, values in new.items()
+    }
+    checks = {
+        each.name: each
+        for each in verify_trajectory(replace(trajectory, **arrays)).checks
+    }
     found = checks[f"{kind.replace('_', ' ')} ratio"]
-    inertia = 1.0 if kind == "jerk" else np.abs(trajectory.torque(t[0]) - _torque(trajectory, t[0], change)).max() / 0.1
+    inertia = (
+        1.0
+        if kind == "jerk"
+        else np.abs(trajectory.torque(t[0]) - _torque(trajectory, t[0], change)).max()
+        / 0.1
+    )
     # Positions are known to 2e-16 |q|: a jerk of 60 * 2e-16 |q| / h^3, near 1e4 rad/s^3 beside 9e5.
-    assert found.value == pytest.approx(factor * 0.1 / h * inertia / FIGURES[kind], rel=2e-2)
+    assert found.value == pytest.approx(
+        factor * 0.1 / h * inertia / FIGURES[kind], rel=2e-2
+    )
     assert found.time == pytest.approx(t[0], abs=2e-6)
 
 
 def _torque(trajectory, t, change):
-    states = (np.atleast_2d(part(t)) for part in (trajectory.position, trajectory.velocity, trajectory.acceleration))
+    states = (
+        np.atleast_2d(part(t))
+        for part in (trajectory.position, trajectory.velocity, trajectory.acceleration)
+    )
     q, qdot, qddot = states
     return torques(trajectory.robot, q, qdot, qddot + change)[0]
 
@@ -119,8 +149,12 @@ def test_prediction_is_what_solving_again_gives(kind, result, step, above):
 
 def test_timeline_and_ratios_know_it(kind, result):
     ratios = limit_ratios(result.trajectory)
-    column = [str(label) for label in ratios.labels].index(f"j2 {kind.replace('_', ' ')}")
-    assert ratios.labels[column].unit == {"jerk": "rad/s^3", "torque_rate": "Nm/s"}[kind]
+    column = [str(label) for label in ratios.labels].index(
+        f"j2 {kind.replace('_', ' ')}"
+    )
+    assert (
+        ratios.labels[column].unit == {"jerk": "rad/s^3", "torque_rate": "Nm/s"}[kind]
+    )
     assert np.abs(ratios.values).max() == pytest.approx(1.0, abs=2e-4)
     # At inner knots of cubic splines the jerk jumps: both sides are there.
     twice = ratios.t[1:][np.diff(ratios.t) == 0.0]
@@ -132,25 +166,45 @@ def test_timeline_and_ratios_know_it(kind, result):
 def test_the_limits_of_rates_are_for_splines_that_can_hold_them(kind):
     figure = {kind: FIGURES[kind]}
     words = f"the {kind.replace('_', ' ')} limit asks for a continuous acceleration"
-    with pytest.raises(InputError, match=rf"spline\.degree: {words}; found 2, .*; allowed: >= 3"):
+    with pytest.raises(
+        InputError, match=rf"spline\.degree: {words}; found 2, .*; allowed: >= 3"
+    ):
         brachis.plan(task(spline={"degree": 2, "rest": "velocity"}, **figure))
-    with pytest.raises(InputError, match=rf"spline\.rest: {words}; found velocity, .*; allowed: full or jerk"):
+    with pytest.raises(
+        InputError,
+        match=rf"spline\.rest: {words}; found velocity, .*; allowed: full or jerk",
+    ):
         brachis.plan(task(spline={"rest": "velocity"}, **figure))
 
 
 def test_rates_of_the_verification_are_differences_of_its_torques(free):
     trajectory, t, h = free.trajectory, np.linspace(0.1, 2.0, 9) + 0.0123, 1e-4
-    parts = [getattr(trajectory, name)(t) for name in ("position", "velocity", "acceleration", "jerk")]
-    friction = replace(trajectory.robot.friction, viscous=np.full(3, 2.0), coulomb=np.full(3, 1.5), v_eps=np.ones(3))
+    parts = [
+        getattr(trajectory, name)(t)
+        for name in ("position", "velocity", "acceleration", "jerk")
+    ]
+    friction = replace(
+        trajectory.robot.friction,
+        viscous=np.full(3, 2.0),
+        coulomb=np.full(3, 1.5),
+        v_eps=np.ones(3),
+    )
     robot = replace(trajectory.robot, friction=friction)
 
     def after(step):
         q, qdot, qddot, qdddot = parts
         moved = q + step * qdot + step**2 / 2 * qddot + step**3 / 6 * qdddot
-        return torques(robot, moved, qdot + step * qddot + step**2 / 2 * qdddot, qddot + step * qdddot)
+        return torques(
+            robot,
+            moved,
+            qdot + step * qddot + step**2 / 2 * qdddot,
+            qddot + step * qdddot,
+        )
 
     expected = (after(h) - after(-h)) / (2.0 * h)
-    np.testing.assert_allclose(torque_rates(robot, *parts), expected, atol=1e-6 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        torque_rates(robot, *parts), expected, atol=1e-6 * np.abs(expected).max()
+    )
 
 
 class _Twist(Limit):
@@ -167,7 +221,11 @@ class _Twist(Limit):
         return motion.qdddot[:, 1:].sum(axis=1)[:, None] / 15.0
 
     def partials(self, motion):
-        return Partials(qdddot=np.broadcast_to(np.array([[0.0, 1.0, 1.0]]) / 15.0, (len(motion.q), 1, 3)))
+        return Partials(
+            qdddot=np.broadcast_to(
+                np.array([[0.0, 1.0, 1.0]]) / 15.0, (len(motion.q), 1, 3)
+            )
+        )
 
 
 def test_a_limit_of_the_users_own_may_ask_for_the_jerk(free):
@@ -175,4 +233,7 @@ def test_a_limit_of_the_users_own_may_ask_for_the_jerk(free):
     assert np.abs(free.trajectory.jerk(t * free.t_end)[:, 1:].sum(axis=1)).max() > 20.0
     result = brachis.plan(task(), own_limits=[_Twist()])
     assert result.verified
-    assert np.abs(result.trajectory.jerk(t * result.t_end)[:, 1:].sum(axis=1)).max() <= 15.0 * 1.0002
+    assert (
+        np.abs(result.trajectory.jerk(t * result.t_end)[:, 1:].sum(axis=1)).max()
+        <= 15.0 * 1.0002
+    )

@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 
 from brachis.limits.torque import WIDTH, RoundedCurve
 
-PIECES = st.lists(st.tuples(st.floats(1e-3, 10.0), st.floats(0.0, 1.0)), min_size=1, max_size=7)
+PIECES = st.lists(
+    st.tuples(st.floats(1e-3, 10.0), st.floats(0.0, 1.0)), min_size=1, max_size=7
+)
 """Lengths of pieces, and the part of the torque that is left behind each of them."""
 
 
@@ -23,7 +25,10 @@ def true_torque(curve, speeds):
     """The curve, its last slope going on to zero torque."""
     speed, torque = np.transpose(curve)
     slope = (torque[-1] - torque[-2]) / (speed[-1] - speed[-2])
-    return np.maximum(np.interp(speeds, speed, torque) + slope * np.maximum(speeds - speed[-1], 0.0), 0.0)
+    return np.maximum(
+        np.interp(speeds, speed, torque) + slope * np.maximum(speeds - speed[-1], 0.0),
+        0.0,
+    )
 
 
 @given(PIECES)
@@ -35,10 +40,14 @@ def test_it_lies_below_the_curve_by_little_and_falls_to_zero_at_most(pieces):
         return
     speed = np.array(curve)[:, 0]
     near = (speed[:, None] + speed[-1] * np.linspace(-0.01, 0.01, 41)).ravel()
-    speeds = np.unique(np.concatenate([np.linspace(0.0, 2.0 * speed[-1], 2001), near.clip(0.0)]))
+    speeds = np.unique(
+        np.concatenate([np.linspace(0.0, 2.0 * speed[-1], 2001), near.clip(0.0)])
+    )
     values, true = rounded.values(speeds), true_torque(curve, speeds)
     eps = 1e-7 + 1e-9 * rounded.at_rest
-    within = np.minimum(values, 50.0)  # what lies above the torque at rest is cut by the plain limit
+    within = np.minimum(
+        values, 50.0
+    )  # what lies above the torque at rest is cut by the plain limit
     assert np.all(within <= true + eps)
     assert np.all(within >= true - WIDTH * 50.0 - eps)
     assert np.all(values >= -eps)
@@ -57,10 +66,14 @@ def test_it_lies_below_the_curve_by_little_and_falls_to_zero_at_most(pieces):
 def test_its_slope_equals_differences_inside_corners_and_off_them(curve):
     rounded = RoundedCurve.below(curve)
     h = 1e-3 * rounded.widths.min()
-    corners = (rounded.corners[:, None] + rounded.widths[:, None] * np.linspace(-1.3, 1.3, 12)).ravel()
+    corners = (
+        rounded.corners[:, None] + rounded.widths[:, None] * np.linspace(-1.3, 1.3, 12)
+    ).ravel()
     speeds = np.concatenate([corners, -corners, np.linspace(-4.0, 4.0, 23)])
     differences = (rounded.values(speeds + h) - rounded.values(speeds - h)) / (2.0 * h)
-    np.testing.assert_allclose(rounded.slopes(speeds), differences, atol=1e-6 * np.abs(rounded.bends).max())
+    np.testing.assert_allclose(
+        rounded.slopes(speeds), differences, atol=1e-6 * np.abs(rounded.bends).max()
+    )
 
 
 def test_a_level_beginning_is_left_to_the_plain_limit():

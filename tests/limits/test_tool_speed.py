@@ -39,7 +39,9 @@ def speeds(trajectory, count=20_000):
 
 def test_the_cap_holds_everywhere_and_is_used(task, result):
     free = brachis.plan({**task, "tool_limits": {"speed": None}})
-    assert speeds(free.trajectory).max() > 2.0 * CAP, "without the cap the tool is much faster"
+    assert speeds(free.trajectory).max() > 2.0 * CAP, (
+        "without the cap the tool is much faster"
+    )
     assert result.verified
     assert speeds(result.trajectory).max() == pytest.approx(CAP, rel=1e-4)
     assert result.t_end > free.t_end
@@ -51,24 +53,39 @@ def test_verification_finds_a_tool_that_is_too_fast_by_pinocchios_own_velocity(r
     check = {each.name: each for each in result.verification.checks}["tool speed ratio"]
     assert (check.subject, check.unit, check.remark) == ("tool", "-", "")
     assert check.value == pytest.approx(1.0, abs=1e-4)
-    tighter = result.task.model_copy(update={"tool_limits": brachis.task.ToolLimits(speed=CAP / 1.001)})
-    verification = verify_trajectory(dataclasses.replace(result.trajectory, task=tighter))
+    tighter = result.task.model_copy(
+        update={"tool_limits": brachis.task.ToolLimits(speed=CAP / 1.001)}
+    )
+    verification = verify_trajectory(
+        dataclasses.replace(result.trajectory, task=tighter)
+    )
     failed = [each for each in verification.checks if not each.passed]
     assert [each.name for each in failed] == ["tool speed ratio"]
     assert failed[0].value == pytest.approx(1.001, abs=1e-4)
-    model, data = result.trajectory.robot.model, result.trajectory.robot.model.createData()
+    model, data = (
+        result.trajectory.robot.model,
+        result.trajectory.robot.model.createData(),
+    )
     state = result.trajectory.at(np.array([failed[0].time]))
     pin.forwardKinematics(model, data, state.q[0], state.qdot[0])
     frame = result.trajectory.robot.frame_id
-    velocity = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).linear
-    assert np.linalg.norm(velocity) * 1.001 / CAP == pytest.approx(failed[0].value, rel=1e-9)
+    velocity = pin.getFrameVelocity(
+        model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    ).linear
+    assert np.linalg.norm(velocity) * 1.001 / CAP == pytest.approx(
+        failed[0].value, rel=1e-9
+    )
 
 
 def test_sensitivity_is_within_5_percent_of_solving_again(result):
     report = brachis.bottleneck.report(result, check=True)
     entry = report.sensitivities.of("tool", "speed")
     assert entry.change(0.1) < -0.03 * result.t_end
-    (checked,) = [each for each in report.check.entries if each.sensitivity.label.subject == "tool"]
+    (checked,) = [
+        each
+        for each in report.check.entries
+        if each.sensitivity.label.subject == "tool"
+    ]
     assert checked.optimal
     assert checked.deviation < 0.05
     assert "10 % more speed at tool (0.1 m/s) saves" in str(report)
@@ -76,7 +93,10 @@ def test_sensitivity_is_within_5_percent_of_solving_again(result):
 
 
 def test_the_timeline_has_a_row(result):
-    labels = [label.get_text() for label in plot_timeline(result.trajectory).axes[0].get_yticklabels()]
+    labels = [
+        label.get_text()
+        for label in plot_timeline(result.trajectory).axes[0].get_yticklabels()
+    ]
     assert "tool speed" in labels
 
 

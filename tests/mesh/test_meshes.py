@@ -12,7 +12,14 @@ import brachis
 from brachis.common.deadline import NEVER, Deadline
 from brachis.optimise import mesh
 from brachis.optimise.backends import SolverOptions, SolveStatus, solver_named
-from brachis.optimise.mesh import MeshOptions, adapt_mesh, coarsest, optimise_knots, refine_mesh, solve_nested
+from brachis.optimise.mesh import (
+    MeshOptions,
+    adapt_mesh,
+    coarsest,
+    optimise_knots,
+    refine_mesh,
+    solve_nested,
+)
 from brachis.optimise.refine import RefinementOptions, refine
 from brachis.task import SplineSettings
 from support.effort import QUICK
@@ -38,7 +45,9 @@ def task(joint="j1", **spline) -> brachis.Task:
 
 
 def robot() -> brachis.Robot:
-    return brachis.Robot.from_urdf(SCARA, gravity=[0, 0, 0], limits=brachis.LimitSpec(torque=10.0, velocity=None))
+    return brachis.Robot.from_urdf(
+        SCARA, gravity=[0, 0, 0], limits=brachis.LimitSpec(torque=10.0, velocity=None)
+    )
 
 
 def solve(program, x):
@@ -54,10 +63,15 @@ def solved():
 
 def failing(program, x):
     """A solver that breaks down."""
-    return dataclasses.replace(solve(program, x), status=SolveStatus.FAILED, violation=np.inf)
+    return dataclasses.replace(
+        solve(program, x), status=SolveStatus.FAILED, violation=np.inf
+    )
 
 
-@pytest.mark.parametrize(("joint", "intervals", "longest"), [("j1", 8, 2.285), ("j1", 12, 2.185), ("j3", 12, 2.38)])
+@pytest.mark.parametrize(
+    ("joint", "intervals", "longest"),
+    [("j1", 8, 2.285), ("j1", 12, 2.185), ("j3", 12, 2.38)],
+)
 def test_free_knots_make_few_intervals_fast(joint, intervals, longest):
     result = brachis.plan(robot(), task(joint, intervals=intervals, knots="free"))
     assert result.verified
@@ -94,13 +108,19 @@ def test_intervals_are_refined_where_the_motion_switches(solved):
     assert len(lengths) < 60
     assert lengths.max() >= 4.0 * lengths.min()
     np.testing.assert_allclose(lengths[[0, -1]], lengths.min(), rtol=1e-9)
-    assert set(np.round(program.phases[0].breaks, 12)) <= set(np.round(finer.phases[0].breaks, 12))
+    assert set(np.round(program.phases[0].breaks, 12)) <= set(
+        np.round(finer.phases[0].breaks, 12)
+    )
 
 
 def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
     program, report = solved
-    rough, reports, _ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.1), NEVER)
-    fine, more, _ = refine_mesh(program, report, solve, MeshOptions(tolerance=0.01), NEVER)
+    rough, reports, _ = refine_mesh(
+        program, report, solve, MeshOptions(tolerance=0.1), NEVER
+    )
+    fine, more, _ = refine_mesh(
+        program, report, solve, MeshOptions(tolerance=0.01), NEVER
+    )
     assert program.intervals < rough.intervals < fine.intervals
     assert more[-1].objective < reports[-1].objective < report.objective
     assert reports[0] is report
@@ -111,8 +131,12 @@ def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
 def test_a_round_beyond_its_end_gains_little(solved):
     program, report = solved
     tolerance = 0.02
-    mesh, reports, _ = refine_mesh(program, report, solve, MeshOptions(tolerance), NEVER)
-    again, further, _ = refine_mesh(mesh, reports[-1], solve, MeshOptions(tolerance), NEVER)
+    mesh, reports, _ = refine_mesh(
+        program, report, solve, MeshOptions(tolerance), NEVER
+    )
+    again, further, _ = refine_mesh(
+        mesh, reports[-1], solve, MeshOptions(tolerance), NEVER
+    )
     assert again.intervals > mesh.intervals
     assert further[-1].objective > (1.0 - tolerance) * reports[-1].objective
 
@@ -123,7 +147,9 @@ def test_what_cannot_be_solved_is_left_as_it_was(solved):
     assert mesh is program
     assert reports[-1] is report
     assert len(reports) == 2
-    same, reports, _ = optimise_knots(program, report, failing, 0.1, RefinementOptions())
+    same, reports, _ = optimise_knots(
+        program, report, failing, 0.1, RefinementOptions()
+    )
     assert same is program
     assert reports[-1] is report
 
@@ -134,9 +160,15 @@ def test_no_interval_is_so_short_that_points_fall_together(solved):
     assert np.diff(moved.phases[0].breaks).min() == pytest.approx(5e-5, rel=1e-3)
 
 
-def test_free_knots_without_a_motion_within_the_limits_are_given_up(solved, monkeypatch):
+def test_free_knots_without_a_motion_within_the_limits_are_given_up(
+    solved, monkeypatch
+):
     program, report = solved
-    monkeypatch.setattr(mesh, "refine", lambda *given: dataclasses.replace(refine(*given), violation=0.5))
+    monkeypatch.setattr(
+        mesh,
+        "refine",
+        lambda *given: dataclasses.replace(refine(*given), violation=0.5),
+    )
     kept, reports, _ = optimise_knots(program, report, solve, 0.1, RefinementOptions())
     assert kept is program
     assert reports[-1] is report
@@ -149,9 +181,13 @@ def test_a_free_solve_that_stalls_still_gives_good_knots(solved):
     def stalling(tried, x):
         answer = solve(tried, x)
         free = len(tried.phases[0].grid.lower) > 0
-        return dataclasses.replace(answer, status=SolveStatus.STALLED) if free else answer
+        return (
+            dataclasses.replace(answer, status=SolveStatus.STALLED) if free else answer
+        )
 
-    moved, reports, _ = optimise_knots(program, report, stalling, 0.1, RefinementOptions())
+    moved, reports, _ = optimise_knots(
+        program, report, stalling, 0.1, RefinementOptions()
+    )
     assert reports[-1].status.usable
     assert reports[-1].objective < 0.95 * report.objective
     assert moved.variables == program.variables, "the knots should be fixed again"
@@ -167,11 +203,15 @@ def test_coarsest_problem(intervals):
     for fine, rough in ((whole.breaks, part.breaks), (whole.t_norm, part.t_norm)):
         assert np.isin(rough, fine).all()
         assert (rough[0], rough[-1]) == (0.0, 1.0)
-    assert np.diff(part.t_norm).max() == pytest.approx(np.diff(part.breaks).max() / 3.0), "3 points an interval"
+    assert np.diff(part.t_norm).max() == pytest.approx(
+        np.diff(part.breaks).max() / 3.0
+    ), "3 points an interval"
 
 
 @pytest.mark.parametrize("intervals", [53, 100])
-def test_nested_iteration_gives_the_answer_of_a_cold_solve_in_a_few_iterations(intervals):
+def test_nested_iteration_gives_the_answer_of_a_cold_solve_in_a_few_iterations(
+    intervals,
+):
     program, _ = brachis.transcribe(robot(), task(intervals=intervals))
     coarse = coarsest(program).with_margin(0.05)
     report = solve(coarse, next(starting_points(coarse)))
@@ -182,7 +222,9 @@ def test_nested_iteration_gives_the_answer_of_a_cold_solve_in_a_few_iterations(i
     assert nested.safeguard_bounds == coarse.safeguard_bounds
     assert reports[0] is report
     assert max(later.iterations for later in reports[1:]) <= 10
-    assert reports[-1].objective == pytest.approx(solve(program, next(starting_points(program))).objective, rel=1e-4)
+    assert reports[-1].objective == pytest.approx(
+        solve(program, next(starting_points(program))).objective, rel=1e-4
+    )
 
 
 def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
@@ -195,12 +237,25 @@ def test_nested_iteration_keeps_the_last_level_that_was_solved_and_tells_so():
 
     nested, reports, undone = solve_nested(program, coarse, report, small_ones_only)
     assert nested.intervals == 50
-    assert [later.status for later in reports][-2:] == [SolveStatus.FAILED, SolveStatus.OPTIMAL]
+    assert [later.status for later in reports][-2:] == [
+        SolveStatus.FAILED,
+        SolveStatus.OPTIMAL,
+    ]
     assert reports[-1].x.shape == (nested.variables,)
     assert undone == "the motion has 50 of 100 intervals, of which more were not solved"
-    settled = adapt_mesh(coarse, (report,), failing, SplineSettings(), RefinementOptions(), target=program)
+    settled = adapt_mesh(
+        coarse,
+        (report,),
+        failing,
+        SplineSettings(),
+        RefinementOptions(),
+        target=program,
+    )
     assert settled.reports[-1] is report
-    assert settled.undone == "the motion has 13 of 100 intervals, of which more were not solved"
+    assert (
+        settled.undone
+        == "the motion has 13 of 100 intervals, of which more were not solved"
+    )
 
 
 def test_no_level_is_begun_after_the_deadline(solved):
@@ -214,7 +269,10 @@ def test_no_level_is_begun_after_the_deadline(solved):
     first = solve(coarse, next(starting_points(coarse)))
     over = RefinementOptions(deadline=Deadline(0.0))
     assert solve_nested(target, coarse, first, never, over.deadline).undone
-    for spline in (SplineSettings(knots="free", intervals=10), SplineSettings(intervals="auto")):
+    for spline in (
+        SplineSettings(knots="free", intervals=10),
+        SplineSettings(intervals="auto"),
+    ):
         kept, reports, undone = adapt_mesh(program, (report,), never, spline, over)
         assert kept is program
         assert reports == (report,)
@@ -235,10 +293,18 @@ def test_settings_choose_what_is_done(solved):
     program, report = solved
     options = RefinementOptions()
     given = SplineSettings(intervals=10)
-    assert adapt_mesh(program, (report,), solve, given, options) == (program, (report,), "")
+    assert adapt_mesh(program, (report,), solve, given, options) == (
+        program,
+        (report,),
+        "",
+    )
     unusable = (report, failing(program, report.x))
     freed = SplineSettings(knots="free", intervals=10)
-    assert adapt_mesh(program, unusable, solve, freed, options) == (program, unusable, "")
+    assert adapt_mesh(program, unusable, solve, freed, options) == (
+        program,
+        unusable,
+        "",
+    )
     before = dataclasses.replace(report)
     free, reports, _ = adapt_mesh(program, (before, report), solve, freed, options)
     assert reports[0] is before

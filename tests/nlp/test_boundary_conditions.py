@@ -15,18 +15,24 @@ from support.phases import CASES, phase_of, reachable_points
 
 def random_points(phase, count=5):
     rng = np.random.default_rng(3)
-    return [np.append(rng.uniform(0.5, 3.0), rng.normal(size=phase.variables - 1)) for _ in range(count)]
+    return [
+        np.append(rng.uniform(0.5, 3.0), rng.normal(size=phase.variables - 1))
+        for _ in range(count)
+    ]
 
 
 def curves_at_the_ends(phase, x):
     """Value, velocity and acceleration of y at both ends from SciPy's B-spline in seconds."""
     motion = phase.motion(x)
-    spline = BSpline(motion.knots * motion.t_end, motion.control_points.T, motion.degree)
+    spline = BSpline(
+        motion.knots * motion.t_end, motion.control_points.T, motion.degree
+    )
     return [spline(np.array([0.0, motion.t_end]), nu=order) for order in range(3)]
 
 
 @pytest.mark.parametrize(
-    ("degree", "rest"), [(2, "velocity"), *((d, r) for d in (3, 4, 5) for r in ("full", "velocity"))]
+    ("degree", "rest"),
+    [(2, "velocity"), *((d, r) for d in (3, 4, 5) for r in ("full", "velocity"))],
 )
 @pytest.mark.parametrize("case", ["r0", "r1", "r2"])
 def test_start_and_rest(case, degree, rest):
@@ -41,15 +47,21 @@ def test_start_and_rest(case, degree, rest):
         if rest == "full":
             np.testing.assert_allclose(yddot, 0.0, atol=1e-9 * scale)
         else:
-            assert np.abs(yddot).min() > 1e-3 * scale, "the acceleration should be free at both ends"
+            assert np.abs(yddot).min() > 1e-3 * scale, (
+                "the acceleration should be free at both ends"
+            )
         if phase.joint_map.r:
-            assert np.abs(y[1, 1:] - start).max() > 1e-3, "the end posture should be free"
+            assert np.abs(y[1, 1:] - start).max() > 1e-3, (
+                "the end posture should be free"
+            )
 
 
 def test_given_end_posture():
     # An end posture on the path: the closed form at s = 1 with a chosen redundant joint.
     free = phase_of("r1")
-    end_q = free.joint_map.postures(np.array([[0.0, 0.1], [0.5, 0.12], [1.0, 0.15]]))[-1]
+    end_q = free.joint_map.postures(np.array([[0.0, 0.1], [0.5, 0.12], [1.0, 0.15]]))[
+        -1
+    ]
     phase = phase_of("r1", end=end_q.tolist())
     assert phase.variables == free.variables - 1
     for x in random_points(phase):
@@ -71,9 +83,13 @@ def test_states_are_those_of_the_curves(case):
     t = phase.t_norm * x[0]
     curves = (state.y, state.ydot, state.yddot, state.ydddot)
     for order, part in enumerate(curves):
-        np.testing.assert_allclose(part, spline(t, nu=order), atol=1e-9 * max(1.0, np.abs(part).max()))
+        np.testing.assert_allclose(
+            part, spline(t, nu=order), atol=1e-9 * max(1.0, np.abs(part).max())
+        )
     for mine, theirs in zip(motion.at(t), curves, strict=True):
-        np.testing.assert_allclose(mine, theirs, atol=1e-10 * max(1.0, np.abs(theirs).max()))
+        np.testing.assert_allclose(
+            mine, theirs, atol=1e-10 * max(1.0, np.abs(theirs).max())
+        )
     np.testing.assert_allclose(state.q[0], phase.joint_map.start, atol=1e-9)
 
 
@@ -82,16 +98,26 @@ def test_resampled_keeps_the_meaning_of_x():
     t_norm = np.linspace(0.0, 1.0, 37)
     other = phase.resampled(t_norm)
     (x,) = reachable_points(phase, 1)
-    np.testing.assert_allclose(other.motion(x).control_points, phase.motion(x).control_points, atol=1e-12)
+    np.testing.assert_allclose(
+        other.motion(x).control_points, phase.motion(x).control_points, atol=1e-12
+    )
     np.testing.assert_array_equal(other.x_lower, phase.x_lower)
     assert other.variables == phase.variables
     assert len(phase.t_norm) == 11
     assert len(other.state(x).q) == 37
-    shared = np.flatnonzero(np.isclose(t_norm[:, None], phase.t_norm[None], atol=1e-12).any(axis=1))
-    matching = np.flatnonzero(np.isclose(phase.t_norm[:, None], t_norm[None], atol=1e-12).any(axis=1))
+    shared = np.flatnonzero(
+        np.isclose(t_norm[:, None], phase.t_norm[None], atol=1e-12).any(axis=1)
+    )
+    matching = np.flatnonzero(
+        np.isclose(phase.t_norm[:, None], t_norm[None], atol=1e-12).any(axis=1)
+    )
     assert len(shared) >= 2
-    np.testing.assert_allclose(other.state(x).q[shared], phase.state(x).q[matching], atol=1e-12)
-    np.testing.assert_allclose(phase.violation_at(x, t_norm), other.violation(x), atol=1e-9)
+    np.testing.assert_allclose(
+        other.state(x).q[shared], phase.state(x).q[matching], atol=1e-12
+    )
+    np.testing.assert_allclose(
+        phase.violation_at(x, t_norm), other.violation(x), atol=1e-9
+    )
     assert len(other.rows(x)) == len(other.lower) == len(other.upper)
     assert len(other.jacobian(x)) == len(other.jacobian_rows)
     assert other.jacobian_rows.max() == len(other.lower) - 1
@@ -107,7 +133,9 @@ def test_monotone_control_points_make_progress_monotone():
     phase = phase_of("r1", degree=5)
     x = random_points(phase, 1)[0]
     part = phase.slices[0]
-    x[part] = np.sort(np.random.default_rng(0).uniform(0.0, 1.0, part.stop - part.start))
+    x[part] = np.sort(
+        np.random.default_rng(0).uniform(0.0, 1.0, part.stop - part.start)
+    )
     _, ydot, *_ = phase.motion(x).at(np.linspace(0.0, x[0], 999))
     assert ydot[:, 0].min() >= -1e-12
     assert ydot[:, 0].max() > 0.1
@@ -124,18 +152,28 @@ def test_monotone_control_points_make_progress_monotone():
 )
 def test_boundary_splines(degree, extra, derivatives, start, end, seed):
     knots = clamped_uniform_knots(degree, 4 + extra)
-    ends = (EndCondition(value, 0.0, min(derivatives, degree - 1)) for value in (start, end))
+    ends = (
+        EndCondition(value, 0.0, min(derivatives, degree - 1)) for value in (start, end)
+    )
     spline = BoundarySpline.between(knots, degree, *ends)
     free = np.random.default_rng(seed).normal(size=spline.free)
     points = spline.control_points(free, 1.0)
     curve = BSpline(knots, points, degree)
     for order in range(1, min(derivatives, degree - 1) + 1):
-        np.testing.assert_allclose(curve(np.array([0.0, 1.0]), nu=order), 0.0, atol=1e-9 * np.abs(points).max() * 100)
+        np.testing.assert_allclose(
+            curve(np.array([0.0, 1.0]), nu=order),
+            0.0,
+            atol=1e-9 * np.abs(points).max() * 100,
+        )
     for wanted, time in ((start, 0.0), (end, 1.0)):
         if np.isfinite(wanted):
             assert float(curve(time)) == pytest.approx(wanted, abs=1e-12)
     np.testing.assert_allclose(spline.free_from(points, 1.0), free, atol=1e-12)
     # Nothing more is tied than the boundary conditions ask for.
     still = min(derivatives, degree - 1)
-    assert spline.free == len(points) - 2 * still - np.isfinite(start) - np.isfinite(end)
-    np.testing.assert_allclose(BSpline(knots, spline.greville, degree)(0.37), 0.37, atol=1e-12)
+    assert spline.free == len(points) - 2 * still - np.isfinite(start) - np.isfinite(
+        end
+    )
+    np.testing.assert_allclose(
+        BSpline(knots, spline.greville, degree)(0.37), 0.37, atol=1e-12
+    )

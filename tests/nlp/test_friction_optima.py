@@ -38,7 +38,9 @@ def slide(damping: float = 0.0, friction: float = 0.0) -> str:
     return chain_urdf([joint], tool=(0.1, 0.2, 0.3))
 
 
-def plan(urdf: str, spline: Mapping[str, object] = EVEN, **robot: object) -> brachis.Result:
+def plan(
+    urdf: str, spline: Mapping[str, object] = EVEN, **robot: object
+) -> brachis.Result:
     options = {"gravity": [0, 0, 0], "tool_frame": "tool", **robot}
     task = {
         "brachis": 1,
@@ -47,7 +49,9 @@ def plan(urdf: str, spline: Mapping[str, object] = EVEN, **robot: object) -> bra
         "path": [{"line": {"by": [LENGTH]}}],
         "spline": {"rest": "velocity", **spline},
     }
-    return brachis.plan(brachis.Robot.from_urdf("slide", urdf_text=urdf, **options), task)
+    return brachis.plan(
+        brachis.Robot.from_urdf("slide", urdf_text=urdf, **options), task
+    )
 
 
 def viscous_time() -> float:
@@ -57,7 +61,9 @@ def viscous_time() -> float:
         braking = pushing - VISCOUS * LENGTH / FORCE
         speed = steady * (1.0 - np.exp(-pushing / scale))
         there = steady * (pushing - scale * (1.0 - np.exp(-pushing / scale)))
-        back = (speed + steady) * scale * (1.0 - np.exp(-braking / scale)) - steady * braking
+        back = (speed + steady) * scale * (
+            1.0 - np.exp(-braking / scale)
+        ) - steady * braking
         return there + back - LENGTH
 
     pushing = brentq(beyond, VISCOUS * LENGTH / FORCE, 10.0)
@@ -79,10 +85,26 @@ FRICTIONLESS = 2.0 * np.sqrt(MASS * LENGTH / FORCE)
         (slide(damping=VISCOUS), {}, EVEN, viscous_time()),
         (slide(), {"viscous": VISCOUS}, EVEN, viscous_time()),
         (slide(friction=COULOMB), {"coulomb_velocity": 1e-3}, FREE, coulomb_time()),
-        (slide(VISCOUS, COULOMB), {"viscous": None, "coulomb": None}, EVEN, FRICTIONLESS),
-        (slide(), {"rotor_inertia": 1e-4, "gear_ratio": 200.0}, EVEN, 2.0 * np.sqrt((MASS + 4.0) * LENGTH / FORCE)),
+        (
+            slide(VISCOUS, COULOMB),
+            {"viscous": None, "coulomb": None},
+            EVEN,
+            FRICTIONLESS,
+        ),
+        (
+            slide(),
+            {"rotor_inertia": 1e-4, "gear_ratio": 200.0},
+            EVEN,
+            2.0 * np.sqrt((MASS + 4.0) * LENGTH / FORCE),
+        ),
     ],
-    ids=["viscous of the URDF", "viscous", "Coulomb of the URDF", "switched off", "rotor"],
+    ids=[
+        "viscous of the URDF",
+        "viscous",
+        "Coulomb of the URDF",
+        "switched off",
+        "rotor",
+    ],
 )
 def test_slides_with_friction_reach_the_known_optimum(urdf, friction, spline, expected):
     result = plan(urdf, spline, friction=friction)
@@ -90,11 +112,17 @@ def test_slides_with_friction_reach_the_known_optimum(urdf, friction, spline, ex
     assert expected * (1.0 - 1e-4) < result.t_end < 1.001 * expected
 
 
-@pytest.mark.parametrize("urdf", [slide(damping=VISCOUS), slide(friction=COULOMB)], ids=["viscous", "Coulomb"])
+@pytest.mark.parametrize(
+    "urdf",
+    [slide(damping=VISCOUS), slide(friction=COULOMB)],
+    ids=["viscous", "Coulomb"],
+)
 def test_a_motion_without_friction_exceeds_the_torque_of_a_drive_that_rubs(urdf):
     free = plan(urdf, FEW, friction={"viscous": None, "coulomb": None})
     assert free.t_end < 0.99 * plan(urdf, FEW).t_end
-    rubbing = brachis.Robot.from_urdf("slide", urdf_text=urdf, gravity=[0, 0, 0], tool_frame="tool")
+    rubbing = brachis.Robot.from_urdf(
+        "slide", urdf_text=urdf, gravity=[0, 0, 0], tool_frame="tool"
+    )
     checks = verify_trajectory(free.trajectory, robot=rubbing).checks
     assert [check.name for check in checks if not check.passed] == ["torque ratio"]
 

@@ -84,11 +84,18 @@ def test_yaw_may_turn_past_half_a_turn(redundant, yaw):
     robot = planar_robot("RRRR" if redundant else "RRR")
     start = np.array([0.4, -0.6, 1.4, 0.0] if redundant else [0.4, 1.8, 0.0])
     rotation = robot.tool_placement(start).rotation
-    start[-1] = np.remainder(yaw - np.arctan2(rotation[1, 0], rotation[0, 0]) + np.pi, 2.0 * np.pi) - np.pi
+    start[-1] = (
+        np.remainder(
+            yaw - np.arctan2(rotation[1, 0], rotation[0, 0]) + np.pi, 2.0 * np.pi
+        )
+        - np.pi
+    )
     path = [{"line": {"by": [-0.05, 0.03, 0.4]}}]
     program = program_of(robot, ["x", "y", "yaw"], path, start, redundant, intervals=8)
     (phase,) = program.phases
-    assert phase.joint_map.path.sample(np.array([0.0, 1.0])).target[:, 2] == pytest.approx([yaw, yaw + 0.4])
+    assert phase.joint_map.path.sample(np.array([0.0, 1.0])).target[
+        :, 2
+    ] == pytest.approx([yaw, yaw + 0.4])
     found = list(starting_points(program))
     assert found, "no guess"
     for x in found:

@@ -31,10 +31,15 @@ def assert_same_motion(one, other, tolerance=1e-12):
     assert one.t_end == pytest.approx(other.t_end, rel=1e-15)
     t = np.linspace(0.0, one.t_end, 173)
     for mine, theirs in zip(one.at(t), other.at(t), strict=True):
-        np.testing.assert_allclose(mine, theirs, atol=tolerance * max(1.0, np.abs(theirs).max()))
+        np.testing.assert_allclose(
+            mine, theirs, atol=tolerance * max(1.0, np.abs(theirs).max())
+        )
 
 
-@pytest.mark.parametrize(("degree", "rest"), [(2, "velocity"), (3, "full"), (3, "velocity"), (4, "full"), (5, "full")])
+@pytest.mark.parametrize(
+    ("degree", "rest"),
+    [(2, "velocity"), (3, "full"), (3, "velocity"), (4, "full"), (5, "full")],
+)
 @pytest.mark.parametrize("case", ["r0", "r1", "r2"])
 def test_insertion_keeps_the_motion_and_rest(case, degree, rest):
     phase = phase_of(case, degree=degree, rest=rest, intervals=6)
@@ -45,10 +50,16 @@ def test_insertion_keeps_the_motion_and_rest(case, degree, rest):
         there = fine.variables_from(inserted)
         assert_same_motion(fine.motion(there), phase.motion(x))
         # Ties and fixed control points of the finer phase hold exactly: nothing was averaged away.
-        np.testing.assert_allclose(fine.motion(there).control_points, inserted.control_points, atol=1e-14)
+        np.testing.assert_allclose(
+            fine.motion(there).control_points, inserted.control_points, atol=1e-14
+        )
         assert there[0] == x[0]
-        between = 0.5 * (fine.t_norm[1:] + fine.t_norm[:-1])  # at knots a spline of degree 2 has two accelerations
-        np.testing.assert_allclose(fine.violation_at(there, between), phase.violation_at(x, between), atol=1e-9)
+        between = 0.5 * (
+            fine.t_norm[1:] + fine.t_norm[:-1]
+        )  # at knots a spline of degree 2 has two accelerations
+        np.testing.assert_allclose(
+            fine.violation_at(there, between), phase.violation_at(x, between), atol=1e-9
+        )
 
 
 def test_a_feasible_motion_stays_feasible_at_old_points():
@@ -57,9 +68,17 @@ def test_a_feasible_motion_stays_feasible_at_old_points():
     fine = finer(phase).resampled(phase.t_norm)
     there = fine.variables_from(phase.motion(x).over(fine.knots))
     # A mean over time is one of the values at the points, weighted by the intervals that they are in.
-    rows = np.concatenate([phase.rows_of(limit).ravel() for limit in phase.limits if limit.where == "points"])
+    rows = np.concatenate(
+        [
+            phase.rows_of(limit).ravel()
+            for limit in phase.limits
+            if limit.where == "points"
+        ]
+    )
     np.testing.assert_allclose(fine.rows(there)[rows], phase.rows(x)[rows], atol=1e-10)
-    assert np.diff(there[fine.slices[0]]).min() >= -1e-15, "s(t) should still be monotone in its control points"
+    assert np.diff(there[fine.slices[0]]).min() >= -1e-15, (
+        "s(t) should still be monotone in its control points"
+    )
 
 
 @pytest.mark.parametrize("degree", [2, 3, 5])
@@ -86,10 +105,16 @@ def test_points_move_with_the_knots():
     t_norm = spread(ends, 2)
     state = free.state(there)
     for mine, theirs in zip(
-        (state.y, state.ydot, state.yddot, state.ydddot), motion.at(t_norm * motion.t_end), strict=True
+        (state.y, state.ydot, state.yddot, state.ydddot),
+        motion.at(t_norm * motion.t_end),
+        strict=True,
     ):
-        np.testing.assert_allclose(mine, theirs, atol=1e-11 * max(1.0, np.abs(theirs).max()))
-    np.testing.assert_allclose(free.violation_at(there, t_norm), free.violation(there), atol=1e-9)
+        np.testing.assert_allclose(
+            mine, theirs, atol=1e-11 * max(1.0, np.abs(theirs).max())
+        )
+    np.testing.assert_allclose(
+        free.violation_at(there, t_norm), free.violation(there), atol=1e-9
+    )
 
 
 def test_frozen():
@@ -125,6 +150,10 @@ def test_curves_at_knots_are_those_behind_them_whatever_the_rounding():
     knots = motion.breaks[1:-1]
     behind = motion.at(knots + 1e-9)[2]
     before = motion.at(knots - 1e-9)[2]
-    assert np.abs(behind - before).min(axis=1).max() > 1e-3, "the acceleration should jump"
+    assert np.abs(behind - before).min(axis=1).max() > 1e-3, (
+        "the acceleration should jump"
+    )
     for rounded in (knots, np.nextafter(knots, 0.0), np.nextafter(knots, 1.0)):
-        np.testing.assert_allclose(motion.at(rounded)[2], behind, atol=1e-12 * np.abs(behind).max())
+        np.testing.assert_allclose(
+            motion.at(rounded)[2], behind, atol=1e-12 * np.abs(behind).max()
+        )

@@ -32,9 +32,14 @@ def slides(tmp_path):
     """Write the URDF of slides, each with MASS, and return its path."""
 
     def write(axes, forces) -> str:
-        limits = [{"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": force} for force in forces]
+        limits = [
+            {"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": force}
+            for force in forces
+        ]
         joints = [
-            Joint("prismatic", axis=axis, limit=limit, inertial=INERTIAL.format(mass=MASS))
+            Joint(
+                "prismatic", axis=axis, limit=limit, inertial=INERTIAL.format(mass=MASS)
+            )
             for axis, limit in zip(axes, limits, strict=True)
         ]
         file = tmp_path / "slides.urdf"
@@ -75,7 +80,9 @@ def plan(
 
 def fastest(result) -> np.ndarray:
     """Largest speed of every joint on a dense grid."""
-    return np.abs(result.trajectory.velocity(np.linspace(0.0, result.t_end, 4001))).max(axis=0)
+    return np.abs(result.trajectory.velocity(np.linspace(0.0, result.t_end, 4001))).max(
+        axis=0
+    )
 
 
 def bang_bang(mass: float) -> float:
@@ -89,16 +96,30 @@ def test_one_slide(slides):
 
 
 @pytest.mark.parametrize("rest", ["velocity", "full"])
-@pytest.mark.parametrize(("first", "last"), [(2.0, 0.0), (0.0, 3.0), (1.5, 4.0), (6.0, 6.0)])
+@pytest.mark.parametrize(
+    ("first", "last"), [(2.0, 0.0), (0.0, 3.0), (1.5, 4.0), (6.0, 6.0)]
+)
 def test_slide_between_speeds(slides, first, last, rest):
     """Full force forwards up to the speed v with 2 v^2 = 2 a L + v0^2 + v1^2, full force back from there."""
-    speeds, boundary = np.array([first, last]), {"start_speed": first, "end_speed": last}
-    result = plan(slides([X], [FORCE]), ["x"], [LENGTH], intervals=100, rest=rest, boundary=boundary)
+    speeds, boundary = (
+        np.array([first, last]),
+        {"start_speed": first, "end_speed": last},
+    )
+    result = plan(
+        slides([X], [FORCE]),
+        ["x"],
+        [LENGTH],
+        intervals=100,
+        rest=rest,
+        boundary=boundary,
+    )
     assert result.verified
     most = np.sqrt(FORCE / MASS * LENGTH + 0.5 * speeds @ speeds)
     exact = (2.0 * most - speeds.sum()) * MASS / FORCE
     # With full rest the force is zero at both ends, and rises and falls within an interval.
-    assert result.t_end == pytest.approx(exact, rel=1e-3 if rest == "velocity" else 1e-2)
+    assert result.t_end == pytest.approx(
+        exact, rel=1e-3 if rest == "velocity" else 1e-2
+    )
     assert result.t_end > exact * (1.0 - 1e-4)
     ends = result.trajectory.velocity(np.array([0.0, result.t_end]))[:, 0]
     np.testing.assert_allclose(ends, speeds, atol=1e-9)
@@ -106,10 +127,15 @@ def test_slide_between_speeds(slides, first, last, rest):
     assert force < 1e-6 if rest == "full" else force > 0.9 * FORCE
 
 
-@pytest.mark.parametrize(("axis", "mass"), [(0, 2.0 * MASS), (1, MASS)], ids=["lower slide", "upper slide"])
+@pytest.mark.parametrize(
+    ("axis", "mass"), [(0, 2.0 * MASS), (1, MASS)], ids=["lower slide", "upper slide"]
+)
 def test_gantry_approaches_bang_bang_from_above(slides, axis, mass):
     # The lower slide carries the upper one.
-    urdf, by = slides([X, Y], [FORCE, FORCE]), [LENGTH * (axis == 0), LENGTH * (axis == 1)]
+    urdf, by = (
+        slides([X, Y], [FORCE, FORCE]),
+        [LENGTH * (axis == 0), LENGTH * (axis == 1)],
+    )
     times = {}
     for intervals in (10, 20, 40):
         result = plan(urdf, ["x", "y"], by, intervals=intervals)
@@ -123,9 +149,17 @@ def test_gantry_approaches_bang_bang_from_above(slides, axis, mass):
 
 @pytest.mark.parametrize("intervals", [10, 20, 40])
 def test_rest_in_acceleration_costs_two_more_ramps(slides, intervals):
-    result = plan(slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, 0.0], intervals=intervals, rest="full")
+    result = plan(
+        slides([X, Y], [FORCE, FORCE]),
+        ["x", "y"],
+        [LENGTH, 0.0],
+        intervals=intervals,
+        rest="full",
+    )
     assert result.verified
-    assert result.t_end == pytest.approx(bang_bang(2.0 * MASS) / np.sqrt(1.0 - 2.0 / intervals), rel=SLACK)
+    assert result.t_end == pytest.approx(
+        bang_bang(2.0 * MASS) / np.sqrt(1.0 - 2.0 / intervals), rel=SLACK
+    )
     ends = result.trajectory.acceleration(np.array([0.0, result.t_end]))
     np.testing.assert_allclose(ends, 0.0, atol=1e-9)
 
@@ -133,16 +167,32 @@ def test_rest_in_acceleration_costs_two_more_ramps(slides, intervals):
 @pytest.mark.parametrize("rest", ["velocity", "full"])
 def test_free_knots_leave_the_shortest_ramps(slides, rest):
     urdf, by, shortest = slides([X, Y], [FORCE, FORCE]), [LENGTH, 0.0], 0.2
-    result = plan(urdf, ["x", "y"], by, intervals=5, rest=rest, knots="free", shortest_interval=shortest)
+    result = plan(
+        urdf,
+        ["x", "y"],
+        by,
+        intervals=5,
+        rest=rest,
+        knots="free",
+        shortest_interval=shortest,
+    )
     assert result.verified
     ramp = shortest / 5
     lost = ramp**2 / 3.0 if rest == "velocity" else 2.0 * ramp - ramp**2
-    assert result.t_end == pytest.approx(bang_bang(2.0 * MASS) / np.sqrt(1.0 - lost), rel=SLACK)
+    assert result.t_end == pytest.approx(
+        bang_bang(2.0 * MASS) / np.sqrt(1.0 - lost), rel=SLACK
+    )
 
 
 @pytest.mark.parametrize("rest", ["velocity", "full"])
 def test_mesh_refinement_comes_near_bang_bang(slides, rest):
-    result = plan(slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, 0.0], intervals="auto", rest=rest)
+    result = plan(
+        slides([X, Y], [FORCE, FORCE]),
+        ["x", "y"],
+        [LENGTH, 0.0],
+        intervals="auto",
+        rest=rest,
+    )
     assert result.verified
     assert bang_bang(2.0 * MASS) <= result.t_end < 1.003 * bang_bang(2.0 * MASS)
     lengths = np.diff(np.unique(result.trajectory.knots))
@@ -152,7 +202,13 @@ def test_mesh_refinement_comes_near_bang_bang(slides, rest):
 # The acceleration jumps at knots: nodes packed closely around one would let rounding spoil the pieces.
 @pytest.mark.parametrize("intervals", [10, 40])
 def test_parabolas_are_bang_bang_itself(slides, intervals):
-    result = plan(slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, 0.0], intervals=intervals, degree=2)
+    result = plan(
+        slides([X, Y], [FORCE, FORCE]),
+        ["x", "y"],
+        [LENGTH, 0.0],
+        intervals=intervals,
+        degree=2,
+    )
     assert result.t_end == pytest.approx(bang_bang(2.0 * MASS), rel=SLACK)
     assert result.verified, result.verification
 
@@ -167,8 +223,12 @@ def test_diagonal_line_is_as_fast_as_its_slower_slide(slides):
 def test_velocity_limit_gives_the_trapezoid(slides):
     urdf, mass, limit = slides([X, Y], [FORCE, FORCE]), 2.0 * MASS, 2.0
     free = plan(urdf, ["x", "y"], [LENGTH, 0.0])
-    assert fastest(free)[0] > 1.5 * limit, "without the limit the slide is faster than the limit"
-    result = plan(urdf, ["x", "y"], [LENGTH, 0.0], robot={"limits": {"velocity": limit}})
+    assert fastest(free)[0] > 1.5 * limit, (
+        "without the limit the slide is faster than the limit"
+    )
+    result = plan(
+        urdf, ["x", "y"], [LENGTH, 0.0], robot={"limits": {"velocity": limit}}
+    )
     assert result.verified
     assert fastest(result)[0] == pytest.approx(limit, rel=SLACK)
     trapezoid = LENGTH / limit + limit * mass / FORCE
@@ -181,9 +241,16 @@ def test_acceleration_limit(slides):
     t = np.linspace(0.0, 1.0, 2001)
     free = plan(urdf, ["x", "y"], [LENGTH, 0.0])
     assert np.abs(free.trajectory.acceleration(t * free.t_end)).max() > 2.0 * limit
-    result = plan(urdf, ["x", "y"], [LENGTH, 0.0], robot={"limits": {"acceleration": limit, "torque": None}})
+    result = plan(
+        urdf,
+        ["x", "y"],
+        [LENGTH, 0.0],
+        robot={"limits": {"acceleration": limit, "torque": None}},
+    )
     assert result.verified
-    assert np.abs(result.trajectory.acceleration(t * result.t_end)).max() <= limit * (1.0 + SLACK)
+    assert np.abs(result.trajectory.acceleration(t * result.t_end)).max() <= limit * (
+        1.0 + SLACK
+    )
     best = 2.0 * np.sqrt(LENGTH / limit)
     assert best <= result.t_end < 1.01 * best
 
@@ -191,16 +258,24 @@ def test_acceleration_limit(slides):
 JERK = 50.0
 
 
-@pytest.mark.parametrize("limit", [{"jerk": JERK}, {"torque_rate": JERK * MASS}], ids=str)
+@pytest.mark.parametrize(
+    "limit", [{"jerk": JERK}, {"torque_rate": JERK * MASS}], ids=str
+)
 def test_jerk_limit(slides, limit):
     # The jerk is J, -J, -J, J over a quarter of the time each: L = J t^3 / 32.
     urdf, t = slides([X], [FORCE]), np.linspace(0.0, 1.0, 2001)
     free = plan(urdf, ["x"], [LENGTH], intervals=20, rest="full")
     assert np.abs(free.trajectory.jerk(t * free.t_end)).max() > 5.0 * JERK
-    result = plan(urdf, ["x"], [LENGTH], intervals=20, rest="full", robot={"limits": limit})
+    result = plan(
+        urdf, ["x"], [LENGTH], intervals=20, rest="full", robot={"limits": limit}
+    )
     assert result.verified
-    assert result.t_end == pytest.approx((32.0 * LENGTH / JERK) ** (1.0 / 3.0), rel=1e-3)
-    assert np.abs(result.trajectory.jerk(t * result.t_end)).max() <= JERK * (1.0 + SLACK)
+    assert result.t_end == pytest.approx(
+        (32.0 * LENGTH / JERK) ** (1.0 / 3.0), rel=1e-3
+    )
+    assert np.abs(result.trajectory.jerk(t * result.t_end)).max() <= JERK * (
+        1.0 + SLACK
+    )
     assert result.t_end > 1.3 * free.t_end
 
 
@@ -208,16 +283,35 @@ def test_jerk_limit(slides, limit):
 def test_jerk_limit_beside_limits_of_velocity_and_acceleration(slides, acceleration):
     velocity = 1.5
     limits = {"jerk": JERK, "velocity": velocity, "acceleration": acceleration}
-    result = plan(slides([X], [FORCE]), ["x"], [LENGTH], intervals=48, rest="full", robot={"limits": limits})
+    result = plan(
+        slides([X], [FORCE]),
+        ["x"],
+        [LENGTH],
+        intervals=48,
+        rest="full",
+        robot={"limits": limits},
+    )
     # The velocity is reached in 2 sqrt(v / J), or in v / a + a / J where the acceleration stays at its limit.
-    ramp = 2.0 * np.sqrt(velocity / JERK) if acceleration is None else velocity / acceleration + acceleration / JERK
+    ramp = (
+        2.0 * np.sqrt(velocity / JERK)
+        if acceleration is None
+        else velocity / acceleration + acceleration / JERK
+    )
     assert result.verified
     assert LENGTH / velocity + ramp <= result.t_end < (LENGTH / velocity + ramp) * 1.001
 
 
 def test_rest_in_jerk_too(slides):
     robot = {"limits": {"jerk": JERK}}
-    result = plan(slides([X], [FORCE]), ["x"], [LENGTH], intervals=40, degree=4, rest="jerk", robot=robot)
+    result = plan(
+        slides([X], [FORCE]),
+        ["x"],
+        [LENGTH],
+        intervals=40,
+        degree=4,
+        rest="jerk",
+        robot=robot,
+    )
     assert result.verified
     names = [check.name for check in result.verification.checks]
     assert {"start jerk", "end jerk"} <= set(names)
@@ -230,7 +324,10 @@ def test_rest_in_jerk_too(slides):
 
 def test_armature_is_carried_like_mass(slides):
     result = plan(
-        slides([X, Y], [FORCE, FORCE]), ["x", "y"], [LENGTH, 0.0], robot={"friction": {"armature": {"j1": 3.0}}}
+        slides([X, Y], [FORCE, FORCE]),
+        ["x", "y"],
+        [LENGTH, 0.0],
+        robot={"friction": {"armature": {"j1": 3.0}}},
     )
     best = bang_bang(2.0 * MASS + 3.0)
     assert result.verified
@@ -244,7 +341,12 @@ def test_lifting_against_gravity(slides, way):
     up, down = force / MASS - 9.81, force / MASS + 9.81
     best = np.sqrt(2.0 * LENGTH * (up + down) / (up * down))
     # The slide along x carries the lift.
-    result = plan(slides([X, Z], [200.0, force]), ["x", "z"], [0.0, way * LENGTH], robot={"gravity": [0, 0, -9.81]})
+    result = plan(
+        slides([X, Z], [200.0, force]),
+        ["x", "z"],
+        [0.0, way * LENGTH],
+        robot={"gravity": [0, 0, -9.81]},
+    )
     assert result.verified
     assert best <= result.t_end < 1.01 * best
 
@@ -256,11 +358,24 @@ def test_two_slides_along_one_line_recoil_against_each_other(slides):
     urdf = slides([X, X], [weak, FORCE])
     held = {"limits": {"position": {"j1": [-1e-4, 1e-4]}}}
     # The interior-point method: an active-set method has to choose among rows that are all but equal.
-    stiff = plan(urdf, ["x"], [LENGTH], redundant=["j1"], joints=[0.0, 0.0], robot=held, solver="ipopt")
+    stiff = plan(
+        urdf,
+        ["x"],
+        [LENGTH],
+        redundant=["j1"],
+        joints=[0.0, 0.0],
+        robot=held,
+        solver="ipopt",
+    )
     result = plan(urdf, ["x"], [LENGTH], redundant=["j1"], joints=[0.0, 0.0])
     assert result.verified
     assert bang_bang(MASS) <= result.t_end < 1.01 * bang_bang(MASS)
-    assert np.abs(result.trajectory.position(np.linspace(0.0, result.t_end, 99))[:, 0]).max() > 0.05
+    assert (
+        np.abs(
+            result.trajectory.position(np.linspace(0.0, result.t_end, 99))[:, 0]
+        ).max()
+        > 0.05
+    )
     # Held in place, the lower slide passes on no more than its own force.
     assert stiff.t_end == pytest.approx(2.0 * np.sqrt(MASS * LENGTH / weak), rel=0.02)
 
@@ -271,4 +386,6 @@ def test_every_solver_finds_the_optimum(slides, solver):
     result = plan(urdf, ["x", "y"], [LENGTH, 0.0], intervals=10, solver=solver)
     assert result.verified
     assert result.solver_report.solver == solver
-    assert result.t_end == pytest.approx(bang_bang(2.0 * MASS) / np.sqrt(1.0 - 4.0 / 300.0), rel=5e-4)
+    assert result.t_end == pytest.approx(
+        bang_bang(2.0 * MASS) / np.sqrt(1.0 - 4.0 / 300.0), rel=5e-4
+    )

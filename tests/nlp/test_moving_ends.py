@@ -21,13 +21,20 @@ def with_boundary(case, degree, **conditions):
     """A phase with every kind of limit and other conditions at its ends."""
     phase = phase_of(case, degree=degree, rest="velocity" if degree == 2 else "full")
     own = phase.boundary
-    values = {"start": own.start, "end": own.end, "derivatives": own.derivatives, **conditions}
+    values = {
+        "start": own.start,
+        "end": own.end,
+        "derivatives": own.derivatives,
+        **conditions,
+    }
     return phase.over(phase.grid, Boundary(**values))
 
 
 def moving(case, degree, derivatives):
     rates = np.array([RATE, *[np.nan] * phase_of(case).joint_map.r])
-    return with_boundary(case, degree, start_rates=rates, end_rates=2.0 * rates, derivatives=derivatives)
+    return with_boundary(
+        case, degree, start_rates=rates, end_rates=2.0 * rates, derivatives=derivatives
+    )
 
 
 def going_round(case, degree):
@@ -60,7 +67,10 @@ def test_jacobian_equals_differences(phase):
         # Process speeds set in, and curves of torque over speed bend, within 1e-3.
         exact, expected = dense(phase, x), differences(phase, x, 2e-6)
         count = len(phase._progress.offset)
-        kinds = {limit.kind: phase.rows_of(limit).ravel()[told(phase, limit, x)] for limit in phase.limits}
+        kinds = {
+            limit.kind: phase.rows_of(limit).ravel()[told(phase, limit, x)]
+            for limit in phase.limits
+        }
         kinds["progress"] = np.arange(len(phase.lower) - count, len(phase.lower))
         assert count >= 3
         for kind, rows in kinds.items():
@@ -84,7 +94,9 @@ def test_the_way_to_x_and_back(phase):
 def test_rates_hold_whatever_the_duration(case, derivatives):
     phase = moving(case, 4, derivatives)
     for x in reachable_points(phase, 3, spread=0.3):
-        value, rate, second = (at_both_ends(phase, x, order)[:, 0] for order in range(3))
+        value, rate, second = (
+            at_both_ends(phase, x, order)[:, 0] for order in range(3)
+        )
         np.testing.assert_allclose(value, [0.0, 1.0], atol=1e-12)
         np.testing.assert_allclose(rate, [RATE, 2.0 * RATE], rtol=1e-12)
         assert (np.abs(second) < 1e-9).all() == (derivatives == 2)
@@ -107,18 +119,26 @@ def test_derivatives_close_over_the_seam(case, degree, smooth):
                 assert gap.max() > 1e-6, "nothing more is tied"
 
 
-@pytest.mark.parametrize("phase", ["moving, constant speed, r2", "periodic, r2"], indirect=True)
+@pytest.mark.parametrize(
+    "phase", ["moving, constant speed, r2", "periodic, r2"], indirect=True
+)
 def test_monotone_rows_say_whether_progress_is_monotone(phase):
     rng = np.random.default_rng(5)
     monotone = []
     for _ in range(200):
         x = np.append(rng.uniform(0.05, 1.5), rng.normal(size=phase.variables - 1))
         own = phase.slices[0]
-        x[own] = np.sort(rng.uniform(0.0, 1.0, own.stop - own.start)) + 0.02 * rng.normal(size=own.stop - own.start)
-        if phase.boundary.periodic and x[own].min() < 0.0:  # which bounds on x take care of
+        x[own] = np.sort(
+            rng.uniform(0.0, 1.0, own.stop - own.start)
+        ) + 0.02 * rng.normal(size=own.stop - own.start)
+        if (
+            phase.boundary.periodic and x[own].min() < 0.0
+        ):  # which bounds on x take care of
             continue
         monotone.append(phase._progress.values(x).min() >= 0.0)
-        assert monotone[-1] == (np.diff(phase.motion(x).control_points[0]).min() >= -1e-15)
+        assert monotone[-1] == (
+            np.diff(phase.motion(x).control_points[0]).min() >= -1e-15
+        )
     assert 10 < sum(monotone) < len(monotone) - 10
 
 
@@ -135,15 +155,23 @@ def test_splines_between_rates(degree, derivatives, start, rate, duration, seed)
     derivatives = min(derivatives, degree - 1)
     knots = clamped_knots(degree, BREAKS)
     condition = EndCondition(start, rate, derivatives)
-    spline = BoundarySpline.between(knots, degree, condition, EndCondition(np.nan, 0.0, 1))
-    points = spline.control_points(np.random.default_rng(seed).normal(size=spline.free), duration)
+    spline = BoundarySpline.between(
+        knots, degree, condition, EndCondition(np.nan, 0.0, 1)
+    )
+    points = spline.control_points(
+        np.random.default_rng(seed).normal(size=spline.free), duration
+    )
     curve = BSpline(knots * duration, points, degree)
     if not np.isnan(start):
         assert float(curve(0.0)) == pytest.approx(start, abs=1e-12)
     if not np.isnan(rate):
-        assert float(curve(0.0, nu=1)) == pytest.approx(rate, abs=1e-9 * np.abs(points).max() / duration)
+        assert float(curve(0.0, nu=1)) == pytest.approx(
+            rate, abs=1e-9 * np.abs(points).max() / duration
+        )
         if derivatives == 2:
-            assert float(curve(0.0, nu=2)) == pytest.approx(0.0, abs=1e-8 * np.abs(points).max() / duration**2)
+            assert float(curve(0.0, nu=2)) == pytest.approx(
+                0.0, abs=1e-8 * np.abs(points).max() / duration**2
+            )
     given = (not np.isnan(start)) + (0 if np.isnan(rate) else derivatives)
     assert spline.free == len(points) - 1 - given
 
@@ -159,11 +187,15 @@ def test_periodic_splines(degree, start, jump, seed):
     spline = periodic(clamped_knots(degree, BREAKS), degree, start, jump)
     free = np.random.default_rng(seed).normal(size=spline.free)
     points = spline.control_points(free, 1.0)
-    np.testing.assert_allclose(spline.matrix @ free + spline.fixed, points, atol=1e-12 * np.abs(points).max())
+    np.testing.assert_allclose(
+        spline.matrix @ free + spline.fixed, points, atol=1e-12 * np.abs(points).max()
+    )
     curve = BSpline(spline.knots, points, degree)
     for order in range(min(degree, 4)):
         first, last = curve(np.array([0.0, 1.0]), nu=order)
-        assert last - first == pytest.approx(jump if order == 0 else 0.0, abs=1e-9 * (1.0 + np.abs(points).max()) * 400)
+        assert last - first == pytest.approx(
+            jump if order == 0 else 0.0, abs=1e-9 * (1.0 + np.abs(points).max()) * 400
+        )
     if not np.isnan(start):
         assert float(curve(0.0)) == pytest.approx(start, abs=1e-12)
     np.testing.assert_allclose(spline.free_from(points, 1.0), free, atol=1e-12)

@@ -27,7 +27,9 @@ def blocks(phase) -> dict[str, slice]:
 
 
 UNIFORM = [(case, degree, "uniform") for case in CASES for degree in (3, 4, 5)]
-FREE = [(case, degree, "free") for case in ("r0", "r1", "r2") for degree in (2, 3, 4, 5)]
+FREE = [
+    (case, degree, "free") for case in ("r0", "r1", "r2") for degree in (2, 3, 4, 5)
+]
 
 
 @pytest.fixture(params=[*UNIFORM, *FREE], ids=str, scope="module")
@@ -45,8 +47,16 @@ def differentiated(phase):
 
 def test_jacobian_equals_differences(phase, differentiated):
     parts = blocks(phase)
-    kinds = [kind for kind in KINDS if phase.degree > 2 or kind not in ("jerk", "torque_rate")]
-    assert list(parts) == [*kinds, "progress", *(["lengths"] if len(phase.grid.total) else [])]
+    kinds = [
+        kind
+        for kind in KINDS
+        if phase.degree > 2 or kind not in ("jerk", "torque_rate")
+    ]
+    assert list(parts) == [
+        *kinds,
+        "progress",
+        *(["lengths"] if len(phase.grid.total) else []),
+    ]
     assert list(parts.values())[-1].stop == len(phase.lower)
     for x, expected in differentiated:
         exact = dense(phase, x)
@@ -79,9 +89,18 @@ def test_pattern_is_fixed_has_no_place_twice_and_covers_all(phase, differentiate
     # Each row touches the end time, at most degree + 1 control points of every curve, and free lengths nearby; a mean
     # touches all, and the very last row of free knots is the sum of them.
     lengths = len(phase.grid.lower)
-    means = np.concatenate([phase.rows_of(limit).ravel() for limit in phase.limits if limit.where == "whole"])
+    means = np.concatenate(
+        [
+            phase.rows_of(limit).ravel()
+            for limit in phase.limits
+            if limit.where == "whole"
+        ]
+    )
     assert np.all(np.bincount(phase.jacobian_rows)[means] == phase.variables)
-    widest = np.delete(np.bincount(phase.jacobian_rows)[: len(phase.lower) - len(phase.grid.total)], means).max()
+    widest = np.delete(
+        np.bincount(phase.jacobian_rows)[: len(phase.lower) - len(phase.grid.total)],
+        means,
+    ).max()
     nearby = min(lengths, 2 * phase.degree - 1)
     assert widest <= 1 + (phase.degree + 1) * (1 + phase.joint_map.r) + nearby
 
@@ -91,14 +110,20 @@ def test_rows_are_ratios_to_the_limits(phase):
     robot, state, parts = phase.joint_map.robot, phase.state(x), blocks(phase)
     values = phase.rows(x)
     n = robot.n
-    np.testing.assert_allclose(values[parts["velocity"]].reshape(-1, n), state.qdot / robot.limits.velocity)
-    np.testing.assert_allclose(values[parts["acceleration"]].reshape(-1, n), state.qddot / 20.0)
+    np.testing.assert_allclose(
+        values[parts["velocity"]].reshape(-1, n), state.qdot / robot.limits.velocity
+    )
+    np.testing.assert_allclose(
+        values[parts["acceleration"]].reshape(-1, n), state.qddot / 20.0
+    )
     for kind in ("torque", "velocity", "acceleration"):
         np.testing.assert_array_equal(phase.upper[parts[kind]], 1.0)
         np.testing.assert_array_equal(phase.lower[parts[kind]], -1.0)
     low, high = robot.limits.position_lower, robot.limits.position_upper
     ratio = values[parts["position"]].reshape(-1, n)
-    np.testing.assert_allclose(low + (ratio + 1.0) * (high - low) / 2.0, state.q, atol=1e-12)
+    np.testing.assert_allclose(
+        low + (ratio + 1.0) * (high - low) / 2.0, state.q, atol=1e-12
+    )
     assert np.all(phase.lower[parts["branch_margin"]] > 0.0)
     # Full rest ties three control points of s at each end to 0 and 1, which the bounds 0 <= s <= 1 take care of; rest
     # in velocity, all that degree 2 can do, ties two.
@@ -115,12 +140,18 @@ def test_one_sided_ranges_are_gaps_in_the_joints_own_unit():
     x = reachable_points(phase_of("r1"), 1)[0]
     state = phase.state(x)
     values = limit.values(state)
-    np.testing.assert_allclose(limit.upper[0] - values[:, 0], 2.9 - state.q[:, 0], atol=1e-14)
-    np.testing.assert_allclose(values[:, 1] - limit.lower[1], state.q[:, 1] + 3.0, atol=1e-14)
+    np.testing.assert_allclose(
+        limit.upper[0] - values[:, 0], 2.9 - state.q[:, 0], atol=1e-14
+    )
+    np.testing.assert_allclose(
+        values[:, 1] - limit.lower[1], state.q[:, 1] + 3.0, atol=1e-14
+    )
     assert limit.lower[0] == -np.inf
     assert limit.upper[1] == np.inf
     rows = blocks(phase)["position"]
-    np.testing.assert_allclose(dense(phase, x)[rows], differences(phase, x)[rows], atol=1e-9)
+    np.testing.assert_allclose(
+        dense(phase, x)[rows], differences(phase, x)[rows], atol=1e-9
+    )
 
 
 def test_state_is_computed_once_for_rows_and_jacobian():

@@ -14,7 +14,9 @@ def differences(program: Program, x: np.ndarray, h: float = 1e-5) -> np.ndarray:
     slopes = []
     for unit in np.eye(len(x)):
         near = program.objective(x + h * unit) - program.objective(x - h * unit)
-        far = program.objective(x + 2.0 * h * unit) - program.objective(x - 2.0 * h * unit)
+        far = program.objective(x + 2.0 * h * unit) - program.objective(
+            x - 2.0 * h * unit
+        )
         slopes.append((8.0 * near - far) / (12.0 * h))
     return np.array(slopes)
 
@@ -29,7 +31,9 @@ def test_gradient_of_least_acceleration_equals_differences(case, knots):
     phase = phase_of(case)
     if knots == "free":
         phase = phase.with_free_knots(0.1)
-    program = Program([phase]).minimising(LeastAcceleration(weights_of(case), np.array([5.0])))
+    program = Program([phase]).minimising(
+        LeastAcceleration(weights_of(case), np.array([5.0]))
+    )
     for x in reachable_points(phase, 2):
         exact, expected = program.gradient(x), differences(program, x)
         assert np.count_nonzero(exact) > 0.9 * len(exact)
@@ -44,7 +48,11 @@ def test_phases_add_up():
     x = np.concatenate([first, second])
     shares = [objective.value(phase, part) for part in (first, second)]
     assert both.objective(x) == pytest.approx(sum(shares), rel=1e-14)
-    np.testing.assert_allclose(both.gradient(x), differences(both, x), atol=1e-6 * np.abs(both.gradient(x)).max())
+    np.testing.assert_allclose(
+        both.gradient(x),
+        differences(both, x),
+        atol=1e-6 * np.abs(both.gradient(x)).max(),
+    )
     np.testing.assert_array_equal(both.x_upper[[0, phase.variables]], [3.0, 4.0])
     finer = both.resampled([np.linspace(0.0, 1.0, 31)] * 2)
     assert finer.minimised is objective
@@ -52,13 +60,19 @@ def test_phases_add_up():
 
 
 def test_value_is_the_mean_square_over_time():
-    phase = phase_of("r1").resampled(np.union1d(np.linspace(0.0, 1.0, 4001), [0.123, 0.1231, 0.7]))
+    phase = phase_of("r1").resampled(
+        np.union1d(np.linspace(0.0, 1.0, 4001), [0.123, 0.1231, 0.7])
+    )
     weights = weights_of("r1")
     (x,) = reachable_points(phase, 1)
     t_norm = np.linspace(0.0, 1.0, 4001)
     qddot = phase.resampled(t_norm).state(x).qddot
-    expected = np.mean(0.5 * ((qddot[1:] * weights) ** 2 + (qddot[:-1] * weights) ** 2).sum(axis=1))
-    assert LeastAcceleration(weights, np.array([5.0])).value(phase, x) == pytest.approx(expected, rel=1e-6)
+    expected = np.mean(
+        0.5 * ((qddot[1:] * weights) ** 2 + (qddot[:-1] * weights) ** 2).sum(axis=1)
+    )
+    assert LeastAcceleration(weights, np.array([5.0])).value(phase, x) == pytest.approx(
+        expected, rel=1e-6
+    )
 
 
 def test_a_program_without_an_objective_minimises_the_end_time_unbounded():

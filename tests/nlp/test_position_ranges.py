@@ -17,25 +17,38 @@ NEAR = 2.0944 - 0.05  # rad; without a range joint 3 goes further
 
 @pytest.fixture(scope="module")
 def plan(scara_urdf):
-    task = yaml.safe_load((scara_urdf.parents[2] / "examples/01_scara_line.yaml").read_text())
+    task = yaml.safe_load(
+        (scara_urdf.parents[2] / "examples/01_scara_line.yaml").read_text()
+    )
     task["robot"]["urdf"] = str(scara_urdf)
     task |= {"redundant_joints": ["j1"], "search": {"effort": "single"}}
 
     def plan(ends):
-        robot = task["robot"] | {"limits": task["robot"]["limits"] | {"position": {"j3": ends}}}
+        robot = task["robot"] | {
+            "limits": task["robot"]["limits"] | {"position": {"j3": ends}}
+        }
         return brachis.plan(task | {"robot": robot})
 
     return plan
 
 
-@pytest.mark.filterwarnings("ignore::brachis.PlausibilityWarning")  # the far ends look like degrees
+@pytest.mark.filterwarnings(
+    "ignore::brachis.PlausibilityWarning"
+)  # the far ends look like degrees
 def test_a_far_end_changes_nothing(plan):
     """The near end is held to 1e-4 rad, whether the other one is 6 rad away, 1e4, 1e6 or nowhere."""
     found = [plan([NEAR, end]) for end in (None, 8.0, 1e4, 1e6)]
     assert all(result.verified for result in found)
-    np.testing.assert_allclose([result.t_end for result in found], found[0].t_end, rtol=1e-5)
-    lowest = [result.trajectory.position(np.linspace(0.0, result.t_end, 5000))[:, 2].min() for result in found]
-    np.testing.assert_allclose(lowest, NEAR, atol=1e-4)  # the end of the range is active
+    np.testing.assert_allclose(
+        [result.t_end for result in found], found[0].t_end, rtol=1e-5
+    )
+    lowest = [
+        result.trajectory.position(np.linspace(0.0, result.t_end, 5000))[:, 2].min()
+        for result in found
+    ]
+    np.testing.assert_allclose(
+        lowest, NEAR, atol=1e-4
+    )  # the end of the range is active
 
 
 @pytest.mark.parametrize("half", [1e-3, 1e-6])
@@ -63,9 +76,13 @@ def test_violation_is_in_rad_or_m_beyond_either_end(far):
     state, robot = phase.state(reachable_points(phase, 1)[0]), phase.joint_map.robot
     q = state.q
     lower = np.array([q[:, 0].max() + 0.25, -np.inf, -3.0])
-    ranges = replace(robot.limits, position_lower=lower, position_upper=np.array([far, np.inf, 3.0]))
+    ranges = replace(
+        robot.limits, position_lower=lower, position_upper=np.array([far, np.inf, 3.0])
+    )
     limit = PositionLimit(replace(robot, limits=ranges), np.array([0, 2]))
     assert [label.subject for label in limit.labels] == ["j1", "j3"]
     violation = limit.violation(limit.values(state))
     np.testing.assert_allclose(violation[:, 0], lower[0] - q[:, 0], atol=1e-12)
-    np.testing.assert_allclose(violation[:, 1], np.maximum(-3.0 - q[:, 2], q[:, 2] - 3.0), atol=1e-12)
+    np.testing.assert_allclose(
+        violation[:, 1], np.maximum(-3.0 - q[:, 2], q[:, 2] - 3.0), atol=1e-12
+    )

@@ -21,7 +21,13 @@ from brachis.optimise.boundary import Boundary
 from brachis.optimise.bspline import clamped_uniform_knots, spread
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import starting_point
-from brachis.optimise.mesh import MeshOptions, coarsest, optimise_knots, refine_mesh, solve_nested
+from brachis.optimise.mesh import (
+    MeshOptions,
+    coarsest,
+    optimise_knots,
+    refine_mesh,
+    solve_nested,
+)
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Link, Program
 from brachis.optimise.refine import RefinementOptions, refine
@@ -36,7 +42,12 @@ ALONE = (0,)
 
 def slide(lower=-5.0, upper=5.0) -> Robot:
     limit = {"lower": lower, "upper": upper, "velocity": 100.0, "effort": FORCE}
-    joint = Joint("prismatic", axis=(1.0, 0.0, 0.0), limit=limit, inertial=INERTIAL.format(mass=MASS))
+    joint = Joint(
+        "prismatic",
+        axis=(1.0, 0.0, 0.0),
+        limit=limit,
+        inertial=INERTIAL.format(mass=MASS),
+    )
     return Robot.from_urdf("slide", urdf_text=chain_urdf([joint], tool=(0.1, 0.2, 0.3)))
 
 
@@ -47,7 +58,9 @@ TORQUE = TorqueLimit(ROBOT, np.array(ALONE))
 def move(start, end, *further, degree=2, intervals=8, points=3) -> Phase:
     """A free move of the slide from rest to rest."""
     breaks = np.linspace(0.0, 1.0, intervals + 1)
-    grid = FixedGrid(clamped_uniform_knots(degree, intervals), degree, spread(breaks, points))
+    grid = FixedGrid(
+        clamped_uniform_knots(degree, intervals), degree, spread(breaks, points)
+    )
     boundary = Boundary(np.array([start]), np.array([end]), derivatives=1)
     return Phase(DirectJointMap(ROBOT, np.zeros(1)), [TORQUE, *further], grid, boundary)
 
@@ -58,11 +71,15 @@ def within(lower, upper) -> PositionLimit:
 
 def two_moves(stop=0.5, **options) -> Program:
     """Move from 0 to a stop and on to LENGTH."""
-    return Program([move(0.0, stop, **options), move(FREE, LENGTH, **options)], [Link(0, 1, ALONE)])
+    return Program(
+        [move(0.0, stop, **options), move(FREE, LENGTH, **options)], [Link(0, 1, ALONE)]
+    )
 
 
 def first_point(program, stop=0.5):
-    return starting_point(program, [np.array([[0.0], [stop]]), np.array([[stop], [LENGTH]])])
+    return starting_point(
+        program, [np.array([[0.0], [stop]]), np.array([[stop], [LENGTH]])]
+    )
 
 
 def solve(program, x):
@@ -76,11 +93,15 @@ def bang_bang(*distances):
 @pytest.mark.parametrize("solver", ["uno", "ipopt", "slsqp"])
 def test_a_given_stop(solver):
     program = two_moves()
-    report = solver_named(solver)[0].solve(program, first_point(program), SolverOptions(), None)
+    report = solver_named(solver)[0].solve(
+        program, first_point(program), SolverOptions(), None
+    )
     assert report.status is SolveStatus.OPTIMAL
     assert report.objective == pytest.approx(bang_bang(0.5, 0.7), rel=1e-3)
     first, second = program.motions(report.x)
-    assert [first.t_end, second.t_end] == pytest.approx([bang_bang(0.5), bang_bang(0.7)], rel=1e-3)
+    assert [first.t_end, second.t_end] == pytest.approx(
+        [bang_bang(0.5), bang_bang(0.7)], rel=1e-3
+    )
     assert second.control_points[0, 0] == pytest.approx(0.5, abs=1e-6)
 
 
@@ -95,7 +116,9 @@ def test_a_stop_that_only_the_ranges_of_the_phases_bound():
     assert first.control_points[0, -1] == pytest.approx(0.9, abs=1e-5)
     assert second.control_points[0, 0] == pytest.approx(0.9, abs=1e-5)
     apart = Program(phases)
-    assert solve(apart, first_point(apart, stop=0.7)).objective < 0.9 * report.objective, "the link should matter"
+    assert (
+        solve(apart, first_point(apart, stop=0.7)).objective < 0.9 * report.objective
+    ), "the link should matter"
 
 
 def test_refinement_holds_the_limits_in_every_phase():
@@ -118,7 +141,9 @@ def test_refinement_holds_the_limits_in_every_phase():
 def test_meshes_of_every_phase_are_refined():
     program = two_moves(degree=3, intervals=4)
     report = solve(program, first_point(program))
-    mesh, reports, undone = refine_mesh(program, report, solve, MeshOptions(tolerance=1e-3), NEVER)
+    mesh, reports, undone = refine_mesh(
+        program, report, solve, MeshOptions(tolerance=1e-3), NEVER
+    )
     assert not undone
     assert min(phase.intervals for phase in mesh.phases) > 8
     assert reports[-1].objective == pytest.approx(bang_bang(0.5, 0.7), rel=1e-3)
@@ -135,7 +160,10 @@ def test_knots_of_every_phase_are_freed():
 
 
 def test_phases_are_solved_from_few_intervals():
-    phases = [move(0.0, 0.5, degree=3, intervals=60), move(FREE, LENGTH, degree=3, intervals=14)]
+    phases = [
+        move(0.0, 0.5, degree=3, intervals=60),
+        move(FREE, LENGTH, degree=3, intervals=14),
+    ]
     program = Program(phases, [Link(0, 1, ALONE)])
     coarse = coarsest(program)
     assert [phase.intervals for phase in coarse.phases] == [15, 14]
@@ -150,12 +178,16 @@ def test_a_limit_of_several_phases_is_one_figure():
     program = two_moves()
     assert program.limits == (TORQUE,)
     report = solve(program, first_point(program))
-    found = sensitivities_at(program, multipliers_of(program, report.x, report.multipliers))
+    found = sensitivities_at(
+        program, multipliers_of(program, report.x, report.multipliers)
+    )
     (entry,) = found.limits
     assert entry.change(1.0) == pytest.approx(-0.5 * report.objective, rel=1e-3)
     relaxed = program.relaxed(TORQUE, entry.bound, 0.21 * FORCE)
     assert len(relaxed.limits) == 1
-    assert solve(relaxed, report.x).objective == pytest.approx(report.objective / 1.1, rel=1e-4)
+    assert solve(relaxed, report.x).objective == pytest.approx(
+        report.objective / 1.1, rel=1e-4
+    )
 
 
 @pytest.mark.parametrize("knots", ["uniform", "free"])
@@ -164,7 +196,9 @@ def test_jacobian_of_a_path_and_a_free_move(case, knots):
     """A phase along a path whose end is free, a free move from there to its start: a closed cycle."""
     path = phase_of(case)
     robot = path.joint_map.robot
-    still = replace(path.boundary, start=np.full(robot.n, np.nan), end=np.full(robot.n, np.nan))
+    still = replace(
+        path.boundary, start=np.full(robot.n, np.nan), end=np.full(robot.n, np.nan)
+    )
     own = [limit for limit in path.limits if limit.role is not Role.SAFEGUARD]
     back = Phase(DirectJointMap(robot, path.joint_map.start), own, path.grid, still)
     if knots == "free":
@@ -177,18 +211,28 @@ def test_jacobian_of_a_path_and_a_free_move(case, knots):
     there = starting_point(Program([back]), [np.vstack([q[-1], q[0]])])
     x = np.concatenate([x, there + 0.01 * rng.uniform(-1.0, 1.0, len(there))])
     assert program.end_time(x) == x[0] + x[path.variables]
-    np.testing.assert_array_equal(np.flatnonzero(program.gradient(x)), [0, path.variables])
+    np.testing.assert_array_equal(
+        np.flatnonzero(program.gradient(x)), [0, path.variables]
+    )
     places = program.jacobian_rows * program.variables + program.jacobian_columns
     assert len(np.unique(places)) == len(places)
     exact = np.zeros((len(program.lower), program.variables))
     exact[program.jacobian_rows, program.jacobian_columns] = program.jacobian(x)
     links = np.arange(len(program.lower) - 2 * robot.n, len(program.lower))
-    sides = [(program.rows(x + step)[links], program.rows(x - step)[links]) for step in 1e-6 * np.eye(len(x))]
+    sides = [
+        (program.rows(x + step)[links], program.rows(x - step)[links])
+        for step in 1e-6 * np.eye(len(x))
+    ]
     expected = np.stack([(above - below) / 2e-6 for above, below in sides], axis=1)
     np.testing.assert_allclose(exact[links], expected, atol=1e-7)
-    assert np.count_nonzero(exact[links[: robot.n]]) >= 2 * robot.n - (case == "r0") * robot.n
+    assert (
+        np.count_nonzero(exact[links[: robot.n]])
+        >= 2 * robot.n - (case == "r0") * robot.n
+    )
     ends = path.state(x[: path.variables]).q[-1], back.state(x[path.variables :]).q[0]
-    np.testing.assert_allclose(program.rows(x)[links[: robot.n]], ends[0] - ends[1], atol=1e-12)
+    np.testing.assert_allclose(
+        program.rows(x)[links[: robot.n]], ends[0] - ends[1], atol=1e-12
+    )
 
 
 def test_one_phase_is_the_program():
@@ -198,10 +242,19 @@ def test_one_phase_is_the_program():
     assert program.variables == phase.variables
     assert program.objective(x) == program.end_time(x) == x[0]
     np.testing.assert_array_equal(program.gradient(x), np.eye(program.variables)[0])
-    for name in ("x_lower", "x_upper", "lower", "upper", "jacobian_rows", "jacobian_columns"):
+    for name in (
+        "x_lower",
+        "x_upper",
+        "lower",
+        "upper",
+        "jacobian_rows",
+        "jacobian_columns",
+    ):
         np.testing.assert_array_equal(getattr(program, name), getattr(phase, name))
     np.testing.assert_allclose(program.rows(x), phase.rows(x), atol=1e-10)
-    np.testing.assert_allclose(program.jacobian(x), phase.jacobian(x), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        program.jacobian(x), phase.jacobian(x), rtol=1e-9, atol=1e-9
+    )
     slower = program.time_scaled(x, 2.0)
     assert slower[0] == 2.0 * x[0]
     np.testing.assert_array_equal(slower[1:], x[1:])

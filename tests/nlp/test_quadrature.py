@@ -12,7 +12,9 @@ BREAKS = np.array([0.0, 0.2, 0.5, 0.6, 1.0])
 EXTRA = np.array([0.23, 0.2301, 0.23013, 0.55, 0.8, 0.9999])
 
 
-@pytest.fixture(params=[(1, 1), (2, 2), (3, 3), (8, 3)], ids=lambda each: f"{each[0]} points")
+@pytest.fixture(
+    params=[(1, 1), (2, 2), (3, 3), (8, 3)], ids=lambda each: f"{each[0]} points"
+)
 def case(request):
     points, exact = request.param
     return np.union1d(spread(BREAKS, points), EXTRA if points > 1 else []), exact
@@ -40,8 +42,13 @@ def test_what_bends_at_knots_is_no_worse():
 
 def test_free_knots_carry_their_points_along():
     t_norm = spread(BREAKS, 3)
-    free, h = FreeGrid(clamped_knots(3, BREAKS), 3, t_norm, 0.01), np.array([0.1, 0.4, 0.3, 0.2])
+    free, h = (
+        FreeGrid(clamped_knots(3, BREAKS), 3, t_norm, 0.01),
+        np.array([0.1, 0.4, 0.3, 0.2]),
+    )
     breaks = np.append(0.0, np.cumsum(h))
     fixed = FixedGrid(clamped_knots(3, breaks), 3, spread(breaks, 3))
-    np.testing.assert_allclose(free.mean_weights(h), fixed.mean_weights(np.empty(0)), atol=1e-12)
+    np.testing.assert_allclose(
+        free.mean_weights(h), fixed.mean_weights(np.empty(0)), atol=1e-12
+    )
     assert free.mean_slopes.shape == (4, len(t_norm))

@@ -13,7 +13,15 @@ from support.chains import INERTIAL, Joint, chain_urdf
 MASS, LENGTH, PUSH, BRAKE = 4.0, 1.2, 50.0, 20.0
 LIMIT = {"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": PUSH}
 SLIDE = chain_urdf(
-    [Joint("prismatic", axis=(1.0, 0.0, 0.0), limit=LIMIT, inertial=INERTIAL.format(mass=MASS))], tool=(0.1, 0.2, 0.3)
+    [
+        Joint(
+            "prismatic",
+            axis=(1.0, 0.0, 0.0),
+            limit=LIMIT,
+            inertial=INERTIAL.format(mass=MASS),
+        )
+    ],
+    tool=(0.1, 0.2, 0.3),
 )
 
 
@@ -42,15 +50,26 @@ def test_a_slide_that_brakes_less_than_it_pushes(way):
 
 
 def test_the_plan_with_equal_limits_breaks_the_unequal_ones_and_sensitivities_name_the_end():
-    free, bound = plan({"torque": PUSH}, intervals=20), plan({"torque": {"j1": [-BRAKE, PUSH]}})
+    free, bound = (
+        plan({"torque": PUSH}, intervals=20),
+        plan({"torque": {"j1": [-BRAKE, PUSH]}}),
+    )
     assert free.t_end < 0.9 * bound.t_end
     (check,) = [
-        check for check in verify_trajectory(free.trajectory, robot=bound.trajectory.robot).checks if not check.passed
+        check
+        for check in verify_trajectory(
+            free.trajectory, robot=bound.trajectory.robot
+        ).checks
+        if not check.passed
     ]
     assert check.name == "torque ratio"
     assert check.value == pytest.approx(PUSH / BRAKE, rel=1e-3)
     entries = report(bound).sensitivities.limits
-    told = {entry.bound.end: entry.derivative for entry in entries if entry.limit.kind == "torque"}
+    told = {
+        entry.bound.end: entry.derivative
+        for entry in entries
+        if entry.limit.kind == "torque"
+    }
     for end, figure in (("lower", -BRAKE), ("upper", PUSH)):
         # t^2 = 2 m L (1 / |F1| + 1 / F2), so that dt / d|F| = -m L / (t F^2)
         slope = MASS * LENGTH / (bound.t_end * figure**2)
@@ -64,5 +83,7 @@ def test_a_slide_that_is_faster_one_way():
         trapezoid = LENGTH / speed + speed * MASS / PUSH
         assert result.verified
         assert trapezoid * (1.0 - 1e-4) < result.t_end < 1.001 * trapezoid
-    checks = verify_trajectory(plan({}, -LENGTH, 20).trajectory, robot=back.trajectory.robot).checks
+    checks = verify_trajectory(
+        plan({}, -LENGTH, 20).trajectory, robot=back.trajectory.robot
+    ).checks
     assert [check.name for check in checks if not check.passed] == ["velocity ratio"]

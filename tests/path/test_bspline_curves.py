@@ -27,7 +27,9 @@ def test_the_path_is_within_the_tolerance_of_all_points_blends_included() -> Non
     path = build_path(segments, position[0], ["x", "y", "z"])
     assert len(segments) == 3
     assert len(path.breaks) == 6
-    distances = brute_distances(position, path.sample(np.linspace(0.0, 1.0, 20_001)).target)
+    distances = brute_distances(
+        position, path.sample(np.linspace(0.0, 1.0, 20_001)).target
+    )
     assert distances.max() <= 0.5 * MM
     away = np.array([corner.row for corner in segments[0].bspline.fit.corners])
     beside = np.abs(np.arange(len(position))[:, None] - away).min(axis=1) > 10
@@ -38,7 +40,9 @@ def test_the_path_is_within_the_tolerance_of_all_points_blends_included() -> Non
 @pytest.mark.parametrize("rows", [["x", "y", "z"], ["x", "y"]])
 def test_derivatives_are_those_of_the_path(rows: list[str]) -> None:
     position = wave(500)[:, : len(rows)]
-    path = build_path(fit_path(position, tolerance={"position": 1e-5}), position[0], rows)
+    path = build_path(
+        fit_path(position, tolerance={"position": 1e-5}), position[0], rows
+    )
     step = 1e-5
     sample, before, after = (path.sample(S[1:-1] + off) for off in (0.0, -step, step))
     for name, of in (("target", "xi"), ("xi", "xi_ds"), ("xi_ds", "xi_dds")):
@@ -49,7 +53,9 @@ def test_derivatives_are_those_of_the_path(rows: list[str]) -> None:
 
 def poses(count: int = 300) -> tuple[np.ndarray, Rotation]:
     t = np.linspace(0.0, 1.0, count)
-    return wave(count), Rotation.from_rotvec(np.column_stack([0.4 * t, np.sin(t), 3.0 - 0.0 * t]))
+    return wave(count), Rotation.from_rotvec(
+        np.column_stack([0.4 * t, np.sin(t), 3.0 - 0.0 * t])
+    )
 
 
 def matrices(position: np.ndarray, turns: Rotation) -> np.ndarray:
@@ -59,7 +65,7 @@ def matrices(position: np.ndarray, turns: Rotation) -> np.ndarray:
 
 
 def test_all_forms_of_poses_give_the_same_path() -> None:
-    import pinocchio as pin  # noqa: PLC0415
+    import pinocchio as pin
 
     position, turns = poses()
     allowed = {"position": "0.02 mm", "orientation": "0.05 deg"}
@@ -73,44 +79,71 @@ def test_all_forms_of_poses_give_the_same_path() -> None:
     start = pose(position[0], turns[0])
     targets = []
     for form in forms:
-        path = build_path(fit_path(form.pop("points"), tolerance=allowed, **form), start, POSE_ROWS)
+        path = build_path(
+            fit_path(form.pop("points"), tolerance=allowed, **form), start, POSE_ROWS
+        )
         targets.append(path.sample(S).target)
         np.testing.assert_allclose(targets[-1], targets[0], atol=1e-9)
-    np.testing.assert_allclose(targets[0][[0, -1]], [pose(position[i], turns[i]) for i in (0, -1)], atol=1e-9)
+    np.testing.assert_allclose(
+        targets[0][[0, -1]], [pose(position[i], turns[i]) for i in (0, -1)], atol=1e-9
+    )
 
 
 def test_a_relative_curve_is_moved_and_turned() -> None:
     position, turns = poses()
-    segments = fit_path(matrices(position, turns), tolerance={"position": "0.02 mm"}, relative=True)
-    recorded = build_path(segments, pose(position[0], turns[0]), POSE_ROWS).sample(S).target
+    segments = fit_path(
+        matrices(position, turns), tolerance={"position": "0.02 mm"}, relative=True
+    )
+    recorded = (
+        build_path(segments, pose(position[0], turns[0]), POSE_ROWS).sample(S).target
+    )
     start, turn = np.array([3.0, 2.0, 1.0]), Rotation.from_rotvec([1.0, -0.4, 0.2])
     moved = build_path(segments, pose(start, turn), POSE_ROWS).sample(S).target
-    np.testing.assert_allclose(moved[:, :3], recorded[:, :3] - position[0] + start, atol=1e-9)
+    np.testing.assert_allclose(
+        moved[:, :3], recorded[:, :3] - position[0] + start, atol=1e-9
+    )
     change = (turn * turns[0].inv()).as_matrix()
-    np.testing.assert_allclose(moved[:, 3:].reshape(-1, 3, 3), change @ recorded[:, 3:].reshape(-1, 3, 3), atol=1e-9)
+    np.testing.assert_allclose(
+        moved[:, 3:].reshape(-1, 3, 3),
+        change @ recorded[:, 3:].reshape(-1, 3, 3),
+        atol=1e-9,
+    )
 
 
 def test_a_start_elsewhere_is_refused() -> None:
     position, turns = poses()
     segments = fit_path(matrices(position, turns), tolerance={"position": "0.02 mm"})
-    with pytest.raises(PathError, match=r"control_points\[0\]: .*, 0.02 m off; allowed: at most 0.0001 m"):
+    with pytest.raises(
+        PathError,
+        match=r"control_points\[0\]: .*, 0.02 m off; allowed: at most 0.0001 m",
+    ):
         build_path(segments, pose(position[0] + [0.0, 0.02, 0.0], turns[0]), POSE_ROWS)
     with pytest.raises(PathError, match=r"control_points\[0\]: .*, 0.01 rad off"):
-        build_path(segments, pose(position[0], Rotation.from_rotvec([0.0, 0.01, 0.0]) * turns[0]), POSE_ROWS)
+        build_path(
+            segments,
+            pose(position[0], Rotation.from_rotvec([0.0, 0.01, 0.0]) * turns[0]),
+            POSE_ROWS,
+        )
 
 
 def test_speeds_follow_the_path_over_its_blends() -> None:
     position, _ = bent(900)
     speed = np.where(np.arange(900) < 450, 0.1, 0.2)
-    segments = fit_path(position, tolerance={"position": "0.05 mm", "corner": "1 mm"}, speed=speed)
+    segments = fit_path(
+        position, tolerance={"position": "0.05 mm", "corner": "1 mm"}, speed=speed
+    )
     path = build_path(segments, position[0], ["x", "y", "z"])
     (table,) = feed_tables(segments, path)
     assert (table.s[0], table.s[-1]) == pytest.approx((0.0, 1.0))
     assert np.all(np.diff(table.s) > 0.0)
     middle = path.sample(S).target
-    nearest = np.array([np.argmin(np.linalg.norm(position - place, axis=1)) for place in middle])
+    nearest = np.array(
+        [np.argmin(np.linalg.norm(position - place, axis=1)) for place in middle]
+    )
     clear = np.abs(nearest - 450) > 2
-    np.testing.assert_allclose(np.interp(S, table.s, table.speed)[clear], speed[nearest[clear]])
+    np.testing.assert_allclose(
+        np.interp(S, table.s, table.speed)[clear], speed[nearest[clear]]
+    )
 
 
 def test_stretches_without_speed_have_no_table() -> None:
@@ -122,32 +155,58 @@ def test_stretches_without_speed_have_no_table() -> None:
     first, second = feed_tables(segments, path)
     assert first.s[-1] == pytest.approx(39 / 99, abs=0.01)
     assert second.s[0] == pytest.approx(59 / 99, abs=0.01)
-    assert feed_tables(fit_path(position), build_path(fit_path(position), position[0], ["x", "y", "z"])) == ()
+    assert (
+        feed_tables(
+            fit_path(position),
+            build_path(fit_path(position), position[0], ["x", "y", "z"]),
+        )
+        == ()
+    )
 
 
 def test_the_first_point_is_where_a_free_start_begins() -> None:
     position, turns = poses()
     base = {"brachis": 1, "start": "free", "task_space": "pose"}
     for allowed in (None, {"position": "0.02 mm"}):
-        made = load_task({**base, "path": fit_path(matrices(position, turns), tolerance=allowed)})
+        made = load_task(
+            {**base, "path": fit_path(matrices(position, turns), tolerance=allowed)}
+        )
         assert isinstance(made.path_start, ToolPose)
         np.testing.assert_allclose(made.path_start.position, position[0])
     with pytest.raises(TaskError, match="path_start"):
-        load_task({**base, "path": fit_path(position, tolerance={"position": "0.02 mm"})})
+        load_task(
+            {**base, "path": fit_path(position, tolerance={"position": "0.02 mm"})}
+        )
     with pytest.raises(TaskError, match="path_start"):
         load_task({**base, "path": fit_path(position, relative=True)})
 
 
 def test_a_quaternion_of_length_zero_at_the_start_is_no_crash() -> None:
-    curve = {"knots": [0.0] * 6 + [1.0] * 6, "control_points": [[0.1 * i, 0, 0, 0, 0, 0, 0] for i in range(6)]}
+    curve = {
+        "knots": [0.0] * 6 + [1.0] * 6,
+        "control_points": [[0.1 * i, 0, 0, 0, 0, 0, 0] for i in range(6)],
+    }
     with pytest.raises(TaskError, match="the quaternion's length is 0"):
-        load_task({"brachis": 1, "start": "free", "task_space": "pose", "path": [{"bspline": curve}]})
+        load_task(
+            {
+                "brachis": 1,
+                "start": "free",
+                "task_space": "pose",
+                "path": [{"bspline": curve}],
+            }
+        )
 
 
 def test_a_fitted_task_survives_being_saved() -> None:
     position, turns = poses()
-    segments = fit_path(matrices(position, turns), tolerance={"position": "0.02 mm"}, speed=np.full(300, 0.1))
-    made = load_task({"brachis": 1, "start": "free", "task_space": "pose", "path": segments})
+    segments = fit_path(
+        matrices(position, turns),
+        tolerance={"position": "0.02 mm"},
+        speed=np.full(300, 0.1),
+    )
+    made = load_task(
+        {"brachis": 1, "start": "free", "task_space": "pose", "path": segments}
+    )
     assert load_task(made.to_dict()) == made
     assert isinstance(made, Task)
     assert made.fits[0].points == 300
@@ -157,9 +216,18 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"points": np.zeros((5, 4, 3))}, r"points of the wrong shape; found \(5, 4, 3\)"),
     ({"points": [[0.0, np.nan], [1.0, 1.0]]}, r"points: row 0: not finite"),
     ({"points": ["a"]}, r"not an array of numbers"),
-    ({"points": wave(5), "orientations": np.zeros((5, 4))}, r"an array of quaternions does not say whether w is first"),
-    ({"points": wave(5), "orientations": np.ones((5, 3, 3))}, r"row 0: no rotation matrix"),
-    ({"points": wave(5), "orientations": np.ones((5, 2))}, r"orientations of the wrong shape"),
+    (
+        {"points": wave(5), "orientations": np.zeros((5, 4))},
+        r"an array of quaternions does not say whether w is first",
+    ),
+    (
+        {"points": wave(5), "orientations": np.ones((5, 3, 3))},
+        r"row 0: no rotation matrix",
+    ),
+    (
+        {"points": wave(5), "orientations": np.ones((5, 2))},
+        r"orientations of the wrong shape",
+    ),
     (
         {"points": wave(5), "orientations": np.ones(4)},
         r"as many orientations as points are needed; found 4; allowed: 5",
@@ -172,7 +240,11 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"points": wave(5), "tolerance": {"positions": 1.0}}, r"tolerance"),
     ({"points": wave(5), "units": {"length": "furlong"}}, r"units: length"),
     (
-        {"points": bent(300)[0], "tolerance": {"position": "0.1 mm"}, "corner": "refuse"},
+        {
+            "points": bent(300)[0],
+            "tolerance": {"position": "0.1 mm"},
+            "corner": "refuse",
+        },
         r"2 corners; found 8\d.* deg at row",
     ),
 ]
@@ -187,8 +259,13 @@ def test_wrong_arrays_are_named(given: dict[str, Any], message: str) -> None:
 def test_knots_that_are_not_smooth_are_refused() -> None:
     points = [[float(i), 0.0] for i in range(6)]
     ends = [0.0] * 6, [5.0] * 6
-    BSplineCurve(knots=tuple(ends[0] + ends[1]), control_points=tuple(map(tuple, points)))
+    BSplineCurve(
+        knots=tuple(ends[0] + ends[1]), control_points=tuple(map(tuple, points))
+    )
     with pytest.raises(ValidationError, match="not clamped"):
-        BSplineCurve(knots=(0.0,) * 5 + (0.1,) + (5.0,) * 6, control_points=tuple(map(tuple, points)))
+        BSplineCurve(
+            knots=(0.0,) * 5 + (0.1,) + (5.0,) * 6,
+            control_points=tuple(map(tuple, points)),
+        )
     with pytest.raises(ValidationError, match="wrong number of knots"):
         BSplineCurve(knots=(0.0, 1.0), control_points=tuple(map(tuple, points)))

@@ -16,10 +16,18 @@ from brachis.path.site import Site
 from brachis.task import ArcSegment, load_task
 
 
-def path_of(segments: list[dict[str, Any]], start: Any, rows: list[str]) -> SequencePath:
+def path_of(
+    segments: list[dict[str, Any]], start: Any, rows: list[str]
+) -> SequencePath:
     """Build a path from segments as a task file writes them."""
     task = load_task(
-        {"brachis": 1, "start": {"joints": [0]}, "task_space": rows, "path": segments, "redundant_joints": []}
+        {
+            "brachis": 1,
+            "start": {"joints": [0]},
+            "task_space": rows,
+            "path": segments,
+            "redundant_joints": [],
+        }
     )
     path = build_path(task.path, start, rows)
     assert isinstance(path, SequencePath)
@@ -36,12 +44,19 @@ def assert_derivatives(curve: Curve, step: float = 1e-5) -> None:
     sigma = rng.uniform(-0.1, 1.1, 50) * curve.length
     exact = curve.derivatives(sigma, 4)
     h = step * curve.length
-    difference = (curve.derivatives(sigma + h, 3) - curve.derivatives(sigma - h, 3)) / (2 * h)
+    difference = (curve.derivatives(sigma + h, 3) - curve.derivatives(sigma - h, 3)) / (
+        2 * h
+    )
     scale = 1 + np.abs(exact[1:]).max(axis=(1, 2), keepdims=True)
     assert np.abs((difference - exact[1:]) / scale).max() < 1e-6
     for order in range(4):
         fewer = exact[: order + 1]
-        np.testing.assert_allclose(curve.derivatives(sigma, order), fewer, rtol=1e-9, atol=1e-12 * np.abs(fewer).max())
+        np.testing.assert_allclose(
+            curve.derivatives(sigma, order),
+            fewer,
+            rtol=1e-9,
+            atol=1e-12 * np.abs(fewer).max(),
+        )
 
 
 XY, XYZ, XYW = ["x", "y"], ["x", "y", "z"], ["x", "z", "yaw"]
@@ -51,11 +66,30 @@ CURVES: dict[str, tuple[dict[str, Any], list[float], list[str]]] = {
     "yaw alone": ({"line": {"by": [0, 0, -3]}}, [0.3, 0.4, 0.5], XYW),
     "heading": ({"line": {"length": 2, "angle_deg": 30}}, [0.3, 0.4], XY),
     "arc": ({"arc": {"center": [1, 0], "angle_deg": -130}}, [0.3, 0.4], XY),
-    "arc in space": ({"arc": {"center": [1, 0, 0], "angle_deg": 80, "normal": [0, 2, -1]}}, [0, 0.5, 1], XYZ),
+    "arc in space": (
+        {"arc": {"center": [1, 0, 0], "angle_deg": 80, "normal": [0, 2, -1]}},
+        [0, 0.5, 1],
+        XYZ,
+    ),
     "arc via": ({"arc": {"via": [1, 0, 1], "to": [2, 1, 3]}}, [0, 0, 0], XYZ),
-    "arc along the tangent": ({"arc": {"center": [1, 0], "angle_deg": 130, "yaw": "tangent"}}, [0, 0, 1], XYW),
+    "arc along the tangent": (
+        {"arc": {"center": [1, 0], "angle_deg": 130, "yaw": "tangent"}},
+        [0, 0, 1],
+        XYW,
+    ),
     "circle": ({"circle": {"center": [0.2, 0], "turns": -2.5}}, [0, 0], XY),
-    "helix": ({"helix": {"center": [0.2, 0, 1], "pitch": -0.1, "normal": [0, 0, 2], "turns": 2.5}}, [0, 0, 1], XYZ),
+    "helix": (
+        {
+            "helix": {
+                "center": [0.2, 0, 1],
+                "pitch": -0.1,
+                "normal": [0, 0, 2],
+                "turns": 2.5,
+            }
+        },
+        [0, 0, 1],
+        XYZ,
+    ),
     "spline, one waypoint": ({"spline": {"through": [[1, 2]]}}, [0, 0], XY),
     "spline, two": ({"spline": {"through": [[1, 2], [2, 1]]}}, [0, 0], XY),
     "spline, three": ({"spline": {"through": [[1, 2], [2, 1], [2.5, 3]]}}, [0, 0], XY),
@@ -72,7 +106,9 @@ CURVES: dict[str, tuple[dict[str, Any], list[float], list[str]]] = {
 def test_derivatives(name: str) -> None:
     curve = curve_of(*CURVES[name])
     assert_derivatives(curve)
-    np.testing.assert_allclose(curve.derivatives(np.zeros(1), 0)[0, 0], CURVES[name][1], atol=1e-12)
+    np.testing.assert_allclose(
+        curve.derivatives(np.zeros(1), 0)[0, 0], CURVES[name][1], atol=1e-12
+    )
     assert curve.knots[0] == 0
     assert curve.knots[-1] == pytest.approx(curve.length)
 
@@ -81,7 +117,9 @@ def test_derivatives_of_a_blend() -> None:
     start, end = np.random.default_rng(2).standard_normal((2, 4, 3))
     curve = septic(start, end, 1.7)
     assert_derivatives(curve)
-    np.testing.assert_allclose(curve.derivatives(np.array([0.0, 1.7])), np.stack([start, end], 1), atol=1e-12)
+    np.testing.assert_allclose(
+        curve.derivatives(np.array([0.0, 1.7])), np.stack([start, end], 1), atol=1e-12
+    )
 
 
 coordinates = st.lists(st.floats(-5, 5), min_size=3, max_size=3).map(np.array)
@@ -98,20 +136,32 @@ def test_a_line_ends_where_it_should(start: Array, end: Array) -> None:
     np.testing.assert_allclose(np.linalg.norm(values[1], axis=1), 1.0)
 
 
-@given(coordinates, st.floats(-720, 720).filter(lambda angle: abs(angle) > 1e-3), coordinates)
-def test_an_arc_keeps_its_radius_and_turns_by_its_angle(center: Array, angle: float, aside: Array) -> None:
+@given(
+    coordinates,
+    st.floats(-720, 720).filter(lambda angle: abs(angle) > 1e-3),
+    coordinates,
+)
+def test_an_arc_keeps_its_radius_and_turns_by_its_angle(
+    center: Array, angle: float, aside: Array
+) -> None:
     normal = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
     outward = np.cross(normal, aside)
     if np.linalg.norm(outward) < 1e-2:
         outward = np.cross(normal, [1.0, 0, 0])
     radius = np.linalg.norm(outward)
-    curve = curve_of({"arc": {"center": center, "angle_deg": angle, "normal": 2 * normal}}, center + outward, XYZ)
+    curve = curve_of(
+        {"arc": {"center": center, "angle_deg": angle, "normal": 2 * normal}},
+        center + outward,
+        XYZ,
+    )
     assert curve.length == pytest.approx(radius * np.deg2rad(abs(angle)))
     z, velocity = curve.derivatives(np.linspace(0, curve.length, 30), 1)
     np.testing.assert_allclose(np.linalg.norm(z - center, axis=1), radius, rtol=1e-9)
     np.testing.assert_allclose((z - center) @ normal, 0, atol=1e-9)
     np.testing.assert_allclose(np.linalg.norm(velocity, axis=1), 1.0)
-    turned = np.cos(np.deg2rad(angle)) * outward + np.sin(np.deg2rad(angle)) * np.cross(normal, outward)
+    turned = np.cos(np.deg2rad(angle)) * outward + np.sin(np.deg2rad(angle)) * np.cross(
+        normal, outward
+    )
     np.testing.assert_allclose(z[-1], center + turned, atol=1e-8)
 
 
@@ -123,14 +173,18 @@ def test_the_sign_of_a_plane_arc(angle: float) -> None:
 
 
 @given(st.floats(0.05, 0.95), st.floats(0.1, 6.2), st.booleans(), st.integers(2, 3))
-def test_an_arc_passes_via_and_then_ends(fraction: float, angle: float, clockwise: bool, rows: int) -> None:  # noqa: FBT001
+def test_an_arc_passes_via_and_then_ends(
+    fraction: float, angle: float, clockwise: bool, rows: int
+) -> None:
     center = np.array([0.3, -0.2, 0.5])[:rows]
     u, v = (np.array([0.6, 0.8, 0.0])[:rows], np.array([0.8, -0.6, 0.0])[:rows])
     if rows == 3:
         v = np.array([0.8 * 0.6, -0.6 * 0.6, 0.8])
 
     def on_circle(phi: float) -> Array:
-        return center + 1.5 * (np.cos(phi) * u + (-1 if clockwise else 1) * np.sin(phi) * v)
+        return center + 1.5 * (
+            np.cos(phi) * u + (-1 if clockwise else 1) * np.sin(phi) * v
+        )
 
     via, end = on_circle(fraction * angle), on_circle(angle)
     curve = curve_of({"arc": {"via": via, "to": end}}, on_circle(0.0), XYZ[:rows])
@@ -143,18 +197,28 @@ def test_an_arc_via_the_point_opposite() -> None:
     for to, length in (([0, -1], 1.5 * np.pi), ([0, 1], 1.5 * np.pi)):
         curve = curve_of({"arc": {"via": [-1, 0], "to": to}}, [1, 0], XY)
         assert curve.length == pytest.approx(length)
-        np.testing.assert_allclose(curve.derivatives(np.array([np.pi, curve.length]), 0)[0], [[-1, 0], to], atol=1e-12)
+        np.testing.assert_allclose(
+            curve.derivatives(np.array([np.pi, curve.length]), 0)[0],
+            [[-1, 0], to],
+            atol=1e-12,
+        )
 
 
 @pytest.mark.parametrize("turns", [1, -1.25])
 def test_yaw_turns_with_the_tangent(turns: float) -> None:
-    curve = curve_of({"circle": {"center": [0, 0], "turns": turns, "yaw": "tangent"}}, [2, 0, 0.7], XYW)
+    curve = curve_of(
+        {"circle": {"center": [0, 0], "turns": turns, "yaw": "tangent"}},
+        [2, 0, 0.7],
+        XYW,
+    )
     z, velocity = curve.derivatives(np.linspace(0, curve.length, 40), 1)
     heading = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
     np.testing.assert_allclose(z[:, 2] - 0.7, heading - heading[0], atol=1e-12)
     assert z[-1, 2] - 0.7 == pytest.approx(2 * np.pi * turns)
     fixed = curve_of({"circle": {"center": [0, 0], "turns": turns}}, [2, 0, 0.7], XYW)
-    np.testing.assert_array_equal(fixed.derivatives(np.array([0.0, 1.0]), 0)[0, :, 2], 0.7)
+    np.testing.assert_array_equal(
+        fixed.derivatives(np.array([0.0, 1.0]), 0)[0, :, 2], 0.7
+    )
 
 
 @pytest.mark.parametrize("count", [2, 3, 5, 12])
@@ -164,18 +228,26 @@ def test_a_spline_passes_its_waypoints_and_is_c4(count: int) -> None:
     curve = curve_of({"spline": {"through": points}}, [0, 0], XY)
     knots = curve.knots
     np.testing.assert_allclose(curve.derivatives(knots, 0)[0, 1:], points, atol=1e-12)
-    np.testing.assert_allclose(np.diff(knots), np.linalg.norm(np.diff([[0, 0], *points], axis=0), axis=1))
+    np.testing.assert_allclose(
+        np.diff(knots), np.linalg.norm(np.diff([[0, 0], *points], axis=0), axis=1)
+    )
     h = 1e-9
     jump = curve.derivatives(knots[1:-1] + h, 4) - curve.derivatives(knots[1:-1] - h, 4)
-    fifth = np.abs(curve.derivatives(np.linspace(0, curve.length, 100), 5)).max(axis=(1, 2))
+    fifth = np.abs(curve.derivatives(np.linspace(0, curve.length, 100), 5)).max(
+        axis=(1, 2)
+    )
     for k in range(5):
         assert np.abs(jump[k]).max() <= 4 * h * fifth[k + 1] + 1e-9 * (1 + fifth[k])
 
 
-@pytest.mark.parametrize("points", [[[1e-4, 0], [1, 0.5]], [[0.5, 1], [0.5, 1.0001], [2, 0]]])
+@pytest.mark.parametrize(
+    "points", [[[1e-4, 0], [1, 0.5]], [[0.5, 1], [0.5, 1.0001], [2, 0]]]
+)
 def test_a_spline_bears_short_chords(points: list[list[float]]) -> None:
     curve = curve_of({"spline": {"through": points}}, [0, 0], XY)
-    np.testing.assert_allclose(curve.derivatives(curve.knots, 0)[0, 1:], points, atol=1e-10)
+    np.testing.assert_allclose(
+        curve.derivatives(curve.knots, 0)[0, 1:], points, atol=1e-10
+    )
 
 
 def test_a_spline_through_an_arc_is_close_to_it() -> None:
@@ -189,19 +261,27 @@ def test_a_spline_through_an_arc_is_close_to_it() -> None:
 
 def test_a_relative_spline() -> None:
     absolute = curve_of({"spline": {"through": [[1.5, 0], [2, 1]]}}, [1, -1], XY)
-    relative = curve_of({"spline": {"through": [[0.5, 1], [1, 2]], "relative": True}}, [1, -1], XY)
+    relative = curve_of(
+        {"spline": {"through": [[0.5, 1], [1, 2]], "relative": True}}, [1, -1], XY
+    )
     sigma = np.linspace(0, absolute.length, 9)
-    np.testing.assert_allclose(relative.derivatives(sigma), absolute.derivatives(sigma), atol=1e-12)
+    np.testing.assert_allclose(
+        relative.derivatives(sigma), absolute.derivatives(sigma), atol=1e-12
+    )
 
 
 def test_a_spline_whose_start_is_stated() -> None:
     waypoints = [[1.5, 0], [2, 1]]
     plain = curve_of({"spline": {"through": waypoints}}, [1, -1], XY)
-    stated = curve_of({"spline": {"through": waypoints, "starts_at": [1, -1.00009]}}, [1, -1], XY)
+    stated = curve_of(
+        {"spline": {"through": waypoints, "starts_at": [1, -1.00009]}}, [1, -1], XY
+    )
     moved = {"through": [[4.5, 4], [5, 5]], "starts_at": [4, 3], "relative": True}
     sigma = np.linspace(0, plain.length, 9)
     for curve in (stated, curve_of({"spline": moved}, [1, -1], XY)):
-        np.testing.assert_allclose(curve.derivatives(sigma), plain.derivatives(sigma), atol=1e-12)
+        np.testing.assert_allclose(
+            curve.derivatives(sigma), plain.derivatives(sigma), atol=1e-12
+        )
 
 
 def test_a_site_knows_its_position_rows() -> None:
@@ -212,18 +292,33 @@ def test_a_site_knows_its_position_rows() -> None:
 
 def test_a_centre_of_few_digits_is_moved_into_the_plane_of_the_arc():
     start = np.array([0.5, 0.0, 0.18959559])
-    arc = ArcSegment(arc={"center": (0.3, 0.0, 0.18959), "angle_deg": 360.0, "normal": (0.0, 0.0, 1.0)})
+    arc = ArcSegment(
+        arc={
+            "center": (0.3, 0.0, 0.18959),
+            "angle_deg": 360.0,
+            "normal": (0.0, 0.0, 1.0),
+        }
+    )
     path = build_path([arc], start, ["x", "y", "z"])
     around = path.sample(np.linspace(0.0, 1.0, 9)).target
     np.testing.assert_allclose(around[:, 2], start[2], atol=1e-15)
     np.testing.assert_allclose(around[[0, -1]], [start, start], atol=1e-12)
-    wrong = arc.model_copy(update={"arc": arc.arc.model_copy(update={"center": (0.3, 0.0, 0.18)})})
-    with pytest.raises(PathError, match=r"Move the centre by 0\.00959559 m along the normal"):
+    wrong = arc.model_copy(
+        update={"arc": arc.arc.model_copy(update={"center": (0.3, 0.0, 0.18)})}
+    )
+    with pytest.raises(
+        PathError, match=r"Move the centre by 0\.00959559 m along the normal"
+    ):
         build_path([wrong], start, ["x", "y", "z"])
 
 
 def test_a_helix_climbs_by_its_pitch():
-    shape = {"center": [0.3, 0.0, 1.0], "pitch": 0.1, "normal": [0, 0, 2], "turns": -2.5}
+    shape = {
+        "center": [0.3, 0.0, 1.0],
+        "pitch": 0.1,
+        "normal": [0, 0, 2],
+        "turns": -2.5,
+    }
     curve = curve_of({"helix": shape}, [0.5, 0.0, 1.0], XYZ)
     length = 2.5 * np.hypot(2 * np.pi * 0.2, 0.1)
     assert curve.length == pytest.approx(length)

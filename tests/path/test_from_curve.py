@@ -12,30 +12,54 @@ from brachis.robot.task_map.protocol import joint_rows
 from brachis.task import load_task
 
 RNG = np.random.default_rng(0)
-TIMES, WAYPOINTS = np.array([0.0, 0.3, 0.7, 1.5, 2.0, 2.2]), RNG.uniform(-1.0, 1.0, (6, 3))
+TIMES, WAYPOINTS = (
+    np.array([0.0, 0.3, 0.7, 1.5, 2.0, 2.2]),
+    RNG.uniform(-1.0, 1.0, (6, 3)),
+)
 QUINTIC = make_interp_spline(TIMES, WAYPOINTS, k=5)
 U = np.linspace(0.0, 1.0, 101)
 
 
 def along(segment, start):
     """The path that a task with this segment alone describes, at U."""
-    content = {"brachis": 1, "start": {"joints": start}, "task_space": "joints", "path": [segment]}
-    return build_path(load_task(content).path, start, joint_rows(["a", "b", "c"])).derivatives(U)
+    content = {
+        "brachis": 1,
+        "start": {"joints": start},
+        "task_space": "joints",
+        "path": [segment],
+    }
+    return build_path(
+        load_task(content).path, start, joint_rows(["a", "b", "c"])
+    ).derivatives(U)
 
 
-@pytest.mark.parametrize("knots", [None, np.sort(np.append(RNG.uniform(-1.0, 3.0, 10), np.arange(-6.0, 10.0)))])
+@pytest.mark.parametrize(
+    "knots",
+    [None, np.sort(np.append(RNG.uniform(-1.0, 3.0, 10), np.arange(-6.0, 10.0)))],
+)
 def test_splines_are_taken_exactly(knots):
     """Clamped or not."""
-    curve = QUINTIC if knots is None else BSpline(knots, RNG.uniform(-1.0, 1.0, (len(knots) - 6, 3)), 5)
+    curve = (
+        QUINTIC
+        if knots is None
+        else BSpline(knots, RNG.uniform(-1.0, 1.0, (len(knots) - 6, 3)), 5)
+    )
     first, last = curve.t[5], curve.t[-6]
     found = along(bspline_segment(curve), curve(first))
     for order in range(4):
         expected = curve(first + U * (last - first), nu=order) * (last - first) ** order
-        np.testing.assert_allclose(found[order], expected, atol=1e-9 * (1.0 + np.abs(expected).max()))
+        np.testing.assert_allclose(
+            found[order], expected, atol=1e-9 * (1.0 + np.abs(expected).max())
+        )
 
 
 def test_piecewise_polynomials_and_parts_of_them():
-    cubic = PPoly(np.array([[[1.0, 0.0, 2.0]], [[0.0, 1.0, 0.0]], [[0.0, 0.0, 1.0]], [[0.1, 0.2, 0.3]]]), [0.0, 2.0])
+    cubic = PPoly(
+        np.array(
+            [[[1.0, 0.0, 2.0]], [[0.0, 1.0, 0.0]], [[0.0, 0.0, 1.0]], [[0.1, 0.2, 0.3]]]
+        ),
+        [0.0, 2.0],
+    )
     found = along(bspline_segment(cubic, (0.5, 1.0)), cubic(0.5))
     np.testing.assert_allclose(found[0], cubic(0.5 + 0.5 * U), atol=1e-13)
 
@@ -47,7 +71,9 @@ def test_functions_are_met_within_the_tolerance():
     for tolerance in (1e-6, 1e-10):
         segment = bspline_segment(curve, (0.0, 2.0), tolerance=tolerance)
         found = along(segment, curve(0.0))[0]
-        np.testing.assert_allclose(found, np.transpose(curve(2.0 * U)), atol=2.0 * tolerance)
+        np.testing.assert_allclose(
+            found, np.transpose(curve(2.0 * U)), atol=2.0 * tolerance
+        )
     assert len(segment["bspline"]["knots"]) < 300
 
 

@@ -15,8 +15,14 @@ from support.poses import pose_path
 from support.seams import wave
 
 PAGE = Path(__file__).parents[2] / "docs" / "task_files.md"
-SNIPPETS = re.findall(r"^```yaml\n(.*?)^```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
-EXAMPLES = [text for text in SNIPPETS if "path" in yaml.safe_load(text.replace("!degrees", ""))]
+SNIPPETS = re.findall(
+    r"^```yaml\n(.*?)^```",
+    PAGE.read_text(encoding="utf-8"),
+    flags=re.DOTALL | re.MULTILINE,
+)
+EXAMPLES = [
+    text for text in SNIPPETS if "path" in yaml.safe_load(text.replace("!degrees", ""))
+]
 
 
 def test_there_are_examples() -> None:
@@ -39,7 +45,9 @@ def test_the_limits_of_ros_are_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
-def test_examples_are_paths(example: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_examples_are_paths(
+    example: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     content = yaml.safe_load(example)
     start = np.zeros(3)

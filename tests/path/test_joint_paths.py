@@ -12,11 +12,23 @@ from brachis.task import load_task
 
 ROWS = joint_rows(["a", "b", "x"])
 START = [0.1, 0.2, 0.3]
-CLAMPED = {"degree": 4, "knots": [0] * 5 + [1] * 5, "control_points": [START, *np.eye(3).tolist(), [1, 1, 1]]}
+CLAMPED = {
+    "degree": 4,
+    "knots": [0] * 5 + [1] * 5,
+    "control_points": [START, *np.eye(3).tolist(), [1, 1, 1]],
+}
 
 
 def task(path, **more):
-    return load_task({"brachis": 1, "start": {"joints": START}, "task_space": "joints", "path": path, **more})
+    return load_task(
+        {
+            "brachis": 1,
+            "start": {"joints": START},
+            "task_space": "joints",
+            "path": path,
+            **more,
+        }
+    )
 
 
 def build(path, start=START):
@@ -28,8 +40,12 @@ def at(path, s):
 
 
 def test_lines_splines_and_blends():
-    path = build([{"line": {"by": [0.3, 0, 0]}, "blend": 0.1}, {"line": {"to": [0.4, 0.8, 0.3]}}])
-    np.testing.assert_allclose(at(path, [0.0, 1.0]), [START, [0.4, 0.8, 0.3]], atol=1e-15)
+    path = build(
+        [{"line": {"by": [0.3, 0, 0]}, "blend": 0.1}, {"line": {"to": [0.4, 0.8, 0.3]}}]
+    )
+    np.testing.assert_allclose(
+        at(path, [0.0, 1.0]), [START, [0.4, 0.8, 0.3]], atol=1e-15
+    )
     assert len(path.breaks) == 4
     path = build([{"spline": {"through": [[0.5, 0.5, 0.5], [0.1, 0.9, 0.2]]}}])
     chord = np.linalg.norm([0.4, 0.3, 0.2])
@@ -39,12 +55,23 @@ def test_lines_splines_and_blends():
 
 def test_joints_may_stand_in_another_order(tmp_path):
     plain = build([{"spline": {"through": [[0.5, 0.6, 0.7], [0.1, 0.9, 0.2]]}}])
-    named = build([{"spline": {"through": [[0.7, 0.5, 0.6], [0.2, 0.1, 0.9]], "joints": ["x", "a", "b"]}}])
+    named = build(
+        [
+            {
+                "spline": {
+                    "through": [[0.7, 0.5, 0.6], [0.2, 0.1, 0.9]],
+                    "joints": ["x", "a", "b"],
+                }
+            }
+        ]
+    )
     s = np.linspace(0.0, 1.0, 7)
     np.testing.assert_allclose(at(named, s), at(plain, s), atol=1e-14)
     file = tmp_path / "path.csv"
     file.write_text("x,a,b\n0.3,0.1,0.2\n0.7,0.5,0.6\n0.2,0.1,0.9\n")
-    np.testing.assert_allclose(at(build([{"csv": {"file": str(file)}}]), s), at(plain, s), atol=1e-14)
+    np.testing.assert_allclose(
+        at(build([{"csv": {"file": str(file)}}]), s), at(plain, s), atol=1e-14
+    )
 
 
 def test_bsplines_are_taken_as_they_are():
@@ -58,13 +85,22 @@ def test_bsplines_are_taken_as_they_are():
 
 REFUSED = [
     ({"circle": {"center": [0, 0, 0]}}, "a path of joints cannot have this segment"),
-    ({"turn": {"rotate": {"axis": [0, 0, 1], "angle_deg": 3}}}, "a path of joints cannot have this segment"),
+    (
+        {"turn": {"rotate": {"axis": [0, 0, 1], "angle_deg": 3}}},
+        "a path of joints cannot have this segment",
+    ),
     ({"line": {"length": 1, "angle_deg": 3}}, "needs 2 position rows"),
     ({"line": {"by": [1, 2]}}, r"found 2: .*joint a, joint b, joint x"),
-    ({"spline": {"through": [[1, 1, 1]], "joints": ["a", "b", "c"]}}, r"spline\.joints.*'c'.*a, b, x"),
+    (
+        {"spline": {"through": [[1, 1, 1]], "joints": ["a", "b", "c"]}},
+        r"spline\.joints.*'c'.*a, b, x",
+    ),
     ({"spline": {"through": [[1, 1]], "joints": ["a", "b"]}}, r"joints are missing"),
     ({"line": {"by": [1, 2, 3]}, "orientation": "fixed"}, "for task spaces of poses"),
-    ({"bspline": {**CLAMPED, "control_points": [[0.1, 0.2]] * 5}}, r"control_points\[0\]: wrong number"),
+    (
+        {"bspline": {**CLAMPED, "control_points": [[0.1, 0.2]] * 5}},
+        r"control_points\[0\]: wrong number",
+    ),
     ({"bspline": {**CLAMPED, "control_points": [START] * 5}}, "zero length"),
 ]
 
@@ -76,7 +112,9 @@ def test_what_a_path_of_joints_cannot_be(segment, words):
 
 
 def test_a_corner_is_refused_with_its_place():
-    with pytest.raises(PathError, match=r"a corner of 90 degrees.*path\[0\].*blend \(rad, m\)"):
+    with pytest.raises(
+        PathError, match=r"a corner of 90 degrees.*path\[0\].*blend \(rad, m\)"
+    ):
         build([{"line": {"by": [0.3, 0, 0]}}, {"line": {"by": [0, 0.3, 0]}}])
 
 

@@ -30,19 +30,27 @@ def polynomial(coefficients, sigma, order=ORDER):
     """Derivatives of vector polynomials, shape (order + 1, K, n)."""
     polynomials = [np.polynomial.Polynomial(row) for row in coefficients]
     return np.stack(
-        [np.stack([p.deriv(k)(sigma) if k else p(sigma) for p in polynomials], -1) for k in range(order + 1)]
+        [
+            np.stack([p.deriv(k)(sigma) if k else p(sigma) for p in polynomials], -1)
+            for k in range(order + 1)
+        ]
     )
 
 
 def assert_derivatives(function):
     """Each derivative of ``function(sigma)``, (order + 1, K, ...), is the slope of the one before."""
     exact, h = function(SIGMA), 1e-3
-    slope = sum(w * (function(SIGMA + k * h) - function(SIGMA - k * h)) for k, w in ((1, 45.0), (2, -9.0), (3, 1.0)))
+    slope = sum(
+        w * (function(SIGMA + k * h) - function(SIGMA - k * h))
+        for k, w in ((1, 45.0), (2, -9.0), (3, 1.0))
+    )
     slope /= 60 * h
     assert len(exact) == ORDER + 1
     for k in range(ORDER):
         assert np.abs(exact[k + 1]).max() > 1e-3
-        np.testing.assert_allclose(slope[k], exact[k + 1], atol=1e-8 * np.abs(exact[k + 1]).max())
+        np.testing.assert_allclose(
+            slope[k], exact[k + 1], atol=1e-8 * np.abs(exact[k + 1]).max()
+        )
 
 
 RANDOM = np.random.default_rng(5)
@@ -56,8 +64,12 @@ def rotation_at(sigma):
 
 
 FUNCTIONS = {
-    "scalar product": lambda s: product(polynomial(ONE, s), polynomial(OTHER, s), "...i,...i->..."),
-    "cross product": lambda s: product(hat(polynomial(ONE, s)), polynomial(OTHER, s), "...ij,...j->...i"),
+    "scalar product": lambda s: product(
+        polynomial(ONE, s), polynomial(OTHER, s), "...i,...i->..."
+    ),
+    "cross product": lambda s: product(
+        hat(polynomial(ONE, s)), polynomial(OTHER, s), "...ij,...j->...i"
+    ),
     "unit vector": lambda s: unit(polynomial(QUATERNION, s)),
     "sine": lambda s: sine_cosine(polynomial(ANGLE, s))[0],
     "cosine": lambda s: sine_cosine(polynomial(ANGLE, s))[1],
@@ -72,9 +84,15 @@ def test_derivatives(name):
 
 def test_values():
     one, other = polynomial(ONE, SIGMA), polynomial(OTHER, SIGMA)
-    np.testing.assert_allclose(FUNCTIONS["cross product"](SIGMA)[0], np.cross(one[0], other[0]))
-    np.testing.assert_allclose(np.linalg.norm(FUNCTIONS["unit vector"](SIGMA)[0], axis=1), 1.0)
-    np.testing.assert_allclose(FUNCTIONS["sine"](SIGMA)[0], np.sin(polynomial(ANGLE, SIGMA)[0]))
+    np.testing.assert_allclose(
+        FUNCTIONS["cross product"](SIGMA)[0], np.cross(one[0], other[0])
+    )
+    np.testing.assert_allclose(
+        np.linalg.norm(FUNCTIONS["unit vector"](SIGMA)[0], axis=1), 1.0
+    )
+    np.testing.assert_allclose(
+        FUNCTIONS["sine"](SIGMA)[0], np.sin(polynomial(ANGLE, SIGMA)[0])
+    )
 
 
 def test_a_product_has_the_derivatives_that_both_factors_have():
@@ -84,12 +102,16 @@ def test_a_product_has_the_derivatives_that_both_factors_have():
 def test_quaternions_have_the_scalar_first():
     rotations = Rotation.random(50, rng=6)
     quaternions = quaternions_of(rotation_of(rotations.as_matrix()))
-    np.testing.assert_allclose(matrices(quaternions[None])[0], rotations.as_matrix(), atol=1e-14)
+    np.testing.assert_allclose(
+        matrices(quaternions[None])[0], rotations.as_matrix(), atol=1e-14
+    )
     np.testing.assert_array_equal(quaternions_of(Rotation.identity()), [1, 0, 0, 0])
 
 
 def test_orientations_of_a_task():
-    expected = Rotation.from_rotvec([0, 0, np.deg2rad(30)]) * Rotation.from_rotvec([0, np.deg2rad(20), 0])
+    expected = Rotation.from_rotvec([0, 0, np.deg2rad(30)]) * Rotation.from_rotvec(
+        [0, np.deg2rad(20), 0]
+    )
     expected = expected * Rotation.from_rotvec([np.deg2rad(10), 0, 0])
     quaternion = quaternions_of(expected)
     for attitude, tolerance in (
@@ -99,33 +121,45 @@ def test_orientations_of_a_task():
         (Attitude(quaternion_wxyz=tuple(np.round(quaternion, 3))), 2e-3),
     ):
         assert (rotation_from(attitude).inv() * expected).magnitude() < tolerance
-        assert np.linalg.norm(quaternions_of(rotation_from(attitude))) == pytest.approx(1.0, abs=1e-15)
+        assert np.linalg.norm(quaternions_of(rotation_from(attitude))) == pytest.approx(
+            1.0, abs=1e-15
+        )
 
 
 def test_quaternion_derivatives_give_the_matrix_back():
     rotation = rotation_at(SIGMA[2:3])[:, 0]
     quaternion = quaternion_derivatives(rotation)
-    np.testing.assert_allclose(matrices(quaternion), rotation, atol=1e-12 * np.abs(rotation).max())
+    np.testing.assert_allclose(
+        matrices(quaternion), rotation, atol=1e-12 * np.abs(rotation).max()
+    )
 
 
 def test_angular_velocity_about_an_axis():
     axis = np.array([1.0, 2.0, -2.0]) / 3.0
     angle = polynomial(ANGLE, SIGMA)[..., 0]
     sine, cosine = sine_cosine(angle)
-    rotation = sine[..., None, None] * hat(axis) - cosine[..., None, None] * hat(axis) @ hat(axis)
+    rotation = sine[..., None, None] * hat(axis) - cosine[..., None, None] * hat(
+        axis
+    ) @ hat(axis)
     rotation[0] += np.eye(3) + hat(axis) @ hat(axis)
-    np.testing.assert_allclose(angular_velocity(rotation), angle[1:, :, None] * axis, atol=1e-12)
+    np.testing.assert_allclose(
+        angular_velocity(rotation), angle[1:, :, None] * axis, atol=1e-12
+    )
 
 
 def test_signs_of_neighbours():
     half = np.linspace(0, 12, 13) / 2
     quaternions = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
     flipped = quaternions * RANDOM.choice([-1.0, 1.0], 13)[:, None]
-    np.testing.assert_allclose(with_like_signs(flipped), quaternions * np.sign(flipped[0] @ quaternions[0]))
+    np.testing.assert_allclose(
+        with_like_signs(flipped), quaternions * np.sign(flipped[0] @ quaternions[0])
+    )
 
 
 def test_the_smallest_value_is_found_between_the_points_looked_at():
-    where, value = smallest(lambda sigma: np.abs(sigma - np.pi / 3), np.array([0.0, 1.0, 4.0]))
+    where, value = smallest(
+        lambda sigma: np.abs(sigma - np.pi / 3), np.array([0.0, 1.0, 4.0])
+    )
     assert where == pytest.approx(np.pi / 3, abs=1e-3)
     assert value < 1e-3
     assert smallest(lambda sigma: sigma, np.array([0.5, 2.0])) == (0.5, 0.5)

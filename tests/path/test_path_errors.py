@@ -19,7 +19,9 @@ UP: dict[str, Any] = {"line": {"by": [0, 1]}}
 
 
 def build(segments: list[dict[str, Any]], rows: list[str]) -> None:
-    task = load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": rows, "path": segments})
+    task = load_task(
+        {"brachis": 1, "start": {"joints": [0]}, "task_space": rows, "path": segments}
+    )
     build_path(task.path, [0.0] * len(rows), rows)
 
 
@@ -30,60 +32,212 @@ def refused(segments: list[dict[str, Any]], rows: list[str]) -> PathError:
 
 
 SEGMENTS: list[tuple[dict[str, Any], list[str], list[str]]] = [
-    ({"line": {"to": [0, 0]}}, XY, ["path[0].line.to: the segment has zero length", "found [0.0, 0.0]"]),
-    ({"line": {"by": [0, 0, 0]}}, XYW, ["path[0].line.by: the segment has zero length"]),
-    ({"line": {"length": 0, "angle_deg": 5}}, XY, ["path[0].line.length: the segment has zero length"]),
-    ({"line": {"to": [1, 2, 3]}}, XY, ["path[0].line.to: wrong number", "found 3: [1.0, 2.0, 3.0]", "2: [x, y]"]),
-    ({"line": {"by": [1, 2]}}, XYW, ["path[0].line.by: wrong number", "allowed: 3: [x, y, yaw]"]),
-    ({"line": {"length": 1, "angle_deg": 0}}, XYZ, ["path[0].line: ", "needs 2 position rows", "[x, y, z]"]),
-    ({"line": {"length": 1, "angle_deg": 0}}, X, ["path[0].line: ", "needs 2 position rows"]),
-    ({"arc": {"center": [1], "angle_deg": 9}}, X, ["path[0].arc: an arc needs 2 or 3 position rows", "Use line"]),
-    ({"arc": {"via": [1], "to": [2]}}, X, ["path[0].arc: an arc needs 2 or 3 position rows"]),
-    ({"circle": {"center": [1]}}, X, ["path[0].circle: an arc needs 2 or 3 position rows"]),
-    ({"arc": {"center": [0, 0], "angle_deg": 9}}, XY, ["path[0].arc.center: ", "zero length", "centre is its start"]),
-    ({"arc": {"center": [1, 0], "angle_deg": 0}}, XY, ["path[0].arc.angle_deg: the segment has zero length"]),
-    ({"arc": {"center": [1, 0, 0], "angle_deg": 9}}, XYW, ["path[0].arc.center: wrong number", "2: [x, y]"]),
-    ({"circle": {"center": [1, 0, 0]}}, XYZ, ["path[0].circle.normal: ", "found no normal", "via and to"]),
-    ({"circle": {"center": [1, 0, 0], "normal": [0, 0, 0]}}, XYZ, ["circle.normal: the normal has zero length"]),
-    ({"circle": {"center": [1, 0, 0], "normal": [1, 0, 1]}}, XYZ, ["circle.normal: ", "found 135 degrees"]),
-    ({"circle": {"center": [1, 0], "normal": [0, 0, 1]}}, XY, ["path[0].circle.normal: ", "allowed: no normal"]),
-    ({"circle": {"center": [1, 0], "yaw": "tangent"}}, XY, ["path[0].circle.yaw: yaw is not a row", "Add yaw"]),
-    ({"arc": {"via": [1, 1], "to": [2, 2]}}, XY, ["path[0].arc.via: ", "lie on a line", "to [2.0, 2.0]"]),
-    ({"arc": {"via": [0, 0], "to": [2, 2]}}, XY, ["path[0].arc.via: ", "lie on a line"]),
-    ({"arc": {"via": [2, 2], "to": [2, 2]}}, XY, ["path[0].arc.via: ", "lie on a line"]),
-    ({"arc": {"via": [2, 2], "to": [0, 0]}}, XY, ["path[0].arc.to: the segment has zero length"]),
-    ({"arc": {"via": [1, 2, 3], "to": [2, 2]}}, XY, ["path[0].arc.via: wrong number of coordinates"]),
-    ({"arc": {"via": [1, 2], "to": [2, 2, 2]}}, XYW, ["path[0].arc.to: wrong number of coordinates", "2: [x, y]"]),
-    ({"spline": {"through": [[1, 1], [1]]}}, XY, ["path[0].spline.through[1]: wrong number", "2: [x, y]"]),
-    ({"spline": {"through": [[1, 1], [1, 1]]}}, XY, ["spline.through[1]: a waypoint repeats its predecessor"]),
-    ({"spline": {"through": [[0, 0], [1, 1], [1, 1]]}}, XY, ["spline.through[2]: a waypoint repeats its predecessor"]),
-    ({"spline": {"through": [[0, 0]]}}, XY, ["path[0].spline.through: the segment has zero length"]),
-    ({"spline": {"through": [[1, 0, 0], [1, 0, 2]]}}, XYW, ["spline.through[1]: a waypoint repeats"]),
+    (
+        {"line": {"to": [0, 0]}},
+        XY,
+        ["path[0].line.to: the segment has zero length", "found [0.0, 0.0]"],
+    ),
+    (
+        {"line": {"by": [0, 0, 0]}},
+        XYW,
+        ["path[0].line.by: the segment has zero length"],
+    ),
+    (
+        {"line": {"length": 0, "angle_deg": 5}},
+        XY,
+        ["path[0].line.length: the segment has zero length"],
+    ),
+    (
+        {"line": {"to": [1, 2, 3]}},
+        XY,
+        ["path[0].line.to: wrong number", "found 3: [1.0, 2.0, 3.0]", "2: [x, y]"],
+    ),
+    (
+        {"line": {"by": [1, 2]}},
+        XYW,
+        ["path[0].line.by: wrong number", "allowed: 3: [x, y, yaw]"],
+    ),
+    (
+        {"line": {"length": 1, "angle_deg": 0}},
+        XYZ,
+        ["path[0].line: ", "needs 2 position rows", "[x, y, z]"],
+    ),
+    (
+        {"line": {"length": 1, "angle_deg": 0}},
+        X,
+        ["path[0].line: ", "needs 2 position rows"],
+    ),
+    (
+        {"arc": {"center": [1], "angle_deg": 9}},
+        X,
+        ["path[0].arc: an arc needs 2 or 3 position rows", "Use line"],
+    ),
+    (
+        {"arc": {"via": [1], "to": [2]}},
+        X,
+        ["path[0].arc: an arc needs 2 or 3 position rows"],
+    ),
+    (
+        {"circle": {"center": [1]}},
+        X,
+        ["path[0].circle: an arc needs 2 or 3 position rows"],
+    ),
+    (
+        {"arc": {"center": [0, 0], "angle_deg": 9}},
+        XY,
+        ["path[0].arc.center: ", "zero length", "centre is its start"],
+    ),
+    (
+        {"arc": {"center": [1, 0], "angle_deg": 0}},
+        XY,
+        ["path[0].arc.angle_deg: the segment has zero length"],
+    ),
+    (
+        {"arc": {"center": [1, 0, 0], "angle_deg": 9}},
+        XYW,
+        ["path[0].arc.center: wrong number", "2: [x, y]"],
+    ),
+    (
+        {"circle": {"center": [1, 0, 0]}},
+        XYZ,
+        ["path[0].circle.normal: ", "found no normal", "via and to"],
+    ),
+    (
+        {"circle": {"center": [1, 0, 0], "normal": [0, 0, 0]}},
+        XYZ,
+        ["circle.normal: the normal has zero length"],
+    ),
+    (
+        {"circle": {"center": [1, 0, 0], "normal": [1, 0, 1]}},
+        XYZ,
+        ["circle.normal: ", "found 135 degrees"],
+    ),
+    (
+        {"circle": {"center": [1, 0], "normal": [0, 0, 1]}},
+        XY,
+        ["path[0].circle.normal: ", "allowed: no normal"],
+    ),
+    (
+        {"circle": {"center": [1, 0], "yaw": "tangent"}},
+        XY,
+        ["path[0].circle.yaw: yaw is not a row", "Add yaw"],
+    ),
+    (
+        {"arc": {"via": [1, 1], "to": [2, 2]}},
+        XY,
+        ["path[0].arc.via: ", "lie on a line", "to [2.0, 2.0]"],
+    ),
+    (
+        {"arc": {"via": [0, 0], "to": [2, 2]}},
+        XY,
+        ["path[0].arc.via: ", "lie on a line"],
+    ),
+    (
+        {"arc": {"via": [2, 2], "to": [2, 2]}},
+        XY,
+        ["path[0].arc.via: ", "lie on a line"],
+    ),
+    (
+        {"arc": {"via": [2, 2], "to": [0, 0]}},
+        XY,
+        ["path[0].arc.to: the segment has zero length"],
+    ),
+    (
+        {"arc": {"via": [1, 2, 3], "to": [2, 2]}},
+        XY,
+        ["path[0].arc.via: wrong number of coordinates"],
+    ),
+    (
+        {"arc": {"via": [1, 2], "to": [2, 2, 2]}},
+        XYW,
+        ["path[0].arc.to: wrong number of coordinates", "2: [x, y]"],
+    ),
+    (
+        {"spline": {"through": [[1, 1], [1]]}},
+        XY,
+        ["path[0].spline.through[1]: wrong number", "2: [x, y]"],
+    ),
+    (
+        {"spline": {"through": [[1, 1], [1, 1]]}},
+        XY,
+        ["spline.through[1]: a waypoint repeats its predecessor"],
+    ),
+    (
+        {"spline": {"through": [[0, 0], [1, 1], [1, 1]]}},
+        XY,
+        ["spline.through[2]: a waypoint repeats its predecessor"],
+    ),
+    (
+        {"spline": {"through": [[0, 0]]}},
+        XY,
+        ["path[0].spline.through: the segment has zero length"],
+    ),
+    (
+        {"spline": {"through": [[1, 0, 0], [1, 0, 2]]}},
+        XYW,
+        ["spline.through[1]: a waypoint repeats"],
+    ),
     (
         {"spline": {"through": [[1e12, 0], [1e12, 1e-6], [1e12, 2e-6], [0, 0]]}},
         XY,
-        ["no spline goes through the waypoints", "found distances from 1e-06 to 1e+12", "like distances"],
+        [
+            "no spline goes through the waypoints",
+            "found distances from 1e-06 to 1e+12",
+            "like distances",
+        ],
     ),
     (
         {"spline": {"through": [[1, 1]], "starts_at": [0, 2e-4]}},
         XY,
-        ["path[0].spline.starts_at: the segment starts elsewhere", "x = 0, y = 0, 0.0002 m off", "relative: true"],
+        [
+            "path[0].spline.starts_at: the segment starts elsewhere",
+            "x = 0, y = 0, 0.0002 m off",
+            "relative: true",
+        ],
     ),
-    ({"spline": {"through": [[1, 1, 1]], "starts_at": [0, 0, 6]}}, XYW, ["spline.starts_at: ", "yaw = 0, 6 rad off"]),
-    ({"spline": {"through": [[1, 1]], "starts_at": [0]}}, XY, ["path[0].spline.starts_at: wrong number of coord"]),
+    (
+        {"spline": {"through": [[1, 1, 1]], "starts_at": [0, 0, 6]}},
+        XYW,
+        ["spline.starts_at: ", "yaw = 0, 6 rad off"],
+    ),
+    (
+        {"spline": {"through": [[1, 1]], "starts_at": [0]}},
+        XY,
+        ["path[0].spline.starts_at: wrong number of coord"],
+    ),
     (
         {"spline": {"through": [[1, 1]], "orientations": [{"rpy_deg": [0, 0, 0]}]}},
         XY,
-        ["path[0].spline.orientations: orientations are for task spaces of poses", "[x, y]", "Set task_space: pose"],
+        [
+            "path[0].spline.orientations: orientations are for task spaces of poses",
+            "[x, y]",
+            "Set task_space: pose",
+        ],
     ),
-    (RIGHT | {"orientation": "fixed"}, XY, ["path[0].orientation: an orientation along", "found task_space [x, y]"]),
-    ({"turn": {"to": {"rpy_deg": [0, 0, 9]}}}, XYZ, ["path[0].turn: a turn is for", "Set task_space: pose"]),
-    ({"turn": {"to": {"rpy_deg": [0, 0, 9]}}}, XYW, ["path[0].turn: a turn is for", "line: {by: [0, 0, ...]}"]),
+    (
+        RIGHT | {"orientation": "fixed"},
+        XY,
+        ["path[0].orientation: an orientation along", "found task_space [x, y]"],
+    ),
+    (
+        {"turn": {"to": {"rpy_deg": [0, 0, 9]}}},
+        XYZ,
+        ["path[0].turn: a turn is for", "Set task_space: pose"],
+    ),
+    (
+        {"turn": {"to": {"rpy_deg": [0, 0, 9]}}},
+        XYW,
+        ["path[0].turn: a turn is for", "line: {by: [0, 0, ...]}"],
+    ),
 ]
 
 
-@pytest.mark.parametrize(("segment", "rows", "expected"), SEGMENTS, ids=[str(one[0]) for one in SEGMENTS])
-def test_wrong_segments(segment: dict[str, Any], rows: list[str], expected: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("segment", "rows", "expected"), SEGMENTS, ids=[str(one[0]) for one in SEGMENTS]
+)
+def test_wrong_segments(
+    segment: dict[str, Any], rows: list[str], expected: list[str]
+) -> None:
     message = str(refused([segment], rows))
     for text in expected:
         assert text in message
@@ -103,15 +257,24 @@ def test_a_corner_names_place_angle_and_key() -> None:
 
 
 def test_all_corners_are_named() -> None:
-    assert "likewise path[1].blend, path[3].blend" in str(refused([RIGHT, UP, RIGHT, RIGHT, UP], XY))
+    assert "likewise path[1].blend, path[3].blend" in str(
+        refused([RIGHT, UP, RIGHT, RIGHT, UP], XY)
+    )
 
 
 @pytest.mark.parametrize(
     ("segments", "rows", "expected"),
     [
-        ([RIGHT, {"arc": {"center": [1, 0.5], "angle_deg": 90}}], XY, "a curvature jump of 2 1/m"),
         (
-            [{"arc": {"center": [0, 1], "angle_deg": 90}}, {"arc": {"center": [0.5, 1], "angle_deg": 90}}],
+            [RIGHT, {"arc": {"center": [1, 0.5], "angle_deg": 90}}],
+            XY,
+            "a curvature jump of 2 1/m",
+        ),
+        (
+            [
+                {"arc": {"center": [0, 1], "angle_deg": 90}},
+                {"arc": {"center": [0.5, 1], "angle_deg": 90}},
+            ],
             XY,
             "a curvature jump of 1 1/m",
         ),
@@ -120,12 +283,18 @@ def test_all_corners_are_named() -> None:
             XYW,
             "in yaw alone, which turns by 1 rad/m before and 3 rad/m after",
         ),
-        ([{"line": {"by": [1, 0, 0]}}, {"line": {"by": [0, 0, 1]}}], XYW, "a corner of 90 degrees"),
+        (
+            [{"line": {"by": [1, 0, 0]}}, {"line": {"by": [0, 0, 1]}}],
+            XYW,
+            "a corner of 90 degrees",
+        ),
         ([RIGHT, {"line": {"by": [-1, 0]}}], XY, "a corner of 180 degrees"),
         ([{"spline": {"through": [[1, 1], [2, 0]]}}, RIGHT], XY, "a corner of "),
     ],
 )
-def test_what_jumps_at_a_join(segments: list[dict[str, Any]], rows: list[str], expected: str) -> None:
+def test_what_jumps_at_a_join(
+    segments: list[dict[str, Any]], rows: list[str], expected: str
+) -> None:
     assert expected in str(refused(segments, rows))
 
 
@@ -140,7 +309,9 @@ def test_what_jumps_at_a_join(segments: list[dict[str, Any]], rows: list[str], e
         (3, [0.0, 1e-8], None),
     ],
 )
-def test_every_derivative_is_compared(order: int, jump: list[float], expected: str | None) -> None:
+def test_every_derivative_is_compared(
+    order: int, jump: list[float], expected: str | None
+) -> None:
     before, after, far = np.zeros((3, 4, 2))
     before[1] = after[1] = far[1] = [1.0, 0.0]
     far[0] = [2.0, 1.0]
@@ -154,7 +325,10 @@ def test_a_blend_that_is_too_long_is_told_the_longest() -> None:
     short = {"line": {"by": [0, 0.3]}}
     error = refused([RIGHT | {"blend": 0.2}, short], XY)
     assert "path[0].blend: " in str(error)
-    assert "longer than half of a neighbouring segment; found 0.2 m; allowed: at most 0.15 m" in str(error)
+    assert (
+        "longer than half of a neighbouring segment; found 0.2 m; allowed: at most 0.15 m"
+        in str(error)
+    )
     assert error.s_interval == pytest.approx((1 / 1.3, 1 / 1.3))
     build([RIGHT | {"blend": 0.15}, short], XY)
 
@@ -182,7 +356,9 @@ def test_a_blend_that_would_reverse(by: list[float]) -> None:
 
 def test_a_blend_beside_a_turn_on_the_spot() -> None:
     segments = [{"line": {"by": [1, 0, 0]}, "blend": 0.1}, {"line": {"by": [0, 0, 1]}}]
-    assert "a blend needs motion of the position on both sides" in str(refused(segments, XYW))
+    assert "a blend needs motion of the position on both sides" in str(
+        refused(segments, XYW)
+    )
 
 
 def test_the_start_must_fit_the_rows() -> None:

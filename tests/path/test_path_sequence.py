@@ -20,8 +20,12 @@ MIXED: list[dict[str, Any]] = [
 ]
 
 
-def path_of(segments: list[dict[str, Any]], start: Any, rows: list[str]) -> SequencePath:
-    task = load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": rows, "path": segments})
+def path_of(
+    segments: list[dict[str, Any]], start: Any, rows: list[str]
+) -> SequencePath:
+    task = load_task(
+        {"brachis": 1, "start": {"joints": [0]}, "task_space": rows, "path": segments}
+    )
     path = build_path(task.path, start, rows)
     assert isinstance(path, SequencePath)
     return path
@@ -46,7 +50,9 @@ def test_derivatives_by_s(mixed: SequencePath) -> None:
 
 
 def test_three_derivatives_continue_across_all_joins(mixed: SequencePath) -> None:
-    assert mixed.breaks.size == 8  # three lines and arcs, a spline, and a blend at each of three corners
+    assert (
+        mixed.breaks.size == 8
+    )  # three lines and arcs, a spline, and a blend at each of three corners
     inner = mixed.breaks[1:-1]
     h = 1e-10
     before, after = mixed.sample(inner - h), mixed.sample(inner + h)
@@ -58,9 +64,16 @@ def test_three_derivatives_continue_across_all_joins(mixed: SequencePath) -> Non
 
 def test_without_a_blend_the_third_derivative_would_jump() -> None:
     """The continuity test above can fail: the same corner, between the curves themselves, is far from continuous."""
-    path = path_of([MIXED[0], {"line": {"length": 1, "angle_deg": 120}}], [0, 0, 0], ["x", "y", "yaw"])
+    path = path_of(
+        [MIXED[0], {"line": {"length": 1, "angle_deg": 120}}],
+        [0, 0, 0],
+        ["x", "y", "yaw"],
+    )
     first, _, last = (piece.curve for piece in path.pieces)
-    jump = last.derivatives(np.zeros(1), 1)[1] - first.derivatives(np.array([first.length]), 1)[1]
+    jump = (
+        last.derivatives(np.zeros(1), 1)[1]
+        - first.derivatives(np.array([first.length]), 1)[1]
+    )
     assert np.linalg.norm(jump) > 1
 
 
@@ -71,17 +84,23 @@ def test_ends_and_length(mixed: SequencePath) -> None:
     center = np.array([0.2, 0.5])
     angle = np.deg2rad(100)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    np.testing.assert_allclose(ends[1, :2], center + turn @ (corner - center) + [0.9, 0.8], atol=1e-12)
+    np.testing.assert_allclose(
+        ends[1, :2], center + turn @ (corner - center) + [0.9, 0.8], atol=1e-12
+    )
     assert ends[1, 2] == pytest.approx(0.3 + angle + 0.1)
     fine = mixed.sample(np.linspace(0, 1, 20001)).target[:, :2]
-    assert mixed.length == pytest.approx(np.linalg.norm(np.diff(fine, axis=0), axis=1).sum(), rel=1e-6)
+    assert mixed.length == pytest.approx(
+        np.linalg.norm(np.diff(fine, axis=0), axis=1).sum(), rel=1e-6
+    )
 
 
 def test_a_blend_leaves_the_rest_of_the_segments_alone() -> None:
     corner = [{"line": {"to": [1, 0]}, "blend": 0.25}, {"line": {"to": [1, 1]}}]
     path = path_of(corner, [0, 0], ["x", "y"])
     sample = path.sample(path.breaks)
-    np.testing.assert_allclose(sample.target, [[0, 0], [0.75, 0], [1, 0.25], [1, 1]], atol=1e-12)
+    np.testing.assert_allclose(
+        sample.target, [[0, 0], [0.75, 0], [1, 0.25], [1, 1]], atol=1e-12
+    )
     inside = path.sample(np.linspace(path.breaks[1], path.breaks[2], 50)).target
     assert np.all(inside[:, 0] <= 1)
     assert np.all(inside[:, 1] >= 0)
@@ -119,22 +138,37 @@ def test_blends_may_meet_in_the_middle() -> None:
     "segments",
     [
         [{"line": {"to": [1, 0.5]}}, {"line": {"to": [3, 1.5]}}],
-        [{"arc": {"center": [1, 0], "angle_deg": 70}}, {"arc": {"center": [1, 0], "angle_deg": 50}}],
-        [{"line": {"to": [1, 1]}}, {"spline": {"through": [[2, 2], [2.5, 2.5], [4, 4]]}}],
+        [
+            {"arc": {"center": [1, 0], "angle_deg": 70}},
+            {"arc": {"center": [1, 0], "angle_deg": 50}},
+        ],
+        [
+            {"line": {"to": [1, 1]}},
+            {"spline": {"through": [[2, 2], [2.5, 2.5], [4, 4]]}},
+        ],
         [{"line": {"to": [0.333333, 0.666667]}}, {"line": {"to": [1, 2]}}],
     ],
 )
 def test_smooth_continuations_need_no_blend(segments: list[dict[str, Any]]) -> None:
     path = path_of(segments, [0, 0], ["x", "y"])
     assert len(path.pieces) == 2
-    assert np.abs(np.diff(path.sample(path.breaks[1] + np.array([-1e-9, 1e-9])).xi_ds, axis=0)).max() < 1e-5
+    assert (
+        np.abs(
+            np.diff(path.sample(path.breaks[1] + np.array([-1e-9, 1e-9])).xi_ds, axis=0)
+        ).max()
+        < 1e-5
+    )
 
 
 def test_the_path_continues_smoothly_beyond_its_ends(mixed: SequencePath) -> None:
     h = 1e-7
     outside = mixed.sample([-h, 0.0, 1.0, 1 + h])
-    np.testing.assert_allclose(outside.target[1] - outside.target[0], outside.xi[0] * h, atol=1e-12)
-    np.testing.assert_allclose(outside.target[3] - outside.target[2], outside.xi[2] * h, atol=1e-12)
+    np.testing.assert_allclose(
+        outside.target[1] - outside.target[0], outside.xi[0] * h, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        outside.target[3] - outside.target[2], outside.xi[2] * h, atol=1e-12
+    )
 
 
 def test_nan_stays_nan(mixed: SequencePath) -> None:

@@ -36,23 +36,51 @@ def along(*attitudes: Any, **keys: Any) -> dict[str, Any]:
 
 
 SEGMENTS: list[tuple[dict[str, Any], list[str]]] = [
-    ({"line": {"to": [1, 2]}}, ["path[0].line.to: wrong number of coordinates", "allowed: 3: [x, y, z]"]),
-    ({"line": {"length": 1, "angle_deg": 0}}, ["path[0].line: ", "needs 2 position rows", "[x, y, z]"]),
-    ({"line": {"by": [0, 0, 0]}}, ["path[0].line.by: the segment has zero length", "turn: {...} turns the tool"]),
-    ({"turn": {"rotate": {"axis": [1, 0, 0], "angle_deg": 0}}}, ["path[0].turn: the turn has zero length"]),
-    ({"turn": {"to": {"rpy_deg": [0, 0, 0]}}}, ["path[0].turn: the turn has zero length", "another orientation"]),
-    ({"turn": {"to": HALF}}, ["path[0].turn.to: the orientation is half a turn away", "rotate: {axis"]),
-    (RIGHT | {"orientation": {"to": HALF}}, ["path[0].orientation.to: ", "found 180 degrees", "less than 180"]),
+    (
+        {"line": {"to": [1, 2]}},
+        ["path[0].line.to: wrong number of coordinates", "allowed: 3: [x, y, z]"],
+    ),
+    (
+        {"line": {"length": 1, "angle_deg": 0}},
+        ["path[0].line: ", "needs 2 position rows", "[x, y, z]"],
+    ),
+    (
+        {"line": {"by": [0, 0, 0]}},
+        ["path[0].line.by: the segment has zero length", "turn: {...} turns the tool"],
+    ),
+    (
+        {"turn": {"rotate": {"axis": [1, 0, 0], "angle_deg": 0}}},
+        ["path[0].turn: the turn has zero length"],
+    ),
+    (
+        {"turn": {"to": {"rpy_deg": [0, 0, 0]}}},
+        ["path[0].turn: the turn has zero length", "another orientation"],
+    ),
+    (
+        {"turn": {"to": HALF}},
+        ["path[0].turn.to: the orientation is half a turn away", "rotate: {axis"],
+    ),
+    (
+        RIGHT | {"orientation": {"to": HALF}},
+        ["path[0].orientation.to: ", "found 180 degrees", "less than 180"],
+    ),
     (
         {"circle": {"center": [1, 0, 0], "normal": [0, 0, 1], "yaw": "tangent"}},
         ["circle.yaw: ", "orientation: tangent"],
     ),
     (
         UP | {"orientation": "tangent"},
-        ["path[0].orientation: the tangent becomes parallel to up", "found 0 degrees", "up: [...]"],
+        [
+            "path[0].orientation: the tangent becomes parallel to up",
+            "found 0 degrees",
+            "up: [...]",
+        ],
     ),
     (
-        {"circle": {"center": [1, 0, 0], "normal": [0, 1, 0]}, "orientation": {"tangent": {"up": [0, 0.001, 1]}}},
+        {
+            "circle": {"center": [1, 0, 0], "normal": [0, 1, 0]},
+            "orientation": {"tangent": {"up": [0, 0.001, 1]}},
+        },
         [
             "path[0].orientation: the tangent becomes parallel",
             "between them at x = 0, y = 0, z = 0",
@@ -60,20 +88,44 @@ SEGMENTS: list[tuple[dict[str, Any], list[str]]] = [
         ],
     ),
     (
-        {"arc": {"via": [1, 0, 0.5], "to": [2.1, 0, 0]}, "orientation": {"tangent": {"up": [1, 0, 0]}}},
+        {
+            "arc": {"via": [1, 0, 0.5], "to": [2.1, 0, 0]},
+            "orientation": {"tangent": {"up": [1, 0, 0]}},
+        },
         ["path[0].orientation: the tangent becomes parallel", "at x = 1.05, y = "],
     ),
     (
-        {"spline": {"through": [[1, 0, 0], [1.000001, 0, 0], [0, 0, 0]]}, "orientation": "tangent"},
+        {
+            "spline": {"through": [[1, 0, 0], [1.000001, 0, 0], [0, 0, 0]]},
+            "orientation": "tangent",
+        },
         ["path[0].orientation: the curve all but stops", "found x = 1.17"],
     ),
-    (spline(starts_at=[0, 0, 0.1]), ["path[0].spline.starts_at: the segment starts elsewhere", "0.1 m off"]),
     (
-        along([0, 0, 0], [0, 0, 9], [0, 0, 0], starts_oriented={"rotation_vector": [0, 0, 0.2]}),
-        ["path[0].spline.starts_oriented: ", "an orientation that is 0.2 rad off", "1e-04|0.0001"],
+        spline(starts_at=[0, 0, 0.1]),
+        ["path[0].spline.starts_at: the segment starts elsewhere", "0.1 m off"],
     ),
-    (along([180, 0, 0], [0, 0, 0], [0, 0, 0]), ["path[0].spline.orientations[0]: ", "half a turn"]),
-    (along([0, 0, 90], [0, 0, -90], [0, 0, 0]), ["path[0].spline.orientations[1]: ", "half a turn"]),
+    (
+        along(
+            [0, 0, 0],
+            [0, 0, 9],
+            [0, 0, 0],
+            starts_oriented={"rotation_vector": [0, 0, 0.2]},
+        ),
+        [
+            "path[0].spline.starts_oriented: ",
+            "an orientation that is 0.2 rad off",
+            "1e-04|0.0001",
+        ],
+    ),
+    (
+        along([180, 0, 0], [0, 0, 0], [0, 0, 0]),
+        ["path[0].spline.orientations[0]: ", "half a turn"],
+    ),
+    (
+        along([0, 0, 90], [0, 0, -90], [0, 0, 0]),
+        ["path[0].spline.orientations[1]: ", "half a turn"],
+    ),
     (
         {
             "spline": {
@@ -90,16 +142,30 @@ SEGMENTS: list[tuple[dict[str, Any], list[str]]] = [
     (
         {
             "spline": {
-                "through": [[1, 0, 0], [1.01, 0, 0], [1.02, 0, 0], [2, 0, 0], [3, 0, 0]],
-                "orientations": [{"rpy_deg": [0, 0, angle]} for angle in (170, 0, 170, 0, 170)],
+                "through": [
+                    [1, 0, 0],
+                    [1.01, 0, 0],
+                    [1.02, 0, 0],
+                    [2, 0, 0],
+                    [3, 0, 0],
+                ],
+                "orientations": [
+                    {"rpy_deg": [0, 0, angle]} for angle in (170, 0, 170, 0, 170)
+                ],
             }
         },
-        ["path[0].spline.orientations[", "differ too much, over too short a distance", "0.5 or more"],
+        [
+            "path[0].spline.orientations[",
+            "differ too much, over too short a distance",
+            "0.5 or more",
+        ],
     ),
 ]
 
 
-@pytest.mark.parametrize(("segment", "expected"), SEGMENTS, ids=[str(one[0]) for one in SEGMENTS])
+@pytest.mark.parametrize(
+    ("segment", "expected"), SEGMENTS, ids=[str(one[0]) for one in SEGMENTS]
+)
 def test_wrong_segments(segment: dict[str, Any], expected: list[str]) -> None:
     message = str(refused([segment]))
     for text in expected:
@@ -119,29 +185,52 @@ def test_a_jump_of_the_turning_rate_is_told_in_words() -> None:
 @pytest.mark.parametrize(
     ("segments", "expected"),
     [
-        ([RIGHT | {"orientation": TURN}, UP], ["a corner of 90 degrees", "Set path[0].blend (m) to round it"]),
-        ([RIGHT | {"orientation": TURN}, RIGHT | {"orientation": TILT}], ["turns jumps by 90 degrees"]),
+        (
+            [RIGHT | {"orientation": TURN}, UP],
+            ["a corner of 90 degrees", "Set path[0].blend (m) to round it"],
+        ),
+        (
+            [RIGHT | {"orientation": TURN}, RIGHT | {"orientation": TILT}],
+            ["turns jumps by 90 degrees"],
+        ),
         (
             [{"turn": TURN}, {"turn": TILT}],
-            ["axis about which the tool turns jumps by 90", "Set profile: smooth where"],
+            [
+                "axis about which the tool turns jumps by 90",
+                "Set profile: smooth where",
+            ],
         ),
-        (
-            [{"turn": TURN}, {"turn": {"rotate": TURN["rotate"] | {"profile": "smooth"}}}],
-            ["the tool's turning rate jumps: 1 rad/rad before and 0 after"],
-        ),
-        ([{"turn": TURN}, RIGHT], ["a stop: ", "Turn the tool along a segment, by its orientation"]),
-        ([RIGHT, {"turn": TURN}], ["a stop: ", "in a task of its own"]),
-        ([RIGHT, UP, RIGHT, RIGHT | {"orientation": TURN}], ["likewise path[1].blend, path[2].blend"]),
         (
             [
-                {"arc": {"center": [0, 1, 0], "angle_deg": 90, "normal": [0, 0, 1]}, "orientation": "tangent"},
+                {"turn": TURN},
+                {"turn": {"rotate": TURN["rotate"] | {"profile": "smooth"}}},
+            ],
+            ["the tool's turning rate jumps: 1 rad/rad before and 0 after"],
+        ),
+        (
+            [{"turn": TURN}, RIGHT],
+            ["a stop: ", "Turn the tool along a segment, by its orientation"],
+        ),
+        ([RIGHT, {"turn": TURN}], ["a stop: ", "in a task of its own"]),
+        (
+            [RIGHT, UP, RIGHT, RIGHT | {"orientation": TURN}],
+            ["likewise path[1].blend, path[2].blend"],
+        ),
+        (
+            [
+                {
+                    "arc": {"center": [0, 1, 0], "angle_deg": 90, "normal": [0, 0, 1]},
+                    "orientation": "tangent",
+                },
                 {"arc": {"center": [0, 1, 0], "angle_deg": 90, "normal": [0, 0, 1]}},
             ],
             ["the tool's turning rate jumps: 1 rad/m before and 0 after"],
         ),
     ],
 )
-def test_what_jumps_at_a_join(segments: list[dict[str, Any]], expected: list[str]) -> None:
+def test_what_jumps_at_a_join(
+    segments: list[dict[str, Any]], expected: list[str]
+) -> None:
     message = str(refused(segments))
     for text in expected:
         assert text in message
@@ -156,9 +245,14 @@ def test_a_blend_beside_a_turn_on_the_spot() -> None:
 def test_a_blend_in_which_the_tool_turns_too_much() -> None:
     fast = {"rotate": {"axis": [0, 0, 1], "angle_deg": 1500}}
     back = {"rotate": {"axis": [0, 0, 1], "angle_deg": -1500}}
-    error = refused([RIGHT | {"orientation": fast, "blend": 0.4}, RIGHT | {"orientation": back}])
+    error = refused(
+        [RIGHT | {"orientation": fast, "blend": 0.4}, RIGHT | {"orientation": back}]
+    )
     assert str(error).startswith("path[0].blend: path[0] to path[1], at s = 0.5")
-    assert "the tool turns too much in the blend; found quaternions interpolated with a quality of " in str(error)
+    assert (
+        "the tool turns too much in the blend; found quaternions interpolated with a quality of "
+        in str(error)
+    )
     assert error.s_interval == (0.5, 0.5)
 
 
@@ -169,12 +263,18 @@ def test_the_start_must_be_a_pose() -> None:
     with pytest.raises(PathError, match=r"start: .*needs 12 finite coordinates"):
         build_path(segments, np.full(12, np.nan), POSE_ROWS)
     for wrong in (2 * np.eye(3), np.diag([1.0, 1.0, -1.0]), np.zeros((3, 3))):
-        with pytest.raises(PathError, match="start: the start of the path has no rotation matrix"):
-            build_path(segments, np.concatenate([np.zeros(3), wrong.ravel()]), POSE_ROWS)
+        with pytest.raises(
+            PathError, match="start: the start of the path has no rotation matrix"
+        ):
+            build_path(
+                segments, np.concatenate([np.zeros(3), wrong.ravel()]), POSE_ROWS
+            )
 
 
 @pytest.mark.parametrize("rows", [POSE_ROWS, ("x", "y", "z")])
 def test_a_csv_file_is_read_before(rows: tuple[str, ...]) -> None:
     start = pose(np.zeros(3), Rotation.identity())[: 12 if rows == POSE_ROWS else 3]
-    with pytest.raises(PathError, match=r"path\[0\].csv.file: the file has not been read; found a.csv"):
+    with pytest.raises(
+        PathError, match=r"path\[0\].csv.file: the file has not been read; found a.csv"
+    ):
         build_path([CsvSegment(csv=PointFile(file="a.csv"))], start, rows)

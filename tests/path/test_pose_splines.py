@@ -24,13 +24,19 @@ def written(attitude: Rotation, form: int = 0) -> dict[str, Any]:
     if form == 0:
         return {"quaternion_wxyz": -np.roll(attitude.as_quat(), 1)}
     return (
-        {"rotation_vector": attitude.as_rotvec()} if form == 1 else {"rpy_deg": attitude.as_euler("xyz", degrees=True)}
+        {"rotation_vector": attitude.as_rotvec()}
+        if form == 1
+        else {"rpy_deg": attitude.as_euler("xyz", degrees=True)}
     )
 
 
 def through(count: int, **keys: Any) -> PosePath:
-    orientations = [written(one, i % 3) for i, one in enumerate(ATTITUDES[1 : count + 1])]
-    return pose_path([{"spline": {"through": POINTS[:count], "orientations": orientations} | keys}])
+    orientations = [
+        written(one, i % 3) for i, one in enumerate(ATTITUDES[1 : count + 1])
+    ]
+    return pose_path(
+        [{"spline": {"through": POINTS[:count], "orientations": orientations} | keys}]
+    )
 
 
 def at_waypoints(path: PosePath) -> np.ndarray:
@@ -48,8 +54,12 @@ def test_waypoints_are_passed(count: int) -> None:
 
 def test_one_waypoint_is_a_line_with_a_uniform_turn() -> None:
     sample = through(1).sample(np.linspace(0, 1, 9))
-    np.testing.assert_allclose(sample.xi[:, 3:], np.broadcast_to(STEPS[0].as_rotvec(), (9, 3)), atol=1e-12)
-    np.testing.assert_allclose(np.linalg.norm(sample.xi[:, :3], axis=1), np.linalg.norm(POINTS[0] - START))
+    np.testing.assert_allclose(
+        sample.xi[:, 3:], np.broadcast_to(STEPS[0].as_rotvec(), (9, 3)), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        np.linalg.norm(sample.xi[:, :3], axis=1), np.linalg.norm(POINTS[0] - START)
+    )
 
 
 @pytest.mark.parametrize("count", [3, 6])
@@ -71,19 +81,29 @@ def test_orientations_on_a_circle_are_close_to_it() -> None:
     points = [[np.cos(angle), np.sin(angle), 0] for angle in angles]
     orientations = [{"rotation_vector": [0, 0, angle]} for angle in angles]
     spline = {"spline": {"through": points[1:], "orientations": orientations[1:]}}
-    sample = pose_path([spline], points[0], Rotation.identity()).sample(np.linspace(0, 1, 100))
+    sample = pose_path([spline], points[0], Rotation.identity()).sample(
+        np.linspace(0, 1, 100)
+    )
     expected = np.broadcast_to([0, 1.5 * np.pi, 0, 0, 0, 1.5 * np.pi], (100, 6))
     np.testing.assert_allclose(sample.xi, expected, atol=0.15)
     heading = np.unwrap(rotations(sample.target).as_rotvec()[:, 2])
-    np.testing.assert_allclose(np.unwrap(np.arctan2(sample.target[:, 1], sample.target[:, 0])), heading, atol=2e-3)
+    np.testing.assert_allclose(
+        np.unwrap(np.arctan2(sample.target[:, 1], sample.target[:, 0])),
+        heading,
+        atol=2e-3,
+    )
 
 
 def test_relative_waypoints() -> None:
     shifts = POINTS - START
     turned = [written(TURNED.inv() * one) for one in ATTITUDES[1:]]
-    relative = pose_path([{"spline": {"through": shifts, "orientations": turned, "relative": True}}])
+    relative = pose_path(
+        [{"spline": {"through": shifts, "orientations": turned, "relative": True}}]
+    )
     s = np.linspace(0, 1, 20)
-    np.testing.assert_allclose(relative.sample(s).target, through(6).sample(s).target, atol=1e-12)
+    np.testing.assert_allclose(
+        relative.sample(s).target, through(6).sample(s).target, atol=1e-12
+    )
 
 
 def test_waypoints_relative_to_a_stated_start() -> None:
@@ -97,26 +117,50 @@ def test_waypoints_relative_to_a_stated_start() -> None:
     }
     s = np.linspace(0, 1, 20)
     moved = pose_path([{"spline": spline | {"relative": True}}])
-    np.testing.assert_allclose(moved.sample(s).target, through(6).sample(s).target, atol=1e-12)
+    np.testing.assert_allclose(
+        moved.sample(s).target, through(6).sample(s).target, atol=1e-12
+    )
     there = pose_path([{"spline": spline}], elsewhere, other)
-    np.testing.assert_allclose(there.sample(s).xi[:, 3:], moved.sample(s).xi[:, 3:], atol=1e-9)
+    np.testing.assert_allclose(
+        there.sample(s).xi[:, 3:], moved.sample(s).xi[:, 3:], atol=1e-9
+    )
     shift = there.sample(s).target[:, :3] - moved.sample(s).target[:, :3]
-    np.testing.assert_allclose(shift, np.broadcast_to(elsewhere - START, (20, 3)), atol=1e-12)
+    np.testing.assert_allclose(
+        shift, np.broadcast_to(elsewhere - START, (20, 3)), atol=1e-12
+    )
 
 
 def test_a_stated_start_may_be_off_by_rounding() -> None:
-    stated = through(6, starts_at=START + 5e-5, starts_oriented=written(TURNED * Rotation.from_rotvec([0, 9e-5, 0])))
+    stated = through(
+        6,
+        starts_at=START + 5e-5,
+        starts_oriented=written(TURNED * Rotation.from_rotvec([0, 9e-5, 0])),
+    )
     s = np.linspace(0, 1, 20)
-    np.testing.assert_allclose(stated.sample(s).target, through(6).sample(s).target, atol=1e-12)
+    np.testing.assert_allclose(
+        stated.sample(s).target, through(6).sample(s).target, atol=1e-12
+    )
 
 
 def test_a_spline_on_the_spot() -> None:
     orientations = [written(one) for one in ATTITUDES[1:]]
-    path = pose_path([{"spline": {"through": [START] * 6, "orientations": orientations}}])
+    path = pose_path(
+        [{"spline": {"through": [START] * 6, "orientations": orientations}}]
+    )
     target = at_waypoints(path)
-    np.testing.assert_allclose(target[:, 3:], np.stack([one.as_matrix().ravel() for one in ATTITUDES]), atol=1e-12)
-    np.testing.assert_allclose(target[:, :3], np.broadcast_to(START, (7, 3)), atol=1e-12)
+    np.testing.assert_allclose(
+        target[:, 3:],
+        np.stack([one.as_matrix().ravel() for one in ATTITUDES]),
+        atol=1e-12,
+    )
+    np.testing.assert_allclose(
+        target[:, :3], np.broadcast_to(START, (7, 3)), atol=1e-12
+    )
     curve = path.coordinates.pieces[0].curve
     np.testing.assert_allclose(np.diff(curve.knots), STEPS.magnitude(), atol=1e-12)
-    once = pose_path([{"spline": {"through": [START], "orientations": orientations[:1]}}]).sample([0.0, 1.0])
-    np.testing.assert_allclose(once.xi, np.broadcast_to([0, 0, 0, *STEPS[0].as_rotvec()], (2, 6)), atol=1e-12)
+    once = pose_path(
+        [{"spline": {"through": [START], "orientations": orientations[:1]}}]
+    ).sample([0.0, 1.0])
+    np.testing.assert_allclose(
+        once.xi, np.broadcast_to([0, 0, 0, *STEPS[0].as_rotvec()], (2, 6)), atol=1e-12
+    )

@@ -30,8 +30,12 @@ def build_robot(joints):
         )
         parent = f"link{i}"
     flange = f'<parent link="{parent}"/><child link="tool"/><origin xyz="0.15 0 0"/>'
-    links.append(f'<link name="tool"/><joint name="flange" type="fixed">{flange}</joint>')
-    return Robot.from_urdf("chain.urdf", urdf_text=f'<robot name="chain">{"".join(links)}</robot>')
+    links.append(
+        f'<link name="tool"/><joint name="flange" type="fixed">{flange}</joint>'
+    )
+    return Robot.from_urdf(
+        "chain.urdf", urdf_text=f'<robot name="chain">{"".join(links)}</robot>'
+    )
 
 
 @pytest.fixture(scope="session")
@@ -43,7 +47,9 @@ def chain():
 def spatial_trajectory(line_trajectory):
     """Seven joints, one of them prismatic, from one posture to another within one polynomial piece."""
     robot = build_robot(SPATIAL_JOINTS)
-    q = np.array([[0.0, 0.3, 0.4, 0.8, 0.2, 0.9, 0.0], [0.9, -0.6, 0.6, 0.5, 0.2, 0.9, 1.0]])
+    q = np.array(
+        [[0.0, 0.3, 0.4, 0.8, 0.2, 0.9, 0.0], [0.9, -0.6, 0.6, 0.5, 0.2, 0.9, 1.0]]
+    )
     return dataclasses.replace(
         line_trajectory,
         task=line_trajectory.task.model_copy(update={"task_space": ("x", "y", "z")}),
@@ -66,6 +72,8 @@ def with_limits():
         robot = trajectory.robot
         other = {kind: limits.pop(kind) for kind in MAGNITUDES if kind in limits}
         changed = dataclasses.replace(robot.limits.with_magnitudes(**other), **limits)
-        return dataclasses.replace(trajectory, robot=dataclasses.replace(robot, limits=changed))
+        return dataclasses.replace(
+            trajectory, robot=dataclasses.replace(robot, limits=changed)
+        )
 
     return change

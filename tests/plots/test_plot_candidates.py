@@ -27,7 +27,9 @@ def drawn(candidates):
     (ax,) = plot_candidates(candidates).axes
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
     times = [marks.get_offsets()[:, 0].tolist() for marks in ax.collections]
-    return dict(zip(labels, times, strict=True)), [tick.get_text() for tick in ax.get_yticklabels()]
+    return dict(zip(labels, times, strict=True)), [
+        tick.get_text() for tick in ax.get_yticklabels()
+    ]
 
 
 @pytest.mark.parametrize("t_end", [2.002, 1.9])
@@ -37,7 +39,9 @@ def test_no_first_plan_is_left_of_the_fastest_for_its_few_collocation_points(t_e
     marks, _ = drawn([fastest, attempt("j2", 2.0005), attempt("j3", 2.5)])
     (star,) = marks["the fastest"]
     assert star == t_end
-    (planned,) = (times for label, times in marks.items() if label.startswith("planned"))
+    (planned,) = (
+        times for label, times in marks.items() if label.startswith("planned")
+    )
     assert planned == pytest.approx([2.0005 * t_end / 2.0, 2.5 * t_end / 2.0])
     assert min(planned) > star
 
@@ -51,15 +55,21 @@ def test_one_motion_is_drawn_once():
 
 def test_refined_times_are_drawn_as_they_are():
     fastest = attempt("j1", 2.0, 2.002, verified=True)
-    marks, _ = drawn([fastest, attempt("j2", 2.3, 2.4, verified=True), attempt("j3", 2.1, 2.2)])
+    marks, _ = drawn(
+        [fastest, attempt("j2", 2.3, 2.4, verified=True), attempt("j3", 2.1, 2.2)]
+    )
     assert marks["refined and verified"] == [2.4]
-    (failed,) = (times for label, times in marks.items() if label.startswith("no verified"))
+    (failed,) = (
+        times for label, times in marks.items() if label.startswith("no verified")
+    )
     assert failed == [2.2]
 
 
 def test_without_a_motion_nothing_is_scaled():
     marks, _ = drawn([attempt("j1", 2.0), attempt("j2", math.inf)])
-    (planned,) = (times for label, times in marks.items() if label.startswith("planned"))
+    (planned,) = (
+        times for label, times in marks.items() if label.startswith("planned")
+    )
     assert planned == [2.0]
 
 

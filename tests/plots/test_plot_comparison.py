@@ -11,7 +11,11 @@ NAN = math.nan
 
 
 def paper_rows(step=45, joints=JOINTS):
-    return [(float(a), j, 2.0 + 0.4 * math.sin(a + 3 * i)) for a in range(0, 360, step) for i, j in enumerate(joints)]
+    return [
+        (float(a), j, 2.0 + 0.4 * math.sin(a + 3 * i))
+        for a in range(0, 360, step)
+        for i, j in enumerate(joints)
+    ]
 
 
 def heights(ax):
@@ -22,28 +26,45 @@ def test_bars_are_the_end_times():
     rows = paper_rows()
     (ax,) = plot_comparison(rows, "direction", "°").axes
     assert ax.get_xlabel() == "direction"
-    assert heights(ax) == {joint: [t for _, name, t in rows if name == joint] for joint in JOINTS}
-    assert [tick.get_text() for tick in ax.get_xticklabels()] == [f"{a}°" for a in range(0, 360, 45)]
+    assert heights(ax) == {
+        joint: [t for _, name, t in rows if name == joint] for joint in JOINTS
+    }
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == [
+        f"{a}°" for a in range(0, 360, 45)
+    ]
     assert ax.get_ylim()[0] == 0.0
     assert ax.get_ylabel() == r"$t_\mathrm{E}$ (s)"
 
 
 def test_angles_are_sorted_and_joints_keep_their_order():
-    (ax,) = plot_comparison([(90.0, "b", 3.0), (-45.0, "a", 1.0), (90.0, "a", 2.0), (-45.0, "b", 4.0)]).axes
+    (ax,) = plot_comparison(
+        [(90.0, "b", 3.0), (-45.0, "a", 1.0), (90.0, "a", 2.0), (-45.0, "b", 4.0)]
+    ).axes
     assert list(heights(ax).items()) == [("b", [4.0, 3.0]), ("a", [1.0, 2.0])]
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["-45", "90"]
 
 
 def test_any_cases_are_compared_in_their_order():
-    rows = [("seam", "rail, j1", 2.0), ("hem", "j1", 1.0), ("seam", "j1", 3.0), ("a circle", "rail, j1", 4.0)]
+    rows = [
+        ("seam", "rail, j1", 2.0),
+        ("hem", "j1", 1.0),
+        ("seam", "j1", 3.0),
+        ("a circle", "rail, j1", 4.0),
+    ]
     (ax,) = plot_comparison(rows, "path").axes
-    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["seam", "hem", "a circle"]
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == [
+        "seam",
+        "hem",
+        "a circle",
+    ]
     assert ax.get_xlabel() == "path"
     assert heights(ax) == {"rail, j1": [2.0, 4.0], "j1": [3.0, 1.0]}
 
 
 def test_numbers_have_their_unit():
-    (ax,) = plot_comparison([(5.0, "stiff", 3.0), (2.5, "stiff", 2.0)], "payload", " kg").axes
+    (ax,) = plot_comparison(
+        [(5.0, "stiff", 3.0), (2.5, "stiff", 2.0)], "payload", " kg"
+    ).axes
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["2.5 kg", "5 kg"]
 
 
@@ -53,18 +74,30 @@ def test_bars_differ_without_colours():
 
 
 def test_every_value_is_written_above_its_bar_and_the_shortest_is_bold():
-    (ax,) = plot_comparison([(0.0, "j1", 2.0), (0.0, "j2", 1.5), (90.0, "j1", 1.25), (90.0, "j2", 3.0)]).axes
+    (ax,) = plot_comparison(
+        [(0.0, "j1", 2.0), (0.0, "j2", 1.5), (90.0, "j1", 1.25), (90.0, "j2", 3.0)]
+    ).axes
     written = {text.get_text(): text for text in ax.texts}
     assert set(written) == {"2.000", "1.500", "1.250", "3.000"}
-    assert {label for label, text in written.items() if text.get_fontweight() == "bold"} == {"1.500", "1.250"}
-    bars = {f"{bar.get_height():.3f}": bar for container in ax.containers for bar in container}
+    assert {
+        label for label, text in written.items() if text.get_fontweight() == "bold"
+    } == {"1.500", "1.250"}
+    bars = {
+        f"{bar.get_height():.3f}": bar
+        for container in ax.containers
+        for bar in container
+    }
     for label, text in written.items():
-        assert text.xy[0] == pytest.approx(bars[label].get_x() + 0.5 * bars[label].get_width())
+        assert text.xy[0] == pytest.approx(
+            bars[label].get_x() + 0.5 * bars[label].get_width()
+        )
         assert text.xy[1] == bars[label].get_height()
 
 
 def test_a_plan_that_was_not_found_is_said_and_a_missing_row_is_a_gap():
-    (ax,) = plot_comparison([(0.0, "j1", 2.0), (0.0, "j2", NAN), (90.0, "j2", 3.0)]).axes
+    (ax,) = plot_comparison(
+        [(0.0, "j1", 2.0), (0.0, "j2", NAN), (90.0, "j2", 3.0)]
+    ).axes
     assert sorted(text.get_text() for text in ax.texts) == ["2.000", "3.000", "no plan"]
     assert heights(ax) == {"j1": [2.0], "j2": [3.0]}
 
@@ -82,7 +115,11 @@ def test_value_labels_are_legible(step):
     for ax in figure.axes:
         boxes = [text.get_window_extent() for text in ax.texts]
         written += len(boxes)
-        assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].overlaps(pair[1])]
+        assert not [
+            pair
+            for pair in itertools.combinations(boxes, 2)
+            if pair[0].overlaps(pair[1])
+        ]
         assert max(box.y1 for box in boxes) < ax.get_window_extent().y1
         assert min(text.get_fontsize() for text in ax.texts) >= 6.0
     assert written == len(paper_rows(step))

@@ -22,13 +22,21 @@ def test_errors_tolerances_and_corners_are_drawn(line_trajectory):
     assert errors.get_ydata().max() == pytest.approx(1e3 * task.fits[0].position_error)
     assert errors.get_ydata().max() <= 0.1
     assert tolerance.get_ydata()[0] == pytest.approx(0.1)
-    np.testing.assert_allclose([line.get_xdata()[0] for line in corners], [300.0, 300.0 + 100.0 * np.pi], atol=1.0)
+    np.testing.assert_allclose(
+        [line.get_xdata()[0] for line in corners],
+        [300.0, 300.0 + 100.0 * np.pi],
+        atol=1.0,
+    )
 
 
 def test_angles_have_an_axis_of_their_own(line_trajectory):
     position = wave(200)
     yaw = np.sin(3.0 * np.linspace(0.0, 1.0, 200))
-    segments = fit_path(position[:, :2], orientations=yaw, tolerance={"position": "0.1 mm", "orientation": "0.2 deg"})
+    segments = fit_path(
+        position[:, :2],
+        orientations=yaw,
+        tolerance={"position": "0.1 mm", "orientation": "0.2 deg"},
+    )
     task = line_trajectory.task.model_copy(update={"path": segments})
     _, beside = plot_fit(dataclasses.replace(line_trajectory, task=task)).axes
     angles, tolerance = beside.get_lines()

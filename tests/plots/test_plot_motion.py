@@ -11,7 +11,11 @@ INF = float("inf")
 
 
 def labelled(ax):
-    return {line.get_label(): line for line in ax.get_lines() if not line.get_label().startswith("_")}
+    return {
+        line.get_label(): line
+        for line in ax.get_lines()
+        if not line.get_label().startswith("_")
+    }
 
 
 def levels(ax):
@@ -32,7 +36,12 @@ def test_panels_show_the_trajectory(line_trajectory):
     t, s = progress.get_lines()[0].get_data()
     assert np.array_equal(s, line_trajectory.path_coordinate(t))
     t, tool = speed.get_lines()[0].get_data()
-    places = np.array([line_trajectory.robot.tool_placement(q).translation for q in line_trajectory.position(t)])
+    places = np.array(
+        [
+            line_trajectory.robot.tool_placement(q).translation
+            for q in line_trajectory.position(t)
+        ]
+    )
     way = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
     assert np.trapezoid(tool, t) == pytest.approx(way, rel=1e-3)
 
@@ -40,14 +49,22 @@ def test_panels_show_the_trajectory(line_trajectory):
 def test_what_the_task_allows_the_tool_is_drawn_where_it_comes_near(line_trajectory):
     fastest = line_trajectory.sample(0.001).tool_speed.max()
     for allowed, drawn in ((1.1 * fastest, 1), (2.0 * fastest, 0)):
-        task = line_trajectory.task.model_copy(update={"tool_limits": ToolLimits(speed=allowed)})
+        task = line_trajectory.task.model_copy(
+            update={"tool_limits": ToolLimits(speed=allowed)}
+        )
         *_, speed = plot_motion(dataclasses.replace(line_trajectory, task=task)).axes
         assert levels(speed) == [allowed] * drawn
-    table = SpeedTable(s=[0.0, 0.5, 0.5, 1.0], speed=[fastest, fastest, 0.5 * fastest, 0.5 * fastest])
-    task = line_trajectory.task.model_copy(update={"tool_limits": ToolLimits(speed=table)})
+    table = SpeedTable(
+        s=[0.0, 0.5, 0.5, 1.0], speed=[fastest, fastest, 0.5 * fastest, 0.5 * fastest]
+    )
+    task = line_trajectory.task.model_copy(
+        update={"tool_limits": ToolLimits(speed=table)}
+    )
     *_, speed = plot_motion(dataclasses.replace(line_trajectory, task=task)).axes
     (limit,) = drawn_limits(speed)
-    assert (limit.get_ydata()[0], limit.get_ydata()[-1]) == pytest.approx((fastest, 0.5 * fastest))
+    assert (limit.get_ydata()[0], limit.get_ydata()[-1]) == pytest.approx(
+        (fastest, 0.5 * fastest)
+    )
 
 
 def test_panels_share_the_time_axis(line_trajectory):
@@ -61,7 +78,12 @@ def test_units_of_revolute_and_of_mixed_chains(line_trajectory, spatial_trajecto
     labels = [ax.get_ylabel() for ax in plot_motion(line_trajectory).axes]
     assert labels == ["$q$ (rad)", r"$\dot{q}$ (rad/s)", "$s$", "tool speed (m/s)"]
     labels = [ax.get_ylabel() for ax in plot_motion(spatial_trajectory).axes]
-    assert labels[:4] == ["$q$ (rad)", "$q$ (m)", r"$\dot{q}$ (rad/s)", r"$\dot{q}$ (m/s)"]
+    assert labels[:4] == [
+        "$q$ (rad)",
+        "$q$ (m)",
+        r"$\dot{q}$ (rad/s)",
+        r"$\dot{q}$ (m/s)",
+    ]
 
 
 def test_joints_in_rad_and_in_m_have_axes_of_their_own(spatial_trajectory):
@@ -80,61 +102,102 @@ def test_limits_are_drawn_where_the_joint_comes_near(line_trajectory, with_limit
     ax = plot_motion(with_limits(line_trajectory, velocity=velocity)).axes[1]
     (limit,) = drawn_limits(ax)
     assert abs(limit.get_ydata()[0]) == velocity[fastest]
-    assert limit.get_color() == labelled(ax)[line_trajectory.joint_names[fastest]].get_color()
+    assert (
+        limit.get_color()
+        == labelled(ax)[line_trajectory.joint_names[fastest]].get_color()
+    )
     assert ax.get_ylim()[0] < limit.get_ydata()[0] < ax.get_ylim()[1]
 
 
 def test_far_and_infinite_limits_do_not_squeeze_the_data(line_trajectory, with_limits):
     free = plot_motion(line_trajectory).axes[1]
     assert levels(free) == []
-    far = plot_motion(with_limits(line_trajectory, velocity=np.array([50.0, INF, 60.0]))).axes[1]
+    far = plot_motion(
+        with_limits(line_trajectory, velocity=np.array([50.0, INF, 60.0]))
+    ).axes[1]
     assert far.get_ylim() == free.get_ylim()
 
 
-def test_every_joint_has_its_own_limits_also_where_they_are_the_same(line_trajectory, with_limits):
+def test_every_joint_has_its_own_limits_also_where_they_are_the_same(
+    line_trajectory, with_limits
+):
     limit = 1.02 * np.abs(line_trajectory.qdot).max()
-    open_below = {"velocity_lower": np.full(3, -INF), "velocity_upper": np.full(3, limit)}
+    open_below = {
+        "velocity_lower": np.full(3, -INF),
+        "velocity_upper": np.full(3, limit),
+    }
     ax = plot_motion(with_limits(line_trajectory, **open_below)).axes[1]
     curves = labelled(ax)
     near = {
-        name for name, line in curves.items() if limit < line.get_ydata().max() + 0.3 * np.ptp(ax.dataLim.intervaly)
+        name
+        for name, line in curves.items()
+        if limit < line.get_ydata().max() + 0.3 * np.ptp(ax.dataLim.intervaly)
     }
     drawn = drawn_limits(ax)
-    assert {line.get_color() for line in drawn} == {curves[name].get_color() for name in near}
+    assert {line.get_color() for line in drawn} == {
+        curves[name].get_color() for name in near
+    }
     assert levels(ax) == [limit] * len(near)
 
 
 def test_joints_that_share_a_level_share_its_dashes():
     dashes = [limit_dashes(place, 3) for place in range(3)]
-    inked = [{(offset_of - offset + step) % 18 for step in range(4) for offset_of in [0.0]} for offset, _ in dashes]
+    inked = [
+        {(offset_of - offset + step) % 18 for step in range(4) for offset_of in [0.0]}
+        for offset, _ in dashes
+    ]
     assert all(sum(pattern) == 18.0 for _, pattern in dashes)
     assert not inked[0] & inked[1]
     assert not inked[1] & inked[2]
     assert not inked[0] & inked[2]
 
 
-def test_limits_that_differ_in_both_directions_are_both_drawn(line_trajectory, with_limits):
+def test_limits_that_differ_in_both_directions_are_both_drawn(
+    line_trajectory, with_limits
+):
     lower = line_trajectory.qdot.min(axis=0) - np.array([0.01, 0.02, 0.03])
     upper = line_trajectory.qdot.max(axis=0) + np.array([0.04, 0.05, 0.06])
-    ax = plot_motion(with_limits(line_trajectory, velocity_lower=lower, velocity_upper=upper)).axes[1]
+    ax = plot_motion(
+        with_limits(line_trajectory, velocity_lower=lower, velocity_upper=upper)
+    ).axes[1]
     assert levels(ax) == sorted([*lower, *upper])
     for joint, name in enumerate(line_trajectory.joint_names):
-        own = [line.get_ydata()[0] for line in drawn_limits(ax) if line.get_color() == labelled(ax)[name].get_color()]
+        own = [
+            line.get_ydata()[0]
+            for line in drawn_limits(ax)
+            if line.get_color() == labelled(ax)[name].get_color()
+        ]
         assert sorted(own) == [lower[joint], upper[joint]]
 
 
 def test_position_ranges_are_drawn(line_trajectory, with_limits):
-    low, high = line_trajectory.q.min(axis=0) - 0.05, line_trajectory.q.max(axis=0) + 0.07
-    ax = plot_motion(with_limits(line_trajectory, position_lower=low, position_upper=high)).axes[0]
+    low, high = (
+        line_trajectory.q.min(axis=0) - 0.05,
+        line_trajectory.q.max(axis=0) + 0.07,
+    )
+    ax = plot_motion(
+        with_limits(line_trajectory, position_lower=low, position_upper=high)
+    ).axes[0]
     assert levels(ax) == sorted([*low, *high])
 
 
 def test_the_overview_has_every_curve(line_trajectory):
     figure = plot_overview(line_trajectory)
     postures, *panels = figure.axes
-    assert len([line for line in postures.get_lines() if (line.get_gid() or "").startswith("posture")]) > 2
+    assert (
+        len(
+            [
+                line
+                for line in postures.get_lines()
+                if (line.get_gid() or "").startswith("posture")
+            ]
+        )
+        > 2
+    )
     wanted = {
-        r"$\tau / \tau_\mathrm{max}$": lambda t: line_trajectory.torque(t) / line_trajectory.robot.limits.torque,
+        r"$\tau / \tau_\mathrm{max}$": lambda t: (
+            line_trajectory.torque(t) / line_trajectory.robot.limits.torque
+        ),
         "$q$ (rad)": line_trajectory.position,
         r"$\dot{q}$ (rad/s)": line_trajectory.velocity,
     }
@@ -146,19 +209,29 @@ def test_the_overview_has_every_curve(line_trajectory):
         drawn = np.column_stack([line.get_ydata() for line in curves.values()])
         np.testing.assert_allclose(drawn, function(t), atol=1e-9)
     assert {"$s$", "tool speed (m/s)"} < set(found)
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == list(line_trajectory.joint_names)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == list(
+        line_trajectory.joint_names
+    )
 
 
 def test_the_overview_shows_what_holds_the_motion(line_trajectory, with_limits):
     """Not the torques, where these are far from their limits."""
-    held = with_limits(line_trajectory, torque=np.full(3, 1e3), acceleration=np.abs(line_trajectory.qddot).max(axis=0))
-    task = held.task.model_copy(update={"tool_limits": ToolLimits(speed=held.sample(0.001).tool_speed.max())})
+    held = with_limits(
+        line_trajectory,
+        torque=np.full(3, 1e3),
+        acceleration=np.abs(line_trajectory.qddot).max(axis=0),
+    )
+    task = held.task.model_copy(
+        update={"tool_limits": ToolLimits(speed=held.sample(0.001).tool_speed.max())}
+    )
     figure = plot_overview(dataclasses.replace(held, task=task))
     titles = [ax.get_ylabel() for ax in figure.axes]
     assert {"acceleration / limit", "tool speed / limit"} < set(titles)
     assert not [title for title in titles if "tau" in title]
     (ax,) = (ax for ax in figure.axes if ax.get_ylabel() == "acceleration / limit")
-    assert max(np.abs(line.get_ydata()).max() for line in labelled(ax).values()) == pytest.approx(1.0, abs=0.02)
+    assert max(
+        np.abs(line.get_ydata()).max() for line in labelled(ax).values()
+    ) == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize("name", ["line_trajectory", "spatial_trajectory"])
@@ -166,6 +239,9 @@ def test_nothing_on_the_overview_overlaps(name, request):
     figure = plot_overview(request.getfixturevalue(name))
     figure.draw_without_rendering()
     boxes = [ax.get_window_extent() for ax in figure.axes]
-    boxes += [legend.get_window_extent() for legend in [*figure.legends, figure.axes[0].get_legend()]]
+    boxes += [
+        legend.get_window_extent()
+        for legend in [*figure.legends, figure.axes[0].get_legend()]
+    ]
     for i, box in enumerate(boxes):
         assert not [other for other in boxes[:i] if box.padded(-1.0).overlaps(other)]

@@ -27,7 +27,9 @@ def test_postures_are_the_arm_at_equidistant_times(line_trajectory):
     for k, t in enumerate(np.linspace(0.0, line_trajectory.t_end, POSTURES)):
         bones = np.column_stack(drawn(figure, f"posture {k}").get_data())
         expected = np.vstack([[0.0, 0.0], planar_arm(line_trajectory.position(t))])
-        corners = bones[np.append(True, np.linalg.norm(np.diff(bones, axis=0), axis=1) > 1e-9)]
+        corners = bones[
+            np.append(True, np.linalg.norm(np.diff(bones, axis=0), axis=1) > 1e-9)
+        ]
         np.testing.assert_allclose(corners, expected, atol=1e-12)
 
 
@@ -48,10 +50,23 @@ def test_later_postures_are_darker_and_on_top(line_trajectory):
 
 def test_only_the_redundant_joint_is_filled(line_trajectory):
     lines = plot_postures(line_trajectory).axes[0].get_lines()
-    joints = [line for line in lines if line.get_marker() == "o" and line.get_linestyle() == "None"]
-    filled = [line for line in joints if line.get_markerfacecolor() not in {"white", line.get_color()}]
-    wrists = [planar_arm(line_trajectory.position(t))[1] for t in np.linspace(0.0, line_trajectory.t_end, POSTURES)]
-    np.testing.assert_allclose(np.array([np.ravel(line.get_data()) for line in filled]), wrists, atol=1e-12)
+    joints = [
+        line
+        for line in lines
+        if line.get_marker() == "o" and line.get_linestyle() == "None"
+    ]
+    filled = [
+        line
+        for line in joints
+        if line.get_markerfacecolor() not in {"white", line.get_color()}
+    ]
+    wrists = [
+        planar_arm(line_trajectory.position(t))[1]
+        for t in np.linspace(0.0, line_trajectory.t_end, POSTURES)
+    ]
+    np.testing.assert_allclose(
+        np.array([np.ravel(line.get_data()) for line in filled]), wrists, atol=1e-12
+    )
 
 
 def test_scales_are_equal_and_axes_labelled(line_trajectory):
@@ -86,7 +101,9 @@ def test_postures_in_space_fill_their_frame_and_nothing_is_cut_off(spatial_traje
     figure.draw_without_rendering()
     ax = figure.axes[0]
     frame, box = ax.get_window_extent(), ax.get_tightbbox()
-    corners = np.array(list(itertools.product(ax.get_xlim(), ax.get_ylim(), ax.get_zlim()))).T
+    corners = np.array(
+        list(itertools.product(ax.get_xlim(), ax.get_ylim(), ax.get_zlim()))
+    ).T
     across, up, _ = proj3d.proj_transform(*corners, ax.get_proj())
     places = ax.transData.transform(np.column_stack([across, up]))
     filled = np.ptp(places, axis=0) / (frame.width, frame.height)
@@ -102,7 +119,9 @@ def test_a_prismatic_joint_is_drawn_from_its_rest_to_where_it_is(spatial_traject
     q = spatial_trajectory.q[-1:]
     figures = skeleton(spatial_trajectory.robot, q)
     np.testing.assert_allclose(
-        figures.bones[0, :3], [[0.0, 0.0, 0.0], [0.0, 0.0, 0.2], [0.0, q[0, 0], 0.2]], atol=1e-12
+        figures.bones[0, :3],
+        [[0.0, 0.0, 0.0], [0.0, 0.0, 0.2], [0.0, q[0, 0], 0.2]],
+        atol=1e-12,
     )
     np.testing.assert_allclose(figures.joints[0, 0], [0.0, q[0, 0], 0.2], atol=1e-12)
     assert figures.bones.shape == (1, 16, 3)
@@ -133,8 +152,14 @@ def test_drawing_plane(chain, joints, axes, plane):
 
 
 def test_no_legend_entry_for_redundant_joints_where_there_are_none(line_trajectory):
-    labels = [text.get_text() for text in plot_postures(line_trajectory).axes[0].get_legend().get_texts()]
+    labels = [
+        text.get_text()
+        for text in plot_postures(line_trajectory).axes[0].get_legend().get_texts()
+    ]
     assert labels == ["start", "end", "tool path", "redundant"]
     without = dataclasses.replace(line_trajectory, redundant_joints=())
-    labels = [text.get_text() for text in plot_postures(without).axes[0].get_legend().get_texts()]
+    labels = [
+        text.get_text()
+        for text in plot_postures(without).axes[0].get_legend().get_texts()
+    ]
     assert labels == ["start", "end", "tool path"]

@@ -16,8 +16,18 @@ def meshes(ax):
 
 def spans(ax):
     """Times of the marked stretches, row by row."""
-    bars = [each for each in ax.collections if isinstance(each, PolyCollection) and not isinstance(each, QuadMesh)]
-    return [[(path.vertices[:, 0].min(), path.vertices[:, 0].max()) for path in bar.get_paths()] for bar in bars]
+    bars = [
+        each
+        for each in ax.collections
+        if isinstance(each, PolyCollection) and not isinstance(each, QuadMesh)
+    ]
+    return [
+        [
+            (path.vertices[:, 0].min(), path.vertices[:, 0].max())
+            for path in bar.get_paths()
+        ]
+        for bar in bars
+    ]
 
 
 def test_a_row_for_every_limit_that_comes_near(line_trajectory):
@@ -47,12 +57,18 @@ def test_colours_are_the_ratios(line_trajectory):
 
 def test_active_stretches_are_marked_where_they_are(line_trajectory):
     ax = plot_timeline(line_trajectory).axes[0]
-    (entry,) = [each for each in saturations(line_trajectory) if str(each.label) == "j1 torque"]
+    (entry,) = [
+        each for each in saturations(line_trajectory) if str(each.label) == "j1 torque"
+    ]
     assert entry.active
     drawn = spans(ax)[rows(ax).index("j1 torque")]
-    np.testing.assert_allclose(sorted(drawn), [(stretch.begin, stretch.end) for stretch in entry.active])
+    np.testing.assert_allclose(
+        sorted(drawn), [(stretch.begin, stretch.end) for stretch in entry.active]
+    )
     marked = sum(end - begin for begin, end in drawn) / line_trajectory.t_end
-    assert marked == pytest.approx(entry.share), "the report's text says what the plot shows"
+    assert marked == pytest.approx(entry.share), (
+        "the report's text says what the plot shows"
+    )
     assert 0.5 < entry.share < 0.7
     assert len(entry.active) < 7
 
@@ -66,8 +82,13 @@ def test_time_axis(line_trajectory):
 
 
 def test_limits_that_are_never_near_are_said(line_trajectory, with_limits):
-    open_range = {"position_lower": np.full(3, -np.inf), "position_upper": np.full(3, np.inf)}
-    ax = plot_timeline(with_limits(line_trajectory, torque=np.full(3, 1e4), **open_range)).axes[0]
+    open_range = {
+        "position_lower": np.full(3, -np.inf),
+        "position_upper": np.full(3, np.inf),
+    }
+    ax = plot_timeline(
+        with_limits(line_trajectory, torque=np.full(3, 1e4), **open_range)
+    ).axes[0]
     assert rows(ax) == []
     assert any("no limit" in text.get_text() for text in ax.texts)
 

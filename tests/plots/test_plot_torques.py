@@ -7,11 +7,17 @@ INF = float("inf")
 
 
 def lines(ax):
-    return {line.get_label(): line for line in ax.get_lines() if not line.get_label().startswith("_")}
+    return {
+        line.get_label(): line
+        for line in ax.get_lines()
+        if not line.get_label().startswith("_")
+    }
 
 
 def levels(ax):
-    return sorted(line.get_ydata()[0] for line in ax.get_lines() if line.get_gid() == "limit")
+    return sorted(
+        line.get_ydata()[0] for line in ax.get_lines() if line.get_gid() == "limit"
+    )
 
 
 def test_lines_are_the_torques_over_their_limits(line_trajectory, with_limits):
@@ -21,7 +27,9 @@ def test_lines_are_the_torques_over_their_limits(line_trajectory, with_limits):
     assert list(drawn) == ["j1", "j2", "j3"]
     for joint, line in enumerate(drawn.values()):
         t, ratio = line.get_data()
-        np.testing.assert_allclose(ratio, trajectory.torque(t)[:, joint] / limits[joint], atol=1e-9)
+        np.testing.assert_allclose(
+            ratio, trajectory.torque(t)[:, joint] / limits[joint], atol=1e-9
+        )
 
 
 def test_lines_cover_the_motion_and_miss_no_knot(line_trajectory):
@@ -42,7 +50,9 @@ def test_the_band_is_drawn_and_visible(line_trajectory):
 
 
 def test_a_torque_beyond_the_limit_stays_in_view(line_trajectory, with_limits):
-    ax = plot_torques(with_limits(line_trajectory, torque=np.array([4.0, 4.0, 4.0]))).axes[0]
+    ax = plot_torques(
+        with_limits(line_trajectory, torque=np.array([4.0, 4.0, 4.0]))
+    ).axes[0]
     peak = max(np.abs(line.get_ydata()).max() for line in lines(ax).values())
     assert peak > 2.0
     assert ax.get_ylim()[1] > peak
@@ -56,19 +66,27 @@ def test_knots_are_minor_ticks(line_trajectory):
 
 def test_the_end_time_is_written_and_there_is_no_title(line_trajectory):
     ax = plot_torques(line_trajectory).axes[0]
-    assert [text for text in ax.texts if f"= {line_trajectory.t_end:.3f}$ s" in text.get_text()]
+    assert [
+        text
+        for text in ax.texts
+        if f"= {line_trajectory.t_end:.3f}$ s" in text.get_text()
+    ]
     assert ax.get_title() == ""
     assert ax.get_xlabel() == "$t$ (s)"
 
 
 def test_joints_without_torque_limit_are_left_out(line_trajectory, with_limits):
-    ax = plot_torques(with_limits(line_trajectory, torque=np.array([10.0, INF, 10.0]))).axes[0]
+    ax = plot_torques(
+        with_limits(line_trajectory, torque=np.array([10.0, INF, 10.0]))
+    ).axes[0]
     assert list(lines(ax)) == ["j1", "j3"]
     full = lines(plot_torques(line_trajectory).axes[0])
     assert lines(ax)["j3"].get_color() == full["j3"].get_color()
 
 
-def test_without_any_torque_limit_the_torques_themselves_are_drawn(line_trajectory, with_limits):
+def test_without_any_torque_limit_the_torques_themselves_are_drawn(
+    line_trajectory, with_limits
+):
     ax = plot_torques(with_limits(line_trajectory, torque=np.full(3, INF))).axes[0]
     t, tau = lines(ax)["j2"].get_data()
     np.testing.assert_allclose(tau, line_trajectory.torque(t)[:, 1], atol=1e-9)
@@ -76,8 +94,12 @@ def test_without_any_torque_limit_the_torques_themselves_are_drawn(line_trajecto
     assert ax.get_ylabel() == r"$\tau$ (Nm)"
 
 
-def test_torques_and_forces_without_limits_have_axes_of_their_own(spatial_trajectory, with_limits):
-    turning, sliding = plot_torques(with_limits(spatial_trajectory, torque=np.full(7, INF))).axes
+def test_torques_and_forces_without_limits_have_axes_of_their_own(
+    spatial_trajectory, with_limits
+):
+    turning, sliding = plot_torques(
+        with_limits(spatial_trajectory, torque=np.full(7, INF))
+    ).axes
     assert (turning.get_ylabel(), sliding.get_ylabel()) == (r"$\tau$ (Nm)", "$F$ (N)")
     assert list(lines(sliding)) == ["rail"]
     assert list(lines(turning)) == list(spatial_trajectory.joint_names[1:])
@@ -92,7 +114,9 @@ def test_what_pushes_a_prismatic_joint_is_a_force(spatial_trajectory, with_limit
     assert list(lines(ax)) == ["rail"]
 
 
-def test_torques_are_measured_by_the_limit_of_their_direction(line_trajectory, with_limits):
+def test_torques_are_measured_by_the_limit_of_their_direction(
+    line_trajectory, with_limits
+):
     lower, upper = np.array([-20.0, -5.0, -10.0]), np.array([10.0, 20.0, 5.0])
     trajectory = with_limits(line_trajectory, torque_lower=lower, torque_upper=upper)
     t, ratio = lines(plot_torques(trajectory).axes[0])["j1"].get_data()

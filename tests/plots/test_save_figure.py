@@ -47,10 +47,13 @@ def test_a_missing_folder_is_named(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "width"), [("torques", 89.0), ("postures", 89.0), ("motion", 89.0), ("overview", 183.0)]
+    ("name", "width"),
+    [("torques", 89.0), ("postures", 89.0), ("motion", 89.0), ("overview", 183.0)],
 )
 def test_figures_have_the_width_of_journal_columns(line_trajectory, name, width):
-    assert PLOTS[name](line_trajectory).get_figwidth() == pytest.approx(width / 25.4)  # inches
+    assert PLOTS[name](line_trajectory).get_figwidth() == pytest.approx(
+        width / 25.4
+    )  # inches
 
 
 def test_pixels_are_those_of_300_dpi(line_trajectory, tmp_path):
@@ -64,16 +67,29 @@ def test_pixels_are_those_of_300_dpi(line_trajectory, tmp_path):
 def test_all_text_is_readable_and_inside_the_figure(name, fixture, request):
     figure = PLOTS[name](request.getfixturevalue(fixture))
     figure.draw_without_rendering()
-    texts = [text for text in figure.findobj(mpl.text.Text) if text.get_visible() and text.get_text().strip()]
-    assert len(texts) > 5 or name == "fit", "a path that was not fitted has a figure that says so"
+    texts = [
+        text
+        for text in figure.findobj(mpl.text.Text)
+        if text.get_visible() and text.get_text().strip()
+    ]
+    assert len(texts) > 5 or name == "fit", (
+        "a path that was not fitted has a figure that says so"
+    )
     assert min(text.get_fontsize() for text in texts) >= 6.0
     page = figure.bbox.padded(2.0)
     ticks = {
-        id(label) for ax in figure.axes for axis in ax._axis_map.values() for label in axis.get_ticklabels(which="both")
+        id(label)
+        for ax in figure.axes
+        for axis in ax._axis_map.values()
+        for label in axis.get_ticklabels(which="both")
     }
     for text in texts:
-        box = text.get_window_extent()  # tick labels beyond the view have a place but are not drawn
-        assert id(text) in ticks or (page.contains(box.x0, box.y0) and page.contains(box.x1, box.y1)), text.get_text()
+        box = (
+            text.get_window_extent()
+        )  # tick labels beyond the view have a place but are not drawn
+        assert id(text) in ticks or (
+            page.contains(box.x0, box.y0) and page.contains(box.x1, box.y1)
+        ), text.get_text()
 
 
 def test_pdf_fonts_are_truetype_and_svg_text_is_text(line_trajectory, tmp_path):
@@ -83,15 +99,21 @@ def test_pdf_fonts_are_truetype_and_svg_text_is_text(line_trajectory, tmp_path):
     assert b"/CIDFontType2" in content
     assert b"/Type3" not in content
     save_figure(figure, tmp_path / "figure.svg")
-    assert re.search(r"<text[^>]*>j1</text>", (tmp_path / "figure.svg").read_text(encoding="utf-8"))
+    assert re.search(
+        r"<text[^>]*>j1</text>", (tmp_path / "figure.svg").read_text(encoding="utf-8")
+    )
 
 
 def test_joints_are_told_apart():
-    looks = {(look["color"], look["linestyle"]) for look in map(style.joint_style, range(21))}
+    looks = {
+        (look["color"], look["linestyle"]) for look in map(style.joint_style, range(21))
+    }
     assert len(looks) == 21
     for colour in style.COLOURS:
         r, g, b = to_rgb(colour)
-        assert 0.2126 * r + 0.7152 * g + 0.0722 * b < 0.75, f"{colour} is too faint on white"
+        assert 0.2126 * r + 0.7152 * g + 0.0722 * b < 0.75, (
+            f"{colour} is too faint on white"
+        )
 
 
 def test_a_dollar_in_a_joint_name_is_no_mathematics(line_trajectory, monkeypatch):
@@ -120,9 +142,22 @@ assert "matplotlib.pyplot" not in sys.modules, "pyplot was imported"
 """
 
 
-def test_matplotlib_is_imported_late_and_left_as_it_is_and_pyplot_never(line_trajectory, tmp_path):
+def test_matplotlib_is_imported_late_and_left_as_it_is_and_pyplot_never(
+    line_trajectory, tmp_path
+):
     line_trajectory.save(tmp_path / "result.npz")
-    arguments = [sys.executable, "-W", "error", "-c", LAZY, str(tmp_path / "result.npz"), str(tmp_path)]
+    arguments = [
+        sys.executable,
+        "-W",
+        "error",
+        "-c",
+        LAZY,
+        str(tmp_path / "result.npz"),
+        str(tmp_path),
+    ]
     run = subprocess.run(arguments, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
-    assert {path.stem for path in tmp_path.glob("*.p[nd][gf]")} == {*PLOTS, "comparison"}
+    assert {path.stem for path in tmp_path.glob("*.p[nd][gf]")} == {
+        *PLOTS,
+        "comparison",
+    }

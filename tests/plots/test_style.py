@@ -14,11 +14,18 @@ def test_line_styles_differ_from_the_first_joint_on():
 
 
 def test_no_two_joints_of_a_long_chain_look_the_same():
-    looks = [(joint_style(joint)["color"], str(joint_style(joint)["linestyle"])) for joint in range(30)]
+    looks = [
+        (joint_style(joint)["color"], str(joint_style(joint)["linestyle"]))
+        for joint in range(30)
+    ]
     assert len(set(looks)) == 30
 
 
 def test_figures_use_them(line_trajectory):
-    lines = [line for line in plot_motion(line_trajectory).axes[0].get_lines() if line.get_gid() != "limit"]
+    lines = [
+        line
+        for line in plot_motion(line_trajectory).axes[0].get_lines()
+        if line.get_gid() != "limit"
+    ]
     patterns = [line._unscaled_dash_pattern for line in lines]
     assert all(one != other for one, other in itertools.combinations(patterns, 2))

@@ -52,7 +52,14 @@ def imported(file, motion):
 def write(tmp_path):
     def write(header, *columns, fmt="%.17g", name="today.csv"):
         path = tmp_path / name
-        np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="", fmt=fmt)
+        np.savetxt(
+            path,
+            np.column_stack(columns),
+            delimiter=",",
+            header=header,
+            comments="",
+            fmt=fmt,
+        )
         return path
 
     return write

@@ -15,7 +15,9 @@ NAMES = ("j1", "j2", "j3")
 
 def test_rows_in_which_the_motion_sets_out_gently_belong_to_it(write):
     t = np.linspace(0.0, 1.0, 1001)
-    way = t**4 * (35.0 - 84.0 * t + 70.0 * t**2 - 20.0 * t**3)  # 3.5e-11 rad in the first millisecond
+    way = t**4 * (
+        35.0 - 84.0 * t + 70.0 * t**2 - 20.0 * t**3
+    )  # 3.5e-11 rad in the first millisecond
     found = read_recording(write("t,j1,j2,j3", t, way, -way, 0.5 * way), ROBOT, Units())
     assert found.t[-1] == 1.0
     assert not any("stands still" in line for line in found.told)
@@ -28,12 +30,18 @@ def test_rows_in_which_the_motion_sets_out_gently_belong_to_it(write):
         ("time,q_j1,q_j2,q_j3", {}, (1.0, 1.0)),
         ("Time [ms],J1_pos [deg],J2_pos [deg],J3_pos [deg]", {}, (1e3, 180.0 / np.pi)),
         ("t_ms,j1_deg,j2_deg,j3_deg", {}, (1e3, 180.0 / np.pi)),
-        ("timestamp,position_j1,position_j2,position_j3", {"angle": "deg", "time": "us"}, (1e6, 180.0 / np.pi)),
+        (
+            "timestamp,position_j1,position_j2,position_j3",
+            {"angle": "deg", "time": "us"},
+            (1e6, 180.0 / np.pi),
+        ),
     ],
 )
 def test_names_and_units(header, units, factors, table, write):
     t, q, _ = table
-    found = read_recording(write(header, factors[0] * (t + 3.0), factors[1] * q), ROBOT, Units(**units))
+    found = read_recording(
+        write(header, factors[0] * (t + 3.0), factors[1] * q), ROBOT, Units(**units)
+    )
     np.testing.assert_allclose(found.t, t, atol=1e-12)
     np.testing.assert_allclose(found.q, q, atol=1e-14)
     assert found.qdot is None
@@ -42,8 +50,15 @@ def test_names_and_units(header, units, factors, table, write):
 @pytest.mark.parametrize("unit", ["deg/s^2", "deg/s2"])
 def test_accelerations_with_their_unit(unit, table, write):
     t, q, qdot = table
-    path = write(f"t,j1,j2,j3,qdd_j1 [{unit}],j2_acc [{unit}],a_j3_deg_per_s2", t, q, np.rad2deg(qdot))
-    np.testing.assert_allclose(read_recording(path, ROBOT, Units()).qddot, qdot, rtol=1e-12)
+    path = write(
+        f"t,j1,j2,j3,qdd_j1 [{unit}],j2_acc [{unit}],a_j3_deg_per_s2",
+        t,
+        q,
+        np.rad2deg(qdot),
+    )
+    np.testing.assert_allclose(
+        read_recording(path, ROBOT, Units()).qddot, qdot, rtol=1e-12
+    )
 
 
 def test_columns_in_any_order_and_others_beside_them(table, write):
@@ -58,29 +73,48 @@ def test_columns_in_any_order_and_others_beside_them(table, write):
 
 def test_semicolons_and_decimal_commas(table, tmp_path):
     t, q, _ = table
-    rows = [";".join(f"{value:.12f}".replace(".", ",") for value in row) for row in np.column_stack([t, q])]
+    rows = [
+        ";".join(f"{value:.12f}".replace(".", ",") for value in row)
+        for row in np.column_stack([t, q])
+    ]
     path = tmp_path / "today.csv"
     path.write_text("\n".join(["t;j1;j2;j3", *rows]))
     np.testing.assert_allclose(read_recording(path, ROBOT, Units()).q, q, atol=1e-12)
 
 
 def test_prismatic_joints_have_lengths(write):
-    robot, t = Robot.from_urdf(ROOT / "robots/gantry2/robot.urdf"), np.linspace(0.0, 1.0, 20)
+    robot, t = (
+        Robot.from_urdf(ROOT / "robots/gantry2/robot.urdf"),
+        np.linspace(0.0, 1.0, 20),
+    )
     names = robot.joint_names
     path = write(f"t,{names[0]} [mm],{names[1]}", t, 100.0 * t, 0.2 * t)
-    np.testing.assert_allclose(read_recording(path, robot, Units()).q, np.outer(t, [0.1, 0.2]), atol=1e-15)
-    with pytest.raises(TaskError, match=r"unknown unit of column .* \[deg\]; found deg; allowed: m, cm, mm"):
+    np.testing.assert_allclose(
+        read_recording(path, robot, Units()).q, np.outer(t, [0.1, 0.2]), atol=1e-15
+    )
+    with pytest.raises(
+        TaskError,
+        match=r"unknown unit of column .* \[deg\]; found deg; allowed: m, cm, mm",
+    ):
         read_recording(write(f"t,{names[0]} [deg],{names[1]}", t, t, t), robot, Units())
 
 
 def test_standing_still_before_and_after_does_not_count(table, write):
     t, q, _ = table
-    around = np.concatenate([np.repeat(q[:1], 10, axis=0), q[1:-1], np.repeat(q[-1:], 6, axis=0)])
+    around = np.concatenate(
+        [np.repeat(q[:1], 10, axis=0), q[1:-1], np.repeat(q[-1:], 6, axis=0)]
+    )
     times = 0.004 * np.arange(len(around))
     found = read_recording(write("t,j1,j2,j3", times, around), ROBOT, Units())
     assert len(found.t) == len(t)
-    assert "left out 0.036 s before the motion, in which the robot stands still (9 rows)" in found.told
-    assert "left out 0.02 s after the motion, in which the robot stands still (5 rows)" in found.told
+    assert (
+        "left out 0.036 s before the motion, in which the robot stands still (9 rows)"
+        in found.told
+    )
+    assert (
+        "left out 0.02 s after the motion, in which the robot stands still (5 rows)"
+        in found.told
+    )
 
 
 @pytest.mark.parametrize(
@@ -93,8 +127,16 @@ def test_standing_still_before_and_after_does_not_count(table, write):
         ),
         ("x,j1,j2,j3", {}, "the time is missing"),
         ("t,j1,j1,j3", {}, "the position of 'j1' stands there twice"),
-        ("t,j1 [grad],j2,j3", {}, r"unknown unit of column j1 \[grad\]; found grad; allowed: rad, mrad, deg"),
-        ("t,j1 [deg],j2,j3", {"angle": "rad"}, "the header contradicts the units asked for; found deg"),
+        (
+            "t,j1 [grad],j2,j3",
+            {},
+            r"unknown unit of column j1 \[grad\]; found grad; allowed: rad, mrad, deg",
+        ),
+        (
+            "t,j1 [deg],j2,j3",
+            {"angle": "rad"},
+            "the header contradicts the units asked for; found deg",
+        ),
         ("t,j1,j2,j3", {"angle": "grad"}, "unknown unit of angle; found grad"),
     ],
 )
@@ -105,18 +147,29 @@ def test_headers_that_are_not_understood(header, change, told, table, write):
 
 def test_only_some_velocities(table, write):
     with pytest.raises(TaskError, match="the velocity of 'j2' is missing"):
-        read_recording(write("t,j1,j2,j3,qd_j1", *table[:2], table[2][:, 0]), ROBOT, Units())
+        read_recording(
+            write("t,j1,j2,j3,qd_j1", *table[:2], table[2][:, 0]), ROBOT, Units()
+        )
 
 
 def test_rows_that_are_no_motion(table, write):
     t, q, _ = table
-    with pytest.raises(TaskError, match=r"line 4: times do not ascend; found 0.004 s after 0.004 s"):
-        read_recording(write("t,j1,j2,j3", np.concatenate([t[:2], t[1:-1]]), q), ROBOT, Units())
-    with pytest.raises(TaskError, match="too few rows for a motion; found 4; allowed: 5 or more"):
+    with pytest.raises(
+        TaskError, match=r"line 4: times do not ascend; found 0.004 s after 0.004 s"
+    ):
+        read_recording(
+            write("t,j1,j2,j3", np.concatenate([t[:2], t[1:-1]]), q), ROBOT, Units()
+        )
+    with pytest.raises(
+        TaskError, match="too few rows for a motion; found 4; allowed: 5 or more"
+    ):
         read_recording(write("t,j1,j2,j3", t[:4], q[:4]), ROBOT, Units())
     with pytest.raises(TaskError, match="the robot does not move"):
         read_recording(write("t,j1,j2,j3", t, 0.0 * q), ROBOT, Units())
-    with pytest.raises(TaskError, match=r"an angle is hardly meant; found [0-9.]+ rad at j1. Degrees\? Say so"):
+    with pytest.raises(
+        TaskError,
+        match=r"an angle is hardly meant; found [0-9.]+ rad at j1. Degrees\? Say so",
+    ):
         read_recording(write("t,j1,j2,j3", t, 100.0 * q), ROBOT, Units())
     with pytest.raises(TaskError, match="there is no such file"):
         read_recording("nowhere.csv", ROBOT, Units())

@@ -30,12 +30,19 @@ def test_the_motion_comes_back(imported, motion):
 
 def test_its_path_comes_back_and_it_verifies(imported, motion):
     found = verify_trajectory(imported)
-    assert {check.name for check in found.checks if not check.passed} <= {"torque ratio"}
+    assert {check.name for check in found.checks if not check.passed} <= {
+        "torque ratio"
+    }
     assert found.worst_ratio == pytest.approx(1.0, abs=2e-3)
     assert found.path_error < 1e-6
     (path,) = (check for check in found.checks if check.name == "path error")
-    assert (path.allowed, path.remark) == (1e-6, "the path was recovered from the motion")
-    places = np.array([motion.robot.tool_placement(q).translation[:2] for q in imported.q])
+    assert (path.allowed, path.remark) == (
+        1e-6,
+        "the path was recovered from the motion",
+    )
+    places = np.array(
+        [motion.robot.tool_placement(q).translation[:2] for q in imported.q]
+    )
     start = places[0]
     assert np.abs(places[:, 0] - start[0]).max() < 1e-9  # a line along y
 
@@ -46,7 +53,9 @@ def test_what_is_known_of_it_is_saved(imported, tmp_path):
     imported.save(tmp_path / "today.npz")
     again = Trajectory.load(tmp_path / "today.npz")
     assert again.recovered.to_file() == imported.recovered.to_file()
-    assert verify_trajectory(again).worst_ratio == pytest.approx(verify_trajectory(imported).worst_ratio, rel=1e-9)
+    assert verify_trajectory(again).worst_ratio == pytest.approx(
+        verify_trajectory(imported).worst_ratio, rel=1e-9
+    )
     export.write(again, tmp_path / "again.csv", dt=0.01)
     (ax, *_) = plots.plot_motion(again).axes
     assert ax.lines[0].get_xdata()[-1] == again.t_end
@@ -57,7 +66,9 @@ def test_the_rows_of_a_file_of_schema_2_are_not_known(imported, tmp_path):
     old = with_parts(
         tmp_path / "today.npz",
         schema=2,
-        recovered=lambda now: {name: now[name] for name in ("source", "tolerance", "told")},
+        recovered=lambda now: {
+            name: now[name] for name in ("source", "tolerance", "told")
+        },
     )
     again = Trajectory.load(old)
     assert again.recovered.to_dict() == imported.recovered.to_dict()
@@ -65,18 +76,25 @@ def test_the_rows_of_a_file_of_schema_2_are_not_known(imported, tmp_path):
     assert comparison.bound_ratios(imported)
     assert comparison.bound_ratios(again) == ()
     again.save(tmp_path / "again.npz")
-    assert Trajectory.load(tmp_path / "again.npz").recovered.to_file() == again.recovered.to_file()
+    assert (
+        Trajectory.load(tmp_path / "again.npz").recovered.to_file()
+        == again.recovered.to_file()
+    )
     result = plan(again.task, intervals=8, effort="single", least_motion=False)
     found = comparison.Comparison(again, verify_trajectory(again), (), result)
     assert found.uses == ()
     assert found.to_dict()["today_within_limits"] is None
     assert "the rows of today's motion are not known" in str(found)
     assert "prove" not in str(found)
-    assert "between its rows" not in str(comparison.plot_today(found).axes[2].get_legend_handles_labels()[1])
+    assert "between its rows" not in str(
+        comparison.plot_today(found).axes[2].get_legend_handles_labels()[1]
+    )
 
 
 def test_a_file_may_not_allow_itself_any_path(imported, tmp_path, monkeypatch):
-    with pytest.raises(InputError, match=r"no tolerance of a path; found 0.1; allowed: 2e-07 to 0.001"):
+    with pytest.raises(
+        InputError, match=r"no tolerance of a path; found 0.1; allowed: 2e-07 to 0.001"
+    ):
         replace(imported.recovered, tolerance=0.1)
     own = imported.recovered.to_file()
     wrong = {
@@ -87,7 +105,9 @@ def test_a_file_may_not_allow_itself_any_path(imported, tmp_path, monkeypatch):
         "not the rows": {"rows": [[0.0, 1.0, 2.0, 3.0], [1.0, 1.0, 2.0, float("nan")]]},
     }
     for message, change in wrong.items():
-        monkeypatch.setattr(Recovered, "to_file", lambda _, change=change: {**own, **change})
+        monkeypatch.setattr(
+            Recovered, "to_file", lambda _, change=change: {**own, **change}
+        )
         imported.save(tmp_path / "today.npz")
         with pytest.raises(ResultFileError, match=message):
             Trajectory.load(tmp_path / "today.npz")
@@ -96,7 +116,11 @@ def test_a_file_may_not_allow_itself_any_path(imported, tmp_path, monkeypatch):
 def test_a_motion_that_leaves_its_recovered_path_fails(imported):
     q = np.array(imported.q)
     q[len(q) // 2] += 1e-5
-    (path,) = (check for check in verify_trajectory(replace(imported, q=q)).checks if check.name == "path error")
+    (path,) = (
+        check
+        for check in verify_trajectory(replace(imported, q=q)).checks
+        if check.name == "path error"
+    )
     assert not path.passed
 
 
@@ -105,7 +129,9 @@ def test_bottlenecks_are_when_limits_are_active(imported):
     assert found.sensitivities is None
     assert found.to_dict()["sensitivities"] is None
     text = str(found)
-    assert text.startswith("the motion was not planned: what a limit costs is not known\n")
+    assert text.startswith(
+        "the motion was not planned: what a limit costs is not known\n"
+    )
     assert "is at its torque limit for" in text
     with pytest.raises(InputError, match="nothing of it can be solved again"):
         bottleneck.report(imported, check=True)
@@ -121,21 +147,37 @@ def test_positions_alone_will_do(motion, table, write):
 def test_few_digits_are_smoothed(motion, table, write):
     t, q, _ = table
     found = import_motion(write("t,j1,j2,j3", t, q, fmt="%.6f"), task=motion.task)
-    assert any("smoothing spline, 2.9e-07 rad (rms) off" in line for line in found.recovered.told)
+    assert any(
+        "smoothing spline, 2.9e-07 rad (rms) off" in line
+        for line in found.recovered.told
+    )
     assert 1e-6 < found.recovered.tolerance < 1e-5  # as the digits have it
     assert found.t_end == pytest.approx(motion.t_end, abs=2.5 * DT)
     middle = np.linspace(0.2, 2.0, 500)
-    times = np.linspace(0.0, 2.0 * DT, 3)  # the rows that were left out at the beginning are whole ones
-    later = min(times, key=lambda late: np.abs(found.position(middle) - motion.position(middle + late)).max())
-    np.testing.assert_allclose(found.position(middle), motion.position(middle + later), atol=2e-6)
-    np.testing.assert_allclose(found.acceleration(middle), motion.acceleration(middle + later), atol=0.2)
+    times = np.linspace(
+        0.0, 2.0 * DT, 3
+    )  # the rows that were left out at the beginning are whole ones
+    later = min(
+        times,
+        key=lambda late: np.abs(
+            found.position(middle) - motion.position(middle + late)
+        ).max(),
+    )
+    np.testing.assert_allclose(
+        found.position(middle), motion.position(middle + later), atol=2e-6
+    )
+    np.testing.assert_allclose(
+        found.acceleration(middle), motion.acceleration(middle + later), atol=0.2
+    )
 
 
 @pytest.mark.parametrize("digits", [4, 5, 6, 8])
 def test_rest_is_found_in_few_digits(digits, motion, table, write):
     """And the time in which the last digit does not show yet that the motion has begun belongs to it."""
     t, q, _ = table
-    recording = read_recording(write("t,j1,j2,j3", t, q, fmt=f"%.{digits}f"), motion.robot, Units())
+    recording = read_recording(
+        write("t,j1,j2,j3", t, q, fmt=f"%.{digits}f"), motion.robot, Units()
+    )
     nodes = nodes_of(recording, recording.rounding / np.sqrt(3.0))
     assert nodes.at_rest == (True, True)
     assert recording.t[-1] == pytest.approx(motion.t_end, abs=2.5 * DT)
@@ -144,34 +186,67 @@ def test_rest_is_found_in_few_digits(digits, motion, table, write):
 @pytest.mark.parametrize("digits", [4, 5, 6, 8])
 def test_accelerations_that_set_in_with_a_jump_are_no_rest(digits, write):
     t = np.arange(0.0, 2.001, DT)
-    way = np.where(t < 1.0, 0.5 * t**2, 1.0 - 0.5 * (2.0 - t) ** 2)[:, None] * [1.0, -0.5, 0.02]
-    recording = read_recording(write("t,j1,j2,j3", t, way, fmt=f"%.{digits}f"), Robot.from_urdf(SCARA), Units())
-    assert nodes_of(recording, recording.rounding / np.sqrt(3.0)).at_rest == (True, False)
+    way = np.where(t < 1.0, 0.5 * t**2, 1.0 - 0.5 * (2.0 - t) ** 2)[:, None] * [
+        1.0,
+        -0.5,
+        0.02,
+    ]
+    recording = read_recording(
+        write("t,j1,j2,j3", t, way, fmt=f"%.{digits}f"), Robot.from_urdf(SCARA), Units()
+    )
+    assert nodes_of(recording, recording.rounding / np.sqrt(3.0)).at_rest == (
+        True,
+        False,
+    )
 
 
 def test_few_digits_of_a_rail_say_nothing_of_the_joints(write):
-    robot, t = Robot.from_urdf(ROOT / "robots/tx90l_rail/robot.urdf"), np.linspace(0.0, 1.0, 251)
-    way = (t**4 * (35.0 - 84.0 * t + 70.0 * t**2 - 20.0 * t**3))[:, None] * np.full(robot.n, 0.3)
+    robot, t = (
+        Robot.from_urdf(ROOT / "robots/tx90l_rail/robot.urdf"),
+        np.linspace(0.0, 1.0, 251),
+    )
+    way = (t**4 * (35.0 - 84.0 * t + 70.0 * t**2 - 20.0 * t**3))[:, None] * np.full(
+        robot.n, 0.3
+    )
     rail = robot.position_units.index("m")
     way[:, rail] = way[:, rail].round(4)  # 0.1 mm
-    recording = read_recording(write(",".join(["t", *robot.joint_names]), t, way), robot, Units())
+    recording = read_recording(
+        write(",".join(["t", *robot.joint_names]), t, way), robot, Units()
+    )
     assert recording.rounding[rail] == pytest.approx(5e-5)
     assert not np.delete(recording.rounding, rail).any()
     nodes = nodes_of(recording, recording.rounding / np.sqrt(3.0))
-    assert "positions in m, velocities and accelerations of a smoothing spline, 2.9e-05 m (rms) off" in nodes.told
+    assert (
+        "positions in m, velocities and accelerations of a smoothing spline, 2.9e-05 m (rms) off"
+        in nodes.told
+    )
     assert not any("rad" in line for line in nodes.told)
     exact = [joint for joint in range(robot.n) if joint != rail]
     assert set(nodes.q[:, exact].ravel()) >= set(recording.q[:, exact].ravel())
     again = nodes_of(recording, np.full(robot.n, 1e-4))
-    assert {line.split(",")[0] for line in again.told} == {"positions in rad", "positions in m"}
+    assert {line.split(",")[0] for line in again.told} == {
+        "positions in rad",
+        "positions in m",
+    }
 
 
 def test_rates_that_contradict_the_positions_are_left_out(motion, write):
     samples = motion.sample(DT)
-    header = ",".join(["t", *(f"{kind}{joint}" for kind in ("", "qd_", "qdd_") for joint in ("j1", "j2", "j3"))])
+    header = ",".join(
+        [
+            "t",
+            *(
+                f"{kind}{joint}"
+                for kind in ("", "qd_", "qdd_")
+                for joint in ("j1", "j2", "j3")
+            ),
+        ]
+    )
     path = write(header, samples.t, samples.q, samples.qdot, 2.0 * samples.qddot)
     found = import_motion(path, task=motion.task)
-    assert any("the file's accelerations do not agree" in line for line in found.recovered.told)
+    assert any(
+        "the file's accelerations do not agree" in line for line in found.recovered.told
+    )
     np.testing.assert_allclose(found.acceleration(samples.t), samples.qddot, atol=0.05)
 
 
@@ -179,7 +254,9 @@ def test_measured_positions_are_smoothed(motion, write):
     samples, noise = motion.sample(0.002), 1e-5
     q = samples.q + noise * np.random.default_rng(0).standard_normal(samples.q.shape)
     path = write("t,j1,j2,j3", samples.t, q)
-    found = verify_trajectory(import_motion(path, task=motion.task, tolerance=1e-4, noise=noise))
+    found = verify_trajectory(
+        import_motion(path, task=motion.task, tolerance=1e-4, noise=noise)
+    )
     assert found.path_error < 1e-4
     assert found.worst_ratio == pytest.approx(1.0, abs=0.05)
     with pytest.raises(PathError, match="say their noise, or raise the tolerance"):
@@ -192,10 +269,14 @@ def test_accelerations_that_jump_do_not_overshoot():
     switch = 1.0037
     first, rest = np.minimum(t, switch), np.maximum(t - switch, 0.0)
     q = (0.5 * first**2 + switch * rest - 0.5 * rest**2)[:, None]
-    nodes = nodes_of(Recording(t, q, None, None, np.zeros(1), ("rad",), "here", ()), np.zeros(1))
-    from scipy.interpolate import BPoly  # noqa: PLC0415
+    nodes = nodes_of(
+        Recording(t, q, None, None, np.zeros(1), ("rad",), "here", ()), np.zeros(1)
+    )
+    from scipy.interpolate import BPoly
 
-    pieces = BPoly.from_derivatives(nodes.t, np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1))
+    pieces = BPoly.from_derivatives(
+        nodes.t, np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1)
+    )
     fine = np.linspace(0.0, 2.0, 20001)
     assert np.abs(pieces(fine, nu=2)).max() < 1.005
     np.testing.assert_allclose(pieces(t), q, atol=1e-12)
@@ -205,22 +286,38 @@ def test_accelerations_that_jump_do_not_overshoot():
 def test_ends_in_motion(motion, table, write):
     t, q, qdot = table
     kept = slice(60, -60)
-    found = import_motion(write("t,j1,j2,j3,qd_j1,qd_j2,qd_j3", t[kept], q[kept], qdot[kept]), task=motion.task)
+    found = import_motion(
+        write("t,j1,j2,j3,qd_j1,qd_j2,qd_j3", t[kept], q[kept], qdot[kept]),
+        task=motion.task,
+    )
     boundary = found.task.boundary
-    for speed, end in ((boundary.start_speed, t[kept][0]), (boundary.end_speed, t[kept][-1])):
+    for speed, end in (
+        (boundary.start_speed, t[kept][0]),
+        (boundary.end_speed, t[kept][-1]),
+    ):
         before, after = (
-            motion.robot.tool_placement(q).translation for q in motion.position(end + np.array([-1e-5, 1e-5]))
+            motion.robot.tool_placement(q).translation
+            for q in motion.position(end + np.array([-1e-5, 1e-5]))
         )
         assert speed == pytest.approx(np.linalg.norm(after - before) / 2e-5, rel=1e-4)
-    failed = {check.name for check in verify_trajectory(found).checks if not check.passed}
+    failed = {
+        check.name for check in verify_trajectory(found).checks if not check.passed
+    }
     assert failed <= {"torque ratio"}
 
 
 def test_a_tool_that_stops_and_turns_off_is_refused(motion, table, write):
     t, q, _ = table
     back = q + 0.5 * (q - q[0]) * [0.0, 0.0, 1.0]
-    path = write("t,j1,j2,j3", np.append(t, t[-1] + t[1:]), np.concatenate([q, back[-2::-1] + q[-1] - back[-1]]))
-    with pytest.raises(PathError, match=r"follows no smooth path within the tolerance.* divide the file there"):
+    path = write(
+        "t,j1,j2,j3",
+        np.append(t, t[-1] + t[1:]),
+        np.concatenate([q, back[-2::-1] + q[-1] - back[-1]]),
+    )
+    with pytest.raises(
+        PathError,
+        match=r"follows no smooth path within the tolerance.* divide the file there",
+    ):
         import_motion(path, task=motion.task)
 
 
@@ -232,11 +329,24 @@ def test_a_path_of_joints(file, motion):
 
 @pytest.mark.parametrize("space", ["pose", "pose_free_roll"])
 def test_poses_of_an_arm_in_space(space, write):
-    robot, t = Robot.from_urdf(ROOT / "robots/iiwa14/robot.urdf"), np.linspace(0.0, 2.0, 401)
+    robot, t = (
+        Robot.from_urdf(ROOT / "robots/iiwa14/robot.urdf"),
+        np.linspace(0.0, 2.0, 401),
+    )
     u = t / 2.0
     progress = (u**4 * (35.0 - 84.0 * u + 70.0 * u**2 - 20.0 * u**3))[:, None]
-    q = np.array([0.1, 0.5, 0.2, -1.2, 0.3, 0.9, 0.4]) + progress * [0.4, -0.2, 0.3, 0.3, -0.2, 0.1, 0.5]
-    found = import_motion(write(",".join(["t", *robot.joint_names]), t, q), robot, task_space=space)
+    q = np.array([0.1, 0.5, 0.2, -1.2, 0.3, 0.9, 0.4]) + progress * [
+        0.4,
+        -0.2,
+        0.3,
+        0.3,
+        -0.2,
+        0.1,
+        0.5,
+    ]
+    found = import_motion(
+        write(",".join(["t", *robot.joint_names]), t, q), robot, task_space=space
+    )
     result = verify_trajectory(found)
     assert result.passed, result
     assert result.path_error < 1e-6

@@ -22,11 +22,16 @@ def swinging(phases, amplitude=1.0, offset=0.0):
     angle = 2.0 * np.pi * t[:, None] + np.array(phases)
     qdot = amplitude * np.sin(angle) + offset
     qddot = 2.0 * np.pi * amplitude * np.cos(angle)
-    return t, JointState(**dict.fromkeys(JointState.__dataclass_fields__, None) | {"qdot": qdot, "qddot": qddot})
+    return t, JointState(
+        **dict.fromkeys(JointState.__dataclass_fields__, None)
+        | {"qdot": qdot, "qddot": qddot}
+    )
 
 
 def rubbing(n, width, coulomb=1.0):
-    return Friction.of([f"j{i}" for i in range(n)], coulomb=coulomb, coulomb_velocity=width)
+    return Friction.of(
+        [f"j{i}" for i in range(n)], coulomb=coulomb, coulomb_velocity=width
+    )
 
 
 @pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-6])
@@ -37,7 +42,11 @@ def test_every_width_around_every_reversal(width):
     for phase in phases:
         for zero in (0.5 - phase / (2.0 * np.pi), 1.0 - phase / (2.0 * np.pi)):
             near = found[np.abs(found - zero) < 2.0 * width] - zero
-            wanted = np.array([-7.0, -4.5, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 7.0]) * width / (2.0 * np.pi)
+            wanted = (
+                np.array([-7.0, -4.5, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.5, 7.0])
+                * width
+                / (2.0 * np.pi)
+            )
             np.testing.assert_allclose(near, wanted, atol=0.01 * width + 1e-8)
     assert len(found) == 44
 
@@ -60,12 +69,19 @@ def test_joints_without_coulomb_friction_are_not_looked_at():
 
 
 @pytest.mark.parametrize("width", [1e-3, 1e-5])
-def test_plans_under_narrow_friction_are_verified_by_refinement_alone(scara_urdf, width):
+def test_plans_under_narrow_friction_are_verified_by_refinement_alone(
+    scara_urdf, width
+):
     """The refinement sees the peaks itself: the verification finds nothing that it has missed."""
-    task = yaml.safe_load((scara_urdf.parents[2] / "examples/01_scara_line.yaml").read_text())
+    task = yaml.safe_load(
+        (scara_urdf.parents[2] / "examples/01_scara_line.yaml").read_text()
+    )
     friction = {"coulomb": [0.6, 0.4, 0.3], "coulomb_velocity": width, "viscous": 0.1}
     task["robot"] |= {"urdf": str(scara_urdf), "friction": friction}
-    task |= {"redundant_joints": ["j3"], "path": [{"line": {"length": 0.8, "angle_deg": 180}}]}
+    task |= {
+        "redundant_joints": ["j3"],
+        "path": [{"line": {"length": 0.8, "angle_deg": 180}}],
+    }
     task["search"] = {"effort": "single"}
     result = brachis.plan(task)
     assert result.verified

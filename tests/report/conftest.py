@@ -19,7 +19,9 @@ SMALL = {"search": QUICK, "spline": {"intervals": 8}}
 
 def quick(example):
     task = brachis.load_task(example).to_dict()
-    return brachis.plan({**task, **{key: {**task[key], **value} for key, value in SMALL.items()}})
+    return brachis.plan(
+        {**task, **{key: {**task[key], **value} for key, value in SMALL.items()}}
+    )
 
 
 @pytest.fixture(scope="session")
@@ -46,8 +48,12 @@ def rail_page(rail):
 def weaker(rail):
     """The motion on drives that are weaker by a tenth."""
     trajectory = rail.trajectory
-    weak = trajectory.robot.limits.with_magnitudes(torque=0.9 * trajectory.robot.limits.torque)
-    return dataclasses.replace(trajectory, robot=dataclasses.replace(trajectory.robot, limits=weak))
+    weak = trajectory.robot.limits.with_magnitudes(
+        torque=0.9 * trajectory.robot.limits.torque
+    )
+    return dataclasses.replace(
+        trajectory, robot=dataclasses.replace(trajectory.robot, limits=weak)
+    )
 
 
 @pytest.fixture(scope="session")
@@ -62,4 +68,8 @@ def data_of(page):
 
 def floats(array):
     values = np.frombuffer(base64.b64decode(array["bdata"]), dtype=array["dtype"])
-    return values.reshape([int(n) for n in array["shape"].split(",")]) if "shape" in array else values
+    return (
+        values.reshape([int(n) for n in array["shape"].split(",")])
+        if "shape" in array
+        else values
+    )

@@ -17,14 +17,18 @@ def opened(browser, tmp_path):
 
     def visit(report, scheme="light"):
         report.save(tmp_path / "report.html")
-        page = browser.new_page(viewport={"width": 1200, "height": 900}, color_scheme=scheme)
+        page = browser.new_page(
+            viewport={"width": 1200, "height": 900}, color_scheme=scheme
+        )
         said, asked = [], []
         page.on("console", lambda message: said.append(message.text))
         page.on("pageerror", lambda error: said.append(str(error)))
         page.on("request", lambda request: asked.append(request.url))
         page.goto((tmp_path / "report.html").as_uri())
         page.wait_for_selector("body[data-ready]", timeout=60_000)
-        page.wait_for_selector("#timeline_figure .cursor", state="attached", timeout=60_000)
+        page.wait_for_selector(
+            "#timeline_figure .cursor", state="attached", timeout=60_000
+        )
         return page, said, asked
 
     return visit
@@ -34,7 +38,9 @@ def pixels(page):
     return page.evaluate("document.getElementById('robot').toDataURL()")
 
 
-def test_the_slider_moves_the_robot_and_all_that_follows_it(opened, planar_page, planar):
+def test_the_slider_moves_the_robot_and_all_that_follows_it(
+    opened, planar_page, planar
+):
     page, said, asked = opened(planar_page)
     before, first = pixels(page), page.locator("#values tbody td").all_inner_texts()
     page.evaluate(MOVE, 0.5)
@@ -43,7 +49,10 @@ def test_the_slider_moves_the_robot_and_all_that_follows_it(opened, planar_page,
     expected = planar.trajectory.position(0.5 * planar.t_end)[0]
     assert float(row[1].split()[0]) == pytest.approx(expected, abs=0.02)
     assert page.locator("#values tbody td").all_inner_texts() != first
-    boxes = page.locator("#motion_figure .cursor").bounding_box(), page.locator("#motion_figure").bounding_box()
+    boxes = (
+        page.locator("#motion_figure .cursor").bounding_box(),
+        page.locator("#motion_figure").bounding_box(),
+    )
     assert 0.3 < (boxes[0]["x"] - boxes[1]["x"]) / boxes[1]["width"] < 0.7
     assert said == []
     assert asked == [page.url], "the page asked for nothing but itself"
@@ -54,7 +63,9 @@ def test_it_plays_to_the_end_and_stops(opened, planar_page, planar):
     page.evaluate(MOVE, 0.97)
     page.click("#play")
     page.get_by_role("button", name="Play", exact=True).wait_for(timeout=60_000)
-    assert page.evaluate("Number(document.getElementById('time').value)") == pytest.approx(planar.t_end, rel=1e-4)
+    assert page.evaluate(
+        "Number(document.getElementById('time').value)"
+    ) == pytest.approx(planar.t_end, rel=1e-4)
     assert said == []
 
 
@@ -63,7 +74,12 @@ def test_figures_are_there_in_dark_and_an_arm_in_space_turns(opened, weaker_page
     for name in ("motion_figure", "timeline_figure"):
         assert page.locator(f"#{name} .main-svg").count() > 0
     assert page.locator("#motion_figure .scatterlayer .trace").count() > 4 * 7
-    assert page.evaluate("getComputedStyle(document.querySelector('header')).backgroundColor") == "rgb(195, 20, 47)"
+    assert (
+        page.evaluate(
+            "getComputedStyle(document.querySelector('header')).backgroundColor"
+        )
+        == "rgb(195, 20, 47)"
+    )
     before = pixels(page)
     page.locator("#robot").scroll_into_view_if_needed()
     box = page.locator("#robot").bounding_box()

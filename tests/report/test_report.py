@@ -41,7 +41,9 @@ def test_the_verdict_the_time_and_what_limits_are_said_first(planar, planar_page
 
 
 def test_everything_is_in_the_file(planar_page):
-    without_plotly = re.sub(r'<script type="text/plain" id="plotly">.*?</script>', "", planar_page.html)
+    without_plotly = re.sub(
+        r'<script type="text/plain" id="plotly">.*?</script>', "", planar_page.html
+    )
     links = re.findall(r"""(?:src|href)\s*=\s*["']?([^"'\s>]{1,40})""", without_plotly)
     assert links
     assert all(link.startswith("data:image/png;base64,") for link in links)
@@ -64,17 +66,29 @@ def test_curves_are_the_motion(rail, rail_page):
     }
     seen = set()
     for trace in data["data"]:
-        title = axes["yaxis" if trace["yaxis"] == "y1" else trace["yaxis"].replace("y", "yaxis")]["title"]["text"]
+        title = axes[
+            "yaxis" if trace["yaxis"] == "y1" else trace["yaxis"].replace("y", "yaxis")
+        ]["title"]["text"]
         kind, _, unit = title.partition(" (")
-        if trace.get("meta") == "limit" or kind not in functions or unit == "of the limit)":
+        if (
+            trace.get("meta") == "limit"
+            or kind not in functions
+            or unit == "of the limit)"
+        ):
             continue
         joint = trajectory.joint_names.index(trace["name"])
-        assert ("rad" in unit or "Nm" in unit) == (trace["name"] != "rail"), "joints in rad and in m are apart"
+        assert ("rad" in unit or "Nm" in unit) == (trace["name"] != "rail"), (
+            "joints in rad and in m are apart"
+        )
         t = np.clip(floats(trace["x"]).astype(float), 0.0, rail.t_end)
         expected = functions[kind](t)[:, joint]
-        np.testing.assert_allclose(floats(trace["y"]), expected, atol=2e-4 * max(1.0, np.abs(expected).max()))
+        np.testing.assert_allclose(
+            floats(trace["y"]), expected, atol=2e-4 * max(1.0, np.abs(expected).max())
+        )
         seen.add((kind, trace["name"]))
-    assert seen >= {(kind, "joint_1") for kind in ("position", "velocity", "acceleration", "torque")}
+    assert seen >= {
+        (kind, "joint_1") for kind in ("position", "velocity", "acceleration", "torque")
+    }
     assert ("force", "rail") in seen
     assert ("torque", "rail") not in seen
 
@@ -87,7 +101,11 @@ def test_limits_of_every_joint_are_drawn(weaker_page, weaker):
             levels.setdefault(trace["name"], set()).update(floats(trace["y"]).tolist())
     limits = weaker.robot.limits
     for joint, name in enumerate(weaker.joint_names):
-        for level in (limits.torque_upper[joint], limits.torque_lower[joint], limits.position_upper[joint]):
+        for level in (
+            limits.torque_upper[joint],
+            limits.torque_lower[joint],
+            limits.position_upper[joint],
+        ):
             assert np.float32(level) in levels[name]
 
 
@@ -100,7 +118,9 @@ def test_the_animation_is_the_motion(rail, rail_page):
     np.testing.assert_allclose(bones[:, -1], samples.tool_position, atol=1e-4)
     np.testing.assert_allclose(floats(scene["speed"]), samples.tool_speed, atol=1e-2)
     assert scene["plane"] is None
-    assert [joint["name"] for joint in scene["joints"] if joint["prismatic"]] == ["rail"]
+    assert [joint["name"] for joint in scene["joints"] if joint["prismatic"]] == [
+        "rail"
+    ]
     assert {len(joint["quantities"]) for joint in scene["joints"]} == {4}
 
 
@@ -110,8 +130,13 @@ def test_a_planar_motion_is_drawn_in_its_plane(planar_page):
 
 def test_the_timeline_shows_what_the_saturations_say(planar, planar_page):
     (heat,) = data_of(planar_page)["timeline"]["data"]
-    found = {str(entry.label): entry for entry in brachis.bottleneck.saturations(planar.trajectory)}
-    assert heat["y"] == [name for name, entry in found.items() if entry.peak > 0.5][::-1]
+    found = {
+        str(entry.label): entry
+        for entry in brachis.bottleneck.saturations(planar.trajectory)
+    }
+    assert (
+        heat["y"] == [name for name, entry in found.items() if entry.peak > 0.5][::-1]
+    )
     t, colours = floats(heat["x"]), floats(heat["z"])
     for name, row in zip(heat["y"], colours, strict=True):
         for stretch in found[name].active:
@@ -123,7 +148,10 @@ def test_an_unverified_motion_says_so_and_what_failed(weaker_page):
     header = re.search(r"<header.*?</header>", weaker_page.html, re.DOTALL)[0]
     assert 'class="unverified"' in header
     assert "<h1>NOT VERIFIED: do not run</h1>" in header
-    assert re.search(r"<b>torque ratio</b>: 1\.11\d* \((rail|joint_\d) at 0\.\d+ s\),\s+allowed 1\.0001", header)
+    assert re.search(
+        r"<b>torque ratio</b>: 1\.11\d* \((rail|joint_\d) at 0\.\d+ s\),\s+allowed 1\.0001",
+        header,
+    )
     assert "Verification: FAILED" in weaker_page.html
     rows = re.findall(r'<tr class="(passed|failed)"><th>(.*?)</th>', weaker_page.html)
     assert rows[0] == ("failed", "torque ratio")
@@ -138,9 +166,14 @@ def test_text_is_no_markup(weaker_page):
     assert "&lt;script&gt;weaker" in weaker_page.html
 
 
-def test_every_joint_is_told_with_its_posture_and_how_near_it_comes_to_its_limits(rail, rail_page):
+def test_every_joint_is_told_with_its_posture_and_how_near_it_comes_to_its_limits(
+    rail, rail_page
+):
     page = rail_page.html
-    rows = re.findall(r"<tr><th>([\w ]+?)( \*)?</th><td>(-?[\d.]+) (rad|m)</td><td>(-?[\d.]+) (?:rad|m)</td>", page)
+    rows = re.findall(
+        r"<tr><th>([\w ]+?)( \*)?</th><td>(-?[\d.]+) (rad|m)</td><td>(-?[\d.]+) (?:rad|m)</td>",
+        page,
+    )
     assert [row[0] for row in rows] == list(rail.trajectory.joint_names)
     assert [row[0] for row in rows if row[1]] == ["rail"]
     starts, ends = ([float(row[i]) for row in rows] for i in (2, 4))
@@ -149,7 +182,9 @@ def test_every_joint_is_told_with_its_posture_and_how_near_it_comes_to_its_limit
     assert re.search(r"100\.0 % of\s+1500 N", page)
 
 
-def test_a_saved_motion_is_verified_again_and_told_as_the_plan(planar, planar_page, tmp_path):
+def test_a_saved_motion_is_verified_again_and_told_as_the_plan(
+    planar, planar_page, tmp_path
+):
     planar.save(tmp_path / "motion.npz")
     page = make_report(brachis.Trajectory.load(tmp_path / "motion.npz"))
 
@@ -158,17 +193,28 @@ def test_a_saved_motion_is_verified_again_and_told_as_the_plan(planar, planar_pa
 
     assert verification(page.html) == verification(planar_page.html)
     assert data_of(page)["scene"]["bones"] == data_of(planar_page)["scene"]["bones"]
-    saves = [line for line in re.findall(r"<li>(.*?)</li>", page.html) if " saves " in line]
+    saves = [
+        line for line in re.findall(r"<li>(.*?)</li>", page.html) if " saves " in line
+    ]
     assert len(saves) >= 2, "the bottlenecks of a saved motion are found again"
 
 
-def test_a_result_writes_its_report_with_remarks_and_what_was_left_undone(planar, tmp_path):
-    remark = Remark("robot.limits.velocity", "looks like degrees", "120 rad/s", "1 to 60 rad/s")
-    result = dataclasses.replace(planar, warnings=(remark,), undone=("the knots",), interrupted=True)
+def test_a_result_writes_its_report_with_remarks_and_what_was_left_undone(
+    planar, tmp_path
+):
+    remark = Remark(
+        "robot.limits.velocity", "looks like degrees", "120 rad/s", "1 to 60 rad/s"
+    )
+    result = dataclasses.replace(
+        planar, warnings=(remark,), undone=("the knots",), interrupted=True
+    )
     page = result.report(tmp_path / "motion.html")
     assert (tmp_path / "motion.html").read_text(encoding="utf-8") == page.html
     aside = re.search(r"<aside>.*?</aside>", page.html, re.DOTALL)[0]
-    assert "robot.limits.velocity: looks like degrees (found 120 rad/s; usual: 1 to 60 rad/s)" in aside
+    assert (
+        "robot.limits.velocity: looks like degrees (found 120 rad/s; usual: 1 to 60 rad/s)"
+        in aside
+    )
     assert "the knots" in aside
     assert "ended early" in aside
     assert len(repr(page)) < 80
@@ -178,31 +224,51 @@ def test_a_result_writes_its_report_with_remarks_and_what_was_left_undone(planar
 def pairs_of(page):
     """What the summary says."""
     return {
-        name: html.unescape(value) for name, value in re.findall(r"<tr><th>(.*?)</th><td>(.*?)</td></tr>", page.html)
+        name: html.unescape(value)
+        for name, value in re.findall(
+            r"<tr><th>(.*?)</th><td>(.*?)</td></tr>", page.html
+        )
     }
 
 
 def test_robot_path_and_what_it_carries_are_named(planar, planar_page):
     said = pairs_of(planar_page)
     assert said["robot"] == "scara3 (robot.urdf)"
-    assert said["path"] == "line (length 1, angle deg 90); the tool moves 1.000 m; prescribed: x, y"
+    assert (
+        said["path"]
+        == "line (length 1, angle deg 90); the tool moves 1.000 m; prescribed: x, y"
+    )
     assert (said["payload"], said["tool offset"]) == ("none", "none")
     assert said["mounting"] == "at the world's origin, upright"
     today = datetime.now().astimezone().strftime("%Y-")
     assert said["report of"].startswith(today)
-    loaded = brachis.load_task({**planar.task.to_dict(), "robot": {**planar.task.robot.model_dump(), **CARRIED}})
-    moved = dataclasses.replace(planar.trajectory, robot=robot_from_settings(loaded.robot), task=loaded)
+    loaded = brachis.load_task(
+        {
+            **planar.task.to_dict(),
+            "robot": {**planar.task.robot.model_dump(), **CARRIED},
+        }
+    )
+    moved = dataclasses.replace(
+        planar.trajectory, robot=robot_from_settings(loaded.robot), task=loaded
+    )
     said = tables.identity(reported_motion(moved))
     assert said["payload"] == "0.5 kg at [0, 0, 0.1] m in the tool frame, a point mass"
     assert said["mounting"] == "at [0, 0, 1] m, roll, pitch, yaw [0, 0, 30] deg"
 
 
-def test_hashes_are_those_of_the_urdf_and_of_the_task_that_is_shown(planar, planar_page):
+def test_hashes_are_those_of_the_urdf_and_of_the_task_that_is_shown(
+    planar, planar_page
+):
     said = pairs_of(planar_page)
     urdf = Path(planar.task.robot.urdf).read_bytes()
     assert said["SHA-256 of the URDF"] == hashlib.sha256(urdf).hexdigest()
-    shown = html.unescape(re.search(r"<pre>(.*?)</pre>", planar_page.html, re.DOTALL)[1])
-    assert said["SHA-256 of the task as it stands below"] == hashlib.sha256(shown.encode()).hexdigest()
+    shown = html.unescape(
+        re.search(r"<pre>(.*?)</pre>", planar_page.html, re.DOTALL)[1]
+    )
+    assert (
+        said["SHA-256 of the task as it stands below"]
+        == hashlib.sha256(shown.encode()).hexdigest()
+    )
 
 
 def test_no_path_of_this_machine_is_in_it(planar, planar_page):
@@ -210,16 +276,33 @@ def test_no_path_of_this_machine_is_in_it(planar, planar_page):
     assert folder.is_absolute()
     assert str(folder) not in planar_page.html
     assert "urdf: robot.urdf" in planar_page.html
-    task = planar.task.model_copy(update={"robot": planar.task.robot.model_copy(update={"urdf": r"C:\cells\arm.urdf"})})
+    task = planar.task.model_copy(
+        update={
+            "robot": planar.task.robot.model_copy(update={"urdf": r"C:\cells\arm.urdf"})
+        }
+    )
     assert "urdf: arm.urdf" in tables.task_text(task)
 
 
 def test_paths_of_many_segments_are_told_in_short():
     points = [[0.01 * i, 0.02 * i] for i in range(1, 30)]
-    path = [{"line": {"by": [0.1, 0.0]}}, {"spline": {"through": points}}, *[{"line": {"by": [0.0, 0.1]}}] * 7]
-    task = brachis.load_task({"brachis": 1, "start": {"joints": [0.0]}, "task_space": ["x", "y"], "path": path})
+    path = [
+        {"line": {"by": [0.1, 0.0]}},
+        {"spline": {"through": points}},
+        *[{"line": {"by": [0.0, 0.1]}}] * 7,
+    ]
+    task = brachis.load_task(
+        {
+            "brachis": 1,
+            "start": {"joints": [0.0]},
+            "task_space": ["x", "y"],
+            "path": path,
+        }
+    )
     said = tables.path_in_words(task)
-    assert said.startswith("line (by [0.1, 0]), then spline (through 29 entries), then line (by [0, 0.1])")
+    assert said.startswith(
+        "line (by [0.1, 0]), then spline (through 29 entries), then line (by [0, 0.1])"
+    )
     assert said.endswith(", and 3 more")
 
 
@@ -231,18 +314,41 @@ def test_angles_may_be_in_degrees_and_lengths_stay(rail):
     assert rows["joint_1"].start == f"{np.rad2deg(q[0, 1]):.4f} deg"
     units = {row.found.partition(" ")[2] for row in tables.check_rows(reported)}
     assert not any("rad" in unit for unit in units - {"m, rad"})
-    assert [row.value.split()[1] for row in rows["joint_1"].peaks] == ["deg", "deg/s", "deg/s²", "Nm"]
-    in_rad = {row.name: row for row in tables.joint_rows(reported_motion(rail.trajectory))}
-    assert [row.share for row in rows["joint_1"].peaks] == [row.share for row in in_rad["joint_1"].peaks]
-    titles = [axis["title"]["text"] for name, axis in motion_figure(reported)["layout"].items() if name[:5] == "yaxis"]
-    assert {"position (deg)", "position (m)", "velocity (deg/s)", "acceleration (m/s²)", "force (N)"} < set(titles)
+    assert [row.value.split()[1] for row in rows["joint_1"].peaks] == [
+        "deg",
+        "deg/s",
+        "deg/s²",
+        "Nm",
+    ]
+    in_rad = {
+        row.name: row for row in tables.joint_rows(reported_motion(rail.trajectory))
+    }
+    assert [row.share for row in rows["joint_1"].peaks] == [
+        row.share for row in in_rad["joint_1"].peaks
+    ]
+    titles = [
+        axis["title"]["text"]
+        for name, axis in motion_figure(reported)["layout"].items()
+        if name[:5] == "yaxis"
+    ]
+    assert {
+        "position (deg)",
+        "position (m)",
+        "velocity (deg/s)",
+        "acceleration (m/s²)",
+        "force (N)",
+    } < set(titles)
 
 
 def test_positions_are_told_by_their_place_in_the_range(rail):
     limits, q = rail.trajectory.robot.limits, rail.sample(rail.t_end / 999).q[:, 1]
     middle = 0.5 * (limits.position_lower[1] + limits.position_upper[1])
     share = np.abs(q - middle).max() / (limits.position_upper[1] - middle)
-    (row,) = (row for row in tables.joint_rows(reported_motion(rail.trajectory)) if row.name == "joint_1")
+    (row,) = (
+        row
+        for row in tables.joint_rows(reported_motion(rail.trajectory))
+        if row.name == "joint_1"
+    )
     assert row.peaks[0].share == f"{100 * share:.1f} %"
 
 
@@ -251,9 +357,13 @@ def test_the_task_and_the_versions_are_in_it(planar_page):
     assert f"brachis {brachis.__version__}" in planar_page.html
 
 
-@pytest.mark.parametrize(("module", "name"), [("jinja2", "Jinja2"), ("plotly.offline", "Plotly")])
+@pytest.mark.parametrize(
+    ("module", "name"), [("jinja2", "Jinja2"), ("plotly.offline", "Plotly")]
+)
 def test_what_is_not_installed_is_said(module, name, planar, monkeypatch):
     _plotly.cache_clear()
     monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(NotInstalledError, match=rf"{name}, which is not installed.*brachis\[report\]"):
+    with pytest.raises(
+        NotInstalledError, match=rf"{name}, which is not installed.*brachis\[report\]"
+    ):
         make_report(planar)

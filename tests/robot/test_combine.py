@@ -50,14 +50,27 @@ def test_limits_that_a_task_scales_hold_for_a_given_robot():
     assert given.t_end == pytest.approx(from_file.t_end, rel=1e-6)
     assert given.t_end > 0.5  # 0.427 s without the scale
     assert brachis.plan(given.task).t_end == pytest.approx(given.t_end, rel=1e-6)
-    assert brachis.plan(Robot.from_urdf(RAIL), given.task).t_end == pytest.approx(given.t_end, rel=1e-6)
+    assert brachis.plan(Robot.from_urdf(RAIL), given.task).t_end == pytest.approx(
+        given.t_end, rel=1e-6
+    )
 
 
 def test_every_part_of_the_task_counts():
     settings = asked(
         gravity=[0, -9.81, 0],
-        limits={"torque": 7, "velocity": 3, "acceleration": 20, "position": [[-3, 3]] * 3, "scale": {"torque": 0.5}},
-        friction={"armature": 0.1, "viscous": [1, 2, 3], "coulomb": {"j2": 0.5}, "coulomb_velocity": 0.02},
+        limits={
+            "torque": 7,
+            "velocity": 3,
+            "acceleration": 20,
+            "position": [[-3, 3]] * 3,
+            "scale": {"torque": 0.5},
+        },
+        friction={
+            "armature": 0.1,
+            "viscous": [1, 2, 3],
+            "coulomb": {"j2": 0.5},
+            "coulomb_velocity": 0.02,
+        },
     )
     made = robot_for(Robot.from_urdf(SCARA), settings)
     alone = robot_for(SCARA, settings)
@@ -72,11 +85,19 @@ def test_every_part_of_the_task_counts():
 def test_frames_and_locked_joints_of_the_task_count():
     plain = Robot.from_urdf(RAIL)
     made = robot_for(
-        plain, asked(base_frame="base_link", locked_joints={"joint_6": 0.3}, limits={"torque": {"joint_1": 5}})
+        plain,
+        asked(
+            base_frame="base_link",
+            locked_joints={"joint_6": 0.3},
+            limits={"torque": {"joint_1": 5}},
+        ),
     )
     assert made.joint_names == plain.joint_names[1:-1]
     assert made.limits.torque[0] == 5.0
-    also = robot_for(Robot.from_urdf(RAIL, locked_joints={"joint_6": 0.3}), asked(locked_joints={"joint_5": 0.2}))
+    also = robot_for(
+        Robot.from_urdf(RAIL, locked_joints={"joint_6": 0.3}),
+        asked(locked_joints={"joint_5": 0.2}),
+    )
     assert also.joint_names == plain.joint_names[:-2]
 
 
@@ -92,7 +113,9 @@ def test_a_robot_stays_as_it_is_where_the_task_adds_nothing():
 def test_limits_are_combined_joint_by_joint():
     robot = scara({"j1": 5.0})
     made = robot_for(robot, asked(limits={"torque": {"j2": 6}}))
-    np.testing.assert_array_equal(made.limits.torque, [5.0, 6.0, robot.limits.torque[2]])
+    np.testing.assert_array_equal(
+        made.limits.torque, [5.0, 6.0, robot.limits.torque[2]]
+    )
     assert made.settings.limits.torque == {"j1": 5.0, "j2": 6.0}
     assert np.isinf(made.limits.velocity).all()
 
@@ -113,7 +136,9 @@ def test_limits_are_combined_joint_by_joint():
 def test_a_contradiction_is_refused_with_its_key(settings, key):
     options = {
         "robot.tool_frame": {"tool_frame": "tool"},
-        "robot.limits.scale.torque": {"limits": brachis.LimitSpec(scale={"torque": 0.25})},
+        "robot.limits.scale.torque": {
+            "limits": brachis.LimitSpec(scale={"torque": 0.25})
+        },
         "robot.friction.coulomb.j3": {"friction": {"coulomb": 0.5}},
         "robot.locked_joints.j3": {"locked_joints": {"j3": 0.4}},
     }
@@ -134,9 +159,15 @@ def test_what_a_task_writes_counts_even_where_it_is_the_default(settings, key):
     robot = Robot.from_urdf(
         SCARA,
         gravity=[0, 0, 0],
-        limits=brachis.LimitSpec(torque=10.0, velocity={"j1": 3.0, "j2": 3.0, "j3": 3.0}, scale={"torque": 0.5}),
+        limits=brachis.LimitSpec(
+            torque=10.0,
+            velocity={"j1": 3.0, "j2": 3.0, "j3": 3.0},
+            scale={"torque": 0.5},
+        ),
     )
-    if key == "robot.limits.velocity":  # joint by joint, "as in the URDF" is what is not said
+    if (
+        key == "robot.limits.velocity"
+    ):  # joint by joint, "as in the URDF" is what is not said
         assert robot_for(robot, asked(**settings)) is robot
         return
     with pytest.raises(TaskError, match="contradict") as caught:
@@ -153,12 +184,16 @@ def test_unknown_joints_of_the_task_are_named():
 
 def test_replaced_limits_are_kept_and_the_task_of_the_result_has_them():
     robot = scara()
-    weak = replace(robot, limits=robot.limits.with_magnitudes(torque=np.array([4.0, 5.0, 90.0])))
+    weak = replace(
+        robot, limits=robot.limits.with_magnitudes(torque=np.array([4.0, 5.0, 90.0]))
+    )
     result = brachis.plan(weak, line())
     assert result.task.robot.limits.torque == {"j1": 4.0, "j2": 5.0, "j3": 90.0}
     assert result.t_end > brachis.plan(robot, line()).t_end
     assert brachis.plan(result.task).t_end == pytest.approx(result.t_end, rel=1e-6)
-    assert brachis.plan(weak, result.task).t_end == pytest.approx(result.t_end, rel=1e-6)
+    assert brachis.plan(weak, result.task).t_end == pytest.approx(
+        result.t_end, rel=1e-6
+    )
     made = robot_for(weak, asked(limits={"acceleration": 50}))
     np.testing.assert_array_equal(made.limits.torque, [4.0, 5.0, 90.0])
     np.testing.assert_array_equal(made.limits.acceleration, 50.0)
@@ -169,7 +204,9 @@ def test_replaced_limits_are_kept_and_the_task_of_the_result_has_them():
 
 def test_replaced_friction_is_kept():
     robot = scara()
-    stiff = replace(robot, friction=replace(robot.friction, viscous=np.array([1.0, 0.0, 2.0])))
+    stiff = replace(
+        robot, friction=replace(robot.friction, viscous=np.array([1.0, 0.0, 2.0]))
+    )
     made = robot_for(stiff, asked(limits={"acceleration": 50}))
     np.testing.assert_array_equal(made.friction.viscous, [1.0, 0.0, 2.0])
     np.testing.assert_array_equal(made.friction.v_eps, 0.01)
@@ -194,6 +231,8 @@ def test_a_robot_whose_tool_rolls_freely_is_made_anew_without_the_virtual_joint(
 
 
 def test_transcribe_combines_as_well():
-    task = brachis.load_task(line(gravity=[0, 0, 0], limits={"torque": 3, "velocity": None}))
+    task = brachis.load_task(
+        line(gravity=[0, 0, 0], limits={"torque": 3, "velocity": None})
+    )
     problem, _ = brachis.transcribe(Robot.from_urdf(SCARA), task)
     np.testing.assert_array_equal(problem.phases[0].joint_map.robot.limits.torque, 3.0)

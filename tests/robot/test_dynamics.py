@@ -10,12 +10,21 @@ from brachis.errors import InputError, UnknownNameError
 from brachis.robot import Robot, dynamics
 from support.chains import Joint, chain_urdf, planar_robot
 
-FRICTION = {"armature": [0.3, 0.2, 0.1], "viscous": {"j1": 4.0, "j3": 2.0}, "coulomb": 5.0, "coulomb_velocity": 0.4}
+FRICTION = {
+    "armature": [0.3, 0.2, 0.1],
+    "viscous": {"j1": 4.0, "j3": 2.0},
+    "coulomb": 5.0,
+    "coulomb_velocity": 0.4,
+}
 
 
-def states(n: int, count: int = 12, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def states(
+    n: int, count: int = 12, seed: int = 0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
-    return tuple(scale * rng.uniform(-1.0, 1.0, (count, n)) for scale in (3.0, 2.0, 5.0))
+    return tuple(
+        scale * rng.uniform(-1.0, 1.0, (count, n)) for scale in (3.0, 2.0, 5.0)
+    )
 
 
 class RodArm:
@@ -26,25 +35,41 @@ class RodArm:
     @classmethod
     def mass_matrix(cls, q: np.ndarray) -> np.ndarray:
         # In absolute angles theta_i: M_ij = c_ij l^2 cos(theta_i - theta_j), c from integrating along the rods.
-        share = np.array([[7.0 / 3.0, 1.5, 0.5], [1.5, 4.0 / 3.0, 0.5], [0.5, 0.5, 1.0 / 3.0]])
+        share = np.array(
+            [[7.0 / 3.0, 1.5, 0.5], [1.5, 4.0 / 3.0, 0.5], [0.5, 0.5, 1.0 / 3.0]]
+        )
         theta = np.cumsum(q)
-        absolute = cls.mass * cls.length**2 * share * np.cos(theta[:, None] - theta[None])
+        absolute = (
+            cls.mass * cls.length**2 * share * np.cos(theta[:, None] - theta[None])
+        )
         to_absolute = np.tril(np.ones((3, 3)))
         return to_absolute.T @ absolute @ to_absolute
 
     @classmethod
     def potential(cls, q: np.ndarray, gravity: float) -> float:
         theta = np.cumsum(q)
-        return cls.mass * gravity * cls.length * float(np.array([2.5, 1.5, 0.5]) @ np.sin(theta))
+        return (
+            cls.mass
+            * gravity
+            * cls.length
+            * float(np.array([2.5, 1.5, 0.5]) @ np.sin(theta))
+        )
 
     @classmethod
     def torque(cls, q, qdot, qddot, gravity: float) -> np.ndarray:
         """Return M qddot + Mdot qdot - d(kinetic)/dq + d(potential)/dq, with differences of closed formulas."""
         h = 1e-6
-        slopes = [(cls.mass_matrix(q + h * e) - cls.mass_matrix(q - h * e)) / (2 * h) for e in np.eye(3)]
+        slopes = [
+            (cls.mass_matrix(q + h * e) - cls.mass_matrix(q - h * e)) / (2 * h)
+            for e in np.eye(3)
+        ]
         rate = sum(slope * speed for slope, speed in zip(slopes, qdot, strict=True))
         kinetic = np.array([0.5 * qdot @ slope @ qdot for slope in slopes])
-        pull = [(cls.potential(q + h * e, gravity) - cls.potential(q - h * e, gravity)) / (2 * h) for e in np.eye(3)]
+        pull = [
+            (cls.potential(q + h * e, gravity) - cls.potential(q - h * e, gravity))
+            / (2 * h)
+            for e in np.eye(3)
+        ]
         return cls.mass_matrix(q) @ qddot + rate @ qdot - kinetic + np.array(pull)
 
 
@@ -57,9 +82,15 @@ def test_scara_joint_names_and_forward_kinematics(scara_urdf):
     for q in np.random.default_rng(0).uniform(-7.0, 7.0, (20, 3)):
         theta = np.cumsum(q)
         placement = robot.tool_placement(q)
-        np.testing.assert_allclose(placement.translation, [np.cos(theta).sum(), np.sin(theta).sum(), 0.0], atol=1e-14)
+        np.testing.assert_allclose(
+            placement.translation,
+            [np.cos(theta).sum(), np.sin(theta).sum(), 0.0],
+            atol=1e-14,
+        )
         tool = placement.rotation[:, 0]
-        np.testing.assert_allclose(tool, [np.cos(theta[2]), np.sin(theta[2]), 0.0], atol=1e-14)
+        np.testing.assert_allclose(
+            tool, [np.cos(theta[2]), np.sin(theta[2]), 0.0], atol=1e-14
+        )
 
 
 @pytest.mark.parametrize("gravity", [0.0, 9.81])
@@ -67,8 +98,12 @@ def test_scara_is_three_slender_rods(scara_urdf, gravity):
     robot = Robot.from_urdf(scara_urdf, gravity=[0.0, -gravity, 0.0])
     q, qdot, qddot = states(3)
     exact = dynamics.torque_derivatives(robot, q, qdot, qddot)
-    expected = np.array([RodArm.torque(*state, gravity) for state in zip(q, qdot, qddot, strict=True)])
-    np.testing.assert_allclose(dynamics.torque(robot, q, qdot, qddot), expected, atol=1e-6)
+    expected = np.array(
+        [RodArm.torque(*state, gravity) for state in zip(q, qdot, qddot, strict=True)]
+    )
+    np.testing.assert_allclose(
+        dynamics.torque(robot, q, qdot, qddot), expected, atol=1e-6
+    )
     matrices = np.array([RodArm.mass_matrix(posture) for posture in q])
     np.testing.assert_allclose(exact.qddot, matrices, atol=1e-12)
 
@@ -80,11 +115,15 @@ def test_friction_formula():
     armature, viscous = np.array([0.3, 0.2, 0.1]), np.array([4.0, 0.0, 2.0])
     expected = armature * qddot + viscous * qdot + 5.0 * np.tanh(qdot / 0.4)
     assert np.abs(expected).min() > 0.0
-    added = dynamics.torque(robot, q, qdot, qddot) - dynamics.torque(rigid, q, qdot, qddot)
+    added = dynamics.torque(robot, q, qdot, qddot) - dynamics.torque(
+        rigid, q, qdot, qddot
+    )
     np.testing.assert_allclose(added, expected, atol=1e-12)
 
 
-@pytest.mark.parametrize(("pattern", "plane"), [("RPR", "xz"), ("CRR", "tilted"), ("RRP", "xy")])
+@pytest.mark.parametrize(
+    ("pattern", "plane"), [("RPR", "xz"), ("CRR", "tilted"), ("RRP", "xy")]
+)
 def test_derivatives_against_central_differences(pattern, plane):
     robot = planar_robot(pattern, plane, friction=FRICTION, gravity=[1.0, -2.0, -9.81])
     state = states(3)
@@ -99,7 +138,9 @@ def test_derivatives_against_central_differences(pattern, plane):
                 moved[place] = state[place] + sign * h * np.eye(3)[joint]
                 sides.append(dynamics.torque(robot, *moved))
             difference = (sides[0] - sides[1]) / (2.0 * h)
-            np.testing.assert_allclose(block[:, :, joint], difference, atol=2e-8 * np.abs(block).max())
+            np.testing.assert_allclose(
+                block[:, :, joint], difference, atol=2e-8 * np.abs(block).max()
+            )
 
 
 def test_coulomb_derivative_is_finite_far_from_rest():
@@ -114,33 +155,50 @@ def test_coulomb_derivative_is_finite_far_from_rest():
 
 def test_one_joint_alone():
     robot = Robot.from_urdf(
-        "one", urdf_text=chain_urdf([Joint("prismatic", axis=(1.0, 0.0, 0.0))], tool=(0.1, 0.0, 0.0))
+        "one",
+        urdf_text=chain_urdf(
+            [Joint("prismatic", axis=(1.0, 0.0, 0.0))], tool=(0.1, 0.0, 0.0)
+        ),
     )
     q, qdot, qddot = states(1)
-    np.testing.assert_allclose(dynamics.torque(robot, q, qdot, qddot), 2.0 * qddot, atol=1e-12)
-    np.testing.assert_allclose(dynamics.torque_derivatives(robot, q, qdot, qddot).qddot, np.full((12, 1, 1), 2.0))
+    np.testing.assert_allclose(
+        dynamics.torque(robot, q, qdot, qddot), 2.0 * qddot, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        dynamics.torque_derivatives(robot, q, qdot, qddot).qddot,
+        np.full((12, 1, 1), 2.0),
+    )
 
 
 def test_pinocchio_adds_the_armature_of_the_model_but_neither_friction_and_damping_nor_rotors():
     plain = chain_urdf([Joint("revolute", xyz=(0.4, 0.0, 0.0))])
-    damped = plain.replace("</joint>", "<dynamics damping='7' friction='3'/></joint>", 2)
+    damped = plain.replace(
+        "</joint>", "<dynamics damping='7' friction='3'/></joint>", 2
+    )
     models = [pin.buildModelFromXML(text) for text in (plain, damped)]
     assert models[1].damping[0] == 7.0
     args = (np.array([0.3]), np.array([2.0]), np.array([5.0]))
     tau = [pin.rnea(model, model.createData(), *args)[0] for model in models]
     assert tau[1] == tau[0]
     assert models[1].friction[0] == models[1].upperDryFrictionLimit[0] == 3.0
-    models[1].rotorInertia, models[1].rotorGearRatio = np.array([1e-3]), np.array([100.0])
+    models[1].rotorInertia, models[1].rotorGearRatio = (
+        np.array([1e-3]),
+        np.array([100.0]),
+    )
     assert pin.rnea(models[1], models[1].createData(), *args)[0] == tau[0]
     models[0].armature = np.array([0.6])
-    assert pin.rnea(models[0], models[0].createData(), *args)[0] == pytest.approx(tau[0] + 0.6 * 5.0)
+    assert pin.rnea(models[0], models[0].createData(), *args)[0] == pytest.approx(
+        tau[0] + 0.6 * 5.0
+    )
 
 
 def test_brachis_counts_armature_once():
     plain = chain_urdf([Joint("revolute", xyz=(0.4, 0.0, 0.0))])
     args = (np.array([[0.3]]), np.array([[2.0]]), np.array([[5.0]]))
     tau = [
-        dynamics.torque(Robot.from_urdf("x", urdf_text=plain, friction=friction), *args)[0, 0]
+        dynamics.torque(
+            Robot.from_urdf("x", urdf_text=plain, friction=friction), *args
+        )[0, 0]
         for friction in (None, {"armature": 0.6})
     ]
     assert tau[1] == pytest.approx(tau[0] + 0.6 * 5.0)
@@ -154,8 +212,14 @@ def test_brachis_counts_armature_once():
             {"armature": [0.0, float("nan"), 0.0]},
             r"robot\.friction\.armature\.j2: is negative, too large or not a number",
         ),
-        ({"coulomb_velocity": 0.0}, r"robot\.friction\.coulomb_velocity: is not a usable speed"),
-        ({"coulomb": [1.0]}, r"robot\.friction\.coulomb: has the wrong number of values"),
+        (
+            {"coulomb_velocity": 0.0},
+            r"robot\.friction\.coulomb_velocity: is not a usable speed",
+        ),
+        (
+            {"coulomb": [1.0]},
+            r"robot\.friction\.coulomb: has the wrong number of values",
+        ),
     ],
 )
 def test_friction_that_cannot_be(friction, words):

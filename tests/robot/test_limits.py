@@ -24,7 +24,9 @@ def with_limit(**changes) -> Robot:
     limit = {"lower": -1.0, "upper": 1.0, "velocity": 1.0, "effort": 1.0, **changes}
     limit = {key: value for key, value in limit.items() if value is not None}
     joints = [Joint("revolute"), Joint("revolute", limit=limit)]
-    return Robot.from_urdf("file.urdf", urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0)))
+    return Robot.from_urdf(
+        "file.urdf", urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0))
+    )
 
 
 @pytest.mark.parametrize(
@@ -44,11 +46,15 @@ def with_limit(**changes) -> Robot:
     ids=str,
 )
 def test_forms_of_a_limit(value, expected):
-    np.testing.assert_array_equal(limits_of(torque=value, acceleration=9.0).torque, expected)
+    np.testing.assert_array_equal(
+        limits_of(torque=value, acceleration=9.0).torque, expected
+    )
 
 
 def test_every_kind_goes_to_its_own_place():
-    limits = limits_of(torque=1.0, velocity=2.0, acceleration=3.0, position=[[-4.0, 5.0]] * 3)
+    limits = limits_of(
+        torque=1.0, velocity=2.0, acceleration=3.0, position=[[-4.0, 5.0]] * 3
+    )
     for values, expected in (
         (limits.torque, 1.0),
         (limits.velocity, 2.0),
@@ -61,7 +67,9 @@ def test_every_kind_goes_to_its_own_place():
 
 def test_urdf_has_no_acceleration():
     np.testing.assert_array_equal(limits_of().acceleration, [INF] * 3)
-    np.testing.assert_array_equal(limits_of(acceleration={"j2": 4.0}).acceleration, [INF, 4.0, INF])
+    np.testing.assert_array_equal(
+        limits_of(acceleration={"j2": 4.0}).acceleration, [INF, 4.0, INF]
+    )
 
 
 @pytest.mark.parametrize(
@@ -83,15 +91,27 @@ def test_forms_of_a_range(value, lower, upper):
 
 
 def test_scale_comes_last():
-    limits = limits_of(torque=10.0, acceleration=4.0, scale={"torque": 0.5, "velocity": 0.1, "acceleration": 0.25})
+    limits = limits_of(
+        torque=10.0,
+        acceleration=4.0,
+        scale={"torque": 0.5, "velocity": 0.1, "acceleration": 0.25},
+    )
     np.testing.assert_allclose(limits.torque, 5.0)
     np.testing.assert_allclose(limits.velocity, [0.3, 0.31, 0.32])
     np.testing.assert_allclose(limits.acceleration, 1.0)
-    np.testing.assert_array_equal(limits_of(torque=None, acceleration=1.0, scale={"torque": 0.5}).torque, [INF] * 3)
+    np.testing.assert_array_equal(
+        limits_of(torque=None, acceleration=1.0, scale={"torque": 0.5}).torque,
+        [INF] * 3,
+    )
 
 
 @pytest.mark.parametrize(
-    ("changes", "kind"), [({"effort": 0.0}, "torque"), ({"effort": -1.0}, "torque"), ({"velocity": 0.0}, "velocity")]
+    ("changes", "kind"),
+    [
+        ({"effort": 0.0}, "torque"),
+        ({"effort": -1.0}, "torque"),
+        ({"velocity": 0.0}, "velocity"),
+    ],
 )
 def test_limit_of_the_urdf_that_is_not_positive(changes, kind):
     with pytest.raises(LimitError) as caught:
@@ -109,12 +129,16 @@ def test_limit_of_the_task_that_is_not_positive(kind, value):
         limits_of(**{kind: {"j3": value}})
     assert caught.value.joint == "j3"
     assert caught.value.key == f"robot.limits.{kind}.j3"
-    assert f"{kind} limit in the task is not positive; found {value:g}" in str(caught.value)
+    assert f"{kind} limit in the task is not positive; found {value:g}" in str(
+        caught.value
+    )
 
 
 @pytest.mark.parametrize("value", ["ten", {"j1": "ten"}], ids=str)
 def test_limit_that_is_no_number(value):
-    with pytest.raises(LimitError, match="torque limit in the task is not a number") as caught:
+    with pytest.raises(
+        LimitError, match="torque limit in the task is not a number"
+    ) as caught:
         limits_of(torque=value)
     assert caught.value.key == "robot.limits.torque.j1"
 
@@ -126,15 +150,25 @@ def test_scale_that_is_not_positive(factor):
 
 
 def test_what_a_program_says_of_limits_is_what_a_task_keeps():
-    given = {"torque": np.array([1.0, 2.0, 3.0]), "position": {"j1": np.array([-1.0, 1.0])}, "scale": {"velocity": 0.5}}
+    given = {
+        "torque": np.array([1.0, 2.0, 3.0]),
+        "position": {"j1": np.array([-1.0, 1.0])},
+        "scale": {"velocity": 0.5},
+    }
     robot = planar_robot("RRR", limits=LimitSpec(**given))
-    assert robot.settings.limits == LimitSpec(**given | {"torque": {"j1": 1.0, "j2": 2.0, "j3": 3.0}})
+    assert robot.settings.limits == LimitSpec(
+        **given | {"torque": {"j1": 1.0, "j2": 2.0, "j3": 3.0}}
+    )
     again = robot_from_settings(robot.settings, urdf_text=robot.urdf)
     assert again.settings.limits == robot.settings.limits
     np.testing.assert_array_equal(again.limits.torque, robot.limits.torque)
 
 
-@pytest.mark.parametrize("wrong", [{"torque": True}, {"acceleration": np.inf}, {"scale": {"torque": True}}], ids=str)
+@pytest.mark.parametrize(
+    "wrong",
+    [{"torque": True}, {"acceleration": np.inf}, {"scale": {"torque": True}}],
+    ids=str,
+)
 def test_what_a_task_could_not_keep_is_refused(wrong):
     with pytest.raises(TaskError, match=f"limits.{next(iter(wrong))}"):
         limits_of(**wrong)
@@ -155,7 +189,9 @@ def test_neither_torque_nor_acceleration():
 
 
 def test_urdf_without_effort():
-    with pytest.raises(LimitError, match="neither a torque nor an acceleration limit") as caught:
+    with pytest.raises(
+        LimitError, match="neither a torque nor an acceleration limit"
+    ) as caught:
         with_limit(effort=None)
     assert caught.value.joint == "j2"
 
@@ -172,7 +208,10 @@ def test_wrong_length(kind):
     value = [[-1.0, 1.0]] * 2 if kind == "position" else [1.0, 2.0]
     with pytest.raises(InputError) as caught:
         limits_of(**{kind: value})
-    assert f"robot.limits.{kind}: has the wrong number of values; found 2; allowed: 3" in str(caught.value)
+    assert (
+        f"robot.limits.{kind}: has the wrong number of values; found 2; allowed: 3"
+        in str(caught.value)
+    )
 
 
 def test_empty_range():
@@ -184,7 +223,9 @@ def test_empty_range():
         with_limit(lower=1.0, upper=0.5)
 
 
-@pytest.mark.parametrize("value", [[-1.0, 1.0, 2.0], {"j1": 1.0}, {"j1": [1.0]}, {"j1": ["a", 1.0]}], ids=str)
+@pytest.mark.parametrize(
+    "value", [[-1.0, 1.0, 2.0], {"j1": 1.0}, {"j1": [1.0]}, {"j1": ["a", 1.0]}], ids=str
+)
 def test_range_of_a_wrong_shape(value):
     with pytest.raises(InputError, match="position"):
         limits_of(position=value)
@@ -195,13 +236,17 @@ def test_coulomb_friction_that_no_torque_overcomes_is_refused():
     with pytest.raises(InputError, match="Coulomb friction holds joint 'j2'"):
         planar_robot("RR", friction=friction)
     strong = LimitSpec(torque={"j2": 100.0})
-    assert planar_robot("RR", friction=friction, limits=strong).friction.coulomb[1] == 90.0
+    assert (
+        planar_robot("RR", friction=friction, limits=strong).friction.coulomb[1] == 90.0
+    )
 
 
 @pytest.mark.parametrize("value", [1e-308, 1e-7, 1e13, 1e300])
 @pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration"])
 def test_limits_that_no_drive_has_are_refused(kind, value):
-    with pytest.raises(LimitError, match=f"{kind} limit is none of a real drive; found") as caught:
+    with pytest.raises(
+        LimitError, match=f"{kind} limit is none of a real drive; found"
+    ) as caught:
         limits_of(**{kind: {"j3": value}})
     assert caught.value.key == f"robot.limits.{kind}.j3"
     assert "1e-06 to 1e+12 in SI units" in str(caught.value)
@@ -210,13 +255,17 @@ def test_limits_that_no_drive_has_are_refused(kind, value):
 @pytest.mark.parametrize("factor", [1e-308, 1e-9, 1e12, 1e308])
 @pytest.mark.parametrize("kind", ["torque", "velocity", "acceleration"])
 def test_scaled_limits_that_no_drive_has_are_refused(kind, factor):
-    with pytest.raises(LimitError, match=f"scaled {kind} limit is none of a real drive") as caught:
+    with pytest.raises(
+        LimitError, match=f"scaled {kind} limit is none of a real drive"
+    ) as caught:
         limits_of(acceleration=9.0, scale={kind: factor})
     assert caught.value.key == f"robot.limits.scale.{kind}"
 
 
 def test_limits_at_the_bounds_are_taken():
-    limits = limits_of(velocity=1e-6, torque=1e12, position={"j1": [-1e6, 1e6], "j2": [0.2, None]})
+    limits = limits_of(
+        velocity=1e-6, torque=1e12, position={"j1": [-1e6, 1e6], "j2": [0.2, None]}
+    )
     np.testing.assert_array_equal(limits.velocity, 1e-6)
     np.testing.assert_array_equal(limits.torque, 1e12)
     assert limits.position_upper[1] == INF
@@ -263,23 +312,37 @@ def test_positions_and_gravity_that_no_robot_has_are_refused():
     [
         ({"j2": [-5.0, 7.0]}, [-80.0, -5.0, -60.0], [80.0, 7.0, 60.0]),
         ([[-5.0, 7.0], 9.0, None], [-5.0, -9.0, -INF], [7.0, 9.0, INF]),
-        (np.array([[-1.0, 2.0], [-3.0, 4.0], [-5.0, 6.0]]), [-1.0, -3.0, -5.0], [2.0, 4.0, 6.0]),
+        (
+            np.array([[-1.0, 2.0], [-3.0, 4.0], [-5.0, 6.0]]),
+            [-1.0, -3.0, -5.0],
+            [2.0, 4.0, 6.0],
+        ),
     ],
     ids=str,
 )
 def test_pairs_of_limits(value, lower, upper):
-    robot = planar_robot("RRR", limits=LimitSpec(torque=value, acceleration=9.0, scale={"torque": 0.5}))
+    robot = planar_robot(
+        "RRR", limits=LimitSpec(torque=value, acceleration=9.0, scale={"torque": 0.5})
+    )
     np.testing.assert_array_equal(robot.limits.torque_lower, 0.5 * np.array(lower))
     np.testing.assert_array_equal(robot.limits.torque_upper, 0.5 * np.array(upper))
-    np.testing.assert_array_equal(robot.limits.torque, 0.5 * np.minimum(upper, -np.array(lower)))
+    np.testing.assert_array_equal(
+        robot.limits.torque, 0.5 * np.minimum(upper, -np.array(lower))
+    )
     again = robot_from_settings(robot.settings, urdf_text=robot.urdf)
     np.testing.assert_array_equal(again.limits.torque_lower, robot.limits.torque_lower)
 
 
-@pytest.mark.parametrize("pair", [[1.0], [1.0, 2.0], [-2.0, -1.0], [-1.0, 0.0], [-1.0, None]], ids=str)
+@pytest.mark.parametrize(
+    "pair", [[1.0], [1.0, 2.0], [-2.0, -1.0], [-1.0, 0.0], [-1.0, None]], ids=str
+)
 def test_pairs_that_are_none_around_zero(pair):
-    with pytest.raises(LimitError, match="torque limit in the task is no pair around zero") as caught:
+    with pytest.raises(
+        LimitError, match="torque limit in the task is no pair around zero"
+    ) as caught:
         limits_of(torque={"j2": pair})
     assert "robot.limits.torque.j2" in str(caught.value)
-    with pytest.raises(LimitError, match="acceleration limit in the task is not a number"):
+    with pytest.raises(
+        LimitError, match="acceleration limit in the task is not a number"
+    ):
         limits_of(acceleration={"j2": [-1.0, 1.0]})

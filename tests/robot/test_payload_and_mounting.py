@@ -21,7 +21,14 @@ TOOL = "tool"
 PAYLOAD = {
     "mass": 4.5,
     "com": [0.05, -0.02, 0.11],
-    "inertia": {"ixx": 0.03, "iyy": 0.04, "izz": 0.02, "ixy": 0.004, "ixz": -0.002, "iyz": 0.003},
+    "inertia": {
+        "ixx": 0.03,
+        "iyy": 0.04,
+        "izz": 0.02,
+        "ixy": 0.004,
+        "ixz": -0.002,
+        "iyz": 0.003,
+    },
 }
 LOAD = """
   <link name="load"><inertial><origin xyz="0.05 -0.02 0.11"/><mass value="4.5"/>
@@ -44,7 +51,9 @@ PLACE = {"xyz": [1, -2, 3], "rpy_deg": np.degrees([0.4, 1.2, -0.6])}
 
 def states(n: int, count: int = 20) -> tuple[np.ndarray, ...]:
     rng = np.random.default_rng(2)
-    return tuple(scale * rng.uniform(-1.0, 1.0, (count, n)) for scale in (2.0, 3.0, 8.0))
+    return tuple(
+        scale * rng.uniform(-1.0, 1.0, (count, n)) for scale in (2.0, 3.0, 8.0)
+    )
 
 
 def edited(*parts: str, text: str = IIWA, tool: str = TOOL, root: str = "base") -> str:
@@ -62,30 +71,52 @@ def of(text: str, **options: object) -> Robot:
         ((LOAD,), {"payload": PAYLOAD}, TOOL),
         ((TIP,), {"tool_offset": OFFSET}, "tip"),
         ((HALL,), {"mounting": PLACE}, TOOL),
-        ((LOAD, TIP, HALL), {"payload": PAYLOAD, "tool_offset": OFFSET, "mounting": PLACE}, "tip"),
+        (
+            (LOAD, TIP, HALL),
+            {"payload": PAYLOAD, "tool_offset": OFFSET, "mounting": PLACE},
+            "tip",
+        ),
     ],
     ids=["payload", "tool offset", "mounting", "all"],
 )
 def test_a_urdf_edited_by_hand_moves_alike(parts, options, tool):
     root = re.search(r'<link name="(\w+)"', IIWA).group(1)
-    plain, mine, other = of(IIWA), of(IIWA, **options), of(edited(*parts, root=root), tool_frame=tool)
+    plain, mine, other = (
+        of(IIWA),
+        of(IIWA, **options),
+        of(edited(*parts, root=root), tool_frame=tool),
+    )
     q, qdot, qddot = states(7)
     expected = dynamics.torque(other, q, qdot, qddot)
     scale = np.abs(expected).max()
-    np.testing.assert_allclose(dynamics.torque(mine, q, qdot, qddot), expected, atol=1e-9 * scale)
-    exact, hand = (dynamics.torque_derivatives(robot, q, qdot, qddot) for robot in (mine, other))
+    np.testing.assert_allclose(
+        dynamics.torque(mine, q, qdot, qddot), expected, atol=1e-9 * scale
+    )
+    exact, hand = (
+        dynamics.torque_derivatives(robot, q, qdot, qddot) for robot in (mine, other)
+    )
     for part in ("q", "qdot", "qddot"):
-        np.testing.assert_allclose(getattr(exact, part), getattr(hand, part), atol=1e-9 * scale)
-    for here, there in zip(mine.tool_placements(q), other.tool_placements(q), strict=True):
+        np.testing.assert_allclose(
+            getattr(exact, part), getattr(hand, part), atol=1e-9 * scale
+        )
+    for here, there in zip(
+        mine.tool_placements(q), other.tool_placements(q), strict=True
+    ):
         np.testing.assert_allclose(here, there, atol=1e-12)
-    changes_torque = np.abs(dynamics.torque(plain, q, qdot, qddot) - expected).max() > 0.01 * scale
+    changes_torque = (
+        np.abs(dynamics.torque(plain, q, qdot, qddot) - expected).max() > 0.01 * scale
+    )
     assert changes_torque == (options.keys() != {"tool_offset"})
 
 
 def line(**robot: object) -> dict:
     return {
         "brachis": 1,
-        "robot": {"gravity": [0, -9.81, 0], "limits": {"torque": 450, "velocity": None}, **robot},
+        "robot": {
+            "gravity": [0, -9.81, 0],
+            "limits": {"torque": 450, "velocity": None},
+            **robot,
+        },
         "start": {"joints": [0.5, -2.0, 2.0]},
         "task_space": ["x", "y"],
         "path": [{"line": {"by": [-0.4, 0.3]}}],
@@ -95,7 +126,9 @@ def line(**robot: object) -> dict:
     }
 
 
-def test_the_plan_with_a_payload_is_that_of_the_edited_urdf_and_differs_without(scara_urdf, tmp_path):
+def test_the_plan_with_a_payload_is_that_of_the_edited_urdf_and_differs_without(
+    scara_urdf, tmp_path
+):
     text = scara_urdf.read_text()
     hand = tmp_path / "hand.urdf"
     hand.write_text(edited(LOAD, text=text, tool="tool"))
@@ -108,11 +141,18 @@ def test_the_plan_with_a_payload_is_that_of_the_edited_urdf_and_differs_without(
     loaded = brachis.Trajectory.load(tmp_path / "result.npz")
     assert loaded.robot.settings.payload == mine.task.robot.payload
     assert brachis.verify_trajectory(loaded).passed
-    without = brachis.verify_trajectory(loaded, robot=Robot.from_urdf(scara_urdf, gravity=[0, -9.81, 0]))
-    assert [check.name for check in without.checks if not check.passed] == ["torque ratio"]
+    without = brachis.verify_trajectory(
+        loaded, robot=Robot.from_urdf(scara_urdf, gravity=[0, -9.81, 0])
+    )
+    assert [check.name for check in without.checks if not check.passed] == [
+        "torque ratio"
+    ]
 
 
-@pytest.mark.parametrize(("word", "direction"), [("floor", [0, 0, 1]), ("wall", [1, 0, 0]), ("ceiling", [0, 0, -1])])
+@pytest.mark.parametrize(
+    ("word", "direction"),
+    [("floor", [0, 0, 1]), ("wall", [1, 0, 0]), ("ceiling", [0, 0, -1])],
+)
 def test_where_the_base_points(word, direction):
     arm = chain_urdf([Joint("prismatic")], tool=(0.0, 0.0, 0.5))
     robot = Robot.from_urdf("x", urdf_text=arm, tool_frame="tool", mounting=word)
@@ -124,11 +164,16 @@ def test_where_the_base_points(word, direction):
 
 def test_a_rotor_behind_a_gear_counts_as_armature():
     chain = planar_urdf("RRP", "xz")
-    geared = {"rotor_inertia": {"j1": 2e-4, "j3": 1e-3}, "gear_ratio": {"j1": 100, "j3": 50.0}}
+    geared = {
+        "rotor_inertia": {"j1": 2e-4, "j3": 1e-3},
+        "gear_ratio": {"j1": 100, "j3": 50.0},
+    }
     robot = of(chain, tool_frame="tool", friction=geared)
     np.testing.assert_allclose(robot.friction.armature, [2.0, 0.0, 2.5])
     same = of(chain, tool_frame="tool", friction={"armature": [2.0, 0.0, 2.5]})
-    np.testing.assert_allclose(*(dynamics.torque(each, *states(3)) for each in (robot, same)), rtol=1e-12)
+    np.testing.assert_allclose(
+        *(dynamics.torque(each, *states(3)) for each in (robot, same)), rtol=1e-12
+    )
     again = robot_from_settings(robot.settings, urdf_text=chain)
     np.testing.assert_array_equal(again.friction.armature, robot.friction.armature)
 
@@ -136,7 +181,10 @@ def test_a_rotor_behind_a_gear_counts_as_armature():
 @pytest.mark.parametrize(
     ("friction", "words"),
     [
-        ({"rotor_inertia": 1e-4}, r"robot\.friction\.gear_ratio\.j1: the rotor of joint 'j1' has no gear ratio"),
+        (
+            {"rotor_inertia": 1e-4},
+            r"robot\.friction\.gear_ratio\.j1: the rotor of joint 'j1' has no gear ratio",
+        ),
         (
             {"rotor_inertia": 1e-4, "gear_ratio": 50, "armature": {"j2": 1.0}},
             r"rotor_inertia\.j2: armature and rotor_inertia of joint 'j2' say the same",
@@ -150,7 +198,14 @@ def test_rotors_that_cannot_be(friction, words):
 
 
 DAMPED = chain_urdf(
-    [Joint("revolute", xyz=(0.4, 0.0, 0.0), extra="<dynamics damping='7' friction='3'/>"), Joint("prismatic")]
+    [
+        Joint(
+            "revolute",
+            xyz=(0.4, 0.0, 0.0),
+            extra="<dynamics damping='7' friction='3'/>",
+        ),
+        Joint("prismatic"),
+    ]
 )
 
 
@@ -164,12 +219,15 @@ def test_friction_is_the_urdfs_unless_the_task_says_otherwise():
     }
     for friction, viscous, coulomb in cases.values():
         robot = robot_for(
-            of(DAMPED, tool_frame="tool", friction=friction), check_robot_settings({"friction": friction})
+            of(DAMPED, tool_frame="tool", friction=friction),
+            check_robot_settings({"friction": friction}),
         )
         np.testing.assert_array_equal(robot.friction.viscous, viscous)
         np.testing.assert_array_equal(robot.friction.coulomb, coulomb)
     said = in_use(of(DAMPED, tool_frame="tool"))
-    assert said["viscous friction"] == "j1 7 Nm s/rad, j2 0 N s/m (as the URDF states it)"
+    assert (
+        said["viscous friction"] == "j1 7 Nm s/rad, j2 0 N s/m (as the URDF states it)"
+    )
     off = in_use(of(DAMPED, tool_frame="tool", friction={"viscous": None}))
     assert off["viscous friction"] == "none (other than the URDF's)"
 
@@ -186,7 +244,9 @@ def test_a_gripper_that_its_friction_holds_is_left_out_as_the_message_says():
     held = {"coulomb": {"j3": 1e4}}
     with pytest.raises(InputError, match="holds joint 'j3'") as caught:
         of(text, tool_frame="tool", friction=held)
-    link = re.search(r"end the chain at (\S+) by robot.tool_frame or --tool-frame", caught.value.hint)[1]
+    link = re.search(
+        r"end the chain at (\S+) by robot.tool_frame or --tool-frame", caught.value.hint
+    )[1]
     assert of(text, tool_frame=link).joint_names == ("j1", "j2")
     with pytest.raises(InputError, match="holds joint 'j1'") as caught:
         of(text, tool_frame="tool", friction={"coulomb": {"j1": 1e4}})
@@ -195,26 +255,46 @@ def test_a_gripper_that_its_friction_holds_is_left_out_as_the_message_says():
 
 def test_speed_override_is_a_factor_on_all_velocity_limits_and_nothing_else():
     plain = planar_urdf("RRP")
-    full, half = (of(plain, tool_frame="tool", speed_override=factor) for factor in (1.0, 0.5))
+    full, half = (
+        of(plain, tool_frame="tool", speed_override=factor) for factor in (1.0, 0.5)
+    )
     np.testing.assert_array_equal(half.limits.velocity, 0.5 * full.limits.velocity)
     np.testing.assert_array_equal(half.limits.torque, full.limits.torque)
-    slow = robot_for(half, check_robot_settings({"limits": {"scale": {"velocity": 0.5}}}))
+    slow = robot_for(
+        half, check_robot_settings({"limits": {"scale": {"velocity": 0.5}}})
+    )
     np.testing.assert_array_equal(slow.limits.velocity, 0.25 * full.limits.velocity)
-    assert check_robot_settings({"speed_override": "30 %"}).speed_override == pytest.approx(0.3)
+    assert check_robot_settings(
+        {"speed_override": "30 %"}
+    ).speed_override == pytest.approx(0.3)
     for wrong in (0.0, 1.2, -1.0):
         with pytest.raises(TaskError, match="speed_override: out of range"):
             of(plain, tool_frame="tool", speed_override=wrong)
     with pytest.raises(InputError, match="has no velocity limit to act on"):
-        of(plain, tool_frame="tool", speed_override=0.5, limits=brachis.LimitSpec(velocity=None))
+        of(
+            plain,
+            tool_frame="tool",
+            speed_override=0.5,
+            limits=brachis.LimitSpec(velocity=None),
+        )
 
 
 def test_everything_is_combined_with_a_task():
     asked = check_robot_settings(
-        {"payload": PAYLOAD, "tool_offset": {"xyz": [0, 0, 0.2]}, "mounting": "wall", "speed_override": 0.5}
+        {
+            "payload": PAYLOAD,
+            "tool_offset": {"xyz": [0, 0, 0.2]},
+            "mounting": "wall",
+            "speed_override": 0.5,
+        }
     )
     made = robot_for(of(IIWA), asked)
     alone = of(
-        IIWA, payload=PAYLOAD, tool_offset={"xyz": [0, 0, 0.2]}, mounting={"rpy_deg": [0, 90, 0]}, speed_override=0.5
+        IIWA,
+        payload=PAYLOAD,
+        tool_offset={"xyz": [0, 0, 0.2]},
+        mounting={"rpy_deg": [0, 90, 0]},
+        speed_override=0.5,
     )
     assert made.settings == alone.settings
     assert made.model == alone.model
@@ -227,11 +307,19 @@ def test_everything_is_combined_with_a_task():
     ("given", "asked", "key"),
     [
         ({"payload": PAYLOAD}, {"payload": {"mass": 2}}, "robot.payload"),
-        ({"tool_offset": {"xyz": [0, 0, 1]}}, {"tool_offset": {"xyz": [0, 0, 2]}}, "robot.tool_offset.xyz"),
+        (
+            {"tool_offset": {"xyz": [0, 0, 1]}},
+            {"tool_offset": {"xyz": [0, 0, 2]}},
+            "robot.tool_offset.xyz",
+        ),
         ({"mounting": "wall"}, {"mounting": "ceiling"}, "robot.mounting.rpy_deg"),
         ({"mounting": "wall"}, {"mounting": "floor"}, "robot.mounting.rpy_deg"),
         ({"speed_override": 0.5}, {"speed_override": 0.7}, "robot.speed_override"),
-        ({"friction": {"coulomb": None}}, {"friction": {"coulomb": 1.0}}, "robot.friction.coulomb"),
+        (
+            {"friction": {"coulomb": None}},
+            {"friction": {"coulomb": 1.0}},
+            "robot.friction.coulomb",
+        ),
     ],
 )
 def test_contradictions_are_refused_with_their_key(given, asked, key):
@@ -245,7 +333,10 @@ def test_contradictions_are_refused_with_their_key(given, asked, key):
     [
         ({"payload": {"mass": -1}}, r"robot.*payload\.mass: out of range"),
         ({"payload": {"com": [0, 0, 0]}}, "mass"),
-        ({"payload": {"mass": 1, "inertia": {"ixx": 1, "iyy": 1, "izz": 9}}}, r"payload\.inertia: is none of a rigid"),
+        (
+            {"payload": {"mass": 1, "inertia": {"ixx": 1, "iyy": 1, "izz": 9}}},
+            r"payload\.inertia: is none of a rigid",
+        ),
         ({"mounting": "roof"}, "mounting: no mounting.*floor, wall, ceiling"),
         ({"tool_offset": {"xyz": [0, 0]}}, r"tool_offset\.xyz"),
     ],

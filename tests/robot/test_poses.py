@@ -43,7 +43,9 @@ def test_difference_of_poses_is_the_displacement_in_the_second_ones_frame():
         shift, turn = size * rng.normal(size=3), size * rng.normal(size=3) / 2.0
         moved = pose * pin.SE3(pin.exp3(turn), shift)
         found = space.difference(coordinates(moved), coordinates(pose))
-        np.testing.assert_allclose(found, np.append(shift, turn), atol=1e-14 if size < 1.0 else 1e-12)
+        np.testing.assert_allclose(
+            found, np.append(shift, turn), atol=1e-14 if size < 1.0 else 1e-12
+        )
 
 
 def test_batches_of_differences():
@@ -68,7 +70,9 @@ def test_the_virtual_joint_turns_the_tool_about_its_own_z_axis():
     assert robot.n == fixed.n + 1
     assert space.m == 6
     assert bind(robot, "pose_free_roll")[0] is robot
-    expected = fixed.tool_placement(np.array(START)) * pin.SE3(pin.exp3(np.array([0.0, 0.0, 0.7])), np.zeros(3))
+    expected = fixed.tool_placement(np.array(START)) * pin.SE3(
+        pin.exp3(np.array([0.0, 0.0, 0.7])), np.zeros(3)
+    )
     assert robot.tool_placement(np.array([*START, 0.7])).isApprox(expected, 1e-14)
 
 
@@ -79,9 +83,20 @@ def test_the_virtual_joint_has_no_inertia_and_no_limits():
     q, qdot, qddot = rng.normal(size=(3, 5, robot.n))
     tau = dynamics.torque(robot, q, qdot, qddot)
     np.testing.assert_allclose(tau[:, -1], 0.0, atol=1e-12)
-    np.testing.assert_allclose(tau[:, :-1], dynamics.torque(fixed, q[:, :-1], qdot[:, :-1], qddot[:, :-1]), rtol=1e-12)
+    np.testing.assert_allclose(
+        tau[:, :-1],
+        dynamics.torque(fixed, q[:, :-1], qdot[:, :-1], qddot[:, :-1]),
+        rtol=1e-12,
+    )
     limits = robot.limits
-    assert np.isinf([limits.torque[-1], limits.velocity[-1], limits.acceleration[-1], limits.position_upper[-1]]).all()
+    assert np.isinf(
+        [
+            limits.torque[-1],
+            limits.velocity[-1],
+            limits.acceleration[-1],
+            limits.position_upper[-1],
+        ]
+    ).all()
 
 
 def test_a_posture_may_leave_the_virtual_joint_out():

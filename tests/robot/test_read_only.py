@@ -17,7 +17,9 @@ def arrays(kind) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "robot", [planar_robot("RPC"), bind(rail_arm(), "pose_free_roll")[0]], ids=["plain", "rolling"]
+    "robot",
+    [planar_robot("RPC"), bind(rail_arm(), "pose_free_roll")[0]],
+    ids=["plain", "rolling"],
 )
 def test_arrays_of_a_robot_are_read_only(robot):
     for part in (robot.limits, robot.friction):

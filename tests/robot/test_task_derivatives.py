@@ -23,7 +23,9 @@ def case(pattern, plane, rows, count=9):
     task_map = task_map_of(robot, rows)
     rng = np.random.default_rng(4)
     # Small angles keep yaw away from its jump at pi.
-    return task_map, *(scale * rng.uniform(-1.0, 1.0, (count, robot.n)) for scale in (0.6, 2.0, 3.0))
+    return task_map, *(
+        scale * rng.uniform(-1.0, 1.0, (count, robot.n)) for scale in (0.6, 2.0, 3.0)
+    )
 
 
 def jacobian_at(task_map, q):
@@ -33,7 +35,10 @@ def jacobian_at(task_map, q):
 def by_joint(function, q, h=1e-5):
     """Central differences of a (K, m) function of postures (K, n): (K, m, n)."""
     steps = h * np.eye(q.shape[1])
-    return np.stack([(function(q + step) - function(q - step)) / (2.0 * h) for step in steps], axis=2)
+    return np.stack(
+        [(function(q + step) - function(q - step)) / (2.0 * h) for step in steps],
+        axis=2,
+    )
 
 
 @pytest.mark.parametrize(("pattern", "plane", "rows"), CASES, ids=str)
@@ -51,7 +56,9 @@ def test_bias_is_the_acceleration_at_constant_joint_velocity(pattern, plane, row
     values = [task_map.values(q + t * qdot) for t in (-h, 0.0, h)]
     expected = (values[0] - 2.0 * values[1] + values[2]) / h**2
     assert np.abs(expected).max() > 0.1
-    np.testing.assert_allclose(task_map.bias(task_map.twists(q), qdot), expected, atol=1e-5)
+    np.testing.assert_allclose(
+        task_map.bias(task_map.twists(q), qdot), expected, atol=1e-5
+    )
 
 
 def check_derivatives(task_map, q, qdot, qddot):
@@ -66,10 +73,26 @@ def check_derivatives(task_map, q, qdot, qddot):
 
     exact = task_map.derivatives(task_map.twists(q), qdot, qddot)
     np.testing.assert_allclose(exact.velocity_q, by_joint(velocity, q), atol=1e-8)
-    np.testing.assert_allclose(task_map.velocity_slopes(task_map.twists(q), qdot), exact.velocity_q, atol=1e-14)
-    np.testing.assert_allclose(exact.acceleration_q, by_joint(lambda p: acceleration(p, qdot), q), atol=1e-7)
-    np.testing.assert_allclose(exact.acceleration_qdot, by_joint(lambda v: acceleration(q, v), qdot), atol=1e-7)
-    assert min(np.abs(part).max() for part in (exact.velocity_q, exact.acceleration_q, exact.acceleration_qdot)) > 0.1
+    np.testing.assert_allclose(
+        task_map.velocity_slopes(task_map.twists(q), qdot), exact.velocity_q, atol=1e-14
+    )
+    np.testing.assert_allclose(
+        exact.acceleration_q, by_joint(lambda p: acceleration(p, qdot), q), atol=1e-7
+    )
+    np.testing.assert_allclose(
+        exact.acceleration_qdot, by_joint(lambda v: acceleration(q, v), qdot), atol=1e-7
+    )
+    assert (
+        min(
+            np.abs(part).max()
+            for part in (
+                exact.velocity_q,
+                exact.acceleration_q,
+                exact.acceleration_qdot,
+            )
+        )
+        > 0.1
+    )
 
 
 @pytest.mark.parametrize(("pattern", "plane", "rows"), CASES, ids=str)
@@ -83,7 +106,9 @@ def test_one_joint_alone():
     task_map = task_map_of(robot, ["x"])
     q = np.array([[0.3], [0.4]])
     np.testing.assert_allclose(jacobian_at(task_map, q), np.full((2, 1, 1), 0.6))
-    np.testing.assert_allclose(task_map.bias(task_map.twists(q), q), np.zeros((2, 1)), atol=1e-15)
+    np.testing.assert_allclose(
+        task_map.bias(task_map.twists(q), q), np.zeros((2, 1)), atol=1e-15
+    )
     for part in vars(task_map.derivatives(task_map.twists(q), q, q)).values():
         np.testing.assert_allclose(part, np.zeros((2, 1, 1)), atol=1e-15)
 
@@ -91,13 +116,17 @@ def test_one_joint_alone():
 def pose_case(space):
     robot, task_map = bind(rail_arm(), space)
     rng = np.random.default_rng(5)
-    return task_map, *(scale * rng.uniform(-1.0, 1.0, (7, robot.n)) for scale in (2.0, 2.0, 3.0))
+    return task_map, *(
+        scale * rng.uniform(-1.0, 1.0, (7, robot.n)) for scale in (2.0, 2.0, 3.0)
+    )
 
 
 def twist(task_map, q, direction, h=1e-4):
     """Body twist (K, 6) of the motion q + t * direction at t = 0, from poses."""
     ahead, here, behind = (task_map.values(q + t * direction) for t in (h, 0.0, -h))
-    return (task_map.difference(ahead, here) - task_map.difference(behind, here)) / (2.0 * h)
+    return (task_map.difference(ahead, here) - task_map.difference(behind, here)) / (
+        2.0 * h
+    )
 
 
 @pytest.mark.parametrize("space", ["pose", "pose_free_roll"])
@@ -105,7 +134,9 @@ def test_jacobian_of_a_pose_gives_the_body_twist(space):
     task_map, q, qdot, _ = pose_case(space)
     jacobian = jacobian_at(task_map, q)
     assert jacobian.shape == (len(q), 6, q.shape[1])
-    np.testing.assert_allclose(np.einsum("kmn,kn->km", jacobian, qdot), twist(task_map, q, qdot), atol=1e-6)
+    np.testing.assert_allclose(
+        np.einsum("kmn,kn->km", jacobian, qdot), twist(task_map, q, qdot), atol=1e-6
+    )
 
 
 @pytest.mark.parametrize("space", ["pose", "pose_free_roll"])
@@ -114,10 +145,18 @@ def test_acceleration_of_a_pose_is_the_derivative_of_the_body_twist(space):
     h = 1e-5
 
     def velocity(t):
-        return np.einsum("kmn,kn->km", jacobian_at(task_map, q + t * qdot + 0.5 * t**2 * qddot), qdot + t * qddot)
+        return np.einsum(
+            "kmn,kn->km",
+            jacobian_at(task_map, q + t * qdot + 0.5 * t**2 * qddot),
+            qdot + t * qddot,
+        )
 
-    exact = np.einsum("kmn,kn->km", jacobian_at(task_map, q), qddot) + task_map.bias(task_map.twists(q), qdot)
-    np.testing.assert_allclose(exact, (velocity(h) - velocity(-h)) / (2.0 * h), atol=1e-7)
+    exact = np.einsum("kmn,kn->km", jacobian_at(task_map, q), qddot) + task_map.bias(
+        task_map.twists(q), qdot
+    )
+    np.testing.assert_allclose(
+        exact, (velocity(h) - velocity(-h)) / (2.0 * h), atol=1e-7
+    )
 
 
 @pytest.mark.parametrize("space", ["pose", "pose_free_roll"])

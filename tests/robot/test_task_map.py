@@ -61,29 +61,41 @@ def test_yaw_turns_from_the_first_row_towards_the_second(plane, rows, sign, axis
     turn = 0.1
     # A rotation by `turn` that carries the first axis towards the second.
     rotation = pin.AngleAxis(turn, np.cross(first, second)).matrix()
-    np.testing.assert_allclose(rotation @ first, np.cos(turn) * first + np.sin(turn) * second, atol=1e-15)
-    turned = space.of_placements(placement.translation[None], (rotation @ placement.rotation)[None])[0]
+    np.testing.assert_allclose(
+        rotation @ first, np.cos(turn) * first + np.sin(turn) * second, atol=1e-15
+    )
+    turned = space.of_placements(
+        placement.translation[None], (rotation @ placement.rotation)[None]
+    )[0]
     assert turned[2] - space.value(q)[2] == pytest.approx(turn)
     # The sign is that of an angular velocity about the positive world axis.
     spin = pin.AngleAxis(turn, np.eye(3)[axis]).matrix()
-    spun = space.of_placements(placement.translation[None], (spin @ placement.rotation)[None])[0]
+    spun = space.of_placements(
+        placement.translation[None], (spin @ placement.rotation)[None]
+    )[0]
     assert spun[2] - space.value(q)[2] == pytest.approx(sign * turn)
 
 
 def test_yaw_is_the_direction_of_a_tool_axis(scara):
     space = task_map_of(scara, ["x", "y", "yaw"])
-    tool_x = scara.tool_placement(np.array([0.5, 0.6, 0.7])).rotation[:, space.tool_axis]
+    tool_x = scara.tool_placement(np.array([0.5, 0.6, 0.7])).rotation[
+        :, space.tool_axis
+    ]
     np.testing.assert_allclose(tool_x, [np.cos(1.8), np.sin(1.8), 0.0], atol=1e-14)
 
 
 def test_batch_equals_single_values(scara):
     space = task_map_of(scara, ["x", "y", "yaw"])
     q = np.random.default_rng(1).uniform(-3.0, 3.0, (7, 3))
-    np.testing.assert_allclose(space.values(q), [space.value(posture) for posture in q], atol=1e-14)
+    np.testing.assert_allclose(
+        space.values(q), [space.value(posture) for posture in q], atol=1e-14
+    )
 
 
 def test_sizes_of_displacements_of_positions_and_angles_apart(scara):
-    position, angle = task_map_of(scara, ["x", "y", "yaw"]).norms(np.array([[3.0, 4.0, -0.5], [0.0, 0.0, 2.0]]))
+    position, angle = task_map_of(scara, ["x", "y", "yaw"]).norms(
+        np.array([[3.0, 4.0, -0.5], [0.0, 0.0, 2.0]])
+    )
     np.testing.assert_allclose(position, [5.0, 0.0])
     np.testing.assert_allclose(angle, [0.5, 2.0])
     position, angle = task_map_of(scara, ["y"]).norms(np.array([[-3.0]]))
@@ -100,7 +112,16 @@ def test_a_map_survives_pickling(scara):
 
 @pytest.mark.parametrize(
     "rows",
-    [[], ["x", "x"], ["yaw"], ["x", "w"], ["x", "yaw"], ["yaw", "x", "y"], ["x", "yaw", "y"], ["x", "y", "z", "yaw"]],
+    [
+        [],
+        ["x", "x"],
+        ["yaw"],
+        ["x", "w"],
+        ["x", "yaw"],
+        ["yaw", "x", "y"],
+        ["x", "yaw", "y"],
+        ["x", "y", "z", "yaw"],
+    ],
     ids=str,
 )
 def test_rows_that_make_no_sense(scara, rows):

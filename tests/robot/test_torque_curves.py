@@ -22,7 +22,11 @@ def robot(**limits):
 def test_its_torque_at_rest_is_a_plain_limit_and_all_are_scaled():
     scale = LimitScale(torque=0.5, power=0.1, rms_torque=0.2)
     limits = robot(
-        torque_speed={"j2": CURVE}, power=[20.0, None, 30.0], total_power=40.0, rms_torque=5.0, scale=scale
+        torque_speed={"j2": CURVE},
+        power=[20.0, None, 30.0],
+        total_power=40.0,
+        rms_torque=5.0,
+        scale=scale,
     ).limits
     assert limits.torque_speed == ((), ((0.0, 25.0), (1.0, 25.0), (2.0, 10.0)), ())
     np.testing.assert_allclose(limits.torque, [40.0, 25.0, 65.0])
@@ -33,7 +37,9 @@ def test_its_torque_at_rest_is_a_plain_limit_and_all_are_scaled():
 
 def test_a_curve_is_torque_limit_enough():
     curves = dict.fromkeys(("j1", "j2", "j3"), CURVE)
-    np.testing.assert_array_equal(robot(torque=None, torque_speed=curves).limits.torque, 50.0)
+    np.testing.assert_array_equal(
+        robot(torque=None, torque_speed=curves).limits.torque, 50.0
+    )
     with pytest.raises(LimitError, match="neither a torque nor an acceleration limit"):
         robot(torque=None, torque_speed={"j1": CURVE})
 
@@ -43,11 +49,27 @@ def test_a_curve_is_torque_limit_enough():
     [
         ([[0.0, 50.0]], "robot.limits.torque_speed.j1", "two or more points"),
         ([[0.5, 50.0], [1.0, 20.0]], "robot.limits.torque_speed.j1", "begin at 0"),
-        ([[0.0, 50.0], [2.0, 40.0], [1.0, 20.0]], "robot.limits.torque_speed.j1", "ascend"),
-        ([[0.0, 50.0], [1.0, 60.0]], "robot.limits.torque_speed.j1[1]", "rises with the speed"),
-        ([[0.0, 50.0], [1.0, 20.0], [2.0, 21.0]], "robot.limits.torque_speed.j1[2]", "stay or fall"),
+        (
+            [[0.0, 50.0], [2.0, 40.0], [1.0, 20.0]],
+            "robot.limits.torque_speed.j1",
+            "ascend",
+        ),
+        (
+            [[0.0, 50.0], [1.0, 60.0]],
+            "robot.limits.torque_speed.j1[1]",
+            "rises with the speed",
+        ),
+        (
+            [[0.0, 50.0], [1.0, 20.0], [2.0, 21.0]],
+            "robot.limits.torque_speed.j1[2]",
+            "stay or fall",
+        ),
         ([[0.0, 50.0], [1.0, -1.0]], "robot.limits.torque_speed.j1", "torques >= 0"),
-        ([[0.0, 50.0], [1.0, "much"]], "robot.limits.torque_speed.j1", "two or more points"),
+        (
+            [[0.0, 50.0], [1.0, "much"]],
+            "robot.limits.torque_speed.j1",
+            "two or more points",
+        ),
     ],
 )
 def test_a_curve_that_is_none_is_refused_with_its_key(curve, where, said):
@@ -70,10 +92,17 @@ def test_other_mistakes_are_refused_with_their_key():
 
 
 def test_a_robot_keeps_them_beside_what_a_task_sets():
-    given = robot(torque_speed={"j1": np.array(CURVE)}, power=30.0, total_power=70.0, rms_torque=12.0)
+    given = robot(
+        torque_speed={"j1": np.array(CURVE)},
+        power=30.0,
+        total_power=70.0,
+        rms_torque=12.0,
+    )
     both = robot_for(given, RobotSettings(limits=LimitSpec(velocity=1.5)))
     for name in ("power", "rms_torque", "torque"):
-        np.testing.assert_array_equal(getattr(both.limits, name), getattr(given.limits, name))
+        np.testing.assert_array_equal(
+            getattr(both.limits, name), getattr(given.limits, name)
+        )
     assert both.limits.torque_speed == given.limits.torque_speed
     assert both.limits.total_power == 70.0
     np.testing.assert_array_equal(both.limits.velocity, 1.5)
@@ -81,6 +110,8 @@ def test_a_robot_keeps_them_beside_what_a_task_sets():
 
 def test_the_virtual_joint_of_a_free_roll_has_none():
     arm = bind(rail_arm(), "pose_free_roll")[0]
-    assert np.isinf([arm.limits.power[-1], arm.limits.rms_torque[-1], arm.limits.position_upper[-1]]).all()
+    assert np.isinf(
+        [arm.limits.power[-1], arm.limits.rms_torque[-1], arm.limits.position_upper[-1]]
+    ).all()
     assert arm.limits.position_lower[-1] == -np.inf
     assert arm.limits.torque_speed[-1] == ()

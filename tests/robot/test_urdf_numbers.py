@@ -25,7 +25,9 @@ TEXT = chain_urdf(
 
 def refused(text: str) -> str:
     with pytest.raises(UrdfError) as caught:
-        Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool", limits=LimitSpec(torque=1.0))
+        Robot.from_urdf(
+            "file.urdf", urdf_text=text, tool_frame="tool", limits=LimitSpec(torque=1.0)
+        )
     return str(caught.value)
 
 
@@ -34,7 +36,9 @@ def changed(old: str, new: str, text: str = TEXT) -> str:
     return text.replace(old, new, 1)
 
 
-@pytest.mark.parametrize("bad", ["nan", "inf", "-Infinity", "1e999", "", "1_0", "0x1", "five"])
+@pytest.mark.parametrize(
+    "bad", ["nan", "inf", "-Infinity", "1e999", "", "1_0", "0x1", "five"]
+)
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -43,7 +47,11 @@ def changed(old: str, new: str, text: str = TEXT) -> str:
         ('<mass value="2.0"/>', '<mass value="{}"/>', "link 'link1': <mass value>"),
         ('ixy="0.002"', 'ixy="{}"', "link 'link1': <inertia ixy>"),
         ("xyz='0.4 0.0 0.0'", "xyz='0.4 0.0 {}'", "joint 'j1': <origin xyz>"),
-        ("<axis xyz='0.0 0.0 1.0'/>", "<axis xyz='0.0 {} 1.0'/>", "joint 'j1': <axis xyz>"),
+        (
+            "<axis xyz='0.0 0.0 1.0'/>",
+            "<axis xyz='0.0 {} 1.0'/>",
+            "joint 'j1': <axis xyz>",
+        ),
         ("velocity='3.0'", "velocity='{}'", "joint 'j1': <limit velocity>"),
         ("lower='0.3'", "lower='{}'", "joint 'flap': <limit lower>"),
         ('<mass value="1.5"/>', '<mass value="{}"/>', "link 'aside': <mass value>"),
@@ -65,11 +73,27 @@ def test_an_inertia_that_parsers_drop_in_silence_is_refused():
     ("old", "new", "hint"),
     [
         ('value="2.0"', 'value="1,5"', 'Write value="1.5"'),
-        ("effort='60.0'", "effort='10 Nm'", 'Write numbers alone, in Nm or N, such as effort="10"'),
-        ("effort='60.0'", "effort='10Nm'", 'Write numbers alone, in Nm or N, such as effort="10"'),
+        (
+            "effort='60.0'",
+            "effort='10 Nm'",
+            'Write numbers alone, in Nm or N, such as effort="10"',
+        ),
+        (
+            "effort='60.0'",
+            "effort='10Nm'",
+            'Write numbers alone, in Nm or N, such as effort="10"',
+        ),
         ("<axis xyz='0.0 0.0 1.0'/>", "<axis xyz='0, 0, 1'/>", 'Write xyz="0 0 1"'),
-        ("<axis xyz='0.0 0.0 1.0'/>", "<axis xyz='0,0 0,0 1,0'/>", 'Write xyz="0.0 0.0 1.0"'),
-        ("xyz='0.4 0.0 0.0'", "xyz='0.4m 0.0m 0.0m'", 'Write numbers alone, in m, such as xyz="0.4 0.0 0.0"'),
+        (
+            "<axis xyz='0.0 0.0 1.0'/>",
+            "<axis xyz='0,0 0,0 1,0'/>",
+            'Write xyz="0.0 0.0 1.0"',
+        ),
+        (
+            "xyz='0.4 0.0 0.0'",
+            "xyz='0.4m 0.0m 0.0m'",
+            'Write numbers alone, in m, such as xyz="0.4 0.0 0.0"',
+        ),
     ],
 )
 def test_the_message_says_what_to_write_instead(old, new, hint):
@@ -77,11 +101,19 @@ def test_the_message_says_what_to_write_instead(old, new, hint):
 
 
 def test_missing_and_repeated_figures():
-    assert "link 'link1': <mass value> is missing" in refused(changed('<mass value="2.0"/>', "<mass/>"))
-    assert "link 'link1': <inertia izz> is missing" in refused(changed('izz="0.055"', ""))
-    assert "link 'link1': <mass> is there twice" in refused(changed("<mass", '<mass value="1"/><mass'))
+    assert "link 'link1': <mass value> is missing" in refused(
+        changed('<mass value="2.0"/>', "<mass/>")
+    )
+    assert "link 'link1': <inertia izz> is missing" in refused(
+        changed('izz="0.055"', "")
+    )
+    assert "link 'link1': <mass> is there twice" in refused(
+        changed("<mass", '<mass value="1"/><mass')
+    )
     assert "3 finite numbers" in refused(changed("xyz='0.4 0.0 0.0'", "xyz='0.4 0.0'"))
-    assert "at most 1e+12" in refused(changed('<mass value="2.0"/>', '<mass value="1e13"/>'))
+    assert "at most 1e+12" in refused(
+        changed('<mass value="2.0"/>', '<mass value="1e13"/>')
+    )
 
 
 def test_numbers_that_do_not_count_are_not_read():
@@ -96,8 +128,12 @@ def test_numbers_that_do_not_count_are_not_read():
     [TEXT, planar_urdf("RPC", "tilted")],
 )
 def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
-    robot = Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool", locked_joints={})
-    bodies = stated_chain(read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.3}, "tool").bodies
+    robot = Robot.from_urdf(
+        "file.urdf", urdf_text=text, tool_frame="tool", locked_joints={}
+    )
+    bodies = stated_chain(
+        read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.3}, "tool"
+    ).bodies
     assert [body.joint for body in bodies] == list(robot.joint_names)
     for body, inertia in zip(bodies, list(robot.model.inertias)[1:], strict=True):
         assert body.mass == pytest.approx(inertia.mass, rel=1e-14)
@@ -107,20 +143,29 @@ def test_bodies_summed_up_from_the_file_are_those_of_the_model(text):
         assert bodies[0].links == ("link1", "aside")
         assert bodies[0].mass == 3.5
         # The held flap counts where it is held: another position is another body.
-        other = stated_chain(read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.4}, "tool").bodies
+        other = stated_chain(
+            read_tree(text, "file.urdf"), robot.joint_names, {"flap": 0.4}, "tool"
+        ).bodies
         assert np.abs(other[0].com - bodies[0].com).max() > 1e-3
 
 
 @pytest.mark.parametrize(
-    ("kind", "change"), [("mass", (0.5, 0, 0)), ("centre of mass", (0, 0.1, 0)), ("inertia", (0, 0, 0.1))]
+    ("kind", "change"),
+    [("mass", (0.5, 0, 0)), ("centre of mass", (0, 0.1, 0)), ("inertia", (0, 0, 0.1))],
 )
 def test_a_model_that_weighs_something_else_is_refused(kind, change):
     robot = Robot.from_urdf("file.urdf", urdf_text=TEXT, tool_frame="tool")
-    bodies = stated_chain(read_tree(TEXT, "file.urdf"), robot.joint_names, {"flap": 0.3}, "tool").bodies
+    bodies = stated_chain(
+        read_tree(TEXT, "file.urdf"), robot.joint_names, {"flap": 0.3}, "tool"
+    ).bodies
     model, old = robot.model.copy(), robot.model.inertias[2]
     mass, lever, moment = change
-    model.inertias[2] = pin.Inertia(old.mass + mass, old.lever + lever, old.inertia + moment * np.eye(3))
-    with pytest.raises(UrdfError, match=f"moved by joint 'j2' has another {kind} in the model") as caught:
+    model.inertias[2] = pin.Inertia(
+        old.mass + mass, old.lever + lever, old.inertia + moment * np.eye(3)
+    )
+    with pytest.raises(
+        UrdfError, match=f"moved by joint 'j2' has another {kind} in the model"
+    ) as caught:
         check_bodies(model, bodies, "file.urdf")
     assert "of links tool, link2" in str(caught.value)
     check_bodies(robot.model, bodies, "file.urdf")
@@ -129,7 +174,8 @@ def test_a_model_that_weighs_something_else_is_refused(kind, change):
 def test_long_chains_are_summed_up_without_recursion():
     links = "".join(f"<link name='l{i}'/>" for i in range(3000))
     joints = "".join(
-        f"<joint name='f{i}' type='fixed'><parent link='l{i}'/><child link='l{i + 1}'/></joint>" for i in range(2999)
+        f"<joint name='f{i}' type='fixed'><parent link='l{i}'/><child link='l{i + 1}'/></joint>"
+        for i in range(2999)
     )
     tree = read_tree(f"<robot name='long'>{links}{joints}</robot>", "file.urdf")
     check_numbers(tree, "file.urdf")
@@ -138,9 +184,14 @@ def test_long_chains_are_summed_up_without_recursion():
 
 def test_ghost_links_are_named():
     message = refused(changed("<parent link='link1'/>", "<parent link='ghost'/>"))
-    assert "the parent of joint 'j2' is not a link of the robot; found ghost; allowed: world, base, " in message
+    assert (
+        "the parent of joint 'j2' is not a link of the robot; found ghost; allowed: world, base, "
+        in message
+    )
     assert message.endswith("Add <link name='ghost'/>")
-    assert "Did you mean 'link1'?" in refused(changed("<parent link='link1'/>", "<parent link='lnik1'/>"))
+    assert "Did you mean 'link1'?" in refused(
+        changed("<parent link='link1'/>", "<parent link='lnik1'/>")
+    )
     assert "the child of joint 'j2' is not a link of the robot" in refused(
         changed("<child link='link2'/>", "<child link='ghost'/>")
     )
@@ -153,24 +204,44 @@ def test_xacro_that_is_left_is_named():
     include = '<xacro:include filename="$(find arm)/arm.xacro"/>'
     declared = changed("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
     assert Robot.from_urdf("file.urdf", urdf_text=declared, tool_frame="tool").n == 2
-    for text in (changed("</robot>", include + "</robot>", declared), changed("</robot>", include + "</robot>")):
+    for text in (
+        changed("</robot>", include + "</robot>", declared),
+        changed("</robot>", include + "</robot>"),
+    ):
         message = refused(text)
         assert "xacro" in message
         assert "include" in message
-        assert message.endswith("Expand the file with xacro first: xacro robot.xacro > robot.urdf")
+        assert message.endswith(
+            "Expand the file with xacro first: xacro robot.xacro > robot.urdf"
+        )
     message = refused(changed('<mass value="2.0"/>', '<mass value="${mass}"/>'))
-    assert "link 'link1': the URDF has xacro macros; found <mass value='${mass}'>" in message
+    assert (
+        "link 'link1': the URDF has xacro macros; found <mass value='${mass}'>"
+        in message
+    )
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("<link name='link2'>", "<link name='link1'>", "links share a name; found link1"),
+        (
+            "<link name='link2'>",
+            "<link name='link1'>",
+            "links share a name; found link1",
+        ),
         ("<joint name='j2'", "<joint name='j1'", "joints share a name; found j1"),
         ("<link name='link2'>", "<link>", "a <link> has no name"),
-        ("type='revolute'", "type='revolut'", "joint 'j1' has no known type; found 'revolut'"),
+        (
+            "type='revolute'",
+            "type='revolut'",
+            "joint 'j1' has no known type; found 'revolut'",
+        ),
         ("type='revolute'", "", "joint 'j1' has no known type; found none"),
-        ("<child link='link2'/>", "<child link='link1'/>", "link 'link1' is the child of two joints, 'j1' and 'j2'"),
+        (
+            "<child link='link2'/>",
+            "<child link='link1'/>",
+            "link 'link1' is the child of two joints, 'j1' and 'j2'",
+        ),
     ],
 )
 def test_names_and_types(old, new, words):
@@ -181,14 +252,22 @@ def test_joints_may_have_the_names_of_links():
     plain = Robot.from_urdf("file.urdf", urdf_text=TEXT, tool_frame="tool")
     for name in ("tool_mount", "mount", "flap", "j2"):
         text = changed(f"name='{name}'", "name='aside'")
-        robot = Robot.from_urdf("file.urdf", urdf_text=text, tool_frame="tool", locked_joints={})
-        assert [inertia.mass for inertia in robot.model.inertias] == [inertia.mass for inertia in plain.model.inertias]
+        robot = Robot.from_urdf(
+            "file.urdf", urdf_text=text, tool_frame="tool", locked_joints={}
+        )
+        assert [inertia.mass for inertia in robot.model.inertias] == [
+            inertia.mass for inertia in plain.model.inertias
+        ]
 
 
 def test_a_locked_joint_with_the_name_of_an_inner_link_is_an_error_of_ours():
     held = changed("name='j1'", "name='link1'")
-    with pytest.raises(UrdfError, match="Pinocchio cannot build the model; found Several frames"):
-        Robot.from_urdf("file.urdf", urdf_text=held, tool_frame="tool", locked_joints={"link1": 0.0})
+    with pytest.raises(
+        UrdfError, match="Pinocchio cannot build the model; found Several frames"
+    ):
+        Robot.from_urdf(
+            "file.urdf", urdf_text=held, tool_frame="tool", locked_joints={"link1": 0.0}
+        )
 
 
 def test_a_tool_frame_with_the_name_of_a_joint_is_found():

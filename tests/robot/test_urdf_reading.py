@@ -27,7 +27,11 @@ GRIPPER = """
 
 def load(joints, **options) -> Robot:
     more = options.pop("more", "")
-    return Robot.from_urdf("file.urdf", urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0), more=more), **options)
+    return Robot.from_urdf(
+        "file.urdf",
+        urdf_text=chain_urdf(joints, tool=(0.3, 0.0, 0.0), more=more),
+        **options,
+    )
 
 
 def test_chain_as_written():
@@ -47,8 +51,12 @@ def test_forward_kinematics_are_those_of_the_file():
     assert (model.nq, model.nv) == (4, 3)
     data, frame = model.createData(), model.getFrameId("tool")
     for q in np.random.default_rng(0).uniform(-3.0, 3.0, (20, 3)):
-        pin.framesForwardKinematics(model, data, np.array([q[0], q[1], np.cos(q[2]), np.sin(q[2])]))
-        np.testing.assert_allclose(robot.tool_placement(q).homogeneous, data.oMf[frame].homogeneous, atol=1e-14)
+        pin.framesForwardKinematics(
+            model, data, np.array([q[0], q[1], np.cos(q[2]), np.sin(q[2])])
+        )
+        np.testing.assert_allclose(
+            robot.tool_placement(q).homogeneous, data.oMf[frame].homogeneous, atol=1e-14
+        )
 
 
 def test_continuous_joint_has_no_range_and_keeps_its_other_limits():
@@ -61,21 +69,32 @@ def test_continuous_joint_has_no_range_and_keeps_its_other_limits():
 
 
 def test_gripper_off_the_chain_is_locked_and_its_mass_is_carried():
-    bare, loaded = load([TURN, TURN]), load([TURN, TURN], tool_frame="palm", more=GRIPPER)
+    bare, loaded = (
+        load([TURN, TURN]),
+        load([TURN, TURN], tool_frame="palm", more=GRIPPER),
+    )
     assert loaded.joint_names == ("j1", "j2")
-    carried = [sum(i.mass for i in list(robot.model.inertias)[1:]) for robot in (bare, loaded)]
+    carried = [
+        sum(i.mass for i in list(robot.model.inertias)[1:]) for robot in (bare, loaded)
+    ]
     assert carried == pytest.approx([4.0, 5.0])
     # The finger is held at the end of its range nearest to zero, or where the user says.
     levers = {}
     for held in (0.02, 0.05):
         locked = None if held == 0.02 else {"finger": held}
-        robot = load([TURN, TURN], tool_frame="palm", more=GRIPPER, locked_joints=locked)
+        robot = load(
+            [TURN, TURN], tool_frame="palm", more=GRIPPER, locked_joints=locked
+        )
         levers[held] = robot.model.inertias[2].mass * robot.model.inertias[2].lever
-    np.testing.assert_allclose(levers[0.05] - levers[0.02], [0.0, 0.5 * 0.03, 0.0], atol=1e-14)
+    np.testing.assert_allclose(
+        levers[0.05] - levers[0.02], [0.0, 0.5 * 0.03, 0.0], atol=1e-14
+    )
 
 
 def test_branching_urdf_needs_a_tool_frame():
-    with pytest.raises(UrdfError, match="2 links without children: finger1, finger2") as caught:
+    with pytest.raises(
+        UrdfError, match="2 links without children: finger1, finger2"
+    ) as caught:
         load([TURN, TURN], more=GRIPPER)
     assert "robot.tool_frame" in str(caught.value)
 
@@ -98,7 +117,9 @@ def test_the_last_link_before_the_chains_part():
     text = chain_urdf([TURN, TURN])
     assert first_limb(text, "file.urdf") == Limb(None, "tool", ("tool",))
     branching = text.replace("</robot>", GRIPPER + "</robot>")
-    assert first_limb(branching, "file.urdf") == Limb(None, "palm", ("finger1", "finger2"))
+    assert first_limb(branching, "file.urdf") == Limb(
+        None, "palm", ("finger1", "finger2")
+    )
 
 
 def test_mimic_on_the_chain_is_refused_by_name():
@@ -109,24 +130,40 @@ def test_mimic_on_the_chain_is_refused_by_name():
 
 def test_mimic_off_the_chain_that_follows_the_chain_is_refused_by_name():
     with pytest.raises(UrdfError, match="joint 'follower' mimics 'j1'"):
-        load([TURN, TURN], tool_frame="palm", more=GRIPPER.replace("joint='finger'", "joint='j1'"))
+        load(
+            [TURN, TURN],
+            tool_frame="palm",
+            more=GRIPPER.replace("joint='finger'", "joint='j1'"),
+        )
 
 
 @pytest.mark.parametrize("kind", ["floating", "planar"])
 def test_joints_of_more_coordinates_are_refused_on_the_chain_alone(kind):
-    with pytest.raises(UrdfError, match=f"joint 'j1' cannot be planned for; found type '{kind}'"):
+    with pytest.raises(
+        UrdfError, match=f"joint 'j1' cannot be planned for; found type '{kind}'"
+    ):
         load([Joint(kind, limit=None), TURN])
     robot = load([Joint(kind, limit=None), TURN], base_frame="link1")
     assert robot.joint_names == ("j2",)
 
 
 def test_missing_range_comes_from_the_task_or_is_refused():
-    for joint in (Joint("revolute", limit={"effort": 1.0, "velocity": 1.0}), Joint("prismatic", limit=None)):
-        with pytest.raises(LimitError, match=r"joint 'j1'.*Set robot.limits.position.j1") as caught:
+    for joint in (
+        Joint("revolute", limit={"effort": 1.0, "velocity": 1.0}),
+        Joint("prismatic", limit=None),
+    ):
+        with pytest.raises(
+            LimitError, match=r"joint 'j1'.*Set robot.limits.position.j1"
+        ) as caught:
             load([joint], limits=LimitSpec(torque=1.0))
         assert caught.value.key == "robot.limits.position.j1"
-        ranged = load([joint], limits=LimitSpec(torque=1.0, position={"j1": [-3.0, 2.0]}))
-        assert (ranged.limits.position_lower[0], ranged.limits.position_upper[0]) == (-3.0, 2.0)
+        ranged = load(
+            [joint], limits=LimitSpec(torque=1.0, position={"j1": [-3.0, 2.0]})
+        )
+        assert (ranged.limits.position_lower[0], ranged.limits.position_upper[0]) == (
+            -3.0,
+            2.0,
+        )
     assert load([Joint("continuous", limit={"effort": 1.0, "velocity": 1.0})]).n == 1
 
 
@@ -149,9 +186,15 @@ def inertial(mass: float, moments: tuple[float, float, float]) -> str:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "the body moved by joint 'j2' has no mass; found links tool, link2 without <inertial>"),
+        (
+            "",
+            "the body moved by joint 'j2' has no mass; found links tool, link2 without <inertial>",
+        ),
         (inertial(0.0, (0.0, 0.0, 0.0)), "the body moved by joint 'j2' has no mass"),
-        (inertial(-1.0, (0.1, 0.1, 0.1)), "link 'link2' has a non-physical mass; found -1 kg"),
+        (
+            inertial(-1.0, (0.1, 0.1, 0.1)),
+            "link 'link2' has a non-physical mass; found -1 kg",
+        ),
         (
             inertial(1.0, (0.1, 0.1, 0.3)),
             "link 'link2' has a non-physical inertia; found principal moments 0.1, 0.1, 0.3",
@@ -168,22 +211,34 @@ def test_bodies_that_cannot_be(text, words):
 def test_massless_link_is_fine_where_its_body_has_mass():
     heavy_tool = "<link name='load'>" + inertial(2.0, (0.1, 0.1, 0.1)) + "</link>"
     heavy_tool += "<joint name='grip' type='fixed'><parent link='tool'/><child link='load'/></joint>"
-    robot = load([TURN, Joint("revolute", xyz=(0.4, 0.0, 0.0), inertial="")], more=heavy_tool)
+    robot = load(
+        [TURN, Joint("revolute", xyz=(0.4, 0.0, 0.0), inertial="")], more=heavy_tool
+    )
     assert robot.model.inertias[2].mass == 2.0
 
 
 def test_unknown_frames_and_joints_with_suggestions():
-    with pytest.raises(UnknownNameError, match=r"there is no frame named 'tol'.*Did you mean 'tool'") as caught:
+    with pytest.raises(
+        UnknownNameError, match=r"there is no frame named 'tol'.*Did you mean 'tool'"
+    ) as caught:
         load([TURN], tool_frame="tol")
     assert caught.value.valid == ("world", "base", "tool", "link1")
-    with pytest.raises(UnknownNameError, match=r"base_frame: there is no frame named 'bas'.*Did you mean 'base'"):
+    with pytest.raises(
+        UnknownNameError,
+        match=r"base_frame: there is no frame named 'bas'.*Did you mean 'base'",
+    ):
         load([TURN], base_frame="bas")
-    with pytest.raises(UnknownNameError, match="locked_joints: there is no moving joint named 'j9'"):
+    with pytest.raises(
+        UnknownNameError, match="locked_joints: there is no moving joint named 'j9'"
+    ):
         load([TURN], locked_joints={"j9": 0.0})
 
 
 def test_base_frame_that_is_not_above_the_tool():
-    with pytest.raises(UrdfError, match="the tool frame is not below the base frame; found tool -> link1"):
+    with pytest.raises(
+        UrdfError,
+        match="the tool frame is not below the base frame; found tool -> link1",
+    ):
         load([TURN, TURN], base_frame="tool", tool_frame="link1")
 
 
@@ -192,21 +247,30 @@ def test_base_frame_in_the_middle_holds_what_lies_before_it():
     assert part.joint_names == ("j2", "j3")
     for q in np.random.default_rng(0).uniform(-3.0, 3.0, (5, 2)):
         held = whole.tool_placement(np.array([0.0, *q]))
-        np.testing.assert_allclose(part.tool_placement(q).homogeneous, held.homogeneous, atol=1e-14)
+        np.testing.assert_allclose(
+            part.tool_placement(q).homogeneous, held.homogeneous, atol=1e-14
+        )
 
 
 def test_locked_joint_on_the_chain():
-    whole, part = load([TURN, TURN, TURN]), load([TURN, TURN, TURN], locked_joints={"j2": 0.7})
+    whole, part = (
+        load([TURN, TURN, TURN]),
+        load([TURN, TURN, TURN], locked_joints={"j2": 0.7}),
+    )
     assert part.joint_names == ("j1", "j3")
     zero = np.zeros(3)
     for q in np.random.default_rng(0).uniform(-3.0, 3.0, (5, 2)):
         full = np.array([q[0], 0.7, q[1]])
         np.testing.assert_allclose(
-            part.tool_placement(q).homogeneous, whole.tool_placement(full).homogeneous, atol=1e-14
+            part.tool_placement(q).homogeneous,
+            whole.tool_placement(full).homogeneous,
+            atol=1e-14,
         )
         held = pin.rnea(whole.model, whole.model.createData(), full, zero, zero)[[0, 2]]
         np.testing.assert_allclose(
-            pin.rnea(part.model, part.model.createData(), q, zero[:2], zero[:2]), held, atol=1e-12
+            pin.rnea(part.model, part.model.createData(), q, zero[:2], zero[:2]),
+            held,
+            atol=1e-12,
         )
 
 
@@ -219,9 +283,15 @@ def test_chain_without_moving_joints():
     ("text", "words"),
     [
         ("<robot name='x'><link name='a'>", "not well-formed XML"),
-        ("j1,j2", "not a URDF; found 'j1,j2' at its beginning; .* a URDF, the name of a robot, or a task file"),
+        (
+            "j1,j2",
+            "not a URDF; found 'j1,j2' at its beginning; .* a URDF, the name of a robot, or a task file",
+        ),
         ("", "not a URDF; found '' at its beginning"),
-        ("<sdf version='1.7'></sdf>", "the file is not a URDF; found root element <sdf>"),
+        (
+            "<sdf version='1.7'></sdf>",
+            "the file is not a URDF; found root element <sdf>",
+        ),
         ("<robot name='x'></robot>", "the URDF has no links"),
         ("<robot name='x'><link name='a'/><link name='b'/></robot>", "links"),
     ],
@@ -247,15 +317,15 @@ def test_missing_file_and_binary_file(tmp_path):
 
 def test_file_with_declared_encoding(tmp_path):
     file = tmp_path / "robot.urdf"
-    file.write_text("<?xml version='1.0' encoding='utf-8'?>\n" + planar_urdf("RR"), encoding="utf-8")
+    file.write_text(
+        "<?xml version='1.0' encoding='utf-8'?>\n" + planar_urdf("RR"), encoding="utf-8"
+    )
     assert Robot.from_urdf(file).n == 2
     assert Robot.from_urdf(str(file)).n == 2
 
 
 def test_meshes_are_not_read():
-    mesh = (
-        "<link name='shell'><visual><geometry><mesh filename='package://nowhere/none.stl'/></geometry></visual></link>"
-    )
+    mesh = "<link name='shell'><visual><geometry><mesh filename='package://nowhere/none.stl'/></geometry></visual></link>"
     mesh += "<joint name='cover' type='fixed'><parent link='tool'/><child link='shell'/></joint>"
     assert load([TURN], more=mesh).tool_frame == "shell"
 
@@ -265,12 +335,16 @@ def test_gravity_vector():
     zero = np.zeros(1)
     # Centre of mass of the link and where it was put; torque about z by gravity along -y.
     expected = 2.0 * 2.0 * 0.21
-    assert pin.rnea(robot.model, robot.model.createData(), zero, zero, zero)[0] == pytest.approx(expected)
+    assert pin.rnea(robot.model, robot.model.createData(), zero, zero, zero)[
+        0
+    ] == pytest.approx(expected)
     standard = load([TURN])
     np.testing.assert_array_equal(standard.model.gravity.linear, [0.0, 0.0, -9.81])
 
 
-@pytest.mark.parametrize("gravity", [[0.0, 0.0], [0.0, 0.0, float("nan")], [[0.0, 0.0, 1.0]]])
+@pytest.mark.parametrize(
+    "gravity", [[0.0, 0.0], [0.0, 0.0, float("nan")], [[0.0, 0.0, 1.0]]]
+)
 def test_gravity_that_is_no_vector(gravity):
     with pytest.raises(InputError, match=r"robot\.gravity: is not a vector"):
         load([TURN], gravity=gravity)
@@ -278,10 +352,17 @@ def test_gravity_that_is_no_vector(gravity):
 
 def test_posture_checks():
     robot = planar_robot("RR")
-    np.testing.assert_array_equal(robot.posture({"j2": 2.0, "j1": 1.0}, "start.joints"), [1.0, 2.0])
-    with pytest.raises(InputError, match=r"start\.joints: joints are missing; found j2"):
+    np.testing.assert_array_equal(
+        robot.posture({"j2": 2.0, "j1": 1.0}, "start.joints"), [1.0, 2.0]
+    )
+    with pytest.raises(
+        InputError, match=r"start\.joints: joints are missing; found j2"
+    ):
         robot.posture({"j1": 1.0}, "start.joints")
-    with pytest.raises(InputError, match="wrong number of values; found 3; allowed: 2, one for each of j1, j2"):
+    with pytest.raises(
+        InputError,
+        match="wrong number of values; found 3; allowed: 2, one for each of j1, j2",
+    ):
         robot.posture([1.0, 2.0, 3.0], "start.joints")
     with pytest.raises(UnknownNameError, match="Did you mean 'j1'"):
         robot.posture({"j1x": 1.0}, "start.joints")

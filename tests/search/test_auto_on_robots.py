@@ -27,7 +27,9 @@ def bench():
     folder = str(ROOT / "benchmarks")
     sys.path.insert(0, folder)
     try:
-        spec = importlib.util.spec_from_file_location("random_auto", ROOT / "benchmarks/random_auto.py")
+        spec = importlib.util.spec_from_file_location(
+            "random_auto", ROOT / "benchmarks/random_auto.py"
+        )
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
     finally:
@@ -44,33 +46,75 @@ def test_auto_is_never_slower_than_the_rail_alone(intervals):
     assert rail.verified
     assert auto.verified
     assert auto.t_end <= rail.t_end * (1.0 + 1e-6)
-    assert {candidate.branch for candidate in auto.candidates} == {CHART}, "no closed form is needed"
+    assert {candidate.branch for candidate in auto.candidates} == {CHART}, (
+        "no closed form is needed"
+    )
 
 
-def test_closed_forms_are_left_for_the_last_and_thorough_looks_at_polynomials_too(monkeypatch):
-    monkeypatch.setattr("brachis.search.schedule.numeric_starts", lambda *_given: [])  # come after the lattices
-    for effort, levels in SEARCH_LEVELS.items():  # which choices are looked at does not depend on how closely
-        monkeypatch.setitem(SEARCH_LEVELS, effort, tuple(replace(each, **COARSE) for each in levels))
-    task = brachis.load_task({**brachis.load_task(RAIL_LINE).to_dict(), "redundant_joints": "auto"})
+def test_closed_forms_are_left_for_the_last_and_thorough_looks_at_polynomials_too(
+    monkeypatch,
+):
+    monkeypatch.setattr(
+        "brachis.search.schedule.numeric_starts", lambda *_given: []
+    )  # come after the lattices
+    for (
+        effort,
+        levels,
+    ) in (
+        SEARCH_LEVELS.items()
+    ):  # which choices are looked at does not depend on how closely
+        monkeypatch.setitem(
+            SEARCH_LEVELS, effort, tuple(replace(each, **COARSE) for each in levels)
+        )
+    task = brachis.load_task(
+        {**brachis.load_task(RAIL_LINE).to_dict(), "redundant_joints": "auto"}
+    )
     names: dict[str, set[str]] = {}
     for level in ("fast", "thorough"):
-        asked = task.model_copy(update={"search": task.search.model_copy(update={"effort": level})})
+        asked = task.model_copy(
+            update={"search": task.search.model_copy(update={"effort": level})}
+        )
         problem = Problem.of(robot_from_settings(task.robot), asked)
-        planned = list(batches(problem, decompositions_of(problem), NEVER, lambda _text: None, lambda *_dead_end: None))
-        first = [start for batch in planned if not batch.last_resort for start in batch.starts]
-        last = [start for batch in planned if batch.last_resort for start in batch.starts]
+        planned = list(
+            batches(
+                problem,
+                decompositions_of(problem),
+                NEVER,
+                lambda _text: None,
+                lambda *_dead_end: None,
+            )
+        )
+        first = [
+            start
+            for batch in planned
+            if not batch.last_resort
+            for start in batch.starts
+        ]
+        last = [
+            start for batch in planned if batch.last_resort for start in batch.starts
+        ]
         assert first
         assert {start.joint_map.branch_label for start in first} == {CHART}
         names[level] = {
-            *(name for start in last if start.origin.startswith("lattice") for name in start.joint_map.redundant_joints)
+            *(
+                name
+                for start in last
+                if start.origin.startswith("lattice")
+                for name in start.joint_map.redundant_joints
+            )
         }
     assert names["fast"] == {"rail", "joint_1", "joint_2", "joint_3"}
     assert names["thorough"] == names["fast"] | {"joint_4", "joint_5", "joint_6"}
 
 
-@pytest.mark.parametrize(("name", "count"), [("scara3", 3), ("tx90l_rail", 1), ("ur10_rail", 1), ("iiwa14", 1)])
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("scara3", 3), ("tx90l_rail", 1), ("ur10_rail", 1), ("iiwa14", 1)],
+)
 def test_random_postures_and_lines_with_everything_left_open(bench, name, count):
-    robot = {"scara3": bench.planar_arm()}.get(name) or brachis.Robot.from_urdf(ROOT / f"robots/{name}/robot.urdf")
+    robot = {"scara3": bench.planar_arm()}.get(name) or brachis.Robot.from_urdf(
+        ROOT / f"robots/{name}/robot.urdf"
+    )
     tasks = list(bench.tasks(name, robot, seed=1, count=count))
     assert len(tasks) == count
     for task in tasks:

@@ -18,7 +18,9 @@ ROOT = Path(__file__).parents[2]
 RESTARTS = 4
 LINES_DEG = (180, 270)
 """One with two optima, and the one whose plans with different redundant joints differ most."""
-spec = importlib.util.spec_from_file_location("scara_restarts", ROOT / "benchmarks/scara_restarts.py")
+spec = importlib.util.spec_from_file_location(
+    "scara_restarts", ROOT / "benchmarks/scara_restarts.py"
+)
 bench = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(bench)
 

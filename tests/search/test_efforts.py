@@ -16,8 +16,16 @@ PAGE = Path(__file__).parents[2] / "docs/fastest_motion.md"
 
 def table(columns):
     """Cells of the page's table with so many columns, by the effort in the first one."""
-    rows = [line.split("|")[1:-1] for line in PAGE.read_text().splitlines() if line.startswith("| `")]
-    named = {cells[0].split("`")[1]: [cell.strip() for cell in cells[1:]] for cells in rows if len(cells) == columns}
+    rows = [
+        line.split("|")[1:-1]
+        for line in PAGE.read_text().splitlines()
+        if line.startswith("| `")
+    ]
+    named = {
+        cells[0].split("`")[1]: [cell.strip() for cell in cells[1:]]
+        for cells in rows
+        if len(cells) == columns
+    }
     return {name: cells for name, cells in named.items() if name in SEARCH_LEVELS}
 
 
@@ -31,10 +39,14 @@ def test_the_documented_efforts_are_the_real_ones():
         assert (plans, refined) == (str(level.in_charts), str(level.refined))
     for name, (decompositions, seeds, plans, refined) in in_closed_forms.items():
         level = [level for level in SEARCH_LEVELS[name] if not level.last_resort][-1]
-        assert decompositions == {1: "the first one", 6: "6", 20: "20"}.get(level.decompositions, "all")
+        assert decompositions == {1: "the first one", 6: "6", 20: "20"}.get(
+            level.decompositions, "all"
+        )
         assert seeds.split(",")[0] == str(level.joint_paths)
         assert ("and 8" in seeds) is (level.numeric == 8)
-        assert plans == (str(level.in_closed_forms) if level.in_closed_forms < 10_000 else "all")
+        assert plans == (
+            str(level.in_closed_forms) if level.in_closed_forms < 10_000 else "all"
+        )
         assert refined == str(level.refined)
 
 
@@ -48,17 +60,23 @@ def test_the_documented_efforts_are_the_real_ones():
     ],
 )
 @pytest.mark.parametrize("given", ["start", "end"])
-def test_polynomials_are_looked_at_where_every_closed_form_is_cramped(rooms, start, expected, given):
+def test_polynomials_are_looked_at_where_every_closed_form_is_cramped(
+    rooms, start, expected, given
+):
     start, end = (start, None) if given == "start" else (None, start)
 
     def decomposition(kind, clearance):
         solver = SimpleNamespace(kind=kind)
         problem = SimpleNamespace(start=start, end=end)
-        return SimpleNamespace(match=SimpleNamespace(solver=solver), clearance=clearance, problem=problem)
+        return SimpleNamespace(
+            match=SimpleNamespace(solver=solver), clearance=clearance, problem=problem
+        )
 
     decompositions = [
         *(decomposition("closed_form", clearance) for clearance in rooms),
         decomposition("polynomial", 0.6),
     ]
     (fast,) = SEARCH_LEVELS["fast"]
-    assert [found.match.solver.kind for found in looked_at(decompositions, fast)] == expected
+    assert [
+        found.match.solver.kind for found in looked_at(decompositions, fast)
+    ] == expected

@@ -39,7 +39,9 @@ CHANGES = {
 @pytest.mark.parametrize("name", CHANGES)
 def test_a_known_motion_takes_the_place_of_the_search(known, name):
     told = []
-    result = brachis.plan(known.task, start_from=known, listener=told.append, **CHANGES[name])
+    result = brachis.plan(
+        known.task, start_from=known, listener=told.append, **CHANGES[name]
+    )
     assert result.verified
     assert result.undone == ()
     assert [attempt.origin for attempt in result.candidates] == [GIVEN]
@@ -57,7 +59,11 @@ def test_saved_motions_will_do(known, tmp_path):
 @pytest.mark.parametrize("space", ["pose_with_yaw", "joints"])
 def test_of_other_task_spaces(space):
     if space == "joints":
-        line = {"task_space": "joints", "path": Line(by=[0.3, 0.2, -0.4]), "redundant_joints": "auto"}
+        line = {
+            "task_space": "joints",
+            "path": Line(by=[0.3, 0.2, -0.4]),
+            "redundant_joints": "auto",
+        }
     else:
         line = {"task_space": ["x", "y", "yaw"], "path": Line(by=[0.0, 0.3, 0.1])}
     first = brachis.plan(TASK, **line)

@@ -36,20 +36,29 @@ def lift(limit: float, **changes: object) -> dict:
 def test_a_mean_force_below_the_weight_is_named_with_one_that_is_enough(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 600.0)
     monkeypatch.setattr("brachis.search.remedies._NEAR", 1.3)
-    with pytest.raises(brachis.PlanningError, match="too low to hold the arm against gravity") as caught:
+    with pytest.raises(
+        brachis.PlanningError, match="too low to hold the arm against gravity"
+    ) as caught:
         brachis.plan(lift(0.6 * WEIGHT))
     error = caught.value
     assert error.where == "robot.limits.rms_torque.y_axis"
     assert error.found.startswith(f"{WEIGHT:.4g} N to hold the arm")
     assert error.allowed == f"{0.6 * WEIGHT:.4g} N"
-    advised = float(re.search(r"Raise robot\.limits\.rms_torque\.y_axis to ([\d.]+) N \(a plan", error.hint)[1])
+    advised = float(
+        re.search(
+            r"Raise robot\.limits\.rms_torque\.y_axis to ([\d.]+) N \(a plan",
+            error.hint,
+        )[1]
+    )
     assert WEIGHT < advised < 1.3 * WEIGHT
     assert brachis.plan(lift(advised)).verified
 
 
 def test_no_plan_is_tried_where_no_posture_can_be_held(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
-    monkeypatch.setattr("brachis.planner.solved", lambda *_: pytest.fail("a plan was tried"))
+    monkeypatch.setattr(
+        "brachis.planner.solved", lambda *_: pytest.fail("a plan was tried")
+    )
     with pytest.raises(brachis.PlanningError, match="too low to hold the arm"):
         brachis.plan(lift(0.6 * WEIGHT))
 
@@ -67,12 +76,22 @@ def test_a_mean_torque_along_a_path_of_joints(monkeypatch):
     monkeypatch.setattr("brachis.search.remedies._TIME", 0.0)
     task = {
         "brachis": 1,
-        "robot": {"urdf": str(ROBOTS / "iiwa14/robot.urdf"), "limits": {"rms_torque": {"joint_2": 10.0}}},
+        "robot": {
+            "urdf": str(ROBOTS / "iiwa14/robot.urdf"),
+            "limits": {"rms_torque": {"joint_2": 10.0}},
+        },
         "start": {"joints": [0.0, 0.3, 0.0, -1.2, 0.0, 0.8, 0.0]},
         "task_space": "joints",
         "path": [{"line": {"to": [0.6, 0.5, -0.3, -0.9, 0.4, 0.6, 0.5]}}],
     }
-    with pytest.raises(brachis.PlanningError, match=r"rms torque limit of 'joint_2' is too low to hold") as caught:
+    with pytest.raises(
+        brachis.PlanningError, match=r"rms torque limit of 'joint_2' is too low to hold"
+    ) as caught:
         brachis.plan(task)
-    low, high = map(float, re.match(r"([\d.]+) to ([\d.]+) Nm to hold the arm", caught.value.found).groups())
+    low, high = map(
+        float,
+        re.match(
+            r"([\d.]+) to ([\d.]+) Nm to hold the arm", caught.value.found
+        ).groups(),
+    )
     assert 10.0 < low < high

@@ -28,7 +28,11 @@ START = [math.pi / 6, -2 * math.pi / 3, 2 * math.pi / 3]
 
 def scara(limits: dict[str, Any] | None = None, **options: Any) -> brachis.Robot:
     spec = brachis.LimitSpec(**({"torque": 10.0, "velocity": None} | (limits or {})))
-    return brachis.Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", limits=spec, **({"gravity": [0, 0, 0]} | options))
+    return brachis.Robot.from_urdf(
+        ROOT / "robots/scara3/robot.urdf",
+        limits=spec,
+        **({"gravity": [0, 0, 0]} | options),
+    )
 
 
 def problem(robot: brachis.Robot, **changes: Any) -> Problem:
@@ -42,17 +46,25 @@ def problem(robot: brachis.Robot, **changes: Any) -> Problem:
 
 
 def example(name: str, **changes: Any) -> Problem:
-    task = brachis.load_task(brachis.load_task(ROOT / "examples" / name).to_dict() | changes)
+    task = brachis.load_task(
+        brachis.load_task(ROOT / "examples" / name).to_dict() | changes
+    )
     return Problem.of(robot_from_settings(task.robot), task)
 
 
 CASES = {
     "planar": lambda: problem(scara()),
-    "ranges": lambda: problem(scara({"position": {"j1": [-0.5, 1.5], "j2": [-3.0, 0.0], "j3": [0.0, 3.5]}})),
-    "free start": lambda: problem(scara(), start="free", path_start=[math.sqrt(3.0), 0.0]),
+    "ranges": lambda: problem(
+        scara({"position": {"j1": [-0.5, 1.5], "j2": [-3.0, 0.0], "j3": [0.0, 3.5]}})
+    ),
+    "free start": lambda: problem(
+        scara(), start="free", path_start=[math.sqrt(3.0), 0.0]
+    ),
     "rail": lambda: example("03_tx90l_rail_line.yaml", redundant_joints="auto"),
     "two redundant": lambda: example("06_free_roll.yaml"),
-    "none redundant": lambda: problem(scara(locked_joints={"j3": 0.4}), start={"joints": START[:2]}),
+    "none redundant": lambda: problem(
+        scara(locked_joints={"j3": 0.4}), start={"joints": START[:2]}
+    ),
 }
 
 
@@ -68,19 +80,30 @@ def test_courses_are_motions_of_the_robot(case):
         found += len(joint_paths)
         for joint_path in joint_paths:
             targets = given.path.sample(joint_path.s).target
-            miss = given.task_map.difference(given.task_map.values(joint_path.q), targets)
+            miss = given.task_map.difference(
+                given.task_map.values(joint_path.q), targets
+            )
             assert np.abs(miss).max() < 1e-6
             assert np.abs(np.diff(joint_path.q, axis=0)).max() < 0.9
             assert np.all(joint_path.q >= limits.position_lower - 1e-9)
             assert np.all(joint_path.q <= limits.position_upper + 1e-9)
             still = np.zeros_like(joint_path.q)
-            assert np.all(np.abs(dynamics.torque(robot, joint_path.q, still, still)) <= limits.torque)
-            margins = decomposition.match.solver.branch_margins(joint_path.q, joint_path.branch)
+            assert np.all(
+                np.abs(dynamics.torque(robot, joint_path.q, still, still))
+                <= limits.torque
+            )
+            margins = decomposition.match.solver.branch_margins(
+                joint_path.q, joint_path.branch
+            )
             assert margins.min(initial=1.0) > 0.0
             if given.start is not None:
                 np.testing.assert_allclose(joint_path.q[0], given.start, atol=1e-12)
         stations = [joint_path.q for joint_path in joint_paths]
-        assert all(np.abs(a - b).max() > 0.05 for i, a in enumerate(stations) for b in stations[:i])
+        assert all(
+            np.abs(a - b).max() > 0.05
+            for i, a in enumerate(stations)
+            for b in stations[:i]
+        )
     assert found >= 3 or case == "none redundant"
     assert found
 
@@ -93,7 +116,9 @@ def test_the_shortest_course_comes_first_and_is_shorter_than_any_detour():
 
 
 def test_an_end_posture_is_reached():
-    free = ClosedFormLattice(decompositions_of(problem(scara(), redundant_joints=["j1"]))[0]).joint_paths(3)
+    free = ClosedFormLattice(
+        decompositions_of(problem(scara(), redundant_joints=["j1"]))[0]
+    ).joint_paths(3)
     end = free[-1].q[-1]
     given = problem(scara(), redundant_joints=["j1"], end={"joints": end})
     joint_paths = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(3)
@@ -103,13 +128,24 @@ def test_an_end_posture_is_reached():
 def test_lifts_follow_the_course():
     """Three turns about the base: the joint leaves (-pi, pi]."""
     arm = scara(locked_joints={"j3": 0.4})
-    given = problem(arm, start={"joints": [0.3, 0.9]}, path=[{"circle": {"center": [0.0, 0.0], "turns": 3}}])
+    given = problem(
+        arm,
+        start={"joints": [0.3, 0.9]},
+        path=[{"circle": {"center": [0.0, 0.0], "turns": 3}}],
+    )
     (joint_path,) = ClosedFormLattice(decompositions_of(given)[0]).joint_paths(1)
-    assert joint_path.q[-1, 0] - joint_path.q[0, 0] == pytest.approx(6 * math.pi, abs=1e-6)
+    assert joint_path.q[-1, 0] - joint_path.q[0, 0] == pytest.approx(
+        6 * math.pi, abs=1e-6
+    )
 
 
 REASONS = {
-    "out of reach": ({}, {"path": [{"line": {"to": [4.0, 0.0]}}]}, "it is out of reach", "out of reach from"),
+    "out of reach": (
+        {},
+        {"path": [{"line": {"to": [4.0, 0.0]}}]},
+        "it is out of reach",
+        "out of reach from",
+    ),
     "joint range": (
         {"limits": {"position": {"j1": [0.3, 0.8], "j2": [-2.2, -1.9]}}},
         {"redundant_joints": ["j1"]},
@@ -129,7 +165,10 @@ REASONS = {
 def test_why_there_is_no_course(case):
     options, changes, reason, message = REASONS[case]
     given = problem(scara(**options), **changes)
-    ends = [lattice_starts(decomposition, SEARCH_LEVELS["fast"][0], 0) for decomposition in decompositions_of(given)]
+    ends = [
+        lattice_starts(decomposition, SEARCH_LEVELS["fast"][0], 0)
+        for decomposition in decompositions_of(given)
+    ]
     assert all(isinstance(end, DeadEnd) for end in ends)
     furthest = max(ends, key=lambda end: end.s)
     assert 0.0 < furthest.s <= 1.0
@@ -144,13 +183,20 @@ def test_a_narrow_range_of_the_redundant_joint_is_not_called_out_of_reach():
     task = brachis.load_task(ROOT / "examples/03_tx90l_rail_line.yaml").to_dict()
     task["robot"]["limits"]["position"] = {"rail": [-0.01, 0.01]}
     task["path"] = [{"line": {"by": [0.0, 1.9, 0.0]}}]
-    with pytest.raises(PathError, match=r"within the joint ranges .*joint 'rail' .* beyond its range, -0.01 to 0.01 m"):
+    with pytest.raises(
+        PathError,
+        match=r"within the joint ranges .*joint 'rail' .* beyond its range, -0.01 to 0.01 m",
+    ):
         brachis.plan(task)
 
 
 def test_advice_names_what_was_kept_low():
-    given = problem(scara(), solver={"max_iterations": 1, "name": "uno"}, redundant_joints=["j1"])
-    with pytest.raises(PlanningError, match=r"Raise solver.max_iterations, which is 1$") as caught:
+    given = problem(
+        scara(), solver={"max_iterations": 1, "name": "uno"}, redundant_joints=["j1"]
+    )
+    with pytest.raises(
+        PlanningError, match=r"Raise solver.max_iterations, which is 1$"
+    ) as caught:
         brachis.plan(given.robot, given.task)
     assert "effort" not in str(caught.value)
 
@@ -158,10 +204,15 @@ def test_advice_names_what_was_kept_low():
 def test_what_eaik_might_add_is_said_where_it_is_missing(monkeypatch):
     """With another redundant joint the motion might go on."""
     monkeypatch.setattr("brachis.ik.eaik.installed", lambda: False)
-    task = {"start": {"joints": [0.3, -0.5, 0.2, -2.2, 0.3, 1.9, 0.8]}, "task_space": "pose"}
+    task = {
+        "start": {"joints": [0.3, -0.5, 0.2, -2.2, 0.3, 1.9, 0.8]},
+        "task_space": "pose",
+    }
     given = problem(panda(), path=[{"line": {"by": [0.0, 0.05, 0.0]}}], **task)
     dead_ends = {"panda_joint4": DeadEnd(0.4, {"the branch ends": 1})}
-    reason = no_motion(given, decompositions_of(given), [], dead_ends, Deadline.after(10.0))
+    reason = no_motion(
+        given, decompositions_of(given), [], dead_ends, Deadline.after(10.0)
+    )
     assert isinstance(reason, PathError)
     assert "EAIK is not installed" in str(reason)
     assert "[panda_joint5], [panda_joint6]" in str(reason)

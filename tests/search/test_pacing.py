@@ -21,7 +21,11 @@ TASK = {
 
 def breaks(times: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> np.ndarray:
     start = SimpleNamespace(problem=SimpleNamespace(task=load_task(TASK)))
-    monkeypatch.setattr(phase_plane, "_paced", lambda _start: (np.linspace(0.0, 1.0, len(times))[:, None], times))
+    monkeypatch.setattr(
+        phase_plane,
+        "_paced",
+        lambda _start: (np.linspace(0.0, 1.0, len(times))[:, None], times),
+    )
     return phase_plane.first_breaks(start)
 
 
@@ -37,7 +41,9 @@ def test_knots_are_closer_where_the_speed_changes(monkeypatch):
     near = np.abs(0.5 * (found[1:] + found[:-1]) - place) < 0.02
     assert np.abs(found - place).min() < 0.01
     assert lengths[near].max() < 0.1 * lengths.max()
-    assert np.abs(np.diff(np.log(lengths[1:-1]))).max() < np.log(5.0), "and not too different from their neighbours"
+    assert np.abs(np.diff(np.log(lengths[1:-1]))).max() < np.log(5.0), (
+        "and not too different from their neighbours"
+    )
     assert found[0] == 0.0
     assert found[-1] == 1.0
 

@@ -45,7 +45,9 @@ TIMES = ("estimate", "coarse", "t_end")
 @pytest.fixture(scope="module")
 def robot() -> brachis.Robot:
     limits = brachis.LimitSpec(torque=10.0, velocity=None)
-    return brachis.Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits)
+    return brachis.Robot.from_urdf(
+        ROOT / "robots/scara3/robot.urdf", gravity=[0, 0, 0], limits=limits
+    )
 
 
 def task(**changes: Any) -> dict[str, Any]:
@@ -80,7 +82,11 @@ def without_times(result: brachis.Result) -> tuple[list[dict[str, Any]], np.ndar
 
 @pytest.mark.parametrize(
     ("asked", "choices"),
-    [({}, {()}), (EVERY_CHOICE, {("j1",), ("j2",), ("j3",)}), ({"redundant_joints": ["j1"]}, {("j1",)})],
+    [
+        ({}, {()}),
+        (EVERY_CHOICE, {("j1",), ("j2",), ("j3",)}),
+        ({"redundant_joints": ["j1"]}, {("j1",)}),
+    ],
 )
 def test_every_candidate_is_listed_the_fastest_first(robot, usual, asked, choices):
     result = brachis.plan(robot, task(**asked)) if asked else usual
@@ -90,14 +96,23 @@ def test_every_candidate_is_listed_the_fastest_first(robot, usual, asked, choice
     assert first.redundant_joints == result.trajectory.redundant_joints
     assert first.branch == result.trajectory.branch
     others = {candidate.redundant_joints for candidate in result.candidates[1:]}
-    assert others <= choices if not asked else others | {first.redundant_joints} == choices
-    assert len({(candidate.redundant_joints, candidate.origin) for candidate in result.candidates}) == len(
-        result.candidates
+    assert (
+        others <= choices if not asked else others | {first.redundant_joints} == choices
     )
+    assert len(
+        {
+            (candidate.redundant_joints, candidate.origin)
+            for candidate in result.candidates
+        }
+    ) == len(result.candidates)
     finished = [candidate for candidate in result.candidates if candidate.verified]
     assert result.t_end == min(candidate.t_end for candidate in finished)
     # Refinement only adds rows: nothing that was left unfinished could have been faster.
-    unfinished = [candidate.coarse for candidate in result.candidates if candidate.status.startswith("planned")]
+    unfinished = [
+        candidate.coarse
+        for candidate in result.candidates
+        if candidate.status.startswith("planned")
+    ]
     assert unfinished
     assert min(unfinished) >= result.t_end * (1.0 - 2e-4)
     assert len(plot_candidates(result.candidates).axes) == 1
@@ -112,7 +127,9 @@ def test_the_same_candidates_whatever_the_number_of_processes(robot, usual, aske
     (first, times), (second, others) = without_times(one), without_times(two)
     assert first == second
     np.testing.assert_allclose(others, times, rtol=1e-6)
-    np.testing.assert_allclose(one.trajectory.control_points, two.trajectory.control_points, atol=1e-5)
+    np.testing.assert_allclose(
+        one.trajectory.control_points, two.trajectory.control_points, atol=1e-5
+    )
 
 
 def test_more_effort_is_never_slower(robot, usual):
@@ -134,7 +151,9 @@ def test_a_free_start_is_faster_and_on_the_path(robot, usual, from_anywhere):
 
 
 def test_a_free_start_is_on_every_branch(robot):
-    free = brachis.plan(robot, task(start="free", path_start=HERE, redundant_joints=["j1"]))
+    free = brachis.plan(
+        robot, task(start="free", path_start=HERE, redundant_joints=["j1"])
+    )
     assert free.verified
     labels = {candidate.branch for candidate in free.candidates}
     assert labels == {"elbow_positive", "elbow_negative"}
@@ -143,25 +162,44 @@ def test_a_free_start_is_on_every_branch(robot):
 def test_a_branch_can_be_asked_for(robot):
     for label in ("elbow_positive", "elbow_negative"):
         result = brachis.plan(
-            robot, task(start="free", path_start=HERE, branch=label, redundant_joints=["j1"], spline={"intervals": 8})
+            robot,
+            task(
+                start="free",
+                path_start=HERE,
+                branch=label,
+                redundant_joints=["j1"],
+                spline={"intervals": 8},
+            ),
         )
         assert result.trajectory.branch == label
         assert {candidate.branch for candidate in result.candidates} == {label}
     with pytest.raises(UnknownNameError, match="elbow_up"):
-        brachis.plan(robot, task(start="free", path_start=HERE, branch="elbow_up", redundant_joints=["j1"]))
+        brachis.plan(
+            robot,
+            task(
+                start="free",
+                path_start=HERE,
+                branch="elbow_up",
+                redundant_joints=["j1"],
+            ),
+        )
 
 
 def test_a_free_start_needs_a_place_and_no_numeric_guess(robot):
     with pytest.raises(TaskError, match=r"path_start: .* allowed: \[x, y\]"):
         brachis.plan(robot, task(start="free"))
     with pytest.raises(TaskError, match=r"search\.guesses"):
-        brachis.plan(robot, task(start="free", path_start=HERE, search={"guesses": "numeric"}))
+        brachis.plan(
+            robot, task(start="free", path_start=HERE, search={"guesses": "numeric"})
+        )
 
 
 def test_an_end_posture_with_a_free_start(robot, from_anywhere):
     free = from_anywhere
     end = free.trajectory.position(free.t_end)
-    result = brachis.plan(robot, task(start="free", path_start=HERE, end={"joints": list(end)}))
+    result = brachis.plan(
+        robot, task(start="free", path_start=HERE, end={"joints": list(end)})
+    )
     assert result.verified
     assert result.t_end == pytest.approx(free.t_end, rel=1e-2)
 
@@ -169,8 +207,14 @@ def test_an_end_posture_with_a_free_start(robot, from_anywhere):
 def test_numeric_guesses_stay_an_option(robot):
     result = brachis.plan(robot, task(search={"guesses": "numeric"}))
     assert result.verified
-    assert all(candidate.origin.startswith("numeric") for candidate in result.candidates)
-    assert {candidate.redundant_joints for candidate in result.candidates} == {("j1",), ("j2",), ("j3",)}
+    assert all(
+        candidate.origin.startswith("numeric") for candidate in result.candidates
+    )
+    assert {candidate.redundant_joints for candidate in result.candidates} == {
+        ("j1",),
+        ("j2",),
+        ("j3",),
+    }
 
 
 class NoPosture:
@@ -183,23 +227,44 @@ class NoPosture:
         return DeadEnd(0.5, {"nothing": 1})
 
 
-def test_closed_forms_step_in_where_the_lattice_of_all_postures_has_no_joint_path(robot, monkeypatch):
+def test_closed_forms_step_in_where_the_lattice_of_all_postures_has_no_joint_path(
+    robot, monkeypatch
+):
     monkeypatch.setattr(chart_starts, "PostureLattice", NoPosture)
     result = brachis.plan(robot, task())
     assert result.verified
-    assert {candidate.redundant_joints for candidate in result.candidates} == {(), ("j1",), ("j2",), ("j3",)}
-    assert result.t_end <= 1.001 * brachis.plan(robot, task(redundant_joints=["j1"])).t_end
-    assert [candidate.status for candidate in result.candidates if not candidate.branch] == ["from s = 0.5 on nothing"]
+    assert {candidate.redundant_joints for candidate in result.candidates} == {
+        (),
+        ("j1",),
+        ("j2",),
+        ("j3",),
+    }
+    assert (
+        result.t_end <= 1.001 * brachis.plan(robot, task(redundant_joints=["j1"])).t_end
+    )
+    assert [
+        candidate.status for candidate in result.candidates if not candidate.branch
+    ] == ["from s = 0.5 on nothing"]
 
 
-@pytest.mark.parametrize(("asked", "lattices"), [({}, 4), ({"redundant_joints": ["j2"]}, 1)])
-def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(robot, monkeypatch, asked, lattices):
+@pytest.mark.parametrize(
+    ("asked", "lattices"), [({}, 4), ({"redundant_joints": ["j2"]}, 1)]
+)
+def test_numeric_guesses_step_in_where_no_lattice_has_a_joint_path(
+    robot, monkeypatch, asked, lattices
+):
     monkeypatch.setattr(starts, "ClosedFormLattice", NoPosture)
     monkeypatch.setattr(chart_starts, "PostureLattice", NoPosture)
     result = brachis.plan(robot, task(**asked))
     assert result.verified
     assert result.candidates[0].origin.startswith("numeric")
-    assert sum(candidate.status == "from s = 0.5 on nothing" for candidate in result.candidates) == lattices
+    assert (
+        sum(
+            candidate.status == "from s = 0.5 on nothing"
+            for candidate in result.candidates
+        )
+        == lattices
+    )
 
 
 def test_ctrl_c_gives_the_best_motion_so_far(robot, monkeypatch):
@@ -240,10 +305,14 @@ def test_a_real_ctrl_c_ends_worker_processes(robot):
     assert result.verified
     assert result.interrupted
     assert result.undone[-1] == "what search.effort asks for was not tried to its end"
-    assert brachis.plan(robot, task(search={"jobs": 2})).verified, "a new search has processes again"
+    assert brachis.plan(robot, task(search={"jobs": 2})).verified, (
+        "a new search has processes again"
+    )
 
 
-def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(robot, monkeypatch):
+def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(
+    robot, monkeypatch
+):
     honest, calls = planner.finished, []
 
     def interrupted(*arguments: Any) -> Any:
@@ -253,7 +322,10 @@ def test_ctrl_c_before_anything_is_verified_tells_of_the_best_motion(robot, monk
         return honest(*arguments)
 
     monkeypatch.setattr(planner, "finished", interrupted)
-    with pytest.raises(KeyboardInterrupt, match=r"takes \d\.\d{4} s, and exceeds a limit by \d.* % \(unverified\)"):
+    with pytest.raises(
+        KeyboardInterrupt,
+        match=r"takes \d\.\d{4} s, and exceeds a limit by \d.* % \(unverified\)",
+    ):
         brachis.plan(robot, task(spline=FEW_POINTS))
 
 
@@ -296,7 +368,10 @@ def test_the_time_limit_gives_the_best_motion_so_far(robot, clock):
 
 @pytest.mark.parametrize(
     ("asked", "solved", "left"),
-    [({}, 1, "of 2 candidates 1 not planned"), (BRANCH, 2, "of 8 candidates 6 not planned, 1 not refined")],
+    [
+        ({}, 1, "of 2 candidates 1 not planned"),
+        (BRANCH, 2, "of 8 candidates 6 not planned, 1 not refined"),
+    ],
 )
 def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
     robot, clock, monkeypatch, asked, solved, left
@@ -307,7 +382,11 @@ def test_before_anything_is_verified_the_time_limit_gives_an_unverified_motion(
     assert result.interrupted
     assert not result.verified
     assert result.verification.worst_ratio > 1.0
-    planned = [candidate.coarse for candidate in result.candidates if math.isfinite(candidate.coarse)]
+    planned = [
+        candidate.coarse
+        for candidate in result.candidates
+        if math.isfinite(candidate.coarse)
+    ]
     assert len(planned) == solved
     assert result.t_end <= 1.01 * min(planned)
     assert left in result.undone, "closed forms: two batches of four each"
@@ -321,29 +400,47 @@ def test_a_time_limit_that_is_too_short_for_the_lattice_of_all_postures(robot, c
     assert len(calls) == 5
 
 
-def test_a_time_limit_that_is_too_short_for_the_lattice_of_several_redundant_joints(robot, clock):
+def test_a_time_limit_that_is_too_short_for_the_lattice_of_several_redundant_joints(
+    robot, clock
+):
     clock.jump(PostureLattice, "_next", at=1)
-    with pytest.raises(PlanningError, match="within the time limit of 60 s: the lattice of all postures"):
+    with pytest.raises(
+        PlanningError,
+        match="within the time limit of 60 s: the lattice of all postures",
+    ):
         brachis.plan(robot, task(task_space=["x"], path=[{"line": {"by": [0.3]}}]))
 
 
 def test_no_solve_begins_without_time_and_the_time_limit_is_to_blame(robot, clock):
     calls = clock.jump(planner, "first_point", at=1)
-    joints = {"task_space": "joints", "path": [{"spline": {"through": [[0.6, -2.0, 2.0]]}}], "solver": {"name": "uno"}}
-    with pytest.raises(PlanningError, match=r"within the time limit of 60 s: .* Raise search\.time_limit"):
+    joints = {
+        "task_space": "joints",
+        "path": [{"spline": {"through": [[0.6, -2.0, 2.0]]}}],
+        "solver": {"name": "uno"},
+    }
+    with pytest.raises(
+        PlanningError,
+        match=r"within the time limit of 60 s: .* Raise search\.time_limit",
+    ):
         brachis.plan(robot, task(**joints))
     assert len(calls) == 1
 
 
 def test_the_search_for_a_reason_ends_with_the_time(robot):
-    problem = Problem.of(robot, load_task(task(path=[{"line": {"length": 3.0, "angle_deg": 0}}])))
+    problem = Problem.of(
+        robot, load_task(task(path=[{"line": {"length": 3.0, "angle_deg": 0}}]))
+    )
     decomposition = decompositions_of(problem, ())[0]
     joint_map = decomposition.joint_map(problem.start, decomposition.branches[0])
     assert "s = 0" in str(reason_out_of_reach(joint_map, problem.limits))
-    assert "raise search.time_limit" in reason_out_of_reach(joint_map, problem.limits, deadline=Deadline(0.0))
+    assert "raise search.time_limit" in reason_out_of_reach(
+        joint_map, problem.limits, deadline=Deadline(0.0)
+    )
 
 
-def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(robot, usual, clock):
+def test_a_lattice_that_is_cut_leaves_the_motions_of_the_level_before(
+    robot, usual, clock
+):
     clock.jump(PostureLattice, "_first_layer", at=2)
     result = brachis.plan(robot, task(search={"effort": "thorough"}))
     assert result.verified
@@ -380,16 +477,25 @@ def test_a_lattice_ends_between_its_layers(robot, clock):
 def test_only_one_second_of_grace_for_what_fails(robot, monkeypatch, clock):
     honest = planner.finished
     monkeypatch.setattr(
-        planner, "finished", lambda *given: dataclasses.replace(honest(*given), trajectory=None, verification=None)
+        planner,
+        "finished",
+        lambda *given: dataclasses.replace(
+            honest(*given), trajectory=None, verification=None
+        ),
     )
     calls = clock.jump(planner, "finished", at=1, by=0.6)
     with pytest.raises(PlanningError, match="within the time limit"):
         brachis.plan(robot, task(search={"time_limit": 1.5}))
-    assert sum(calls) <= math.ceil((1.5 + 1.0) / 0.6) + 3, "three more are only verified at last"
+    assert sum(calls) <= math.ceil((1.5 + 1.0) / 0.6) + 3, (
+        "three more are only verified at last"
+    )
 
 
 @pytest.mark.usefixtures("wall_clock")
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what is patched here is only forked there")
+@pytest.mark.skipif(
+    not sys.platform.startswith("linux"),
+    reason="what is patched here is only forked there",
+)
 def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(robot, monkeypatch):
     honest = uno._run
 
@@ -398,9 +504,19 @@ def test_a_solver_that_does_not_come_back_leaves_a_coarser_motion(robot, monkeyp
 
     monkeypatch.setattr(uno, "_run", hanging)
     monkeypatch.setattr(child_process, "ENTRIES", 60 * 300)
-    result = brachis.plan(robot, task(redundant_joints=["j1"], spline={"intervals": 100}, search={"time_limit": 5.0}))
+    result = brachis.plan(
+        robot,
+        task(
+            redundant_joints=["j1"],
+            spline={"intervals": 100},
+            search={"time_limit": 5.0},
+        ),
+    )
     assert result.verified
-    assert "the motion has 25 of 100 intervals, of which more were not solved" in result.undone
+    assert (
+        "the motion has 25 of 100 intervals, of which more were not solved"
+        in result.undone
+    )
 
 
 def test_within_other_workers_no_processes_are_made(robot):
@@ -408,7 +524,9 @@ def test_within_other_workers_no_processes_are_made(robot):
     handler = signal.getsignal(signal.SIGINT)
     asked = task(search={"jobs": 2}, redundant_joints=["j1"])
     for backend in ("threading", "loky"):
-        times = joblib.Parallel(n_jobs=2, backend=backend)(joblib.delayed(end_time)(robot, asked) for _ in range(2))
+        times = joblib.Parallel(n_jobs=2, backend=backend)(
+            joblib.delayed(end_time)(robot, asked) for _ in range(2)
+        )
         assert times[0] == pytest.approx(times[1], rel=1e-9)
     assert signal.getsignal(signal.SIGINT) is handler
 
@@ -419,27 +537,47 @@ def end_time(robot: brachis.Robot, asked: dict[str, Any]) -> float:
 
 def test_more_processes_than_processors_are_not_made(robot, monkeypatch):
     monkeypatch.setattr("os.cpu_count", lambda: 1)
-    assert brachis.plan(robot, task(search={"jobs": 100_000}, redundant_joints=["j1"])).verified
+    assert brachis.plan(
+        robot, task(search={"jobs": 100_000}, redundant_joints=["j1"])
+    ).verified
 
 
 def test_the_rule_that_leaves_plans_unfinished_loses_nothing(robot, usual, monkeypatch):
     ruled = usual
     (fast,) = SEARCH_LEVELS["fast"]
-    monkeypatch.setitem(SEARCH_LEVELS, "fast", (dataclasses.replace(fast, refined=100),))
+    monkeypatch.setitem(
+        SEARCH_LEVELS, "fast", (dataclasses.replace(fast, refined=100),)
+    )
     monkeypatch.setattr(record, "_WORTH_IT", -100.0)
     every = brachis.plan(robot, task())
-    finished = [candidate for candidate in every.candidates if math.isfinite(candidate.t_end)]
-    assert len(finished) > sum(math.isfinite(candidate.t_end) for candidate in ruled.candidates)
-    assert all(candidate.t_end >= candidate.coarse * (1.0 - 1e-6) for candidate in finished)
+    finished = [
+        candidate for candidate in every.candidates if math.isfinite(candidate.t_end)
+    ]
+    assert len(finished) > sum(
+        math.isfinite(candidate.t_end) for candidate in ruled.candidates
+    )
+    assert all(
+        candidate.t_end >= candidate.coarse * (1.0 - 1e-6) for candidate in finished
+    )
     assert ruled.t_end <= every.t_end * (1.0 + 2e-4)
 
 
 def test_a_motion_of_an_earlier_level_is_not_finished_again(robot):
-    result = brachis.plan(robot, task(search={"effort": "thorough"}, redundant_joints=["j1"]))
-    finished = [candidate.coarse for candidate in result.candidates if math.isfinite(candidate.t_end)]
+    result = brachis.plan(
+        robot, task(search={"effort": "thorough"}, redundant_joints=["j1"])
+    )
+    finished = [
+        candidate.coarse
+        for candidate in result.candidates
+        if math.isfinite(candidate.t_end)
+    ]
     assert len({f"{coarse:.4g}" for coarse in finished}) == len(finished)
 
 
 def test_no_processes_are_started_where_little_time_is_left():
-    assert processes(2) == processes(2, Deadline.after(60.0)) == min(2, os.cpu_count() or 1)
+    assert (
+        processes(2)
+        == processes(2, Deadline.after(60.0))
+        == min(2, os.cpu_count() or 1)
+    )
     assert processes(2, Deadline.after(1.0)) == 1

@@ -31,16 +31,28 @@ TURN = 2.0 * math.pi
 
 def scara(limits: dict[str, Any] | None = None, **options: Any) -> brachis.Robot:
     spec = brachis.LimitSpec(**({"torque": 10.0, "velocity": None} | (limits or {})))
-    return brachis.Robot.from_urdf(SCARA, limits=spec, **({"gravity": [0, 0, 0]} | options))
+    return brachis.Robot.from_urdf(
+        SCARA, limits=spec, **({"gravity": [0, 0, 0]} | options)
+    )
 
 
 def problem(robot: brachis.Robot, rows: Any = ("x", "y"), **task: Any) -> Problem:
     rows = rows if isinstance(rows, str) else list(rows)
-    return Problem.of(robot, brachis.load_task({"brachis": 1, "task_space": rows} | task))
+    return Problem.of(
+        robot, brachis.load_task({"brachis": 1, "task_space": rows} | task)
+    )
 
 
-def line(robot: brachis.Robot, start: list[float], by: list[float], rows: Any = ("x", "y"), **task: Any) -> Problem:
-    return problem(robot, rows, start={"joints": start}, path=[{"line": {"by": by}}], **task)
+def line(
+    robot: brachis.Robot,
+    start: list[float],
+    by: list[float],
+    rows: Any = ("x", "y"),
+    **task: Any,
+) -> Problem:
+    return problem(
+        robot, rows, start={"joints": start}, path=[{"line": {"by": by}}], **task
+    )
 
 
 def lengthened(given: Problem, **options: Any) -> Any:
@@ -51,18 +63,32 @@ CASES = {
     "r = 0, 2R": lambda: line(scara(locked_joints={"j3": 0.4}), START[:2], [0.1, 0.4]),
     "r = 1, 3R": lambda: line(scara(), START, [0.0, 1.0]),
     "r = 1, ranges": lambda: line(
-        scara({"position": {"j1": [-0.5, 1.5], "j2": [-3.0, 0.0], "j3": [0.0, 3.5]}}), START, [0.0, 1.0]
+        scara({"position": {"j1": [-0.5, 1.5], "j2": [-3.0, 0.0], "j3": [0.0, 3.5]}}),
+        START,
+        [0.0, 1.0],
     ),
     "r = 1, gravity": lambda: line(
-        scara({"torque": [330.0, 200.0, 70.0]}, gravity=[0.0, -9.81, 0.0]), START, [0.3, 0.9]
+        scara({"torque": [330.0, 200.0, 70.0]}, gravity=[0.0, -9.81, 0.0]),
+        START,
+        [0.3, 0.9],
     ),
-    "r = 1, RPR": lambda: line(planar_robot("RPR", "tilted"), [0.4, 0.2, 0.9], [0.2, 0.1]),
+    "r = 1, RPR": lambda: line(
+        planar_robot("RPR", "tilted"), [0.4, 0.2, 0.9], [0.2, 0.1]
+    ),
     "r = 1, 7R, pose": lambda: line(seven_joints(), SEVEN, [0.1, 0.2, 0.1], "pose"),
-    "r = 1, rail, pose": lambda: line(rail_arm(), list(RAIL_START), [0.1, 0.9, 0.1], "pose"),
+    "r = 1, rail, pose": lambda: line(
+        rail_arm(), list(RAIL_START), [0.1, 0.9, 0.1], "pose"
+    ),
     "r = 2, 4R": lambda: line(planar_robot("RRRR"), [0.4, 0.8, 0.7, 0.5], [-0.6, 0.3]),
-    "r = 2, rail, free roll": lambda: line(rail_arm(), list(RAIL_START), [0.1, 0.5, 0.1], "pose_free_roll"),
-    "r = 3, 5R": lambda: line(planar_robot("RRRRR"), [0.4, 0.8, -0.7, 0.5, 0.6], [-0.6, 0.3]),
-    "r = 4, 7R, position": lambda: line(seven_joints(), SEVEN, [0.1, 0.2, 0.1], "position"),
+    "r = 2, rail, free roll": lambda: line(
+        rail_arm(), list(RAIL_START), [0.1, 0.5, 0.1], "pose_free_roll"
+    ),
+    "r = 3, 5R": lambda: line(
+        planar_robot("RRRRR"), [0.4, 0.8, -0.7, 0.5, 0.6], [-0.6, 0.3]
+    ),
+    "r = 4, 7R, position": lambda: line(
+        seven_joints(), SEVEN, [0.1, 0.2, 0.1], "position"
+    ),
 }
 
 
@@ -76,27 +102,42 @@ def test_joint_paths_are_motions_of_the_robot(case):
     for joint_path in joint_paths:
         q = joint_path.q
         np.testing.assert_array_equal(joint_path.s[[0, -1]], [0.0, 1.0])
-        miss = given.task_map.difference(given.task_map.values(q), given.path.sample(joint_path.s).target)
+        miss = given.task_map.difference(
+            given.task_map.values(q), given.path.sample(joint_path.s).target
+        )
         assert np.abs(miss).max() < 1e-10
         assert np.abs(np.diff(q, axis=0)).max() <= 0.8 + 1e-12
-        assert np.all((q >= limits.position_lower - 1e-9) & (q <= limits.position_upper + 1e-9))
+        assert np.all(
+            (q >= limits.position_lower - 1e-9) & (q <= limits.position_upper + 1e-9)
+        )
         still = np.zeros_like(q)
-        assert np.all(np.abs(dynamics.torque(given.robot, q, still, still)) <= limits.torque + 1e-9)
+        assert np.all(
+            np.abs(dynamics.torque(given.robot, q, still, still))
+            <= limits.torque + 1e-9
+        )
         np.testing.assert_array_equal(q[0], given.start)
 
 
 def test_gravity_turns_joint_paths_away():
     """Without the torque limit the shortest joint path goes where the torques of the case above could not hold it."""
-    held, free = CASES["r = 1, gravity"](), scara({"torque": 1e4}, gravity=[0.0, -9.81, 0.0])
+    held, free = (
+        CASES["r = 1, gravity"](),
+        scara({"torque": 1e4}, gravity=[0.0, -9.81, 0.0]),
+    )
     (shortest, *_) = lengthened(line(free, START, [0.3, 0.9]))
     still = np.zeros_like(shortest.q)
-    assert np.any(np.abs(dynamics.torque(free, shortest.q, still, still)) > held.robot.limits.torque)
+    assert np.any(
+        np.abs(dynamics.torque(free, shortest.q, still, still))
+        > held.robot.limits.torque
+    )
 
 
 def test_ranges_turn_joint_paths_away():
     bounded = CASES["r = 1, ranges"]().robot.limits
     (shortest, *_) = lengthened(line(scara(), START, [0.0, 1.0]))
-    assert np.any((shortest.q < bounded.position_lower) | (shortest.q > bounded.position_upper))
+    assert np.any(
+        (shortest.q < bounded.position_lower) | (shortest.q > bounded.position_upper)
+    )
 
 
 def test_it_goes_on_where_the_branch_of_a_closed_form_ends():
@@ -105,9 +146,13 @@ def test_it_goes_on_where_the_branch_of_a_closed_form_ends():
     robot = scara({"position": {"j1": [start[0] - 0.6, start[0] + 0.6]}})
     path = [{"line": {"length": 1.652, "angle_deg": 58.5}}]
     given = problem(robot, start={"joints": start}, path=path)
-    (by_j3,) = decompositions_of(problem(robot, start={"joints": start}, path=path, redundant_joints=["j3"]))
+    (by_j3,) = decompositions_of(
+        problem(robot, start={"joints": start}, path=path, redundant_joints=["j3"])
+    )
     for finer in (1, 3):
-        end = ClosedFormLattice(by_j3, cells_per_turn=72 * finer, density=float(finer)).joint_paths(4)
+        end = ClosedFormLattice(
+            by_j3, cells_per_turn=72 * finer, density=float(finer)
+        ).joint_paths(4)
         assert isinstance(end, DeadEnd)
         assert 0.5 < end.s < 1.0
     (first, *_) = lengthened(given)
@@ -115,9 +160,18 @@ def test_it_goes_on_where_the_branch_of_a_closed_form_ends():
 
 
 @pytest.mark.parametrize("angle", range(0, 360, 90))
-def test_the_shortest_joint_path_is_about_as_short_as_the_best_of_all_closed_forms(angle):
-    given = problem(scara(), start={"joints": START}, path=[{"line": {"length": 1.0, "angle_deg": angle}}])
-    best = min(ClosedFormLattice(one).joint_paths(1)[0].length for one in decompositions_of(given))
+def test_the_shortest_joint_path_is_about_as_short_as_the_best_of_all_closed_forms(
+    angle,
+):
+    given = problem(
+        scara(),
+        start={"joints": START},
+        path=[{"line": {"length": 1.0, "angle_deg": angle}}],
+    )
+    best = min(
+        ClosedFormLattice(one).joint_paths(1)[0].length
+        for one in decompositions_of(given)
+    )
     assert lengthened(given)[0].length < 1.15 * best
 
 
@@ -126,9 +180,16 @@ def component(q: np.ndarray) -> int:
     return int(np.sign(np.sin(q[1])))
 
 
-@pytest.mark.parametrize("known", [True, False], ids=["closed forms", "random postures"])
+@pytest.mark.parametrize(
+    "known", [True, False], ids=["closed forms", "random postures"]
+)
 def test_a_free_start_finds_both_components_of_the_self_motion(known):
-    given = problem(scara(), start="free", path_start=[0.5, 0.2], path=[{"line": {"by": [-0.3, 0.1]}}])
+    given = problem(
+        scara(),
+        start="free",
+        path_start=[0.5, 0.2],
+        path=[{"line": {"by": [-0.3, 0.1]}}],
+    )
     decompositions = decompositions_of(given)
     expected = {
         component(joint_path.q[0])
@@ -136,33 +197,53 @@ def test_a_free_start_finds_both_components_of_the_self_motion(known):
         for joint_path in ClosedFormLattice(one, cells_per_turn=36).joint_paths(6)
     }
     assert expected == {-1, 1}
-    joint_paths = PostureLattice(given, decompositions if known else [], cells_per_turn=36).joint_paths(6)
+    joint_paths = PostureLattice(
+        given, decompositions if known else [], cells_per_turn=36
+    ).joint_paths(6)
     for joint_path in joint_paths:
         assert len({component(q) for q in joint_path.q}) == 1
     assert {component(joint_path.q[0]) for joint_path in joint_paths} == expected
-    best = min(ClosedFormLattice(one).joint_paths(1)[0].length for one in decompositions)
+    best = min(
+        ClosedFormLattice(one).joint_paths(1)[0].length for one in decompositions
+    )
     assert joint_paths[0].length < 1.15 * best
 
 
 def test_a_free_start_of_seven_joints_is_as_good_as_the_best_branch():
     robot = seven_joints()
     path_start = pose_of(robot, SEVEN)
-    given = problem(robot, "pose", start="free", path_start=path_start, path=[{"line": {"by": [0.0, 0.15, 0.05]}}])
+    given = problem(
+        robot,
+        "pose",
+        start="free",
+        path_start=path_start,
+        path=[{"line": {"by": [0.0, 0.15, 0.05]}}],
+    )
     decompositions = [one for one in decompositions_of(given) if one.redundant == (2,)]
     found = PostureLattice(given, decompositions, cells_per_turn=24).joint_paths(8)
-    best = [ClosedFormLattice(one, cells_per_turn=24).joint_paths(8) for one in decompositions]
-    lengths = [joint_paths[0].length for joint_paths in best if not isinstance(joint_paths, DeadEnd)]
+    best = [
+        ClosedFormLattice(one, cells_per_turn=24).joint_paths(8)
+        for one in decompositions
+    ]
+    lengths = [
+        joint_paths[0].length
+        for joint_paths in best
+        if not isinstance(joint_paths, DeadEnd)
+    ]
     assert lengths
     assert found[0].length < 1.15 * min(lengths)
     assert len({tuple(np.sign(joint_path.q[0, [1, 3, 5]])) for joint_path in found}) > 1
 
 
 def pose_of(robot: brachis.Robot, q: Any) -> dict[str, list[float]]:
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415
+    from scipy.spatial.transform import Rotation
 
     placement = robot.tool_placement(np.array(q, dtype=float))
     turn = Rotation.from_matrix(placement.rotation).as_quat()
-    return {"position": placement.translation.tolist(), "quaternion_xyzw": turn.tolist()}
+    return {
+        "position": placement.translation.tolist(),
+        "quaternion_xyzw": turn.tolist(),
+    }
 
 
 CIRCLE = [{"circle": {"center": [0.0, 0.0], "turns": 1}}]
@@ -176,7 +257,9 @@ RANGE = {"position": {"j1": [START[0] - 7.0, START[0] + 13.0]}}
 def test_the_end_is_reached_in_its_own_turn(turns, reached):
     """Once round the base, so far from it that no other joint can turn in place of the first."""
     end = START + TURN * turns * np.eye(3)[0]
-    given = problem(scara(RANGE), path=CIRCLE, start={"joints": START}, end={"joints": end.tolist()})
+    given = problem(
+        scara(RANGE), path=CIRCLE, start={"joints": START}, end={"joints": end.tolist()}
+    )
     found = lengthened(given, **COARSE)
     assert isinstance(found, list) is reached
     for joint_path in found if reached else []:
@@ -190,7 +273,13 @@ def test_a_given_end_is_reached_from_the_turn_before(turns, reached):
     robot = scara(RANGE)
     end = START + TURN * turns * np.eye(3)[0]
     path_start = robot.tool_placement(end).translation[:2].tolist()
-    given = problem(robot, path=CIRCLE, start="free", path_start=path_start, end={"joints": end.tolist()})
+    given = problem(
+        robot,
+        path=CIRCLE,
+        start="free",
+        path_start=path_start,
+        end={"joints": end.tolist()},
+    )
     found = lengthened(given, **COARSE)
     assert isinstance(found, list) is reached
     for joint_path in found if reached else []:
@@ -206,8 +295,12 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way):
     here = robot.tool_placement(start).translation[:2].tolist()
     turns = [{"circle": {"center": [0.0, 0.0], "turns": 1.5 * way}}]
     given = problem(robot, start="free", path_start=here, path=turns)
-    joint_paths = PostureLattice(given, decompositions_of(given), density=0.2).joint_paths(4)
-    assert all(-TURN <= q <= TURN for joint_path in joint_paths for q in joint_path.q[:, 0])
+    joint_paths = PostureLattice(
+        given, decompositions_of(given), density=0.2
+    ).joint_paths(4)
+    assert all(
+        -TURN <= q <= TURN for joint_path in joint_paths for q in joint_path.q[:, 0]
+    )
     assert min(abs(joint_path.q[0, 0] - start[0]) for joint_path in joint_paths) < 1e-6
     turns[0]["circle"]["turns"] = 2.1 * way
     given = problem(robot, start="free", path_start=here, path=turns)
@@ -217,7 +310,11 @@ def test_a_free_start_may_be_in_any_turn_of_a_range(way):
     assert "the range of joint 'j1' ends" in end.causes
 
 
-@pytest.mark.parametrize("turned", [{"shoulder_pan_joint": -1}, {"wrist_1_joint": 1, "wrist_3_joint": -1}], ids=str)
+@pytest.mark.parametrize(
+    "turned",
+    [{"shoulder_pan_joint": -1}, {"wrist_1_joint": 1, "wrist_3_joint": -1}],
+    ids=str,
+)
 def test_back_from_a_given_end_in_its_own_turns(turned):
     task = brachis.load_task(ROOT / "examples/04_ur10_rail_weld.yaml").to_dict()
     robot = robot_from_settings(brachis.load_task(task).robot)
@@ -228,7 +325,11 @@ def test_back_from_a_given_end_in_its_own_turns(turned):
     place = pose_of(robot, end)
     place["position"] = (np.array(place["position"]) - by).tolist()
     path = {"start": "free", "path_start": place, "path": [{"line": {"by": by}}]}
-    task |= path | {"end": {"joints": end.tolist()}, "redundant_joints": "auto", "branch": "auto"}
+    task |= path | {
+        "end": {"joints": end.tolist()},
+        "redundant_joints": "auto",
+        "branch": "auto",
+    }
     joint_paths = lengthened(Problem.of(robot, brachis.load_task(task)))
     assert joint_paths
     for joint_path in joint_paths:
@@ -241,10 +342,27 @@ def test_back_from_a_given_end_of_a_circle_of_positions_in_ranges_of_two_turns()
     robot = seven_joints()
     end = SEVEN + TURN * (np.eye(7)[0] - np.eye(7)[2])
     wide = {name: [-TURN - 1.0, TURN + 1.0] for name in robot.joint_names}
-    robot = brachis.Robot.from_urdf("wide", urdf_text=robot.urdf, limits=brachis.LimitSpec(position=wide))
+    robot = brachis.Robot.from_urdf(
+        "wide", urdf_text=robot.urdf, limits=brachis.LimitSpec(position=wide)
+    )
     here = robot.tool_placement(end).translation
-    path = [{"circle": {"center": np.add(here, [0.05, 0.03, 0.0]).tolist(), "turns": -1.0, "normal": [0.0, 0.0, 1.0]}}]
-    given = problem(robot, "position", start="free", path_start=here.tolist(), end={"joints": end.tolist()}, path=path)
+    path = [
+        {
+            "circle": {
+                "center": np.add(here, [0.05, 0.03, 0.0]).tolist(),
+                "turns": -1.0,
+                "normal": [0.0, 0.0, 1.0],
+            }
+        }
+    ]
+    given = problem(
+        robot,
+        "position",
+        start="free",
+        path_start=here.tolist(),
+        end={"joints": end.tolist()},
+        path=path,
+    )
     joint_paths = lengthened(given, nodes=40)
     assert joint_paths
     for joint_path in joint_paths:
@@ -257,11 +375,19 @@ def test_back_from_a_given_end_of_a_circle_of_positions_in_ranges_of_two_turns()
     [
         (lambda: line(scara(), START, [3.0, 0.0]), "it is out of reach"),
         (
-            lambda: line(scara({"position": {"j1": [0.3, 0.8], "j2": [-2.2, -1.9]}}), START, [0.0, 1.0]),
+            lambda: line(
+                scara({"position": {"j1": [0.3, 0.8], "j2": [-2.2, -1.9]}}),
+                START,
+                [0.0, 1.0],
+            ),
             "range of joint",
         ),
         (
-            lambda: line(scara({"torque": [280.0, 200.0, 100.0]}, gravity=[0, -9.81, 0]), START, [1.1, 0.0]),
+            lambda: line(
+                scara({"torque": [280.0, 200.0, 100.0]}, gravity=[0, -9.81, 0]),
+                START,
+                [1.1, 0.0],
+            ),
             "the torque limit cannot hold",
         ),
     ],
@@ -280,7 +406,10 @@ def test_the_same_seed_gives_the_same_joint_paths():
     assert len(first) == len(again)
     for one, two in zip(first, again, strict=True):
         np.testing.assert_allclose(one.q, two.q, atol=1e-9)
-    assert any(np.abs(one.q - two.q).max() > 1e-6 for one, two in zip(first, other, strict=False))
+    assert any(
+        np.abs(one.q - two.q).max() > 1e-6
+        for one, two in zip(first, other, strict=False)
+    )
 
 
 def test_no_layer_is_begun_after_the_deadline():

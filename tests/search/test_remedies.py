@@ -21,7 +21,11 @@ JOINTS = ("j1", "j2", "j3")
 def task():
     content = {
         "brachis": 1,
-        "robot": {"urdf": str(SCARA), "limits": {"torque": 10.0}, "payload": {"mass": 8.0}},
+        "robot": {
+            "urdf": str(SCARA),
+            "limits": {"torque": 10.0},
+            "payload": {"mass": 8.0},
+        },
         "start": {"joints": [0.5, -2.1, 2.1]},
         "task_space": ["x", "y"],
         "path": [{"line": {"by": [0.0, 1.0]}}],
@@ -61,15 +65,24 @@ def test_a_limit_of_all_joints_is_raised_for_one(task, needed):
         return changed.robot.limits.torque["j2"] >= needed
 
     found = hint(task, [Remedy("robot.limits.torque.j2", 10.0, 25.0, "Nm")], is_planned)
-    good = float(re.match(r"Raise robot\.limits\.torque\.j2 to ([\d.]+) Nm \(a plan", found)[1])
+    good = float(
+        re.match(r"Raise robot\.limits\.torque\.j2 to ([\d.]+) Nm \(a plan", found)[1]
+    )
     assert needed <= good <= 1.06 * needed
     assert all(limit["j1"] == limit["j3"] == 10.0 for limit in limits)
 
 
-def test_what_a_trial_of_one_joint_path_does_not_find_is_not_said_to_be_impossible(task):
+def test_what_a_trial_of_one_joint_path_does_not_find_is_not_said_to_be_impossible(
+    task,
+):
     remedy = Remedy("robot.payload.mass", 8.0, 4.0, "kg")
-    found = hint(task, [remedy], lambda changed, *_: changed.robot.payload.mass < 5.0 or None)
-    assert re.match(r"Lower robot\.payload\.mass to 4\.\d+ kg \(a plan with it was verified\), or", found)
+    found = hint(
+        task, [remedy], lambda changed, *_: changed.robot.payload.mass < 5.0 or None
+    )
+    assert re.match(
+        r"Lower robot\.payload\.mass to 4\.\d+ kg \(a plan with it was verified\), or",
+        found,
+    )
 
 
 def test_a_whole_search_that_finds_more_is_believed(task):
@@ -79,7 +92,10 @@ def test_a_whole_search_that_finds_more_is_believed(task):
         return changed.boundary.end_speed <= (0.5 if most else 0.6) or None
 
     found = hint(task, [Remedy("boundary.end_speed", 0.9, 0.45, "m/s")], is_planned)
-    assert re.match(r"Lower boundary\.end_speed to 0\.5[01]\d* m/s \(a plan with it was verified\), or", found)
+    assert re.match(
+        r"Lower boundary\.end_speed to 0\.5[01]\d* m/s \(a plan with it was verified\), or",
+        found,
+    )
 
 
 @pytest.mark.parametrize("seconds", [0.0, 60.0])
@@ -89,7 +105,10 @@ def test_a_number_that_was_not_verified_is_not_told(task, seconds):
         Remedy("robot.payload.mass", 8.0, 4.0, "kg", is_refined=False),
     ]
     found = hint(task, remedies, lambda *_: False, seconds=seconds)
-    assert found == "Lower boundary.end_speed (how far was not found out), or try another path"
+    assert (
+        found
+        == "Lower boundary.end_speed (how far was not found out), or try another path"
+    )
 
 
 def test_a_payload_that_the_arm_can_hold_is_advised(monkeypatch):
@@ -103,9 +122,15 @@ def test_a_payload_that_the_arm_can_hold_is_advised(monkeypatch):
         "spline": {"intervals": 12},
         "search": {"effort": "single", "least_motion": False, "time_limit": 600.0},
     }
-    with pytest.raises(brachis.errors.StartError, match="cannot hold the arm against gravity") as caught:
+    with pytest.raises(
+        brachis.errors.StartError, match="cannot hold the arm against gravity"
+    ) as caught:
         brachis.plan(task)
-    mass = float(re.search(r"Lower robot\.payload\.mass to ([\d.]+) kg \(a plan", caught.value.hint)[1])
+    mass = float(
+        re.search(
+            r"Lower robot\.payload\.mass to ([\d.]+) kg \(a plan", caught.value.hint
+        )[1]
+    )
     task["robot"]["payload"]["mass"] = mass
     assert brachis.plan(task).verified
 
@@ -116,7 +141,11 @@ def test_of_many_plans_none_spends_time_on_advice(way, monkeypatch, tmp_path):
     monkeypatch.setattr("brachis.planner.is_planned", lambda *_: bool(trials.append(1)))
     task = {
         "brachis": 1,
-        "robot": {"urdf": str(SCARA), "gravity": [0.0, -9.81, 0.0], "limits": {"torque": [200.0, 300.0, 300.0]}},
+        "robot": {
+            "urdf": str(SCARA),
+            "gravity": [0.0, -9.81, 0.0],
+            "limits": {"torque": [200.0, 300.0, 300.0]},
+        },
         "start": {"joints": [0.5, -2.1, 2.1]},
         "task_space": ["x", "y"],
         "path": [{"line": {"by": [0.0, 0.5]}}],

@@ -40,7 +40,9 @@ def starts():
     robot = Robot.from_urdf(URDF, gravity=[0, 0, 0], limits=task.robot.limits)
     problem = Problem.of(robot, task)
     (level,) = SEARCH_LEVELS["fast"]
-    many = dataclasses.replace(level, in_charts=100, only_minima=False, cells_per_turn=24)
+    many = dataclasses.replace(
+        level, in_charts=100, only_minima=False, cells_per_turn=24
+    )
     found = chart_starts(problem, decompositions_of(problem), many)
     assert isinstance(found, list)
     assert len(found) > MOST
@@ -72,7 +74,9 @@ def test_without_time_or_backend_starts_are_kept_as_they_come(starts, monkeypatc
 
     monkeypatch.setattr(screening, "solved_in_chart", missing)
     without = screening.screened(starts, MOST, NEVER, quiet)
-    assert [start.origin for start in without] == [start.origin for start in starts[:MOST]]
+    assert [start.origin for start in without] == [
+        start.origin for start in starts[:MOST]
+    ]
 
 
 def test_those_for_which_there_was_no_time_come_after_the_others(starts, monkeypatch):
@@ -91,19 +95,25 @@ def test_those_for_which_there_was_no_time_come_after_the_others(starts, monkeyp
 
 
 def test_starts_say_whose_closed_form_they_begin_with(starts):
-    names = {decomposition.name for decomposition in decompositions_of(starts[0].problem)}
+    names = {
+        decomposition.name for decomposition in decompositions_of(starts[0].problem)
+    }
     for start in starts:
         number, _, seed = start.origin.partition(", from ")
         assert number.startswith("lattice ")
         assert seed in names
 
 
-def test_no_further_start_is_looked_at_where_the_least_end_time_is_met_again(starts, monkeypatch):
+def test_no_further_start_is_looked_at_where_the_least_end_time_is_met_again(
+    starts, monkeypatch
+):
     looked_at = []
 
     def quickly(start, _deadline, _listener):
         looked_at.append(start)
-        return dataclasses.replace(start, estimate=[1.5, 1.0, np.inf, 1.001, 1.002, 1.0][len(looked_at) - 1])
+        return dataclasses.replace(
+            start, estimate=[1.5, 1.0, np.inf, 1.001, 1.002, 1.0][len(looked_at) - 1]
+        )
 
     monkeypatch.setattr(screening, "_quickly", quickly)
     monkeypatch.setattr(screening, "_same", lambda *_starts: False)

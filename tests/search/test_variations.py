@@ -57,7 +57,9 @@ def test_given_ends_stay_and_ranges_are_kept(given):
 
 def test_they_are_the_same_for_the_same_seed():
     one = straight(problem_of())
-    first, again, other = (np.array([each.q for each in varied([one], 3, seed)]) for seed in (0, 0, 1))
+    first, again, other = (
+        np.array([each.q for each in varied([one], 3, seed)]) for seed in (0, 0, 1)
+    )
     np.testing.assert_array_equal(first, again)
     assert np.abs(first - other).max() > 0.01
 
@@ -67,8 +69,12 @@ def test_they_are_looked_at_where_both_ends_are_given(monkeypatch):
     monkeypatch.setattr(module, "screened", lambda starts, *_others: starts)
     end = [0.62, 0.62, 0.35, -1.1, 0.3, 0.8, 0.1]
     robot = Robot.from_urdf(URDF)
-    places = [robot.tool_placement(np.array(posture)).translation for posture in (START, end)]
-    problem = problem_of(end={"joints": end}, path=[{"line": {"by": (places[1] - places[0]).tolist()}}])
+    places = [
+        robot.tool_placement(np.array(posture)).translation for posture in (START, end)
+    ]
+    problem = problem_of(
+        end={"joints": end}, path=[{"line": {"by": (places[1] - places[0]).tolist()}}]
+    )
     (level,) = SEARCH_LEVELS["fast"]
     starts = module.chart_starts(problem, decompositions_of(problem), level)
     assert isinstance(starts, list)

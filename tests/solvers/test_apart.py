@@ -12,11 +12,18 @@ import time
 import numpy as np
 import pytest
 
-from brachis.optimise.backends import SolverOptions, SolveStatus, child_process, solver_named, uno
+from brachis.optimise.backends import (
+    SolverOptions,
+    SolveStatus,
+    child_process,
+    solver_named,
+    uno,
+)
 from support.programs import disc
 
 pytestmark = pytest.mark.skipif(
-    not sys.platform.startswith("linux"), reason="what is patched here is only forked there"
+    not sys.platform.startswith("linux"),
+    reason="what is patched here is only forked there",
 )
 START, OPTIONS = np.array([4.0, 0.5]), SolverOptions()
 
@@ -28,7 +35,11 @@ def everything_is_large(monkeypatch):
 
 def own_children() -> list[str]:
     """Processes of solves; other tests may have left workers that wait for more to do."""
-    return [process.name for process in multiprocessing.active_children() if not process.name.startswith("Loky")]
+    return [
+        process.name
+        for process in multiprocessing.active_children()
+        if not process.name.startswith("Loky")
+    ]
 
 
 def solve(options=OPTIONS, progress=None, name="uno"):
@@ -42,7 +53,9 @@ def test_the_answer_and_the_progress_are_those_of_a_solve_here(name, monkeypatch
     monkeypatch.setattr(child_process, "ENTRIES", 10)
     near = solve(progress=lambda *call: calls["here"].append(call), name=name)
     assert calls["here"]
-    np.testing.assert_allclose(calls["apart"], calls["here"], atol=1e-6)  # another process may have other BLAS threads
+    np.testing.assert_allclose(
+        calls["apart"], calls["here"], atol=1e-6
+    )  # another process may have other BLAS threads
     for entry in dataclasses.fields(far):
         if entry.name != "wall_time":
             there, here = getattr(far, entry.name), getattr(near, entry.name)
@@ -68,7 +81,13 @@ def test_the_system_ends_it_even_if_nobody_waits(monkeypatch):
     _, sender = context.Pipe(duplex=False)
     process = context.Process(
         target=child_process._work,
-        args=(sender, "brachis.optimise.backends.uno", disc(), START, SolverOptions(time_limit=0.05)),
+        args=(
+            sender,
+            "brachis.optimise.backends.uno",
+            disc(),
+            START,
+            SolverOptions(time_limit=0.05),
+        ),
     )
     process.start()
     process.join()
@@ -99,6 +118,8 @@ def test_ctrl_c_ends_it():
 def test_a_process_that_may_start_none_solves_itself(monkeypatch):
     monkeypatch.setitem(multiprocessing.current_process()._config, "daemon", 1)
     monkeypatch.setattr(
-        child_process, "_solve_apart", lambda *_: pytest.fail("a daemonic process may have no children")
+        child_process,
+        "_solve_apart",
+        lambda *_: pytest.fail("a daemonic process may have no children"),
     )
     assert solve().status is SolveStatus.OPTIMAL

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from brachis.errors import UnknownNameError, UnreachableError
-from brachis.optimise.backends import AUTO_ORDER, NAMES, SolverOptions, SolveStatus, residual, solver_named
+from brachis.optimise.backends import (
+    AUTO_ORDER,
+    NAMES,
+    SolverOptions,
+    SolveStatus,
+    residual,
+    solver_named,
+)
 from brachis.optimise.backends.monitor import Watch
 from brachis.optimise.backends.registry import TABLE
 from support.programs import bounded, corner, curved, disc, impossible
@@ -147,14 +154,18 @@ def test_interrupt_during_an_evaluation(name, evaluation):
     problem = disc(interrupt_at=evaluation)
     with pytest.raises(KeyboardInterrupt):
         solve(name, problem, [40.0, -30.0])
-    assert len(problem.evaluations) == evaluation, "the backend went on after the interrupt"
+    assert len(problem.evaluations) == evaluation, (
+        "the backend went on after the interrupt"
+    )
 
 
 # The objective is not the first variable here, as it is in a program of one phase.
 def test_progress_tells_iteration_and_objective(name):
     problem, calls = bounded(), []
     report = solve(name, problem, [1.0, 3.0], progress=lambda *call: calls.append(call))
-    assert [iteration for iteration, _ in calls] == list(range(1, report.iterations + 1))
+    assert [iteration for iteration, _ in calls] == list(
+        range(1, report.iterations + 1)
+    )
     assert calls[-1][1] == pytest.approx(0.5, abs=1e-3)
 
 
@@ -206,7 +217,10 @@ def test_residual_where_rows_cannot_be_evaluated():
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e200])
 def test_backends_get_finite_numbers_only(bad):
-    for wrong in ({"row_values": lambda _x: np.array([bad])}, {"row_slopes": lambda _x: np.array([[1.0, bad]])}):
+    for wrong in (
+        {"row_values": lambda _x: np.array([bad])},
+        {"row_slopes": lambda _x: np.array([[1.0, bad]])},
+    ):
         watch = Watch(dataclasses.replace(disc(), **wrong), OPTIONS, None)
         with pytest.raises(UnreachableError, match="not a finite number"):
             _ = watch.rows(np.zeros(2)), watch.jacobian(np.zeros(2))
@@ -240,11 +254,17 @@ def test_a_start_that_is_not_finite_is_not_given_to_a_backend(name, bad):
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_rows_that_are_not_finite_at_the_start(name, bad):
-    report = solve(name, dataclasses.replace(disc(), row_values=lambda _x: np.array([bad])), [4.0, 0.5])
+    report = solve(
+        name,
+        dataclasses.replace(disc(), row_values=lambda _x: np.array([bad])),
+        [4.0, 0.5],
+    )
     assert report.status is SolveStatus.EVALUATION_ERROR
     assert report.violation == np.inf
 
 
 def test_bounds_that_are_not_numbers(name):
-    report = solve(name, dataclasses.replace(disc(), upper=np.array([np.nan])), [4.0, 0.5])
+    report = solve(
+        name, dataclasses.replace(disc(), upper=np.array([np.nan])), [4.0, 0.5]
+    )
     assert report.status is SolveStatus.EVALUATION_ERROR

@@ -35,14 +35,23 @@ def check(starter: Starter, folder: Path) -> None:
     assert task.path == starter.result.task.path
     assert Path(task.robot.urdf).samefile(starter.robot.source)
     limits, q = starter.robot.limits, starter.result.trajectory.position(0.0)
-    inner = 0.1 * np.where(np.isfinite(limits.position_upper), limits.position_upper - limits.position_lower, 0.0)
-    assert np.all((q > limits.position_lower + inner) & (q < limits.position_upper - inner))
+    inner = 0.1 * np.where(
+        np.isfinite(limits.position_upper),
+        limits.position_upper - limits.position_lower,
+        0.0,
+    )
+    assert np.all(
+        (q > limits.position_lower + inner) & (q < limits.position_upper - inner)
+    )
 
 
 def two_joints(axis: tuple[float, ...] = (0.0, 0.0, 1.0), effort: float = 60.0) -> str:
     """A chain whose first joint may be weak."""
     limit = {"lower": -3.1, "upper": 3.1, "velocity": 3.0, "effort": effort}
-    joints = [Joint("revolute", axis, limit=limit), Joint("revolute", axis, xyz=(0.5, 0.0, 0.0))]
+    joints = [
+        Joint("revolute", axis, limit=limit),
+        Joint("revolute", axis, xyz=(0.5, 0.0, 0.0)),
+    ]
     return chain_urdf(joints, tool=(0.5, 0.0, 0.0))
 
 
@@ -52,16 +61,22 @@ def test_robots_that_come_along(name, tmp_path):
     check(starter, tmp_path)
     motion = starter.result.trajectory
     heights = starter.robot.heights(motion.position(np.linspace(0.0, motion.t_end, 20)))
-    assert heights.min() > (-1e-9 if name in ("scara3", "gantry2") else 0.05), "the tool is above the robot's base"
+    assert heights.min() > (-1e-9 if name in ("scara3", "gantry2") else 0.05), (
+        "the tool is above the robot's base"
+    )
 
 
-@pytest.mark.parametrize(("name", "slides"), [("tx90l_rail", 1), ("ur10_rail", 1), ("gen3_rails", 2)])
+@pytest.mark.parametrize(
+    ("name", "slides"), [("tx90l_rail", 1), ("ur10_rail", 1), ("gen3_rails", 2)]
+)
 def test_an_arm_on_a_rail_begins_away_from_its_own_singularities(name, slides):
     robot, space = bind(getattr(brachis.robots, name), "pose")
     assert robot.revolute.argmax() == slides
     first = next(choices(space))
     arm = space.jacobian(space.twists(first.posture[None]))[0, :, slides:]
-    assert np.linalg.svd(arm, compute_uv=False)[-1] > 0.1  # 0.011 to 0.017 with the rail's help alone
+    assert (
+        np.linalg.svd(arm, compute_uv=False)[-1] > 0.1
+    )  # 0.011 to 0.017 with the rail's help alone
 
 
 def test_the_limits_that_are_suggested_are_those_of_the_urdf():
@@ -77,14 +92,25 @@ def test_heights_are_above_the_base_wherever_it_is():
     limit = {"lower": -1.0, "upper": 1.0, "velocity": 1.0, "effort": 50.0}
     text = chain_urdf([Joint("prismatic", limit=limit)], tool=(0.3, 0.0, 0.5))
     q = np.array([[0.2], [-0.7]])
-    for mounting in ("floor", "wall", "ceiling", {"xyz": [1, 2, 3], "rpy_deg": [10, 20, 30]}):
-        robot = brachis.Robot.from_urdf("x", urdf_text=text, tool_frame="tool", mounting=mounting)
+    for mounting in (
+        "floor",
+        "wall",
+        "ceiling",
+        {"xyz": [1, 2, 3], "rpy_deg": [10, 20, 30]},
+    ):
+        robot = brachis.Robot.from_urdf(
+            "x", urdf_text=text, tool_frame="tool", mounting=mounting
+        )
         np.testing.assert_allclose(robot.heights(q), [0.7, -0.2], atol=1e-12)
 
 
 @pytest.mark.parametrize("file", FOREIGN)
 def test_robots_of_others(file, tmp_path):
-    found = [folder / PACKAGE / file for folder in map(Path, sys.path) if (folder / PACKAGE / file).exists()]
+    found = [
+        folder / PACKAGE / file
+        for folder in map(Path, sys.path)
+        if (folder / PACKAGE / file).exists()
+    ]
     if not found:
         pytest.skip("example-robot-data is not installed")
     starter = starter_task(found[0], folder=tmp_path)
@@ -95,7 +121,11 @@ def test_robots_of_others(file, tmp_path):
 def test_names_that_yaml_would_misread(tmp_path):
     text = two_joints()
     urdf = tmp_path / "robot # 1.urdf"
-    urdf.write_text(text.replace("'j1'", "'on'").replace("'j2'", "'2: a # b'").replace("'tool'", "'null'"))
+    urdf.write_text(
+        text.replace("'j1'", "'on'")
+        .replace("'j2'", "'2: a # b'")
+        .replace("'tool'", "'null'")
+    )
     starter = starter_task(urdf, folder=tmp_path)
     check(starter, tmp_path)
     assert list(yaml.safe_load(starter.text)["start"]["joints"]) == ["on", "2: a # b"]
@@ -105,11 +135,16 @@ def test_limits_that_are_missing_are_marked(tmp_path):
     (tmp_path / "robot.urdf").write_text(two_joints(effort=0.0))
     starter = starter_task(tmp_path / "robot.urdf", folder=tmp_path)
     assert "PUT THE MAKER'S FIGURES HERE" in starter.text
-    assert yaml.safe_load(starter.text)["robot"]["limits"] == {"torque": {"j1": None}, "acceleration": {"j1": 1.0}}
+    assert yaml.safe_load(starter.text)["robot"]["limits"] == {
+        "torque": {"j1": None},
+        "acceleration": {"j1": 1.0},
+    }
 
 
 def test_placeholders_of_every_kind():
-    limits = placeholders(("a", "b"), (UrdfLimit(-1.0, 1.0, 2.0, 3.0), UrdfLimit(0.0, 0.0, 0.0, None)))
+    limits = placeholders(
+        ("a", "b"), (UrdfLimit(-1.0, 1.0, 2.0, 3.0), UrdfLimit(0.0, 0.0, 0.0, None))
+    )
     assert limits.torque == {"b": None}
     assert limits.velocity == {"b": None}
     assert limits.position == {"b": (-1.5, 1.5)}

@@ -33,7 +33,9 @@ TX90L_STEPS = (
 )
 
 
-def placement(position: Sequence[float] = (0.0, 0.0, 0.0), rotation: Rotation | None = None) -> np.ndarray:
+def placement(
+    position: Sequence[float] = (0.0, 0.0, 0.0), rotation: Rotation | None = None
+) -> np.ndarray:
     """Placement as a (4, 4) matrix."""
     matrix = np.eye(4)
     matrix[:3, 3] = position
@@ -53,7 +55,9 @@ class Arm:
     def mirrored(self) -> Arm:
         """The same arm held at its tool."""
         steps = tuple(np.linalg.inv(step) for step in reversed(self.steps))
-        return Arm(self.letters[::-1], tuple(-axis for axis in reversed(self.axes)), steps)
+        return Arm(
+            self.letters[::-1], tuple(-axis for axis in reversed(self.axes)), steps
+        )
 
     def with_slide(self, place: int, axis: Sequence[float]) -> Arm:
         """Put a slide before the joint at a place."""
@@ -71,17 +75,33 @@ class Arm:
         steps = list(self.steps)
         for i, offset in enumerate(offsets):
             turned = self.letters[i] == "R"
-            turn = placement(rotation=Rotation.from_rotvec(offset * self.axes[i])) if turned else np.eye(4)
+            turn = (
+                placement(rotation=Rotation.from_rotvec(offset * self.axes[i]))
+                if turned
+                else np.eye(4)
+            )
             shift = np.eye(4) if turned else placement(offset * self.axes[i])
             steps[i + 1] = turn @ shift @ steps[i + 1]
-        return Arm(self.letters, tuple(s * axis for s, axis in zip(signs, self.axes, strict=True)), tuple(steps))
+        return Arm(
+            self.letters,
+            tuple(s * axis for s, axis in zip(signs, self.axes, strict=True)),
+            tuple(steps),
+        )
 
     def robot(self, mount: np.ndarray | None = None) -> Robot:
         """Robot with joints j1, j2, ..."""
         joints = []
-        for letter, axis, step in zip(self.letters, self.axes, self.steps, strict=False):
-            kind, limit = ("revolute", Joint("revolute").limit) if letter == "R" else ("prismatic", SLIDE)
-            joints.append(Joint(kind, axis=tuple(axis.tolist()), limit=limit, **_origin(step)))
+        for letter, axis, step in zip(
+            self.letters, self.axes, self.steps, strict=False
+        ):
+            kind, limit = (
+                ("revolute", Joint("revolute").limit)
+                if letter == "R"
+                else ("prismatic", SLIDE)
+            )
+            joints.append(
+                Joint(kind, axis=tuple(axis.tolist()), limit=limit, **_origin(step))
+            )
         joints.append(Joint("fixed", limit=None, **_origin(self.steps[-1])))
         base = None if mount is None else Joint("fixed", limit=None, **_origin(mount))
         return Robot.from_urdf("arm", urdf_text=chain_urdf(joints, mount=base))
@@ -103,7 +123,11 @@ def ur10() -> Arm:
 
 def tx90l() -> Arm:
     """TX90L by its axes at the zero posture."""
-    return Arm("RRRRRR", (Z, Y, Y, Z, Y, Z), (*(placement(step) for step in TX90L_STEPS), np.eye(4)))
+    return Arm(
+        "RRRRRR",
+        (Z, Y, Y, Z, Y, Z),
+        (*(placement(step) for step in TX90L_STEPS), np.eye(4)),
+    )
 
 
 TOOL = placement((0.02, 0.05, 0.1), Rotation.from_rotvec((0.4, -0.3, 0.2)))
@@ -138,52 +162,79 @@ def generic(letters: str = "RRRRRR", first: int = 1) -> Arm:
 
 def example_robot(name: str) -> Robot:
     """A UR arm of example-robot-data, where that is installed."""
-    share = Path(sysconfig.get_path("purelib")) / "cmeel.prefix/share/example-robot-data/robots"
+    share = (
+        Path(sysconfig.get_path("purelib"))
+        / "cmeel.prefix/share/example-robot-data/robots"
+    )
     path = share / f"ur_description/urdf/{name}_robot.urdf"
     if not path.exists():
         pytest.skip("example-robot-data is not installed")
     return Robot.from_urdf(path, tool_frame="tool0")
 
 
-def zero_crossing(function: Callable[[np.ndarray], np.ndarray], q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def zero_crossing(
+    function: Callable[[np.ndarray], np.ndarray], q: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
     """Posture of a curve (K, n) at which a function of postures first vanishes, and the curve's step there."""
     crossings = np.flatnonzero(np.diff(np.sign(function(q))))
     if len(crossings) == 0:
         return None
     start = q[crossings[0]]
     step = q[crossings[0] + 1] - start
-    share = brentq(lambda x: function((start + x * step)[None])[0], 0.0, 1.0, xtol=1e-14)
+    share = brentq(
+        lambda x: function((start + x * step)[None])[0], 0.0, 1.0, xtol=1e-14
+    )
     return start + share * step, step
 
 
 class PoseBench:
     """Random postures of a robot, their poses, and a family's solver for some redundant joints."""
 
-    def __init__(self, family: Family, robot: Robot, redundant: Sequence[int], postures: int = 800, seed: int = 5):
+    def __init__(
+        self,
+        family: Family,
+        robot: Robot,
+        redundant: Sequence[int],
+        postures: int = 800,
+        seed: int = 5,
+    ):
         self.robot, self.redundant = robot, list(redundant)
         self.space = task_map_of(robot, "pose")
         self.geometry = ChainGeometry.of(robot)
         self.rest = [i for i in range(robot.n) if i not in redundant]
         self.turning = self.geometry.revolute[self.rest]
         self.q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (postures, robot.n))
-        self.solver: IKSolver = family.build(self.geometry, self.space, tuple(redundant))
+        self.solver: IKSolver = family.build(
+            self.geometry, self.space, tuple(redundant)
+        )
 
     def poses(self, q: np.ndarray) -> np.ndarray:
         """Task coordinates (K, 12) by the product of exponentials."""
         posed = self.geometry.posed(q)
         return np.concatenate(
-            [posed.tool_position.T, np.moveaxis(posed.tool_rotation, 2, 0).reshape(len(q), 9)], axis=1
+            [
+                posed.tool_position.T,
+                np.moveaxis(posed.tool_rotation, 2, 0).reshape(len(q), 9),
+            ],
+            axis=1,
         )
 
     def answers(self, q: np.ndarray) -> np.ndarray:
         """Non-redundant joints (K, B A, 6) that reach the poses of some postures."""
         solved = self.solver.solve(self.poses(q), q[:, self.redundant])
-        assert solved.shape == (len(q), len(self.solver.branches), self.solver.alternatives, 6)
+        assert solved.shape == (
+            len(q),
+            len(self.solver.branches),
+            self.solver.alternatives,
+            6,
+        )
         return solved.reshape(len(q), -1, 6)
 
     def distance(self, solved: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Largest difference (K, ...) of answers from the non-redundant joints of postures; infinite for NaN."""
-        delta = np.abs(wrapped(solved - q[:, *[None] * (solved.ndim - 2), self.rest], self.turning)).max(axis=-1)
+        delta = np.abs(
+            wrapped(solved - q[:, *[None] * (solved.ndim - 2), self.rest], self.turning)
+        ).max(axis=-1)
         return np.where(np.isnan(delta), np.inf, delta)
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> float:
@@ -192,13 +243,21 @@ class PoseBench:
 
     def margins(self, q: np.ndarray) -> np.ndarray:
         """Margins (K, B, k) of all branches."""
-        return np.stack([self.solver.branch_margins(q, b) for b in range(len(self.solver.branches))], axis=1)
+        return np.stack(
+            [
+                self.solver.branch_margins(q, b)
+                for b in range(len(self.solver.branches))
+            ],
+            axis=1,
+        )
 
     def determinant(self, q: np.ndarray) -> np.ndarray:
         """Det J_nr by Pinocchio."""
         return np.linalg.det(self.space.jacobian(self.space.twists(q))[:, :, self.rest])
 
-    def check_answers(self, solved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def check_answers(
+        self, solved: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Put the answers for the random postures to the test; return their samples, branches and postures."""
         sample, branch = np.nonzero(np.isfinite(solved).all(axis=2))
         assert np.isfinite(solved).sum() == 6 * len(sample), "an answer is NaN in part"
@@ -209,11 +268,15 @@ class PoseBench:
         # A slide that runs almost across the way it has to go goes far: positions are good to their own size.
         size = 1.0 + np.abs(np.where(self.geometry.revolute, 0.0, postures)).max(axis=1)
         targets = self.poses(self.q)
-        miss = np.abs(self.space.difference(self.poses(postures), targets[sample])).max(axis=1)
+        miss = np.abs(self.space.difference(self.poses(postures), targets[sample])).max(
+            axis=1
+        )
         assert (miss / size).max() < 1e-8
         some = slice(0, 400)
         pinocchio = self.space.values(postures[some])
-        miss = np.abs(self.space.difference(pinocchio, targets[sample[some]])).max(axis=1)
+        miss = np.abs(self.space.difference(pinocchio, targets[sample[some]])).max(
+            axis=1
+        )
         assert (miss / size[some]).max() < 1e-8
         return sample, branch, postures
 
@@ -223,11 +286,21 @@ class PoseBench:
         for branch in (0, len(self.solver.branches) - 1):
             exact = margin_gradient(self.solver, q, branch)
             for joint, step in enumerate(h * np.eye(self.robot.n)):
-                upper, lower = (self.solver.branch_margins(q + s, branch) for s in (step, -step))
-                np.testing.assert_allclose(exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-7)
+                upper, lower = (
+                    self.solver.branch_margins(q + s, branch) for s in (step, -step)
+                )
+                np.testing.assert_allclose(
+                    exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-7
+                )
 
     def curve(self, seed: int, samples: int = 2001) -> np.ndarray:
         """A smooth random motion of all joints, (samples, n)."""
-        rng, n, t = np.random.default_rng(seed), self.robot.n, np.linspace(0.0, 1.0, samples)[:, None]
-        sway = rng.uniform(0.5, 2.0, n) * np.sin(2.0 * np.pi * t * rng.uniform(0.3, 1.0, n))
+        rng, n, t = (
+            np.random.default_rng(seed),
+            self.robot.n,
+            np.linspace(0.0, 1.0, samples)[:, None],
+        )
+        sway = rng.uniform(0.5, 2.0, n) * np.sin(
+            2.0 * np.pi * t * rng.uniform(0.3, 1.0, n)
+        )
         return rng.uniform(-2.0, 2.0, n) + sway

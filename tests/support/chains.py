@@ -16,7 +16,11 @@ from brachis.task import load_task
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 
-PLANES: dict[str, Vector] = {"xy": ZERO, "xz": (np.pi / 2, 0.0, 0.0), "tilted": (0.5, -0.35, 0.7)}
+PLANES: dict[str, Vector] = {
+    "xy": ZERO,
+    "xz": (np.pi / 2, 0.0, 0.0),
+    "tilted": (0.5, -0.35, 0.7),
+}
 """Roll, pitch and yaw by which the xy-plane becomes each plane."""
 
 INERTIAL = """
@@ -36,23 +40,48 @@ class Joint:
     xyz: Vector = ZERO
     rpy: Vector = ZERO
     limit: Mapping[str, float] | None = field(
-        default_factory=lambda: {"lower": -3.1, "upper": 3.1, "velocity": 3.0, "effort": 60.0}
+        default_factory=lambda: {
+            "lower": -3.1,
+            "upper": 3.1,
+            "velocity": 3.0,
+            "effort": 60.0,
+        }
     )
     extra: str = ""
     inertial: str = INERTIAL.format(mass=2.0)
 
 
-def chain_urdf(joints: Sequence[Joint], *, tool: Vector = ZERO, mount: Joint | None = None, more: str = "") -> str:
+def chain_urdf(
+    joints: Sequence[Joint],
+    *,
+    tool: Vector = ZERO,
+    mount: Joint | None = None,
+    more: str = "",
+) -> str:
     """Joints j1, j2, ... that move link1, link2, ..., from the link ``base`` to the link ``tool``.
 
     ``base`` hangs fixed below ``world`` as `mount` says; `more` is put in before the end of the URDF.
     """
-    parts = ["<robot name='chain'>", "<link name='world'/>", "<link name='base'/>", "<link name='tool'/>"]
+    parts = [
+        "<robot name='chain'>",
+        "<link name='world'/>",
+        "<link name='base'/>",
+        "<link name='tool'/>",
+    ]
     parts.append(_joint("mount", mount or Joint("fixed", limit=None), "world", "base"))
     for i, joint in enumerate(joints, start=1):
         parts.append(f"<link name='link{i}'>{joint.inertial}</link>")
-        parts.append(_joint(f"j{i}", joint, f"link{i - 1}" if i > 1 else "base", f"link{i}"))
-    parts.append(_joint("tool_mount", Joint("fixed", xyz=tool, limit=None), f"link{len(joints)}", "tool"))
+        parts.append(
+            _joint(f"j{i}", joint, f"link{i - 1}" if i > 1 else "base", f"link{i}")
+        )
+    parts.append(
+        _joint(
+            "tool_mount",
+            Joint("fixed", xyz=tool, limit=None),
+            f"link{len(joints)}",
+            "tool",
+        )
+    )
     return "\n".join([*parts, more, "</robot>"])
 
 
@@ -62,7 +91,11 @@ def _joint(name: str, joint: Joint, parent: str, child: str) -> str:
     if joint.kind != "fixed":
         text += f"<axis xyz='{_numbers(joint.axis)}'/>"
     if joint.limit is not None:
-        text += "<limit " + " ".join(f"{key}='{value!r}'" for key, value in joint.limit.items()) + "/>"
+        text += (
+            "<limit "
+            + " ".join(f"{key}='{value!r}'" for key, value in joint.limit.items())
+            + "/>"
+        )
     return f"{text}{joint.extra}</joint>"
 
 
@@ -84,25 +117,54 @@ def planar_urdf(pattern: str, plane: str = "xy") -> str:
         }
         if letter == "P":
             angle = 0.4 + 0.9 * i
-            limit = {"lower": -1.1, "upper": 1.3, "velocity": 1.5 + 0.1 * i, "effort": 150.0 - 10.0 * i}
-            joints.append(Joint("prismatic", axis=(np.cos(angle), np.sin(angle), 0.0), limit=limit, **common))
+            limit = {
+                "lower": -1.1,
+                "upper": 1.3,
+                "velocity": 1.5 + 0.1 * i,
+                "effort": 150.0 - 10.0 * i,
+            }
+            joints.append(
+                Joint(
+                    "prismatic",
+                    axis=(np.cos(angle), np.sin(angle), 0.0),
+                    limit=limit,
+                    **common,
+                )
+            )
         else:
             kind = "revolute" if letter == "R" else "continuous"
-            limit = {"lower": -3.0, "upper": 2.9, "velocity": 3.0 + 0.1 * i, "effort": 80.0 - 10.0 * i}
-            joints.append(Joint(kind, axis=(0.0, 0.0, -1.0 if i == 1 else 1.0), limit=limit, **common))
+            limit = {
+                "lower": -3.0,
+                "upper": 2.9,
+                "velocity": 3.0 + 0.1 * i,
+                "effort": 80.0 - 10.0 * i,
+            }
+            joints.append(
+                Joint(
+                    kind,
+                    axis=(0.0, 0.0, -1.0 if i == 1 else 1.0),
+                    limit=limit,
+                    **common,
+                )
+            )
     mount = Joint("fixed", xyz=(0.1, -0.2, 0.3), rpy=PLANES[plane], limit=None)
     return chain_urdf(joints, tool=(0.33, 0.04, 0.01), mount=mount)
 
 
 def planar_robot(pattern: str, plane: str = "xy", **options: Any) -> Robot:
     """Robot of `planar_urdf`; options are those of `Robot.from_urdf`."""
-    return Robot.from_urdf(f"{pattern} {plane}", urdf_text=planar_urdf(pattern, plane), **options)
+    return Robot.from_urdf(
+        f"{pattern} {plane}", urdf_text=planar_urdf(pattern, plane), **options
+    )
 
 
 def gantry_robot(axes: Sequence[Vector], **options: Any) -> Robot:
     """Prismatic joints along `axes`, which need not be perpendicular."""
     limit = {"lower": -5.0, "upper": 5.0, "velocity": 100.0, "effort": 50.0}
-    text = chain_urdf([Joint("prismatic", axis=axis, limit=limit) for axis in axes], tool=(0.1, 0.2, 0.3))
+    text = chain_urdf(
+        [Joint("prismatic", axis=axis, limit=limit) for axis in axes],
+        tool=(0.1, 0.2, 0.3),
+    )
     return Robot.from_urdf("gantry", urdf_text=text, **options)
 
 

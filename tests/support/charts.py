@@ -16,12 +16,21 @@ from brachis.task import load_task
 PLACES = 33
 
 
-def path_from(robot: Robot, rows: str | Sequence[str], segments: list[dict[str, Any]], start: Any) -> Any:
+def path_from(
+    robot: Robot, rows: str | Sequence[str], segments: list[dict[str, Any]], start: Any
+) -> Any:
     """Task map and path from a start posture; the segments as a task file writes them."""
     robot, task_map = bind(robot, rows)
     rows = rows if isinstance(rows, str) else list(rows)
     start = np.array(start, dtype=float)
-    task = load_task({"brachis": 1, "start": {"joints": start.tolist()}, "task_space": rows, "path": segments})
+    task = load_task(
+        {
+            "brachis": 1,
+            "start": {"joints": start.tolist()},
+            "task_space": rows,
+            "path": segments,
+        }
+    )
     return task_map, build_path(task.path, task_map.value(start), task_map.rows)
 
 
@@ -30,7 +39,9 @@ def jacobian(task_map: TaskMap, q: np.ndarray) -> np.ndarray:
     return task_map.jacobian(task_map.twists(q))
 
 
-def least_motion(task_map: TaskMap, path: Path, start: Any, s: np.ndarray) -> np.ndarray:
+def least_motion(
+    task_map: TaskMap, path: Path, start: Any, s: np.ndarray
+) -> np.ndarray:
     """Postures (S, n), from each to the next by steps of the pseudo-inverse."""
     q = [np.array(start, dtype=float)]
     for target in path.sample(s[1:]).target:
@@ -54,7 +65,11 @@ def turned_null_spaces(task_map: TaskMap, q: np.ndarray) -> np.ndarray:
 
 
 def chart_of(
-    robot: Robot, rows: str | Sequence[str], segments: list[dict[str, Any]], start: Any, kind: str
+    robot: Robot,
+    rows: str | Sequence[str],
+    segments: list[dict[str, Any]],
+    start: Any,
+    kind: str,
 ) -> ChartMap:
     """Chart along the least motion; its rows are ``constant``, ``following`` the null space or ``swinging``."""
     task_map, path = path_from(robot, rows, segments, start)
@@ -63,6 +78,12 @@ def chart_of(
     null = turned_null_spaces(task_map, reference)
     if kind == "swinging":
         aside = np.random.default_rng(2).normal(size=null.shape[1:])
-        null = null + 0.3 * np.sin(4.0 * s)[:, None, None] * aside / np.linalg.norm(aside)
-    chosen = ChartRows.constant(null.mean(axis=0)) if kind == "constant" else ChartRows.along(s, null, reference)
+        null = null + 0.3 * np.sin(4.0 * s)[:, None, None] * aside / np.linalg.norm(
+            aside
+        )
+    chosen = (
+        ChartRows.constant(null.mean(axis=0))
+        if kind == "constant"
+        else ChartRows.along(s, null, reference)
+    )
     return ChartMap(task_map, path, chosen, s, reference)

@@ -19,7 +19,9 @@ def wrapped(delta: np.ndarray, angles: np.ndarray) -> np.ndarray:
 class Bench:
     """A robot and task space with random postures, their task coordinates and Jacobians by Pinocchio."""
 
-    def __init__(self, robot: Robot, rows: Sequence[str], postures: int, seed: int = 5) -> None:
+    def __init__(
+        self, robot: Robot, rows: Sequence[str], postures: int, seed: int = 5
+    ) -> None:
         self.robot = robot
         self.space = task_map_of(robot, rows)
         self.q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (postures, robot.n))
@@ -30,7 +32,9 @@ class Bench:
 
     def decompositions(self) -> Iterator[tuple[tuple[int, ...], bool]]:
         """Every choice of redundant joints, and whether its J_nr is regular anywhere."""
-        for redundant in itertools.combinations(range(self.robot.n), self.robot.n - self.space.m):
+        for redundant in itertools.combinations(
+            range(self.robot.n), self.robot.n - self.space.m
+        ):
             yield redundant, bool(np.abs(self.determinant(redundant)).max() > 1e-6)
 
     def rest(self, redundant: Sequence[int]) -> list[int]:
@@ -40,14 +44,29 @@ class Bench:
         """Det J_nr at the postures, from Pinocchio."""
         return np.linalg.det(self.jacobian[:, :, self.rest(redundant)])
 
-    def find(self, redundant: Sequence[int], families: Sequence[Family] = ()) -> Candidate:
-        return find(self.robot, self.space, [self.robot.joint_names[i] for i in redundant], families=families)
+    def find(
+        self, redundant: Sequence[int], families: Sequence[Family] = ()
+    ) -> Candidate:
+        return find(
+            self.robot,
+            self.space,
+            [self.robot.joint_names[i] for i in redundant],
+            families=families,
+        )
 
     def miss(self, postures: np.ndarray, targets: np.ndarray) -> np.ndarray:
         """Largest distance from the target of every posture, by Pinocchio's forward kinematics."""
-        return np.abs(wrapped(self.space.values(postures) - targets, self.angles)).max(axis=1)
+        return np.abs(wrapped(self.space.values(postures) - targets, self.angles)).max(
+            axis=1
+        )
 
-    def check(self, redundant: Sequence[int], families: Sequence[Family] = (), *, distinct_roots: int) -> Candidate:
+    def check(
+        self,
+        redundant: Sequence[int],
+        families: Sequence[Family] = (),
+        *,
+        distinct_roots: int,
+    ) -> Candidate:
         """Hold a closed form to its promises; `distinct_roots` is how many answers geometry allows."""
         candidate = self.find(redundant, families)
         solver, rest, q = candidate.solver, self.rest(redundant), self.q
@@ -61,7 +80,9 @@ class Bench:
         regular = np.abs(determinant) > 1e-6 * scale
 
         finite = np.isfinite(answers).all(axis=2)
-        assert np.array_equal(finite, np.isfinite(answers).any(axis=2)), "an answer is NaN in part"
+        assert np.array_equal(finite, np.isfinite(answers).any(axis=2)), (
+            "an answer is NaN in part"
+        )
         sample, branch = np.nonzero(finite)
         assert len(sample) >= len(q) - 1
         postures = q[sample].copy()
@@ -71,7 +92,9 @@ class Bench:
         assert (self.miss(postures, self.targets[sample]) / size).max() < 1e-8
         assert np.all(finite.sum(axis=1)[regular] == distinct_roots)
 
-        margins = np.stack([solver.branch_margins(q, b) for b in range(len(solver.branches))], axis=1)
+        margins = np.stack(
+            [solver.branch_margins(q, b) for b in range(len(solver.branches))], axis=1
+        )
         if margins.shape[2] == 0:  # the closed form is linear with a constant matrix
             assert np.ptp(determinant) < 1e-9 * scale
             own = np.zeros(len(q), dtype=int)
@@ -80,7 +103,9 @@ class Bench:
             ratio = margins[:, 0, 0] / determinant
             np.testing.assert_allclose(ratio[regular], ratio[regular][0], rtol=1e-6)
             np.testing.assert_allclose(margins[:, 1], -margins[:, 0], atol=1e-12)
-            assert 0.05 < np.abs(margins).max() < 20.0, "margins are of the order of one"
+            assert 0.05 < np.abs(margins).max() < 20.0, (
+                "margins are of the order of one"
+            )
             own = np.argmax(margins[:, :, 0], axis=1)
         back = wrapped(answers[np.arange(len(q)), own] - q[:, rest], self.turning[rest])
         slack = 1e-9 * scale / np.abs(determinant)
@@ -97,5 +122,10 @@ class Bench:
             exact = margin_gradient(solver, q, branch)
             for joint in range(self.robot.n):
                 step = h * np.eye(self.robot.n)[joint]
-                upper, lower = solver.branch_margins(q + step, branch), solver.branch_margins(q - step, branch)
-                np.testing.assert_allclose(exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-7)
+                upper, lower = (
+                    solver.branch_margins(q + step, branch),
+                    solver.branch_margins(q - step, branch),
+                )
+                np.testing.assert_allclose(
+                    exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-7
+                )

@@ -19,13 +19,25 @@ def wrapped(delta, turning):
 class Bench:
     """Random postures of a robot, their task coordinates by Pinocchio, and a solver for some redundant joints."""
 
-    def __init__(self, robot, redundant, postures=800, seed=5, family=spherical_wrist, rows="pose"):
+    def __init__(
+        self,
+        robot,
+        redundant,
+        postures=800,
+        seed=5,
+        family=spherical_wrist,
+        rows="pose",
+    ):
         self.robot, self.redundant = robot, list(redundant)
         self.space = task_map_of(robot, rows)
         self.rest = [i for i in range(robot.n) if i not in redundant]
-        self.turning = np.array([unit == "rad" for unit in robot.position_units])[self.rest]
+        self.turning = np.array([unit == "rad" for unit in robot.position_units])[
+            self.rest
+        ]
         self.q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (postures, robot.n))
-        self.solver = family.build(ChainGeometry.of(robot), self.space, tuple(redundant))
+        self.solver = family.build(
+            ChainGeometry.of(robot), self.space, tuple(redundant)
+        )
 
     def targets(self, q):
         return self.space.values(q)
@@ -40,7 +52,13 @@ class Bench:
 
     def margins(self, q):
         """Margins (K, B, k) of all branches."""
-        return np.stack([self.solver.branch_margins(q, b) for b in range(len(self.solver.branches))], axis=1)
+        return np.stack(
+            [
+                self.solver.branch_margins(q, b)
+                for b in range(len(self.solver.branches))
+            ],
+            axis=1,
+        )
 
     def determinant(self, q):
         return np.linalg.det(self.space.jacobian(self.space.twists(q))[:, :, self.rest])
@@ -50,28 +68,41 @@ class Bench:
         postures = self.answers(self.q)
         finite = np.isfinite(postures).all(axis=2)
         solved = postures[:, :, self.rest]
-        assert np.array_equal(finite, np.isfinite(solved).any(axis=2)), "an answer is NaN in part"
+        assert np.array_equal(finite, np.isfinite(solved).any(axis=2)), (
+            "an answer is NaN in part"
+        )
         angles = solved[finite][:, self.turning]
         assert np.all((angles > -np.pi) & (angles <= np.pi))
         sample, branch = np.nonzero(finite)
         size = 1.0 + np.abs(np.where(self.turning, 0.0, solved[finite])).max(axis=1)
         wanted = self.targets(self.q)
-        miss = np.abs(self.space.difference(self.targets(postures[finite]), wanted[sample])).max(axis=1)
+        miss = np.abs(
+            self.space.difference(self.targets(postures[finite]), wanted[sample])
+        ).max(axis=1)
         assert (miss / size).max() < 1e-8
 
         margins = self.margins(self.q)
         assert margins.shape[2] <= 3
         largest = np.abs(margins).max(axis=(0, 1))
-        assert np.all((largest > 0.8) & (largest < 3.0)), "margins are of the order of one"
+        assert np.all((largest > 0.8) & (largest < 3.0)), (
+            "margins are of the order of one"
+        )
         inside = (margins > 0.0).all(axis=2)
         assert np.all(inside.sum(axis=1) == 1), "a posture is in exactly one branch"
         own = np.argmax(inside, axis=1)
         assert set(own) == set(range(len(self.solver.branches)))
         product = np.abs(margins[:, 0]).prod(axis=1)
-        back = wrapped(solved[np.arange(len(own)), own] - self.q[:, self.rest], self.turning)
+        back = wrapped(
+            solved[np.arange(len(own)), own] - self.q[:, self.rest], self.turning
+        )
         assert (np.abs(back).max(axis=1) * product)[product > 1e-6].max() < 1e-9
         for b in range(len(self.solver.branches)):
-            assert self.solver.branch_margins(postures[sample[branch == b], b], b).min(initial=np.inf) > -1e-7
+            assert (
+                self.solver.branch_margins(postures[sample[branch == b], b], b).min(
+                    initial=np.inf
+                )
+                > -1e-7
+            )
 
         determinant = self.determinant(self.q)
         ratio = determinant[product > 1e-4] / margins[product > 1e-4, 0].prod(axis=1)
@@ -84,25 +115,37 @@ class Bench:
         for branch in (0, len(self.solver.branches) - 1):
             exact = margin_gradient(self.solver, q, branch)
             for joint, step in enumerate(h * np.eye(self.robot.n)):
-                upper, lower = (self.solver.branch_margins(q + s, branch) for s in (step, -step))
-                np.testing.assert_allclose(exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-8)
+                upper, lower = (
+                    self.solver.branch_margins(q + s, branch) for s in (step, -step)
+                )
+                np.testing.assert_allclose(
+                    exact[:, :, joint], (upper - lower) / (2.0 * h), atol=1e-8
+                )
 
     def check_labels_along_curves(self):
         """Labels follow their branch along smooth curves, and determinants change sign where margins do."""
         rng, t = np.random.default_rng(11), np.linspace(0.0, 1.0, 2001)[:, None]
         n, changes, followed = self.robot.n, 0, 0
         for _ in range(4):
-            sway = rng.uniform(0.5, 2.0, n) * np.sin(2.0 * np.pi * t * rng.uniform(0.3, 1.0, n))
+            sway = rng.uniform(0.5, 2.0, n) * np.sin(
+                2.0 * np.pi * t * rng.uniform(0.3, 1.0, n)
+            )
             q = rng.uniform(-2.0, 2.0, n) + sway
             postures = self.answers(q)
             for branch in range(postures.shape[1]):
                 exists = np.isfinite(postures[:, branch]).all(axis=1)
                 margin = np.full(len(t), -1.0)
-                margin[exists] = self.solver.branch_margins(postures[exists, branch], branch).min(axis=1)
-                assert np.all(margin[exists] > -1e-7), "an answer lies outside its own branch"
+                margin[exists] = self.solver.branch_margins(
+                    postures[exists, branch], branch
+                ).min(axis=1)
+                assert np.all(margin[exists] > -1e-7), (
+                    "an answer lies outside its own branch"
+                )
                 steps = np.diff(postures[:, branch][:, self.rest], axis=0)
                 inside = (margin[1:] > 0.15) & (margin[:-1] > 0.15)
-                assert np.abs(wrapped(steps, self.turning))[inside].max(initial=0.0) < 0.2, "the branch jumps"
+                assert (
+                    np.abs(wrapped(steps, self.turning))[inside].max(initial=0.0) < 0.2
+                ), "the branch jumps"
                 followed += np.count_nonzero(inside)
             crossings = np.diff(np.sign(self.margins(q)[:, 0]), axis=0) != 0.0
             turned = np.diff(np.sign(self.determinant(q))) != 0.0
@@ -123,17 +166,24 @@ class Bench:
         """Two answers meet where a margin vanishes; `steps` are the joints whose answers do, None for a linear step."""
         assert self.margins(self.q[:1]).shape[2] == len(steps)
         largest, met = np.abs(self.determinant(self.q)).max(), [0] * len(steps)
-        for (start, end), kind in itertools.product(itertools.pairwise(self.q[:50] * 0.8), range(len(steps))):
+        for (start, end), kind in itertools.product(
+            itertools.pairwise(self.q[:50] * 0.8), range(len(steps))
+        ):
             if met[kind] >= 6:
                 continue
 
             def margin(x, start=start, end=end, kind=kind):
-                return self.solver.branch_margins((start + x * (end - start))[None], 0)[0, kind]
+                return self.solver.branch_margins((start + x * (end - start))[None], 0)[
+                    0, kind
+                ]
 
             if margin(0.0) * margin(1.0) > 0.0:
                 continue
             at = brentq(margin, 0.0, 1.0, xtol=1e-15)
-            edge, beside = start + at * (end - start), start + (at + 1e-5) * (end - start)
+            edge, beside = (
+                start + at * (end - start),
+                start + (at + 1e-5) * (end - start),
+            )
             others = np.abs(np.delete(self.margins(edge[None])[0, 0], kind))
             if others.min(initial=np.inf) < 0.1 or abs(margin(at + 1e-5)) < 1e-6:
                 continue

@@ -33,4 +33,8 @@ def told(phase, limit, x) -> np.ndarray:
     if kind in PROCESS:
         (speed,) = (each for each in phase.limits if each.kind == "tool_speed")
         near &= speed.values(state)[:, 0] > 0.05
-    return np.repeat(near, len(limit.lower)) if limit.where == "points" else np.ones(len(limit.lower), dtype=bool)
+    return (
+        np.repeat(near, len(limit.lower))
+        if limit.where == "points"
+        else np.ones(len(limit.lower), dtype=bool)
+    )

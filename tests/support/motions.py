@@ -27,11 +27,20 @@ def joint_map(
     start = np.array(start, dtype=float)
     space = task_map_of(robot, rows)
     asked = rows if isinstance(rows, str) else list(rows)
-    task = load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": asked, "path": list(path)})
+    task = load_task(
+        {
+            "brachis": 1,
+            "start": {"joints": [0]},
+            "task_space": asked,
+            "path": list(path),
+        }
+    )
     curve = build_path(task.path, space.value(start), space.rows)
     candidate = find(robot, space, redundant)
     branch = branch_of(space, candidate, start, "auto")
-    indices = tuple(robot.joint_names.index(name) for name in candidate.redundant_joints)
+    indices = tuple(
+        robot.joint_names.index(name) for name in candidate.redundant_joints
+    )
     assert candidate.solver is not None
     return ClosedFormMap(space, curve, candidate.solver, indices, branch, start)
 
@@ -47,11 +56,18 @@ class Sway:
         """Return y and three derivatives at times t in [0, 1], each (K, 1 + r)."""
 
         def swing(rate: float, phase: float) -> np.ndarray:
-            return np.array([rate**order * np.sin(rate * t + phase + order * np.pi / 2.0) for order in range(4)])
+            return np.array(
+                [
+                    rate**order * np.sin(rate * t + phase + order * np.pi / 2.0)
+                    for order in range(4)
+                ]
+            )
 
         value = np.array([1.0, 0.0, 0.0, 0.0])[:, None]
         columns = [0.5 * value + 0.5 * swing(np.pi, -np.pi / 2.0)]
-        for place, q in enumerate(self.joint_map.coordinates(0.0, self.joint_map.start)[1:]):
+        for place, q in enumerate(
+            self.joint_map.coordinates(0.0, self.joint_map.start)[1:]
+        ):
             columns.append(q * value + self.amplitude * swing(2.0 + place, 0.0))
         return tuple(np.stack(columns, axis=2))
 
@@ -60,14 +76,18 @@ def check_time_derivatives(motion: Any, t: np.ndarray, exact: float) -> None:
     """Positions are the postures', to `exact`; velocities, accelerations and jerks differences over time."""
     joint_map, h = motion.joint_map, 1e-4
     state = joint_map.state(*motion(t))
-    before, here, after = (joint_map.postures(motion(t + step)[0]) for step in (-h, 0.0, h))
+    before, here, after = (
+        joint_map.postures(motion(t + step)[0]) for step in (-h, 0.0, h)
+    )
     np.testing.assert_allclose(state.q, here, atol=exact)
     speed, bend = (after - before) / (2.0 * h), (after - 2.0 * here + before) / h**2
     assert np.abs(speed).max() > 0.1
     assert np.abs(bend).max() > 0.1
     np.testing.assert_allclose(state.qdot, speed, atol=1e-5 * np.abs(speed).max())
     np.testing.assert_allclose(state.qddot, bend, atol=1e-5 * np.abs(bend).max())
-    before, after = (joint_map.state(*motion(t + step), near=here).qddot for step in (-h, h))
+    before, after = (
+        joint_map.state(*motion(t + step), near=here).qddot for step in (-h, h)
+    )
     jerk = (after - before) / (2.0 * h)
     assert np.abs(jerk).max() > 0.1
     np.testing.assert_allclose(state.qdddot, jerk, atol=1e-5 * np.abs(jerk).max())
@@ -86,10 +106,15 @@ def check_derivatives(motion: Any, t: np.ndarray) -> JointDerivatives:
             moved[place][:, column] += sign * h
             sides.append(joint_map.state(*moved))
         names = ("q", "qdot", "qddot", "qdddot")
-        return [(getattr(sides[0], name) - getattr(sides[1], name)) / (2.0 * h) for name in names]
+        return [
+            (getattr(sides[0], name) - getattr(sides[1], name)) / (2.0 * h)
+            for name in names
+        ]
 
     for column in range(1 + joint_map.r):
-        by_y, by_ydot, by_yddot, by_ydddot = (difference(place, column) for place in range(4))
+        by_y, by_ydot, by_yddot, by_ydddot = (
+            difference(place, column) for place in range(4)
+        )
         gradient = state.gradient[:, :, column]
         # Zeros: position does not hang on speed, nor speed on acceleration.
         for value, expected in (
@@ -106,8 +131,12 @@ def check_derivatives(motion: Any, t: np.ndarray) -> JointDerivatives:
             (3.0 * exact.qdot_y[:, :, column], by_yddot[3]),
             (3.0 * exact.qddot_y[:, :, column], by_ydot[3]),
         ):
-            np.testing.assert_allclose(value, expected, atol=2e-7 * max(1.0, np.abs(expected).max()))
+            np.testing.assert_allclose(
+                value, expected, atol=2e-7 * max(1.0, np.abs(expected).max())
+            )
         # A difference of differences, where the highest derivatives of a chart's splines have corners at its knots.
         value, expected = state.qdddot_y[:, :, column], by_y[3]
-        np.testing.assert_allclose(value, expected, atol=2e-6 * max(1.0, np.abs(expected).max()))
+        np.testing.assert_allclose(
+            value, expected, atol=2e-6 * max(1.0, np.abs(expected).max())
+        )
     return exact

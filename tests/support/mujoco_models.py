@@ -15,10 +15,12 @@ COMPILER = """
 
 def mujoco_model(robot):
     """The model, and the places of the robot's joints in its coordinates."""
-    import mujoco  # noqa: PLC0415  (not everyone has it)
+    import mujoco
 
     text = robot.urdf.replace("</robot>", COMPILER + "</robot>")
-    text = re.sub(r'ixx="0(\.0)?"', 'ixx="1e-12"', text)  # slender rods, which MuJoCo refuses, turn about z alone
+    text = re.sub(
+        r'ixx="0(\.0)?"', 'ixx="1e-12"', text
+    )  # slender rods, which MuJoCo refuses, turn about z alone
     model = mujoco.MjModel.from_xml_string(text)
     model.opt.gravity[:] = robot.model.gravity.linear
     order = [model.joint(name).qposadr[0] for name in robot.joint_names]

@@ -28,7 +28,13 @@ CASES: dict[str, tuple[str, list[str], list[float], list[str]]] = {
 }
 
 
-def phase_of(case: str, *, end: list[float] | None = None, position: Any = FROM_URDF, **spline: Any) -> Phase:
+def phase_of(
+    case: str,
+    *,
+    end: list[float] | None = None,
+    position: Any = FROM_URDF,
+    **spline: Any,
+) -> Phase:
     """A bent path in the vertical plane under gravity, friction, and limits of every kind that the splines can hold."""
     pattern, rows, start, redundant = CASES[case]
     friction = {**FRICTION, "viscous": [1.0 + 0.1 * i for i in range(len(pattern))]}
@@ -46,12 +52,30 @@ def phase_of(case: str, *, end: list[float] | None = None, position: Any = FROM_
     )
     robot = planar_robot(pattern, "xz", friction=friction, limits=limits)
     through = [[-0.05, 0.05, 0.1], [-0.1, 0.06, 0.15], [-0.13, 0.03, 0.2]]
-    path = [{"spline": {"through": [point[: len(rows)] for point in through], "relative": True}}]
-    (phase,) = program_of(robot, rows, path, start, redundant, end=end, tool_limits=TOOL_LIMITS, **settings).phases
+    path = [
+        {
+            "spline": {
+                "through": [point[: len(rows)] for point in through],
+                "relative": True,
+            }
+        }
+    ]
+    (phase,) = program_of(
+        robot,
+        rows,
+        path,
+        start,
+        redundant,
+        end=end,
+        tool_limits=TOOL_LIMITS,
+        **settings,
+    ).phases
     return phase
 
 
-def reachable_points(phase: Phase, count: int, spread: float = 0.01) -> list[np.ndarray]:
+def reachable_points(
+    phase: Phase, count: int, spread: float = 0.01
+) -> list[np.ndarray]:
     """Points x near the first guess, moved at random in every variable."""
     rng, first = np.random.default_rng(7), next(starting_points(Program([phase])))
     return [first + spread * rng.uniform(-1.0, 1.0, len(first)) for _ in range(count)]

@@ -16,7 +16,10 @@ BACK, DOWN = (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
 SLIDE = {"lower": -1.0, "upper": 1.0, "velocity": 1.0, "effort": 50.0}
 
 IIWA = [(Z, (0.0, 0.0, height)) for height in (0.0, 0.36, 0.36, 0.78, 0.78, 1.18, 1.18)]
-IIWA = [(axis, point) for axis, (_, point) in zip((Z, Y, Z, BACK, Z, Y, Z), IIWA, strict=True)]
+IIWA = [
+    (axis, point)
+    for axis, (_, point) in zip((Z, Y, Z, BACK, Z, Y, Z), IIWA, strict=True)
+]
 IIWA_TOOL = (0.0, 0.0, 1.306)
 
 
@@ -25,9 +28,16 @@ def chain(joints, tool):
     parts, before = [], np.zeros(3)
     for axis, position, *slide in joints:
         step = tuple((np.array(position) - before).tolist())
-        parts.append(Joint("prismatic", axis=axis, xyz=step, limit=SLIDE) if slide else Joint("revolute", axis, step))
+        parts.append(
+            Joint("prismatic", axis=axis, xyz=step, limit=SLIDE)
+            if slide
+            else Joint("revolute", axis, step)
+        )
         before = np.array(position)
-    return Robot.from_urdf("chain", urdf_text=chain_urdf(parts, tool=tuple((np.array(tool) - before).tolist())))
+    return Robot.from_urdf(
+        "chain",
+        urdf_text=chain_urdf(parts, tool=tuple((np.array(tool) - before).tolist())),
+    )
 
 
 def iiwa():
@@ -64,7 +74,13 @@ def panda_lengths():
 
 def rail_arm():
     """Spherical wrist on an ortho-parallel base, on a rail."""
-    points = [(0.0, 0.0, 0.4), (0.05, 0.0, 0.4), (0.07, 0.05, 0.9), (0.09, 0.05, 1.0), (0.09, 0.05, 1.4)]
+    points = [
+        (0.0, 0.0, 0.4),
+        (0.05, 0.0, 0.4),
+        (0.07, 0.05, 0.9),
+        (0.09, 0.05, 1.0),
+        (0.09, 0.05, 1.4),
+    ]
     arm = list(zip((Z, Y, Y, Z, Y, Z), [*points, points[-1]], strict=True))
     return chain([(Y, (0.0, 0.0, 0.0), "slide"), *arm], (0.14, 0.03, 1.5))
 
@@ -86,16 +102,34 @@ def gen3():
     heights = (0.28481, 0.28481, 0.49519, 0.70557, 0.914, 1.01993, 1.12586)
     offsets = (0.0, 0.005375, 0.01175, 0.018125, 0.0245, 0.024675, 0.02485)
     axes = (Z, Y, Z, Y, Z, Y, Z)
-    return chain([(axis, (0.0, y, z)) for axis, y, z in zip(axes, offsets, heights, strict=True)], (0.0, 0.02485, 1.3))
+    return chain(
+        [
+            (axis, (0.0, y, z))
+            for axis, y, z in zip(axes, offsets, heights, strict=True)
+        ],
+        (0.0, 0.02485, 1.3),
+    )
 
 
 def iiwa_by_angles(quarter):
     """The iiwa with every axis along its frame's z, as URDF exporters write it: turned by quarters to and fro."""
     turns = (0.0, -quarter, quarter, quarter, -quarter, -quarter, quarter)
-    steps = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.36), (0.0, -0.21, 0.0), (0.0, 0.0, 0.21), (0.0, 0.2, 0.0), (0.0, 0.0, 0.2)]
+    steps = [
+        (0.0, 0.0, 0.0),
+        (0.0, 0.0, 0.36),
+        (0.0, -0.21, 0.0),
+        (0.0, 0.0, 0.21),
+        (0.0, 0.2, 0.0),
+        (0.0, 0.0, 0.2),
+    ]
     steps.append((0.0, -0.05, 0.0))
-    joints = [Joint("revolute", xyz=xyz, rpy=(turn, 0.0, 0.0)) for turn, xyz in zip(turns, steps, strict=True)]
-    return Robot.from_urdf("by angles", urdf_text=chain_urdf(joints, tool=(0.0, 0.0, 0.076)))
+    joints = [
+        Joint("revolute", xyz=xyz, rpy=(turn, 0.0, 0.0))
+        for turn, xyz in zip(turns, steps, strict=True)
+    ]
+    return Robot.from_urdf(
+        "by angles", urdf_text=chain_urdf(joints, tool=(0.0, 0.0, 0.076))
+    )
 
 
 FAMILIES = (
@@ -137,12 +171,17 @@ def family(kind):
         elif first is not None:
             axes[first + 1] = axes[first]
     tool = rng.uniform(-0.5, 0.5, 3)
-    return chain([(tuple(a.tolist()), p) for a, p in zip(axes, points, strict=True)], tool)
+    return chain(
+        [(tuple(a.tolist()), p) for a, p in zip(axes, points, strict=True)], tool
+    )
 
 
 def panda():
     """The Panda's own URDF, where example-robot-data is installed."""
-    share = Path(sysconfig.get_path("purelib")) / "cmeel.prefix/share/example-robot-data/robots"
+    share = (
+        Path(sysconfig.get_path("purelib"))
+        / "cmeel.prefix/share/example-robot-data/robots"
+    )
     path = share / "panda_description/urdf/panda.urdf"
     if not path.exists():
         pytest.skip("example-robot-data is not installed")

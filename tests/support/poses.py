@@ -25,9 +25,13 @@ def rotations(coordinates: np.ndarray) -> Rotation:
     return Rotation.from_matrix(coordinates[:, 3:].reshape(-1, 3, 3))
 
 
-def pose_path(segments: list[dict[str, Any]], position: Any = START, rotation: Rotation = TURNED) -> PosePath:
+def pose_path(
+    segments: list[dict[str, Any]], position: Any = START, rotation: Rotation = TURNED
+) -> PosePath:
     """The path of poses that segments describe as a task file writes them."""
-    task = load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": "pose", "path": segments})
+    task = load_task(
+        {"brachis": 1, "start": {"joints": [0]}, "task_space": "pose", "path": segments}
+    )
     path = build_path(task.path, pose(position, rotation), POSE_ROWS)
     assert isinstance(path, PosePath)
     return path
@@ -47,12 +51,18 @@ def smooth_places(path: PosePath, distance: float, count: int = 60) -> np.ndarra
 def central_difference(function: Any, s: np.ndarray, h: float) -> np.ndarray:
     """Derivative to the sixth power of the step."""
     weights = {1: 45.0, 2: -9.0, 3: 1.0}
-    return sum(w * (function(s + k * h) - function(s - k * h)) for k, w in weights.items()) / (60.0 * h)
+    return sum(
+        w * (function(s + k * h) - function(s - k * h)) for k, w in weights.items()
+    ) / (60.0 * h)
 
 
 def twist_by_difference(path: PosePath, s: np.ndarray, h: float) -> np.ndarray:
     """Body twist from poses alone: the velocity in the tool frame, and the rate of the relative rotation vector."""
     here = rotations(path.sample(s).target)
-    velocity = here.inv().apply(central_difference(lambda s: path.sample(s).target[:, :3], s, h))
-    turning = central_difference(lambda s: (here.inv() * rotations(path.sample(s).target)).as_rotvec(), s, h)
+    velocity = here.inv().apply(
+        central_difference(lambda s: path.sample(s).target[:, :3], s, h)
+    )
+    turning = central_difference(
+        lambda s: (here.inv() * rotations(path.sample(s).target)).as_rotvec(), s, h
+    )
     return np.concatenate([velocity, turning], axis=1)

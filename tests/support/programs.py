@@ -39,7 +39,9 @@ class Program:
         self.jacobian_rows, self.jacobian_columns = rows.ravel(), columns.ravel()
 
     def objective(self, x):
-        return float(self.costs @ x) + (0.0 if self.near is None else 0.5 * float((x - self.near) @ (x - self.near)))
+        return float(self.costs @ x) + (
+            0.0 if self.near is None else 0.5 * float((x - self.near) @ (x - self.near))
+        )
 
     def gradient(self, x):
         return self.costs + (0.0 if self.near is None else x - self.near)

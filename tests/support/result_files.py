@@ -24,5 +24,7 @@ def with_parts(path, **parts):
         place[last] = change(place.get(last))
     if "meta" not in parts:
         contents["meta"] = np.array(json.dumps(meta))
-    np.savez(path, **{name: value for name, value in contents.items() if value is not None})
+    np.savez(
+        path, **{name: value for name, value in contents.items() if value is not None}
+    )
     return path

@@ -13,13 +13,17 @@ from support.chains import Joint, Vector, chain_urdf
 from support.pose_arms import IIWA, IIWA_TOOL
 
 Y = np.array([0.0, 1.0, 0.0])
-QUARTERS = np.pi / 2 * np.array(list(itertools.product((0.0, 1.0, -1.0, 2.0), repeat=3)))
+QUARTERS = (
+    np.pi / 2 * np.array(list(itertools.product((0.0, 1.0, -1.0, 2.0), repeat=3)))
+)
 """Roll, pitch and yaw of all frames turned by quarters."""
 TURNED = Rotation.from_euler("xyz", QUARTERS)
 ANY_DIGITS = 15
 
 
-def by_angles(arm: Arm, digits: int = 4, *, seed: int = 0, bent: float = 0.0, bent_joint: int = 4) -> Robot:
+def by_angles(
+    arm: Arm, digits: int = 4, *, seed: int = 0, bent: float = 0.0, bent_joint: int = 4
+) -> Robot:
     """Robot of an arm; its joints' frames are turned by quarters and slid along the axes at random.
 
     Parameters
@@ -48,9 +52,21 @@ def by_angles(arm: Arm, digits: int = 4, *, seed: int = 0, bent: float = 0.0, be
         if last:
             kind, axis, limit = "fixed", np.zeros(3), None
         else:
-            kind, limit = ("revolute", Joint("revolute").limit) if arm.letters[i] == "R" else ("prismatic", SLIDE)
+            kind, limit = (
+                ("revolute", Joint("revolute").limit)
+                if arm.letters[i] == "R"
+                else ("prismatic", SLIDE)
+            )
             axis = here.inv().apply(arm.axes[i]).round()
-        joints.append(Joint(kind, axis=_vector(axis), xyz=_vector(place), rpy=_vector(rpy), limit=limit))
+        joints.append(
+            Joint(
+                kind,
+                axis=_vector(axis),
+                xyz=_vector(place),
+                rpy=_vector(rpy),
+                limit=limit,
+            )
+        )
     return Robot.from_urdf("arm", urdf_text=chain_urdf(joints))
 
 
@@ -69,7 +85,11 @@ def _vector(values: np.ndarray) -> Vector:
 def iiwa() -> Arm:
     """Lengths of the LBR iiwa 14."""
     points = np.array([np.zeros(3), *(point for _, point in IIWA), IIWA_TOOL])
-    return Arm("R" * 7, tuple(np.array(axis) for axis, _ in IIWA), tuple(map(placement, np.diff(points, axis=0))))
+    return Arm(
+        "R" * 7,
+        tuple(np.array(axis) for axis, _ in IIWA),
+        tuple(map(placement, np.diff(points, axis=0))),
+    )
 
 
 ARMS = {

@@ -12,7 +12,8 @@ PANDA = next(
         found
         for folder in map(Path, sys.path)
         if (
-            found := folder / "cmeel.prefix/share/example-robot-data/robots/panda_description/urdf/panda.urdf"
+            found := folder
+            / "cmeel.prefix/share/example-robot-data/robots/panda_description/urdf/panda.urdf"
         ).is_file()
     ),
     None,

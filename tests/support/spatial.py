@@ -20,12 +20,22 @@ def rail_arm_joints(rail: Vector = Y) -> list[Joint]:
     masses = (8.0, 6.0, 4.0, 2.0, 1.0, 0.5)
     axes = (Z, Y, Y, Z, Y, Z)
     arm = [
-        Joint("revolute", axis=axis, xyz=xyz, limit=turn, inertial=INERTIAL.format(mass=mass))
+        Joint(
+            "revolute",
+            axis=axis,
+            xyz=xyz,
+            limit=turn,
+            inertial=INERTIAL.format(mass=mass),
+        )
         for axis, xyz, mass in zip(axes, TX90L_STEPS, masses, strict=True)
     ]
     return [Joint("prismatic", axis=rail, limit=slide), *arm]
 
 
-def rail_arm(rail: Vector = Y, *, tool: Vector = (0.05, -0.02, 0.12), **options: Any) -> Robot:
+def rail_arm(
+    rail: Vector = Y, *, tool: Vector = (0.05, -0.02, 0.12), **options: Any
+) -> Robot:
     """Robot of `rail_arm_joints`; options are those of `Robot.from_urdf`."""
-    return Robot.from_urdf("rail arm", urdf_text=chain_urdf(rail_arm_joints(rail), tool=tool), **options)
+    return Robot.from_urdf(
+        "rail arm", urdf_text=chain_urdf(rail_arm_joints(rail), tool=tool), **options
+    )

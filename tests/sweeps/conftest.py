@@ -40,7 +40,9 @@ def content() -> dict:
 
 @pytest.fixture(scope="session")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> brachis.SweepResult:
-    return brachis.sweep(CONTENT, tmp_path_factory.mktemp("undisturbed") / "out", jobs=1)
+    return brachis.sweep(
+        CONTENT, tmp_path_factory.mktemp("undisturbed") / "out", jobs=1
+    )
 
 
 @pytest.fixture(scope="session")
@@ -49,7 +51,12 @@ def same_as_undisturbed(undisturbed):
 
     def same(table) -> bool:
         ours, theirs = (each.drop(ROUNDED) for each in (table, undisturbed.table))
-        ends, others = (np.array(each.column("t_end_s").to_pylist(), float) for each in (table, undisturbed.table))
-        return ours.equals(theirs) and ends == pytest.approx(others, rel=1e-6, nan_ok=True)
+        ends, others = (
+            np.array(each.column("t_end_s").to_pylist(), float)
+            for each in (table, undisturbed.table)
+        )
+        return ours.equals(theirs) and ends == pytest.approx(
+            others, rel=1e-6, nan_ok=True
+        )
 
     return same

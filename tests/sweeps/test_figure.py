@@ -16,7 +16,9 @@ def row(t_end, **keys):
 
 
 def test_a_line_over_one_key():
-    figure = plot_sweep([row(2.0, a=3), row(1.0, a=1), row(None, a=2), row(1.5, a=1)], ["a"])
+    figure = plot_sweep(
+        [row(2.0, a=3), row(1.0, a=1), row(None, a=2), row(1.5, a=1)], ["a"]
+    )
     (ax,) = figure.axes
     (line,) = ax.lines
     assert line.get_xdata().tolist() == [1.0, 2.0, 3.0]
@@ -27,7 +29,11 @@ def test_a_line_over_one_key():
 
 
 def test_a_heat_map_over_two_keys():
-    rows = [row(1.0 + a + b if a + b < 3 else None, a=a, b=word) for a in (0, 1, 2) for b, word in enumerate("xy")]
+    rows = [
+        row(1.0 + a + b if a + b < 3 else None, a=a, b=word)
+        for a in (0, 1, 2)
+        for b, word in enumerate("xy")
+    ]
     figure = plot_sweep(rows, ["a", "b"])
     ax, bar = figure.axes
     shown = np.ma.filled(ax.images[0].get_array(), np.nan)
@@ -35,14 +41,28 @@ def test_a_heat_map_over_two_keys():
     assert math.isnan(shown[1, 2])
     assert [tick.get_text() for tick in ax.get_yticklabels()] == ["x", "y"]
     assert ax.collections[0].get_offsets().tolist() == [[2.0, 1.0]]
-    assert sorted(text.get_text() for text in ax.texts) == ["1.00", "2.00", "2.00", "3.00", "3.00"]
+    assert sorted(text.get_text() for text in ax.texts) == [
+        "1.00",
+        "2.00",
+        "2.00",
+        "3.00",
+        "3.00",
+    ]
     assert bar.get_ylabel() == r"$t_\mathrm{E}$ (s)"
 
 
 def test_cells_are_written_with_the_digits_that_tell_them_apart():
-    for near, shown in ((0.0012, ["12.3450", "12.3462"]), (2.0, ["12.35", "14.35"]), (1e-7, ["12.35", "12.35"])):
-        rows = [row(12.3450 + near * (a + b), a=a, b=b) for a in (0, 0.5) for b in (0, 0.5)]
-        texts = sorted({text.get_text() for text in plot_sweep(rows, ["a", "b"]).axes[0].texts})
+    for near, shown in (
+        (0.0012, ["12.3450", "12.3462"]),
+        (2.0, ["12.35", "14.35"]),
+        (1e-7, ["12.35", "12.35"]),
+    ):
+        rows = [
+            row(12.3450 + near * (a + b), a=a, b=b) for a in (0, 0.5) for b in (0, 0.5)
+        ]
+        texts = sorted(
+            {text.get_text() for text in plot_sweep(rows, ["a", "b"]).axes[0].texts}
+        )
         assert [texts[0], texts[-1]] == [shown[0], shown[1]]
 
 
@@ -51,7 +71,9 @@ def test_draws_of_two_keys_are_points():
     rows = [row(1.0 + x, a=x, b=y) for x, y in generator.random((40, 2)).tolist()]
     ax = plot_sweep(rows, ["a", "b"]).axes[0]
     assert not ax.images
-    assert ax.collections[0].get_offsets().tolist() == [[each["a"], each["b"]] for each in rows]
+    assert ax.collections[0].get_offsets().tolist() == [
+        [each["a"], each["b"]] for each in rows
+    ]
 
 
 @pytest.mark.parametrize("rows", [[], [row(None, a=1)]])
@@ -61,9 +83,16 @@ def test_nothing_to_draw(rows):
 
 
 def test_which_keys_are_drawn(undisturbed):
-    assert undisturbed.varied == ("path.0.line.angle_deg", "path.0.line.length", "spline.degree")
+    assert undisturbed.varied == (
+        "path.0.line.angle_deg",
+        "path.0.line.length",
+        "spline.degree",
+    )
     ax = undisturbed.plot().axes[0]
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("path.0.line.angle_deg (deg)", "path.0.line.length (m)")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (
+        "path.0.line.angle_deg (deg)",
+        "path.0.line.length (m)",
+    )
     assert undisturbed.plot(["spline.degree"]).axes[0].get_xlabel() == "spline.degree"
     with pytest.raises(UnknownNameError, match=r"path\.0\.line\.length"):
         undisturbed.plot(["line.length"])

@@ -37,7 +37,9 @@ class Processes:
             if broken:
                 future.set_exception(BrokenExecutor("killed"))
             else:
-                future.set_result(Outcome({"status": "verified", "t_end_s": float(plan)}))
+                future.set_result(
+                    Outcome({"status": "verified", "t_end_s": float(plan)})
+                )
         self.running.clear()
 
 
@@ -53,7 +55,9 @@ def test_a_plan_that_ends_its_process_fails_and_no_other(monkeypatch):
     found = dict(as_completed(range(10), processes.submit, lambda: 3))
     assert sorted(found) == list(range(10))
     assert processes.most == 3
-    assert {plan for plan, outcome in found.items() if outcome.facts["status"] == "failed"} == {4, 7}
+    assert {
+        plan for plan, outcome in found.items() if outcome.facts["status"] == "failed"
+    } == {4, 7}
     assert found[4].facts["error"] == "BrokenExecutor"
     assert "ended its worker process" in found[4].facts["message"]
 
@@ -61,7 +65,10 @@ def test_a_plan_that_ends_its_process_fails_and_no_other(monkeypatch):
 def test_what_no_worker_can_run_ends_the_sweep():
     future = Future()
     future.set_exception(ModuleNotFoundError("No module named 'brachis'"))
-    with pytest.raises(ClusterError, match="plans cannot be made there; found ModuleNotFoundError: No module"):
+    with pytest.raises(
+        ClusterError,
+        match="plans cannot be made there; found ModuleNotFoundError: No module",
+    ):
         next(as_completed([0], lambda _plan: future, lambda: 1))
 
 
@@ -80,7 +87,9 @@ def test_wrong_pools_are_refused(jobs, scheduler, expected):
 @pytest.fixture
 def cluster(tmp_path):
     """A scheduler's file, and two workers; all end with the test."""
-    pytest.importorskip("distributed", reason="Dask is not installed: pip install 'brachis[cluster]'")
+    pytest.importorskip(
+        "distributed", reason="Dask is not installed: pip install 'brachis[cluster]'"
+    )
     file = tmp_path / "scheduler.json"
     common = ["--scheduler-file", str(file), "--host", "127.0.0.1", "--no-dashboard"]
     commands = [[DASK, "scheduler", "--port", "0", *common]]
@@ -88,7 +97,10 @@ def cluster(tmp_path):
     started = []
     try:
         with (tmp_path / "cluster.log").open("w") as log:
-            started += [subprocess.Popen(command, cwd=tmp_path, stdout=log, stderr=log) for command in commands]
+            started += [
+                subprocess.Popen(command, cwd=tmp_path, stdout=log, stderr=log)
+                for command in commands
+            ]
         yield file, started[1:]
     finally:
         for process in started:
@@ -97,7 +109,9 @@ def cluster(tmp_path):
             process.wait(WAIT)
 
 
-def test_a_sweep_on_dask_survives_a_worker_that_is_killed(cluster, content, tmp_path, same_as_undisturbed):
+def test_a_sweep_on_dask_survives_a_worker_that_is_killed(
+    cluster, content, tmp_path, same_as_undisturbed
+):
     file, workers = cluster
     until = time.monotonic() + WAIT
     while not file.exists():
@@ -108,22 +122,30 @@ def test_a_sweep_on_dask_survives_a_worker_that_is_killed(cluster, content, tmp_
         if text.startswith("1 of"):
             workers[0].kill()
 
-    result = brachis.sweep(content, tmp_path / "out", scheduler=str(file), listener=listener)
+    result = brachis.sweep(
+        content, tmp_path / "out", scheduler=str(file), listener=listener
+    )
     assert same_as_undisturbed(result.table)
     assert workers[0].wait(WAIT) == -9
     assert workers[1].poll() is None
 
 
 def test_no_scheduler_answers(content, tmp_path, monkeypatch):
-    pytest.importorskip("distributed", reason="Dask is not installed: pip install 'brachis[cluster]'")
+    pytest.importorskip(
+        "distributed", reason="Dask is not installed: pip install 'brachis[cluster]'"
+    )
     monkeypatch.setattr("brachis.apps.sweeps.pools._CONNECTING", 0.1)
-    with pytest.raises(ClusterError, match=r"tcp://127\.0\.0\.1:9: no Dask scheduler answers"):
+    with pytest.raises(
+        ClusterError, match=r"tcp://127\.0\.0\.1:9: no Dask scheduler answers"
+    ):
         brachis.sweep(content, tmp_path / "out", scheduler="tcp://127.0.0.1:9")
 
 
 def test_a_scheduler_that_is_lost(monkeypatch):
     """The client says so with an error of its own, whatever it is asked for."""
-    distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'brachis[cluster]'")
+    distributed = pytest.importorskip(
+        "distributed", reason="Dask is not installed: pip install 'brachis[cluster]'"
+    )
 
     class Client:
         def __init__(self, **_):
@@ -136,15 +158,20 @@ def test_a_scheduler_that_is_lost(monkeypatch):
             pass
 
         def nthreads(self):
-            raise distributed.comm.CommClosedError("in <TCP (closed)>: Connection reset by peer")
+            raise distributed.comm.CommClosedError(
+                "in <TCP (closed)>: Connection reset by peer"
+            )
 
     monkeypatch.setattr("dask.distributed.Client", Client)
     with pytest.raises(
-        ClusterError, match=r"tcp://here:1: the Dask scheduler was lost; found in <TCP .closed.*goes on"
+        ClusterError,
+        match=r"tcp://here:1: the Dask scheduler was lost; found in <TCP .closed.*goes on",
     ):
         list(on_dask([], "tcp://here:1", print))
 
 
 def test_a_sweep_through_ray(content, tmp_path, same_as_undisturbed):
     pytest.importorskip("ray", reason="Ray is not installed")
-    assert same_as_undisturbed(brachis.sweep(content, tmp_path / "out", scheduler="ray").table)
+    assert same_as_undisturbed(
+        brachis.sweep(content, tmp_path / "out", scheduler="ray").table
+    )

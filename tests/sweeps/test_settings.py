@@ -36,7 +36,9 @@ def test_every_combination_of_grid_rows_and_draws():
     assert len(found) == 2 * 3 * 2 * 2
     assert list(found[0]) == ["a", "b", "c", "d", "e"]
     assert [each["b"] for each in found[::4]] == [0.0, 0.5, 1.0] * 2
-    assert found[0]["e"] == found[2]["e"] != found[1]["e"]  # the same draws for all combinations
+    assert (
+        found[0]["e"] == found[2]["e"] != found[1]["e"]
+    )  # the same draws for all combinations
 
 
 def test_values_at_equal_ratios():
@@ -50,7 +52,10 @@ def test_nothing_varied_is_one_plan():
 
 def test_draws_follow_their_distributions():
     found = drawn(
-        u={"uniform": [1, 3]}, l={"log_uniform": [0.01, 100]}, n={"normal": [5, 0.5]}, c={"choice": ["x", [1]]}
+        u={"uniform": [1, 3]},
+        l={"log_uniform": [0.01, 100]},
+        n={"normal": [5, 0.5]},
+        c={"choice": ["x", [1]]},
     )
     u, logs, n = (np.array([each[key] for each in found]) for key in ("u", "l", "n"))
     assert u.min() >= 1.0
@@ -64,25 +69,35 @@ def test_draws_follow_their_distributions():
 
 def test_more_draws_and_further_keys_leave_the_first_ones():
     few = drawn(10, a={"normal": [0, 1]}, b={"choice": [1, 2, 3]})
-    many = drawn(100, b={"choice": [1, 2, 3]}, a={"normal": [0, 1]}, c={"uniform": [0, 1]})
-    assert [(each["a"], each["b"]) for each in many[:10]] == [(each["a"], each["b"]) for each in few]
+    many = drawn(
+        100, b={"choice": [1, 2, 3]}, a={"normal": [0, 1]}, c={"uniform": [0, 1]}
+    )
+    assert [(each["a"], each["b"]) for each in many[:10]] == [
+        (each["a"], each["b"]) for each in few
+    ]
     assert drawn(10, seed=1, a={"normal": [0, 1]}) != drawn(10, a={"normal": [0, 1]})
 
 
 def test_too_many_plans_are_refused_at_once():
-    with pytest.raises(TaskError, match=r"too many plans; found 1e\+12; allowed: at most 1000000"):
+    with pytest.raises(
+        TaskError, match=r"too many plans; found 1e\+12; allowed: at most 1000000"
+    ):
         changes(grid={"a": {"linear": [0, 1, 10**6]}, "b": {"linear": [0, 1, 10**6]}})
 
 
 def test_values_are_numbers():
-    values = changes(grid={"a": {"linear": [0, 1, 2]}}) + drawn(2, a={"log_uniform": [1, 2]})
+    values = changes(grid={"a": {"linear": [0, 1, 2]}}) + drawn(
+        2, a={"log_uniform": [1, 2]}
+    )
     assert all(type(each["a"]) is float and math.isfinite(each["a"]) for each in values)
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/sweeps.md"])
 def test_sweeps_of_the_documentation_are_ones(page, monkeypatch):
     monkeypatch.chdir((ROOT / page).parent)
-    (text,) = re.findall(r"^```yml\n(sweep:.*?)^```", (ROOT / page).read_text(), re.DOTALL | re.MULTILINE)
+    (text,) = re.findall(
+        r"^```yml\n(sweep:.*?)^```", (ROOT / page).read_text(), re.DOTALL | re.MULTILINE
+    )
     content = yaml.safe_load(text)
     if "random" in content:
         content["random"]["count"] = 1
@@ -107,9 +122,15 @@ def test_a_key_is_refused_only_where_every_plan_that_sets_it_is(tmp_path):
 
 def test_the_wrong_key_is_named(tmp_path):
     grid = {"spline.intervals": [6, 7], "robot.limits.scale.torqe": [1, 2]}
-    content = {"sweep": 1, "task": str(ROOT / "examples/01_scara_line.yaml"), "grid": grid}
+    content = {
+        "sweep": 1,
+        "task": str(ROOT / "examples/01_scara_line.yaml"),
+        "grid": grid,
+    }
     (tmp_path / "sweep.yaml").write_text(yaml.safe_dump(content))
-    with pytest.raises(TaskError, match=r"sweep\.yaml: robot\.limits\.scale\.torqe: refused"):
+    with pytest.raises(
+        TaskError, match=r"sweep\.yaml: robot\.limits\.scale\.torqe: refused"
+    ):
         load_sweep(tmp_path / "sweep.yaml")
 
 

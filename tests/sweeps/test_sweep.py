@@ -51,14 +51,18 @@ def here(monkeypatch):
 
 def test_every_plan_is_a_row_and_equal_ones_come_once(undisturbed):
     rows = undisturbed.rows()
-    assert [(row["path.0.line.angle_deg"], row["path.0.line.length"]) for row in rows] == [
-        (angle, length) for angle in (80, 90) for length in (0.9, 9.0, 0.9)
-    ]
+    assert [
+        (row["path.0.line.angle_deg"], row["path.0.line.length"]) for row in rows
+    ] == [(angle, length) for angle in (80, 90) for length in (0.9, 9.0, 0.9)]
     assert [row["status"] for row in rows] == ["verified", "failed", "failed"] * 2
-    assert all(1.0 < row["t_end_s"] < 5.0 and row["worst_ratio"] < 1.001 for row in rows[::3])
+    assert all(
+        1.0 < row["t_end_s"] < 5.0 and row["worst_ratio"] < 1.001 for row in rows[::3]
+    )
 
 
-def test_workers_have_ended_when_an_outcome_cannot_be_stored(content, tmp_path, monkeypatch):
+def test_workers_have_ended_when_an_outcome_cannot_be_stored(
+    content, tmp_path, monkeypatch
+):
     ended = []
 
     def pool(plans):
@@ -104,7 +108,9 @@ def test_a_sweep_is_summed_up(undisturbed):
     assert (summary["plans"], summary["verified"], summary["failed"]) == (6, 2, 4)
     times = sorted(row["t_end_s"] for row in undisturbed.rows() if row["t_end_s"])
     assert [summary[name]["t_end_s"] for name in ("best", "worst")] == times
-    assert repr(undisturbed).startswith("SweepResult\n  plans        6\n  verified     2\n")
+    assert repr(undisturbed).startswith(
+        "SweepResult\n  plans        6\n  verified     2\n"
+    )
 
 
 def test_tables_are_read_back(undisturbed):
@@ -115,7 +121,9 @@ def test_tables_are_read_back(undisturbed):
     assert frame["t_end_s"].notna().sum() == 2
     csv = (undisturbed.folder / "table.csv").read_text().splitlines()
     assert len(csv) == 7
-    assert csv[0].startswith('"plan","path.0.line.angle_deg","path.0.line.length","spline.degree","status","t_end_s"')
+    assert csv[0].startswith(
+        '"plan","path.0.line.angle_deg","path.0.line.length","spline.degree","status","t_end_s"'
+    )
 
 
 @pytest.mark.usefixtures("nothing_runs")
@@ -125,21 +133,33 @@ def test_a_finished_sweep_is_not_run_again(undisturbed, content, same_as_undistu
 
 def test_plans_of_a_changed_sweep_are_added(undisturbed, content, here, tmp_path):
     folder = shutil.copytree(undisturbed.folder, tmp_path / "out")
-    content |= {"grid": {"path.0.line.length": [9.0, 0.9], "path.0.line.angle_deg": [95, 90]}, "rows": []}
+    content |= {
+        "grid": {"path.0.line.length": [9.0, 0.9], "path.0.line.angle_deg": [95, 90]},
+        "rows": [],
+    }
     result = brachis.sweep(content, folder)
     assert [plan.task.path[0].line.angle_deg for plan in here] == [95.0, 95.0]
-    assert [row["status"] for row in result.rows()] == ["failed", "failed", "verified", "verified"]
+    assert [row["status"] for row in result.rows()] == [
+        "failed",
+        "failed",
+        "verified",
+        "verified",
+    ]
     assert result.rows()[3]["t_end_s"] == undisturbed.rows()[3]["t_end_s"]
 
 
-def test_failures_are_planned_again_where_asked(undisturbed, content, here, tmp_path, same_as_undisturbed):
+def test_failures_are_planned_again_where_asked(
+    undisturbed, content, here, tmp_path, same_as_undisturbed
+):
     folder = shutil.copytree(undisturbed.folder, tmp_path / "out")
     assert same_as_undisturbed(brachis.sweep(content, folder, retry=True).table)
     assert [plan.task.path[0].line.length for plan in here] == [9.0] * 2
 
 
 @pytest.mark.parametrize("damage", ["part", "motion", "cut"])
-def test_what_is_not_stored_whole_is_planned_again(undisturbed, content, here, tmp_path, damage, same_as_undisturbed):
+def test_what_is_not_stored_whole_is_planned_again(
+    undisturbed, content, here, tmp_path, damage, same_as_undisturbed
+):
     folder = shutil.copytree(undisturbed.folder, tmp_path / "out")
     motion = folder / undisturbed.rows()[0]["motion"]
     part = motion.with_suffix(".parquet")
@@ -149,14 +169,22 @@ def test_what_is_not_stored_whole_is_planned_again(undisturbed, content, here, t
         (part if damage == "part" else motion).unlink()
     assert same_as_undisturbed(brachis.sweep(content, folder).table)
     assert [plan.digest for plan in here] == [motion.stem]
-    assert brachis.Trajectory.load(motion).t_end == pytest.approx(undisturbed.rows()[0]["t_end_s"], rel=1e-6)
+    assert brachis.Trajectory.load(motion).t_end == pytest.approx(
+        undisturbed.rows()[0]["t_end_s"], rel=1e-6
+    )
 
 
 @pytest.mark.usefixtures("nothing_runs")
 def test_folders_of_others_are_left_alone(content, tmp_path):
     (tmp_path / "thesis.tex").write_text("...")
-    for use in (lambda: brachis.sweep(content, tmp_path), lambda: brachis.SweepResult.load(tmp_path)):
-        with pytest.raises(InputError, match="holds other files; allowed: a new folder, or one with a sweep's"):
+    for use in (
+        lambda: brachis.sweep(content, tmp_path),
+        lambda: brachis.SweepResult.load(tmp_path),
+    ):
+        with pytest.raises(
+            InputError,
+            match="holds other files; allowed: a new folder, or one with a sweep's",
+        ):
             use()
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
@@ -165,25 +193,42 @@ def test_folders_of_others_are_left_alone(content, tmp_path):
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"grid": {"path.0.line.lenght": [1, 2]}}, ["sweep: path.0.line.lenght", "(6)", "Did you mean 'length'"]),
+        (
+            {"grid": {"path.0.line.lenght": [1, 2]}},
+            ["sweep: path.0.line.lenght", "(6)", "Did you mean 'length'"],
+        ),
         ({"grid": {"path.1.line.length": [1, 2]}}, ["path is a list of 1", "path.1"]),
-        ({"grid": {"robot.limits.torque.scale": [1, 2]}}, ["robot.limits.torque has no keys of its own", "found 10"]),
-        ({"grid": {"start.joints.3": [0.1]}}, ["start.joints is a list of 3", "start.joints.0 to start.joints.2"]),
+        (
+            {"grid": {"robot.limits.torque.scale": [1, 2]}},
+            ["robot.limits.torque has no keys of its own", "found 10"],
+        ),
+        (
+            {"grid": {"start.joints.3": [0.1]}},
+            ["start.joints is a list of 3", "start.joints.0 to start.joints.2"],
+        ),
         (
             {"grid": {"robot.limits.acceleration.j9": [1.0, 2.0]}},
             ["joint named 'j9'", "j1, j2, j3"],
         ),
         ({"grid": {"spline.degree": []}}, ["grid.spline.degree", "too few items"]),
         ({"grid": {"spline.degree": {"linera": [1, 2, 3]}}}, ["Did you mean 'linear'"]),
-        ({"random": {"count": 2, "keys": {"start.joints.0": {"uniform": [1, 0]}}}}, ["low < high", "found [1"]),
-        ({"rows": [{"path.0.line.angle_deg": 1.0}]}, ["path.0.line.angle_deg is varied twice", "in grid and in rows"]),
+        (
+            {"random": {"count": 2, "keys": {"start.joints.0": {"uniform": [1, 0]}}}},
+            ["low < high", "found [1"],
+        ),
+        (
+            {"rows": [{"path.0.line.angle_deg": 1.0}]},
+            ["path.0.line.angle_deg is varied twice", "in grid and in rows"],
+        ),
         ({"gird": {}}, ["gird", "Did you mean 'grid'"]),
         ({"task": 3}, ["no task", "found 3"]),
         ({"task": "nothing.yaml"}, ["nothing.yaml", "no such file"]),
         ({"fixed": {"spline.degre": 3}}, ["Did you mean 'degree'"]),
     ],
 )
-def test_what_is_wrong_is_refused_before_anything_runs(content, tmp_path, change, expected):
+def test_what_is_wrong_is_refused_before_anything_runs(
+    content, tmp_path, change, expected
+):
     with pytest.raises(TaskError) as caught:
         brachis.sweep({**content, **change}, tmp_path / "out")
     assert [part for part in expected if part not in str(caught.value)] == []
@@ -204,7 +249,9 @@ def test_a_sweep_that_is_killed_goes_on(content, here, tmp_path, same_as_undistu
     source, folder = tmp_path / "sweep.yaml", tmp_path / "sweep"
     source.write_text(yaml.safe_dump(content))
     command = [sys.executable, "-m", "brachis", "sweep", str(source), "--jobs", "1"]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL, start_new_session=True) as process:
+    with subprocess.Popen(
+        command, cwd=tmp_path, stderr=subprocess.DEVNULL, start_new_session=True
+    ) as process:
         try:
             until = time.monotonic() + WAIT
             while len(list(folder.glob("plans/*/*.parquet"))) < 2:
@@ -213,10 +260,15 @@ def test_a_sweep_that_is_killed_goes_on(content, here, tmp_path, same_as_undistu
                 time.sleep(0.01)
         finally:
             os.killpg(process.pid, signal.SIGKILL)
-    finished = {path: path.stat().st_mtime_ns for path in folder.glob("plans/*/*.parquet")}
+    finished = {
+        path: path.stat().st_mtime_ns for path in folder.glob("plans/*/*.parquet")
+    }
     assert 2 <= len(finished) < 4
     result = brachis.sweep(source, folder)
     assert same_as_undisturbed(result.table)
     assert len(here) == 4 - len(finished)
     assert {path: path.stat().st_mtime_ns for path in finished} == finished
-    assert json.loads((folder / "sweep.json").read_text())["settings"]["grid"] == content["grid"]
+    assert (
+        json.loads((folder / "sweep.json").read_text())["settings"]["grid"]
+        == content["grid"]
+    )

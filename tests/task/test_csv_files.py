@@ -17,7 +17,9 @@ from brachis.robot.task_map.protocol import POSE_ROWS
 from brachis.task import CsvSegment, SplineSegment, SplineThrough, Task, load_task
 from support.poses import pose
 
-TURNS = Rotation.from_rotvec([[0.1, 0.2, 0.3], [0.2, 0.2, 0.9], [0.5, 0.1, 1.2], [0.9, 0, 1.2]])
+TURNS = Rotation.from_rotvec(
+    [[0.1, 0.2, 0.3], [0.2, 0.2, 0.9], [0.5, 0.1, 1.2], [0.9, 0, 1.2]]
+)
 POINTS = np.array([[0.5, 0.1, 0.3], [0.7, 0.2, 0.3], [0.8, 0.4, 0.5], [1.0, 0.4, 0.6]])
 QUATERNIONS = np.roll(TURNS.as_quat(), 1, axis=1)
 S = np.linspace(0, 1, 20)
@@ -35,7 +37,9 @@ def write(header: str, rows: Any, name: str = "poses.csv") -> None:
 
 def task(space: Any = "pose", **keys: Any) -> Task:
     segment = {"csv": {"file": "poses.csv"} | keys}
-    return load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": space, "path": [segment]})
+    return load_task(
+        {"brachis": 1, "start": {"joints": [0]}, "task_space": space, "path": [segment]}
+    )
 
 
 def spline_of(one: Task) -> SplineThrough:
@@ -56,7 +60,9 @@ def test_quaternions() -> None:
     np.testing.assert_allclose(given, QUATERNIONS[1:], atol=1e-15)
     assert spline.starts_at == tuple(POINTS[0].tolist())
     assert spline.starts_oriented is not None
-    np.testing.assert_allclose(spline.starts_oriented.quaternion_wxyz, QUATERNIONS[0], atol=1e-15)
+    np.testing.assert_allclose(
+        spline.starts_oriented.quaternion_wxyz, QUATERNIONS[0], atol=1e-15
+    )
     assert not spline.relative
 
 
@@ -65,7 +71,9 @@ def test_rotation_vectors_in_any_order_of_columns() -> None:
     spline = spline_of(task("pose_free_roll", orientation="rotation_vector"))
     assert spline.through == tuple(map(tuple, POINTS[1:].tolist()))
     assert spline.starts_oriented is not None
-    np.testing.assert_allclose(spline.starts_oriented.quaternion_wxyz, QUATERNIONS[0], atol=1e-15)
+    np.testing.assert_allclose(
+        spline.starts_oriented.quaternion_wxyz, QUATERNIONS[0], atol=1e-15
+    )
 
 
 def test_both_forms_give_the_same_path() -> None:
@@ -74,20 +82,31 @@ def test_both_forms_give_the_same_path() -> None:
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
     other = path_of(task(orientation="rotation_vector"), POINTS[0], TURNS[0])
     np.testing.assert_allclose(one.sample(S).target, other.sample(S).target, atol=1e-12)
-    np.testing.assert_allclose(one.sample([1.0]).target[0], pose(POINTS[-1], TURNS[-1]), atol=1e-12)
+    np.testing.assert_allclose(
+        one.sample([1.0]).target[0], pose(POINTS[-1], TURNS[-1]), atol=1e-12
+    )
 
 
 def test_positions_alone_leave_the_orientation_to_the_segment() -> None:
     write("x,y,z", POINTS)
     segment = {"csv": {"file": "poses.csv"}, "orientation": "tangent", "blend": 0.01}
     line = {"line": {"by": [0.1, 0, 0]}}
-    made = load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": "pose", "path": [segment, line]})
+    made = load_task(
+        {
+            "brachis": 1,
+            "start": {"joints": [0]},
+            "task_space": "pose",
+            "path": [segment, line],
+        }
+    )
     through = tuple(map(tuple, POINTS[1:].tolist()))
     spline = SplineThrough(through=through, starts_at=tuple(POINTS[0].tolist()))
     (report,) = made.fits
     spline = spline.model_copy(update={"fit": report})
     assert (report.source, report.points, report.profile) == ("poses.csv", 4, ())
-    assert made.path[0] == SplineSegment(spline=spline, orientation="tangent", blend=0.01)
+    assert made.path[0] == SplineSegment(
+        spline=spline, orientation="tangent", blend=0.01
+    )
     path_of(made, POINTS[0], TURNS[0])
 
 
@@ -97,7 +116,9 @@ def test_rows(rows: Any) -> None:
     write(",".join(names), POINTS[:, : len(names)])
     made = task(rows)
     path = build_path(made.path, POINTS[0, : len(names)], names)
-    np.testing.assert_allclose(path.sample([0.0, 1.0]).target, POINTS[[0, -1], : len(names)], atol=1e-12)
+    np.testing.assert_allclose(
+        path.sample([0.0, 1.0]).target, POINTS[[0, -1], : len(names)], atol=1e-12
+    )
 
 
 def test_relative_rows_start_anywhere() -> None:
@@ -106,7 +127,9 @@ def test_relative_rows_start_anywhere() -> None:
     recorded = path_of(task(**vectors), POINTS[0], TURNS[0]).sample(S).target
     start, turn = np.array([3.0, 2.0, 1.0]), Rotation.from_rotvec([1.0, -0.4, 0.2])
     moved = path_of(task(relative=True, **vectors), start, turn).sample(S).target
-    np.testing.assert_allclose(moved[:, :3], recorded[:, :3] - POINTS[0] + start, atol=1e-12)
+    np.testing.assert_allclose(
+        moved[:, :3], recorded[:, :3] - POINTS[0] + start, atol=1e-12
+    )
     change = turn * TURNS[0].inv()
     expected = change.as_matrix() @ recorded[:, 3:].reshape(-1, 3, 3)
     np.testing.assert_allclose(moved[:, 3:].reshape(-1, 3, 3), expected, atol=1e-12)
@@ -114,14 +137,21 @@ def test_relative_rows_start_anywhere() -> None:
 
 def test_a_start_elsewhere_is_told_by_how_much() -> None:
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
-    with pytest.raises(PathError, match=r"starts_at: .*0.02 m off; allowed: at most 0.0001 m .*relative: true"):
+    with pytest.raises(
+        PathError,
+        match=r"starts_at: .*0.02 m off; allowed: at most 0.0001 m .*relative: true",
+    ):
         path_of(task(orientation="rotation_vector"), POINTS[0] + [0, 0.02, 0], TURNS[0])
     with pytest.raises(PathError, match=r"starts_oriented: .* 0.3 rad off"):
-        path_of(task(orientation="rotation_vector"), POINTS[0], TURNS[0] * Rotation.from_rotvec([0, 0.3, 0]))
+        path_of(
+            task(orientation="rotation_vector"),
+            POINTS[0],
+            TURNS[0] * Rotation.from_rotvec([0, 0.3, 0]),
+        )
 
 
 @pytest.mark.parametrize("relative", [True, False])
-def test_a_loaded_task_needs_the_file_no_more(relative: bool) -> None:  # noqa: FBT001
+def test_a_loaded_task_needs_the_file_no_more(relative: bool) -> None:
     write("x,y,z,qw,qx,qy,qz", np.hstack([POINTS, QUATERNIONS]))
     once = task(relative=relative)
     Path("poses.csv").unlink()
@@ -133,7 +163,9 @@ def test_the_file_is_relative_to_the_task_file() -> None:
     write("x,y,z", POINTS, "tasks/poses.csv")
     text = "{brachis: 1, robot: {urdf: a}, start: {joints: [0]}, task_space: pose, path: [{csv: {file: poses.csv}}]}"
     Path("tasks/task.yaml").write_text(text, encoding="utf-8")
-    assert spline_of(load_task("tasks/task.yaml")).through == tuple(map(tuple, POINTS[1:].tolist()))
+    assert spline_of(load_task("tasks/task.yaml")).through == tuple(
+        map(tuple, POINTS[1:].tolist())
+    )
     Path("tasks/poses.csv").unlink()
     with pytest.raises(TaskError) as caught:
         load_task("tasks/task.yaml")
@@ -151,45 +183,98 @@ def test_what_spreadsheets_write_is_read() -> None:
 
 def test_poses_on_the_spot() -> None:
     write("x,y,z,rx,ry,rz", np.hstack([POINTS[[0, 0, 0, 0]], TURNS.as_rotvec()]))
-    sample = path_of(task(orientation="rotation_vector"), POINTS[0], TURNS[0]).sample([0.0, 1.0])
+    sample = path_of(task(orientation="rotation_vector"), POINTS[0], TURNS[0]).sample(
+        [0.0, 1.0]
+    )
     np.testing.assert_allclose(sample.target[1], pose(POINTS[0], TURNS[-1]), atol=1e-12)
 
 
 def test_a_task_that_is_not_loaded_keeps_the_file() -> None:
     made = Task.model_validate(
-        {"brachis": 1, "start": {"joints": [0]}, "task_space": "pose", "path": [{"csv": {"file": "poses.csv"}}]}
+        {
+            "brachis": 1,
+            "start": {"joints": [0]},
+            "task_space": "pose",
+            "path": [{"csv": {"file": "poses.csv"}}],
+        }
     )
     assert isinstance(made.path[0], CsvSegment)
 
 
 MISTAKES: list[tuple[str, list[str]]] = [
-    ("", ["poses.csv: the file is empty; allowed: x,y,z | x,y,z,qw,qx,qy,qz | x,y,z,q1,q2,q3,q4 | x,y,z,rx,ry,rz"]),
+    (
+        "",
+        [
+            "poses.csv: the file is empty; allowed: x,y,z | x,y,z,qw,qx,qy,qz | x,y,z,q1,q2,q3,q4 | x,y,z,rx,ry,rz"
+        ],
+    ),
     ("# nothing\n\n", ["poses.csv: the file is empty"]),
-    ("x,y\n0,0\n1,1", ["poses.csv: line 1: wrong columns; found x, y; allowed: x,y,z | x,y,z,qw"]),
-    ("t,x,y,z\n0,0,0,0", ["line 1: wrong columns; found t, x, y, z", "The first line names the columns"]),
+    (
+        "x,y\n0,0\n1,1",
+        ["poses.csv: line 1: wrong columns; found x, y; allowed: x,y,z | x,y,z,qw"],
+    ),
+    (
+        "t,x,y,z\n0,0,0,0",
+        ["line 1: wrong columns; found t, x, y, z", "The first line names the columns"],
+    ),
     ("x,y,z,z\n0,0,0,0", ["line 1: wrong columns; found x, y, z, z"]),
     ("x,y,z,qx,qy,qz\n0,0,0,0,0,0", ["line 1: wrong columns"]),
-    ("x|y|z\n0|0|0", ["line 1: wrong columns; found x|y|z", "separated by commas, semicolons"]),
+    (
+        "x|y|z\n0|0|0",
+        ["line 1: wrong columns; found x|y|z", "separated by commas, semicolons"],
+    ),
     ("0,0,0\n1,1,1", ["line 1: wrong columns; found 0, 0, 0"]),
-    ("x,y,z\n0,0,0", ["poses.csv: a path needs its start and at least one waypoint; found 1 row of"]),
-    ("x,y,z\n0,0,0\n1,2\n", ["poses.csv: line 3: wrong number of values; found 2; allowed: 3: x, y, z"]),
-    ("x,y,z\n\n0,0,0\n1,1,one\n", ["line 4: the value of column z is not a finite number; found 'one'"]),
-    ("x,y,z\n0,0,0\n1,,1\n", ["line 3: the value of column y is not a finite number; found ''"]),
-    ("x,y,z\n0,0,nan\n1,1,1\n", ["line 2: the value of column z is not a finite number; found 'nan'"]),
-    ("x,y,z\n0,0,1e308\n1,1,1\n", ["line 2: the value of column z is out of range", "'1e308'", "-1e+12 to 1e+12"]),
-    ("x,y,z\n0,0,0\n1,1,1\n1,1,1\n", ["line 4: the row repeats line 3; found line 4, [1, 1, 1] m"]),
+    (
+        "x,y,z\n0,0,0",
+        ["poses.csv: a path needs its start and at least one waypoint; found 1 row of"],
+    ),
+    (
+        "x,y,z\n0,0,0\n1,2\n",
+        ["poses.csv: line 3: wrong number of values; found 2; allowed: 3: x, y, z"],
+    ),
+    (
+        "x,y,z\n\n0,0,0\n1,1,one\n",
+        ["line 4: the value of column z is not a finite number; found 'one'"],
+    ),
+    (
+        "x,y,z\n0,0,0\n1,,1\n",
+        ["line 3: the value of column y is not a finite number; found ''"],
+    ),
+    (
+        "x,y,z\n0,0,nan\n1,1,1\n",
+        ["line 2: the value of column z is not a finite number; found 'nan'"],
+    ),
+    (
+        "x,y,z\n0,0,1e308\n1,1,1\n",
+        ["line 2: the value of column z is out of range", "'1e308'", "-1e+12 to 1e+12"],
+    ),
+    (
+        "x,y,z\n0,0,0\n1,1,1\n1,1,1\n",
+        ["line 4: the row repeats line 3; found line 4, [1, 1, 1] m"],
+    ),
     ("x,y,z\n0,0,0\n0,0,0\n1,1,1\n", ["line 3: the row repeats line 2"]),
-    ("x,y,z,rx,ry,rz\n0,0,0,0,0,0\n1,1,1,0,0,0\n1,1,1,0,0,1\n", ["line 4: the row repeats line 3", "in position"]),
-    ("x,y,z,rx,ry,rz\n0,0,0,0,0,0\n0,0,0,0,0,0\n", ["line 3: the row repeats line 2", "differ", "orientation"]),
+    (
+        "x,y,z,rx,ry,rz\n0,0,0,0,0,0\n1,1,1,0,0,0\n1,1,1,0,0,1\n",
+        ["line 4: the row repeats line 3", "in position"],
+    ),
+    (
+        "x,y,z,rx,ry,rz\n0,0,0,0,0,0\n0,0,0,0,0,0\n",
+        ["line 3: the row repeats line 2", "differ", "orientation"],
+    ),
     (
         "x,y,z,qw,qx,qy,qz\n0,0,0,1,0,0,0\n1,1,1,1,1,0,0\n",
         ["line 3: the quaternion's length is 1.41421; found [1.0, 1.0, 0.0, 0.0]"],
     ),
-    ("x,y,z\n0,0,0\n" + "1" * 200_000, ["line 3: not a CSV file: field larger than field limit"]),
+    (
+        "x,y,z\n0,0,0\n" + "1" * 200_000,
+        ["line 3: not a CSV file: field larger than field limit"],
+    ),
 ]
 
 
-@pytest.mark.parametrize(("content", "expected"), MISTAKES, ids=[content[:40] for content, _ in MISTAKES])
+@pytest.mark.parametrize(
+    ("content", "expected"), MISTAKES, ids=[content[:40] for content, _ in MISTAKES]
+)
 def test_wrong_files(content: str, expected: list[str]) -> None:
     Path("poses.csv").write_text(content, encoding="utf-8")
     vectors = {"orientation": "rotation_vector"} if "rx" in content else {}
@@ -202,15 +287,23 @@ def test_wrong_files(content: str, expected: list[str]) -> None:
 
 def test_columns_of_the_wrong_task_space() -> None:
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
-    with pytest.raises(TaskError, match=r"line 1: wrong columns; found x, y, z, rx, ry, rz; allowed: x,y,yaw"):
+    with pytest.raises(
+        TaskError,
+        match=r"line 1: wrong columns; found x, y, z, rx, ry, rz; allowed: x,y,yaw",
+    ):
         task(["x", "y", "yaw"])
 
 
 def test_unreadable_files() -> None:
-    with pytest.raises(TaskError, match=r"task: path\[0\].csv.file: there is no such file; found poses.csv"):
+    with pytest.raises(
+        TaskError,
+        match=r"task: path\[0\].csv.file: there is no such file; found poses.csv",
+    ):
         task()
     Path("poses.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(TaskError, match=r"path\[0\].csv.file: not a text file in UTF-8"):
+    with pytest.raises(
+        TaskError, match=r"path\[0\].csv.file: not a text file in UTF-8"
+    ):
         task()
     Path("poses.csv").unlink()
     Path("poses.csv").mkdir()
@@ -220,9 +313,21 @@ def test_unreadable_files() -> None:
 
 def test_one_word_on_the_orientation() -> None:
     write("x,y,z,rx,ry,rz", np.hstack([POINTS, TURNS.as_rotvec()]))
-    segment = {"csv": {"file": "poses.csv", "orientation": "rotation_vector"}, "orientation": "fixed"}
-    with pytest.raises(TaskError, match=r"path\[0\].orientation: the points' orientations say already"):
-        load_task({"brachis": 1, "start": {"joints": [0]}, "task_space": "pose", "path": [segment]})
+    segment = {
+        "csv": {"file": "poses.csv", "orientation": "rotation_vector"},
+        "orientation": "fixed",
+    }
+    with pytest.raises(
+        TaskError, match=r"path\[0\].orientation: the points' orientations say already"
+    ):
+        load_task(
+            {
+                "brachis": 1,
+                "start": {"joints": [0]},
+                "task_space": "pose",
+                "path": [segment],
+            }
+        )
 
 
 EULER = {
@@ -239,13 +344,20 @@ def test_angles_of_the_makers_are_read(convention: str) -> None:
     header = "x,y,z," + ",".join(f"{name}_deg" for name in columns.split(","))
     write(header, np.hstack([POINTS, TURNS.as_euler(axes, degrees=True)]))
     spline = spline_of(task(orientation=convention))
-    turns = [one.quaternion_wxyz for one in (spline.starts_oriented, *(spline.orientations or ())) if one is not None]
+    turns = [
+        one.quaternion_wxyz
+        for one in (spline.starts_oriented, *(spline.orientations or ()))
+        if one is not None
+    ]
     np.testing.assert_allclose(turns, QUATERNIONS, atol=1e-12)
 
 
 def test_quaternions_of_numbered_columns() -> None:
     write("x,y,z,q1,q2,q3,q4", np.hstack([POINTS, QUATERNIONS]))
-    with pytest.raises(TaskError, match=r"q1, q2, q3, q4 do not say .* quaternion_wxyz \(quaternion, w first: ABB"):
+    with pytest.raises(
+        TaskError,
+        match=r"q1, q2, q3, q4 do not say .* quaternion_wxyz \(quaternion, w first: ABB",
+    ):
         task()
     given = spline_of(task(orientation="quaternion_wxyz")).starts_oriented
     write("x,y,z,q1,q2,q3,q4", np.hstack([POINTS, TURNS.as_quat()]))
@@ -258,24 +370,59 @@ AMBIGUOUS = [
     (
         "x,y,z,rx,ry,rz",
         {},
-        ["line 1: the columns rx, ry, rz do not say how", "rotation_vector (axis times angle: Universal"],
+        [
+            "line 1: the columns rx, ry, rz do not say how",
+            "rotation_vector (axis times angle: Universal",
+        ],
     ),
-    ("x,y,z,rx_deg,ry_deg,rz_deg", {}, ["staubli_xyz (Rx about x", "another choice gives another motion"]),
-    ("x,y,z,a,b,c", {}, ["kuka_abc (A about z, B about the new y", "rpy (roll, pitch, yaw about the fixed x"]),
-    ("x,y,z,a,b,c", {"orientation": "kuka_abc"}, ["the unit of a is not stated", "Write a_deg in the header"]),
-    ("x,y,z,rx,ry,rz", {"orientation": "kuka_abc"}, ["csv.orientation is kuka_abc", "columns a, b, c for kuka_abc"]),
-    ("x,y,z,w,p,r", {"orientation": "rpy"}, ["columns rx, ry, rz | a, b, c | roll, pitch, yaw for rpy"]),
-    ("x,y,z", {"orientation": "rpy"}, ["csv.orientation is rpy, which the columns", "Leave csv.orientation away"]),
+    (
+        "x,y,z,rx_deg,ry_deg,rz_deg",
+        {},
+        ["staubli_xyz (Rx about x", "another choice gives another motion"],
+    ),
+    (
+        "x,y,z,a,b,c",
+        {},
+        [
+            "kuka_abc (A about z, B about the new y",
+            "rpy (roll, pitch, yaw about the fixed x",
+        ],
+    ),
+    (
+        "x,y,z,a,b,c",
+        {"orientation": "kuka_abc"},
+        ["the unit of a is not stated", "Write a_deg in the header"],
+    ),
+    (
+        "x,y,z,rx,ry,rz",
+        {"orientation": "kuka_abc"},
+        ["csv.orientation is kuka_abc", "columns a, b, c for kuka_abc"],
+    ),
+    (
+        "x,y,z,w,p,r",
+        {"orientation": "rpy"},
+        ["columns rx, ry, rz | a, b, c | roll, pitch, yaw for rpy"],
+    ),
+    (
+        "x,y,z",
+        {"orientation": "rpy"},
+        ["csv.orientation is rpy, which the columns", "Leave csv.orientation away"],
+    ),
     (
         "x,y,z",
         {"orientation": "kuka"},
-        ["csv.orientation: this convention of an orientation is not known", "kuka_abc (A"],
+        [
+            "csv.orientation: this convention of an orientation is not known",
+            "kuka_abc (A",
+        ],
     ),
 ]
 
 
 @pytest.mark.parametrize(("header", "keys", "expected"), AMBIGUOUS, ids=str)
-def test_orientations_that_are_left_open(header: str, keys: dict[str, str], expected: list[str]) -> None:
+def test_orientations_that_are_left_open(
+    header: str, keys: dict[str, str], expected: list[str]
+) -> None:
     write(header, np.arange(2.0 * len(header.split(","))).reshape(2, -1))
     with pytest.raises(TaskError) as caught:
         task(**keys)

@@ -18,7 +18,10 @@ TASK = {
 @pytest.mark.parametrize("key", ["path.1.line.by", "path[1].line.by"])
 def test_lists_are_indexed(key):
     changed = with_keys(TASK, {key: [2.0, 2.0]})
-    assert changed["path"] == [{"line": {"by": [1.0, 0.0]}}, {"line": {"by": [2.0, 2.0]}}]
+    assert changed["path"] == [
+        {"line": {"by": [1.0, 0.0]}},
+        {"line": {"by": [2.0, 2.0]}},
+    ]
     assert TASK["path"][1] == {"line": {"by": [0.0, 1.0]}}
 
 
@@ -46,7 +49,10 @@ def test_ways_that_lead_nowhere(key, expected):
 
 
 def test_unknown_keys_are_named_with_their_alternatives():
-    with pytest.raises(TaskError, match=r"spline.intervls: unknown key.*allowed: .*Did you mean 'intervals'"):
+    with pytest.raises(
+        TaskError,
+        match=r"spline.intervls: unknown key.*allowed: .*Did you mean 'intervals'",
+    ):
         load_task(with_keys(TASK, {"spline.intervls": 40}))
 
 
@@ -65,5 +71,7 @@ def test_values_are_yaml(text, expected):
 
 @pytest.mark.parametrize("text", ["spline.intervals", "start.joints=[1, 2"])
 def test_what_is_no_assignment(text):
-    with pytest.raises(TaskError, match=r"key=value|value of start.joints: line 1.*not valid YAML"):
+    with pytest.raises(
+        TaskError, match=r"key=value|value of start.joints: line 1.*not valid YAML"
+    ):
         read_assignment(text)

@@ -31,10 +31,16 @@ def loaded(tmp_path):
     """Load a task whose robot part is given, beside a limits file."""
 
     def load(robot: dict, **changes: object) -> brachis.Task:
-        (tmp_path / "limits.yaml").write_text(yaml.safe_dump(FILE | changes), encoding="utf-8")
+        (tmp_path / "limits.yaml").write_text(
+            yaml.safe_dump(FILE | changes), encoding="utf-8"
+        )
         task = {
             "brachis": 1,
-            "robot": {"urdf": str(ROOT / "robots/scara3/robot.urdf"), "limits_file": "limits.yaml", **robot},
+            "robot": {
+                "urdf": str(ROOT / "robots/scara3/robot.urdf"),
+                "limits_file": "limits.yaml",
+                **robot,
+            },
             "start": {"joints": [0.5, -2.0, 2.0]},
             "task_space": ["x", "y"],
             "path": [{"line": {"length": 0.5, "angle_deg": 90}}],
@@ -52,10 +58,20 @@ def test_the_limits_of_the_file_count_and_what_the_task_says_counts_more(loaded)
     assert limits.acceleration == {"j1": 20.0, "j2": 20.0, "j3": 20.0}
     assert limits.velocity == {"j2": 2.0}
     assert limits.position == "urdf"
-    own = loaded({"limits": {"torque": {"j2": 1}, "acceleration": None, "scale": {"torque": 0.5}}}).robot
+    own = loaded(
+        {
+            "limits": {
+                "torque": {"j2": 1},
+                "acceleration": None,
+                "scale": {"torque": 0.5},
+            }
+        }
+    ).robot
     assert own.limits.torque == {"j1": 5.0, "j2": 1.0, "j3": (-7.0, 8.0)}
     assert own.limits.acceleration is None
-    np.testing.assert_array_equal(robot_from_settings(own).limits.torque_upper, [2.5, 0.5, 4.0])
+    np.testing.assert_array_equal(
+        robot_from_settings(own).limits.torque_upper, [2.5, 0.5, 4.0]
+    )
     assert loaded({"limits": {"torque": 3}}).robot.limits.torque == 3.0
 
 
@@ -73,7 +89,9 @@ def test_joints_that_the_task_locks_are_left_out(loaded):
 def test_a_program_reads_the_file_too(tmp_path):
     path = tmp_path / "limits.yaml"
     path.write_text(yaml.safe_dump(FILE), encoding="utf-8")
-    robot = Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", limits=brachis.read_limits(path))
+    robot = Robot.from_urdf(
+        ROOT / "robots/scara3/robot.urdf", limits=brachis.read_limits(path)
+    )
     np.testing.assert_array_equal(robot.limits.torque_lower, [-5.0, -6.0, -7.0])
     np.testing.assert_array_equal(robot.limits.acceleration, 20.0)
 
@@ -83,12 +101,27 @@ def test_a_program_reads_the_file_too(tmp_path):
     [
         ({"brachis_limits": 2}, ["limits.yaml: brachis_limits"]),
         ({"source": None}, ["limits.yaml: source"]),
-        ({"limits": {"torqe": 1}}, ["limits.torqe: unknown key", "Did you mean 'torque'"]),
-        ({"limits": {"torque": [1, 2]}}, ["limits.torque: has the wrong number of values; found 2", "j1, j2, j3"]),
+        (
+            {"limits": {"torqe": 1}},
+            ["limits.torqe: unknown key", "Did you mean 'torque'"],
+        ),
+        (
+            {"limits": {"torque": [1, 2]}},
+            ["limits.torque: has the wrong number of values; found 2", "j1, j2, j3"],
+        ),
         ({"limits": {"torque": {"j4": 1}}}, ["limits.torque", "'j4'", "j1, j2, j3"]),
-        ({"limits": {"torque": [1, 2, -3]}}, ["limits.torque[2]: out of range; found -3"]),
-        ({"limits": {"torque": [1, 2, [3, 4]]}}, ["limits.torque[2]: a pair of limits lies around zero"]),
-        ({"limits": {"scale": {"torque": 0.5}}}, ["limits.scale: factors on limits belong to the task"]),
+        (
+            {"limits": {"torque": [1, 2, -3]}},
+            ["limits.torque[2]: out of range; found -3"],
+        ),
+        (
+            {"limits": {"torque": [1, 2, [3, 4]]}},
+            ["limits.torque[2]: a pair of limits lies around zero"],
+        ),
+        (
+            {"limits": {"scale": {"torque": 0.5}}},
+            ["limits.scale: factors on limits belong to the task"],
+        ),
     ],
     ids=str,
 )
@@ -115,22 +148,38 @@ def test_joints_that_the_robot_does_not_have_are_named(loaded):
 
 
 def test_the_published_limits_of_the_panda_are_those_of_its_urdf():
-    folder = next((Path(folder) for folder in sys.path if (Path(folder) / URDF).is_file()), None)
+    folder = next(
+        (Path(folder) for folder in sys.path if (Path(folder) / URDF).is_file()), None
+    )
     if folder is None:
         pytest.skip("example-robot-data is not installed")
     stated = Robot.from_urdf(folder / URDF, tool_frame="panda_hand_tcp").limits
-    published = Robot.from_urdf(folder / URDF, tool_frame="panda_hand_tcp", limits=read_limits(PANDA)).limits
+    published = Robot.from_urdf(
+        folder / URDF, tool_frame="panda_hand_tcp", limits=read_limits(PANDA)
+    ).limits
     for name in ("position_lower", "position_upper", "velocity", "torque"):
-        np.testing.assert_allclose(getattr(published, name), getattr(stated, name), rtol=1e-12)
-    np.testing.assert_array_equal(published.acceleration, [15, 7.5, 10, 12.5, 15, 20, 20])
-    np.testing.assert_array_equal(published.jerk, [7500, 3750, 5000, 6250, 7500, 10000, 10000])
+        np.testing.assert_allclose(
+            getattr(published, name), getattr(stated, name), rtol=1e-12
+        )
+    np.testing.assert_array_equal(
+        published.acceleration, [15, 7.5, 10, 12.5, 15, 20, 20]
+    )
+    np.testing.assert_array_equal(
+        published.jerk, [7500, 3750, 5000, 6250, 7500, 10000, 10000]
+    )
     np.testing.assert_array_equal(published.torque_rate, 1000.0)
 
 
 def test_a_file_states_torque_curves_and_the_power_of_all_joints_too(loaded):
-    limits = {"torque": 30, "total_power": 70, "torque_speed": {"j2": [[0, 20], [2, 10]]}}
+    limits = {
+        "torque": 30,
+        "total_power": 70,
+        "torque_speed": {"j2": [[0, 20], [2, 10]]},
+    }
     assert loaded({}, limits=limits).robot.limits.total_power == 70.0
-    robot = robot_from_settings(loaded({"limits": {"total_power": 50}}, limits=limits).robot)
+    robot = robot_from_settings(
+        loaded({"limits": {"total_power": 50}}, limits=limits).robot
+    )
     assert robot.limits.total_power == 50.0
     np.testing.assert_array_equal(robot.limits.torque, [30.0, 20.0, 30.0])
 
@@ -175,7 +224,14 @@ joint_limits:
   {4}: *limits
   {5}: {{<<: *limits, max_effort: 28}}
 """
-SHORT = ("shoulder_pan", "shoulder_lift", "elbow_joint", "wrist_1", "wrist_2", "wrist_3")
+SHORT = (
+    "shoulder_pan",
+    "shoulder_lift",
+    "elbow_joint",
+    "wrist_1",
+    "wrist_2",
+    "wrist_3",
+)
 
 
 def test_a_file_of_moveit_is_read(loaded, tmp_path):
@@ -186,24 +242,47 @@ def test_a_file_of_moveit_is_read(loaded, tmp_path):
     assert limits.acceleration == {"j1": 3.75, "j2": 5.0, "j3": None}
     assert (limits.jerk, limits.torque) == ({"j1": 90.0}, {"j3": 7.5})
     assert (limits.scale.velocity, limits.scale.acceleration) == (0.5, 1.0)
-    own = loaded({"limits_file": "joint_limits.yaml", "limits": {"scale": {"velocity": 1.0}, "velocity": {"j1": 1.0}}})
+    own = loaded(
+        {
+            "limits_file": "joint_limits.yaml",
+            "limits": {"scale": {"velocity": 1.0}, "velocity": {"j1": 1.0}},
+        }
+    )
     assert own.robot.limits.scale.velocity == 1.0
     assert own.robot.limits.velocity == {"j1": 1.0, "j2": None}
-    robot = Robot.from_urdf(ROOT / "robots/scara3/robot.urdf", limits=read_limits(tmp_path / "joint_limits.yaml"))
-    np.testing.assert_array_equal(robot.limits.velocity, [1.0, np.inf, robot.stated_limits[2].velocity * 0.5])
+    robot = Robot.from_urdf(
+        ROOT / "robots/scara3/robot.urdf",
+        limits=read_limits(tmp_path / "joint_limits.yaml"),
+    )
+    np.testing.assert_array_equal(
+        robot.limits.velocity, [1.0, np.inf, robot.stated_limits[2].velocity * 0.5]
+    )
     np.testing.assert_array_equal(robot.limits.acceleration, [3.75, 5.0, np.inf])
 
 
-@pytest.mark.parametrize("names", [SHORT, tuple(name.removesuffix("_joint") + "_joint" for name in SHORT)])
+@pytest.mark.parametrize(
+    "names", [SHORT, tuple(name.removesuffix("_joint") + "_joint" for name in SHORT)]
+)
 def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
     (tmp_path / "ur.yaml").write_text(UR.format(*names), encoding="utf-8")
     ur = {"urdf": str(ROOT / "robots/ur10_rail/robot.urdf"), "limits_file": "ur.yaml"}
-    robot = robot_from_settings(loaded({**ur, "limits": {"velocity": {"rail": 0.7}}}).robot)
-    np.testing.assert_array_equal(robot.limits.velocity, [0.7, *[180.0 * (np.pi / 180.0)] * 6])
+    robot = robot_from_settings(
+        loaded({**ur, "limits": {"velocity": {"rail": 0.7}}}).robot
+    )
+    np.testing.assert_array_equal(
+        robot.limits.velocity, [0.7, *[180.0 * (np.pi / 180.0)] * 6]
+    )
     np.testing.assert_array_equal(robot.limits.torque[1:], [150.0] * 5 + [28.0])
-    np.testing.assert_array_equal(robot.limits.position_upper[[1, 3]], np.radians([360.0, 180.0]))
-    assert robot_from_settings(loaded({**ur, "locked_joints": {"rail": 0.0}}).robot).n == 6
-    with pytest.raises(TaskError, match=r"ur\.yaml: joint_limits: joint 'rail', which moves the tool, has no entry"):
+    np.testing.assert_array_equal(
+        robot.limits.position_upper[[1, 3]], np.radians([360.0, 180.0])
+    )
+    assert (
+        robot_from_settings(loaded({**ur, "locked_joints": {"rail": 0.0}}).robot).n == 6
+    )
+    with pytest.raises(
+        TaskError,
+        match=r"ur\.yaml: joint_limits: joint 'rail', which moves the tool, has no entry",
+    ):
         loaded(ur)
 
 
@@ -212,7 +291,10 @@ def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
     [
         (
             ("  j2:", "  j4:"),
-            ["joint_limits.yaml: joint_limits: there is no joint of the URDF named 'j4'", "j1, j2, j3"],
+            [
+                "joint_limits.yaml: joint_limits: there is no joint of the URDF named 'j4'",
+                "j1, j2, j3",
+            ],
         ),
         (("  j2:", "  j1:"), ["line 14, column 3", "the key 'j1' occurs twice"]),
         (
@@ -221,19 +303,41 @@ def test_a_file_of_universal_robots_is_read(loaded, tmp_path, names):
         ),
         (
             ("    max_velocity: 2\n", ""),
-            ["joint_limits.j1.max_velocity: this figure is missing", "has_velocity_limits: f"],
+            [
+                "joint_limits.j1.max_velocity: this figure is missing",
+                "has_velocity_limits: f",
+            ],
         ),
-        (("    min_position: !degrees -170\n", ""), ["joint_limits.j1.min_position: this figure is missing"]),
-        (("!degrees -170", "!degrees left"), ["!degrees stands before a number, and not before 'left'"]),
-        (("!degrees -170", "!degres -170"), ["could not determine a constructor for the tag '!degres'"]),
-        (("max_jerk", "max_jrk"), ["joint_limits.j1.max_jrk: unknown key", "Did you mean 'max_jerk'?"]),
-        (("factor: 0.5", "factor: 50"), ["default_velocity_scaling_factor: out of range; found 50"]),
+        (
+            ("    min_position: !degrees -170\n", ""),
+            ["joint_limits.j1.min_position: this figure is missing"],
+        ),
+        (
+            ("!degrees -170", "!degrees left"),
+            ["!degrees stands before a number, and not before 'left'"],
+        ),
+        (
+            ("!degrees -170", "!degres -170"),
+            ["could not determine a constructor for the tag '!degres'"],
+        ),
+        (
+            ("max_jerk", "max_jrk"),
+            ["joint_limits.j1.max_jrk: unknown key", "Did you mean 'max_jerk'?"],
+        ),
+        (
+            ("factor: 0.5", "factor: 50"),
+            ["default_velocity_scaling_factor: out of range; found 50"],
+        ),
     ],
     ids=str,
 )
-def test_a_wrong_file_of_moveit_is_refused_with_its_key(loaded, tmp_path, changes, words):
+def test_a_wrong_file_of_moveit_is_refused_with_its_key(
+    loaded, tmp_path, changes, words
+):
     assert changes[0] in MOVEIT
-    (tmp_path / "joint_limits.yaml").write_text(MOVEIT.replace(*changes), encoding="utf-8")
+    (tmp_path / "joint_limits.yaml").write_text(
+        MOVEIT.replace(*changes), encoding="utf-8"
+    )
     with pytest.raises(InputError) as caught:
         loaded({"limits_file": "joint_limits.yaml"})
     assert all(word in str(caught.value) for word in words), str(caught.value)
@@ -241,7 +345,9 @@ def test_a_wrong_file_of_moveit_is_refused_with_its_key(loaded, tmp_path, change
 
 def test_limits_of_joints_that_stand_still_have_no_effect():
     urdf = ROOT / "robots/ur10_rail/robot.urdf"
-    limits = brachis.LimitSpec(velocity={"shoulder_pan_joint": 1.0, "wrist_3_joint": 0.5})
+    limits = brachis.LimitSpec(
+        velocity={"shoulder_pan_joint": 1.0, "wrist_3_joint": 0.5}
+    )
     robot = Robot.from_urdf(urdf, tool_frame="wrist_2_link", limits=limits)
     assert "wrist_3_joint" not in robot.joint_names
     assert robot.limits.velocity[1] == 1.0
@@ -251,18 +357,35 @@ def test_limits_of_joints_that_stand_still_have_no_effect():
 
 def test_a_task_may_limit_joints_that_stand_still_of_a_robot_that_has_limits():
     urdf = ROOT / "robots/ur10_rail/robot.urdf"
-    robot = Robot.from_urdf(urdf, tool_frame="wrist_2_link", limits=brachis.LimitSpec(velocity={"rail": 0.4}))
-    settings = RobotSettings(limits=brachis.LimitSpec(velocity={"shoulder_pan_joint": 1.0, "wrist_3_joint": 0.5}))
+    robot = Robot.from_urdf(
+        urdf,
+        tool_frame="wrist_2_link",
+        limits=brachis.LimitSpec(velocity={"rail": 0.4}),
+    )
+    settings = RobotSettings(
+        limits=brachis.LimitSpec(
+            velocity={"shoulder_pan_joint": 1.0, "wrist_3_joint": 0.5}
+        )
+    )
     assert robot_for(robot, settings).limits.velocity[:2].tolist() == [0.4, 1.0]
 
 
-@pytest.mark.parametrize("wrong", [{"urdf": "a\0b"}, {"urdf": "."}, {"tool_frame": [1]}, {"locked_joints": 5}], ids=str)
-def test_a_wrong_robot_beside_a_file_of_moveit_is_an_error_of_ours(loaded, tmp_path, wrong):
+@pytest.mark.parametrize(
+    "wrong",
+    [{"urdf": "a\0b"}, {"urdf": "."}, {"tool_frame": [1]}, {"locked_joints": 5}],
+    ids=str,
+)
+def test_a_wrong_robot_beside_a_file_of_moveit_is_an_error_of_ours(
+    loaded, tmp_path, wrong
+):
     (tmp_path / "joint_limits.yaml").write_text(MOVEIT, encoding="utf-8")
     with pytest.raises(InputError):
         robot_from_settings(loaded({"limits_file": "joint_limits.yaml", **wrong}).robot)
 
 
 def test_a_task_is_not_a_limits_file(loaded):
-    with pytest.raises(TaskError, match=r"task.yaml: .* another kind; found a task file; allowed: a limits file"):
+    with pytest.raises(
+        TaskError,
+        match=r"task.yaml: .* another kind; found a task file; allowed: a limits file",
+    ):
         loaded({"limits_file": "task.yaml"})

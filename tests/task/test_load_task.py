@@ -74,13 +74,23 @@ def complete(tmp_path: Path) -> Task:
 
 
 def test_a_complete_file_is_read(complete: Task, tmp_path: Path) -> None:
-    assert complete.robot.urdf == str(tmp_path.parent / "robots" / "scara3" / "robot.urdf")
+    assert complete.robot.urdf == str(
+        tmp_path.parent / "robots" / "scara3" / "robot.urdf"
+    )
     assert complete.robot.limits.torque == {"j1": 10.0, "j2": None}
     assert complete.robot.limits.position == {"j1": (-1.0, 1.0), "j2": None}
     assert complete.robot.friction.viscous == (0.1, 0.2, 0.0)
     assert complete.path[0].blend == 0.1
     assert complete.path[1].shape == LineBy(by=(1.0, 2.0))
-    assert [segment.kind for segment in complete.path] == ["line", "line", "line", "arc", "arc", "circle", "spline"]
+    assert [segment.kind for segment in complete.path] == [
+        "line",
+        "line",
+        "line",
+        "arc",
+        "arc",
+        "circle",
+        "spline",
+    ]
     assert complete.solver.tolerance == 1e-6  # YAML 1.1 would read the string '1e-6'
 
 
@@ -88,19 +98,33 @@ def test_defaults() -> None:
     task = load_task(minimal())
     assert task.robot.gravity == (0.0, 0.0, -9.81)
     assert task.end == "free"
-    assert (task.spline.degree, task.spline.intervals, task.spline.rest, task.spline.points_per_interval) == (
+    assert (
+        task.spline.degree,
+        task.spline.intervals,
+        task.spline.rest,
+        task.spline.points_per_interval,
+    ) == (
         3,
         "auto",
         "full",
         3,
     )
-    assert (task.solver.name, task.solver.max_iterations, task.solver.time_limit, task.solver.tolerance) == (
+    assert (
+        task.solver.name,
+        task.solver.max_iterations,
+        task.solver.time_limit,
+        task.solver.tolerance,
+    ) == (
         "auto",
         300,
         20.0,
         1e-6,
     )
-    assert (task.refinement.tolerance, task.refinement.density, task.refinement.max_rounds) == (1e-4, 10, 10)
+    assert (
+        task.refinement.tolerance,
+        task.refinement.density,
+        task.refinement.max_rounds,
+    ) == (1e-4, 10, 10)
     assert task.robot.friction.coulomb_velocity == 0.01
 
 
@@ -131,7 +155,11 @@ def test_an_absent_limit_differs_from_none(key: str) -> None:
         st.none(),
         st.floats(1e-6, 1e6),
         st.lists(st.floats(1e-6, 1e6), min_size=1, max_size=7),
-        st.dictionaries(st.text(min_size=1, max_size=5), st.none() | st.floats(1e-6, 1e6), max_size=7),
+        st.dictionaries(
+            st.text(min_size=1, max_size=5),
+            st.none() | st.floats(1e-6, 1e6),
+            max_size=7,
+        ),
     )
 )
 def test_every_form_of_limit_survives_the_round_trip(limit: object) -> None:
@@ -140,17 +168,26 @@ def test_every_form_of_limit_survives_the_round_trip(limit: object) -> None:
 
 
 def test_position_is_the_three_rows() -> None:
-    assert load_task(minimal(task_space="position")) == load_task(minimal(task_space=["x", "y", "z"]))
-    assert load_task(minimal(task_space="pose_free_roll")).task_space == "pose_free_roll"
+    assert load_task(minimal(task_space="position")) == load_task(
+        minimal(task_space=["x", "y", "z"])
+    )
+    assert (
+        load_task(minimal(task_space="pose_free_roll")).task_space == "pose_free_roll"
+    )
 
 
 def test_arrays_and_paths_are_accepted_in_mappings() -> None:
-    task = load_task(minimal(start={"joints": np.array([1.0, 2.0])}, robot={"urdf": Path("a.urdf")}))
+    task = load_task(
+        minimal(start={"joints": np.array([1.0, 2.0])}, robot={"urdf": Path("a.urdf")})
+    )
     assert task.start.joints == (1.0, 2.0)
     assert task.robot.urdf == str(Path.cwd() / "a.urdf")
 
 
-@pytest.mark.parametrize(("value", "share"), [("1 %", 0.01), ("0.5%", 0.005), ("100 %", 1.0), (0.02, 0.02), (0, 0.0)])
+@pytest.mark.parametrize(
+    ("value", "share"),
+    [("1 %", 0.01), ("0.5%", 0.005), ("100 %", 1.0), (0.02, 0.02), (0, 0.0)],
+)
 def test_a_share_is_a_fraction_or_a_percentage(value: object, share: float) -> None:
     task = load_task(minimal(search={"slower": value}))
     assert task.search.slower == pytest.approx(share, rel=1e-15)
@@ -174,12 +211,26 @@ LINE = {"line": {"to": [1, 0]}}
 MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ({"brachis": 2}, ["task: brachis: ", "found 2", "allowed: 1"]),
     ({"brachis": True}, ["task: brachis: ", "found true (a boolean)"]),
-    ({"strat": 1}, ["task: strat: unknown key", "allowed: brachis, robot, start", "Did you mean 'start'?"]),
+    (
+        {"strat": 1},
+        [
+            "task: strat: unknown key",
+            "allowed: brachis, robot, start",
+            "Did you mean 'start'?",
+        ],
+    ),
     (
         {"robot": {"urdff": "a"}},
-        ["task: robot.urdff: unknown key", "allowed: urdf, tool_frame", "Did you mean 'urdf'?"],
+        [
+            "task: robot.urdff: unknown key",
+            "allowed: urdf, tool_frame",
+            "Did you mean 'urdf'?",
+        ],
     ),
-    ({"robot": {"limits": 10}}, ["task: robot.limits: wrong type; found 10; allowed: a mapping"]),
+    (
+        {"robot": {"limits": 10}},
+        ["task: robot.limits: wrong type; found 10; allowed: a mapping"],
+    ),
     (
         {"robot": {"limits": {"torqe": 1}}},
         [
@@ -191,89 +242,239 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ),
     (
         {"robot": {"limits": {"scale": {"torqe": 1}}}},
-        ["robot.limits.scale.torqe: unknown key", "allowed: torque, velocity, acceleration", "Did you mean 'torque'?"],
+        [
+            "robot.limits.scale.torqe: unknown key",
+            "allowed: torque, velocity, acceleration",
+            "Did you mean 'torque'?",
+        ],
     ),
-    ({"robot": {"limits": {"torque": "10"}}}, ["robot.limits.torque: ", "found '10' (a string)", "a number > 0"]),
-    ({"robot": {"limits": {"torque": True}}}, ["robot.limits.torque: ", "found true (a boolean)"]),
-    ({"robot": {"limits": {"torque": 0}}}, ["robot.limits.torque: out of range; found 0; allowed: > 0"]),
-    ({"robot": {"limits": {"velocity": {"j1": -1}}}}, ["robot.limits.velocity.j1: out of range; found -1"]),
-    ({"robot": {"limits": {"velocity": {1: 1}}}}, ["robot.limits.velocity[1]: a name must be a string"]),
-    ({"robot": {"limits": {"acceleration": [float("nan")]}}}, ["limits.acceleration[0]: not a finite number"]),
-    ({"robot": {"limits": {"acceleration": "urdf"}}}, ["robot.limits.acceleration: ", "found 'urdf'"]),
-    ({"robot": {"limits": {"position": [[1, -1]]}}}, ["limits.position[0]: ", "found [1.0, -1.0]", "low < high"]),
-    ({"robot": {"limits": {"position": [[1]]}}}, ["limits.position[0][1]: the list is too short"]),
-    ({"robot": {"limits": {"position": {"j": [1, 2, 3]}}}}, ["limits.position.j: too many items", "at most 2"]),
-    ({"robot": {"limits": {"scale": {"torque": 0}}}}, ["robot.limits.scale.torque: out of range", "> 0"]),
+    (
+        {"robot": {"limits": {"torque": "10"}}},
+        ["robot.limits.torque: ", "found '10' (a string)", "a number > 0"],
+    ),
+    (
+        {"robot": {"limits": {"torque": True}}},
+        ["robot.limits.torque: ", "found true (a boolean)"],
+    ),
+    (
+        {"robot": {"limits": {"torque": 0}}},
+        ["robot.limits.torque: out of range; found 0; allowed: > 0"],
+    ),
+    (
+        {"robot": {"limits": {"velocity": {"j1": -1}}}},
+        ["robot.limits.velocity.j1: out of range; found -1"],
+    ),
+    (
+        {"robot": {"limits": {"velocity": {1: 1}}}},
+        ["robot.limits.velocity[1]: a name must be a string"],
+    ),
+    (
+        {"robot": {"limits": {"acceleration": [float("nan")]}}},
+        ["limits.acceleration[0]: not a finite number"],
+    ),
+    (
+        {"robot": {"limits": {"acceleration": "urdf"}}},
+        ["robot.limits.acceleration: ", "found 'urdf'"],
+    ),
+    (
+        {"robot": {"limits": {"position": [[1, -1]]}}},
+        ["limits.position[0]: ", "found [1.0, -1.0]", "low < high"],
+    ),
+    (
+        {"robot": {"limits": {"position": [[1]]}}},
+        ["limits.position[0][1]: the list is too short"],
+    ),
+    (
+        {"robot": {"limits": {"position": {"j": [1, 2, 3]}}}},
+        ["limits.position.j: too many items", "at most 2"],
+    ),
+    (
+        {"robot": {"limits": {"scale": {"torque": 0}}}},
+        ["robot.limits.scale.torque: out of range", "> 0"],
+    ),
     ({"robot": {"gravity": [0, 0]}}, ["robot.gravity[2]: the list is too short"]),
-    ({"robot": {"gravity": [0, 0, float("inf")]}}, ["robot.gravity[2]: not a finite number; found inf"]),
-    ({"search": {"slower": "150 %"}}, ["search.slower: no share; found '150 %'", "100 %"]),
-    ({"search": {"slower": 1.5}}, ["search.slower: out of range; found 1.5; allowed: <= 1"]),
+    (
+        {"robot": {"gravity": [0, 0, float("inf")]}},
+        ["robot.gravity[2]: not a finite number; found inf"],
+    ),
+    (
+        {"search": {"slower": "150 %"}},
+        ["search.slower: no share; found '150 %'", "100 %"],
+    ),
+    (
+        {"search": {"slower": 1.5}},
+        ["search.slower: out of range; found 1.5; allowed: <= 1"],
+    ),
     (
         {"search": {"slower": 0.1, "least_motion": False}},
-        ["search.slower: a slower motion is of use for least motion alone", "least_motion: true"],
+        [
+            "search.slower: a slower motion is of use for least motion alone",
+            "least_motion: true",
+        ],
     ),
-    ({"refinement": {"tolerance": 1e-6}}, ["refinement.tolerance: out of range; found 1e-06; allowed: >= 1e-05"]),
-    ({"robot": {"friction": {"viscous": -1}}}, ["robot.friction.viscous: out of range; found -1; allowed: >= 0"]),
-    ({"robot": {"friction": {"coulomb_velocity": 0}}}, ["coulomb_velocity: out of range; found 0; allowed: > 0"]),
+    (
+        {"refinement": {"tolerance": 1e-6}},
+        ["refinement.tolerance: out of range; found 1e-06; allowed: >= 1e-05"],
+    ),
+    (
+        {"robot": {"friction": {"viscous": -1}}},
+        ["robot.friction.viscous: out of range; found -1; allowed: >= 0"],
+    ),
+    (
+        {"robot": {"friction": {"coulomb_velocity": 0}}},
+        ["coulomb_velocity: out of range; found 0; allowed: > 0"],
+    ),
     ({"robot": 3}, ["task: robot: wrong type; found 3; allowed: a mapping"]),
     ({"start": {"joints": []}}, ["start.joints: too few items", "at least 1"]),
-    ({"start": {"joints": [1, "2"]}}, ["start.joints[1]: wrong type; found '2' (a string); allowed: a number"]),
+    (
+        {"start": {"joints": [1, "2"]}},
+        ["start.joints[1]: wrong type; found '2' (a string); allowed: a number"],
+    ),
     ({"start": {}}, ["start.joints: this key is required, and missing"]),
     ({"end": "fre"}, ["task: end: ", "found 'fre'", "allowed: free, or a mapping"]),
     ({"task_space": ["x", "yaw"]}, ["task_space: yaw needs exactly two position rows"]),
     ({"task_space": ["yaw", "x", "y"]}, ["task_space: yaw needs", "comes last"]),
-    ({"task_space": ["x", "x"]}, ["task_space: a row occurs twice", "found ['x', 'x']"]),
-    ({"task_space": ["x", "w"]}, ["task_space[1]: not one of the allowed values; found 'w'", "'yaw'"]),
+    (
+        {"task_space": ["x", "x"]},
+        ["task_space: a row occurs twice", "found ['x', 'x']"],
+    ),
+    (
+        {"task_space": ["x", "w"]},
+        ["task_space[1]: not one of the allowed values; found 'w'", "'yaw'"],
+    ),
     ({"task_space": "poses"}, ["task_space: ", "found 'poses'", "pose_free_roll"]),
     ({"path": []}, ["task: path: too few items"]),
-    ({"path": [{"lien": {"to": [1, 0]}}]}, ["path[0]: a segment needs exactly one kind", "Did you mean 'line'?"]),
-    ({"path": [LINE | {"arc": {}}]}, ["path[0]: a segment needs exactly one kind", "keys line, arc"]),
-    ({"path": [{"line": {"to": [1], "by": [1]}}]}, ["path[0].line: a line needs exactly one", "{length, angle_deg}"]),
-    ({"path": [{"arc": {"via": [1], "center": [1]}}]}, ["path[0].arc: an arc needs exactly one of its forms"]),
-    ({"path": [{"line": {"to": ["1", 0]}}]}, ["path[0].line.to[0]: wrong type; found '1' (a string)"]),
-    ({"path": [{"line": {"length": 1}}]}, ["path[0].line.angle_deg: this key is required"]),
-    ({"path": [{"line": {"length": -1, "angle_deg": 0}}]}, ["path[0].line.length: out of range; found -1"]),
+    (
+        {"path": [{"lien": {"to": [1, 0]}}]},
+        ["path[0]: a segment needs exactly one kind", "Did you mean 'line'?"],
+    ),
+    (
+        {"path": [LINE | {"arc": {}}]},
+        ["path[0]: a segment needs exactly one kind", "keys line, arc"],
+    ),
+    (
+        {"path": [{"line": {"to": [1], "by": [1]}}]},
+        ["path[0].line: a line needs exactly one", "{length, angle_deg}"],
+    ),
+    (
+        {"path": [{"arc": {"via": [1], "center": [1]}}]},
+        ["path[0].arc: an arc needs exactly one of its forms"],
+    ),
+    (
+        {"path": [{"line": {"to": ["1", 0]}}]},
+        ["path[0].line.to[0]: wrong type; found '1' (a string)"],
+    ),
+    (
+        {"path": [{"line": {"length": 1}}]},
+        ["path[0].line.angle_deg: this key is required"],
+    ),
+    (
+        {"path": [{"line": {"length": -1, "angle_deg": 0}}]},
+        ["path[0].line.length: out of range; found -1"],
+    ),
     (
         {"path": [{"line": {"length": 1, "angle": 2, "angle_deg": 2}}]},
-        ["path[0].line.angle: unknown key; found angle; allowed: length, angle_deg. Did you mean 'angle_deg'?"],
+        [
+            "path[0].line.angle: unknown key; found angle; allowed: length, angle_deg. Did you mean 'angle_deg'?"
+        ],
     ),
-    ({"path": [{"circle": {"center": [0, 0], "turns": 0}}]}, ["path[0].circle.turns: ", "zero length"]),
-    ({"path": [{"circle": {"center": [0, 0], "yaw": "on"}}]}, ["path[0].circle.yaw: ", "'fixed' or 'tangent'"]),
-    ({"path": [{"spline": {"through": []}}]}, ["path[0].spline.through: too few items"]),
-    ({"path": [{"spline": {"through": [[1, 2]], "relative": 1}}]}, ["spline.relative: ", "true or false"]),
-    ({"path": [LINE | {"blend": -0.1}, LINE]}, ["path[0].blend: out of range; found -0.1; allowed: > 0"]),
-    ({"path": [LINE, LINE | {"blend": 0.1}]}, ["path[1].blend: the last segment", "found 0.1"]),
+    (
+        {"path": [{"circle": {"center": [0, 0], "turns": 0}}]},
+        ["path[0].circle.turns: ", "zero length"],
+    ),
+    (
+        {"path": [{"circle": {"center": [0, 0], "yaw": "on"}}]},
+        ["path[0].circle.yaw: ", "'fixed' or 'tangent'"],
+    ),
+    (
+        {"path": [{"spline": {"through": []}}]},
+        ["path[0].spline.through: too few items"],
+    ),
+    (
+        {"path": [{"spline": {"through": [[1, 2]], "relative": 1}}]},
+        ["spline.relative: ", "true or false"],
+    ),
+    (
+        {"path": [LINE | {"blend": -0.1}, LINE]},
+        ["path[0].blend: out of range; found -0.1; allowed: > 0"],
+    ),
+    (
+        {"path": [LINE, LINE | {"blend": 0.1}]},
+        ["path[1].blend: the last segment", "found 0.1"],
+    ),
     ({"redundant_joints": ["a", "a"]}, ["redundant_joints: a joint occurs twice"]),
     (
         {"redundant_joints": "j3"},
-        ["redundant_joints: wrong form; found 'j3' (a string); allowed: auto, or a list of joint names"],
+        [
+            "redundant_joints: wrong form; found 'j3' (a string); allowed: auto, or a list of joint names"
+        ],
     ),
-    ({"spline": {"degree": 2}}, ["spline.degree: rest: full", "found 2", "allowed: >= 3, or rest: velocity"]),
-    ({"spline": {"degree": 8}}, ["spline.degree: out of range; found 8; allowed: <= 7"]),
-    ({"spline": {"intervals": 20.5}}, ["spline.intervals: wrong type; found 20.5; allowed: a whole number"]),
+    (
+        {"spline": {"degree": 2}},
+        ["spline.degree: rest: full", "found 2", "allowed: >= 3, or rest: velocity"],
+    ),
+    (
+        {"spline": {"degree": 8}},
+        ["spline.degree: out of range; found 8; allowed: <= 7"],
+    ),
+    (
+        {"spline": {"intervals": 20.5}},
+        ["spline.intervals: wrong type; found 20.5; allowed: a whole number"],
+    ),
     *(
-        ({"spline": spline}, ["spline.intervals: knots: free needs a number of intervals", "12, or knots: uniform"])
+        (
+            {"spline": spline},
+            [
+                "spline.intervals: knots: free needs a number of intervals",
+                "12, or knots: uniform",
+            ],
+        )
         for spline in ({"knots": "free"}, {"intervals": "auto", "knots": "free"})
     ),
-    ({"spline": {"intervals": 3}}, ["spline.intervals: out of range; found 3; allowed: >= 4"]),
-    ({"spline": {"rest": "none"}}, ["spline.rest: not one of the allowed values", "'full' or 'jerk'"]),
+    (
+        {"spline": {"intervals": 3}},
+        ["spline.intervals: out of range; found 3; allowed: >= 4"],
+    ),
+    (
+        {"spline": {"rest": "none"}},
+        ["spline.rest: not one of the allowed values", "'full' or 'jerk'"],
+    ),
     (
         {"spline": {"rest": "jerk"}},
-        ["spline.degree: rest: jerk", "continuous jerk", "found 3", "allowed: >= 4, or rest: velocity or rest: full"],
+        [
+            "spline.degree: rest: jerk",
+            "continuous jerk",
+            "found 3",
+            "allowed: >= 4, or rest: velocity or rest: full",
+        ],
     ),
     (
         {"spline": {"rest": "jerk", "degree": 4, "intervals": 4}},
-        ["spline.intervals: rest: jerk leaves splines of degree 4 no freedom", "found 4; allowed: >= 5, or auto"],
+        [
+            "spline.intervals: rest: jerk leaves splines of degree 4 no freedom",
+            "found 4; allowed: >= 5, or auto",
+        ],
     ),
-    ({"robot": {"urdf": "a.urdf", "limits": {"jerk": -1}}}, ["robot.limits.jerk", "found -1"]),
-    ({"robot": {"urdf": "a.urdf", "limits": {"torque_rate": "urdf"}}}, ["robot.limits.torque_rate", "'urdf'"]),
+    (
+        {"robot": {"urdf": "a.urdf", "limits": {"jerk": -1}}},
+        ["robot.limits.jerk", "found -1"],
+    ),
+    (
+        {"robot": {"urdf": "a.urdf", "limits": {"torque_rate": "urdf"}}},
+        ["robot.limits.torque_rate", "'urdf'"],
+    ),
     ({"solver": {"name": ""}}, ["solver.name: the string is empty"]),
     ({"solver": {"time_limit": 0}}, ["solver.time_limit: out of range"]),
-    ({"refinement": {"density": 9}}, ["refinement.density: out of range; found 9; allowed: >= 10"]),
+    (
+        {"refinement": {"density": 9}},
+        ["refinement.density: out of range; found 9; allowed: >= 10"],
+    ),
 ]
 
 
-@pytest.mark.parametrize(("change", "expected"), MISTAKES, ids=[json.dumps(change) for change, _ in MISTAKES])
+@pytest.mark.parametrize(
+    ("change", "expected"), MISTAKES, ids=[json.dumps(change) for change, _ in MISTAKES]
+)
 def test_every_mistake_is_named(change: dict[str, Any], expected: list[str]) -> None:
     error = refused(minimal(**change))
     assert "mistakes" not in str(error), "one mistake, one complaint"
@@ -282,7 +483,9 @@ def test_every_mistake_is_named(change: dict[str, Any], expected: list[str]) -> 
 
 
 def test_degree_two_is_accepted_where_only_the_velocity_vanishes() -> None:
-    assert load_task(minimal(spline={"degree": 2, "rest": "velocity"})).spline.degree == 2
+    assert (
+        load_task(minimal(spline={"degree": 2, "rest": "velocity"})).spline.degree == 2
+    )
 
 
 @pytest.mark.parametrize("key", ["brachis", "start", "task_space", "path"])
@@ -293,23 +496,38 @@ def test_required_keys(key: str) -> None:
 
 
 def test_all_mistakes_are_in_one_message(tmp_path: Path) -> None:
-    text = COMPLETE.replace("0.9", ".nan").replace("to: [1, 2]", "to: [1, x]").replace("uno", "3")
+    text = (
+        COMPLETE.replace("0.9", ".nan")
+        .replace("to: [1, 2]", "to: [1, x]")
+        .replace("uno", "3")
+    )
     file = written(tmp_path, text)
     lines = str(refused(file)).splitlines()
     assert lines[0] == f"{file}: 3 mistakes"
     keys = ["robot.limits.scale.torque", "path[0].line.to[1]", "solver.name"]
-    assert [line.startswith(f"  {file}: {key}: ") for line, key in zip(lines[1:], keys, strict=True)] == [True] * 3
+    assert [
+        line.startswith(f"  {file}: {key}: ")
+        for line, key in zip(lines[1:], keys, strict=True)
+    ] == [True] * 3
 
 
-LAUGHS = "a0: &a0 [1]\n" + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 10))
+LAUGHS = "a0: &a0 [1]\n" + "".join(
+    f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 10)
+)
 
 
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
         ("brachis: 1\nstart: [1, 2", ["line 2, column ", "not valid YAML"]),
-        ("brachis: 1\nstart: 1\nbrachis: 1", ["line 3, column 1", "'brachis' occurs twice"]),
-        ("robot: {limits: {torque: 1, torque: 2}}", ["line 1, column 29", "'torque' occurs twice"]),
+        (
+            "brachis: 1\nstart: 1\nbrachis: 1",
+            ["line 3, column 1", "'brachis' occurs twice"],
+        ),
+        (
+            "robot: {limits: {torque: 1, torque: 2}}",
+            ["line 1, column 29", "'torque' occurs twice"],
+        ),
         ("[1, 2]", ["a task is a mapping; found [1, 2] (a list)"]),
         ("", ["a task is a mapping; found null"]),
         ("a: 1\n---\nb: 2", ["not valid YAML"]),
@@ -318,13 +536,25 @@ LAUGHS = "a0: &a0 [1]\n" + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10
         ("\x07", ["not valid YAML"]),
         ("a: &a [*a]", ["contains itself"]),
         ("a: &a {<<: *a}", ["contains itself"]),
-        (LAUGHS, ["not valid YAML", "2.35e+09 values with all aliases written out, at most 1000000 are read"]),
+        (
+            LAUGHS,
+            [
+                "not valid YAML",
+                "2.35e+09 values with all aliases written out, at most 1000000 are read",
+            ],
+        ),
         ("a: " + "[" * 5000, ["not valid YAML"]),
         ('a: !!int ""', ["not valid YAML"]),
         ("a: !!bool x", ["not valid YAML"]),
         ("a: !!timestamp x", ["not valid YAML"]),
         ("a: " + "1" * 5000, ["not valid YAML"]),
-        ("#" * 1_000_001, ["it is 1.0 MB long, at most 1 MB are read", "waypoints belong in a CSV file"]),
+        (
+            "#" * 1_000_001,
+            [
+                "it is 1.0 MB long, at most 1 MB are read",
+                "waypoints belong in a CSV file",
+            ],
+        ),
     ],
 )
 def test_broken_files(tmp_path: Path, text: str, expected: list[str]) -> None:
@@ -337,11 +567,16 @@ def test_broken_files(tmp_path: Path, text: str, expected: list[str]) -> None:
 
 def test_merge_keys_may_be_overridden(tmp_path: Path) -> None:
     text = COMPLETE.replace("j1: 10, j2: null", "<<: &limits {j1: 1, j2: 2}, j2: 3")
-    assert load_task(written(tmp_path, text)).robot.limits.torque == {"j1": 1.0, "j2": 3.0}
+    assert load_task(written(tmp_path, text)).robot.limits.torque == {
+        "j1": 1.0,
+        "j2": 3.0,
+    }
 
 
 def test_a_missing_file_and_a_folder(tmp_path: Path) -> None:
-    assert "nothing.yaml: there is no such file" in str(refused(tmp_path / "nothing.yaml"))
+    assert "nothing.yaml: there is no such file" in str(
+        refused(tmp_path / "nothing.yaml")
+    )
     assert "the file cannot be read" in str(refused(str(tmp_path)))
 
 
@@ -356,7 +591,9 @@ def test_what_is_no_source() -> None:
 
 
 def test_a_file_needs_a_urdf(tmp_path: Path) -> None:
-    file = written(tmp_path, COMPLETE.replace("  urdf: ../robots/scara3/robot.urdf\n", ""))
+    file = written(
+        tmp_path, COMPLETE.replace("  urdf: ../robots/scara3/robot.urdf\n", "")
+    )
     assert f"{file}: robot.urdf: this key is required" in str(refused(file))
 
 

@@ -33,11 +33,19 @@ from brachis.task import (
 LINE: dict[str, Any] = {"line": {"to": [1, 0, 0]}}
 ROTATE: dict[str, Any] = {"rotate": {"axis": [0, 0, 2], "angle_deg": 90}}
 QUATERNION: dict[str, Any] = {"quaternion_wxyz": [0.6, 0, 0, -0.8]}
-SPLINE: dict[str, Any] = {"through": [[1, 0, 0], [1, 1, 0]], "orientations": [QUATERNION, {"rpy_deg": [1, 2, 3]}]}
+SPLINE: dict[str, Any] = {
+    "through": [[1, 0, 0], [1, 1, 0]],
+    "orientations": [QUATERNION, {"rpy_deg": [1, 2, 3]}],
+}
 
 
 def written(*segments: dict[str, Any], space: Any = "pose") -> dict[str, Any]:
-    return {"brachis": 1, "start": {"joints": [0]}, "task_space": space, "path": list(segments)}
+    return {
+        "brachis": 1,
+        "start": {"joints": [0]},
+        "task_space": space,
+        "path": list(segments),
+    }
 
 
 def task(*segments: dict[str, Any]) -> Task:
@@ -52,12 +60,24 @@ SEGMENTS: list[dict[str, Any]] = [
     LINE | {"orientation": {"tangent": {}}},
     LINE | {"orientation": {"tangent": {"up": [0, 1, 0]}}},
     LINE | {"orientation": ROTATE},
-    LINE | {"orientation": {"rotate": ROTATE["rotate"] | {"frame": "tool", "profile": "smooth"}}},
+    LINE
+    | {
+        "orientation": {
+            "rotate": ROTATE["rotate"] | {"frame": "tool", "profile": "smooth"}
+        }
+    },
     LINE | {"orientation": {"to": QUATERNION | {"profile": "smooth"}}},
     LINE | {"orientation": {"to": {"rotation_vector": [0, 0, 1]}}},
     LINE | {"orientation": {"to": {"rpy_deg": [1, 2, 3]}}},
     {"spline": SPLINE},
-    {"spline": SPLINE | {"starts_at": [0, 0, 0], "starts_oriented": {"rotation_vector": [0, 0, 1]}, "relative": True}},
+    {
+        "spline": SPLINE
+        | {
+            "starts_at": [0, 0, 0],
+            "starts_oriented": {"rotation_vector": [0, 0, 1]},
+            "relative": True,
+        }
+    },
     {"turn": ROTATE},
     {"turn": {"to": {"rpy_deg": [1, 2, 3], "profile": "smooth"}}},
 ]
@@ -80,7 +100,9 @@ def test_a_task_may_be_made_of_models() -> None:
     assert line == LineSegment(line=line.line, orientation=rotate)
     assert task({"turn": ROTATE}).path[0] == TurnSegment(turn=rotate)
     up = AlongTangent(tangent=Tangent(up=(0, 0, 1)))
-    made = load_task(written(LINE | {"orientation": {"tangent": {"up": np.array([0, 0, 1])}}}))
+    made = load_task(
+        written(LINE | {"orientation": {"tangent": {"up": np.array([0, 0, 1])}}})
+    )
     assert made.path[0] == LineSegment(line=line.line, orientation=up)
     spline = task({"spline": SPLINE}).path[0]
     assert isinstance(spline, SplineSegment)
@@ -93,7 +115,10 @@ def test_defaults() -> None:
     rotation = Rotation(axis=(0, 0, 1), angle_deg=1)
     assert (rotation.frame, rotation.profile) == ("path", "uniform")
     assert TurnTo(to=Target(rpy_deg=(0, 0, 1))).to.profile == "uniform"
-    assert [segment.kind for segment in task(LINE | {"orientation": "fixed"}, {"turn": ROTATE}).path] == [
+    assert [
+        segment.kind
+        for segment in task(LINE | {"orientation": "fixed"}, {"turn": ROTATE}).path
+    ] == [
         "line",
         "turn",
     ]
@@ -102,27 +127,47 @@ def test_defaults() -> None:
 MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     (
         LINE | {"orientation": "tangnt"},
-        ["path[0].orientation: wrong form; found 'tangnt'", "fixed | tangent | {rotate"],
+        [
+            "path[0].orientation: wrong form; found 'tangnt'",
+            "fixed | tangent | {rotate",
+        ],
     ),
     (LINE | {"orientation": 90}, ["path[0].orientation: wrong form; found 90"]),
     (
         LINE | {"orientation": {}},
-        ["path[0].orientation: an orientation along a segment needs exactly one", "{tangent}"],
+        [
+            "path[0].orientation: an orientation along a segment needs exactly one",
+            "{tangent}",
+        ],
     ),
     (
         LINE | {"orientation": ROTATE | {"to": QUATERNION}},
         ["path[0].orientation: ", "found a mapping with the keys rotate"],
     ),
-    (LINE | {"orientation": {"rotat": {}}}, ["path[0].orientation: ", "Did you mean 'rotate'?"]),
-    (LINE | {"orientation": {"rotate": {"axis": [0, 0, 1]}}}, ["rotate.angle_deg: this key is required, and missing"]),
+    (
+        LINE | {"orientation": {"rotat": {}}},
+        ["path[0].orientation: ", "Did you mean 'rotate'?"],
+    ),
+    (
+        LINE | {"orientation": {"rotate": {"axis": [0, 0, 1]}}},
+        ["rotate.angle_deg: this key is required, and missing"],
+    ),
     (
         LINE | {"orientation": {"rotate": {"axis": [0, 0, 0], "angle_deg": 9}}},
-        ["path[0].orientation.rotate.axis: a direction cannot have zero length; found [0.0, 0.0, 0.0]"],
+        [
+            "path[0].orientation.rotate.axis: a direction cannot have zero length; found [0.0, 0.0, 0.0]"
+        ],
     ),
-    (LINE | {"orientation": {"rotate": {"axis": [1, 0], "angle_deg": 9}}}, ["rotate.axis[2]: the list is too short"]),
+    (
+        LINE | {"orientation": {"rotate": {"axis": [1, 0], "angle_deg": 9}}},
+        ["rotate.axis[2]: the list is too short"],
+    ),
     (
         LINE | {"orientation": {"rotate": ROTATE["rotate"] | {"frame": "base"}}},
-        ["path[0].orientation.rotate.frame: not one of the allowed values; found 'base'", "'path' or 'tool'"],
+        [
+            "path[0].orientation.rotate.frame: not one of the allowed values; found 'base'",
+            "'path' or 'tool'",
+        ],
     ),
     (
         LINE | {"orientation": {"rotate": ROTATE["rotate"] | {"profile": "linear"}}},
@@ -141,30 +186,64 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ),
     (
         LINE | {"orientation": {"to": QUATERNION | {"rpy_deg": [0, 0, 0]}}},
-        ["orientation.to: an orientation needs exactly one convention", "the keys quaternion_wxyz, rpy_deg"],
+        [
+            "orientation.to: an orientation needs exactly one convention",
+            "the keys quaternion_wxyz, rpy_deg",
+        ],
     ),
     (
         LINE | {"orientation": {"to": [0, 0, 0]}},
         ["path[0].orientation.to: an orientation needs exactly one", "(a list)"],
     ),
-    (LINE | {"orientation": {"to": {"quaternion_xyzw": [1, 0, 0]}}}, ["to.quaternion_xyzw[3]: the list is too short"]),
+    (
+        LINE | {"orientation": {"to": {"quaternion_xyzw": [1, 0, 0]}}},
+        ["to.quaternion_xyzw[3]: the list is too short"],
+    ),
     (
         LINE | {"orientation": {"to": {"quaternion_wxyz": [1, 0, 0, 1]}}},
-        ["path[0].orientation.to.quaternion_wxyz: the quaternion's length is 1.41421; found [1.0, 0.0, 0.0, 1.0]"],
+        [
+            "path[0].orientation.to.quaternion_wxyz: the quaternion's length is 1.41421; found [1.0, 0.0, 0.0, 1.0]"
+        ],
     ),
-    (LINE | {"orientation": {"to": QUATERNION | {"frame": "tool"}}}, ["orientation.to.frame: unknown key", "profile"]),
-    (LINE | {"orientation": {"tangent": {"up": [0, 0, 0]}}}, ["orientation.tangent.up: a direction cannot have zero"]),
-    (LINE | {"orientation": {"tangent": True}}, ["path[0].orientation.tangent: wrong type", "a mapping"]),
-    ({"turn": "fixed"}, ["path[0].turn: a turn needs exactly one of its forms", "{rotate} | {to}"]),
-    ({"turn": {"tangent": {}}}, ["path[0].turn: a turn needs exactly one of its forms"]),
-    ({"turn": ROTATE, "orientation": "fixed"}, ["path[0].orientation: unknown key", "allowed: blend, turn"]),
+    (
+        LINE | {"orientation": {"to": QUATERNION | {"frame": "tool"}}},
+        ["orientation.to.frame: unknown key", "profile"],
+    ),
+    (
+        LINE | {"orientation": {"tangent": {"up": [0, 0, 0]}}},
+        ["orientation.tangent.up: a direction cannot have zero"],
+    ),
+    (
+        LINE | {"orientation": {"tangent": True}},
+        ["path[0].orientation.tangent: wrong type", "a mapping"],
+    ),
+    (
+        {"turn": "fixed"},
+        ["path[0].turn: a turn needs exactly one of its forms", "{rotate} | {to}"],
+    ),
+    (
+        {"turn": {"tangent": {}}},
+        ["path[0].turn: a turn needs exactly one of its forms"],
+    ),
+    (
+        {"turn": ROTATE, "orientation": "fixed"},
+        ["path[0].orientation: unknown key", "allowed: blend, turn"],
+    ),
     (
         {"spline": SPLINE | {"orientations": [QUATERNION]}},
-        ["path[0].spline.orientations: a spline needs an orientation for each", "found 1; allowed: 2"],
+        [
+            "path[0].spline.orientations: a spline needs an orientation for each",
+            "found 1; allowed: 2",
+        ],
     ),
     (
-        {"spline": SPLINE | {"orientations": [QUATERNION, {"quaternion_wxyz": [2, 0, 0, 0]}]}},
-        ["path[0].spline.orientations[1].quaternion_wxyz: the quaternion's length is 2"],
+        {
+            "spline": SPLINE
+            | {"orientations": [QUATERNION, {"quaternion_wxyz": [2, 0, 0, 0]}]}
+        },
+        [
+            "path[0].spline.orientations[1].quaternion_wxyz: the quaternion's length is 2"
+        ],
     ),
     (
         {"spline": {"through": [[1, 0, 0]], "starts_oriented": QUATERNION}},
@@ -172,13 +251,20 @@ MISTAKES: list[tuple[dict[str, Any], list[str]]] = [
     ),
     (
         {"spline": SPLINE, "orientation": "fixed"},
-        ["path[0].orientation: the spline's orientations say already", "found a mapping with the keys spline, orient"],
+        [
+            "path[0].orientation: the spline's orientations say already",
+            "found a mapping with the keys spline, orient",
+        ],
     ),
     ({"csv": {}}, ["path[0].csv.file: this key is required, and missing"]),
 ]
 
 
-@pytest.mark.parametrize(("segment", "expected"), MISTAKES, ids=[json.dumps(segment) for segment, _ in MISTAKES])
+@pytest.mark.parametrize(
+    ("segment", "expected"),
+    MISTAKES,
+    ids=[json.dumps(segment) for segment, _ in MISTAKES],
+)
 def test_every_mistake_is_named(segment: dict[str, Any], expected: list[str]) -> None:
     with pytest.raises(TaskError) as caught:
         task(segment)
@@ -189,7 +275,9 @@ def test_every_mistake_is_named(segment: dict[str, Any], expected: list[str]) ->
 
 
 def free(path_start: Any, space: Any = "pose") -> Task:
-    return load_task(written(LINE, space=space) | {"start": "free", "path_start": path_start})
+    return load_task(
+        written(LINE, space=space) | {"start": "free", "path_start": path_start}
+    )
 
 
 def test_a_path_may_start_at_a_pose_in_any_convention() -> None:
@@ -209,39 +297,82 @@ def test_a_path_may_start_at_a_pose_in_any_convention() -> None:
         assert load_task(json.loads(json.dumps(task.to_dict()))) == task
         assert task.path_start is not None
         found = space.read(task.path_start, "path_start")
-        np.testing.assert_allclose(found, [1, 2, 3, *turn.as_matrix().ravel()], atol=1e-14)
+        np.testing.assert_allclose(
+            found, [1, 2, 3, *turn.as_matrix().ravel()], atol=1e-14
+        )
 
 
 def test_a_program_gives_the_start_of_a_path_as_a_transform() -> None:
     placement = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.array([1.0, 2.0, 3.0]))
-    task = task_with(path=brachis.Line(by=[0, 0.1, 0]), start="free", path_start=placement, task_space="pose")
+    task = task_with(
+        path=brachis.Line(by=[0, 0.1, 0]),
+        start="free",
+        path_start=placement,
+        task_space="pose",
+    )
     assert task.path_start is not None
-    found = brachis.task_map_of(brachis.robots.iiwa14, "pose").read(task.path_start, "path_start")
-    np.testing.assert_allclose(found, [1, 2, 3, *placement.rotation.ravel()], atol=1e-14)
+    found = brachis.task_map_of(brachis.robots.iiwa14, "pose").read(
+        task.path_start, "path_start"
+    )
+    np.testing.assert_allclose(
+        found, [1, 2, 3, *placement.rotation.ravel()], atol=1e-14
+    )
 
 
 def test_another_start_of_the_path_takes_the_place_of_the_first_one() -> None:
     task = free({"position": [1, 2, 3], "rpy_deg": [0, 0, 90]})
-    other = task_with(task, path_start={"position": [1, 2, 3], "kuka_abc_deg": [90, 0, 0]})
-    assert other.path_start == ToolPose.model_validate({"position": [1, 2, 3], "kuka_abc_deg": [90, 0, 0]})
+    other = task_with(
+        task, path_start={"position": [1, 2, 3], "kuka_abc_deg": [90, 0, 0]}
+    )
+    assert other.path_start == ToolPose.model_validate(
+        {"position": [1, 2, 3], "kuka_abc_deg": [90, 0, 0]}
+    )
 
 
 WRONG_STARTS: list[tuple[Any, Any, list[str]]] = [
     (
         [1, 2, 3, 1, 0, 0, 0],
         "pose",
-        ["path_start: a list does not say how", "quaternion_xyzw (quaternion, w last: ROS"],
+        [
+            "path_start: a list does not say how",
+            "quaternion_xyzw (quaternion, w last: ROS",
+        ],
     ),
-    ({"position": [1, 2, 3]}, "pose", ["path_start: an orientation needs exactly one convention", "kuka_abc_deg (A"]),
-    ({"rpy_deg": [1, 2, 3]}, "pose_free_roll", ["path_start.position: this key is required"]),
-    ({"position": [1, 2, 3], "rpy_deg": [1, 2, 3]}, "position", ["path_start: a position with an orientation is for"]),
-    (7, "pose", ["path_start: wrong form; found 7", "{position: [x, y, z], rpy_deg: [...]}"]),
-    (None, "pose", ["path_start: a free start posture leaves open", "allowed: {position: [x, y, z], ...} with one of"]),
+    (
+        {"position": [1, 2, 3]},
+        "pose",
+        ["path_start: an orientation needs exactly one convention", "kuka_abc_deg (A"],
+    ),
+    (
+        {"rpy_deg": [1, 2, 3]},
+        "pose_free_roll",
+        ["path_start.position: this key is required"],
+    ),
+    (
+        {"position": [1, 2, 3], "rpy_deg": [1, 2, 3]},
+        "position",
+        ["path_start: a position with an orientation is for"],
+    ),
+    (
+        7,
+        "pose",
+        ["path_start: wrong form; found 7", "{position: [x, y, z], rpy_deg: [...]}"],
+    ),
+    (
+        None,
+        "pose",
+        [
+            "path_start: a free start posture leaves open",
+            "allowed: {position: [x, y, z], ...} with one of",
+        ],
+    ),
 ]
 
 
 @pytest.mark.parametrize(("path_start", "space", "expected"), WRONG_STARTS, ids=str)
-def test_wrong_starts_of_a_path(path_start: Any, space: Any, expected: list[str]) -> None:
+def test_wrong_starts_of_a_path(
+    path_start: Any, space: Any, expected: list[str]
+) -> None:
     with pytest.raises(TaskError) as caught:
         free(path_start, space)
     for text in expected:

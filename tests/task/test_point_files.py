@@ -21,13 +21,25 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def write(rows: np.ndarray, header: str = "x_mm,y_mm,z_mm", name: str = "seam.csv") -> None:
+def write(
+    rows: np.ndarray, header: str = "x_mm,y_mm,z_mm", name: str = "seam.csv"
+) -> None:
     np.savetxt(name, rows, fmt="%.9f", header=header, delimiter=",", comments="")
 
 
-def task(name: str = "seam.csv", space: Any = "position", beside: dict[str, Any] | None = None, **keys: Any) -> Task:
-    segment = {"csv": {"file": name, "tolerance": {"position": "0.1 mm"}, **keys}, **(beside or {})}
-    return load_task({"brachis": 1, "start": "free", "task_space": space, "path": [segment]})
+def task(
+    name: str = "seam.csv",
+    space: Any = "position",
+    beside: dict[str, Any] | None = None,
+    **keys: Any,
+) -> Task:
+    segment = {
+        "csv": {"file": name, "tolerance": {"position": "0.1 mm"}, **keys},
+        **(beside or {}),
+    }
+    return load_task(
+        {"brachis": 1, "start": "free", "task_space": space, "path": [segment]}
+    )
 
 
 def test_a_file_becomes_a_curve_that_needs_it_no_more() -> None:
@@ -51,10 +63,15 @@ def test_corners_become_blends() -> None:
     write(1e3 * bent(900, 0.005 * MM)[0])
     made = task()
     assert [segment.blend is None for segment in made.path] == [False, False, True]
-    assert [corner.blend for corner in made.fits[0].corners] == [segment.blend for segment in made.path[:-1]]
+    assert [corner.blend for corner in made.fits[0].corners] == [
+        segment.blend for segment in made.path[:-1]
+    ]
     assert "2 corners blended: row 30" in str(made.fits[0])
     wider = task(tolerance={"position": "0.1 mm", "corner": "1 mm"})
-    assert all(one.blend < other.blend for one, other in zip(made.fits[0].corners, wider.fits[0].corners, strict=True))
+    assert all(
+        one.blend < other.blend
+        for one, other in zip(made.fits[0].corners, wider.fits[0].corners, strict=True)
+    )
 
 
 def test_feed_rates_are_kept() -> None:
@@ -68,7 +85,9 @@ def test_feed_rates_are_kept() -> None:
 
 
 def test_gcode_is_known_by_its_suffix() -> None:
-    Path("part.nc").write_text("G21 G0 X800 Y0 Z600\nG1 Y300 F3000\nG3 X750 Y350 I-50 J0\n", encoding="utf-8")
+    Path("part.nc").write_text(
+        "G21 G0 X800 Y0 Z600\nG1 Y300 F3000\nG3 X750 Y350 I-50 J0\n", encoding="utf-8"
+    )
     (fit,) = task("part.nc").fits
     assert fit.told[0] == "G-code"
     assert fit.length == pytest.approx(0.3 + 0.05 * np.pi / 2.0, abs=1e-4)
@@ -78,21 +97,45 @@ def test_rough_files_are_named_as_such() -> None:
     write(wave(2_000), "x,y,z", "smooth.csv")
     segment = {"csv": {"file": "rough.csv"}}
     Path("rough.csv").write_text(
-        "\n".join(["x,y,z", *(",".join(f"{value:.6f}" for value in row) for row in wave(2_000))]), encoding="utf-8"
+        "\n".join(
+            [
+                "x,y,z",
+                *(",".join(f"{value:.6f}" for value in row) for row in wave(2_000)),
+            ]
+        ),
+        encoding="utf-8",
     )
     with pytest.raises(
-        TaskError, match=r"rough.csv: the points are too rough .*rounded to 1e-06 m at 0.\d+ mm spacing"
+        TaskError,
+        match=r"rough.csv: the points are too rough .*rounded to 1e-06 m at 0.\d+ mm spacing",
     ):
-        load_task({"brachis": 1, "start": "free", "task_space": "position", "path": [segment]})
-    assert task("rough.csv", tolerance={"position": "0.01 mm"}).fits[0].position_error <= 0.01 * MM
+        load_task(
+            {"brachis": 1, "start": "free", "task_space": "position", "path": [segment]}
+        )
+    assert (
+        task("rough.csv", tolerance={"position": "0.01 mm"}).fits[0].position_error
+        <= 0.01 * MM
+    )
 
 
 WRONG: list[tuple[dict[str, Any], str]] = [
-    ({"corner": "stop"}, r"path\[0\].csv.corner: a path cannot stop at a corner.*found 'stop'.*two tasks"),
-    ({"corner": "refuse"}, r"path\[0\].corner: the points have 2 corners; found .* deg at row 30\d, .*corner: blend"),
-    ({"units": {"length": "m"}}, r"seam.csv: line 1: the header contradicts the task's units"),
+    (
+        {"corner": "stop"},
+        r"path\[0\].csv.corner: a path cannot stop at a corner.*found 'stop'.*two tasks",
+    ),
+    (
+        {"corner": "refuse"},
+        r"path\[0\].corner: the points have 2 corners; found .* deg at row 30\d, .*corner: blend",
+    ),
+    (
+        {"units": {"length": "m"}},
+        r"seam.csv: line 1: the header contradicts the task's units",
+    ),
     ({"units": {"length": "feet"}}, r"path\[0\].csv.units.length.*found 'feet'"),
-    ({"tolerance": {"position": "0.1"}}, r"path\[0\].csv.tolerance.position: no quantity; found '0.1'.*0.05 mm"),
+    (
+        {"tolerance": {"position": "0.1"}},
+        r"path\[0\].csv.tolerance.position: no quantity; found '0.1'.*0.05 mm",
+    ),
     ({"tolerance": {"position": 0}}, r"path\[0\].csv.tolerance.position"),
     ({"tolerance": {}}, r"path\[0\].csv.tolerance.position"),
 ]
@@ -108,7 +151,10 @@ def test_mistakes_are_named(keys: dict[str, Any], message: str) -> None:
 def test_a_turn_cannot_go_on_over_corners() -> None:
     write(1e3 * bent(900, 0.005 * MM)[0])
     turn = {"orientation": {"rotate": {"axis": [0, 0, 1], "angle_deg": 30}}}
-    with pytest.raises(TaskError, match=r"path\[0\].orientation: the tool cannot turn at a constant rate over corners"):
+    with pytest.raises(
+        TaskError,
+        match=r"path\[0\].orientation: the tool cannot turn at a constant rate over corners",
+    ):
         task(space="pose", beside=turn, relative=False)
 
 
@@ -117,7 +163,8 @@ def test_a_bad_row_is_named() -> None:
     rows[321, 1] = np.nan
     write(rows)
     with pytest.raises(
-        TaskError, match=r"seam.csv: line 323: the value of column y_mm is not a finite number; found 'nan'"
+        TaskError,
+        match=r"seam.csv: line 323: the value of column y_mm is not a finite number; found 'nan'",
     ):
         task()
     rows = 1e3 * wave(500)

@@ -21,10 +21,19 @@ def task(**changes: Any) -> dict[str, Any]:
         {"circle": {"center": [1, 2], "turns": -2}},
         {"spline": {"through": [[1, 2], [3, 4]]}},
     ]
-    limits = {"torque": {"j1": 10, "j2": None}, "velocity": None, "acceleration": 2, "position": [[-1, 1]]}
+    limits = {
+        "torque": {"j1": 10, "j2": None},
+        "velocity": None,
+        "acceleration": 2,
+        "position": [[-1, 1]],
+    }
     return {
         "brachis": 1,
-        "robot": {"urdf": "robot.urdf", "limits": limits, "friction": {"viscous": [0, 1]}},
+        "robot": {
+            "urdf": "robot.urdf",
+            "limits": limits,
+            "friction": {"viscous": [0, 1]},
+        },
         "start": {"joints": {"j1": 0.5}},
         "end": "free",
         "task_space": ["x", "y"],
@@ -46,7 +55,12 @@ DYNAMICS = {
     "tool_offset": {"xyz": [0, 0, 0.1]},
     "mounting": "wall",
     "speed_override": "50 %",
-    "friction": {"viscous": None, "coulomb": "urdf", "rotor_inertia": 1e-4, "gear_ratio": {"j1": 100}},
+    "friction": {
+        "viscous": None,
+        "coulomb": "urdf",
+        "rotor_inertia": 1e-4,
+        "gear_ratio": {"j1": 100},
+    },
 }
 
 
@@ -61,11 +75,26 @@ DYNAMICS = {
         {"solver": "ipopt"},
         {"search": {"slower": "1 %"}},
         {"robot": DYNAMICS},
-        {"robot": {"urdf": "robot.urdf", "limits": {"torque": {"j1": [-5, 7], "j2": 3}, "velocity": [[-1, 2], 3]}}},
-        {"robot": {"urdf": "robot.urdf", "mounting": {"xyz": [1, 2, 3], "rpy_deg": [0, 30, 0]}}},
+        {
+            "robot": {
+                "urdf": "robot.urdf",
+                "limits": {
+                    "torque": {"j1": [-5, 7], "j2": 3},
+                    "velocity": [[-1, 2], 3],
+                },
+            }
+        },
+        {
+            "robot": {
+                "urdf": "robot.urdf",
+                "mounting": {"xyz": [1, 2, 3], "rpy_deg": [0, 30, 0]},
+            }
+        },
     ],
 )
-def test_the_schema_accepts_what_the_loader_accepts(validator: Any, change: dict[str, Any]) -> None:
+def test_the_schema_accepts_what_the_loader_accepts(
+    validator: Any, change: dict[str, Any]
+) -> None:
     load_task(task(**change))
     assert validator.is_valid(task(**change))
 
@@ -92,7 +121,9 @@ def test_the_schema_accepts_a_saved_task(validator: Any) -> None:
         {"search": {"slower": "150 %"}},
     ],
 )
-def test_the_schema_refuses_what_the_loader_refuses(validator: Any, change: dict[str, Any]) -> None:
+def test_the_schema_refuses_what_the_loader_refuses(
+    validator: Any, change: dict[str, Any]
+) -> None:
     assert not validator.is_valid(task(**change))
 
 
@@ -100,7 +131,9 @@ def test_the_schema_tells_an_editor_what_keys_mean() -> None:
     schema = json_schema()
     assert schema["$schema"].startswith("https://json-schema.org/")
     assert schema["title"]
-    described = [key for key, value in schema["properties"].items() if value.get("description")]
+    described = [
+        key for key, value in schema["properties"].items() if value.get("description")
+    ]
     assert described == list(schema["properties"])
 
 

@@ -24,17 +24,28 @@ MIDDLE = 60
 @pytest.fixture(scope="module")
 def rubbing(scara_urdf):
     """A motion of the planar arm under Coulomb friction, whose joints reverse, with a torque limit out of the way."""
-    task = yaml.safe_load((scara_urdf.parents[2] / "examples/01_scara_line.yaml").read_text())
-    task["robot"] |= {"urdf": str(scara_urdf), "friction": {"coulomb": 0.5, "coulomb_velocity": 0.01}}
+    task = yaml.safe_load(
+        (scara_urdf.parents[2] / "examples/01_scara_line.yaml").read_text()
+    )
+    task["robot"] |= {
+        "urdf": str(scara_urdf),
+        "friction": {"coulomb": 0.5, "coulomb_velocity": 0.01},
+    }
     return brachis.plan(task, **QUICK).trajectory
 
 
 def failed(trajectory):
-    return {check.name for check in verify_trajectory(trajectory).checks if not check.passed}
+    return {
+        check.name for check in verify_trajectory(trajectory).checks if not check.passed
+    }
 
 
 def ratio(trajectory, kind):
-    (check,) = [check for check in verify_trajectory(trajectory).checks if check.name == f"{kind} ratio"]
+    (check,) = [
+        check
+        for check in verify_trajectory(trajectory).checks
+        if check.name == f"{kind} ratio"
+    ]
     return check
 
 
@@ -61,7 +72,10 @@ def with_node(trajectory, t, **offsets):
         "qddot": trajectory.acceleration(t),
         "qddot_before": trajectory.acceleration(t),
     }
-    arrays = {name: np.insert(getattr(trajectory, name), place, value, axis=0) for name, value in values.items()}
+    arrays = {
+        name: np.insert(getattr(trajectory, name), place, value, axis=0)
+        for name, value in values.items()
+    }
     for name, offset in offsets.items():
         arrays[name][place] += offset
     return replace(trajectory, **arrays)
@@ -69,7 +83,9 @@ def with_node(trajectory, t, **offsets):
 
 def nodes_close_together(trajectory, gap, by, joint):
     """Two nodes `gap` seconds apart that disagree by `by` rad."""
-    return with_node(trajectory, trajectory.times[MIDDLE] + gap, q=by * np.eye(3)[joint])
+    return with_node(
+        trajectory, trajectory.times[MIDDLE] + gap, q=by * np.eye(3)[joint]
+    )
 
 
 ORDERS = {
@@ -94,7 +110,10 @@ GROWTH = (0.5, 1.8, 5.0, 50.0)
 def limited_to(trajectory, kind):
     """The motion, limited by nothing but one kind, of which it uses two thirds."""
     free = with_limits(
-        replace(trajectory, task=trajectory.task.model_copy(update={"tool_limits": ToolLimits()})),
+        replace(
+            trajectory,
+            task=trajectory.task.model_copy(update={"tool_limits": ToolLimits()}),
+        ),
         **dict.fromkeys(MAGNITUDES, np.full(3, np.inf)),
         position_lower=np.full(3, -np.inf),
         position_upper=np.full(3, np.inf),
@@ -106,13 +125,24 @@ def limited_to(trajectory, kind):
     if kind == "process speed":
         # Between 40 and 60 % of the path the speed is between the first and the last of these.
         speed = states.tool_speed[(states.s > 0.4) & (states.s < 0.6)]
-        middle, off = 0.5 * (speed.max() + speed.min()), 0.5 * (speed.max() - speed.min())
-        part = ProcessSpeed(s=(0.4, 0.6), speed=middle, tolerance=min(1.5 * off / middle, 0.5))
+        middle, off = (
+            0.5 * (speed.max() + speed.min()),
+            0.5 * (speed.max() - speed.min()),
+        )
+        part = ProcessSpeed(
+            s=(0.4, 0.6), speed=middle, tolerance=min(1.5 * off / middle, 0.5)
+        )
         return with_tool_limits(free, process_speed=(part,)), 3.0 * middle
     if kind.startswith("tool"):
         spin = np.abs(states.qdot.sum(axis=1)).max()
-        bend = np.linalg.norm(np.gradient(np.gradient(states.tool_position, t, axis=0), t, axis=0), axis=1)[5:-5].max()
-        limit = {"speed": states.tool_speed.max(), "angular_speed": spin, "acceleration": bend}
+        bend = np.linalg.norm(
+            np.gradient(np.gradient(states.tool_position, t, axis=0), t, axis=0), axis=1
+        )[5:-5].max()
+        limit = {
+            "speed": states.tool_speed.max(),
+            "angular_speed": spin,
+            "acceleration": bend,
+        }
         name = kind.removeprefix("tool ").replace(" ", "_")
         return with_tool_limits(free, **{name: 1.5 * limit[name]}), 6.0 * limit[name]
     rate = np.abs(np.gradient(states.tau, t, axis=0)).max()
@@ -130,7 +160,10 @@ def limited_to(trajectory, kind):
 
 
 def with_tool_limits(trajectory, **limits):
-    return replace(trajectory, task=trajectory.task.model_copy(update={"tool_limits": ToolLimits(**limits)}))
+    return replace(
+        trajectory,
+        task=trajectory.task.model_copy(update={"tool_limits": ToolLimits(**limits)}),
+    )
 
 
 @pytest.mark.parametrize("gap", [1e-6, 2e-5, 1e-4, 1e-3])
@@ -142,7 +175,9 @@ def test_a_limit_that_is_exceeded_between_nodes_close_together(planned, kind, ga
     by = max(excess * gap**order / GROWTH[order], 1e-14) * np.eye(3)[1]
     divided = with_node(with_node(limited, middle), middle + gap)
     assert f"{kind} ratio" not in failed(divided)
-    spiked = changed(divided, "q", int(np.searchsorted(divided.times, middle + gap)), 2.0 * by)
+    spiked = changed(
+        divided, "q", int(np.searchsorted(divided.times, middle + gap)), 2.0 * by
+    )
     assert f"{kind} ratio" in failed(spiked)
 
 
@@ -153,26 +188,39 @@ def test_a_path_that_is_left_between_nodes_close_together(planned, gap):
     divided = with_node(with_node(planned, middle), middle + gap)
     assert "path error" not in failed(divided)
     place = int(np.searchsorted(divided.times, middle))
-    assert "path error" in failed(changed(divided, "qdot", place, 1e-7 / gap * np.eye(3)[1]))
+    assert "path error" in failed(
+        changed(divided, "qdot", place, 1e-7 / gap * np.eye(3)[1])
+    )
 
 
 def true_worst_torque(trajectory, pieces=slice(None), places=100):
     """Largest ratio that the trajectory's own evaluation finds at so many places in every piece."""
     lengths = np.diff(trajectory.times)[pieces, None]
-    t = (trajectory.times[:-1][pieces, None] + lengths * np.linspace(0.0, 1.0, places)).ravel()
+    t = (
+        trajectory.times[:-1][pieces, None] + lengths * np.linspace(0.0, 1.0, places)
+    ).ravel()
     t = np.clip(t, 0.0, trajectory.t_end)
-    tau = dynamics.torque(trajectory.robot, trajectory.position(t), trajectory.velocity(t), trajectory.acceleration(t))
+    tau = dynamics.torque(
+        trajectory.robot,
+        trajectory.position(t),
+        trajectory.velocity(t),
+        trajectory.acceleration(t),
+    )
     return float(np.abs(tau / trajectory.robot.limits.torque).max())
 
 
 @pytest.mark.parametrize("joint", range(3))
-@pytest.mark.parametrize(("gap", "by"), [(1e-6, 5e-10), (1e-7, 5e-12), (1e-5, 1e-9), (1e-4, 2e-8)])
+@pytest.mark.parametrize(
+    ("gap", "by"), [(1e-6, 5e-10), (1e-7, 5e-12), (1e-5, 1e-9), (1e-4, 2e-8)]
+)
 def test_nodes_close_together_that_disagree(planned, gap, by, joint):
     """The torque in between is hidden from any grid of times; its limit and the acceleration's are exceeded."""
     spiked = nodes_close_together(planned, gap, by, joint)
     assert "torque ratio" in failed(spiked)
     check = ratio(spiked, "torque")
-    assert check.value == pytest.approx(true_worst_torque(spiked, slice(MIDDLE - 2, MIDDLE + 3), 4000), rel=1e-5)
+    assert check.value == pytest.approx(
+        true_worst_torque(spiked, slice(MIDDLE - 2, MIDDLE + 3), 4000), rel=1e-5
+    )
     assert abs(check.time - planned.times[MIDDLE]) <= 2.0 * np.diff(planned.times).max()
 
 
@@ -187,7 +235,11 @@ def test_nodes_that_are_a_little_off(planned, name, by, joint):
 def test_a_coefficient_of_one_piece(planned, piece, row):
     """Inner coefficients leave both nodes as they are, or one of them: a spike of acceleration in between."""
     lengths = np.diff(planned.times)
-    chosen = {"shortest": int(np.argmin(lengths)), "first": 0, "last": len(lengths) - 1}[piece]
+    chosen = {
+        "shortest": int(np.argmin(lengths)),
+        "first": 0,
+        "last": len(lengths) - 1,
+    }[piece]
     torn = replace(planned)
     coefficients = torn.pieces.c.copy()
     coefficients[row, chosen, 1] += 20.0 * lengths[chosen] ** 2
@@ -196,13 +248,18 @@ def test_a_coefficient_of_one_piece(planned, piece, row):
 
 
 def test_a_motion_of_one_piece(planned):
-    ends = {name: getattr(planned, name)[[0, -1]] for name in ("times", "q", "qdot", "qddot", "qddot_before")}
+    ends = {
+        name: getattr(planned, name)[[0, -1]]
+        for name in ("times", "q", "qdot", "qddot", "qddot_before")
+    }
     assert "path error" in failed(replace(planned, **ends))
 
 
 def test_a_motion_that_takes_too_long_to_look_at_is_refused(planned):
     fast = replace(planned, q=1e6 * planned.q, qdot=1e6 * planned.qdot)
-    with pytest.raises(InputError, match=r"found \d+ instants to look at; allowed: 200000"):
+    with pytest.raises(
+        InputError, match=r"found \d+ instants to look at; allowed: 200000"
+    ):
         verify_trajectory(fast)
 
 
@@ -215,42 +272,61 @@ def finely(planned):
 @pytest.mark.parametrize("far", [1e4, 1e300, np.inf])
 @pytest.mark.parametrize("upper", [False, True])
 @pytest.mark.parametrize("joint", range(3))
-def test_a_position_beyond_the_near_end_of_a_far_range(planned, finely, joint, upper, far):
+def test_a_position_beyond_the_near_end_of_a_far_range(
+    planned, finely, joint, upper, far
+):
     """Half a range of 1e4 rad is no measure of what is beyond its near end."""
     q, beyond = finely[:, joint], 2e-4
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
-    low[joint], high[joint] = (-far, q.max() - beyond) if upper else (q.min() + beyond, far)
+    low[joint], high[joint] = (
+        (-far, q.max() - beyond) if upper else (q.min() + beyond, far)
+    )
     limited = with_limits(planned, position_lower=low, position_upper=high)
     assert failed(limited) == {"position ratio"}
     check = ratio(limited, "position")
     assert check.subject == planned.joint_names[joint]
     assert check.value == pytest.approx(1.0 + beyond, abs=1e-6)
-    assert not failed(with_limits(planned, position_lower=low - beyond, position_upper=high + beyond))
+    assert not failed(
+        with_limits(planned, position_lower=low - beyond, position_upper=high + beyond)
+    )
 
 
 @pytest.mark.parametrize("half", [1e-3, 1e-6])
 def test_a_narrow_range_is_measured_in_its_halves(planned, half):
-    still = replace(planned, q=np.zeros_like(planned.q), qdot=0.0 * planned.q, qddot=0.0 * planned.q)
+    still = replace(
+        planned, q=np.zeros_like(planned.q), qdot=0.0 * planned.q, qddot=0.0 * planned.q
+    )
     still = replace(still, qddot_before=0.0 * planned.q)
     open_end = np.full(3, np.inf)
     ends = np.array([half, np.inf, np.inf])
     inside = with_limits(still, position_lower=-ends, position_upper=ends)
     assert "position ratio" not in failed(inside)
     beyond = 2e-4 * max(half, 1e-5)
-    outside = with_limits(still, position_lower=np.array([beyond, *-open_end[1:]]), position_upper=2.0 * ends + beyond)
+    outside = with_limits(
+        still,
+        position_lower=np.array([beyond, *-open_end[1:]]),
+        position_upper=2.0 * ends + beyond,
+    )
     assert "position ratio" in failed(outside)
 
 
 def test_position_velocity_and_acceleration_are_exact_between_the_nodes(planned):
     """The largest values of the polynomials lie between the nodes, and between the points of any grid."""
     t = np.linspace(0.0, planned.t_end, 200_001)
-    for kind, curve in (("velocity", planned.velocity), ("acceleration", planned.acceleration)):
+    for kind, curve in (
+        ("velocity", planned.velocity),
+        ("acceleration", planned.acceleration),
+    ):
         limit = np.abs(curve(t)).max(axis=0)
         found = ratio(with_limits(planned, **{kind: limit}), kind)
         assert 1.0 - 1e-12 <= found.value < 1.0 + 1e-7
     q = planned.position(t)
     limits = {"position_lower": q.min(axis=0), "position_upper": q.max(axis=0)}
-    assert 1.0 - 1e-12 <= ratio(with_limits(planned, **limits), "position").value < 1.0 + 1e-8
+    assert (
+        1.0 - 1e-12
+        <= ratio(with_limits(planned, **limits), "position").value
+        < 1.0 + 1e-8
+    )
 
 
 @pytest.mark.parametrize("width", [1e-2, 1e-3, 1e-4, 1e-5, 1e-7])
@@ -260,7 +336,9 @@ def test_a_peak_within_the_friction_of_a_reversal(rubbing, width):
     narrow = replace(rubbing, robot=replace(rubbing.robot, friction=friction))
     t, places = rubbing.times, []
     for joint in range(3):
-        crossing = np.flatnonzero(rubbing.qdot[1:, joint] * rubbing.qdot[:-1, joint] < 0.0)
+        crossing = np.flatnonzero(
+            rubbing.qdot[1:, joint] * rubbing.qdot[:-1, joint] < 0.0
+        )
         places += [(joint, k) for k in crossing]
     assert places, "no joint reverses: the test would show nothing"
     joint, k = places[len(places) // 2]
@@ -269,7 +347,9 @@ def test_a_peak_within_the_friction_of_a_reversal(rubbing, width):
         middle = 0.5 * (low + high)
         same = rubbing.velocity(middle)[joint] * rubbing.velocity(low)[joint] > 0.0
         low, high = (middle, high) if same else (low, middle)
-    offsets = np.concatenate([-np.logspace(-9, -4, 3000)[::-1], np.logspace(-9, -4, 3000)])
+    offsets = np.concatenate(
+        [-np.logspace(-9, -4, 3000)[::-1], np.logspace(-9, -4, 3000)]
+    )
     tau = narrow.torque(np.clip(0.5 * (low + high) + offsets, t[k], t[k + 1]))[:, joint]
     limit = np.full(3, 1e6)
     limit[joint] = np.abs(tau).max() / (1.0 + 2e-4)
@@ -284,12 +364,16 @@ def test_s_runs_backwards_within_one_interval(planned, interval):
     points, knots = np.array(planned.control_points), np.unique(planned.knots)
     middle = 0.5 * (knots[interval] + knots[interval + 1])
     width = 1e-6
-    fine = np.sort(np.concatenate([planned.knots, np.linspace(middle - width, middle + width, 8)]))
+    fine = np.sort(
+        np.concatenate([planned.knots, np.linspace(middle - width, middle + width, 8)])
+    )
     points = insert_knots(points, planned.knots, fine, planned.degree)
     place = int(np.searchsorted(fine, middle)) - 2
     points[0, place] += 1e-6
     points[0, place + 1] -= 1e-6
-    assert "ds/dt below zero" in failed(replace(planned, knots=fine, control_points=points))
+    assert "ds/dt below zero" in failed(
+        replace(planned, knots=fine, control_points=points)
+    )
 
 
 @pytest.mark.parametrize("point", [2, 8, 13, 20])
@@ -301,12 +385,18 @@ def test_wrong_control_points(planned, row, point):
 def test_a_bump_of_a_spline_between_two_nodes(planned):
     """Knots of its own make room for it where no node is."""
     t = planned.times / planned.t_end
-    fine = np.sort(np.concatenate([planned.knots, np.linspace(t[MIDDLE], t[MIDDLE + 1], 10)[1:-1]]))
+    fine = np.sort(
+        np.concatenate([planned.knots, np.linspace(t[MIDDLE], t[MIDDLE + 1], 10)[1:-1]])
+    )
     points = insert_knots(planned.control_points, planned.knots, fine, planned.degree)
     points[1, int(np.searchsorted(fine, 0.5 * (t[MIDDLE] + t[MIDDLE + 1]))) - 2] += 1e-5
-    assert failed(replace(planned, knots=fine, control_points=points)) == {"redundant joints' splines"}
+    assert failed(replace(planned, knots=fine, control_points=points)) == {
+        "redundant joints' splines"
+    }
 
 
 def test_the_torque_is_found_to_a_hundred_thousandth(planned):
     verification = verify_trajectory(planned)
-    assert verification.worst_ratio == pytest.approx(true_worst_torque(planned), abs=1e-5)
+    assert verification.worst_ratio == pytest.approx(
+        true_worst_torque(planned), abs=1e-5
+    )

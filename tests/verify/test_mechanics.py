@@ -13,7 +13,11 @@ from support.chains import planar_robot
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 OPTIONS = {
-    "payload": {"mass": 3, "com": [0.1, 0.2, 0.3], "inertia": {"ixx": 0.1, "iyy": 0.2, "izz": 0.25, "iyz": 0.02}},
+    "payload": {
+        "mass": 3,
+        "com": [0.1, 0.2, 0.3],
+        "inertia": {"ixx": 0.1, "iyy": 0.2, "izz": 0.25, "iyz": 0.02},
+    },
     "tool_offset": {"xyz": [0.1, 0.2, 0.3], "rpy_deg": [10, 20, 30]},
     "mounting": {"xyz": [1, 2, 3], "rpy_deg": [30, -50, 70]},
     "friction": {"armature": 0.3, "viscous": 1.0, "coulomb": 2.0},
@@ -21,16 +25,28 @@ OPTIONS = {
 }
 
 
-@pytest.mark.parametrize("name", ["tx90l_rail", "ur10_rail", "iiwa14", "iiwa14, free roll", "RPCR"])
+@pytest.mark.parametrize(
+    "name", ["tx90l_rail", "ur10_rail", "iiwa14", "iiwa14, free roll", "RPCR"]
+)
 def test_own_mechanics_are_pinocchios(name):
     folder, *rolls = name.split(", ")
     path = ROBOTS / folder / "robot.urdf"
-    robot = Robot.from_urdf(path, **OPTIONS) if path.exists() else planar_robot(folder, "tilted", **OPTIONS)
+    robot = (
+        Robot.from_urdf(path, **OPTIONS)
+        if path.exists()
+        else planar_robot(folder, "tilted", **OPTIONS)
+    )
     if rolls:
         robot, _ = bind(robot, "pose_free_roll")
     rng = np.random.default_rng(0)
     q, qdot, qddot = (rng.normal(size=(50, robot.n)) for _ in range(3))
     expected = dynamics.torque(robot, q, qdot, qddot)
-    np.testing.assert_allclose(mechanics.torques(robot, q, qdot, qddot), expected, atol=1e-13 * np.abs(expected).max())
-    for mine, other in zip(mechanics.tool_placements(robot, q), robot.tool_placements(q), strict=True):
+    np.testing.assert_allclose(
+        mechanics.torques(robot, q, qdot, qddot),
+        expected,
+        atol=1e-13 * np.abs(expected).max(),
+    )
+    for mine, other in zip(
+        mechanics.tool_placements(robot, q), robot.tool_placements(q), strict=True
+    ):
         np.testing.assert_allclose(mine, other, atol=1e-13)

@@ -27,7 +27,9 @@ def test_roots_of_random_polynomials(degree):
     for f in range(c.shape[1]):
         expected = np.roots(powers_of(c[:, f]))
         real = np.sort(expected[np.abs(expected.imag) < 1e-10].real)
-        np.testing.assert_allclose(u[column == f], real[(real > 0.0) & (real < 1.0)], atol=1e-9)
+        np.testing.assert_allclose(
+            u[column == f], real[(real > 0.0) & (real < 1.0)], atol=1e-9
+        )
     np.testing.assert_array_equal(column, np.sort(column))
     np.testing.assert_allclose(values_of(c[:, column], u), 0.0, atol=1e-12)
 

@@ -24,8 +24,12 @@ def test_an_excess_just_before_a_knot_is_seen(scara_urdf):
     }
     result = brachis.plan(robot, task)
     assert result.verified
-    finished = [candidate for candidate in result.candidates if np.isfinite(candidate.t_end)]
-    assert all(candidate.verified for candidate in finished), "refinement should look at both sides of knots too"
+    finished = [
+        candidate for candidate in result.candidates if np.isfinite(candidate.t_end)
+    ]
+    assert all(candidate.verified for candidate in finished), (
+        "refinement should look at both sides of knots too"
+    )
     motion = result.trajectory
     jumps = np.flatnonzero(np.any(motion.qddot_before != motion.qddot, axis=1))
     assert len(jumps) >= 6
@@ -33,10 +37,14 @@ def test_an_excess_just_before_a_knot_is_seen(scara_urdf):
     before = np.array(motion.qddot_before)
     before[knot] *= 3.0
     (check,) = [
-        c for c in brachis.verify_trajectory(replace(motion, qddot_before=before)).checks if c.name == "torque ratio"
+        c
+        for c in brachis.verify_trajectory(replace(motion, qddot_before=before)).checks
+        if c.name == "torque ratio"
     ]
     assert not check.passed
     assert check.time == motion.times[knot]
     # The grid beside the knot sees less than the torque on its left side, which this is.
-    expected = dynamics.torque(robot, motion.q[[knot]], motion.qdot[[knot]], before[[knot]])[0]
+    expected = dynamics.torque(
+        robot, motion.q[[knot]], motion.qdot[[knot]], before[[knot]]
+    )[0]
     assert check.value == pytest.approx(np.abs(expected / 10.0).max(), rel=1e-12)

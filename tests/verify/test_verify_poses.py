@@ -20,7 +20,12 @@ def motion(request):
         "brachis": 1,
         "start": {"joints": START},
         "task_space": request.param,
-        "path": [{"line": {"by": [0.1, 0.3, 0.0]}, "orientation": {"rotate": {"axis": [1, 0, 0], "angle_deg": 20}}}],
+        "path": [
+            {
+                "line": {"by": [0.1, 0.3, 0.0]},
+                "orientation": {"rotate": {"axis": [1, 0, 0], "angle_deg": 20}},
+            }
+        ],
         "redundant_joints": ["j1"],
         "spline": {"intervals": 10},
         "search": QUICK,
@@ -29,7 +34,11 @@ def motion(request):
 
 
 def path_error(trajectory):
-    (check,) = [check for check in verify_trajectory(trajectory).checks if check.name == "path error"]
+    (check,) = [
+        check
+        for check in verify_trajectory(trajectory).checks
+        if check.name == "path error"
+    ]
     return check
 
 

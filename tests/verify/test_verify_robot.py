@@ -14,8 +14,15 @@ from support.effort import QUICK
 ROBOT = {
     "tool_frame": "tool",
     "gravity": [0, -9.81, 0],
-    "limits": {"torque": {"j1": [-400, 450], "j2": [-200, 250], "j3": [-110, 90]}, "velocity": 4},
-    "payload": {"mass": 2, "com": [0.05, 0.02, 0], "inertia": {"ixx": 0.1, "iyy": 0.1, "izz": 0.12}},
+    "limits": {
+        "torque": {"j1": [-400, 450], "j2": [-200, 250], "j3": [-110, 90]},
+        "velocity": 4,
+    },
+    "payload": {
+        "mass": 2,
+        "com": [0.05, 0.02, 0],
+        "inertia": {"ixx": 0.1, "iyy": 0.1, "izz": 0.12},
+    },
     "tool_offset": {"xyz": [0.1, 0.05, 0], "rpy_deg": [0, 0, 20]},
     "mounting": {"xyz": [0.2, 0.1, 0], "rpy_deg": [0, 0, 30]},
     "friction": {
@@ -49,12 +56,20 @@ def saved(scara_urdf, tmp_path_factory):
 
 def failed(trajectory, robot: Robot) -> set[str]:
     """Names of the checks that fail for a robot in the place of the saved one."""
-    return {check.name for check in brachis.verify_trajectory(trajectory, robot=robot).checks if not check.passed}
+    return {
+        check.name
+        for check in brachis.verify_trajectory(trajectory, robot=robot).checks
+        if not check.passed
+    }
 
 
 def test_a_saved_motion_passes_again(saved):
     assert brachis.verify_trajectory(saved).passed
-    ratios = [check.value for check in brachis.verify_trajectory(saved).checks if check.name == "torque ratio"]
+    ratios = [
+        check.value
+        for check in brachis.verify_trajectory(saved).checks
+        if check.name == "torque ratio"
+    ]
     assert ratios[0] > 0.999
 
 
@@ -68,12 +83,17 @@ def test_a_saved_motion_passes_again(saved):
         ({"tool_offset": {"xyz": [0.1, 0.06, 0]}}, "path error"),
         ({"mounting": {"rpy_deg": [0, 0, 31]}}, "path error"),
         ({"speed_override": 0.2}, "velocity ratio"),
-        ({"limits": {**ROBOT["limits"], "torque": {"j1": 400, "j2": 200, "j3": 90}}}, "torque ratio"),
+        (
+            {"limits": {**ROBOT["limits"], "torque": {"j1": 400, "j2": 200, "j3": 90}}},
+            "torque ratio",
+        ),
     ],
     ids=str,
 )
 def test_every_part_counts(saved, change, fault):
-    other = robot_from_settings(check_robot_settings({**ROBOT, **change}), urdf_text=saved.urdf)
+    other = robot_from_settings(
+        check_robot_settings({**ROBOT, **change}), urdf_text=saved.urdf
+    )
     assert fault in failed(saved, other)
 
 
@@ -81,7 +101,11 @@ def test_an_arm_on_a_wall_is_the_arm_on_the_floor_turned(scara_urdf):
     def plan(space: list[str], by: list[float], **robot: object) -> brachis.Result:
         task = {
             "brachis": 1,
-            "robot": {"gravity": [0, 0, 0], "limits": {"torque": 10, "velocity": None}, **robot},
+            "robot": {
+                "gravity": [0, 0, 0],
+                "limits": {"torque": 10, "velocity": None},
+                **robot,
+            },
             "start": {"joints": [0.5, -2.0, 2.0]},
             "task_space": space,
             "path": [{"line": {"by": by}}],
@@ -91,12 +115,19 @@ def test_an_arm_on_a_wall_is_the_arm_on_the_floor_turned(scara_urdf):
         }
         return brachis.plan(scara_urdf, task)
 
-    floor, wall = plan(["x", "y"], [-0.4, 0.3]), plan(["y", "z"], [0.3, 0.4], mounting="wall")
+    floor, wall = (
+        plan(["x", "y"], [-0.4, 0.3]),
+        plan(["y", "z"], [0.3, 0.4], mounting="wall"),
+    )
     assert wall.verified
     assert wall.t_end == pytest.approx(floor.t_end, rel=1e-4)
     t = np.linspace(0.0, 1.0, 50)
     places = [
-        result.trajectory.robot.tool_placements(result.trajectory.position(t * result.t_end))[0]
+        result.trajectory.robot.tool_placements(
+            result.trajectory.position(t * result.t_end)
+        )[0]
         for result in (floor, wall)
     ]
-    np.testing.assert_allclose(places[1], places[0][:, [2, 1, 0]] * [1, 1, -1], atol=1e-3)
+    np.testing.assert_allclose(
+        places[1], places[0][:, [2, 1, 0]] * [1, 1, -1], atol=1e-3
+    )

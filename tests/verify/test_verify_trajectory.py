@@ -52,7 +52,9 @@ def started_elsewhere(trajectory):
 
 
 def ended_elsewhere(trajectory):
-    return with_task(trajectory, end=Posture(joints=tuple(trajectory.q[-1] + [0.0, 1e-6, 0.0])))
+    return with_task(
+        trajectory, end=Posture(joints=tuple(trajectory.q[-1] + [0.0, 1e-6, 0.0]))
+    )
 
 
 def backwards(trajectory):
@@ -74,20 +76,47 @@ FAULTS = {
     "off the path": ("path error", lambda t: shifted(t, "q", (MIDDLE, 0), 1e-8)),
     "too fast": ("torque ratio", lambda t: faster(t, 1.001)),
     "backwards": ("ds/dt below zero", backwards),
-    "short of the path's end": ("s at the ends", lambda t: shifted(t, "control_points", (0, -1), -1e-6)),
-    "not from the path's beginning": ("s at the ends", lambda t: shifted(t, "control_points", (0, 0), 1e-6)),
+    "short of the path's end": (
+        "s at the ends",
+        lambda t: shifted(t, "control_points", (0, -1), -1e-6),
+    ),
+    "not from the path's beginning": (
+        "s at the ends",
+        lambda t: shifted(t, "control_points", (0, 0), 1e-6),
+    ),
     "starts elsewhere": ("start posture", started_elsewhere),
     "ends elsewhere": ("end posture", ended_elsewhere),
-    "moving at the start": ("start velocity", lambda t: shifted(t, "qdot", (0, 1), 1e-7)),
+    "moving at the start": (
+        "start velocity",
+        lambda t: shifted(t, "qdot", (0, 1), 1e-7),
+    ),
     "moving at the end": ("end velocity", lambda t: shifted(t, "qdot", (-1, 1), 1e-7)),
-    "accelerating at the start": ("start acceleration", lambda t: shifted(t, "qddot", (0, 1), 1e-5)),
-    "accelerating at the end": ("end acceleration", lambda t: shifted(t, "qddot_before", (-1, 1), 1e-5)),
-    "another spline": ("redundant joints' splines", lambda t: shifted(t, "control_points", 1, 0.3)),
-    "one control point": ("redundant joints' splines", lambda t: shifted(t, "control_points", (1, 9), 1e-6)),
+    "accelerating at the start": (
+        "start acceleration",
+        lambda t: shifted(t, "qddot", (0, 1), 1e-5),
+    ),
+    "accelerating at the end": (
+        "end acceleration",
+        lambda t: shifted(t, "qddot_before", (-1, 1), 1e-5),
+    ),
+    "another spline": (
+        "redundant joints' splines",
+        lambda t: shifted(t, "control_points", 1, 0.3),
+    ),
+    "one control point": (
+        "redundant joints' splines",
+        lambda t: shifted(t, "control_points", (1, 9), 1e-6),
+    ),
     "position jumps": ("position jump", lambda t: torn(t, 5, 1e-4)),
     "velocity jumps": ("velocity jump", lambda t: torn(t, 4, 1e-6)),
-    "acceleration jumps": ("acceleration jump", lambda t: shifted(t, "qddot_before", (MIDDLE, 0), 1e-3)),
-    "torque jumps": ("torque jump", lambda t: shifted(t, "qddot_before", (MIDDLE, 0), 1e-6)),
+    "acceleration jumps": (
+        "acceleration jump",
+        lambda t: shifted(t, "qddot_before", (MIDDLE, 0), 1e-3),
+    ),
+    "torque jumps": (
+        "torque jump",
+        lambda t: shifted(t, "qddot_before", (MIDDLE, 0), 1e-6),
+    ),
 }
 ALONE = {
     "off the path",
@@ -117,13 +146,18 @@ def test_fault_is_found(fault, planned):
 
 
 def test_every_check_has_its_fault(planned):
-    limits = {f"{kind} ratio" for kind in ("velocity", "acceleration", "position")}  # see below
+    limits = {
+        f"{kind} ratio" for kind in ("velocity", "acceleration", "position")
+    }  # see below
     names = [check.name for check in verify_trajectory(ended_elsewhere(planned)).checks]
     assert sorted(names) == sorted({name for name, _ in FAULTS.values()} | limits)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize(("kind", "quantity"), [("velocity", "qdot"), ("acceleration", "qddot"), ("torque", "tau")])
+@pytest.mark.parametrize(
+    ("kind", "quantity"),
+    [("velocity", "qdot"), ("acceleration", "qddot"), ("torque", "tau")],
+)
 def test_limit(kind, quantity, sign, planned):
     joint = 1
     values = np.abs(getattr(planned.sample(planned.t_end / 5000), quantity)[:, joint])
@@ -131,18 +165,24 @@ def test_limit(kind, quantity, sign, planned):
     limit[joint] = values.max() / 1.001
     mirrored = mirror(planned) if sign < 0 else planned
     verification = verify_trajectory(with_limits(mirrored, **{kind: limit}))
-    check = next(check for check in verification.checks if check.name == f"{kind} ratio")
+    check = next(
+        check for check in verification.checks if check.name == f"{kind} ratio"
+    )
     assert not check.passed
     assert check.subject == "j2"
     assert check.value == pytest.approx(1.001, abs=1e-4)
     assert verification.worst_ratio == check.value
-    assert check.time == pytest.approx(np.argmax(values) / 5000 * planned.t_end, abs=0.02)
+    assert check.time == pytest.approx(
+        np.argmax(values) / 5000 * planned.t_end, abs=0.02
+    )
 
 
 def mirror(trajectory):
     """The motion backwards in space; it leaves the path, and its torques change sign without gravity."""
     t = trajectory
-    return replace(t, q=-t.q, qdot=-t.qdot, qddot=-t.qddot, qddot_before=-t.qddot_before)
+    return replace(
+        t, q=-t.q, qdot=-t.qdot, qddot=-t.qddot, qddot_before=-t.qddot_before
+    )
 
 
 @pytest.mark.parametrize("one_sided", [False, True])
@@ -151,26 +191,47 @@ def test_position_limit(side, one_sided, planned):
     joint, upper = 2, side == "position_upper"
     q = planned.sample(planned.t_end / 5000).q[:, joint]
     beyond = 0.01
-    limits = {name: np.array(getattr(planned.robot.limits, name)) for name in ("position_lower", "position_upper")}
+    limits = {
+        name: np.array(getattr(planned.robot.limits, name))
+        for name in ("position_lower", "position_upper")
+    }
     if one_sided:
-        limits["position_lower"][joint], limits["position_upper"][joint] = -np.inf, np.inf
+        limits["position_lower"][joint], limits["position_upper"][joint] = (
+            -np.inf,
+            np.inf,
+        )
     limits[side][joint] = q.max() - beyond if upper else q.min() + beyond
     verification = verify_trajectory(with_limits(planned, **limits))
     assert failed(verification) == {"position ratio"}
-    check = next(check for check in verification.checks if check.name == "position ratio")
+    check = next(
+        check for check in verification.checks if check.name == "position ratio"
+    )
     assert check.subject == "j3"
-    assert check.value == pytest.approx(1.0 + beyond, abs=1e-6)  # in rad, though the range is several rad wide
+    assert check.value == pytest.approx(
+        1.0 + beyond, abs=1e-6
+    )  # in rad, though the range is several rad wide
 
 
 def test_positions_are_told_by_their_place_in_the_range(planned):
     q = planned.sample(planned.t_end / 5000).q
     middle, half = q[0], 1.25 * np.abs(q - q[0]).max(axis=0)
-    verification = verify_trajectory(with_limits(planned, position_lower=middle - half, position_upper=middle + half))
-    check = next(check for check in verification.checks if check.name == "position ratio")
+    verification = verify_trajectory(
+        with_limits(planned, position_lower=middle - half, position_upper=middle + half)
+    )
+    check = next(
+        check for check in verification.checks if check.name == "position ratio"
+    )
     assert check.passed
     assert check.value == pytest.approx(0.8, abs=1e-4)
-    far = verify_trajectory(with_limits(planned, position_lower=np.full(3, -np.inf), position_upper=np.full(3, 50.0)))
-    assert next(check.value for check in far.checks if check.name == "position ratio") == 0.0
+    far = verify_trajectory(
+        with_limits(
+            planned, position_lower=np.full(3, -np.inf), position_upper=np.full(3, 50.0)
+        )
+    )
+    assert (
+        next(check.value for check in far.checks if check.name == "position ratio")
+        == 0.0
+    )
 
 
 def test_nothing_passes_that_is_no_number(planned):
@@ -178,7 +239,9 @@ def test_nothing_passes_that_is_no_number(planned):
     assert "ds/dt below zero" in failed(verification)
     assert "path error" in failed(verification)
     verification = verify_trajectory(shifted(planned, "q", (MIDDLE, 0), np.nan))
-    assert {"path error", "torque ratio", "position ratio", "position jump"} <= failed(verification)
+    assert {"path error", "torque ratio", "position ratio", "position jump"} <= failed(
+        verification
+    )
 
 
 def test_tolerances_are_options(planned):
@@ -190,8 +253,13 @@ def test_tolerances_are_options(planned):
 
 def test_saved_and_loaded_trajectory_has_the_same_verification(planned, tmp_path):
     planned.save(tmp_path / "result.npz")
-    again, first = verify_trajectory(Trajectory.load(tmp_path / "result.npz")), verify_trajectory(planned)
-    assert [check.name for check in again.checks] == [check.name for check in first.checks]
+    again, first = (
+        verify_trajectory(Trajectory.load(tmp_path / "result.npz")),
+        verify_trajectory(planned),
+    )
+    assert [check.name for check in again.checks] == [
+        check.name for check in first.checks
+    ]
     assert again.worst_ratio == pytest.approx(first.worst_ratio, rel=1e-9)
     for one, other in zip(again.checks, first.checks, strict=True):
         assert one.value == pytest.approx(other.value, rel=1e-6, abs=1e-9)
@@ -202,13 +270,17 @@ def test_another_robot_of_the_same_joints(planned, tmp_path):
     text = planned.urdf.replace('mass value="', 'mass value="1')  # 10 kg becomes 110 kg
     assert text != planned.urdf
     heavier.write_text(text)
-    robot = Robot.from_urdf(heavier, tool_frame=planned.robot.tool_frame, gravity=(0.0, 0.0, 0.0))
+    robot = Robot.from_urdf(
+        heavier, tool_frame=planned.robot.tool_frame, gravity=(0.0, 0.0, 0.0)
+    )
     verification = verify_trajectory(planned, robot=robot)
     assert "torque ratio" in failed(verification)
     assert "path error" not in failed(verification)
 
 
-@pytest.mark.parametrize(("old", "new"), [('"j2"', '"elbow"'), ('type="continuous"', 'type="fixed"')])
+@pytest.mark.parametrize(
+    ("old", "new"), [('"j2"', '"elbow"'), ('type="continuous"', 'type="fixed"')]
+)
 def test_robot_of_other_joints_is_refused(old, new, planned):
     place = planned.urdf.index(old)
     text = planned.urdf[:place] + planned.urdf[place:].replace(old, new, 1)
@@ -220,7 +292,11 @@ def test_robot_of_other_joints_is_refused(old, new, planned):
 
 
 def test_robot_without_redundancy_has_no_spline_check(planned):
-    plain = replace(planned, redundant_joints=(), control_points=planned.control_points[:1])
+    plain = replace(
+        planned, redundant_joints=(), control_points=planned.control_points[:1]
+    )
     verification = verify_trajectory(plain)
     assert verification.passed
-    assert "redundant joints' splines" not in {check.name for check in verification.checks}
+    assert "redundant joints' splines" not in {
+        check.name for check in verification.checks
+    }

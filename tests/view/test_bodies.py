@@ -19,14 +19,18 @@ def placed(bodies, found):
 
 
 def test_placements_are_those_of_the_model(motion_of):
-    robot = Robot.from_urdf(ROBOTS[-1], mounting={"xyz": [0.1, 0.2, 0.3], "rpy_deg": [10, 20, 30]})
+    robot = Robot.from_urdf(
+        ROBOTS[-1], mounting={"xyz": [0.1, 0.2, 0.3], "rpy_deg": [10, 20, 30]}
+    )
     motion = motion_of(robot)
     t = np.linspace(0.2, 0.9, 5)
     found = placements(robot, motion.position(t))
     tool, rotations = robot.tool_placements(motion.position(t))
     np.testing.assert_allclose(found.tool, tool, atol=1e-12)
     w, x, y, z = found.quaternions[0, -1]
-    np.testing.assert_allclose(1.0 - 2.0 * (y * y + z * z), rotations[0, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(
+        1.0 - 2.0 * (y * y + z * z), rotations[0, 0, 0], atol=1e-12
+    )
     np.testing.assert_allclose(2.0 * (x * y + w * z), rotations[0, 1, 0], atol=1e-12)
 
 
@@ -39,7 +43,9 @@ def test_a_rail_is_part_of_what_stands_still_and_the_arm_is_not(motion_of):
     assert bodies.moving_upper[1] - bodies.moving_lower[1] < 2.0
 
 
-def test_a_robot_without_shapes_gets_a_skeleton_from_base_to_tool(bare_robot, motion_of):
+def test_a_robot_without_shapes_gets_a_skeleton_from_base_to_tool(
+    bare_robot, motion_of
+):
     motion = motion_of(bare_robot)
     bodies = bodies_of(motion)
     assert not bodies.shows_links
@@ -47,7 +53,9 @@ def test_a_robot_without_shapes_gets_a_skeleton_from_base_to_tool(bare_robot, mo
     found = placements(bare_robot, motion.q[:1])
     vertices = placed(bodies.skeleton, found)
     assert np.linalg.norm(vertices[2] - found.tool[0], axis=1).min() < 0.05
-    np.testing.assert_allclose([vertices[0][:, 1].min(), vertices[0][:, 1].max()], [-1.0, 2.0], atol=0.02)  # the rail
+    np.testing.assert_allclose(
+        [vertices[0][:, 1].min(), vertices[0][:, 1].max()], [-1.0, 2.0], atol=0.02
+    )  # the rail
     assert np.linalg.norm(vertices[1] - found.positions[0, 2], axis=1).min() < 0.05
 
 
@@ -56,7 +64,9 @@ def test_the_box_holds_every_robot(urdf, motion_of):
     motion = motion_of(Robot.from_urdf(urdf))
     bodies = bodies_of(motion)
     assert bodies.shows_links
-    vertices = np.vstack(list(placed(bodies.links, placements(motion.robot, motion.q[:1])).values()))
+    vertices = np.vstack(
+        list(placed(bodies.links, placements(motion.robot, motion.q[:1])).values())
+    )
     assert (vertices >= bodies.lower - 1e-9).all()
     assert (vertices <= bodies.upper + 1e-9).all()
 

@@ -46,7 +46,12 @@ CUT = """() => [...document.querySelectorAll('table')]
 def rail_result():
     """The TX90L on its rail."""
     task = load_task(ROOT / "examples/03_tx90l_rail_line.yaml")
-    return plan(None, task.model_copy(update={"search": task.search.model_copy(update={"effort": "single"})}))
+    return plan(
+        None,
+        task.model_copy(
+            update={"search": task.search.model_copy(update={"effort": "single"})}
+        ),
+    )
 
 
 def picture(page, name, folder):
@@ -66,25 +71,34 @@ def test_the_slider_moves_the_robot(browser, rail_result, tmp_path):
     folder.mkdir(parents=True, exist_ok=True)
     candidates = [candidate.to_dict() for candidate in rail_result.candidates]
     foreign, faults = [], []
-    with Viewer(rail_result.trajectory, candidates, verified=rail_result.verified, port=0) as viewer:
+    with Viewer(
+        rail_result.trajectory, candidates, verified=rail_result.verified, port=0
+    ) as viewer:
         page = browser.new_page(viewport={"width": 1300, "height": 700})
         page.set_default_timeout(PATIENCE)
         page.on("request", lambda request: foreign.append(request.url))
         page.on("pageerror", lambda error: faults.append(str(error)))
         page.goto(f"{viewer.url}?fixedDpr=1")
         page.wait_for_function(DRAWN)
-        page.wait_for_function("() => document.body.innerText.includes('t = 0.1')")  # it is played by itself
+        page.wait_for_function(
+            "() => document.body.innerText.includes('t = 0.1')"
+        )  # it is played by itself
         page.get_by_role("button", name="Pause").click()
         slider = page.get_by_role("slider").first
         slider.press("Home")
         page.wait_for_function("() => document.body.innerText.includes('t = 0.0000 s')")
         page.wait_for_timeout(1000)
-        first, again = picture(page, "viewer_start", folder), picture(page, "viewer_start", folder)
+        first, again = (
+            picture(page, "viewer_start", folder),
+            picture(page, "viewer_start", folder),
+        )
         slider.press("End")
         page.wait_for_function("() => document.body.innerText.includes('s = 1.0000')")
         page.wait_for_timeout(1000)
         last = picture(page, "viewer_end", folder)
-        page.locator(".mantine-Notification-closeButton").first.click()  # "software rendering detected"
+        page.locator(
+            ".mantine-Notification-closeButton"
+        ).first.click()  # "software rendering detected"
         slider.blur()
         viewer.playback.go_to(0.4 * viewer.playback.t_end)
         viewer.show()
@@ -98,10 +112,19 @@ def test_the_slider_moves_the_robot(browser, rail_result, tmp_path):
         report = Path(download.value.path()).read_text(encoding="utf-8")
         page.close()
     assert viewer.playback.time == pytest.approx(0.4 * rail_result.t_end)
-    assert len(np.unique(first.reshape(-1, 3), axis=0)) > 500  # there is something to see
+    assert (
+        len(np.unique(first.reshape(-1, 3), axis=0)) > 500
+    )  # there is something to see
     assert changed(first, again) < 50
     assert changed(first, last) > 2000
-    for part in ("verified", "torque / limit", "tool speed (m/s)", "rail", "joint_6", "candidates"):
+    for part in (
+        "verified",
+        "torque / limit",
+        "tool speed (m/s)",
+        "rail",
+        "joint_6",
+        "candidates",
+    ):
         assert part in text
     assert cut == []
     assert not viewer.playback.repeats
@@ -109,4 +132,6 @@ def test_the_slider_moves_the_robot(browser, rail_result, tmp_path):
     assert len(apart) >= 4
     assert np.abs(apart).max() < 2.0
     assert faults == []
-    assert [url for url in foreign if not url.startswith((viewer.url, "data:", "blob:"))] == []
+    assert [
+        url for url in foreign if not url.startswith((viewer.url, "data:", "blob:"))
+    ] == []

@@ -11,12 +11,18 @@ from support.shown import ROBOTS
 
 def with_limits(motion, **limits):
     return dataclasses.replace(
-        motion, robot=dataclasses.replace(motion.robot, limits=dataclasses.replace(motion.robot.limits, **limits))
+        motion,
+        robot=dataclasses.replace(
+            motion.robot, limits=dataclasses.replace(motion.robot.limits, **limits)
+        ),
     )
 
 
 def curves_of(motion):
-    return {curves.title: curves for curves in all_curves(motion, motion.at(np.linspace(0.0, motion.t_end, 50)))}
+    return {
+        curves.title: curves
+        for curves in all_curves(motion, motion.at(np.linspace(0.0, motion.t_end, 50)))
+    }
 
 
 def test_a_planned_motion_reaches_its_torque_limits_and_keeps_them(line_result):
@@ -27,27 +33,45 @@ def test_a_planned_motion_reaches_its_torque_limits_and_keeps_them(line_result):
     assert found["torque / limit"].bounds == (-1.0, 1.0)
     use = found["largest of every kind / limit"]
     assert "torque" in use.names
-    assert use.values[:, use.names.index("torque")].max() == pytest.approx(1.0, abs=1e-3)
+    assert use.values[:, use.names.index("torque")].max() == pytest.approx(
+        1.0, abs=1e-3
+    )
     assert (np.diff(use.t) > 0.0).all()
 
 
 def test_unequal_limits_count_in_their_own_direction(bare_robot, motion_of):
     motion = motion_of(bare_robot)
-    motion = with_limits(motion, velocity_lower=np.array([-9.0, -9.0]), velocity_upper=np.array([1.0, 2.0]))
+    motion = with_limits(
+        motion,
+        velocity_lower=np.array([-9.0, -9.0]),
+        velocity_upper=np.array([1.0, 2.0]),
+    )
     speed = curves_of(motion)["velocity / limit"]
-    np.testing.assert_allclose(speed.values * [1.0, 2.0], motion.velocity(speed.t), atol=1e-12)
+    np.testing.assert_allclose(
+        speed.values * [1.0, 2.0], motion.velocity(speed.t), atol=1e-12
+    )
 
 
 def test_positions_count_from_the_middle_of_their_range(bare_robot, motion_of):
-    position = curves_of(motion_of(bare_robot, begin=0.5, end=2.0))["position in its range"]
+    position = curves_of(motion_of(bare_robot, begin=0.5, end=2.0))[
+        "position in its range"
+    ]
     np.testing.assert_allclose(position.values[0], [0.0, 0.25], atol=1e-12)
     np.testing.assert_allclose(position.values[-1], [1.0, 1.0], atol=1e-12)
 
 
 def test_joints_without_limits_are_plotted_in_their_units(bare_robot, motion_of):
-    motion = with_limits(motion_of(bare_robot), torque_upper=np.full(2, np.inf), torque_lower=np.full(2, -np.inf))
+    motion = with_limits(
+        motion_of(bare_robot),
+        torque_upper=np.full(2, np.inf),
+        torque_lower=np.full(2, -np.inf),
+    )
     found = curves_of(motion)
-    assert not [title for title in found if "torque / limit" in title or "force / limit" in title]
+    assert not [
+        title
+        for title in found
+        if "torque / limit" in title or "force / limit" in title
+    ]
     force, torque = found["force (N), no limit"], found["torque (Nm), no limit"]
     assert (force.names, torque.names) == (("rail",), ("turn",))
     np.testing.assert_allclose(force.values[:, 0], motion.torque(force.t)[:, 0])
@@ -67,30 +91,47 @@ def test_every_robot_has_curves(urdf, motion_of):
         assert curves.values.shape == (len(curves.t), len(curves.names))
 
 
-def test_the_tools_speed_is_in_metres_per_second_beside_what_the_task_allows(line_result):
+def test_the_tools_speed_is_in_metres_per_second_beside_what_the_task_allows(
+    line_result,
+):
     motion = line_result.trajectory
     free = curves_of(motion)["tool speed (m/s)"]
     np.testing.assert_allclose(free.values[:, 0], motion.at(free.t).tool_speed)
     assert free.bounds == ()
-    task = motion.task.model_copy(update={"tool_limits": ToolLimits(speed=1.1 * free.values.max())})
+    task = motion.task.model_copy(
+        update={"tool_limits": ToolLimits(speed=1.1 * free.values.max())}
+    )
     capped = curves_of(dataclasses.replace(motion, task=task))["tool speed (m/s)"]
     assert capped.bounds == (pytest.approx(1.1 * free.values.max()),)
     assert capped.bounds[0] < capped.high
 
 
 def test_what_is_limited_is_plotted_over_its_limit(line_result):
-    motion = with_limits(line_result.trajectory, acceleration=np.array([1.0, 2.0, 4.0]), jerk=np.full(3, 50.0))
+    motion = with_limits(
+        line_result.trajectory,
+        acceleration=np.array([1.0, 2.0, 4.0]),
+        jerk=np.full(3, 50.0),
+    )
     found = curves_of(motion)
     acceleration, jerk = found["acceleration / limit"], found["jerk / limit"]
-    np.testing.assert_allclose(acceleration.values * [1.0, 2.0, 4.0], motion.acceleration(acceleration.t))
+    np.testing.assert_allclose(
+        acceleration.values * [1.0, 2.0, 4.0], motion.acceleration(acceleration.t)
+    )
     np.testing.assert_allclose(jerk.values * 50.0, motion.jerk(jerk.t))
 
 
 def test_angles_without_limits_may_be_in_degrees(bare_robot, motion_of):
     motion = motion_of(bare_robot)
-    motion = with_limits(motion, velocity_upper=np.full(2, np.inf), velocity_lower=np.full(2, -np.inf))
+    motion = with_limits(
+        motion, velocity_upper=np.full(2, np.inf), velocity_lower=np.full(2, -np.inf)
+    )
     samples = motion.at(np.linspace(0.0, motion.t_end, 50))
-    found = {curves.title: curves for curves in all_curves(motion, samples, degrees=True)}
-    turning, sliding = found["velocity (deg/s), no limit"], found["velocity (m/s), no limit"]
+    found = {
+        curves.title: curves for curves in all_curves(motion, samples, degrees=True)
+    }
+    turning, sliding = (
+        found["velocity (deg/s), no limit"],
+        found["velocity (m/s), no limit"],
+    )
     np.testing.assert_allclose(turning.values[:, 0], np.rad2deg(samples.qdot[:, 1]))
     np.testing.assert_allclose(sliding.values[:, 0], samples.qdot[:, 0])

@@ -27,14 +27,20 @@ def connects(address, port):
 
 
 def test_the_page_is_served_on_this_machine_alone(server):
-    with urllib.request.urlopen(f"http://{LOOPBACK}:{server.get_port()}", timeout=10) as answer:
+    with urllib.request.urlopen(
+        f"http://{LOOPBACK}:{server.get_port()}", timeout=10
+    ) as answer:
         assert b"<html" in answer.read(200)
-    assert not connects("127.0.0.2", server.get_port())  # which a server on all addresses answers, too
+    assert not connects(
+        "127.0.0.2", server.get_port()
+    )  # which a server on all addresses answers, too
 
 
 def test_a_probe_of_the_server_is_refused_without_a_traceback(caplog):
     server = start_server(LOOPBACK, 0)
-    with contextlib.closing(http.client.HTTPConnection(LOOPBACK, server.get_port(), timeout=10)) as connection:
+    with contextlib.closing(
+        http.client.HTTPConnection(LOOPBACK, server.get_port(), timeout=10)
+    ) as connection:
         connection.request("HEAD", "/")
         with pytest.raises(http.client.RemoteDisconnected):
             connection.getresponse()
@@ -52,9 +58,14 @@ def test_a_page_cannot_have_the_scene_published(server):
     assert server.request_share_url() is None
 
 
-def test_a_port_in_use_is_refused_and_left_out_the_next_one_is_taken(server, monkeypatch):
+def test_a_port_in_use_is_refused_and_left_out_the_next_one_is_taken(
+    server, monkeypatch
+):
     taken = server.get_port()
-    with pytest.raises(InputError, match=rf"the port is in use; found {taken} on 127.0.0.1.*next free one"):
+    with pytest.raises(
+        InputError,
+        match=rf"the port is in use; found {taken} on 127.0.0.1.*next free one",
+    ):
         start_server(LOOPBACK, taken)
     monkeypatch.setattr("brachis.apps.view.server.FIRST_PORT", taken)
     other = start_server(LOOPBACK, None)
@@ -72,7 +83,9 @@ def test_a_port_that_somebody_takes_in_between_is_refused_as_well(server, monkey
 
 @pytest.mark.parametrize("port", [-1, 65536])
 def test_what_is_no_port_is_refused(port):
-    with pytest.raises(InputError, match=rf"--port: is no port; found {port}; allowed: 0 to 65535"):
+    with pytest.raises(
+        InputError, match=rf"--port: is no port; found {port}; allowed: 0 to 65535"
+    ):
         start_server(LOOPBACK, port)
 
 
@@ -85,7 +98,9 @@ def test_a_host_that_is_not_here_is_refused(monkeypatch):
     ):  # an address of no machine
         start_server("192.0.2.1", 0)
     monkeypatch.setattr(socket, "getaddrinfo", unknown)
-    with pytest.raises(InputError, match="found nowhere, port 0: Name or service not known"):
+    with pytest.raises(
+        InputError, match="found nowhere, port 0: Name or service not known"
+    ):
         start_server("nowhere", 0)
 
 
@@ -97,6 +112,12 @@ def test_loopback_addresses_are_local():
 
 def test_without_viser_the_error_says_what_to_install(monkeypatch):
     find = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "viser" else find(name))
-    with pytest.raises(NotInstalledError, match=r'needs viser, .*pip install "brachis\[view\]"'):
+    monkeypatch.setattr(
+        importlib.util,
+        "find_spec",
+        lambda name: None if name == "viser" else find(name),
+    )
+    with pytest.raises(
+        NotInstalledError, match=r'needs viser, .*pip install "brachis\[view\]"'
+    ):
         require_viser()

@@ -30,7 +30,12 @@ def shown(line_result):
 
 
 def poses(viewer):
-    return np.array([[*frame.position, *frame.wxyz] for frame in (*viewer._scene._frames, viewer._scene._tool)])
+    return np.array(
+        [
+            [*frame.position, *frame.wxyz]
+            for frame in (*viewer._scene._frames, viewer._scene._tool)
+        ]
+    )
 
 
 def test_the_robot_is_where_the_motion_has_it_at_the_chosen_instant(shown, line_result):
@@ -39,7 +44,9 @@ def test_the_robot_is_where_the_motion_has_it_at_the_chosen_instant(shown, line_
     shown.playback.go_to(0.6 * motion.t_end)
     shown.show()
     found = placements(motion.robot, motion.position(0.6 * motion.t_end)[None])
-    np.testing.assert_allclose(poses(shown), np.hstack([found.positions[0], found.quaternions[0]]), atol=1e-6)
+    np.testing.assert_allclose(
+        poses(shown), np.hstack([found.positions[0], found.quaternions[0]]), atol=1e-6
+    )
     assert np.abs(poses(shown) - before).max() > 0.1
     assert shown._panel._slider.value == pytest.approx(0.6 * motion.t_end, abs=0.01)
 
@@ -50,7 +57,10 @@ def test_plots_and_table_follow_the_slider(shown, line_result):
     shown.show()
     for chart in shown._panel._charts:
         assert 'data-part="0.25000"' in chart._line.content
-    assert f"t = {0.25 * motion.t_end:.4f} s of {motion.t_end:.4f} s" in shown._panel._state.content
+    assert (
+        f"t = {0.25 * motion.t_end:.4f} s of {motion.t_end:.4f} s"
+        in shown._panel._state.content
+    )
 
 
 def test_path_and_trace_are_one_curve_and_every_layer_can_be_hidden(shown):
@@ -88,11 +98,17 @@ def test_a_script_waits_and_a_notebook_does_not(line_result, monkeypatch):
     assert len(waited) == 1
 
 
-def test_robots_without_shapes_and_with_lost_meshes_are_shown_as_skeletons(bare_robot, motion_of):
+def test_robots_without_shapes_and_with_lost_meshes_are_shown_as_skeletons(
+    bare_robot, motion_of
+):
     robots = [bare_robot]
     if PANDA is not None:
         text = PANDA.read_text().replace("package://", "package://no")
-        robots.append(Robot.from_urdf("/nowhere/panda.urdf", urdf_text=text, tool_frame="panda_hand_tcp"))
+        robots.append(
+            Robot.from_urdf(
+                "/nowhere/panda.urdf", urdf_text=text, tool_frame="panda_hand_tcp"
+            )
+        )
     for robot in robots:
         with Viewer(motion_of(robot), port=0) as viewer:
             layers = viewer._scene.layers
@@ -122,7 +138,9 @@ def test_angles_may_be_in_degrees(bare_robot, motion_of):
         assert " deg/s</td>" in viewer._panel._state.content
 
 
-def test_the_report_button_sends_the_page_to_whoever_asks(shown, line_result, monkeypatch):
+def test_the_report_button_sends_the_page_to_whoever_asks(
+    shown, line_result, monkeypatch
+):
     sent, told = {}, []
 
     class Client:
@@ -147,17 +165,35 @@ def test_tables_have_units_and_escape_names(bare_robot, motion_of):
     motion = motion_of(bare_robot)
     now = motion.at(np.array([0.5]))
     table = state_table(motion, now)
-    for part in (f" m, {now.tool_speed[0]:.3f} m/s", " m/s</td>", " rad/s</td>", " N</td>", " Nm</td>"):
+    for part in (
+        f" m, {now.tool_speed[0]:.3f} m/s",
+        " m/s</td>",
+        " rad/s</td>",
+        " N</td>",
+        " Nm</td>",
+    ):
         assert part in table
-    known = {"redundant_joints": ["<b>"], "branch": "up", "origin": "lattice 1", "status": "verified"}
-    listed = candidates_table([{**known, "coarse": 1.5, "t_end": math.inf}, {**known, "coarse": None, "t_end": None}])
+    known = {
+        "redundant_joints": ["<b>"],
+        "branch": "up",
+        "origin": "lattice 1",
+        "status": "verified",
+    }
+    listed = candidates_table(
+        [
+            {**known, "coarse": 1.5, "t_end": math.inf},
+            {**known, "coarse": None, "t_end": None},
+        ]
+    )
     assert "&lt;b&gt;" in listed
     assert "1.5000" in listed
     assert "coarse [s]" in listed
     assert "inf" not in listed
     assert "result.json" in candidates_table([])
     assert "40 more" in candidates_table([known] * 100)
-    again = candidates_table([known, {**known, "origin": "twice", "status": SAME_MOTION}])
+    again = candidates_table(
+        [known, {**known, "origin": "twice", "status": SAME_MOTION}]
+    )
     assert "twice" not in again
     assert "1 more" in again
 

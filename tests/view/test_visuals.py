@@ -27,8 +27,18 @@ def test_meshes_of_a_package_are_found_beside_the_urdf():
     pytest.importorskip("collada", reason="pycollada is not installed")
     shapes, unread = link_shapes(PANDA.read_text(), PANDA.parent)
     assert unread == []
-    assert {"panda_link0", "panda_link7", "panda_hand", "panda_leftfinger", "panda_rightfinger"} <= set(shapes)
-    colours = {tuple(mesh.visual.material.baseColorFactor) for meshes in shapes.values() for mesh in meshes}
+    assert {
+        "panda_link0",
+        "panda_link7",
+        "panda_hand",
+        "panda_leftfinger",
+        "panda_rightfinger",
+    } <= set(shapes)
+    colours = {
+        tuple(mesh.visual.material.baseColorFactor)
+        for meshes in shapes.values()
+        for mesh in meshes
+    }
     assert len(colours) > 3
     assert 0.15 < np.ptp(shapes["panda_link5"][0].vertices, axis=0).max() < 0.5
 
@@ -40,7 +50,10 @@ def test_shapes_stand_where_the_urdf_has_them_in_their_colour():
     assert tuple(box.visual.material.baseColorFactor) == (255, 0, 0, 255)
 
 
-@pytest.mark.parametrize("name", ["part.stl", "meshes/../part.stl", "package://cell/part.stl", "file://{}/part.stl"])
+@pytest.mark.parametrize(
+    "name",
+    ["part.stl", "meshes/../part.stl", "package://cell/part.stl", "file://{}/part.stl"],
+)
 def test_mesh_files_are_found(name, tmp_path, monkeypatch):
     folder = tmp_path / "cell"
     (folder / "meshes").mkdir(parents=True)
@@ -48,10 +61,15 @@ def test_mesh_files_are_found(name, tmp_path, monkeypatch):
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"/nowhere:{tmp_path}")
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
-    found = mesh_file(name.format(folder), elsewhere if name.startswith("package") else folder)
+    found = mesh_file(
+        name.format(folder), elsewhere if name.startswith("package") else folder
+    )
     assert found is not None
     assert found.samefile(folder / "part.stl")
-    shapes, unread = link_shapes(LINK.format(f'<mesh filename="{name.format(folder)}" scale="2 2 2"/>', ""), folder)
+    shapes, unread = link_shapes(
+        LINK.format(f'<mesh filename="{name.format(folder)}" scale="2 2 2"/>', ""),
+        folder,
+    )
     assert unread == []
     np.testing.assert_allclose(np.ptp(shapes["a"][0].vertices, axis=0), [2.0, 4.0, 6.0])
 
@@ -67,7 +85,10 @@ def test_a_missing_mesh_is_named_and_the_other_links_are_read(tmp_path):
     shapes, unread = link_shapes(text, tmp_path)
     assert list(shapes) == ["b"]
     (line,) = unread
-    assert line == "a mesh file is missing: package://none/a.dae; ROS_PACKAGE_PATH may name the folder of its package"
+    assert (
+        line
+        == "a mesh file is missing: package://none/a.dae; ROS_PACKAGE_PATH may name the folder of its package"
+    )
 
 
 def test_many_missing_meshes_are_one_line(tmp_path):
@@ -83,7 +104,9 @@ def test_packages_of_the_python_installation_are_found_from_anywhere(tmp_path):
     found = mesh_file(name, tmp_path)
     assert found is not None
     assert found.samefile(PANDA)
-    assert mesh_file(name + 5000 * "x", tmp_path) is None, "longer than a name of a file can be"
+    assert mesh_file(name + 5000 * "x", tmp_path) is None, (
+        "longer than a name of a file can be"
+    )
 
 
 BROKEN = {
@@ -91,7 +114,10 @@ BROKEN = {
     "cut.zip": (b"PK\3\4", "BadZipFile"),
     "empty.stl": (b"", "no faces"),
     "words.stl": (b"solid nonsense", "no faces"),
-    "nan.stl": (b"\0" * 80 + struct.pack("<I12fH", 1, *[math.nan] * 12, 0), "not finite"),
+    "nan.stl": (
+        b"\0" * 80 + struct.pack("<I12fH", 1, *[math.nan] * 12, 0),
+        "not finite",
+    ),
     "packed.tar.gz": (b"\x1f\x8b", "packed meshes are not read"),
     "a" * 5000 + ".stl": (None, "a mesh file is missing"),
 }
@@ -104,7 +130,9 @@ def test_a_broken_mesh_is_told(name, tmp_path):
     content, reason = BROKEN[name]
     if content is not None:
         (tmp_path / name).write_bytes(content)
-    shapes, unread = link_shapes(LINK.format(f'<mesh filename="{name}"/>', ""), tmp_path)
+    shapes, unread = link_shapes(
+        LINK.format(f'<mesh filename="{name}"/>', ""), tmp_path
+    )
     assert shapes == {}
     assert len(unread) == 1
     assert reason in unread[0]
@@ -120,7 +148,9 @@ def test_meshes_that_are_too_large_are_told_and_not_read(packed, tmp_path):
     else:
         with (tmp_path / name).open("wb") as stream:
             stream.truncate(4_000_000_000)  # takes no room
-    shapes, unread = link_shapes(LINK.format(f'<mesh filename="{name}"/>', ""), tmp_path)
+    shapes, unread = link_shapes(
+        LINK.format(f'<mesh filename="{name}"/>', ""), tmp_path
+    )
     found = "200 MB" if packed else "4000 MB"
     assert shapes == {}
     assert unread == [

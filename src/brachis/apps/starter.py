@@ -91,7 +91,9 @@ def choices(task_map: TaskMap) -> Iterator[Choice]:
     reach = _reach(robot, postures)
     for lowest in (_CLEARANCE * reach, -np.inf):
         quality = _quality(task_map, postures, reach, lowest)
-        best = [k for k in np.argsort(-quality)[:_BEST] if quality[k] > _LEAST_DEXTERITY]
+        best = [
+            k for k in np.argsort(-quality)[:_BEST] if quality[k] > _LEAST_DEXTERITY
+        ]
         for k in best:
             line = _line(task_map, postures[k], float(quality[k]), reach, lowest)
             if line is not None:
@@ -115,7 +117,9 @@ def _reach(robot: Robot, postures: np.ndarray) -> float:
     return float(np.linalg.norm(np.ptp(positions, axis=0))) / 2.0
 
 
-def _quality(task_map: TaskMap, postures: np.ndarray, reach: float, lowest: float) -> np.ndarray:
+def _quality(
+    task_map: TaskMap, postures: np.ndarray, reach: float, lowest: float
+) -> np.ndarray:
     """Rate postures (K, n): least singular value of the task Jacobian without units, with and without the rail.
 
     Positions are divided by the arm's length, and so are prismatic joints. Postures count nothing where holding takes
@@ -128,8 +132,14 @@ def _quality(task_map: TaskMap, postures: np.ndarray, reach: float, lowest: floa
     dexterity = np.linalg.svd(jacobian, compute_uv=False)[:, -1]
     rail = int(np.argmax(robot.revolute))  # slides before the first joint that turns
     if 0 < rail <= robot.n - task_map.m:
-        dexterity = np.minimum(dexterity, np.linalg.svd(jacobian[:, :, rail:], compute_uv=False)[:, -1])
-    return dexterity * (_holding(robot, postures) < _STRONGEST) * (robot.heights(postures) >= lowest)
+        dexterity = np.minimum(
+            dexterity, np.linalg.svd(jacobian[:, :, rail:], compute_uv=False)[:, -1]
+        )
+    return (
+        dexterity
+        * (_holding(robot, postures) < _STRONGEST)
+        * (robot.heights(postures) >= lowest)
+    )
 
 
 def _holding(robot: Robot, postures: np.ndarray) -> np.ndarray:
@@ -137,11 +147,18 @@ def _holding(robot: Robot, postures: np.ndarray) -> np.ndarray:
     still = np.zeros_like(postures)
     torque = rigid_torque(robot, postures, still, still)
     return np.asarray(
-        np.max(np.maximum(torque / robot.limits.torque_upper, torque / robot.limits.torque_lower), axis=1)
+        np.max(
+            np.maximum(
+                torque / robot.limits.torque_upper, torque / robot.limits.torque_lower
+            ),
+            axis=1,
+        )
     )
 
 
-def _line(task_map: TaskMap, posture: np.ndarray, quality: float, reach: float, lowest: float) -> np.ndarray | None:
+def _line(
+    task_map: TaskMap, posture: np.ndarray, quality: float, reach: float, lowest: float
+) -> np.ndarray | None:
     """Find the longest line along an axis on which the arm stays about as dexterous; None where there is none."""
     for length in (each for each in _LENGTHS if each <= _SHARE * reach):
         rated = {}
@@ -151,14 +168,21 @@ def _line(task_map: TaskMap, posture: np.ndarray, quality: float, reach: float, 
                 displacement[row] = sign * length
                 followed = _followed(task_map, posture, displacement)
                 if followed is not None:
-                    rated[row, sign] = (float(_quality(task_map, followed, reach, lowest).min()), displacement)
-        worst, displacement = max(rated.values(), key=lambda each: each[0], default=(0.0, np.zeros(0)))
+                    rated[row, sign] = (
+                        float(_quality(task_map, followed, reach, lowest).min()),
+                        displacement,
+                    )
+        worst, displacement = max(
+            rated.values(), key=lambda each: each[0], default=(0.0, np.zeros(0))
+        )
         if worst > _KEPT * quality:
             return displacement
     return None
 
 
-def _followed(task_map: TaskMap, posture: np.ndarray, displacement: np.ndarray) -> np.ndarray | None:
+def _followed(
+    task_map: TaskMap, posture: np.ndarray, displacement: np.ndarray
+) -> np.ndarray | None:
     """Follow a line by small steps of least joint motion; None where a joint leaves its range or the line is lost."""
     robot = task_map.robot
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
@@ -167,12 +191,18 @@ def _followed(task_map: TaskMap, posture: np.ndarray, displacement: np.ndarray) 
     step[list(task_map.axes)] = displacement / _STEPS
     postures = [posture]
     for k in range(1, _STEPS + 1):
-        target, q = task_map.of_placements(position + k * step, rotation)[0], postures[-1]
+        target, q = (
+            task_map.of_placements(position + k * step, rotation)[0],
+            postures[-1],
+        )
         for _ in range(_NEWTON):
             error = task_map.difference(target, task_map.value(q))
             if np.abs(error).max() < _ON_PATH:
                 break
-            q = q + np.linalg.pinv(task_map.jacobian(task_map.twists(q[None]))[0]) @ error
+            q = (
+                q
+                + np.linalg.pinv(task_map.jacobian(task_map.twists(q[None]))[0]) @ error
+            )
         else:
             return None
         if np.any(q <= lower) or np.any(q >= upper):
@@ -196,7 +226,9 @@ def placeholders(names: Sequence[str], stated: Sequence[UrdfLimit]) -> LimitSpec
     by_name = dict(zip(names, stated, strict=True))
     weak = [name for name, limit in by_name.items() if not limit.effort]
     slow = [name for name, limit in by_name.items() if not limit.velocity]
-    open_ended = [name for name, limit in by_name.items() if limit.needs_range or _is_empty(limit)]
+    open_ended = [
+        name for name, limit in by_name.items() if limit.needs_range or _is_empty(limit)
+    ]
     given: dict[str, dict[str, object]] = {
         "torque": dict.fromkeys(weak),
         "acceleration": dict.fromkeys(weak, _ACCELERATION),
@@ -254,7 +286,13 @@ _PLACEHOLDERS = """\
   limits:    # the URDF states no usable ones for these joints: PUT THE MAKER'S FIGURES HERE (null: none)"""
 
 
-def task_text(robot: Robot, space: str | list[str], choice: Choice, limits: LimitSpec, folder: Path) -> str:
+def task_text(
+    robot: Robot,
+    space: str | list[str],
+    choice: Choice,
+    limits: LimitSpec,
+    folder: Path,
+) -> str:
     """Write the task file.
 
     Parameters
@@ -270,10 +308,14 @@ def task_text(robot: Robot, space: str | list[str], choice: Choice, limits: Limi
     """
     degree = robot.n - (6 if space == "pose" else len(space))
     return _TEXT.format(
-        name=Path(robot.source).parent.name if Path(robot.source).name == "robot.urdf" else Path(robot.source).name,
+        name=Path(robot.source).parent.name
+        if Path(robot.source).name == "robot.urdf"
+        else Path(robot.source).name,
         urdf=_inline(_near(Path(robot.source), folder)),
         tool=_inline(robot.tool_frame),
-        base=f"\n  base_frame: {_inline(robot.base_frame)}" if robot.settings.base_frame else "",
+        base=f"\n  base_frame: {_inline(robot.base_frame)}"
+        if robot.settings.base_frame
+        else "",
         limits=_limits(robot, limits),
         joints="\n".join(_joint(robot, i, choice.posture[i]) for i in range(robot.n)),
         space=_inline(space),
@@ -284,7 +326,11 @@ def task_text(robot: Robot, space: str | list[str], choice: Choice, limits: Limi
 
 def _inline(value: object) -> str:
     """Write a value as YAML on one line, with quotes where it needs them."""
-    return yaml.safe_dump(value, default_flow_style=True, width=10_000).removesuffix("...\n").strip()
+    return (
+        yaml.safe_dump(value, default_flow_style=True, width=10_000)
+        .removesuffix("...\n")
+        .strip()
+    )
 
 
 def _near(urdf: Path, folder: Path) -> str:
@@ -303,21 +349,39 @@ def _joint(robot: Robot, i: int, position: float) -> str:
 def _limits(robot: Robot, limits: LimitSpec) -> str:
     """Write the placeholders, or how to change limits where none are needed."""
     given = {each.name: getattr(limits, each.name) for each in fields(limits)}
-    needed = {kind: values for kind, values in given.items() if isinstance(values, dict)}
+    needed = {
+        kind: values for kind, values in given.items() if isinstance(values, dict)
+    }
     if not needed:
         return _OWN_LIMITS.format(
             joint=_inline(robot.joint_names[0]),
             torque=_inline(float(f"{robot.limits.torque_upper[0]:.4g}")),
             unit=UNITS["torque"][robot.position_units[0]],
         )
-    return "\n".join((_PLACEHOLDERS, *(f"    {kind}: {_inline(_lists(values))}" for kind, values in needed.items())))
+    return "\n".join(
+        (
+            _PLACEHOLDERS,
+            *(
+                f"    {kind}: {_inline(_lists(values))}"
+                for kind, values in needed.items()
+            ),
+        )
+    )
 
 
 def _lists(values: dict[str, object]) -> dict[str, object]:
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+    return {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in values.items()
+    }
 
 
-_SOON = {"search.effort": "single", "search.time_limit": 20.0, "spline.intervals": 10, "search.least_motion": False}
+_SOON = {
+    "search.effort": "single",
+    "search.time_limit": 20.0,
+    "spline.intervals": 10,
+    "search.least_motion": False,
+}
 """Keys of the plan by which a task is tried."""
 _LONGEST = 90.0
 """Time after which no further space is tried, s."""
@@ -384,12 +448,16 @@ def starter_task(
     if tool is None:
         limb = first_limb(text, str(path))
         base, tool = base or limb.base, limb.tool
-    chain = read_chain(text, str(path), tool_frame=tool, base_frame=base, locked_joints={})
+    chain = read_chain(
+        text, str(path), tool_frame=tool, base_frame=base, locked_joints={}
+    )
     limits = placeholders(chain.joint_names, chain.limits)
     robot = Robot.from_urdf(path, tool_frame=tool, base_frame=base, limits=limits)
     deadline = Deadline.after(_LONGEST)
     for space in spaces(robot):
-        tell(f"looking for a first motion that prescribes {space if isinstance(space, str) else ', '.join(space)}")
+        tell(
+            f"looking for a first motion that prescribes {space if isinstance(space, str) else ', '.join(space)}"
+        )
         bound, task_map = bind(robot, space)
         for choice in () if deadline.passed else choices(task_map):
             written = task_text(bound, space, choice, limits, Path(folder))
@@ -407,7 +475,7 @@ def starter_task(
 def _tried(text: str, urdf: Path, listener: Callable[[str], None]) -> Result | None:
     """Plan a task quickly; None where there is no plan."""
     content = read_yaml(text, "starter task")
-    assert isinstance(content, dict)  # noqa: S101  (as it was written)
+    assert isinstance(content, dict)
     task = load_task(content, changes={**_SOON, "robot.urdf": str(urdf.absolute())})
     try:
         return planner.plan(task, listener=listener, check_advice=False)

@@ -31,7 +31,9 @@ def named(function: Callable[_P, _R], where: str | None = None) -> Callable[_P, 
         One that is needed is missing, or there are too many without a name.
     """
     signature, name = inspect.signature(function), where or function.__name__
-    parameters = {each: own for each, own in signature.parameters.items() if each != "self"}
+    parameters = {
+        each: own for each, own in signature.parameters.items() if each != "self"
+    }
 
     @wraps(function)
     def checked(*args: _P.args, **kwargs: _P.kwargs) -> _R:
@@ -41,7 +43,9 @@ def named(function: Callable[_P, _R], where: str | None = None) -> Callable[_P, 
         try:
             signature.bind(*args, **kwargs)
         except TypeError as error:
-            allowed = ", ".join(_in_words(parameter) for parameter in parameters.values())
+            allowed = ", ".join(
+                _in_words(parameter) for parameter in parameters.values()
+            )
             raise InputError(str(error), where=name, allowed=allowed) from None
         return function(*args, **kwargs)
 
@@ -63,7 +67,9 @@ def file_name(value: object, where: str) -> Path:
         It is something else.
     """
     if not isinstance(value, str | os.PathLike):
-        raise InputError("wrong type", where=where, found=repr(value), allowed="the name of a file")
+        raise InputError(
+            "wrong type", where=where, found=repr(value), allowed="the name of a file"
+        )
     return Path(value)
 
 
@@ -75,7 +81,9 @@ def check_callable(value: object, where: str) -> None:
     InputError
     """
     if value is not None and not callable(value):
-        raise InputError("wrong type", where=where, found=repr(value), allowed="a function, or None")
+        raise InputError(
+            "wrong type", where=where, found=repr(value), allowed="a function, or None"
+        )
 
 
 def check_list(value: object, where: str, of: str) -> None:
@@ -86,7 +94,12 @@ def check_list(value: object, where: str, of: str) -> None:
     InputError
     """
     if not isinstance(value, Sequence) or isinstance(value, str):
-        raise InputError("is no list", where=where, found=repr(value), allowed=f"a list of {of}: {where}=[...]")
+        raise InputError(
+            "is no list",
+            where=where,
+            found=repr(value),
+            allowed=f"a list of {of}: {where}=[...]",
+        )
 
 
 def numbers(value: ArrayLike, where: str, unit: str) -> np.ndarray:
@@ -100,14 +113,21 @@ def numbers(value: ArrayLike, where: str, unit: str) -> np.ndarray:
     try:
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError):
-        raise InputError("wrong type", where=where, found=repr(value), allowed=f"a number, {unit}") from None
+        raise InputError(
+            "wrong type", where=where, found=repr(value), allowed=f"a number, {unit}"
+        ) from None
 
 
 def number(value: float, where: str, unit: str) -> float:
     """Return one number as a float; see `numbers`."""
     found = numbers(value, where, unit)
     if found.ndim:
-        raise InputError("wrong type", where=where, found=f"an array {found.shape}", allowed=f"a number, {unit}")
+        raise InputError(
+            "wrong type",
+            where=where,
+            found=f"an array {found.shape}",
+            allowed=f"a number, {unit}",
+        )
     return float(found)
 
 
@@ -120,7 +140,11 @@ def count(value: int, where: str) -> int:
         It is something else.
     """
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise InputError("wrong type", where=where, found=repr(value), allowed="a whole number >= 1")
+        raise InputError(
+            "wrong type", where=where, found=repr(value), allowed="a whole number >= 1"
+        )
     if value < 1:
-        raise InputError("out of range", where=where, found=value, allowed="a whole number >= 1")
+        raise InputError(
+            "out of range", where=where, found=value, allowed="a whole number >= 1"
+        )
     return int(value)

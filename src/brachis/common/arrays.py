@@ -12,7 +12,7 @@ _STEP = 3e-5
 differences is of the order of its square."""
 
 
-def freeze(owner: Any, *names: str) -> None:  # noqa: ANN401  (any frozen dataclass)
+def freeze(owner: Any, *names: str) -> None:
     """Replace arrays of a frozen dataclass by read-only copies of its own."""
     for name in names:
         own = np.array(getattr(owner, name), dtype=float)
@@ -30,7 +30,9 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return product
 
 
-def rates(parts: Callable[..., Sequence[np.ndarray]], motion: Sequence[np.ndarray]) -> list[np.ndarray]:
+def rates(
+    parts: Callable[..., Sequence[np.ndarray]], motion: Sequence[np.ndarray]
+) -> list[np.ndarray]:
     """Time derivatives of functions of a motion, by central differences along it.
 
     Parameters
@@ -46,7 +48,10 @@ def rates(parts: Callable[..., Sequence[np.ndarray]], motion: Sequence[np.ndarra
         Per second.
     """
     x, *derivatives = motion
-    speeds = [np.abs(part).max(axis=1, initial=0.0) ** (1.0 / order) for order, part in enumerate(derivatives, 1)]
+    speeds = [
+        np.abs(part).max(axis=1, initial=0.0) ** (1.0 / order)
+        for order, part in enumerate(derivatives, 1)
+    ]
     h = _STEP / np.maximum(np.max(speeds, axis=0), 1.0)
     step = np.concatenate([h, -h])[:, None]
     xdot, xddot, xdddot = (np.tile(part, (2, 1)) for part in derivatives)
@@ -57,7 +62,10 @@ def rates(parts: Callable[..., Sequence[np.ndarray]], motion: Sequence[np.ndarra
         xdddot,
     )
     sides = (np.split(part, 2) for part in parts(*moved))
-    return [(ahead - behind) / (2.0 * h.reshape(-1, *[1] * (ahead.ndim - 1))) for ahead, behind in sides]
+    return [
+        (ahead - behind) / (2.0 * h.reshape(-1, *[1] * (ahead.ndim - 1)))
+        for ahead, behind in sides
+    ]
 
 
 def with_like_signs(quaternions: np.ndarray) -> np.ndarray:

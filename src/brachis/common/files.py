@@ -69,7 +69,12 @@ def is_folder(path: str | os.PathLike[str]) -> bool:
     return os.path.isdir(path)  # noqa: PTH112
 
 
-def read_file(path: str | os.PathLike[str], largest: int = LARGEST_TEXT, *, beginning: int | None = None) -> bytes:
+def read_file(
+    path: str | os.PathLike[str],
+    largest: int = LARGEST_TEXT,
+    *,
+    beginning: int | None = None,
+) -> bytes:
     """Read a regular file of at most `largest` bytes, or its first bytes; what would never end is refused at once.
 
     Raises
@@ -78,7 +83,9 @@ def read_file(path: str | os.PathLike[str], largest: int = LARGEST_TEXT, *, begi
         The file is missing, cannot be read, is no regular file, or is longer; ``strerror`` says which.
     """
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)  # so as not to wait for a pipe's writer
+        descriptor = os.open(
+            path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC
+        )  # so as not to wait for a pipe's writer
     except ValueError as error:
         raise OSError(errno.EINVAL, f"no name of a file: {error}") from error
     refusal = _refusal(os.fstat(descriptor), largest)
@@ -86,19 +93,30 @@ def read_file(path: str | os.PathLike[str], largest: int = LARGEST_TEXT, *, begi
         os.close(descriptor)
         raise OSError(*refusal, os.fspath(path))
     with os.fdopen(descriptor, "rb") as stream:
-        content = stream.read(largest + 1 if beginning is None else beginning) or b""  # None: the kernel says no more
-    if len(content) > largest:  # files that the kernel makes up as they are read have no size
-        raise OSError(errno.EFBIG, f"it is longer than {largest / 1e6:g} MB", os.fspath(path))
+        content = (
+            stream.read(largest + 1 if beginning is None else beginning) or b""
+        )  # None: the kernel says no more
+    if (
+        len(content) > largest
+    ):  # files that the kernel makes up as they are read have no size
+        raise OSError(
+            errno.EFBIG, f"it is longer than {largest / 1e6:g} MB", os.fspath(path)
+        )
     return content
 
 
 def _refusal(status: os.stat_result, largest: int) -> tuple[int, str] | None:
     """Say why what has this status is not read, as number and text of an `OSError`."""
-    kind = next((name for is_kind, name in _KINDS.items() if is_kind(status.st_mode)), None)
+    kind = next(
+        (name for is_kind, name in _KINDS.items() if is_kind(status.st_mode)), None
+    )
     if kind is not None:
         return errno.EINVAL, f"it is {kind}, no file"
     if status.st_size > largest:
-        return errno.EFBIG, f"it is {status.st_size / 1e6:.1f} MB long, at most {largest / 1e6:g} MB are read"
+        return (
+            errno.EFBIG,
+            f"it is {status.st_size / 1e6:.1f} MB long, at most {largest / 1e6:g} MB are read",
+        )
     return None
 
 
@@ -149,7 +167,9 @@ def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
     suffix = Path(path).suffix
     if suffix and not suffix[1:].isdigit() and suffix.lower() != allowed:
         problem = "the suffix is that of another format"
-        raise InputError(problem, where=os.fspath(path), found=suffix, allowed=allowed, hint=hint)
+        raise InputError(
+            problem, where=os.fspath(path), found=suffix, allowed=allowed, hint=hint
+        )
 
 
 @contextmanager
@@ -177,7 +197,9 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         in_place = status is not None and not stat.S_ISREG(status.st_mode)
         target = target if in_place else target.resolve()
         temporary = target if in_place else temporary_in(target.parent)
-        file = _File(temporary, "w" if in_place else "x")  # unlike tempfile's, with the permissions of a new file
+        file = _File(
+            temporary, "w" if in_place else "x"
+        )  # unlike tempfile's, with the permissions of a new file
     try:
         with io.BufferedWriter(file) as stream:
             yield stream
@@ -204,8 +226,14 @@ def writing_errors(path: str | os.PathLike[str]) -> Iterator[None]:
         raise _cannot_be_written(path, error) from error
 
 
-def _cannot_be_written(path: str | os.PathLike[str], error: OSError | ValueError) -> InputError:
-    return InputError("cannot be written", where=str(path), found=getattr(error, "strerror", None) or str(error))
+def _cannot_be_written(
+    path: str | os.PathLike[str], error: OSError | ValueError
+) -> InputError:
+    return InputError(
+        "cannot be written",
+        where=str(path),
+        found=getattr(error, "strerror", None) or str(error),
+    )
 
 
 class _File(io.FileIO):
@@ -250,8 +278,16 @@ def mesh_file(name: str, folder: Path) -> Path | None:
     scheme, given, within = name.partition("://")
     within = within if given else name
     above = [folder, *folder.absolute().parents]
-    python = [Path(place) / share for place in (*sys.path, sys.prefix) for share in ("cmeel.prefix/share", "share")]
-    found = [place / within for place in above] + ros_files(within) + [place / within for place in python]
+    python = [
+        Path(place) / share
+        for place in (*sys.path, sys.prefix)
+        for share in ("cmeel.prefix/share", "share")
+    ]
+    found = (
+        [place / within for place in above]
+        + ros_files(within)
+        + [place / within for place in python]
+    )
     if scheme == "package":  # which may be in a folder of another name
         found += [place / within.partition("/")[2] for place in above]
     return next((path for path in found if is_file(path)), None)
@@ -260,9 +296,19 @@ def mesh_file(name: str, folder: Path) -> Path | None:
 def ros_files(within: str) -> list[Path]:
     """Name the places where ROS may have a file of a package, ``<package>/<file>``."""
     package, _, inner = within.partition("/")
-    roots = [Path(place) for place in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if place]
-    shares = [Path(place, "share") for place in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if place]
-    return [root / inner for root in roots if root.name == package] + [root / within for root in roots + shares]
+    roots = [
+        Path(place)
+        for place in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
+        if place
+    ]
+    shares = [
+        Path(place, "share")
+        for place in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+        if place
+    ]
+    return [root / inner for root in roots if root.name == package] + [
+        root / within for root in roots + shares
+    ]
 
 
 TASK_SUFFIXES = (".yaml", ".yml")
@@ -296,7 +342,9 @@ _ADVICE = {
 def kind_of(path: str | os.PathLike[str]) -> Kind | None:
     """Tell what a file is; None where it cannot be read, or is something else."""
     try:
-        beginning = read_file(path, 4 * LARGEST_TEXT, beginning=_LOOKED_AT).removeprefix(codecs.BOM_UTF8)
+        beginning = read_file(
+            path, 4 * LARGEST_TEXT, beginning=_LOOKED_AT
+        ).removeprefix(codecs.BOM_UTF8)
     except OSError:
         return None
     if beginning.startswith(b"PK"):
@@ -310,7 +358,9 @@ def kind_of(path: str | os.PathLike[str]) -> Kind | None:
     return Kind.TASK if _TASK.search(beginning) else None
 
 
-def check_kind(path: str | os.PathLike[str], expected: Kind | str, error: type[InputError]) -> None:
+def check_kind(
+    path: str | os.PathLike[str], expected: Kind | str, error: type[InputError]
+) -> None:
     """Refuse a file that is of another kind than is expected; what is none of them is for its reader to refuse.
 
     Parameters
@@ -338,7 +388,13 @@ def check_kind(path: str | os.PathLike[str], expected: Kind | str, error: type[I
 
 
 def read_text(
-    path: Path, *, where: str, folder: Path, found: str | None = None, largest: int = LARGEST_TEXT, hint: str = ""
+    path: Path,
+    *,
+    where: str,
+    folder: Path,
+    found: str | None = None,
+    largest: int = LARGEST_TEXT,
+    hint: str = "",
 ) -> str:
     """Return the content of a text file in UTF-8.
 
@@ -363,12 +419,20 @@ def read_text(
         The file is missing, is no text file, too long, or cannot be read.
     """
     try:
-        with io.TextIOWrapper(io.BytesIO(read_file(path, largest)), encoding="utf-8") as text:  # any line ends
+        with io.TextIOWrapper(
+            io.BytesIO(read_file(path, largest)), encoding="utf-8"
+        ) as text:  # any line ends
             return text.read()
     except FileNotFoundError:
         problem, hint = "there is no such file", f"Paths are relative to {folder}"
     except UnicodeDecodeError as error:
-        problem, hint = f"not a text file in UTF-8: {error.reason} at byte {error.start}", ""
+        problem, hint = (
+            f"not a text file in UTF-8: {error.reason} at byte {error.start}",
+            "",
+        )
     except OSError as error:
-        problem, hint = f"the file cannot be read: {error.strerror}", hint if error.errno == errno.EFBIG else ""
+        problem, hint = (
+            f"the file cannot be read: {error.strerror}",
+            hint if error.errno == errno.EFBIG else "",
+        )
     raise TaskError(problem, found=found, where=where, hint=hint or None)

@@ -48,7 +48,12 @@ class Presses:
     def remember(self) -> None:
         """Remember a press; end the program if one is pending already."""
         if self.pending:
-            os.write(2, b"\x1b[?25h\nbrachis: interrupted\n" if os.isatty(2) else b"brachis: interrupted\n")
+            os.write(
+                2,
+                b"\x1b[?25h\nbrachis: interrupted\n"
+                if os.isatty(2)
+                else b"brachis: interrupted\n",
+            )
             os._exit(INTERRUPTED)
         self.pending = True
 
@@ -115,7 +120,9 @@ def postponed() -> Iterator[None]:
     For what must not be broken off, or might swallow it: imports of compiled libraries, finalisers.
     """
     before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(before):  # ignored, or not Python's
+    if threading.current_thread() is not threading.main_thread() or not callable(
+        before
+    ):  # ignored, or not Python's
         yield
         return
     pressed = False
@@ -139,14 +146,18 @@ def postponed() -> Iterator[None]:
 def blocked() -> Iterator[None]:
     """Let processes that are started within this block never hear Ctrl-C; this one hears a press at its end."""
     with postponed():
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which processes inherit
+        before = signal.pthread_sigmask(
+            signal.SIG_BLOCK, {signal.SIGINT}
+        )  # which processes inherit
         try:
             yield
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _quiet(hook: Callable[[UnraisableHookArgs], object]) -> Callable[[UnraisableHookArgs], object]:
+def _quiet(
+    hook: Callable[[UnraisableHookArgs], object],
+) -> Callable[[UnraisableHookArgs], object]:
     """Say nothing of a KeyboardInterrupt in a finaliser: the press is remembered."""
 
     def quiet(unraisable: UnraisableHookArgs) -> None:

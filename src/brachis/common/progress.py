@@ -24,7 +24,9 @@ class Iteration(str):
 
 
 @contextmanager
-def report_progress(listener: Listener | None, progress: bool | None) -> Iterator[Listener]:  # noqa: FBT001
+def report_progress(
+    listener: Listener | None, progress: bool | None
+) -> Iterator[Listener]:
     """Give a listener that logs every step, tells it to another listener, and shows it.
 
     Parameters
@@ -37,7 +39,9 @@ def report_progress(listener: Listener | None, progress: bool | None) -> Iterato
     line = _Line() if shown else None
 
     def tell(text: str) -> None:
-        _LOG.log(logging.DEBUG if isinstance(text, Iteration) else logging.INFO, "%s", text)
+        _LOG.log(
+            logging.DEBUG if isinstance(text, Iteration) else logging.INFO, "%s", text
+        )
         if listener is not None:
             listener(text)
         if line is not None:

@@ -20,11 +20,12 @@ class Summary:
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown, by name."""
-        return {each.name: getattr(self, each.name) for each in fields(self) if each.repr}  # type: ignore[arg-type]
+        shown = [each.name for each in fields(self) if each.repr]  # type: ignore[arg-type]
+        return {name: getattr(self, name) for name in shown}
 
     if not TYPE_CHECKING:
 
-        def __getattr__(self, name: str) -> Any:  # noqa: ANN401
+        def __getattr__(self, name: str) -> Any:
             """Refuse a name that is not there, and name the one that may be meant."""
             if hasattr(type(self), name):  # a property that failed
                 return object.__getattribute__(self, name)
@@ -37,7 +38,9 @@ class Summary:
         if len(line) <= COLUMNS:
             return line
         width = max(len(key) for key, _ in entries)
-        return "\n".join([name, *(f"  {key:<{width}}  {value}" for key, value in entries)])
+        return "\n".join(
+            [name, *(f"  {key:<{width}}  {value}" for key, value in entries)]
+        )
 
     def _repr_html_(self) -> str:
         """Show it as a table in a notebook."""
@@ -51,14 +54,20 @@ class Summary:
     def _entries(self) -> list[tuple[str, str]]:
         given = list(self.summary().items())
         entries = [(key, shown(value)) for key, value in given[:LINES]]
-        return entries + ([("...", f"{len(given) - LINES} more")] if len(given) > LINES else [])
+        return entries + (
+            [("...", f"{len(given) - LINES} more")] if len(given) > LINES else []
+        )
 
 
-def shown(value: Any, room: int = _ROOM) -> str:  # noqa: ANN401
+def shown(value: Any, room: int = _ROOM) -> str:
     """Show a value in at most `room` characters: arrays by their shape, long sequences by their length."""
     shape = getattr(value, "shape", None)
     if isinstance(shape, tuple) and shape:
-        return _listed(value.tolist(), room) if len(shape) == 1 and shape[0] <= _ITEMS else f"array {shape}"
+        return (
+            _listed(value.tolist(), room)
+            if len(shape) == 1 and shape[0] <= _ITEMS
+            else f"array {shape}"
+        )
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, str):
@@ -66,8 +75,14 @@ def shown(value: Any, room: int = _ROOM) -> str:  # noqa: ANN401
     if type(value) in {list, tuple}:  # not those with names
         return _listed(value, room)
     if isinstance(value, Mapping):
-        items = ", ".join(f"{key}: {shown(each, room)}" for key, each in list(value.items())[:_ITEMS])
-        return items if len(items) <= room and len(value) <= _ITEMS else f"{len(value)} entries"
+        items = ", ".join(
+            f"{key}: {shown(each, room)}" for key, each in list(value.items())[:_ITEMS]
+        )
+        return (
+            items
+            if len(items) <= room and len(value) <= _ITEMS
+            else f"{len(value)} entries"
+        )
     text = repr(value)
     return text if len(text) <= room and "\n" not in text else type(value).__name__
 
@@ -81,4 +96,6 @@ def _shortened(text: str, room: int) -> str:
 
 def _listed(values: list[Any] | tuple[Any, ...], room: int) -> str:
     text = f"[{', '.join(shown(each, room) for each in values[:_ITEMS])}]"
-    return text if len(text) <= room and len(values) <= _ITEMS else f"{len(values)} items"
+    return (
+        text if len(text) <= room and len(values) <= _ITEMS else f"{len(values)} items"
+    )

@@ -10,8 +10,23 @@ Examples
 """
 
 from brachis.ik.check import check_answers
-from brachis.ik.protocol import Family, IKSolver, NotApplicableError, ik_family, margin_gradient
-from brachis.ik.registry import BUILTIN, NO_CLOSED_FORM, Candidate, Match, find, find_all, missing_eaik, natural_space
+from brachis.ik.protocol import (
+    Family,
+    IKSolver,
+    NotApplicableError,
+    ik_family,
+    margin_gradient,
+)
+from brachis.ik.registry import (
+    BUILTIN,
+    NO_CLOSED_FORM,
+    Candidate,
+    Match,
+    find,
+    find_all,
+    missing_eaik,
+    natural_space,
+)
 from brachis.ik.screws import ChainGeometry, PosedScrews
 
 __all__ = [

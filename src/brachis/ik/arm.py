@@ -56,10 +56,18 @@ class RemainingJoints:
     def beside(cls, geometry: ChainGeometry, redundant: tuple[int, ...]) -> Self:
         """Hold the redundant joints at random positions."""
         rest = tuple(complement(geometry.n, redundant))
-        q_r = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, len(redundant)))
+        q_r = np.random.default_rng(0).uniform(
+            -np.pi, np.pi, (_SAMPLES, len(redundant))
+        )
         held, kept = geometry.held(redundant, q_r), list(rest)
         names = tuple(geometry.joint_names[i] for i in rest)
-        return cls(names, rest, geometry.revolute[kept], held.axes[:, kept], held.points[:, kept])
+        return cls(
+            names,
+            rest,
+            geometry.revolute[kept],
+            held.axes[:, kept],
+            held.points[:, kept],
+        )
 
     def reversed(self) -> Self:
         """List the same joints in the reverse order: what they do seen from the tool, with their senses turned round.
@@ -84,7 +92,10 @@ class RemainingJoints:
         axes = -posed.axes if self.mirrored else posed.axes
         spread = (slice(None), *[None] * alternatives)
         return tuple(
-            Screw(axes[:, i][spread], posed.points[:, i][spread], bool(posed.revolute[i])) for i in self.joints
+            Screw(
+                axes[:, i][spread], posed.points[:, i][spread], bool(posed.revolute[i])
+            )
+            for i in self.joints
         )
 
 
@@ -143,7 +154,9 @@ class Arm:
     def with_axis(self, joint: int, axis: np.ndarray) -> Arm:
         """Turn the axis of one joint."""
         moved = replace(self.screws[joint], axis=axis)
-        return replace(self, screws=(*self.screws[:joint], moved, *self.screws[joint + 1 :]))
+        return replace(
+            self, screws=(*self.screws[:joint], moved, *self.screws[joint + 1 :])
+        )
 
 
 def aligned(joints: RemainingJoints, i: int, j: int) -> bool:
@@ -158,7 +171,10 @@ def perpendicular(joints: RemainingJoints, i: int, j: int) -> bool:
 
 def miss(joints: RemainingJoints, *places: int) -> float:
     """Largest distance of the axes of revolute joints from the point where the first two come nearest, m."""
-    gaps = across(joints.axes[:, places], _nearest(joints, *places[:2])[:, None] - joints.points[:, places])
+    gaps = across(
+        joints.axes[:, places],
+        _nearest(joints, *places[:2])[:, None] - joints.points[:, places],
+    )
     return float(np.sqrt(dot(gaps, gaps).max()))
 
 
@@ -183,7 +199,9 @@ def _nearest(joints: RemainingJoints, i: int, j: int) -> np.ndarray:
     normal = cross(first, second)
     size = dot(normal, normal)
     along = dot(cross(joints.points[:, j] - joints.points[:, i], second), normal)
-    return joints.points[:, i] + first * (along / np.where(size < _TOLERANCE**2, np.inf, size))
+    return joints.points[:, i] + first * (
+        along / np.where(size < _TOLERANCE**2, np.inf, size)
+    )
 
 
 _JOINTS = 6
@@ -197,7 +215,9 @@ class PoseJoints(RemainingJoints):
     """The six non-redundant joints of a pose; see `RemainingJoints`."""
 
     @classmethod
-    def of(cls, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> PoseJoints:
+    def of(
+        cls, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
+    ) -> PoseJoints:
         """Hold the redundant joints at random positions.
 
         Raises
@@ -208,28 +228,41 @@ class PoseJoints(RemainingJoints):
         if not isinstance(task_map, Pose):
             raise NotApplicableError("only for poses")
         if geometry.n - len(redundant) != _JOINTS:
-            raise NotApplicableError(f"{write_count(geometry.n - len(redundant), 'joint')} would be left over, not six")
+            raise NotApplicableError(
+                f"{write_count(geometry.n - len(redundant), 'joint')} would be left over, not six"
+            )
         return cls.beside(geometry, redundant)
 
     def parallel(self, *places: int) -> bool:
         """Whether joints are revolute and all their axes parallel."""
         first = self.axes[:, places[0]]
-        sines = [np.abs(cross(first, self.axes[:, place])).max() for place in places[1:]]
-        return bool(self.revolute[list(places)].all()) and max(sines) < _TOLERANCE_POSE_JOINTS
+        sines = [
+            np.abs(cross(first, self.axes[:, place])).max() for place in places[1:]
+        ]
+        return (
+            bool(self.revolute[list(places)].all())
+            and max(sines) < _TOLERANCE_POSE_JOINTS
+        )
 
     def meet(self, first: int, second: int) -> bool:
         """Whether two joints are revolute and their axes meet in one point."""
-        return meeting(self, first, second) is not None and not aligned(self, first, second)
+        return meeting(self, first, second) is not None and not aligned(
+            self, first, second
+        )
 
 
 def random_postures(geometry: ChainGeometry) -> PosedScrews:
     """Screws at random postures, by which branch margins are made dimensionless."""
-    return geometry.posed(np.random.default_rng(1).uniform(-np.pi, np.pi, (_POSTURES, geometry.n)))
+    return geometry.posed(
+        np.random.default_rng(1).uniform(-np.pi, np.pi, (_POSTURES, geometry.n))
+    )
 
 
 def determinant(posed: PosedScrews, joints: Sequence[int]) -> np.ndarray:
     """Det J_nr (K,) of six joints for a pose, or of three for a position; real or complex, and analytic."""
-    return np.linalg.det(np.moveaxis(posed.jacobian_columns(joints)[: len(joints)], 2, 0))
+    return np.linalg.det(
+        np.moveaxis(posed.jacobian_columns(joints)[: len(joints)], 2, 0)
+    )
 
 
 def largest_determinant(posed: PosedScrews, joints: Sequence[int]) -> float:

@@ -38,7 +38,13 @@ class SignSolver(IKSolver):
 
     branches = ("determinant_positive", "determinant_negative")
 
-    def __init__(self, chain: ChainGeometry, joints: Sequence[int], scale: float, alternatives: int) -> None:
+    def __init__(
+        self,
+        chain: ChainGeometry,
+        joints: Sequence[int],
+        scale: float,
+        alternatives: int,
+    ) -> None:
         self.alternatives = alternatives
         self._chain = chain
         self._joints = tuple(joints)
@@ -47,9 +53,15 @@ class SignSolver(IKSolver):
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """See `IKSolver.branch_margins`: det J_nr, divided by its largest size."""
         sign = 1.0 if branch == 0 else -1.0
-        return sign * determinant(self._chain.posed(q), self._joints)[:, None] / self._scale
+        return (
+            sign
+            * determinant(self._chain.posed(q), self._joints)[:, None]
+            / self._scale
+        )
 
-    def _arranged(self, joints: np.ndarray, samples: np.ndarray, negative: np.ndarray, count: int) -> np.ndarray:
+    def _arranged(
+        self, joints: np.ndarray, samples: np.ndarray, negative: np.ndarray, count: int
+    ) -> np.ndarray:
         """Arrange answers, angles in (-pi, pi].
 
         Parameters
@@ -68,7 +80,9 @@ class SignSolver(IKSolver):
             NaN where there is no further answer.
         """
         revolute = self._chain.revolute[list(self._joints)]
-        marks = 0.5 + np.where(revolute, joints / TURN, 0.5 * joints / (1.0 + np.abs(joints)))
+        marks = 0.5 + np.where(
+            revolute, joints / TURN, 0.5 * joints / (1.0 + np.abs(joints))
+        )
         keys = np.zeros(len(joints), dtype=np.int64)
         for cell in np.floor(_CELLS * marks[:, revolute]).astype(np.int64).T:
             keys = keys * (_CELLS + 1) + cell
@@ -91,5 +105,7 @@ def _repeated(marks: np.ndarray, groups: np.ndarray) -> np.ndarray:
         if len(together) == 0:
             break
         gap = np.abs(marks[together + behind] - marks[together])
-        repeated[together + behind] |= np.minimum(gap, 1.0 - gap).max(axis=1) < _SAME / TURN
+        repeated[together + behind] |= (
+            np.minimum(gap, 1.0 - gap).max(axis=1) < _SAME / TURN
+        )
     return repeated

@@ -46,8 +46,13 @@ def check_answers(
     low, high = _checked_ranges(robot)
     q = np.random.default_rng(1).uniform(low, high, (postures, robot.n))
     if len(set(solver.branches)) < len(solver.branches):
-        raise NotApplicableError(f"its branches share labels: {', '.join(solver.branches)}")
-    margins = [solver.branch_margins(q, b).min(axis=1, initial=np.inf) for b in range(len(solver.branches))]
+        raise NotApplicableError(
+            f"its branches share labels: {', '.join(solver.branches)}"
+        )
+    margins = [
+        solver.branch_margins(q, b).min(axis=1, initial=np.inf)
+        for b in range(len(solver.branches))
+    ]
     q = q[np.max(margins, axis=0) > _INSIDE]
     if not len(q):
         raise NotApplicableError("no random posture is inside a branch")
@@ -56,16 +61,25 @@ def check_answers(
     answers = solver.solve(targets, q[:, list(redundant)])
     expected = (len(q), len(solver.branches), solver.alternatives, len(rest))
     if answers.shape != expected:
-        raise NotApplicableError(f"its answers have the shape {answers.shape}, not {expected}")
+        raise NotApplicableError(
+            f"its answers have the shape {answers.shape}, not {expected}"
+        )
     turning = ChainGeometry.of(robot).revolute[rest]
     own = np.abs(difference(answers, q[:, None, None, rest], turning)).max(axis=3)
-    if not np.all(np.nanmin(np.where(np.isnan(own), np.inf, own), axis=(1, 2)) < _POSE_TOLERANCE * 100):
+    if not np.all(
+        np.nanmin(np.where(np.isnan(own), np.inf, own), axis=(1, 2))
+        < _POSE_TOLERANCE * 100
+    ):
         raise NotApplicableError("its answers leave out postures that reach the target")
     exists = np.isfinite(answers).all(axis=3)
     sample = np.nonzero(exists)[0]
     reached = q[sample]
     reached[:, rest] = answers[exists]
-    miss = np.abs(task_map.difference(task_map.of_placements(*robot.tool_placements(reached)), targets[sample])).max()
+    miss = np.abs(
+        task_map.difference(
+            task_map.of_placements(*robot.tool_placements(reached)), targets[sample]
+        )
+    ).max()
     if not miss < _POSE_TOLERANCE:
         raise NotApplicableError(f"its answers miss the target by {miss:.1e}")
 
@@ -76,7 +90,11 @@ def _checked_ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     Of far ranges what is near zero: positions in kilometres are not precise to the tolerances.
     """
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
-    ranged = (np.array(robot.position_units) == "m") & np.isfinite(lower) & np.isfinite(upper)
+    ranged = (
+        (np.array(robot.position_units) == "m")
+        & np.isfinite(lower)
+        & np.isfinite(upper)
+    )
     near = np.clip(0.0, lower, upper)
     lower, upper = np.maximum(lower, near - _FAR), np.minimum(upper, near + _FAR)
     return np.where(ranged, lower, -np.pi), np.where(ranged, upper, np.pi)

@@ -57,9 +57,17 @@ class Displacement:
         held = geometry.held(redundant, q_r)
         rest = complement(geometry.n, redundant)
         wanted = np.moveaxis(targets[:, 3:].reshape(-1, 3, 3), 0, 2)
-        rotation = np.stack([apply(wanted, held.tool_rotation[row]) for row in range(3)], axis=1)
+        rotation = np.stack(
+            [apply(wanted, held.tool_rotation[row]) for row in range(3)], axis=1
+        )
         translation = targets[:, :3].T - apply(rotation, held.tool_position)
-        equation = cls(held.axes[:, rest], held.points[:, rest], geometry.revolute[rest], rotation, translation)
+        equation = cls(
+            held.axes[:, rest],
+            held.points[:, rest],
+            geometry.revolute[rest],
+            rotation,
+            translation,
+        )
         return equation.reversed() if mirrored else equation
 
     def reversed(self) -> Displacement:
@@ -84,8 +92,13 @@ class Displacement:
 
     def screws(self) -> tuple[Screw, ...]:
         """Screws of the joints: (3, 1, 1, 1, K), with room for three alternatives."""
-        axes, points = (array[:, :, None, None, None] for array in (self.axes, self.points))
-        return tuple(Screw(axes[:, i], points[:, i], bool(turns)) for i, turns in enumerate(self.revolute))
+        axes, points = (
+            array[:, :, None, None, None] for array in (self.axes, self.points)
+        )
+        return tuple(
+            Screw(axes[:, i], points[:, i], bool(turns))
+            for i, turns in enumerate(self.revolute)
+        )
 
     def moved(self, position: np.ndarray) -> np.ndarray:
         """Apply D to positions (3, K)."""

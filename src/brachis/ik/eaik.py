@@ -64,7 +64,7 @@ def installed() -> bool:
     return True
 
 
-def _extension() -> Any:  # noqa: ANN401  (a compiled module without types)
+def _extension() -> Any:
     return importlib.import_module("eaik.pybindings.EAIK")
 
 
@@ -92,7 +92,9 @@ class EaikChain:
         """Whether EAIK has a decomposition at each of some held values (U, h)."""
         return all(robot is not None for robot in self._made(values, EXACT_AXES))
 
-    def answers(self, targets: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def answers(
+        self, targets: np.ndarray, values: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Let EAIK solve for six joints.
 
         Parameters
@@ -116,9 +118,14 @@ class EaikChain:
         poses[:, :3, :3] = targets[:, 3:].reshape(-1, 3, 3)
         poses[:, :3, 3] = targets[:, :3]
         poses[:, 3, 3] = 1.0
-        found = [_ask(robot, pose) for (robot, _), pose in zip(robots, poses, strict=True)]
+        found = [
+            _ask(robot, pose) for (robot, _), pose in zip(robots, poses, strict=True)
+        ]
         samples = np.repeat(np.arange(len(found)), [len(joints) for joints in found])
-        joints, slack = np.concatenate(found), np.array([slack for _, slack in robots])[samples]
+        joints, slack = (
+            np.concatenate(found),
+            np.array([slack for _, slack in robots])[samples],
+        )
         finite = np.isfinite(joints).all(axis=1)
         return joints[finite], samples[finite], slack[finite]
 
@@ -128,13 +135,21 @@ class EaikChain:
         kept = self._robots if len(self._robots) <= _KEPT else {}
         new = [key for key in dict.fromkeys(keys) if key not in kept]
         if new:
-            made = self._made(np.array(new).reshape(len(new), len(self._held)), EXACT_AXES)
+            made = self._made(
+                np.array(new).reshape(len(new), len(self._held)), EXACT_AXES
+            )
             for key, robot in zip(new, made, strict=True):
                 if robot is None:
-                    kept[key] = (self._made(np.array([key]), COARSE)[0], _AMPLIFIED * COARSE)
+                    kept[key] = (
+                        self._made(np.array([key]), COARSE)[0],
+                        _AMPLIFIED * COARSE,
+                    )
                 else:
                     quartic = _QUARTIC in robot.get_kinematic_family()
-                    kept[key] = (robot, _FEW_DIGITS if quartic else _AMPLIFIED * EXACT_AXES)
+                    kept[key] = (
+                        robot,
+                        _FEW_DIGITS if quartic else _AMPLIFIED * EXACT_AXES,
+                    )
         self._robots = kept
         return [kept[key] for key in keys]
 
@@ -143,21 +158,30 @@ class EaikChain:
         create = _extension().Robot
         none_fixed: list[tuple[int, float]] = []
         screws = self._chain.held(self._held, values)
-        axes, points = exact_axes(screws.axes[:, self._rest], screws.points[:, self._rest], tolerance)
+        axes, points = exact_axes(
+            screws.axes[:, self._rest], screws.points[:, self._rest], tolerance
+        )
         tool = np.broadcast_to(screws.tool_position[:, None], points[:, :1].shape)
-        offsets = np.concatenate([points[:, :1], np.diff(np.concatenate([points, tool], axis=1), axis=1)], axis=1)
-        parts = (np.moveaxis(part, 2, 0) for part in (axes, offsets, screws.tool_rotation))
+        offsets = np.concatenate(
+            [points[:, :1], np.diff(np.concatenate([points, tool], axis=1), axis=1)],
+            axis=1,
+        )
+        parts = (
+            np.moveaxis(part, 2, 0) for part in (axes, offsets, screws.tool_rotation)
+        )
         robots: list[Any] = []
         for h, p, rotation in zip(*parts, strict=True):
             try:
                 robot = create(h, p, rotation, none_fixed, True)  # noqa: FBT003  (double precision)
             except RuntimeError:  # axes that are almost parallel
                 robot = None
-            robots.append(robot if robot is not None and robot.has_known_decomposition() else None)
+            robots.append(
+                robot if robot is not None and robot.has_known_decomposition() else None
+            )
         return robots
 
 
-def _ask(robot: Any, pose: np.ndarray) -> np.ndarray:  # noqa: ANN401
+def _ask(robot: Any, pose: np.ndarray) -> np.ndarray:
     """EAIK's answers for one pose, (count, 6)."""
     if robot is None:
         return _NONE
@@ -168,7 +192,9 @@ def _ask(robot: Any, pose: np.ndarray) -> np.ndarray:  # noqa: ANN401
     return joints if len(joints) else _NONE
 
 
-def exact_axes(axes: np.ndarray, points: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+def exact_axes(
+    axes: np.ndarray, points: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Make axes that are parallel, or that meet, to within a tolerance do so exactly.
 
     An axis that is parallel to one before it takes over its direction. An axis that meets its predecessor is moved to
@@ -206,13 +232,17 @@ def _meeting(axes: np.ndarray, points: np.ndarray, tolerance: float) -> np.ndarr
     size = dot(normal, normal)
     skew = size > tolerance**2
     size = np.where(skew, size, 1.0)
-    meets = skew & (np.abs(dot(normal, np.diff(points, axis=1))) < tolerance * np.sqrt(size))
+    meets = skew & (
+        np.abs(dot(normal, np.diff(points, axis=1))) < tolerance * np.sqrt(size)
+    )
     for first in range(axes.shape[1] - 1):
         before, axis, start = axes[:, first], axes[:, first + 1], points[:, first]
         gap = points[:, first + 1] - start
         along = dot(cross(gap, axis), normal[:, first]) / size[first]
         along = np.where(np.abs(along) < tolerance, 0.0, along)
-        points[:, first + 1] = np.where(meets[first], start + before * along, start + across(axis, gap))
+        points[:, first + 1] = np.where(
+            meets[first], start + before * along, start + across(axis, gap)
+        )
     return points
 
 
@@ -247,13 +277,22 @@ class EaikSolver(SignSolver):
         self._tool = Poses.of_tool(geometry.held([], np.empty((1, 0))))
         postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, chain.n))
         if not self._eaik.knows(postures[:, self._held]):
-            raise NotApplicableError("EAIK knows no decomposition: too few of the six axes are parallel or meet")
-        super().__init__(chain, six, float(np.abs(determinant(chain.posed(postures), six)).max()), _PER_SIGN)
+            raise NotApplicableError(
+                "EAIK knows no decomposition: too few of the six axes are parallel or meet"
+            )
+        super().__init__(
+            chain,
+            six,
+            float(np.abs(determinant(chain.posed(postures), six)).max()),
+            _PER_SIGN,
+        )
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """See `IKSolver.solve`."""
         joints = np.full((len(q_r), 2, _PER_SIGN, len(self._joints)), np.nan)
-        finite = np.flatnonzero(np.isfinite(targets).all(axis=1) & np.isfinite(q_r).all(axis=1))
+        finite = np.flatnonzero(
+            np.isfinite(targets).all(axis=1) & np.isfinite(q_r).all(axis=1)
+        )
         if len(finite):
             joints[finite] = self._solve(targets[finite], q_r[finite])
         return joints
@@ -265,9 +304,16 @@ class EaikSolver(SignSolver):
         q[:, self._held] = values[samples]
         q[:, self._joints] = joints
         determinants, right = self._put_to_test(q, wanted[samples], slack)
-        return self._arranged(wrap(q[right][:, self._joints]), samples[right], determinants[right] < 0.0, len(q_r))
+        return self._arranged(
+            wrap(q[right][:, self._joints]),
+            samples[right],
+            determinants[right] < 0.0,
+            len(q_r),
+        )
 
-    def _put_to_test(self, q: np.ndarray, wanted: Poses, slack: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _put_to_test(
+        self, q: np.ndarray, wanted: Poses, slack: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Polish postures (N, n) that miss their poses by less than a slack (N,), in place.
 
         Returns
@@ -285,7 +331,10 @@ class EaikSolver(SignSolver):
         moved = near[converged]
         q[moved[:, None], six] = joints[converged]
         posed = self._chain.posed(q[moved])
-        miss[moved], determinants[moved] = wanted[moved].miss(posed), determinant(posed, six)
+        miss[moved], determinants[moved] = (
+            wanted[moved].miss(posed),
+            determinant(posed, six),
+        )
         return determinants, np.flatnonzero((miss < _REACHED) & (determinants != 0.0))
 
     def _wanted(self, targets: np.ndarray, q_r: np.ndarray) -> Poses:
@@ -318,23 +367,38 @@ def _part(geometry: ChainGeometry, joints: slice) -> ChainGeometry:
 def _check_rank(geometry: ChainGeometry, redundant: tuple[int, ...]) -> None:
     """Refuse a decomposition whose J_nr is singular at all of many random postures."""
     try:
-        largest_determinant(random_postures(geometry), complement(geometry.n, redundant))
+        largest_determinant(
+            random_postures(geometry), complement(geometry.n, redundant)
+        )
     except NotApplicableError as singular:
         names = ", ".join(geometry.joint_names[i] for i in redundant)
-        more = f": there is always a motion of the tool that needs {names}" if names else ""
+        more = (
+            f": there is always a motion of the tool that needs {names}"
+            if names
+            else ""
+        )
         raise NotApplicableError(f"{singular}{more}") from None
 
 
 @ik_family(
-    "eaik", source="D. Ostermeier, J. Külz, M. Althoff, Automatic geometric decomposition for analytical IK, 2025"
+    "eaik",
+    source="D. Ostermeier, J. Külz, M. Althoff, Automatic geometric decomposition for analytical IK, 2025",
 )
-def eaik(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> EaikSolver:
+def eaik(
+    geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
+) -> EaikSolver:
     """Fit the family: a pose is prescribed, and six joints are left over, all revolute, which EAIK can solve."""
     if not isinstance(task_map, Pose):
         raise NotApplicableError("no whole pose is prescribed")
-    sliding = [geometry.joint_names[i] for i in complement(geometry.n, redundant) if not geometry.revolute[i]]
+    sliding = [
+        geometry.joint_names[i]
+        for i in complement(geometry.n, redundant)
+        if not geometry.revolute[i]
+    ]
     if sliding:
-        raise NotApplicableError(f"{', '.join(sliding)} would be left over and not revolute")
+        raise NotApplicableError(
+            f"{', '.join(sliding)} would be left over and not revolute"
+        )
     _check_rank(geometry, redundant)
     if not installed():
         raise NotApplicableError(NOT_INSTALLED)

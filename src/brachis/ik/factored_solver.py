@@ -76,7 +76,14 @@ class Factor:
 
 def vanishing(factors: Iterable[Factor], postures: Arm) -> Factor | None:
     """Return a factor that is zero at all postures, if there is one."""
-    return next((factor for factor in factors if np.abs(factor.value(postures)).max() < _VANISHES), None)
+    return next(
+        (
+            factor
+            for factor in factors
+            if np.abs(factor.value(postures)).max() < _VANISHES
+        ),
+        None,
+    )
 
 
 class FactoredBranches:
@@ -95,21 +102,34 @@ class FactoredBranches:
         A word for each factor that has both signs.
     """
 
-    def __init__(self, factors: Sequence[Factor], joints: RemainingJoints, postures: Arm) -> None:
+    def __init__(
+        self, factors: Sequence[Factor], joints: RemainingJoints, postures: Arm
+    ) -> None:
         self._factors = factors
         self._joints = joints
         values = [factor.value(postures) for factor in factors]
         self._scales = [float(np.abs(value).max()) for value in values]
-        self._bounds = [slot for slot, value in enumerate(values) if np.ptp(value) > _VANISHES * self._scales[slot]]
+        self._bounds = [
+            slot
+            for slot, value in enumerate(values)
+            if np.ptp(value) > _VANISHES * self._scales[slot]
+        ]
         linear = [factor.linear(joints) for factor in factors]
-        self._signs = [_signs(value, one_answer=one) for value, one in zip(values, linear, strict=True)]
+        self._signs = [
+            _signs(value, one_answer=one)
+            for value, one in zip(values, linear, strict=True)
+        ]
         self._choices = list(itertools.product(*self._signs))
-        words = [_LEFT if one else factor.words for factor, one in zip(factors, linear, strict=True)]
+        words = [
+            _LEFT if one else factor.words
+            for factor, one in zip(factors, linear, strict=True)
+        ]
         named = [slot for slot in range(len(factors)) if len(self._signs[slot]) > 1]
         # Linear steps of which either side exists, but not for the same redundant joints.
         self._sided = [slot for slot in named if linear[slot]]
         self.labels: tuple[str, ...] = tuple(
-            "_".join(words[slot][int(signs[slot] < 0.0)] for slot in named) or _ALONE for signs in self._choices
+            "_".join(words[slot][int(signs[slot] < 0.0)] for slot in named) or _ALONE
+            for signs in self._choices
         )
 
     def answers(self, values: Sequence[np.ndarray], held: Arm) -> np.ndarray:
@@ -127,7 +147,9 @@ class FactoredBranches:
         (K, B, J) ndarray
             Chain order; NaN all through where one of an answer's joints is; angles in (-pi, pi].
         """
-        joints = np.empty((len(values), *(len(signs) for signs in self._signs), values[-1].shape[-1]))
+        joints = np.empty(
+            (len(values), *(len(signs) for signs in self._signs), values[-1].shape[-1])
+        )
         for place, value in enumerate(values):
             joints[place] = value
         revolute = self._joints.revolute
@@ -136,16 +158,27 @@ class FactoredBranches:
         joints += 0.0 * joints.sum(axis=0)
         alternatives = range(len(self._factors) + 1)
         for slot in self._sided:
-            side = np.expand_dims(self._signs[slot], [axis for axis in alternatives if axis != slot])
-            joints = np.where(side * self._factors[slot].value(held) > 0.0, joints, np.nan)
+            side = np.expand_dims(
+                self._signs[slot], [axis for axis in alternatives if axis != slot]
+            )
+            joints = np.where(
+                side * self._factors[slot].value(held) > 0.0, joints, np.nan
+            )
         ordered = joints[::-1] if self._joints.mirrored else joints
         return ordered.reshape(len(values), len(self.labels), -1).T
 
     def margins(self, postures: Arm, branch: int) -> np.ndarray:
         """Compute the factors that are not constant, (K, k): positive within a branch; analytic."""
         signs = self._choices[branch]
-        margins = [self._factors[slot].value(postures) * (signs[slot] / self._scales[slot]) for slot in self._bounds]
-        return np.stack(margins, axis=1) if margins else np.zeros((postures.centre.shape[-1], 0), postures.centre.dtype)
+        margins = [
+            self._factors[slot].value(postures) * (signs[slot] / self._scales[slot])
+            for slot in self._bounds
+        ]
+        return (
+            np.stack(margins, axis=1)
+            if margins
+            else np.zeros((postures.centre.shape[-1], 0), postures.centre.dtype)
+        )
 
 
 def _signs(values: np.ndarray, *, one_answer: bool) -> np.ndarray:
@@ -194,7 +227,11 @@ def meet(joints: RemainingJoints, i: int, j: int) -> bool:
 
 def on_cylinder(joints: RemainingJoints) -> bool:
     """Whether the first joint slides along the second's axis, and the third's is perpendicular to it."""
-    return joints.revolute[:3].tolist() == [False, True, True] and aligned(joints, 0, 1) and perpendicular(joints, 1, 2)
+    return (
+        joints.revolute[:3].tolist() == [False, True, True]
+        and aligned(joints, 0, 1)
+        and perpendicular(joints, 1, 2)
+    )
 
 
 _FRONT, _UP = ("front", "back"), ("up", "down")
@@ -207,8 +244,18 @@ RECIPES = (
         None,
         placing.plane_of_last,
         (
-            Factor(placing.out_of_last_factor, f"{{a}} {_OUT} {{b}} and {{c}} do", _FRONT, (0,)),
-            Factor(placing.within_last_factor, "{b} and {c} move {point} along one line", _UP, (1, 2)),
+            Factor(
+                placing.out_of_last_factor,
+                f"{{a}} {_OUT} {{b}} and {{c}} do",
+                _FRONT,
+                (0,),
+            ),
+            Factor(
+                placing.within_last_factor,
+                "{b} and {c} move {point} along one line",
+                _UP,
+                (1, 2),
+            ),
         ),
     ),
     Recipe(
@@ -216,8 +263,18 @@ RECIPES = (
         None,
         placing.plane_of_first,
         (
-            Factor(placing.within_first_factor, "{a} and {b} move {point} along one line", _FRONT, (0, 1)),
-            Factor(placing.out_of_first_factor, f"{{c}} {_OUT} {{a}} and {{b}} do", _UP, (2,)),
+            Factor(
+                placing.within_first_factor,
+                "{a} and {b} move {point} along one line",
+                _FRONT,
+                (0, 1),
+            ),
+            Factor(
+                placing.out_of_first_factor,
+                f"{{c}} {_OUT} {{a}} and {{b}} do",
+                _UP,
+                (2,),
+            ),
         ),
     ),
     Recipe(
@@ -225,8 +282,16 @@ RECIPES = (
         (0, 1),
         placing.meeting_of_first,
         (
-            Factor(placing.along_first_factor, "{b} does not move {point} along the axis of {a}", _FRONT),
-            Factor(placing.approach_of_last_factor, f"{{c}} {_AWAY} {{a}} and {{b}} meet", _UP),
+            Factor(
+                placing.along_first_factor,
+                "{b} does not move {point} along the axis of {a}",
+                _FRONT,
+            ),
+            Factor(
+                placing.approach_of_last_factor,
+                f"{{c}} {_AWAY} {{a}} and {{b}} meet",
+                _UP,
+            ),
         ),
     ),
     Recipe(
@@ -234,8 +299,16 @@ RECIPES = (
         (1, 2),
         placing.meeting_of_last,
         (
-            Factor(placing.along_second_factor, "{c} does not move {point} along the axis of {b}", _FRONT),
-            Factor(placing.approach_of_first_factor, f"{{a}} {_AWAY} {{b}} and {{c}} meet", _UP),
+            Factor(
+                placing.along_second_factor,
+                "{c} does not move {point} along the axis of {b}",
+                _FRONT,
+            ),
+            Factor(
+                placing.approach_of_first_factor,
+                f"{{a}} {_AWAY} {{b}} and {{c}} meet",
+                _UP,
+            ),
         ),
     ),
     Recipe(
@@ -243,7 +316,11 @@ RECIPES = (
         None,
         placing.cylinder,
         (
-            Factor(placing.in_front_factor, "{a} and {b} do not move {point} along the axis of {c}", _FRONT),
+            Factor(
+                placing.in_front_factor,
+                "{a} and {b} do not move {point} along the axis of {c}",
+                _FRONT,
+            ),
             Factor(placing.to_front_factor, f"{{c}} {_OUT} {{a}} and {{b}} do", _UP),
         ),
     ),
@@ -262,7 +339,9 @@ def recipe_for(joints: RemainingJoints, point: str) -> tuple[Recipe, Anchor | No
         if recipe.fits(joints):
             return recipe, meeting(joints, *recipe.meets) if recipe.meets else None
     relations = f"{_relation(joints, 0, 1)}, and {_relation(joints, 1, 2)}"
-    raise NotApplicableError(f"no closed form moves {point} by {', '.join(joints.names[:3])}: {relations}")
+    raise NotApplicableError(
+        f"no closed form moves {point} by {', '.join(joints.names[:3])}: {relations}"
+    )
 
 
 def _relation(joints: RemainingJoints, i: int, j: int) -> str:
@@ -273,7 +352,13 @@ def _relation(joints: RemainingJoints, i: int, j: int) -> str:
             return f"the axes of {first} and {second} are parallel"
         apart = "are not parallel and do not meet in a fixed point of one of them"
         return f"the axes of {first} and {second} {'meet' if meet(joints, i, j) else apart}"
-    manner = "along" if aligned(joints, i, j) else "across" if perpendicular(joints, i, j) else "at an angle to"
+    manner = (
+        "along"
+        if aligned(joints, i, j)
+        else "across"
+        if perpendicular(joints, i, j)
+        else "at an angle to"
+    )
     if joints.revolute[i]:
         first, second = second, first
     return f"{first} slides {manner} the {'axis' if joints.revolute[[i, j]].any() else 'direction'} of {second}"
@@ -342,7 +427,9 @@ class FactoredSolver(IKSolver, Generic[S]):
 
     kind: Kind = "closed_form"
 
-    def __init__(self, geometry: ChainGeometry, redundant: tuple[int, ...], structure: S) -> None:
+    def __init__(
+        self, geometry: ChainGeometry, redundant: tuple[int, ...], structure: S
+    ) -> None:
         self._geometry = geometry
         self._redundant = redundant
         self._structure = structure
@@ -351,7 +438,9 @@ class FactoredSolver(IKSolver, Generic[S]):
         self.branches: tuple[str, ...] = self._branches.labels
 
     @abstractmethod
-    def steps(self, targets: np.ndarray, q_r: np.ndarray) -> tuple[Arm, Sequence[np.ndarray]]:
+    def steps(
+        self, targets: np.ndarray, q_r: np.ndarray
+    ) -> tuple[Arm, Sequence[np.ndarray]]:
         """Return the arm while its joints are at zero, and their positions, with the alternatives before the samples.
 
         A slide whose direction, beside a plane, depends on joints that are solved for before it has that direction.
@@ -365,7 +454,9 @@ class FactoredSolver(IKSolver, Generic[S]):
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """See `IKSolver.branch_margins`: the factors of det J_nr that are not constant."""
-        return self._branches.margins(self._structure.posed(self._geometry.posed(q)), branch)
+        return self._branches.margins(
+            self._structure.posed(self._geometry.posed(q)), branch
+        )
 
 
 def fitted(geometry: ChainGeometry, joints: J, fits: Sequence[Callable[[J], S]]) -> S:
@@ -397,7 +488,11 @@ def fitted(geometry: ChainGeometry, joints: J, fits: Sequence[Callable[[J], S]])
         largest_determinant(posed, joints.joints)
     except NotApplicableError as singular:
         factor = structure and vanishing(structure.factors, structure.posed(posed))
-        meaning = f": {factor.vanishes.format(**structure.words())}" if structure and factor else ""
+        meaning = (
+            f": {factor.vanishes.format(**structure.words())}"
+            if structure and factor
+            else ""
+        )
         raise NotApplicableError(f"{singular}{meaning}") from None
     if structure is None:
         raise NotApplicableError("; ".join(reasons))

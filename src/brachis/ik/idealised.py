@@ -54,10 +54,14 @@ class Ideal:
         """How far the axes of the given chain are from the ideal ones, for messages."""
         sizes = ((self.turned, "rad"), (self.shifted, "m"))
         least = 1e-3 * max(self.turned, self.shifted)
-        return " and ".join(f"{size:.1e} {unit}" for size, unit in sizes if size > least)
+        return " and ".join(
+            f"{size:.1e} {unit}" for size, unit in sizes if size > least
+        )
 
 
-def idealised(geometry: ChainGeometry, task_map: TaskMap, tolerance: float = TOLERANCE) -> Ideal | None:
+def idealised(
+    geometry: ChainGeometry, task_map: TaskMap, tolerance: float = TOLERANCE
+) -> Ideal | None:
     """Make axes that are almost parallel, perpendicular or meeting so exactly.
 
     Parameters
@@ -76,7 +80,9 @@ def idealised(geometry: ChainGeometry, task_map: TaskMap, tolerance: float = TOL
     chain = _Chain([] if isinstance(task_map, Pose) else list(np.eye(3)), tolerance)
     axes, points = np.empty_like(geometry.axes), np.zeros_like(geometry.points)
     for i, revolute in enumerate(geometry.revolute):
-        axes[i] = chain.direction(geometry.axes[i], geometry.points[i], revolute=revolute)
+        axes[i] = chain.direction(
+            geometry.axes[i], geometry.points[i], revolute=revolute
+        )
         if revolute:
             points[i] = chain.place(axes[i], geometry.points[i])
     if not isinstance(task_map, Pose):
@@ -116,7 +122,9 @@ class _Chain:
         """Carry a point of the given chain along."""
         return self.rotation @ point + self.offset
 
-    def direction(self, axis: np.ndarray, point: np.ndarray, *, revolute: bool) -> np.ndarray:
+    def direction(
+        self, axis: np.ndarray, point: np.ndarray, *, revolute: bool
+    ) -> np.ndarray:
         """Direction of the next joint; turns the rest of the chain about its axis' point that is nearest."""
         given = self.rotation @ axis
         ideal = _snapped(given, self._fixed, self._tolerance)
@@ -154,7 +162,9 @@ class _Chain:
         self.shifted = max(self.shifted, float(np.linalg.norm(step)))
         self.offset = self.offset + step
 
-    def _nearest(self, axis: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _nearest(
+        self, axis: np.ndarray, point: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Points where the last axis and another one are nearest; where they are parallel, beside the last point."""
         if self._axis is None:
             return point, point
@@ -164,7 +174,9 @@ class _Chain:
         return before, point + axis * (axis @ (before - point))
 
 
-def _snapped(axis: np.ndarray, fixed: Sequence[np.ndarray], tolerance: float) -> np.ndarray:
+def _snapped(
+    axis: np.ndarray, fixed: Sequence[np.ndarray], tolerance: float
+) -> np.ndarray:
     """Direction exactly parallel to one of some others, else perpendicular to one or two of them, if it almost is."""
     for other in fixed:
         if np.linalg.norm(np.cross(axis, other)) < tolerance:
@@ -212,7 +224,11 @@ class Polished(IKSolver):
         task_map: TaskMap,
         redundant: tuple[int, ...],
     ) -> None:
-        self.branches, self.alternatives, self.kind = solver.branches, solver.alternatives, solver.kind
+        self.branches, self.alternatives, self.kind = (
+            solver.branches,
+            solver.alternatives,
+            solver.kind,
+        )
         self._solver = solver
         self._geometry = geometry
         self._task_map = task_map
@@ -223,11 +239,17 @@ class Polished(IKSolver):
         """See `IKSolver.solve`."""
         return self._exact(self._solver.solve(targets, q_r), targets, q_r)
 
-    def solve_branch(self, targets: np.ndarray, q_r: np.ndarray, branch: int) -> np.ndarray:
+    def solve_branch(
+        self, targets: np.ndarray, q_r: np.ndarray, branch: int
+    ) -> np.ndarray:
         """See `IKSolver.solve_branch`."""
-        return self._exact(self._solver.solve_branch(targets, q_r, branch), targets, q_r)
+        return self._exact(
+            self._solver.solve_branch(targets, q_r, branch), targets, q_r
+        )
 
-    def _exact(self, answers: np.ndarray, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
+    def _exact(
+        self, answers: np.ndarray, targets: np.ndarray, q_r: np.ndarray
+    ) -> np.ndarray:
         """Polish answers (K, ..., m)."""
         exists = np.isfinite(answers).all(axis=-1)
         sample = np.nonzero(exists)[0]
@@ -235,7 +257,9 @@ class Polished(IKSolver):
         q[:, self._redundant] = q_r[sample]
         q[:, self._rest] = answers[exists]
         exact = np.full_like(answers, np.nan)
-        exact[exists] = polished(self._geometry, self._rest, q, goal_of(self._task_map, targets[sample]))
+        exact[exists] = polished(
+            self._geometry, self._rest, q, goal_of(self._task_map, targets[sample])
+        )
         return exact
 
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:

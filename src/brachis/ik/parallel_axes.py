@@ -54,7 +54,14 @@ from brachis.ik.factored_solver import Factor, FactoredSolver, Structure, fitted
 from brachis.ik.placing import within_plane
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, Circle, PosedScrews, Screw
-from brachis.ik.vectors import angle_about, apply, apply_inverse, dot, meeting_point, rotate
+from brachis.ik.vectors import (
+    angle_about,
+    apply,
+    apply_inverse,
+    dot,
+    meeting_point,
+    rotate,
+)
 from brachis.robot import TaskMap
 
 _LAST_FIRST = {1: 4, 2: 5}
@@ -88,10 +95,16 @@ class ParallelStructure(Structure):
         NotApplicableError
             The joints have not this structure; says what is missing.
         """
-        triples = [first for first in range(4) if six.parallel(first, first + 1, first + 2)]
+        triples = [
+            first for first in range(4) if six.parallel(first, first + 1, first + 2)
+        ]
         if not triples:
             raise NotApplicableError("no three successive joints have parallel axes")
-        found = [structure for order in (six, six.reversed()) for structure in _arrangements(order)]
+        found = [
+            structure
+            for order in (six, six.reversed())
+            for structure in _arrangements(order)
+        ]
         if found:
             return found[0]
         names = ", ".join(six.names[triples[0] : triples[0] + 3])
@@ -103,12 +116,23 @@ class ParallelStructure(Structure):
     @property
     def factors(self) -> tuple[Factor, ...]:
         """See `Structure.factors`; of the alternatives shoulder, elbow, wrist, or of elbow, wrist, rail."""
-        elbow = Factor(self._elbow, "the axes of two of {b}, {c}, {d} coincide", ("up", "down"))
-        wrist = Factor(self._wrist, "the axes of {x}, {f}, {b} always are parallel to one plane", ("noflip", "flip"))
+        elbow = Factor(
+            self._elbow, "the axes of two of {b}, {c}, {d} coincide", ("up", "down")
+        )
+        wrist = Factor(
+            self._wrist,
+            "the axes of {x}, {f}, {b} always are parallel to one plane",
+            ("noflip", "flip"),
+        )
         if self.slide is None:
             way = "{a} does not move the point where the axes of {x} and {f} meet along the parallel axes"
             return Factor(self._shoulder, way, ("front", "back")), elbow, wrist
-        rail = Factor(self._rail, "{p} never moves the arm along the parallel axes", ("left", "right"), (self.slide,))
+        rail = Factor(
+            self._rail,
+            "{p} never moves the arm along the parallel axes",
+            ("left", "right"),
+            (self.slide,),
+        )
         return elbow, wrist, rail
 
     @property
@@ -130,7 +154,11 @@ class ParallelStructure(Structure):
         """See `Structure.words`; x is e or a."""
         places = {"a": self.turn, "p": self.slide, "f": 5, "x": self.beside}
         places |= zip("bcd", self.parallel, strict=True)
-        return {letter: self.joints.names[place] for letter, place in places.items() if place is not None}
+        return {
+            letter: self.joints.names[place]
+            for letter, place in places.items()
+            if place is not None
+        }
 
     def posed(self, posed: PosedScrews) -> Arm:
         """See `Structure.posed`."""
@@ -139,12 +167,18 @@ class ParallelStructure(Structure):
     def arm(self, screws: tuple[Screw, ...]) -> Arm:
         """Put in P, as the centre."""
         e, f = screws[4:]
-        centre = meeting_point(e.axis, e.point, f.axis, f.point) if self.first == 1 else f.point
+        centre = (
+            meeting_point(e.axis, e.point, f.axis, f.point)
+            if self.first == 1
+            else f.point
+        )
         return Arm(screws, centre, centre)
 
     def _shoulder(self, arm: Arm) -> np.ndarray:
         """Velocity that a gives P along the parallel axes."""
-        return dot(arm.screws[self.first].axis, arm.screws[self.turn or 0].velocity(arm.centre))
+        return dot(
+            arm.screws[self.first].axis, arm.screws[self.turn or 0].velocity(arm.centre)
+        )
 
     def _elbow(self, arm: Arm) -> np.ndarray:
         """Velocity that c gives the axis of d away from that of b, times its distance."""
@@ -153,7 +187,10 @@ class ParallelStructure(Structure):
 
     def _wrist(self, arm: Arm) -> np.ndarray:
         """Volume spanned by two axes and n."""
-        return dot(cross(arm.screws[self.beside].axis, arm.screws[5].axis), arm.screws[self.first].axis)
+        return dot(
+            cross(arm.screws[self.beside].axis, arm.screws[5].axis),
+            arm.screws[self.first].axis,
+        )
 
     def _rail(self, arm: Arm) -> np.ndarray:
         """Velocity that p gives the arm along the parallel axes."""
@@ -167,11 +204,14 @@ def _arrangements(six: PoseJoints) -> list[ParallelStructure]:
         before, after = range(first), range(one_after, 6)
         turns = [place for place in before if six.revolute[place]]
         slides = [place for place in before if not six.revolute[place]]
-        if not six.parallel(first, first + 1, first + 2) or not six.revolute[list(after)].all():
+        if (
+            not six.parallel(first, first + 1, first + 2)
+            or not six.revolute[list(after)].all()
+        ):
             continue
         if first == 1 and not six.meet(4, 5):
             continue
-        if first == 2 and len(turns) != 1:  # noqa: PLR2004
+        if first == 2 and len(turns) != 1:
             continue
         turn, slide = turns[0] if turns else None, slides[0] if slides else None
         structures.append(ParallelStructure(six, first, turn, slide))
@@ -184,17 +224,26 @@ _SHOULDER = 0
 class ParallelAxesSolver(FactoredSolver[ParallelStructure]):
     """Closed form around three parallel axes; see the module's formulas."""
 
-    def steps(self, targets: np.ndarray, q_r: np.ndarray) -> tuple[Arm, Sequence[np.ndarray]]:
+    def steps(
+        self, targets: np.ndarray, q_r: np.ndarray
+    ) -> tuple[Arm, Sequence[np.ndarray]]:
         """See `FactoredSolver.steps`."""
         structure = self._structure
         mirrored = structure.joints.mirrored
-        equation = Displacement.of(self._geometry, self._redundant, targets, q_r, mirrored=mirrored)
-        arm, rotation = structure.arm(equation.screws()), equation.rotation[:, :, None, None, None]
+        equation = Displacement.of(
+            self._geometry, self._redundant, targets, q_r, mirrored=mirrored
+        )
+        arm, rotation = (
+            structure.arm(equation.screws()),
+            equation.rotation[:, :, None, None, None],
+        )
         place = apply(rotation, arm.centre) + equation.translation[:, None, None, None]
         values, angle, image = self._outer(arm, rotation, place)
         a, b, c, d = (arm.screws[i] for i in (structure.turn or 0, *structure.parallel))
         place, n, slide = a.inverse.orbit(place).at(angle), b.axis, structure.slide
-        theta = angle_about(n, arm.screws[structure.first + 3].axis, rotate(a.axis, -angle, image))
+        theta = angle_about(
+            n, arm.screws[structure.first + 3].axis, rotate(a.axis, -angle, image)
+        )
         if slide is not None:
             s = arm.screws[slide].axis
             if slide < (structure.turn or 0):  # a turns its direction as well
@@ -205,7 +254,9 @@ class ParallelAxesSolver(FactoredSolver[ParallelStructure]):
         end = place + rotate(n, theta, d.point - arm.centre)
         around = within_plane(b, c, d.point, end, structure.elbow)
         outer, elbow = (np.flip(answers, axis=structure.elbow) for answers in around)
-        last = np.sign(dot(n, d.axis)) * (theta - outer - np.sign(dot(n, c.axis)) * elbow)
+        last = np.sign(dot(n, d.axis)) * (
+            theta - outer - np.sign(dot(n, c.axis)) * elbow
+        )
         values |= zip(structure.parallel, (outer, elbow, last), strict=True)
         return arm, [values[i] for i in range(6)]
 
@@ -214,17 +265,25 @@ class ParallelAxesSolver(FactoredSolver[ParallelStructure]):
     ) -> tuple[dict[int, np.ndarray], np.ndarray, np.ndarray]:
         """Solve for the turning joints beside the parallel ones; return them, the angle of a, and R_D R_post^T e."""
         structure, angle = self._structure, np.zeros(1)
-        n, turn, wrist = arm.screws[structure.first].axis, structure.turn, structure.elbow + 1
+        n, turn, wrist = (
+            arm.screws[structure.first].axis,
+            structure.turn,
+            structure.elbow + 1,
+        )
         a, e, f = arm.screws[turn or 0], arm.screws[4], arm.screws[5]
         if structure.first == 1:
             if turn is not None:
-                angle = a.inverse.orbit(place).component(-n, -dot(n, arm.centre), _SHOULDER)
+                angle = a.inverse.orbit(place).component(
+                    -n, -dot(n, arm.centre), _SHOULDER
+                )
             y = apply_inverse(rotation, rotate(a.axis, angle, n))
             last = Circle.of(f.axis, y).component(e.axis, dot(e.axis, n), wrist)
             values = {4: angle_about(e.axis, rotate(f.axis, last, y), n), 5: last}
             image = rotate(f.axis, -last, e.axis)
         else:
-            last = Circle.of(-f.axis, n).component(-apply_inverse(rotation, a.axis), -dot(a.axis, n), wrist)
+            last = Circle.of(-f.axis, n).component(
+                -apply_inverse(rotation, a.axis), -dot(a.axis, n), wrist
+            )
             angle = angle_about(a.axis, n, apply(rotation, rotate(f.axis, -last, n)))
             values, image = {5: last}, f.axis
         if turn is not None:
@@ -232,8 +291,15 @@ class ParallelAxesSolver(FactoredSolver[ParallelStructure]):
         return values, angle, apply(rotation, image)
 
 
-@ik_family("parallel_axes", source="Hawkins 2013 and IK-Geo 2022 for six revolute joints; this module's docstring")
-def parallel_axes(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> ParallelAxesSolver:
+@ik_family(
+    "parallel_axes",
+    source="Hawkins 2013 and IK-Geo 2022 for six revolute joints; this module's docstring",
+)
+def parallel_axes(
+    geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
+) -> ParallelAxesSolver:
     """Fit the family: a pose, six joints left over, and three parallel axes in succession among them."""
     six = PoseJoints.of(geometry, task_map, redundant)
-    return ParallelAxesSolver(geometry, redundant, fitted(geometry, six, (ParallelStructure.of,)))
+    return ParallelAxesSolver(
+        geometry, redundant, fitted(geometry, six, (ParallelStructure.of,))
+    )

@@ -105,7 +105,11 @@ def meeting_of_last(arm: Arm, target: np.ndarray) -> Values:
     first = outer.distance(arm.meeting, dot(away, away), UP)
     end, inner = outer.at(first), c.orbit(arm.centre)
     third = inner.component(b.axis, dot(b.axis, end), FRONT)
-    return first, angle_about(b.axis, inner.at(third) - arm.meeting, end - arm.meeting), third
+    return (
+        first,
+        angle_about(b.axis, inner.at(third) - arm.meeting, end - arm.meeting),
+        third,
+    )
 
 
 def approach_of_first_factor(arm: Arm) -> np.ndarray:
@@ -125,9 +129,15 @@ def cylinder(arm: Arm, target: np.ndarray) -> Values:
     radius, side = across(b.axis, away), dot(c.axis, arm.centre - b.point)
     reach = np.sqrt(dot(radius, radius) - side * side)
     orbit = c.orbit(arm.centre)
-    third = orbit.component(front, np.concatenate([reach, -reach], axis=FRONT) + dot(front, b.point), UP)
+    third = orbit.component(
+        front, np.concatenate([reach, -reach], axis=FRONT) + dot(front, b.point), UP
+    )
     start = orbit.at(third)
-    return dot(a.axis, target - start), angle_about(b.axis, start - b.point, away), third
+    return (
+        dot(a.axis, target - start),
+        angle_about(b.axis, start - b.point, away),
+        third,
+    )
 
 
 def in_front_factor(arm: Arm) -> np.ndarray:
@@ -163,7 +173,9 @@ def within_plane(
         return outer, angle_about(second.axis, away, orbit.at(outer) - second.point)
     normal, way = cross(first.axis, second.axis), end - start
     size = dot(normal, normal)
-    return dot(cross(way, second.axis), normal) / size, dot(cross(first.axis, way), normal) / size
+    return dot(cross(way, second.axis), normal) / size, dot(
+        cross(first.axis, way), normal
+    ) / size
 
 
 def _area(first: Screw, second: Screw, position: np.ndarray) -> np.ndarray:

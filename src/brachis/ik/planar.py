@@ -81,11 +81,18 @@ class PlanarChain:
         inert = ~geometry.revolute & (np.abs(along) > 1.0 - _PARALLEL)
         selection = np.eye(3)[list(task_map.axes)]
         if np.any(inert) and np.any(np.abs(selection @ normal) > _PARALLEL):
-            raise NotApplicableError("a slide along the plane's normal changes the prescribed rows")
+            raise NotApplicableError(
+                "a slide along the plane's normal changes the prescribed rows"
+            )
         to_plane = selection @ np.column_stack([first, second])
         offset = selection @ (normal * (normal @ geometry.tool_position))
-        if np.linalg.matrix_rank(to_plane, tol=_PARALLEL) < min(2, len(to_plane)) or len(to_plane) > 2:  # noqa: PLR2004
-            raise NotApplicableError("the prescribed rows do not fit the plane in which the joints move")
+        if (
+            np.linalg.matrix_rank(to_plane, tol=_PARALLEL) < min(2, len(to_plane))
+            or len(to_plane) > 2
+        ):
+            raise NotApplicableError(
+                "the prescribed rows do not fit the plane in which the joints move"
+            )
         yaw = 0.0
         if isinstance(task_map, RowsAndYaw):
             if abs(normal[task_map.world_axis]) < 1.0 - _PARALLEL:
@@ -102,7 +109,9 @@ class PlanarChain:
             offset=offset,
         )
 
-    def compose(self, joints: Iterable[int], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def compose(
+        self, joints: Iterable[int], q: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Coefficients (alpha, beta), each (K,), of the map of some joints, first outermost, at postures (K, n)."""
         alpha = np.ones(len(q), dtype=complex)
         beta = np.zeros(len(q), dtype=complex)
@@ -115,7 +124,9 @@ class PlanarChain:
                 beta = beta + alpha * self.slide[i] * q[:, i]
         return alpha, beta
 
-    def jacobian_determinant(self, q: np.ndarray, columns: list[int], rows: int) -> np.ndarray:
+    def jacobian_determinant(
+        self, q: np.ndarray, columns: list[int], rows: int
+    ) -> np.ndarray:
         """Compute the determinant of the task Jacobian's columns of some joints, up to a constant factor.
 
         Parameters
@@ -131,7 +142,10 @@ class PlanarChain:
         -------
         (K,) ndarray
         """
-        x, y, angle = (np.full(len(q), value, dtype=q.dtype) for value in (self.tool.real, self.tool.imag, 0.0))
+        x, y, angle = (
+            np.full(len(q), value, dtype=q.dtype)
+            for value in (self.tool.real, self.tool.imag, 0.0)
+        )
         # From the tool inwards: (x, y) is the tool as the joints seen so far have moved it.
         levers: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         turns: dict[int, tuple[np.ndarray, np.ndarray]] = {}
@@ -144,8 +158,14 @@ class PlanarChain:
                 levers[i] = (self.centre[i].imag - y, x - self.centre[i].real)
                 turns[i] = (cos, sin)
             else:
-                x, y = x + self.slide[i].real * q[:, i], y + self.slide[i].imag * q[:, i]
-                levers[i] = (np.full_like(angle, self.slide[i].real), np.full_like(angle, self.slide[i].imag))
+                x, y = (
+                    x + self.slide[i].real * q[:, i],
+                    y + self.slide[i].imag * q[:, i],
+                )
+                levers[i] = (
+                    np.full_like(angle, self.slide[i].real),
+                    np.full_like(angle, self.slide[i].imag),
+                )
         matrix = np.empty((len(q), rows, len(columns)), dtype=q.dtype)
         for position, joint in enumerate(columns):
             vx, vy = levers[joint]
@@ -155,10 +175,12 @@ class PlanarChain:
                     vx, vy = cos * vx - sin * vy, sin * vx + cos * vy
             vector = (vx, vy)
             if rows == 1:
-                matrix[:, 0, position] = self.to_plane[0, 0] * vx + self.to_plane[0, 1] * vy
+                matrix[:, 0, position] = (
+                    self.to_plane[0, 0] * vx + self.to_plane[0, 1] * vy
+                )
             else:
                 matrix[:, 0, position], matrix[:, 1, position] = vector
-            if rows == 3:  # noqa: PLR2004
+            if rows == 3:
                 matrix[:, 2, position] = float(self.revolute[joint])
         return _determinant(matrix)
 
@@ -167,9 +189,11 @@ def _determinant(matrix: np.ndarray) -> np.ndarray:
     """Compute determinants (K,) of matrices (K, m, m), m <= 3; written out, faster than LAPACK's batch."""
     if matrix.shape[1] == 1:
         return matrix[:, 0, 0]
-    if matrix.shape[1] == 2:  # noqa: PLR2004
+    if matrix.shape[1] == 2:
         return matrix[:, 0, 0] * matrix[:, 1, 1] - matrix[:, 0, 1] * matrix[:, 1, 0]
-    return np.einsum("ki,ki->k", matrix[:, :, 0], np.cross(matrix[:, :, 1], matrix[:, :, 2]))
+    return np.einsum(
+        "ki,ki->k", matrix[:, :, 0], np.cross(matrix[:, :, 1], matrix[:, :, 2])
+    )
 
 
 def _normal(geometry: ChainGeometry) -> np.ndarray:
@@ -186,14 +210,16 @@ def _normal(geometry: ChainGeometry) -> np.ndarray:
                 f"not planar: the axes of {geometry.joint_names[turning[0]]} and {name} are not parallel"
             )
         if not geometry.revolute[i] and _PARALLEL < cosine < 1.0 - _PARALLEL:
-            raise NotApplicableError(f"not planar: {name} slides at an angle to the plane")
+            raise NotApplicableError(
+                f"not planar: {name} slides at an angle to the plane"
+            )
     return normal
 
 
 def _basis(normal: np.ndarray, task_map: TaskMap) -> tuple[np.ndarray, np.ndarray]:
     """Two orthonormal vectors of the plane; the rows' own axes where the rows span it."""
     wanted = np.eye(3)[list(task_map.axes[:2])]
-    if len(wanted) == 2 and np.all(np.abs(wanted @ normal) < _PARALLEL):  # noqa: PLR2004
+    if len(wanted) == 2 and np.all(np.abs(wanted @ normal) < _PARALLEL):
         return wanted[0], wanted[1]
     first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
     first /= np.linalg.norm(first)
@@ -201,7 +227,14 @@ def _basis(normal: np.ndarray, task_map: TaskMap) -> tuple[np.ndarray, np.ndarra
 
 
 _SAMPLES = 64
-_LABELS = {"RR": "elbow", "RP": "reach", "PR": "reach", "PP": "slides", "R": "swing", "P": "slide"}
+_LABELS = {
+    "RR": "elbow",
+    "RP": "reach",
+    "PR": "reach",
+    "PP": "slides",
+    "R": "swing",
+    "P": "slide",
+}
 
 
 class PlanarSolver(IKSolver):
@@ -209,7 +242,9 @@ class PlanarSolver(IKSolver):
 
     kind: Kind = "closed_form"
 
-    def __init__(self, chain: PlanarChain, redundant: tuple[int, ...], *, yaw: bool) -> None:
+    def __init__(
+        self, chain: PlanarChain, redundant: tuple[int, ...], *, yaw: bool
+    ) -> None:
         self._chain = chain
         self._n = len(chain.revolute)
         self._redundant = list(redundant)
@@ -226,9 +261,11 @@ class PlanarSolver(IKSolver):
     def _largest_determinant(self) -> float:
         """Size of det J_nr over random postures, by which branch margins are made dimensionless."""
         postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, self._n))
-        determinant = self._chain.jacobian_determinant(postures, self._rest, len(self._rest))
+        determinant = self._chain.jacobian_determinant(
+            postures, self._rest, len(self._rest)
+        )
         scale = float(np.abs(determinant).max())
-        if scale < 1e-9:  # noqa: PLR2004
+        if scale < 1e-9:
             raise NotApplicableError("J_nr is singular everywhere")
         return scale
 
@@ -248,7 +285,9 @@ class PlanarSolver(IKSolver):
             elif self._yaw:
                 roots = self._with_yaw(targets, known)
             else:
-                roots = self._two(self._plane_target(targets), known, self._chain.tool, range(self._n))
+                roots = self._two(
+                    self._plane_target(targets), known, self._chain.tool, range(self._n)
+                )
         return self._by_sign(known, roots)[:, :, None]
 
     def _by_sign(self, known: np.ndarray, roots: np.ndarray) -> np.ndarray:
@@ -256,7 +295,9 @@ class PlanarSolver(IKSolver):
         count = len(known)
         q = np.repeat(known[:, None], 2, axis=1)
         q[:, :, self._rest] = roots
-        determinant = self._chain.jacobian_determinant(q.reshape(2 * count, -1), self._rest, len(self._rest))
+        determinant = self._chain.jacobian_determinant(
+            q.reshape(2 * count, -1), self._rest, len(self._rest)
+        )
         first_positive = determinant.reshape(count, 2) > 0.0
         first_negative = determinant.reshape(count, 2) < 0.0
         ordered = np.full_like(roots, np.nan)
@@ -289,7 +330,9 @@ class PlanarSolver(IKSolver):
         slide = (value - (np.conj(nu) * (alpha * tool + beta)).real) / rate
         return np.repeat(slide[:, None, None], 2, axis=1)
 
-    def _two(self, z: np.ndarray, known: np.ndarray, tool: complex, joints: range) -> np.ndarray:
+    def _two(
+        self, z: np.ndarray, known: np.ndarray, tool: complex, joints: range
+    ) -> np.ndarray:
         """Two joints a, b for a point in the plane that the `joints` carry from `tool`: (K, 2, 2)."""
         chain, (a, b) = self._chain, self._pair
         alpha, beta = chain.compose(range(a), known)
@@ -304,22 +347,36 @@ class PlanarSolver(IKSolver):
         if chain.revolute[b]:
             lever = between[0] * (c - chain.centre[b])
             centre = between[0] * chain.centre[b] + between[1]
-            return self._line_circle(w - centre, np.broadcast_to(chain.slide[a], w.shape), lever, b)
-        return _lines(w - (between[0] * c + between[1]), chain.slide[a], between[0] * chain.slide[b])
+            return self._line_circle(
+                w - centre, np.broadcast_to(chain.slide[a], w.shape), lever, b
+            )
+        return _lines(
+            w - (between[0] * c + between[1]),
+            chain.slide[a],
+            between[0] * chain.slide[b],
+        )
 
-    def _circles(self, w: np.ndarray, between: tuple[np.ndarray, np.ndarray], c: np.ndarray) -> np.ndarray:
+    def _circles(
+        self, w: np.ndarray, between: tuple[np.ndarray, np.ndarray], c: np.ndarray
+    ) -> np.ndarray:
         """Solve w = exp(i a) (L1 + exp(i b) L2)."""
         chain, (a, b) = self._chain, self._pair
         first = between[0] * chain.centre[b] + between[1] - chain.centre[a]
         second = between[0] * (c - chain.centre[b])
-        cosine = (np.abs(w) ** 2 - np.abs(first) ** 2 - np.abs(second) ** 2) / (2.0 * np.abs(first) * np.abs(second))
+        cosine = (np.abs(w) ** 2 - np.abs(first) ** 2 - np.abs(second) ** 2) / (
+            2.0 * np.abs(first) * np.abs(second)
+        )
         bend = np.arccos(cosine)
         relative = np.stack([bend, -bend], axis=1)
         inner = relative - np.angle(second / first)[:, None]
-        outer = np.angle(w[:, None] / (first[:, None] + np.exp(1j * inner) * second[:, None]))
+        outer = np.angle(
+            w[:, None] / (first[:, None] + np.exp(1j * inner) * second[:, None])
+        )
         return np.stack([chain.sigma[a] * outer, chain.sigma[b] * wrap(inner)], axis=2)
 
-    def _circle_line(self, w: np.ndarray, between: tuple[np.ndarray, np.ndarray], c: np.ndarray) -> np.ndarray:
+    def _circle_line(
+        self, w: np.ndarray, between: tuple[np.ndarray, np.ndarray], c: np.ndarray
+    ) -> np.ndarray:
         """Solve w = exp(i a) (g + u t), u of unit length."""
         chain, (a, b) = self._chain, self._pair
         g = between[0] * c + between[1] - chain.centre[a]
@@ -330,7 +387,9 @@ class PlanarSolver(IKSolver):
         outer = np.angle(w[:, None] / (g[:, None] + u[:, None] * slide))
         return np.stack([chain.sigma[a] * outer, slide], axis=2)
 
-    def _line_circle(self, h: np.ndarray, u: np.ndarray, lever: np.ndarray, turning: int) -> np.ndarray:
+    def _line_circle(
+        self, h: np.ndarray, u: np.ndarray, lever: np.ndarray, turning: int
+    ) -> np.ndarray:
         """Solve h = u t + exp(i theta) lever, u of unit length; answers (t, theta)."""
         across, along = (np.conj(u) * h).imag, (np.conj(u) * h).real
         root = np.sqrt(np.abs(lever) ** 2 - across**2)
@@ -344,50 +403,82 @@ class PlanarSolver(IKSolver):
         turned = targets[:, 2] - chain.yaw
         after_last = chain.compose(range(last + 1, self._n), known)
         world = np.exp(1j * turned) / after_last[0]
-        z = self._plane_target(targets) - world * (after_last[0] * chain.tool + after_last[1] - chain.centre[last])
+        z = self._plane_target(targets) - world * (
+            after_last[0] * chain.tool + after_last[1] - chain.centre[last]
+        )
         late = [i for i in self._pair if i > last]
         early = [i for i in self._pair if i < last]
         if not late:
             pair = self._two(z, known, complex(chain.centre[last]), range(last))
         else:
-            directions = [world * chain.compose(range(last + 1, i), known)[0] * chain.slide[i] for i in late]
+            directions = [
+                world * chain.compose(range(last + 1, i), known)[0] * chain.slide[i]
+                for i in late
+            ]
             pair = self._late(z, known, early, directions)
         angles = np.zeros((len(targets), 2))
         others = [i for i in range(self._n) if i != last and chain.revolute[i]]
         for i in others:
             angles = angles + chain.sigma[i] * (
-                pair[:, :, self._pair.index(i)] if i in self._pair else known[:, i, None]
+                pair[:, :, self._pair.index(i)]
+                if i in self._pair
+                else known[:, i, None]
             )
         final = chain.sigma[last] * wrap(turned[:, None] - angles)
         order = [(*self._pair, last).index(i) for i in self._rest]
         return np.concatenate([pair, final[:, :, None]], axis=2)[:, :, order]
 
-    def _late(self, z: np.ndarray, known: np.ndarray, early: list[int], directions: list[np.ndarray]) -> np.ndarray:
+    def _late(
+        self,
+        z: np.ndarray,
+        known: np.ndarray,
+        early: list[int],
+        directions: list[np.ndarray],
+    ) -> np.ndarray:
         """Two joints of which one or both are slides after the last revolute joint, along known world directions."""
         chain, last = self._chain, self._last
         if not early:
             alpha, beta = chain.compose(range(last), known)
-            return _lines(z - (alpha * chain.centre[last] + beta), directions[0], directions[1])
+            return _lines(
+                z - (alpha * chain.centre[last] + beta), directions[0], directions[1]
+            )
         a = early[0]
         alpha, beta = chain.compose(range(a), known)
         between = chain.compose(range(a + 1, last), known)
         point = between[0] * chain.centre[last] + between[1]
         if not chain.revolute[a]:
-            return _lines(z - (alpha * point + beta), alpha * chain.slide[a], directions[0])
+            return _lines(
+                z - (alpha * point + beta), alpha * chain.slide[a], directions[0]
+            )
         centre = alpha * chain.centre[a] + beta
-        answers = self._line_circle(z - centre, directions[0], alpha * (point - chain.centre[a]), a)
+        answers = self._line_circle(
+            z - centre, directions[0], alpha * (point - chain.centre[a]), a
+        )
         return answers[:, :, ::-1]
 
 
-def _lines(h: np.ndarray, first: np.ndarray | complex, second: np.ndarray | complex) -> np.ndarray:
+def _lines(
+    h: np.ndarray, first: np.ndarray | complex, second: np.ndarray | complex
+) -> np.ndarray:
     """Solve h = first t1 + second t2: (K, 2, 2), the one answer twice."""
     determinant = (np.conj(first) * second).imag
-    answers = np.stack([(np.conj(h) * second).imag / determinant, (np.conj(first) * h).imag / determinant], axis=1)
+    answers = np.stack(
+        [
+            (np.conj(h) * second).imag / determinant,
+            (np.conj(first) * h).imag / determinant,
+        ],
+        axis=1,
+    )
     return np.repeat(answers[:, None], 2, axis=1)
 
 
-@ik_family("planar", source="two circles, circle and line, two lines: elementary plane geometry")
-def planar(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> PlanarSolver:
+@ik_family(
+    "planar",
+    source="two circles, circle and line, two lines: elementary plane geometry",
+)
+def planar(
+    geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
+) -> PlanarSolver:
     """Fit the family: all joints move in one plane that the prescribed rows can see."""
     if isinstance(task_map, Pose):
         raise NotApplicableError("a whole pose is prescribed")

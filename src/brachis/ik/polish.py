@@ -65,7 +65,9 @@ class Poses:
     @classmethod
     def of_targets(cls, targets: np.ndarray) -> Poses:
         """Return the poses that task coordinates, (N, 12), stand for."""
-        return cls(targets[:, :3].T, np.moveaxis(targets[:, 3:].reshape(-1, 3, 3), 0, 2))
+        return cls(
+            targets[:, :3].T, np.moveaxis(targets[:, 3:].reshape(-1, 3, 3), 0, 2)
+        )
 
     @classmethod
     def of_tool(cls, screws: PosedScrews) -> Poses:
@@ -74,16 +76,24 @@ class Poses:
 
     def targets(self) -> np.ndarray:
         """Task coordinates, (N, 12)."""
-        return np.concatenate([self.position.T, np.moveaxis(self.rotation, 2, 0).reshape(-1, 9)], axis=1)
+        return np.concatenate(
+            [self.position.T, np.moveaxis(self.rotation, 2, 0).reshape(-1, 9)], axis=1
+        )
 
     def __matmul__(self, other: Poses) -> Poses:
         """Move other poses as these ones move the origin; N or 1 of each."""
-        rotation = np.stack([apply(self.rotation, other.rotation[:, column]) for column in range(3)], axis=1)
+        rotation = np.stack(
+            [apply(self.rotation, other.rotation[:, column]) for column in range(3)],
+            axis=1,
+        )
         return Poses(apply(self.rotation, other.position) + self.position, rotation)
 
     def inverse(self) -> Poses:
         """Return the motions that undo these."""
-        return Poses(-apply_inverse(self.rotation, self.position), np.swapaxes(self.rotation, 0, 1))
+        return Poses(
+            -apply_inverse(self.rotation, self.position),
+            np.swapaxes(self.rotation, 0, 1),
+        )
 
     def __getitem__(self, samples: np.ndarray) -> Poses:
         """See `Goal`."""
@@ -101,7 +111,9 @@ class Poses:
     def miss(self, posed: PosedScrews) -> np.ndarray:
         """Largest difference (N,) of positions (m) and rotation matrices."""
         shift = np.abs(self.position - posed.tool_position).max(axis=0)
-        return np.maximum(shift, np.abs(self.rotation - posed.tool_rotation).max(axis=(0, 1)))
+        return np.maximum(
+            shift, np.abs(self.rotation - posed.tool_rotation).max(axis=(0, 1))
+        )
 
 
 @dataclass(frozen=True)
@@ -123,7 +135,9 @@ class Rows:
 
     def gap(self, posed: PosedScrews) -> np.ndarray:
         """See `Goal`."""
-        reached = self.task_map.of_placements(posed.tool_position.T, np.moveaxis(posed.tool_rotation, 2, 0))
+        reached = self.task_map.of_placements(
+            posed.tool_position.T, np.moveaxis(posed.tool_rotation, 2, 0)
+        )
         return self.task_map.difference(self.targets, reached)
 
     def rows(self, columns: np.ndarray) -> np.ndarray:
@@ -133,10 +147,16 @@ class Rows:
 
 def goal_of(task_map: TaskMap, targets: np.ndarray) -> Goal:
     """Return what task coordinates, (N, c), ask for."""
-    return Poses.of_targets(targets) if isinstance(task_map, Pose) else Rows(task_map, targets)
+    return (
+        Poses.of_targets(targets)
+        if isinstance(task_map, Pose)
+        else Rows(task_map, targets)
+    )
 
 
-def polished(chain: ChainGeometry, joints: Sequence[int], q: np.ndarray, goal: Goal) -> np.ndarray:
+def polished(
+    chain: ChainGeometry, joints: Sequence[int], q: np.ndarray, goal: Goal
+) -> np.ndarray:
     """Move joints so that the tool reaches what it misses by little.
 
     Parameters
@@ -165,7 +185,9 @@ def polished(chain: ChainGeometry, joints: Sequence[int], q: np.ndarray, goal: G
     return answers
 
 
-def _round(chain: ChainGeometry, columns: list[int], q: np.ndarray, goal: Goal) -> tuple[np.ndarray, np.ndarray]:
+def _round(
+    chain: ChainGeometry, columns: list[int], q: np.ndarray, goal: Goal
+) -> tuple[np.ndarray, np.ndarray]:
     """Make two steps with one Jacobian, in place; tell which postures converged and of which the steps shrink."""
     posed = chain.posed(q)
     size = 1.0 + np.abs(q).max(axis=1)

@@ -65,20 +65,26 @@ class PolynomialSolver(SignSolver):
 
     kind: Kind = "polynomial"
 
-    def __init__(self, geometry: ChainGeometry, redundant: tuple[int, ...], six: PoseJoints) -> None:
+    def __init__(
+        self, geometry: ChainGeometry, redundant: tuple[int, ...], six: PoseJoints
+    ) -> None:
         self._redundant = list(redundant)
         self._mirrored = six.mirrored
         self._turn = 0 if six.revolute[0] else 1
         posed = random_postures(geometry)
         slide, parallel = six.joints[1 - self._turn], six.joints[2]
         if np.abs(dot(posed.axes[:, slide], posed.axes[:, parallel])).max() < _ZERO:
-            raise NotApplicableError(f"{six.names[1 - self._turn]} never moves the arm along the parallel axes")
+            raise NotApplicableError(
+                f"{six.names[1 - self._turn]} never moves the arm along the parallel axes"
+            )
         joints = sorted(six.joints)
         super().__init__(geometry, joints, largest_determinant(posed, joints), _EACH)
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """See `IKSolver.solve`."""
-        equation = Displacement.of(self._chain, self._redundant, targets, q_r, mirrored=self._mirrored)
+        equation = Displacement.of(
+            self._chain, self._redundant, targets, q_r, mirrored=self._mirrored
+        )
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             equations = Equations.of(equation, self._turn, 1 - self._turn)
             angles = real_roots(equations.resultant(sample_angles(_DEGREE)), _DEGREE)
@@ -92,9 +98,13 @@ class PolynomialSolver(SignSolver):
             q[:, self._redundant] = q_r[sample]
             q[:, self._joints] = (joints[::-1] if self._mirrored else joints).T
             posed = self._chain.posed(q)
-            sound = Poses.of_targets(targets[sample]).miss(posed) < _MISS * (1.0 + np.abs(roots[1]))
+            sound = Poses.of_targets(targets[sample]).miss(posed) < _MISS * (
+                1.0 + np.abs(roots[1])
+            )
             negative = determinant(posed, self._joints) < 0.0
-        return self._arranged(q[sound][:, self._joints], sample[sound], negative[sound], len(q_r))
+        return self._arranged(
+            q[sound][:, self._joints], sample[sound], negative[sound], len(q_r)
+        )
 
 
 def _structure(six: PoseJoints) -> PoseJoints:
@@ -105,14 +115,22 @@ def _structure(six: PoseJoints) -> PoseJoints:
     NotApplicableError
         They have it in neither order; says what is missing.
     """
-    slides = [name for name, revolute in zip(six.names, six.revolute, strict=True) if not revolute]
+    slides = [
+        name
+        for name, revolute in zip(six.names, six.revolute, strict=True)
+        if not revolute
+    ]
     if len(slides) != 1:
-        raise NotApplicableError(f"one slide is needed among the six joints, not {len(slides)}")
+        raise NotApplicableError(
+            f"one slide is needed among the six joints, not {len(slides)}"
+        )
     for order in (six, six.reversed()):
         if order.revolute[:2].all() or not order.parallel(2, 3) or not order.meet(4, 5):
             continue
         if order.parallel(2, 3, 4) or (order.revolute[1] and order.parallel(1, 2, 3)):
-            raise NotApplicableError("three successive axes are parallel: that is closed form")
+            raise NotApplicableError(
+                "three successive axes are parallel: that is closed form"
+            )
         return order
     raise NotApplicableError(
         f"not {slides[0]} and a revolute joint before two with parallel axes and two whose axes meet, "
@@ -120,7 +138,14 @@ def _structure(six: PoseJoints) -> PoseJoints:
     )
 
 
-@ik_family("polynomial", source="resultant of two equations linear in a cosine and a sine; this module's docstring")
-def polynomial(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> PolynomialSolver:
+@ik_family(
+    "polynomial",
+    source="resultant of two equations linear in a cosine and a sine; this module's docstring",
+)
+def polynomial(
+    geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
+) -> PolynomialSolver:
     """Fit the family: a pose, and six joints left over that have the module's structure."""
-    return PolynomialSolver(geometry, redundant, _structure(PoseJoints.of(geometry, task_map, redundant)))
+    return PolynomialSolver(
+        geometry, redundant, _structure(PoseJoints.of(geometry, task_map, redundant))
+    )

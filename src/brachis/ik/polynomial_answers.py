@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.ik.displacement import Displacement
-from brachis.ik.vectors import angle_about, apply, apply_inverse, dot, meeting_point, rotate
+from brachis.ik.vectors import (
+    angle_about,
+    apply,
+    apply_inverse,
+    dot,
+    meeting_point,
+    rotate,
+)
 
 
 def joints_of_roots(equation: Displacement, turn: int, roots: np.ndarray) -> np.ndarray:
@@ -23,9 +30,15 @@ def joints_of_roots(equation: Displacement, turn: int, roots: np.ndarray) -> np.
     moved = points[:, turn] + rotate(a, -angle, moved - points[:, turn])
     if turn == 0:
         moved = moved - rail
-    first = angle_about(n, points[:, 3] - points[:, 2], moved - points[:, 2] - rotate(n, theta, wrist - points[:, 3]))
+    first = angle_about(
+        n,
+        points[:, 3] - points[:, 2],
+        moved - points[:, 2] - rotate(n, theta, wrist - points[:, 3]),
+    )
     second = np.sign(dot(n, axes[:, 3])) * (theta - first)
     forth = rotate(n, -theta, rotate(a, -angle, apply(rotation, v)))
     back = apply_inverse(rotation, rotate(a, angle, rotate(n, theta, u)))
     before = (angle, slide) if turn == 0 else (slide, angle)
-    return np.stack([*before, first, second, angle_about(u, v, forth), angle_about(v, back, u)])
+    return np.stack(
+        [*before, first, second, angle_about(u, v, forth), angle_about(v, back, u)]
+    )

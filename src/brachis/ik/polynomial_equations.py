@@ -82,12 +82,18 @@ class Equations:
         level[0] += dot(u, v)
         way[0] -= dot(n, wrist - start)
         alpha = dot(plane, u) * np.conj(_flat(direction))
-        harmonics = np.stack([alpha, level, rail[:, 0], way, _flat(position), _flat(rail)], axis=1)
+        harmonics = np.stack(
+            [alpha, level, rail[:, 0], way, _flat(position), _flat(rail)], axis=1
+        )
         return cls(harmonics, dot(plane, middle - start), dot(plane, wrist - middle))
 
     def __getitem__(self, samples: np.ndarray) -> Equations:
         """Return some of the K."""
-        return Equations(np.take(self.harmonics, samples, axis=2), self.arm[samples], self.lever[samples])
+        return Equations(
+            np.take(self.harmonics, samples, axis=2),
+            self.arm[samples],
+            self.lever[samples],
+        )
 
     def terms(self, angle: np.ndarray) -> Terms:
         """Terms at angles (..., K)."""
@@ -96,19 +102,26 @@ class Equations:
 
     def _rates(self, angle: np.ndarray) -> Terms:
         """Differentiate the terms with respect to q_a at angles (K,)."""
-        return Terms.of(self.harmonics[2] * np.cos(angle) - self.harmonics[1] * np.sin(angle))
+        return Terms.of(
+            self.harmonics[2] * np.cos(angle) - self.harmonics[1] * np.sin(angle)
+        )
 
     def _distance(self, terms: Terms) -> tuple[np.ndarray, np.ndarray]:
         """Beta and right side of the third equation without p, times the square of the rate: ``Re(beta E) = right``."""
         scaled = terms.rate * terms.place - terms.way * terms.slide
-        right = _square(scaled) + terms.rate**2 * (_square(self.lever) - _square(self.arm))
+        right = _square(scaled) + terms.rate**2 * (
+            _square(self.lever) - _square(self.arm)
+        )
         return 2.0 * terms.rate * self.lever * np.conj(scaled), right
 
     def resultant(self, angles: np.ndarray) -> np.ndarray:
         """Trigonometric polynomial F at angles (S,): (S, K)."""
         terms = self.terms(angles[:, None])
         beta, right = self._distance(terms)
-        return _square(right * terms.alpha - terms.level * beta) - (terms.alpha * np.conj(beta)).imag ** 2
+        return (
+            _square(right * terms.alpha - terms.level * beta)
+            - (terms.alpha * np.conj(beta)).imag ** 2
+        )
 
     def guesses(self, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Guess solutions for q_a, (K,), which are roots of the resultant but for rounding.
@@ -126,13 +139,23 @@ class Equations:
         # believes. Where alpha is small, those of the third are better. Where the rail hardly moves the wrist along n,
         # way, rate and beta vanish together: F has a fourfold root, and p follows from the distance instead.
         flat, sideways = np.abs(terms.alpha) < _SMALL, np.abs(terms.rate) < _SMALL
-        theta = np.stack([*_cosine_roots(terms.alpha, terms.level), *_cosine_roots(beta, right)])
-        miss = np.abs((beta * np.exp(1j * theta)).real - right) / (np.abs(beta) + np.abs(right))
+        theta = np.stack(
+            [*_cosine_roots(terms.alpha, terms.level), *_cosine_roots(beta, right)]
+        )
+        miss = np.abs((beta * np.exp(1j * theta)).real - right) / (
+            np.abs(beta) + np.abs(right)
+        )
         of_first = np.array([True, True, False, False])[:, None]
         free = np.abs(beta) < _SMALL  # the third equation does not know theta then
-        usual = np.where(of_first, free | (miss < _CREDIBLE) | (miss <= miss[:2].min(axis=0)) | sideways, flat)
+        usual = np.where(
+            of_first,
+            free | (miss < _CREDIBLE) | (miss <= miss[:2].min(axis=0)) | sideways,
+            flat,
+        )
         unusual = sideways & (of_first | flat)
-        slides = np.stack(np.broadcast_arrays(terms.way / terms.rate, *self._slides(terms, theta)))
+        slides = np.stack(
+            np.broadcast_arrays(terms.way / terms.rate, *self._slides(terms, theta))
+        )
         kept = np.stack([usual, unusual, unusual])
         _, choice, which = np.nonzero(kept)
         return which, np.stack([angle[which], slides[kept], theta[choice, which]])
@@ -141,7 +164,11 @@ class Equations:
         """Both p that solve the third equation, or the nearest to it."""
         away = terms.place - self.lever * np.exp(1j * theta)
         size, middle = _square(terms.slide), _along(away, terms.slide)
-        root = np.sqrt(np.maximum(middle * middle - size * (_square(away) - _square(self.arm)), 0.0))
+        root = np.sqrt(
+            np.maximum(
+                middle * middle - size * (_square(away) - _square(self.arm)), 0.0
+            )
+        )
         return (middle - root) / size, (middle + root) / size
 
     def polished(self, roots: np.ndarray) -> np.ndarray:
@@ -153,23 +180,42 @@ class Equations:
                 step = equations._step(*some)
                 some = some - step
             roots[:, rough] = some
-            left = np.flatnonzero(np.abs(step).max(axis=0) > _EXACT * (1.0 + np.abs(some[1])))
+            left = np.flatnonzero(
+                np.abs(step).max(axis=0) > _EXACT * (1.0 + np.abs(some[1]))
+            )
             rough, equations = rough[left], equations[left]
             if len(rough) == 0:
                 break
         return roots
 
-    def _step(self, angle: np.ndarray, slide: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    def _step(
+        self, angle: np.ndarray, slide: np.ndarray, theta: np.ndarray
+    ) -> np.ndarray:
         """One step (3, K) of Newton's method, by Cramer's rule."""
-        t, d, turn, none = self.terms(angle), self._rates(angle), np.exp(1j * theta), np.zeros_like(angle)
+        t, d, turn, none = (
+            self.terms(angle),
+            self._rates(angle),
+            np.exp(1j * theta),
+            np.zeros_like(angle),
+        )
         gap = t.place - slide * t.slide - self.lever * turn
-        gap_rates = np.stack([d.place - slide * d.slide, -t.slide, -1j * self.lever * turn])
-        first = np.stack([(d.alpha * turn).real - d.level, none, -(t.alpha * turn).imag])
+        gap_rates = np.stack(
+            [d.place - slide * d.slide, -t.slide, -1j * self.lever * turn]
+        )
+        first = np.stack(
+            [(d.alpha * turn).real - d.level, none, -(t.alpha * turn).imag]
+        )
         second = np.stack([d.way - slide * d.rate, -t.rate, none])
         third = 2.0 * _along(gap, gap_rates)
-        values = (t.alpha * turn).real - t.level, t.way - slide * t.rate, _square(gap) - _square(self.arm)
+        values = (
+            (t.alpha * turn).real - t.level,
+            t.way - slide * t.rate,
+            _square(gap) - _square(self.arm),
+        )
         columns = cross(second, third), cross(third, first), cross(first, second)
-        step = sum(value * column for value, column in zip(values, columns, strict=True)) / dot(first, columns[0])
+        step = sum(
+            value * column for value, column in zip(values, columns, strict=True)
+        ) / dot(first, columns[0])
         step[::2] = np.clip(step[::2], -_LONGEST_STEP, _LONGEST_STEP)
         return step
 
@@ -177,7 +223,12 @@ class Equations:
 def _turned_back(axis: np.ndarray, frame: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Components of R_a^T vector in the frame: constant part, factors of cos q_a and sin q_a, (3, 3, K)."""
     along = axis[:, None] * dot(axis[:, None], frame)
-    return np.stack([dot(part, vector[:, None]) for part in (along, frame - along, cross(axis[:, None], frame))])
+    return np.stack(
+        [
+            dot(part, vector[:, None])
+            for part in (along, frame - along, cross(axis[:, None], frame))
+        ]
+    )
 
 
 def _flat(components: np.ndarray) -> np.ndarray:
@@ -195,7 +246,9 @@ def _along(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return first.real * second.real + first.imag * second.imag
 
 
-def _cosine_roots(coefficient: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _cosine_roots(
+    coefficient: np.ndarray, level: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Both angles with ``Re(coefficient exp(i theta)) = level``, or the nearest to it."""
     half = np.arccos(np.clip(level / np.abs(coefficient), -1.0, 1.0))
     middle = -np.angle(coefficient)

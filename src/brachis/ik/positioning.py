@@ -23,7 +23,12 @@ import numpy as np
 
 from brachis.errors import write_count
 from brachis.ik.arm import Arm, RemainingJoints, random_postures
-from brachis.ik.factored_solver import FactoredSolver, PlacingStructure, fitted, recipe_for
+from brachis.ik.factored_solver import (
+    FactoredSolver,
+    PlacingStructure,
+    fitted,
+    recipe_for,
+)
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, PosedScrews, Screw
 from brachis.robot import TaskMap
@@ -81,28 +86,41 @@ class PositioningSolver(FactoredSolver[ToolStructure]):
     """
 
     def __init__(
-        self, geometry: ChainGeometry, redundant: tuple[int, ...], structure: ToolStructure, rows: Sequence[int]
+        self,
+        geometry: ChainGeometry,
+        redundant: tuple[int, ...],
+        structure: ToolStructure,
+        rows: Sequence[int],
     ) -> None:
         super().__init__(geometry, redundant, structure)
         self._order = np.argsort(rows)
 
-    def steps(self, targets: np.ndarray, q_r: np.ndarray) -> tuple[Arm, Sequence[np.ndarray]]:
+    def steps(
+        self, targets: np.ndarray, q_r: np.ndarray
+    ) -> tuple[Arm, Sequence[np.ndarray]]:
         """See `FactoredSolver.steps`."""
         structure = self._structure
         posed = self._geometry.held(self._redundant, q_r)
-        tool, target = posed.tool_position[:, None, None], targets.T[self._order, None, None]
+        tool, target = (
+            posed.tool_position[:, None, None],
+            targets.T[self._order, None, None],
+        )
         start, end = (target, tool) if structure.joints.mirrored else (tool, target)
         arm = structure.arm(structure.joints.screws(posed, alternatives=2), start)
         return arm, structure.recipe.solve(arm, end)
 
 
 @ik_family("positioning", source="Pieper 1968; Paden 1985; IK-Geo 2022; `placing`")
-def positioning(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> PositioningSolver:
+def positioning(
+    geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
+) -> PositioningSolver:
     """Fit the family: the tool's position alone is prescribed, and three joints are left over for it."""
     if isinstance(task_map, Pose) or len(task_map.axes) != _JOINTS:
         raise NotApplicableError("only for the position: x, y and z")
     if geometry.n - len(redundant) != _JOINTS:
-        raise NotApplicableError(f"{write_count(geometry.n - len(redundant), 'joint')} would be left over, not three")
+        raise NotApplicableError(
+            f"{write_count(geometry.n - len(redundant), 'joint')} would be left over, not three"
+        )
     three = RemainingJoints.beside(geometry, redundant)
     _refuse_idle(geometry, three)
     structure = fitted(geometry, three, (ToolStructure.of,))
@@ -111,7 +129,11 @@ def positioning(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int
 
 def _refuse_idle(geometry: ChainGeometry, three: RemainingJoints) -> None:
     """Refuse a joint that never moves the tool: the last one, often, if the tool is on its axis."""
-    speeds = np.abs(random_postures(geometry).jacobian_columns(three.joints)[:_JOINTS]).max(axis=(0, 2))
+    speeds = np.abs(
+        random_postures(geometry).jacobian_columns(three.joints)[:_JOINTS]
+    ).max(axis=(0, 2))
     for name, speed in zip(three.names, speeds, strict=True):
         if speed < _VANISHES:
-            raise NotApplicableError(f"J_nr is singular everywhere: {name} does not move the tool")
+            raise NotApplicableError(
+                f"J_nr is singular everywhere: {name} does not move the tool"
+            )

@@ -22,23 +22,31 @@ class PrismaticSolver(IKSolver):
 
     kind: Kind = "closed_form"
 
-    def __init__(self, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> None:
+    def __init__(
+        self, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
+    ) -> None:
         self._geometry = geometry
         self._redundant = list(redundant)
         self._rest = complement(geometry.n, redundant)
         self._rows = list(task_map.axes)
-        postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, geometry.n))
+        postures = np.random.default_rng(0).uniform(
+            -np.pi, np.pi, (_SAMPLES, geometry.n)
+        )
         determinants = np.linalg.det(self._directions(postures)[1])
         self._scale = float(np.abs(determinants).max())
-        if self._scale < 1e-9:  # noqa: PLR2004
+        if self._scale < 1e-9:
             raise NotApplicableError("J_nr is singular everywhere")
         turns = np.ptp(determinants) > 1e-9 * self._scale
-        self.branches: tuple[str, ...] = ("slides_positive", "slides_negative") if turns else ("slides",)
+        self.branches: tuple[str, ...] = (
+            ("slides_positive", "slides_negative") if turns else ("slides",)
+        )
 
     def _directions(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Task coordinates (K, m) and the matrix D (K, m, m) of the slides' directions."""
         posed = self._geometry.posed(q)
-        return posed.tool_position[self._rows].T, np.moveaxis(posed.axes[self._rows][:, self._rest], 2, 0)
+        return posed.tool_position[self._rows].T, np.moveaxis(
+            posed.axes[self._rows][:, self._rest], 2, 0
+        )
 
     def solve(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
         """See `IKSolver.solve`."""
@@ -64,13 +72,21 @@ class PrismaticSolver(IKSolver):
 
 
 @ik_family("prismatic", source="linear in the slides; this module's docstring")
-def prismatic(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> PrismaticSolver:
+def prismatic(
+    geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
+) -> PrismaticSolver:
     """Fit the family: every non-redundant joint is prismatic and no angle is prescribed."""
     if isinstance(task_map, Pose):
         raise NotApplicableError("a whole pose is prescribed")
-    turning = [geometry.joint_names[i] for i in complement(geometry.n, redundant) if geometry.revolute[i]]
+    turning = [
+        geometry.joint_names[i]
+        for i in complement(geometry.n, redundant)
+        if geometry.revolute[i]
+    ]
     if turning:
-        raise NotApplicableError(f"{', '.join(turning)} would be left over and not prismatic")
+        raise NotApplicableError(
+            f"{', '.join(turning)} would be left over and not prismatic"
+        )
     if isinstance(task_map, RowsAndYaw):
         raise NotApplicableError("prismatic joints do not change yaw")
     return PrismaticSolver(geometry, task_map, redundant)

@@ -51,7 +51,9 @@ class IKSolver(ABC):
             Chain order; angles in (-pi, pi] or any other turn; NaN where there is no answer, or no further one.
         """
 
-    def solve_branch(self, targets: np.ndarray, q_r: np.ndarray, branch: int) -> np.ndarray:
+    def solve_branch(
+        self, targets: np.ndarray, q_r: np.ndarray, branch: int
+    ) -> np.ndarray:
         """Non-redundant joints of one branch, (K, A, m); see `solve`. Families to which this saves work override it."""
         return self.solve(targets, q_r)[:, branch]
 

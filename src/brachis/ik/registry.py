@@ -38,7 +38,15 @@ from brachis.robot import Robot, TaskMap
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import AXES, POSE_ROWS
 
-BUILTIN: tuple[Family, ...] = (prismatic, planar, positioning, spherical_wrist, parallel_axes, eaik, polynomial)
+BUILTIN: tuple[Family, ...] = (
+    prismatic,
+    planar,
+    positioning,
+    spherical_wrist,
+    parallel_axes,
+    eaik,
+    polynomial,
+)
 
 _NEAR = 2e-3
 """Axes this near (rad, m) to those of an ideal arm may be meant to be there."""
@@ -78,7 +86,9 @@ class Match(Candidate):
 @cache
 def plugin_families() -> tuple[Family, ...]:
     """Families of other packages, from the entry-point group ``brachis.ik``; a broken one says so when it is tried."""
-    return tuple(_loaded(entry) for entry in importlib.metadata.entry_points(group="brachis.ik"))
+    return tuple(
+        _loaded(entry) for entry in importlib.metadata.entry_points(group="brachis.ik")
+    )
 
 
 def _loaded(entry: importlib.metadata.EntryPoint) -> Family:
@@ -97,7 +107,13 @@ def _loaded(entry: importlib.metadata.EntryPoint) -> Family:
     return Family(entry.name, refuse, entry.value)
 
 
-def find(robot: Robot, task_map: TaskMap, redundant_joints: Sequence[str], *, families: Sequence[Family] = ()) -> Match:
+def find(
+    robot: Robot,
+    task_map: TaskMap,
+    redundant_joints: Sequence[str],
+    *,
+    families: Sequence[Family] = (),
+) -> Match:
     """Find the closed form for a choice of redundant joints.
 
     Parameters
@@ -123,15 +139,21 @@ def find(robot: Robot, task_map: TaskMap, redundant_joints: Sequence[str], *, fa
     names = tuple(redundant_joints)
     for name in names:
         if name not in robot.joint_names:
-            raise UnknownNameError("joint", name, robot.joint_names, where="redundant_joints")
+            raise UnknownNameError(
+                "joint", name, robot.joint_names, where="redundant_joints"
+            )
     r = robot.n - task_map.m
     if len(set(names)) != len(names) or len(names) != r:
         joints = write_count(robot.n, "joint")
         rows = write_count(task_map.m, "row")
         raise DecompositionError(
-            "wrong number of redundant joints" if r >= 0 else "the robot has fewer joints than the task space has rows",
+            "wrong number of redundant joints"
+            if r >= 0
+            else "the robot has fewer joints than the task space has rows",
             redundant_joints=names,
-            found=f"{len(names)} ({', '.join(names) or 'none'})" if r >= 0 else f"{robot.n} for {task_map.m} rows",
+            found=f"{len(names)} ({', '.join(names) or 'none'})"
+            if r >= 0
+            else f"{robot.n} for {task_map.m} rows",
             allowed=f"{r}: {joints} less {rows} ({', '.join(task_map.rows)})"
             if r >= 0
             else f"at most {robot.n} rows; or task_space: joints, with a path of the joints such as "
@@ -139,7 +161,11 @@ def find(robot: Robot, task_map: TaskMap, redundant_joints: Sequence[str], *, fa
         )
     candidate = _try(robot, task_map, names, families, _ideals(robot, task_map))
     if not isinstance(candidate, Match):
-        available = [c.redundant_joints for c in find_all(robot, task_map, families=families) if c.solver is not None]
+        available = [
+            c.redundant_joints
+            for c in find_all(robot, task_map, families=families)
+            if c.solver is not None
+        ]
         raise DecompositionError(
             f"no closed form for redundant joints [{', '.join(names)}]",
             redundant_joints=names,
@@ -149,13 +175,18 @@ def find(robot: Robot, task_map: TaskMap, redundant_joints: Sequence[str], *, fa
     return candidate
 
 
-def find_all(robot: Robot, task_map: TaskMap, *, families: Sequence[Family] = ()) -> list[Candidate]:
+def find_all(
+    robot: Robot, task_map: TaskMap, *, families: Sequence[Family] = ()
+) -> list[Candidate]:
     """Try every choice of redundant joints; see `find`. Paths of joints need no closed form."""
     r = robot.n - task_map.m
     if r < 0 or isinstance(task_map, JointSpace):
         return []
     ideals = _ideals(robot, task_map)
-    return [_try(robot, task_map, names, families, ideals) for names in itertools.combinations(robot.joint_names, r)]
+    return [
+        _try(robot, task_map, names, families, ideals)
+        for names in itertools.combinations(robot.joint_names, r)
+    ]
 
 
 def _ideals(robot: Robot, task_map: TaskMap) -> Callable[[float], Ideal | None]:
@@ -180,7 +211,9 @@ def _try(
         match = _fitting(robot, task_map, redundant, tried, reasons, ideal)
     if match is None and (rough := ideals(_NEAR)):
         _name_rounding(task_map, redundant, tried, reasons, rough)
-    return match or Candidate(tuple(robot.joint_names[i] for i in redundant), None, None, reasons)
+    return match or Candidate(
+        tuple(robot.joint_names[i] for i in redundant), None, None, reasons
+    )
 
 
 def _fitting(
@@ -195,7 +228,9 @@ def _fitting(
     geometry = ChainGeometry.of(robot)
     for family in families:
         try:
-            solver = family.build(ideal.geometry if ideal else geometry, task_map, redundant)
+            solver = family.build(
+                ideal.geometry if ideal else geometry, task_map, redundant
+            )
             if ideal:
                 solver = Polished(solver, geometry, task_map, redundant)
             check_answers(robot, task_map, redundant, solver)
@@ -204,16 +239,32 @@ def _fitting(
         except Exception as error:
             if family in BUILTIN:
                 raise
-            reasons[family.name] = f"its code failed: {type(error).__name__}: {error}"  # another package's fault
+            reasons[family.name] = (
+                f"its code failed: {type(error).__name__}: {error}"  # another package's fault
+            )
         else:
             reasons.pop(family.name, None)
-            remark = f"axes within {ideal.miss} of an ideal arm's: answers are polished" if ideal else ""
-            return Match(tuple(robot.joint_names[i] for i in redundant), family.name, solver, reasons, remark)
+            remark = (
+                f"axes within {ideal.miss} of an ideal arm's: answers are polished"
+                if ideal
+                else ""
+            )
+            return Match(
+                tuple(robot.joint_names[i] for i in redundant),
+                family.name,
+                solver,
+                reasons,
+                remark,
+            )
     return None
 
 
 def _name_rounding(
-    task_map: TaskMap, redundant: tuple[int, ...], families: Sequence[Family], reasons: dict[str, str], ideal: Ideal
+    task_map: TaskMap,
+    redundant: tuple[int, ...],
+    families: Sequence[Family],
+    reasons: dict[str, str],
+    ideal: Ideal,
 ) -> None:
     """Put down which families would fit if the axes were nearer to the ideal arm's."""
     if max(ideal.turned, ideal.shifted) < TOLERANCE:
@@ -228,7 +279,8 @@ def _name_rounding(
 
 
 NO_CLOSED_FORM = (
-    "no choice of redundant joints has a closed form: motions are planned from differential inverse kinematics"
+    "no choice of redundant joints has a closed form: "
+    "motions are planned from differential inverse kinematics"
 )
 """Of a robot and a task space without any."""
 _INSTALLING = "installing it takes a C++ compiler except on macOS and on Linux for x86_64 with Python 3.13 or older"
@@ -251,7 +303,8 @@ def missing_eaik(candidates: Sequence[Candidate]) -> str:
     further = [
         candidate.redundant_joints
         for candidate in candidates
-        if candidate.solver is None and candidate.reasons.get(eaik.name) == NOT_INSTALLED
+        if candidate.solver is None
+        and candidate.reasons.get(eaik.name) == NOT_INSTALLED
     ]
     if not further:
         return ""
@@ -265,7 +318,13 @@ _PARALLEL = 1e-9
 def natural_space(robot: Robot) -> str | list[str]:
     """Return the task space of a whole pose, of three rows, or of those of the plane in which a robot moves."""
     geometry = ChainGeometry.of(robot)
-    along = np.abs(np.where(geometry.revolute[:, None], 1.0 - np.abs(geometry.axes), np.abs(geometry.axes)))
+    along = np.abs(
+        np.where(
+            geometry.revolute[:, None],
+            1.0 - np.abs(geometry.axes),
+            np.abs(geometry.axes),
+        )
+    )
     normals = np.flatnonzero(np.all(along < _PARALLEL, axis=0))
     if len(normals):
         return [row for i, row in enumerate(AXES) if i != normals[0]][: robot.n]

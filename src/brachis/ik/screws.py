@@ -82,19 +82,26 @@ class Circle:
         """Position at an angle of which cosine and sine are known, (3, ...)."""
         return self.arm * cos + self.across * sin + self.middle
 
-    def component(self, direction: np.ndarray, level: np.ndarray, slot: int) -> np.ndarray:
+    def component(
+        self, direction: np.ndarray, level: np.ndarray, slot: int
+    ) -> np.ndarray:
         """Angles at which ``direction . position = level``: growing with the angle at the first, falling at the second.
 
         The two follow each other along the axis `slot`; NaN where there is none.
         """
         level = level - dot(direction, self.middle)
-        return np.concatenate(cosine_roots(dot(direction, self.arm), dot(direction, self.across), level), axis=slot)
+        return np.concatenate(
+            cosine_roots(dot(direction, self.arm), dot(direction, self.across), level),
+            axis=slot,
+        )
 
     def distance(self, other: np.ndarray, squared: np.ndarray, slot: int) -> np.ndarray:
         """Angles at a distance from another position: approaching it at the first, leaving it at the second."""
         away = other - self.middle
         level = 0.5 * (dot(away, away) + dot(self.arm, self.arm) - squared)
-        return np.concatenate(cosine_roots(dot(away, self.arm), dot(away, self.across), level), axis=slot)
+        return np.concatenate(
+            cosine_roots(dot(away, self.arm), dot(away, self.across), level), axis=slot
+        )
 
 
 @dataclass(frozen=True)
@@ -108,7 +115,9 @@ class Line:
         """Position after a slide, (3, ...)."""
         return self.start + self.axis * slide
 
-    def component(self, direction: np.ndarray, level: np.ndarray, slot: int) -> np.ndarray:  # noqa: ARG002
+    def component(
+        self, direction: np.ndarray, level: np.ndarray, slot: int
+    ) -> np.ndarray:
         """Return the slide at which ``direction . position = level``; it is the only one, so `slot` is not used."""
         return (level - dot(direction, self.start)) / dot(direction, self.axis)
 
@@ -147,7 +156,9 @@ class PosedScrews:
         chosen = list(joints)
         axes, turns = self.axes[:, chosen], self.revolute[chosen][:, None]
         lever = self.tool_position[:, None] - self.points[:, chosen]
-        return np.concatenate([np.where(turns, cross(axes, lever), axes), np.where(turns, axes, 0.0)])
+        return np.concatenate(
+            [np.where(turns, cross(axes, lever), axes), np.where(turns, axes, 0.0)]
+        )
 
 
 @dataclass(frozen=True)
@@ -183,7 +194,7 @@ class ChainGeometry:
         data = robot.model.createData()
         columns = pin.computeJointJacobians(robot.model, data, zero).reshape(6, robot.n)
         linear, angular = columns[:3].T, columns[3:].T
-        revolute = np.linalg.norm(angular, axis=1) > 0.5  # noqa: PLR2004  (unit or zero)
+        revolute = np.linalg.norm(angular, axis=1) > 0.5
         placement = robot.tool_placement(zero)
         return cls(
             joint_names=robot.joint_names,
@@ -205,7 +216,10 @@ class ChainGeometry:
 
         They act from the left on the columns' index of rotation matrices (3, 3, K or 1): one product for all samples.
         """
-        skews = [np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]) for x, y, z in self.axes]
+        skews = [
+            np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+            for x, y, z in self.axes
+        ]
         return [(skew, skew @ skew) for skew in skews]
 
     def posed(self, q: np.ndarray) -> PosedScrews:
@@ -238,7 +252,10 @@ class ChainGeometry:
         """Move joints one after the other; q is (n, K), and `moving` says which of them move at all."""
         count = q.shape[1]
         axes, points = (np.empty((3, self.n, count), dtype=q.dtype) for _ in range(2))
-        rotation, offset = np.eye(3, dtype=q.dtype)[:, :, None], np.zeros((3, 1), dtype=q.dtype)
+        rotation, offset = (
+            np.eye(3, dtype=q.dtype)[:, :, None],
+            np.zeros((3, 1), dtype=q.dtype),
+        )
         placed = 0
         for i in np.flatnonzero(moving).tolist():
             here = slice(placed, i + 1)
@@ -246,7 +263,11 @@ class ChainGeometry:
             points[:, here] = self.points[here] @ rotation + offset[:, None]
             if self.revolute[i]:
                 first, second = self._generators[i]
-                rotation = rotation + (first @ rotation) * np.sin(q[i]) + (second @ rotation) * (1.0 - np.cos(q[i]))
+                rotation = (
+                    rotation
+                    + (first @ rotation) * np.sin(q[i])
+                    + (second @ rotation) * (1.0 - np.cos(q[i]))
+                )
                 offset = points[:, i] - (self.points[i, None] @ rotation)[:, 0]
             else:
                 offset = offset + axes[:, i] * q[i]
@@ -256,5 +277,9 @@ class ChainGeometry:
         position = (self.tool_position[None] @ rotation)[:, 0] + offset
         tool = self.tool_rotation.T @ rotation
         return PosedScrews(
-            axes, points, np.broadcast_to(position, (3, count)), np.broadcast_to(tool, (3, 3, count)), self.revolute
+            axes,
+            points,
+            np.broadcast_to(position, (3, count)),
+            np.broadcast_to(tool, (3, 3, count)),
+            self.revolute,
         )

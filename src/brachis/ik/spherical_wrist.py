@@ -32,7 +32,13 @@ import numpy as np
 from brachis.common.arrays import cross
 from brachis.ik.arm import Anchor, Arm, PoseJoints, RemainingJoints, meeting, miss
 from brachis.ik.displacement import Displacement
-from brachis.ik.factored_solver import Factor, FactoredSolver, PlacingStructure, fitted, recipe_for
+from brachis.ik.factored_solver import (
+    Factor,
+    FactoredSolver,
+    PlacingStructure,
+    fitted,
+    recipe_for,
+)
 from brachis.ik.placing import FLIP
 from brachis.ik.protocol import NotApplicableError, ik_family
 from brachis.ik.screws import ChainGeometry, Circle, PosedScrews, Screw
@@ -48,7 +54,11 @@ def wrist_factor(arm: Arm) -> np.ndarray:
     return dot(u.axis, cross(w.axis, v.axis))
 
 
-WRIST = Factor(wrist_factor, "the axes of {u}, {v}, {w} always are parallel to one plane", ("noflip", "flip"))
+WRIST = Factor(
+    wrist_factor,
+    "the axes of {u}, {v}, {w} always are parallel to one plane",
+    ("noflip", "flip"),
+)
 
 
 @dataclass(frozen=True)
@@ -91,7 +101,10 @@ class WristStructure(PlacingStructure):
 
     def words(self) -> dict[str, str]:
         """See `Structure.words`."""
-        return {**dict(zip("abcuvw", self.joints.names, strict=True)), "point": _point(self.joints)}
+        return {
+            **dict(zip("abcuvw", self.joints.names, strict=True)),
+            "point": _point(self.joints),
+        }
 
     def posed(self, posed: PosedScrews) -> Arm:
         """See `Structure.posed`."""
@@ -120,20 +133,35 @@ def _reason_against_centre(six: RemainingJoints) -> str:
 class SphericalWristSolver(FactoredSolver[WristStructure]):
     """Closed form of six joints with a spherical wrist or shoulder; see the module's formulas."""
 
-    def steps(self, targets: np.ndarray, q_r: np.ndarray) -> tuple[Arm, Sequence[np.ndarray]]:
+    def steps(
+        self, targets: np.ndarray, q_r: np.ndarray
+    ) -> tuple[Arm, Sequence[np.ndarray]]:
         """See `FactoredSolver.steps`."""
         mirrored = self._structure.joints.mirrored
-        equation = Displacement.of(self._geometry, self._redundant, targets, q_r, mirrored=mirrored)
-        rotation, translation = equation.rotation[:, :, None, None, None], equation.translation[:, None, None, None]
+        equation = Displacement.of(
+            self._geometry, self._redundant, targets, q_r, mirrored=mirrored
+        )
+        rotation, translation = (
+            equation.rotation[:, :, None, None, None],
+            equation.translation[:, None, None, None],
+        )
         arm = self._structure.arm(equation.screws())
-        base = self._structure.recipe.solve(arm, apply(rotation, arm.centre) + translation)
+        base = self._structure.recipe.solve(
+            arm, apply(rotation, arm.centre) + translation
+        )
         return arm, (*base, *_wrist(arm, base, rotation))
 
 
-def _wrist(arm: Arm, base: tuple[np.ndarray, ...], rotation: np.ndarray) -> tuple[np.ndarray, ...]:
+def _wrist(
+    arm: Arm, base: tuple[np.ndarray, ...], rotation: np.ndarray
+) -> tuple[np.ndarray, ...]:
     """Solve R_u R_v R_w = (R_a R_b R_c)^-1 R_D for the angles of u, v, w."""
     u, v, w = arm.wrist
-    turns = [(joint.axis, np.cos(q), np.sin(q)) for joint, q in zip(arm.base, base, strict=True) if joint.revolute]
+    turns = [
+        (joint.axis, np.cos(q), np.sin(q))
+        for joint, q in zip(arm.base, base, strict=True)
+        if joint.revolute
+    ]
     end = apply(rotation, w.axis)
     for axis, cos, sin in turns:
         end = Circle.of(axis, end).turned(cos, -sin)
@@ -149,10 +177,17 @@ def _wrist(arm: Arm, base: tuple[np.ndarray, ...], rotation: np.ndarray) -> tupl
     return first, bend, last
 
 
-@ik_family("spherical_wrist", source="Pieper 1968; Paden 1985; Brandstoetter et al. 2014; IK-Geo 2022; `placing`")
-def spherical_wrist(geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]) -> SphericalWristSolver:
+@ik_family(
+    "spherical_wrist",
+    source="Pieper 1968; Paden 1985; Brandstoetter et al. 2014; IK-Geo 2022; `placing`",
+)
+def spherical_wrist(
+    geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
+) -> SphericalWristSolver:
     """Fit the family: a pose, and six joints left over of which the last or the first three axes meet in a point."""
     six = PoseJoints.of(geometry, task_map, redundant)
     return SphericalWristSolver(
-        geometry, redundant, fitted(geometry, six, (WristStructure.of, WristStructure.backwards))
+        geometry,
+        redundant,
+        fitted(geometry, six, (WristStructure.of, WristStructure.backwards)),
     )

@@ -24,7 +24,10 @@ _NEARLY_REAL = 1e-2
 @cache
 def _conversion(degree: int) -> np.ndarray:
     """Coefficients (2 d + 1, d + 1) of (1 + i t)^(d + k) (1 - i t)^(d - k) for k = 0 ... d, highest power first."""
-    columns = [(-1.0) ** k * np.poly([1j] * (degree + k) + [-1j] * (degree - k)) for k in range(degree + 1)]
+    columns = [
+        (-1.0) ** k * np.poly([1j] * (degree + k) + [-1j] * (degree - k))
+        for k in range(degree + 1)
+    ]
     return np.stack(columns, axis=1)
 
 
@@ -55,7 +58,9 @@ def real_roots(samples: np.ndarray, degree: int) -> np.ndarray:
     sound = np.isfinite(size) & (size > 0.0)
     samples = np.where(sound, samples, 1.0) / np.where(sound, size, 1.0)
     start = 2.0 * np.pi * np.argmax(np.abs(samples), axis=0) / count + np.pi
-    harmonics = np.fft.rfft(samples, axis=0)[: degree + 1] * np.exp(1j * np.arange(degree + 1)[:, None] * start)
+    harmonics = np.fft.rfft(samples, axis=0)[: degree + 1] * np.exp(
+        1j * np.arange(degree + 1)[:, None] * start
+    )
     harmonics[1:] *= 2.0
     coefficients = (_conversion(degree) @ harmonics).real
     companion = np.zeros((samples.shape[1], 2 * degree, 2 * degree))

@@ -27,12 +27,20 @@ def across(axis: np.ndarray, vector: np.ndarray) -> np.ndarray:
 def rotate(axis: np.ndarray, angle: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Turn a vector about a unit axis (Rodrigues' formula), shape (3, ...)."""
     cos, sin = np.cos(angle), np.sin(angle)
-    return vector * cos + cross(axis, vector) * sin + axis * (dot(axis, vector) * (1.0 - cos))
+    return (
+        vector * cos
+        + cross(axis, vector) * sin
+        + axis * (dot(axis, vector) * (1.0 - cos))
+    )
 
 
 def apply(rotation: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Apply rotation matrices (3, 3, ...) to vectors (3, ...)."""
-    return rotation[:, 0] * vector[0] + rotation[:, 1] * vector[1] + rotation[:, 2] * vector[2]
+    return (
+        rotation[:, 0] * vector[0]
+        + rotation[:, 1] * vector[1]
+        + rotation[:, 2] * vector[2]
+    )
 
 
 def apply_inverse(rotation: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -49,7 +57,9 @@ def angle_about(axis: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndar
     return np.arctan2(dot(axis, cross(start, end)), dot(start, end))
 
 
-def cosine_roots(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def cosine_roots(
+    a: np.ndarray, b: np.ndarray, c: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Angles at which ``a cos + b sin = c``.
 
     Returns
@@ -77,10 +87,14 @@ def perpendiculars(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first, np.stack([mixed, sign + y * y * scale, -y])
 
 
-def meeting_point(axis: np.ndarray, point: np.ndarray, other: np.ndarray, through: np.ndarray) -> np.ndarray:
+def meeting_point(
+    axis: np.ndarray, point: np.ndarray, other: np.ndarray, through: np.ndarray
+) -> np.ndarray:
     """Position on the line through `point` along `axis` that is nearest to a second line, (3, ...)."""
     normal = cross(axis, other)
-    return point + axis * (dot(cross(through - point, other), normal) / dot(normal, normal))
+    return point + axis * (
+        dot(cross(through - point, other), normal) / dot(normal, normal)
+    )
 
 
 def wrap(angle: np.ndarray) -> np.ndarray:

@@ -67,10 +67,12 @@ class ChartRows:
     @classmethod
     def along(cls, s: np.ndarray, rows: np.ndarray, reference: np.ndarray) -> ChartRows:
         """Lead splines through rows, (S, r, n), and C q_ref = p, with reference postures (S, n), at S places."""
-        from scipy.interpolate import make_interp_spline  # noqa: PLC0415  (imports in 0.3 s)
+        from scipy.interpolate import make_interp_spline
 
         offset = np.einsum("sij,sj->si", rows, reference)
-        spline = make_interp_spline(s, np.concatenate([rows, offset[:, :, None]], axis=2), k=DEGREE)
+        spline = make_interp_spline(
+            s, np.concatenate([rows, offset[:, :, None]], axis=2), k=DEGREE
+        )
         return cls(np.asarray(spline.c), np.asarray(spline.t))
 
     @classmethod
@@ -96,7 +98,9 @@ class ChartRows:
     def selected(self) -> tuple[int, ...]:
         """The joints that the rows select, ascending; none where they are other rows than unit rows."""
         rows = self.coefficients[0, :, :-1]
-        unit = self.knots is None and bool(np.all((rows == 0.0) | (rows == 1.0)) and np.all(rows.sum(axis=1) == 1.0))
+        unit = self.knots is None and bool(
+            np.all((rows == 0.0) | (rows == 1.0)) and np.all(rows.sum(axis=1) == 1.0)
+        )
         return tuple(int(joint) for joint in np.argmax(rows, axis=1)) if unit else ()
 
     def _orders(self, s: np.ndarray, orders: int) -> np.ndarray:
@@ -105,7 +109,7 @@ class ChartRows:
             values = np.zeros((orders, len(s), *self.coefficients.shape[1:]))
             values[0] = self.coefficients[0]
             return values
-        from scipy.interpolate import BSpline  # noqa: PLC0415
+        from scipy.interpolate import BSpline
 
         spline = BSpline(self.knots, self.coefficients, DEGREE)
         return np.array([spline(s, nu=order) for order in range(orders)])
@@ -175,14 +179,24 @@ class ChartMap:
         Postures q_ref there, so near each other that straight lines join them.
     """
 
-    def __init__(self, task_map: TaskMap, path: Path, rows: ChartRows, s: np.ndarray, reference: np.ndarray) -> None:
+    def __init__(
+        self,
+        task_map: TaskMap,
+        path: Path,
+        rows: ChartRows,
+        s: np.ndarray,
+        reference: np.ndarray,
+    ) -> None:
         self.robot = task_map.robot
         self.task_map, self.path, self.rows = task_map, path, rows
         self.s, self.reference = s, reference
         self.start = np.asarray(reference[0])
         self._newton = Newton(task_map)
         null_motion = self._inverse_at(s, reference)[:, :, task_map.m :]
-        self._table = np.concatenate([reference, rows.values(s, reference), null_motion.reshape(len(s), -1)], axis=1)
+        self._table = np.concatenate(
+            [reference, rows.values(s, reference), null_motion.reshape(len(s), -1)],
+            axis=1,
+        )
         even = np.linspace(0.0, 1.0, _PLACES)
         augmented = self._augmented_at(even, self._between(even)[0])
         least = np.linalg.svd(augmented, compute_uv=False)[:, -1]
@@ -201,10 +215,16 @@ class ChartMap:
     def _between(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Postures (K, n), sigma (K, r) and dq/dsigma (K, n, r) of the reference, by straight lines in between."""
         right = np.clip(np.searchsorted(self.s, s, side="right"), 1, len(self.s) - 1)
-        part = ((s - self.s[right - 1]) / (self.s[right] - self.s[right - 1])).clip(0.0, 1.0)[:, None]
+        part = ((s - self.s[right - 1]) / (self.s[right] - self.s[right - 1])).clip(
+            0.0, 1.0
+        )[:, None]
         n, r = self.robot.n, self.r
         table = (1.0 - part) * self._table[right - 1] + part * self._table[right]
-        return table[:, :n], table[:, n : n + r], table[:, n + r :].reshape(len(s), n, r)
+        return (
+            table[:, :n],
+            table[:, n : n + r],
+            table[:, n + r :].reshape(len(s), n, r),
+        )
 
     @property
     def r(self) -> int:
@@ -230,7 +250,11 @@ class ChartMap:
         return np.column_stack([s, self.rows.values(s, q)])
 
     def postures(
-        self, y: np.ndarray, sample: PathSample | None = None, *, near: np.ndarray | None = None
+        self,
+        y: np.ndarray,
+        sample: PathSample | None = None,
+        *,
+        near: np.ndarray | None = None,
     ) -> np.ndarray:
         """Joint positions, (K, n), where the curves are y, (K, 1 + r), at any times.
 
@@ -256,7 +280,12 @@ class ChartMap:
         reference, sigma, null_motion = self._between(s)
         aside = np.einsum("kij,kj->ki", null_motion, y[:, 1:] - sigma)
         near_enough = np.abs(aside).max(axis=1, initial=0.0) < _NEAR
-        return self._newton.solve(targets, np.where(near_enough[:, None], reference + aside, reference), rows, wanted)
+        return self._newton.solve(
+            targets,
+            np.where(near_enough[:, None], reference + aside, reference),
+            rows,
+            wanted,
+        )
 
     def state(
         self,
@@ -265,7 +294,7 @@ class ChartMap:
         yddot: np.ndarray,
         ydddot: np.ndarray,
         *,
-        t: np.ndarray | None = None,  # noqa: ARG002  (the reference tells the turns)
+        t: np.ndarray | None = None,
         near: np.ndarray | None = None,
     ) -> ChartState:
         """See `JointMap`."""
@@ -277,7 +306,9 @@ class ChartMap:
         rows, drift = self.rows.orders(y[:, 0], q)
         augmented = np.concatenate([self.task_map.jacobian(twists), rows[0]], axis=1)
         if (np.sign(np.linalg.det(augmented)) != self._side).any():
-            raise UnreachableError("the motion leaves the sheet of postures that the chart is laid on")
+            raise UnreachableError(
+                "the motion leaves the sheet of postures that the chart is laid on"
+            )
         try:
             inverse = np.linalg.inv(augmented)
         except np.linalg.LinAlgError as error:
@@ -289,17 +320,40 @@ class ChartMap:
         gradient = inverse @ right
         qdot = np.einsum("kij,kj->ki", gradient, ydot)
         bent = -2.0 * sdot * np.einsum("kij,kj->ki", rows[1], qdot) - drift[1] * sdot**2
-        given = np.concatenate([sample.xi_ds * sdot**2 - self.task_map.bias(twists, qdot), bent], axis=1)
-        qddot = np.einsum("kij,kj->ki", gradient, yddot) + np.einsum("kij,kj->ki", inverse, given)
+        given = np.concatenate(
+            [sample.xi_ds * sdot**2 - self.task_map.bias(twists, qdot), bent], axis=1
+        )
+        qddot = np.einsum("kij,kj->ki", gradient, yddot) + np.einsum(
+            "kij,kj->ki", inverse, given
+        )
         least = _least_singular(inverse)
         return ChartState(
-            self, y, ydot, yddot, ydddot, q, qdot, qddot, gradient, sample, twists, inverse, rows, drift, *least
+            self,
+            y,
+            ydot,
+            yddot,
+            ydddot,
+            q,
+            qdot,
+            qddot,
+            gradient,
+            sample,
+            twists,
+            inverse,
+            rows,
+            drift,
+            *least,
         )
 
     def derivatives(self, state: ChartState) -> JointDerivatives:
         """Exact derivatives of a state; see the module's formulas."""
         task = self.task_map.derivatives(state.twists, state.qdot, state.qddot)
-        sdot, sddot, gradient, sample = state.ydot[:, :1], state.yddot[:, :1], state.gradient, state.path
+        sdot, sddot, gradient, sample = (
+            state.ydot[:, :1],
+            state.yddot[:, :1],
+            state.gradient,
+            state.path,
+        )
         _, first, second, _ = state.rows
         _, e_ds, e_dds = state.drift
         along = sdot[:, :, None]
@@ -307,20 +361,33 @@ class ChartMap:
         by_s = np.einsum("kij,kj->ki", first, state.qdot)
         rows = -first @ gradient * along
         rows[:, :, 0] -= by_s + e_ds * sdot
-        qdot_y = self._solved(state, -task.velocity_q @ gradient, rows, sample.xi_ds * sdot)
+        qdot_y = self._solved(
+            state, -task.velocity_q @ gradient, rows, sample.xi_ds * sdot
+        )
 
         rows = -2.0 * first @ gradient * along
         rows[:, :, 0] -= 2.0 * (by_s + e_ds * sdot)
-        qddot_ydot = self._solved(state, -task.acceleration_qdot @ gradient, rows, 2.0 * sample.xi_ds * sdot)
+        qddot_ydot = self._solved(
+            state, -task.acceleration_qdot @ gradient, rows, 2.0 * sample.xi_ds * sdot
+        )
 
-        rows = -2.0 * first @ qdot_y * along - (second * along**2 + first * sddot[:, :, None]) @ gradient
-        rows[:, :, 0] -= np.einsum("kij,kj->ki", first, state.qddot) + e_dds * sdot**2 + e_ds * sddot
+        rows = (
+            -2.0 * first @ qdot_y * along
+            - (second * along**2 + first * sddot[:, :, None]) @ gradient
+        )
+        rows[:, :, 0] -= (
+            np.einsum("kij,kj->ki", first, state.qddot) + e_dds * sdot**2 + e_ds * sddot
+        )
         rows[:, :, 0] -= 2.0 * sdot * np.einsum("kij,kj->ki", second, state.qdot)
         right = -task.acceleration_q @ gradient - task.acceleration_qdot @ qdot_y
-        qddot_y = self._solved(state, right, rows, sample.xi_dds * sdot**2 + sample.xi_ds * sddot)
+        qddot_y = self._solved(
+            state, right, rows, sample.xi_dds * sdot**2 + sample.xi_ds * sddot
+        )
         return JointDerivatives(qdot_y, qddot_y, qddot_ydot)
 
-    def _solved(self, state: ChartState, task: np.ndarray, rows: np.ndarray, by_s: np.ndarray) -> np.ndarray:
+    def _solved(
+        self, state: ChartState, task: np.ndarray, rows: np.ndarray, by_s: np.ndarray
+    ) -> np.ndarray:
         """J_aug^-1 (task + [by_s, 0]; rows), with parts (K, m, c), (K, r, c) and (K, m)."""
         task[:, :, 0] += by_s
         return state.inverse @ np.concatenate([task, rows], axis=1)

@@ -27,7 +27,11 @@ _PLACES = (9, 17, 33, 65, 129)
 
 
 def chart_around(
-    task_map: TaskMap, path: Path, s: np.ndarray, reference: np.ndarray, rows: ChartRows | None = None
+    task_map: TaskMap,
+    path: Path,
+    s: np.ndarray,
+    reference: np.ndarray,
+    rows: ChartRows | None = None,
 ) -> ChartMap:
     """Lay a chart around a joint path.
 
@@ -62,13 +66,17 @@ def chart_around(
         return ChartMap(task_map, path, ChartRows.constant(constant), s, reference)
     following = np.swapaxes(_continued(null), 1, 2)
     for count in _PLACES:
-        places = np.unique(np.linspace(0, len(s) - 1, min(count, len(s))).round().astype(int))
+        places = np.unique(
+            np.linspace(0, len(s) - 1, min(count, len(s))).round().astype(int)
+        )
         if len(places) <= DEGREE:
             continue
         chosen = ChartRows.along(s[places], following[places], reference[places])
         if transversality(chosen.at(s)[0], null).min() >= _ENOUGH:
             return ChartMap(task_map, path, chosen, s, reference)
-    raise UnreachableError("the arm comes too near a singularity of its own for a chart")
+    raise UnreachableError(
+        "the arm comes too near a singularity of its own for a chart"
+    )
 
 
 def _growing(s: np.ndarray) -> np.ndarray:
@@ -95,7 +103,9 @@ def moving_most(null: np.ndarray) -> np.ndarray:
         row = left[np.arange(len(left)), joint]
         unit = row / np.maximum(np.linalg.norm(row, axis=1, keepdims=True), 1e-300)
         left = left - np.einsum("knr,kr->kn", left, unit)[:, :, None] * unit[:, None]
-    return np.sort(np.array(chosen, dtype=int).reshape(null.shape[2], len(null)).T, axis=1)
+    return np.sort(
+        np.array(chosen, dtype=int).reshape(null.shape[2], len(null)).T, axis=1
+    )
 
 
 def _continued(null: np.ndarray) -> np.ndarray:

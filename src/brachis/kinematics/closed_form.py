@@ -67,7 +67,11 @@ class ClosedFormMap:
         self.branch = branch
         self.start = start
         self._turning = robot.revolute[self.nonredundant]
-        self._turns = [joint for joint, turning in zip(self.nonredundant, self._turning, strict=True) if turning]
+        self._turns = [
+            joint
+            for joint, turning in zip(self.nonredundant, self._turning, strict=True)
+            if turning
+        ]
         limits = robot.limits
         ranged = np.isfinite(limits.position_lower) | np.isfinite(limits.position_upper)
         self._ranged = ranged[self._turns]
@@ -112,7 +116,11 @@ class ClosedFormMap:
         return np.append(s, q[self.redundant])
 
     def postures(
-        self, y: np.ndarray, sample: PathSample | None = None, *, near: np.ndarray | None = None
+        self,
+        y: np.ndarray,
+        sample: PathSample | None = None,
+        *,
+        near: np.ndarray | None = None,
     ) -> np.ndarray:
         """Joint positions at K successive times, continuous from the start posture on.
 
@@ -137,10 +145,16 @@ class ClosedFormMap:
         if self.solver.alternatives == 1:
             answers = answers[:, 0]
         else:
-            answers = self._tracked(answers) if near is None else self._nearest(answers, near[:, self.nonredundant])
+            answers = (
+                self._tracked(answers)
+                if near is None
+                else self._nearest(answers, near[:, self.nonredundant])
+            )
         turning = self._turning
         if turning.any() and np.all(np.isfinite(answers)):
-            turns = np.vstack([self.start[self.nonredundant][None, turning], answers[:, turning]])
+            turns = np.vstack(
+                [self.start[self.nonredundant][None, turning], answers[:, turning]]
+            )
             answers[:, turning] = np.unwrap(turns, axis=0)[1:]
         q = np.empty((len(y), self.robot.n))
         q[:, self.redundant] = y[:, 1:]
@@ -211,11 +225,28 @@ class ClosedFormMap:
         qddot[:, self.nonredundant] += np.einsum("kij,kj->ki", inverse, wanted)
         if near is not None:
             q = in_turn_of(q, near, np.isin(np.arange(self.robot.n), self._turns))
-        elif t is not None and self._ranged.any():  # otherwise no limit asks which turn an angle is in
+        elif (
+            t is not None and self._ranged.any()
+        ):  # otherwise no limit asks which turn an angle is in
             self._follow(q, qdot, qddot, t)
-        return PathState(self, y, ydot, yddot, ydddot, q, qdot, qddot, gradient, sample, twists, inverse)
+        return PathState(
+            self,
+            y,
+            ydot,
+            yddot,
+            ydddot,
+            q,
+            qdot,
+            qddot,
+            gradient,
+            sample,
+            twists,
+            inverse,
+        )
 
-    def _follow(self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, t: np.ndarray) -> None:
+    def _follow(
+        self, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, t: np.ndarray
+    ) -> None:
         """Choose turns of angles, in place, that follow their velocities; the quintic's rule predicts each step."""
         turns, h = self._turns, np.diff(t)[:, None]
         v, a = qdot[:, turns], qddot[:, turns]
@@ -224,15 +255,23 @@ class ClosedFormMap:
         counted = np.round(gap)
         unsure = np.abs(gap - counted) > _SURE
         if np.any(unsure & self._ranged):
-            raise UnreachableError("a joint turns too far between collocation points to count its turns")
+            raise UnreachableError(
+                "a joint turns too far between collocation points to count its turns"
+            )
         first = np.round((self.start[turns] - q[0, turns]) / TURN)
-        q[:, turns] += TURN * (first + np.vstack([np.zeros(len(turns)), np.cumsum(counted, axis=0)]))
+        q[:, turns] += TURN * (
+            first + np.vstack([np.zeros(len(turns)), np.cumsum(counted, axis=0)])
+        )
 
-    def _gradient(self, sample: PathSample, jacobian: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+    def _gradient(
+        self, sample: PathSample, jacobian: np.ndarray, inverse: np.ndarray
+    ) -> np.ndarray:
         """G = dq/dy, (K, n, 1 + r)."""
         gradient = np.zeros((len(jacobian), self.robot.n, 1 + self.r))
         gradient[:, self.redundant, np.arange(1, 1 + self.r)] = 1.0
-        columns = np.concatenate([sample.xi[:, :, None], -jacobian[:, :, self.redundant]], axis=2)
+        columns = np.concatenate(
+            [sample.xi[:, :, None], -jacobian[:, :, self.redundant]], axis=2
+        )
         gradient[:, self.nonredundant] = inverse @ columns
         return gradient
 

@@ -57,7 +57,9 @@ class Nodes:
     position_error: float
 
 
-def interpolate(joint_map: JointMap, curves: Curves, breaks: np.ndarray, *, jumps: bool) -> Nodes:
+def interpolate(
+    joint_map: JointMap, curves: Curves, breaks: np.ndarray, *, jumps: bool
+) -> Nodes:
     """Place nodes so densely that quintic pieces stand for the closed form.
 
     Parameters
@@ -80,7 +82,10 @@ def interpolate(joint_map: JointMap, curves: Curves, breaks: np.ndarray, *, jump
         The motion leaves the branch between the breaks.
     """
     steps = np.ceil(_PIECES * np.diff(breaks) / np.diff(breaks).max()).astype(int)
-    pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(breaks[:-1], breaks[1:], steps, strict=True)]
+    pieces = [
+        np.linspace(a, b, n, endpoint=False)
+        for a, b, n in zip(breaks[:-1], breaks[1:], steps, strict=True)
+    ]
     times = np.append(np.concatenate(pieces), breaks[-1])
     error, inherited = np.inf, np.full(len(times) - 1, np.inf)
     for _ in range(_ROUNDS):
@@ -101,11 +106,22 @@ def interpolate(joint_map: JointMap, curves: Curves, breaks: np.ndarray, *, jump
     if error > _LARGEST_ERROR:
         raise UnreachableError("the motion is too sharp for polynomial pieces")
     # The middles are known exactly as well; as nodes they make the error 64 times smaller still.
-    return Nodes(merged, _positions(joint_map, curves, merged, state, before), state.qdot, state.qddot, before, error)
+    return Nodes(
+        merged,
+        _positions(joint_map, curves, merged, state, before),
+        state.qdot,
+        state.qddot,
+        before,
+        error,
+    )
 
 
 def _positions(
-    joint_map: JointMap, curves: Curves, times: np.ndarray, state: JointState, before: np.ndarray
+    joint_map: JointMap,
+    curves: Curves,
+    times: np.ndarray,
+    state: JointState,
+    before: np.ndarray,
 ) -> np.ndarray:
     """Sum up positions, (L + 1, n), so that every piece has the closed form's jerk in its middle.
 
@@ -113,9 +129,15 @@ def _positions(
     What the sum is off at the end is shared by the pieces so that it adds the same jerk to each.
     """
     h = np.diff(times)[:, None]
-    jerk = joint_map.state(*curves(np.sort(np.concatenate([times, times[:-1] + 0.5 * h[:, 0]])))).qdddot[1::2]
+    jerk = joint_map.state(
+        *curves(np.sort(np.concatenate([times, times[:-1] + 0.5 * h[:, 0]])))
+    ).qdddot[1::2]
     v, change = state.qdot, before[1:] - state.qddot[:-1]
-    way = 0.5 * h * (v[:-1] + v[1:]) - h**2 / 12.0 * change + h**3 / 30.0 * (change / h - jerk)
+    way = (
+        0.5 * h * (v[:-1] + v[1:])
+        - h**2 / 12.0 * change
+        + h**3 / 30.0 * (change / h - jerk)
+    )
     share = h**3 / np.sum(h**3)
     off = state.q[-1] - state.q[0] - way.sum(axis=0)
     q = np.cumsum(np.concatenate([state.q[:1], way + off * share]), axis=0)
@@ -128,18 +150,25 @@ def _excess(
     """Gaps of every piece in units of their tolerances, the largest of them, (L,); the same of noise; that of q."""
     h = np.diff(times)
     gap_q, gap_qddot = _middle_gaps(times, state, before)
-    tolerances = [_POSITION_TOLERANCE, _ACCELERATION_TOLERANCE * (1.0 + np.abs(state.qddot).max())]
+    tolerances = [
+        _POSITION_TOLERANCE,
+        _ACCELERATION_TOLERANCE * (1.0 + np.abs(state.qddot).max()),
+    ]
     gaps, noises = [gap_q, gap_qddot], [np.full(len(h), _NOISE), 6.0 * _NOISE / h**2]
     if not jumps:
         tolerances.append(_JERK_TOLERANCE * (1.0 + np.abs(state.qdddot).max()))
         gaps.append(_jerk_gaps(times, state))
         noises.append(60.0 * _NOISE / h**3)
-    in_units = (np.array(values) / np.array(tolerances)[:, None] for values in (gaps, noises))
+    in_units = (
+        np.array(values) / np.array(tolerances)[:, None] for values in (gaps, noises)
+    )
     excess, noise = (values.max(axis=0) for values in in_units)
     return excess, noise, float(gap_q.max())
 
 
-def _middle_gaps(times: np.ndarray, state: JointState, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _middle_gaps(
+    times: np.ndarray, state: JointState, before: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Largest differences of position and acceleration in the middle of every piece, (L,) each.
 
     States alternate between nodes and middles. In the middle of a quintic Hermite piece of length h:
@@ -148,9 +177,15 @@ def _middle_gaps(times: np.ndarray, state: JointState, before: np.ndarray) -> tu
     h = np.diff(times)[:, None]
     q, v = state.q[::2], state.qdot[::2]
     ends = state.qddot[:-1:2] + before[2::2]
-    position = 0.5 * (q[1:] + q[:-1]) - 5.0 * h / 32.0 * np.diff(v, axis=0) + h**2 / 64.0 * ends
+    position = (
+        0.5 * (q[1:] + q[:-1])
+        - 5.0 * h / 32.0 * np.diff(v, axis=0)
+        + h**2 / 64.0 * ends
+    )
     acceleration = 1.5 * np.diff(v, axis=0) / h - 0.25 * ends
-    return np.abs(position - state.q[1::2]).max(axis=1), np.abs(acceleration - state.qddot[1::2]).max(axis=1)
+    return np.abs(position - state.q[1::2]).max(axis=1), np.abs(
+        acceleration - state.qddot[1::2]
+    ).max(axis=1)
 
 
 def _jerk_gaps(times: np.ndarray, state: JointState) -> np.ndarray:
@@ -161,6 +196,10 @@ def _jerk_gaps(times: np.ndarray, state: JointState) -> np.ndarray:
     """
     h = np.diff(times)[:, None]
     q, v, a = state.q[::2], state.qdot[::2], state.qddot[::2]
-    jerk = 60.0 * np.diff(q, axis=0) / h**3 - (36.0 * v[:-1] + 24.0 * v[1:]) / h**2 - (9.0 * a[:-1] - 3.0 * a[1:]) / h
+    jerk = (
+        60.0 * np.diff(q, axis=0) / h**3
+        - (36.0 * v[:-1] + 24.0 * v[1:]) / h**2
+        - (9.0 * a[:-1] - 3.0 * a[1:]) / h
+    )
     rounding = _ROUNDING * (1.0 + np.abs(q).max()) / h**3
     return np.asarray((np.abs(jerk - state.qdddot[:-1:2]) - rounding).max(axis=1))

@@ -69,8 +69,14 @@ class JointState(SharedTorques):
     def qdddot(self) -> np.ndarray:
         """Jerk of all joints, (K, n)."""
         exact = self.derivatives
-        pairs = (exact.qddot_y, self.ydot), (exact.qddot_ydot, self.yddot), (self.gradient, self.ydddot)
-        return np.asarray(sum(np.einsum("kij,kj->ki", slope, part) for slope, part in pairs))
+        pairs = (
+            (exact.qddot_y, self.ydot),
+            (exact.qddot_ydot, self.yddot),
+            (self.gradient, self.ydddot),
+        )
+        return np.asarray(
+            sum(np.einsum("kij,kj->ki", slope, part) for slope, part in pairs)
+        )
 
     @cached_property
     def qdddot_y(self) -> np.ndarray:
@@ -185,7 +191,7 @@ class JointMap(Protocol):
         """
         ...
 
-    def derivatives(self, state: Any) -> JointDerivatives:  # noqa: ANN401  (a subclass of `JointState` of its own)
+    def derivatives(self, state: Any) -> JointDerivatives:
         """Exact derivatives of a state that this map gave."""
         ...
 
@@ -193,10 +199,10 @@ class JointMap(Protocol):
         """Margins, (b,), of the start to where the map ends to be computable; b = 0 where it never does."""
         ...
 
-    def margins(self, state: Any) -> np.ndarray:  # noqa: ANN401
+    def margins(self, state: Any) -> np.ndarray:
         """Margins, (K, b), of a state that this map gave; see `start_margins`."""
         ...
 
-    def margin_gradient(self, state: Any) -> tuple[np.ndarray, np.ndarray | None]:  # noqa: ANN401
+    def margin_gradient(self, state: Any) -> tuple[np.ndarray, np.ndarray | None]:
         """Differentiate `margins` with respect to q, (K, b, n), and to s, (K, b); None where it vanishes."""
         ...

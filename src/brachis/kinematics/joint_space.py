@@ -64,13 +64,24 @@ class JointSpaceMap:
         yddot: np.ndarray,
         ydddot: np.ndarray,
         *,
-        t: np.ndarray | None = None,  # noqa: ARG002  (the path itself tells the turns)
-        near: np.ndarray | None = None,  # noqa: ARG002
+        t: np.ndarray | None = None,
+        near: np.ndarray | None = None,
     ) -> JointSpaceState:
         """See `JointMap`."""
         path = self.path.sample(y[:, 0])
         qdot, qddot = path.xi * ydot, path.xi * yddot + path.xi_ds * ydot**2
-        return JointSpaceState(self, y, ydot, yddot, ydddot, path.target, qdot, qddot, path.xi[:, :, None], path)
+        return JointSpaceState(
+            self,
+            y,
+            ydot,
+            yddot,
+            ydddot,
+            path.target,
+            qdot,
+            qddot,
+            path.xi[:, :, None],
+            path,
+        )
 
     def derivatives(self, state: JointSpaceState) -> JointDerivatives:
         """See `JointMap`."""
@@ -134,8 +145,8 @@ class DirectJointMap:
         yddot: np.ndarray,
         ydddot: np.ndarray,
         *,
-        t: np.ndarray | None = None,  # noqa: ARG002  (y itself tells the turns)
-        near: np.ndarray | None = None,  # noqa: ARG002
+        t: np.ndarray | None = None,
+        near: np.ndarray | None = None,
     ) -> JointState:
         """See `JointMap`."""
         gradient = np.broadcast_to(np.eye(self.r), (len(y), self.r, self.r))

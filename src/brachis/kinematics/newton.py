@@ -38,12 +38,19 @@ class Newton:
         posed = self._geometry.posed(q)
         linear, angular = np.split(posed.jacobian_columns(range(self._geometry.n)), 2)
         if self._task_map.frame is pin.ReferenceFrame.LOCAL:
-            linear, angular = (np.einsum("iak,ink->ank", posed.tool_rotation, part) for part in (linear, angular))
+            linear, angular = (
+                np.einsum("iak,ink->ank", posed.tool_rotation, part)
+                for part in (linear, angular)
+            )
         twists = np.swapaxes(np.concatenate([linear, angular]), 1, 2)
-        values = self._task_map.of_placements(posed.tool_position.T, np.moveaxis(posed.tool_rotation, 2, 0))
+        values = self._task_map.of_placements(
+            posed.tool_position.T, np.moveaxis(posed.tool_rotation, 2, 0)
+        )
         return values, self._task_map.jacobian(twists)
 
-    def solve(self, targets: np.ndarray, q: np.ndarray, rows: np.ndarray, levels: np.ndarray) -> np.ndarray:
+    def solve(
+        self, targets: np.ndarray, q: np.ndarray, rows: np.ndarray, levels: np.ndarray
+    ) -> np.ndarray:
         """Find postures near given ones.
 
         Parameters
@@ -62,7 +69,10 @@ class Newton:
         (K, n) ndarray
             Angles in the turns into which the search leads; NaN where it does not converge.
         """
-        found, left = np.full(q.shape, np.nan), np.flatnonzero(np.isfinite(q).all(axis=1) & np.isfinite(levels).all(1))
+        found, left = (
+            np.full(q.shape, np.nan),
+            np.flatnonzero(np.isfinite(q).all(axis=1) & np.isfinite(levels).all(1)),
+        )
         q = q[left]
         for _ in range(_STEPS):
             if not len(left):
@@ -70,12 +80,21 @@ class Newton:
             values, jacobian = self.placed(q)
             own = rows[left]
             miss = np.concatenate(
-                [self._task_map.difference(targets[left], values), levels[left] - np.einsum("kij,kj->ki", own, q)],
+                [
+                    self._task_map.difference(targets[left], values),
+                    levels[left] - np.einsum("kij,kj->ki", own, q),
+                ],
                 axis=1,
             )
             step = solved_each(np.concatenate([jacobian, own], axis=1), miss)
             size = np.abs(step).max(axis=1, initial=0.0)
-            q = q + step * np.minimum(1.0, _LARGEST_STEP / np.maximum(size, _LARGEST_STEP))[:, None]
+            q = (
+                q
+                + step
+                * np.minimum(1.0, _LARGEST_STEP / np.maximum(size, _LARGEST_STEP))[
+                    :, None
+                ]
+            )
             met = np.abs(miss).max(axis=1, initial=0.0) < _MET
             found[left[met]] = q[met]
             kept = ~met & np.isfinite(q).all(axis=1)
@@ -101,5 +120,7 @@ def solved_each(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
     except np.linalg.LinAlgError:
         regular = np.abs(np.linalg.det(matrices)) > 0.0
         answers = np.full(right.shape, np.nan)
-        answers[regular] = np.linalg.solve(matrices[regular], right[regular][:, :, None])[:, :, 0]
+        answers[regular] = np.linalg.solve(
+            matrices[regular], right[regular][:, :, None]
+        )[:, :, 0]
         return answers

@@ -17,12 +17,36 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from brachis.limits.checks import bound_limits
-from brachis.limits.joint import build_acceleration, build_jerk, build_position, build_velocity
+from brachis.limits.joint import (
+    build_acceleration,
+    build_jerk,
+    build_position,
+    build_velocity,
+)
 from brachis.limits.power import build_power, build_total_power
 from brachis.limits.process_speed import build_least_process_speed, build_process_speed
-from brachis.limits.protocol import Approach, Bound, JointMotion, Label, Limit, Moments, Partials, PhaseLines, Role
-from brachis.limits.tool import build_tool_acceleration, build_tool_angular_speed, build_tool_speed
-from brachis.limits.torque import build_rms_torque, build_torque, build_torque_rate, build_torque_speed
+from brachis.limits.protocol import (
+    Approach,
+    Bound,
+    JointMotion,
+    Label,
+    Limit,
+    Moments,
+    Partials,
+    PhaseLines,
+    Role,
+)
+from brachis.limits.tool import (
+    build_tool_acceleration,
+    build_tool_angular_speed,
+    build_tool_speed,
+)
+from brachis.limits.torque import (
+    build_rms_torque,
+    build_torque,
+    build_torque_rate,
+    build_torque_speed,
+)
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel, custom_limits
 from brachis.task import Task
@@ -50,7 +74,10 @@ TABLE: dict[str, Build] = {
 
 
 def limits_of(
-    robot: Robot, task: Task, further: Sequence[LimitModel] = (), approach: Approach | None = None
+    robot: Robot,
+    task: Task,
+    further: Sequence[LimitModel] = (),
+    approach: Approach | None = None,
 ) -> tuple[Limit, ...]:
     """List the limits of a task on a robot.
 
@@ -73,10 +100,18 @@ def limits_of(
     InputError
         A limit of the user's own does not fit the robot, or is none (see `bound_limits`).
     """
-    built = tuple(limit for build in TABLE.values() if (limit := build(robot, task)) is not None)
+    built = tuple(
+        limit for build in TABLE.values() if (limit := build(robot, task)) is not None
+    )
     named = bound_limits(custom_limits(task), robot, built, "custom_limits")
-    limits = (*built, *named, *bound_limits(further, robot, (*built, *named), "own_limits"))
-    return limits if approach is None else tuple(limit.along(approach) for limit in limits)
+    limits = (
+        *built,
+        *named,
+        *bound_limits(further, robot, (*built, *named), "own_limits"),
+    )
+    return (
+        limits if approach is None else tuple(limit.along(approach) for limit in limits)
+    )
 
 
 __all__ = [

@@ -16,7 +16,9 @@ _MOMENTS = 2
 """Moments at which a limit is tried; two tell (K, c) from (c,)."""
 
 
-def bound_limits(models: Sequence[LimitModel], robot: Robot, others: Sequence[Limit], where: str) -> list[Limit]:
+def bound_limits(
+    models: Sequence[LimitModel], robot: Robot, others: Sequence[Limit], where: str
+) -> list[Limit]:
     """Bind a user's limits to a robot, and check them.
 
     Parameters
@@ -49,10 +51,16 @@ def bound_limits(models: Sequence[LimitModel], robot: Robot, others: Sequence[Li
             limit = model.bind(robot)
         except (TypeError, ValueError) as error:
             raise InputError(
-                f"cannot be bound to the robot: {error}", where=here, found=type(model).__name__
+                f"cannot be bound to the robot: {error}",
+                where=here,
+                found=type(model).__name__,
             ) from error
         if not isinstance(limit, Limit):
-            raise InputError("bind returned no brachis.limits.Limit", where=here, found=type(limit).__name__)
+            raise InputError(
+                "bind returned no brachis.limits.Limit",
+                where=here,
+                found=type(limit).__name__,
+            )
         _check(limit, robot.n, here)
         taken = {str(label) for other in (*others, *found) for label in other.labels}
         for label in limit.labels:
@@ -65,18 +73,36 @@ def bound_limits(models: Sequence[LimitModel], robot: Robot, others: Sequence[Li
 
 def _check(limit: Limit, n: int, where: str) -> None:
     """Refuse a limit whose parts do not fit together."""
-    missing = [name for name in ("kind", "labels", "lower", "upper") if not hasattr(limit, name)]
+    missing = [
+        name
+        for name in ("kind", "labels", "lower", "upper")
+        if not hasattr(limit, name)
+    ]
     if missing:
-        raise InputError("lacks what every limit has", where=where, found=f"no {', '.join(missing)}")
+        raise InputError(
+            "lacks what every limit has", where=where, found=f"no {', '.join(missing)}"
+        )
     count = len(limit.labels)
     if not all(isinstance(label, Label) for label in limit.labels):
-        raise InputError("are not all brachis.limits.Label", where=f"{where}.labels", found=limit.labels)
+        raise InputError(
+            "are not all brachis.limits.Label",
+            where=f"{where}.labels",
+            found=limit.labels,
+        )
     if not count and not len(limit.lower):
-        raise InputError("the limit has no values", where=f"{where}.labels", allowed="at least one label")
+        raise InputError(
+            "the limit has no values",
+            where=f"{where}.labels",
+            allowed="at least one label",
+        )
     for name in ("lower", "upper"):
-        _check_shape(f"{where}.{name}", np.asarray(getattr(limit, name)), (count,), finite=False)
+        _check_shape(
+            f"{where}.{name}", np.asarray(getattr(limit, name)), (count,), finite=False
+        )
     if not np.all(np.asarray(limit.lower) < limit.upper):
-        raise InputError("lower is not below upper", where=where, found=[limit.lower, limit.upper])
+        raise InputError(
+            "lower is not below upper", where=where, found=[limit.lower, limit.upper]
+        )
     _check_functions(limit, n, where)
 
 
@@ -88,10 +114,16 @@ def _check_functions(limit: Limit, n: int, where: str) -> None:
     _check_shape(f"{where}.values", limit.values(moments), (_MOMENTS, count))
     partials = limit.partials(moments)
     if not isinstance(partials, Partials):
-        raise InputError("is no brachis.limits.Partials", where=f"{where}.partials", found=partials)
+        raise InputError(
+            "is no brachis.limits.Partials", where=f"{where}.partials", found=partials
+        )
     given = {name: getattr(partials, name) for name in ("q", "qdot", "qddot", "qdddot")}
     if all(part is None for part in given.values()):
-        raise InputError("are all None", where=f"{where}.partials", allowed="at least one of q, qdot, qddot, qdddot")
+        raise InputError(
+            "are all None",
+            where=f"{where}.partials",
+            allowed="at least one of q, qdot, qddot, qdddot",
+        )
     for name, part in given.items():
         if part is not None:
             _check_shape(f"{where}.partials.{name}", part, (_MOMENTS, count, n))
@@ -99,13 +131,23 @@ def _check_functions(limit: Limit, n: int, where: str) -> None:
         _check_shape(f"{where}.partials.s", partials.s, (_MOMENTS, count))
 
 
-def _check_shape(where: str, array: object, shape: tuple[int, ...], *, finite: bool = True) -> None:
+def _check_shape(
+    where: str, array: object, shape: tuple[int, ...], *, finite: bool = True
+) -> None:
     """Refuse what is no array of a shape, or not finite."""
     found = np.asarray(array).shape
     if found != shape:
         moments = f" for {_MOMENTS} moments" if finite else ""
-        raise InputError("has the wrong shape", where=where, found=f"{found}{moments}", allowed=f"{shape}")
+        raise InputError(
+            "has the wrong shape",
+            where=where,
+            found=f"{found}{moments}",
+            allowed=f"{shape}",
+        )
     if finite and not np.all(np.isfinite(np.asarray(array, dtype=float))):
         raise InputError(
-            "is not finite", where=where, found=np.asarray(array).ravel().tolist(), allowed="finite numbers"
+            "is not finite",
+            where=where,
+            found=np.asarray(array).ravel().tolist(),
+            allowed="finite numbers",
         )

@@ -13,7 +13,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials, PhaseLines
+from brachis.limits.protocol import (
+    Bound,
+    JointMotion,
+    Label,
+    Limit,
+    Partials,
+    PhaseLines,
+)
 from brachis.robot import Robot
 from brachis.task import Task
 
@@ -43,7 +50,10 @@ class PositionLimit(Limit):
     whole_turns = True
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
-        low, high = robot.limits.position_lower[joints], robot.limits.position_upper[joints]
+        low, high = (
+            robot.limits.position_lower[joints],
+            robot.limits.position_upper[joints],
+        )
         half = 0.5 * high - 0.5 * low
         ranged = half <= _WIDE
         per_row = np.where(ranged, half, 1.0)
@@ -62,11 +72,20 @@ class PositionLimit(Limit):
             )
             for i, name in ((i, robot.joint_names[i]) for i in joints)
         )
-        self.lower, self.upper = (low - self._middle) * self._scale, (high - self._middle) * self._scale
+        self.lower, self.upper = (
+            (low - self._middle) * self._scale,
+            (high - self._middle) * self._scale,
+        )
         self._violation_scale = per_row / position_measure(low, high)
         whole = np.where(np.isfinite(half), 2.0 * half, 1.0)
         self._bounds = tuple(
-            Bound(column, float(ends[column]), float(whole[column]), float(self._scale[column]), end)
+            Bound(
+                column,
+                float(ends[column]),
+                float(whole[column]),
+                float(self._scale[column]),
+                end,
+            )
             for column in range(len(joints))
             for end, ends in (("lower", low), ("upper", high))
             if np.isfinite(ends[column])
@@ -88,13 +107,17 @@ class PositionLimit(Limit):
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
-        return Partials(q=np.broadcast_to(self._selection, (len(motion.q), *self._selection.shape)))
+        return Partials(
+            q=np.broadcast_to(self._selection, (len(motion.q), *self._selection.shape))
+        )
 
 
 def build_position(robot: Robot, _task: Task) -> PositionLimit | None:
     """Build the limit for the joints with a finite end of range."""
     limits = robot.limits
-    joints = np.flatnonzero(np.isfinite(limits.position_lower) | np.isfinite(limits.position_upper))
+    joints = np.flatnonzero(
+        np.isfinite(limits.position_lower) | np.isfinite(limits.position_upper)
+    )
     return PositionLimit(robot, joints) if len(joints) else None
 
 
@@ -119,19 +142,44 @@ class JointRatioLimit(Limit):
 
     time_scaling = True
 
-    def __init__(self, robot: Robot, joints: np.ndarray, figures: np.ndarray, units: Sequence[str]) -> None:
-        low, high = self._figures = figures if figures.ndim > 1 else np.array([-figures, figures])
-        self._joints, self._middle, self._scale = joints, 0.5 * (high + low), 2.0 / (high - low)
+    def __init__(
+        self,
+        robot: Robot,
+        joints: np.ndarray,
+        figures: np.ndarray,
+        units: Sequence[str],
+    ) -> None:
+        low, high = self._figures = (
+            figures if figures.ndim > 1 else np.array([-figures, figures])
+        )
+        self._joints, self._middle, self._scale = (
+            joints,
+            0.5 * (high + low),
+            2.0 / (high - low),
+        )
         self.labels = tuple(
-            Label(name, in_words(self.name, position_unit), units[i], f"robot.limits.{self.kind}.{name}")
-            for i, name, position_unit in ((i, robot.joint_names[i], robot.position_units[i]) for i in joints)
+            Label(
+                name,
+                in_words(self.name, position_unit),
+                units[i],
+                f"robot.limits.{self.kind}.{name}",
+            )
+            for i, name, position_unit in (
+                (i, robot.joint_names[i], robot.position_units[i]) for i in joints
+            )
         )
         self.lower, self.upper = -np.ones(len(joints)), np.ones(len(joints))
         self._violation_scale = 0.5 * (high - low) / np.minimum(high, -low)
         self._bounds = tuple(
             Bound(column, figure, abs(figure), float(self._scale[column]), end)
-            for column, (below, above) in enumerate(zip(low.tolist(), high.tolist(), strict=True))
-            for end, figure in (((None, above),) if -below == above else (("lower", below), ("upper", above)))
+            for column, (below, above) in enumerate(
+                zip(low.tolist(), high.tolist(), strict=True)
+            )
+            for end, figure in (
+                ((None, above),)
+                if -below == above
+                else (("lower", below), ("upper", above))
+            )
         )
 
     def _normalised(self, quantity: np.ndarray) -> np.ndarray:
@@ -169,7 +217,12 @@ class _JointRateLimit(JointRatioLimit):
     _per_time: str
 
     def __init__(self, robot: Robot, joints: np.ndarray, figures: np.ndarray) -> None:
-        super().__init__(robot, joints, figures, [unit + self._per_time for unit in robot.position_units])
+        super().__init__(
+            robot,
+            joints,
+            figures,
+            [unit + self._per_time for unit in robot.position_units],
+        )
         self._selection = np.eye(robot.n)[joints] * self._scale[:, None]
 
     def _rows(self, count: int) -> np.ndarray:
@@ -191,7 +244,9 @@ class VelocityLimit(_JointRateLimit):
         """See `Limit.partials`."""
         return Partials(qdot=self._rows(len(motion.q)))
 
-    def lines(self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
+    def lines(
+        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
+    ) -> PhaseLines:
         """See `Limit.lines`: the square of the ratio, q_ds^2 x / v^2, to the limit of the direction."""
         low, high = self._figures
         tangent = q_ds[:, self._joints]
@@ -217,7 +272,9 @@ class AccelerationLimit(_JointRateLimit):
         """See `Limit.partials`."""
         return Partials(qddot=self._rows(len(motion.q)))
 
-    def lines(self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
+    def lines(
+        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
+    ) -> PhaseLines:
         """See `Limit.lines`."""
         by_u, by_x = (part[:, self._joints] * self._scale for part in (q_ds, q_dds))
         return PhaseLines(by_u, by_x, np.zeros((len(q), len(self.lower))))
@@ -253,7 +310,11 @@ def build_velocity(robot: Robot, _task: Task) -> VelocityLimit | None:
 def build_acceleration(robot: Robot, _task: Task) -> AccelerationLimit | None:
     """Build the limit for the joints with a finite acceleration limit."""
     joints = np.flatnonzero(np.isfinite(robot.limits.acceleration))
-    return AccelerationLimit(robot, joints, robot.limits.acceleration[joints]) if len(joints) else None
+    return (
+        AccelerationLimit(robot, joints, robot.limits.acceleration[joints])
+        if len(joints)
+        else None
+    )
 
 
 def build_jerk(robot: Robot, _task: Task) -> JerkLimit | None:
@@ -262,15 +323,28 @@ def build_jerk(robot: Robot, _task: Task) -> JerkLimit | None:
     return JerkLimit(robot, joints, robot.limits.jerk[joints]) if len(joints) else None
 
 
-def reciprocals_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def reciprocals_near(
+    robot: Robot, limits: Sequence[Limit], q: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Reciprocals of the largest acceleration and of the largest velocity, (n,) each, of each joint alone near `q`.
 
     They are what the joints' own limits allow, 0 where these allow any.
     """
     by_acceleration, by_velocity = np.zeros(robot.n), np.zeros(robot.n)
     for limit in limits:
-        own = np.array([[label.subject == name for name in robot.joint_names] for label in limit.labels])
-        for weights, rows in zip((by_acceleration, by_velocity), limit.step_rows(q[None]), strict=True):
+        own = np.array(
+            [
+                [label.subject == name for name in robot.joint_names]
+                for label in limit.labels
+            ]
+        )
+        for weights, rows in zip(
+            (by_acceleration, by_velocity), limit.step_rows(q[None]), strict=True
+        ):
             if rows is not None:
-                np.maximum(weights, np.abs(np.where(own, rows[0], 0.0)).max(axis=0), out=weights)
+                np.maximum(
+                    weights,
+                    np.abs(np.where(own, rows[0], 0.0)).max(axis=0),
+                    out=weights,
+                )
     return by_acceleration, by_velocity

@@ -32,7 +32,10 @@ class PowerLimit(JointRatioLimit):
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
-        parts = (part[:, self._joints] * self._scale[:, None] for part in _power_partials(self._robot, motion))
+        parts = (
+            part[:, self._joints] * self._scale[:, None]
+            for part in _power_partials(self._robot, motion)
+        )
         return Partials(*parts)
 
 
@@ -49,7 +52,9 @@ class TotalPowerLimit(Limit):
 
     def __init__(self, robot: Robot) -> None:
         self._robot, self._figure = robot, robot.limits.total_power
-        self.labels = (Label("all joints", "total power", "W", "robot.limits.total_power"),)
+        self.labels = (
+            Label("all joints", "total power", "W", "robot.limits.total_power"),
+        )
         self.lower, self.upper = -np.ones(1), np.ones(1)
 
     @property
@@ -64,7 +69,9 @@ class TotalPowerLimit(Limit):
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
         parts = _power_partials(self._robot, motion)
-        return Partials(*(part.sum(axis=1, keepdims=True) / self._figure for part in parts))
+        return Partials(
+            *(part.sum(axis=1, keepdims=True) / self._figure for part in parts)
+        )
 
 
 def _powers(robot: Robot, motion: JointMotion) -> np.ndarray:
@@ -72,10 +79,14 @@ def _powers(robot: Robot, motion: JointMotion) -> np.ndarray:
     return motion.torque(robot) * motion.qdot
 
 
-def _power_partials(robot: Robot, motion: JointMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _power_partials(
+    robot: Robot, motion: JointMotion
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Differentiate the powers of all joints with respect to q, qdot, qddot, (K, n, n) each."""
     exact = motion.torque_derivatives(robot)
-    by_q, by_qdot, by_qddot = (part * motion.qdot[:, :, None] for part in (exact.q, exact.qdot, exact.qddot))
+    by_q, by_qdot, by_qddot = (
+        part * motion.qdot[:, :, None] for part in (exact.q, exact.qdot, exact.qddot)
+    )
     every = np.arange(robot.n)
     by_qdot[:, every, every] += motion.torque(robot)
     return by_q, by_qdot, by_qddot

@@ -24,7 +24,16 @@ from typing import Self
 import numpy as np
 
 from brachis.errors import InputError
-from brachis.limits.protocol import Approach, Bound, JointMotion, Label, Limit, Partials, PhaseLines, Role
+from brachis.limits.protocol import (
+    Approach,
+    Bound,
+    JointMotion,
+    Label,
+    Limit,
+    Partials,
+    PhaseLines,
+    Role,
+)
 from brachis.limits.tool import ToolSpeed
 from brachis.path import Path, path_speed
 from brachis.robot import Robot, TaskMap, dynamics, task_map_of
@@ -56,14 +65,25 @@ class _ProcessSpeedLimit(Limit):
 
     def __init__(self, robot: Robot, parts: Sequence[ProcessSpeed]) -> None:
         self._tool = ToolSpeed(robot)
-        self._speeds, self._tolerances = (np.array([getattr(part, name) for part in parts]) for name in _FIGURES)
+        self._speeds, self._tolerances = (
+            np.array([getattr(part, name) for part in parts]) for name in _FIGURES
+        )
         self._part = np.array([part.s for part in parts]).T
         self._lay_ways(np.zeros((2, len(parts))))
         self.breaks = self._part.ravel()
         what = "process speed" if self._side > 0.0 else "least process speed"
-        places = [""] if len(parts) == 1 else [f", s = {part.s[0]:g} to {part.s[1]:g}" for part in parts]
-        self.labels = tuple(self._label(number, what, place) for number, place in enumerate(places))
-        self.lower, self.upper = np.full(len(parts), -np.inf), np.full(len(parts), np.inf)
+        places = (
+            [""]
+            if len(parts) == 1
+            else [f", s = {part.s[0]:g} to {part.s[1]:g}" for part in parts]
+        )
+        self.labels = tuple(
+            self._label(number, what, place) for number, place in enumerate(places)
+        )
+        self.lower, self.upper = (
+            np.full(len(parts), -np.inf),
+            np.full(len(parts), np.inf),
+        )
 
     def _label(self, number: int, what: str, place: str) -> Label:
         """Name the speed of a part, whose place is told where there are several."""
@@ -71,20 +91,34 @@ class _ProcessSpeedLimit(Limit):
         within = f"{place}," if place else ""
         reached = f"tool is at the {end} end of its process speed{within}"
         room = f"tolerance {side} the process speed{within}"
-        return Label(f"tool{place}", what, "m/s", f"tool_limits.process_speed[{number}].speed", reached, room)
+        return Label(
+            f"tool{place}",
+            what,
+            "m/s",
+            f"tool_limits.process_speed[{number}].speed",
+            reached,
+            room,
+        )
 
     def _lay_ways(self, ways: np.ndarray) -> None:
         """Set the ways to the speeds before and behind the parts, (2, c), in s, and the widths of their corners."""
         # Also where the robot accelerates faster than estimated, the path before a part is way enough.
         beside = np.array([self._part[0], 1.0 - self._part[1]])
         self._ramp = np.maximum(np.minimum(ways, beside), _SHORTEST)
-        self._width = np.minimum(2.0 * self._ramp, np.sqrt(_COST * self._ramp * np.diff(self._part, axis=0)))
+        self._width = np.minimum(
+            2.0 * self._ramp, np.sqrt(_COST * self._ramp * np.diff(self._part, axis=0))
+        )
 
     def along(self, approach: Approach) -> Self:
         """See `Limit.along`."""
         other = copy.copy(self)
-        pairs = [zip(self._speeds.tolist(), places.tolist(), strict=True) for places in self._part]
-        other._lay_ways(np.array([[approach.way(*pair) for pair in rows] for rows in pairs]))  # noqa: SLF001  (its own class)
+        pairs = [
+            zip(self._speeds.tolist(), places.tolist(), strict=True)
+            for places in self._part
+        ]
+        other._lay_ways(  # noqa: SLF001
+            np.array([[approach.way(*pair) for pair in rows] for rows in pairs])
+        )
         return other
 
     @property
@@ -92,8 +126,16 @@ class _ProcessSpeedLimit(Limit):
         """See `Limit`: the speed at this side of the tolerance; a change by 100 % is one by the tolerance."""
         figures = self._speeds * (1.0 + self._side * self._tolerances)
         end = "upper" if self._side > 0.0 else "lower"
-        rows = zip(figures.tolist(), self._speeds.tolist(), self._tolerances.tolist(), strict=True)
-        return tuple(Bound(c, figure, share * v, 1.0 / v, end) for c, (figure, v, share) in enumerate(rows))
+        rows = zip(
+            figures.tolist(),
+            self._speeds.tolist(),
+            self._tolerances.tolist(),
+            strict=True,
+        )
+        return tuple(
+            Bound(c, figure, share * v, 1.0 / v, end)
+            for c, (figure, v, share) in enumerate(rows)
+        )
 
     def _giving(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How much each bound gives way, g, and its derivative by s, (K, c); infinitely much off the path."""
@@ -103,29 +145,48 @@ class _ProcessSpeedLimit(Limit):
         column = np.arange(len(self._speeds))
         ramp, width = self._ramp[end, column], self._width[end, column]
         way = np.maximum(np.maximum(before, behind), 0.0)
-        given = _STEEPNESS / ramp * np.where(way < width, 0.5 * way**2 / width, way - 0.5 * width)
-        slope = _STEEPNESS / ramp * np.minimum(way / width, 1.0) * np.where(end, 1.0, -1.0)
+        given = (
+            _STEEPNESS
+            / ramp
+            * np.where(way < width, 0.5 * way**2 / width, way - 0.5 * width)
+        )
+        slope = (
+            _STEEPNESS / ramp * np.minimum(way / width, 1.0) * np.where(end, 1.0, -1.0)
+        )
         near = given < _FARTHEST
         return np.where(near, given, _FARTHEST), np.where(near, slope, 0.0)
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
         given, _ = self._giving(motion.s)
-        return (self._tool.speed(motion)[:, None] / self._speeds - 1.0 - self._side * given) / (1.0 + given)
+        return (
+            self._tool.speed(motion)[:, None] / self._speeds - 1.0 - self._side * given
+        ) / (1.0 + given)
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
         given, slope = self._giving(motion.s)
         speed, by_q, by_qdot = self._tool.derivatives(motion)
         share = (1.0 / self._speeds / (1.0 + given))[:, :, None]
-        by_s = -(self._side + (speed[:, None] / self._speeds - 1.0 - self._side * given) / (1.0 + given))
-        return Partials(q=share * by_q[:, None], qdot=share * by_qdot[:, None], s=by_s * slope / (1.0 + given))
+        by_s = -(
+            self._side
+            + (speed[:, None] / self._speeds - 1.0 - self._side * given) / (1.0 + given)
+        )
+        return Partials(
+            q=share * by_q[:, None],
+            qdot=share * by_qdot[:, None],
+            s=by_s * slope / (1.0 + given),
+        )
 
-    def lines(self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
+    def lines(
+        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
+    ) -> PhaseLines:
         """See `Limit.lines`: within the parts alone, as the square of the ratio; for the least speeds 2 minus it."""
         inside = (s[:, None] >= self._part[0]) & (s[:, None] <= self._part[1])
         level = self._speeds * (1.0 + self._side * self._tolerances)
-        squares = np.where(inside, (self._tool.slope(q, q_ds)[:, None] / level) ** 2, 0.0)
+        squares = np.where(
+            inside, (self._tool.slope(q, q_ds)[:, None] / level) ** 2, 0.0
+        )
         constant = np.where(inside & (self._side < 0.0), 2.0, 0.0)
         return PhaseLines(None, self._side * squares, constant)
 
@@ -193,11 +254,22 @@ class FromRest:
 
     def way(self, speed: float, s: float) -> float:
         """See `Approach.way`."""
-        return 0.5 * speed**2 / self.acceleration / max(_tool_path_speed(self.task_map, self.path, s), _STILL)
+        return (
+            0.5
+            * speed**2
+            / self.acceleration
+            / max(_tool_path_speed(self.task_map, self.path, s), _STILL)
+        )
 
 
 def approach_of(
-    task: Task, robot: Robot, task_map: TaskMap, path: Path, posture: np.ndarray | None, *, own: bool = False
+    task: Task,
+    robot: Robot,
+    task_map: TaskMap,
+    path: Path,
+    posture: np.ndarray | None,
+    *,
+    own: bool = False,
 ) -> FromRest | None:
     """Find out how speeds along the path are reached; None where no limit asks for it.
 
@@ -223,7 +295,9 @@ def approach_of(
         return None
     for number in range(len(tool.process_speed)):
         _check_ends(task, task_map, path, number)
-    largest = largest_acceleration(robot, _middle(robot) if posture is None else posture)
+    largest = largest_acceleration(
+        robot, _middle(robot) if posture is None else posture
+    )
     return FromRest(task_map, path, min(largest, tool.acceleration or np.inf))
 
 
@@ -236,13 +310,22 @@ def largest_acceleration(robot: Robot, posture: np.ndarray) -> float:
     tool = task_map_of(robot, "position")
     jacobian = tool.jacobian(tool.twists(posture[None]))[0]
     mass = dynamics.mass_matrices(robot, posture[None])[0]
-    torque, rate = (np.abs(robot.limits.both_ways(kind)).max(axis=0) for kind in ("torque", "acceleration"))
+    torque, rate = (
+        np.abs(robot.limits.both_ways(kind)).max(axis=0)
+        for kind in ("torque", "acceleration")
+    )
     found = []
     for first in (torque, np.full(robot.n, np.inf)):
         by_torque = np.isfinite(first) | (np.isfinite(torque) & ~np.isfinite(rate))
         rows = np.where(by_torque[:, None], mass, np.eye(robot.n))
         figures = np.where(by_torque, torque, np.where(np.isfinite(rate), rate, 0.0))
-        found.append(float(np.linalg.norm(np.abs(jacobian @ np.linalg.inv(rows) * figures).sum(axis=1))))
+        found.append(
+            float(
+                np.linalg.norm(
+                    np.abs(jacobian @ np.linalg.inv(rows) * figures).sum(axis=1)
+                )
+            )
+        )
     return max(min(found), _STILL)
 
 
@@ -260,13 +343,21 @@ def _check_ends(task: Task, task_map: TaskMap, path: Path, number: int) -> None:
     for s, end, speed in ((0.0, 0, given.start_speed), (1.0, 1, given.end_speed)):
         if part.s[end] != s or given.periodic:
             continue
-        ratio = _tool_path_speed(task_map, path, s) / max(path_speed(task_map, path, s), _STILL)
+        ratio = _tool_path_speed(task_map, path, s) / max(
+            path_speed(task_map, path, s), _STILL
+        )
         found = speed * ratio
-        low, high = (1.0 - part.tolerance) * part.speed, (1.0 + part.tolerance) * part.speed
+        low, high = (
+            (1.0 - part.tolerance) * part.speed,
+            (1.0 + part.tolerance) * part.speed,
+        )
         free = not isinstance(task_map, JointSpace) and len(task_map.axes) < _PLANE
         if not (0.0 if free else low) <= found <= high or not found > 0.0:
             wanted = part.speed / max(ratio, _STILL)
-            name, begins, reach = (("start", "begins", "reach"), ("end", "ends", "leave"))[end]
+            name, begins, reach = (
+                ("start", "begins", "reach"),
+                ("end", "ends", "leave"),
+            )[end]
             raise InputError(
                 f"the part with a constant speed {begins} with the path, which is passed there at another one",
                 where=f"tool_limits.process_speed[{number}].s[{end}]",
@@ -280,4 +371,6 @@ def _middle(robot: Robot) -> np.ndarray:
     """Return the posture in the middle of the joint ranges, (n,); zero where a joint has none."""
     low, high = robot.limits.position_lower, robot.limits.position_upper
     ranged = np.isfinite(low) & np.isfinite(high)
-    return np.where(ranged, 0.5 * (np.where(ranged, low, 0.0) + np.where(ranged, high, 0.0)), 0.0)
+    return np.where(
+        ranged, 0.5 * (np.where(ranged, low, 0.0) + np.where(ranged, high, 0.0)), 0.0
+    )

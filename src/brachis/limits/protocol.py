@@ -279,10 +279,10 @@ class Limit(ABC):
 
     def lines(
         self,
-        s: np.ndarray,  # noqa: ARG002
-        q: np.ndarray,  # noqa: ARG002
-        q_ds: np.ndarray,  # noqa: ARG002
-        q_dds: np.ndarray,  # noqa: ARG002
+        s: np.ndarray,
+        q: np.ndarray,
+        q_ds: np.ndarray,
+        q_dds: np.ndarray,
     ) -> PhaseLines | None:
         """Write the limit in the phase plane, along a joint path: postures, (S, n), at s, (S,), and derivatives by s.
 
@@ -290,7 +290,7 @@ class Limit(ABC):
         """
         return None
 
-    def step_rows(self, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:  # noqa: ARG002
+    def step_rows(self, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
         """How much of the limit a step of the joints takes: rows A and B, (K, c, n), in postures (K, n).
 
         A qddot is the part of the limit that joint accelerations qddot take, B qdot that of joint velocities; None
@@ -298,7 +298,7 @@ class Limit(ABC):
         """
         return None, None
 
-    def along(self, approach: Approach) -> Self:  # noqa: ARG002
+    def along(self, approach: Approach) -> Self:
         """Return the limit for a path: where its bounds set in depends on how speeds are reached there."""
         return self
 
@@ -315,18 +315,26 @@ class Limit(ABC):
 
     def violation(self, values: np.ndarray) -> np.ndarray:
         """How far values, (K, c), are beyond their bounds; negative inside. See the module."""
-        return np.maximum(values - self.upper, self.lower - values) * self.violation_scale
+        return (
+            np.maximum(values - self.upper, self.lower - values) * self.violation_scale
+        )
 
     def ratio(self, values: np.ndarray) -> np.ndarray:
         """How near values, (K, c), are to their bounds; see the module."""
         above = (values - self.upper) * self.violation_scale
         below = (self.lower - values) * self.violation_scale
-        near = np.where(above >= below, np.maximum(1.0 + above, 0.0), -np.maximum(1.0 + below, 0.0))
+        near = np.where(
+            above >= below, np.maximum(1.0 + above, 0.0), -np.maximum(1.0 + below, 0.0)
+        )
         with np.errstate(invalid="ignore"):  # inf - inf
             away = values - self.centre
-            room = np.where(away > 0.0, self.upper - self.centre, self.centre - self.lower)
+            room = np.where(
+                away > 0.0, self.upper - self.centre, self.centre - self.lower
+            )
         inside = np.isfinite(room) & (above <= 0.0) & (below <= 0.0)
-        return np.where(inside, np.divide(away, room, out=np.zeros_like(away), where=inside), near)
+        return np.where(
+            inside, np.divide(away, room, out=np.zeros_like(away), where=inside), near
+        )
 
     def ratios(self, motion: JointMotion, t: np.ndarray) -> np.ndarray:
         """How near a whole motion is to the bounds at times t, (K,), dense and ascending, s: (K, c).
@@ -335,5 +343,7 @@ class Limit(ABC):
         """
         values = self.values(motion)
         if self.where == "whole":
-            values = np.broadcast_to(np.trapezoid(values, t, axis=0) / (t[-1] - t[0]), values.shape)
+            values = np.broadcast_to(
+                np.trapezoid(values, t, axis=0) / (t[-1] - t[0]), values.shape
+            )
         return self.ratio(values)

@@ -28,17 +28,25 @@ class BranchMargin(Limit):
     role = Role.SAFEGUARD
     static = True
 
-    def __init__(self, joint_map: JointMap, at_start: np.ndarray, margin: float) -> None:
+    def __init__(
+        self, joint_map: JointMap, at_start: np.ndarray, margin: float
+    ) -> None:
         self._joint_map = joint_map
         label, count = joint_map.branch_label, len(at_start)
         names = [f"{label} {i}" for i in range(count)] if count > 1 else [label]
         self.labels = tuple(Label(name, "branch margin", "-") for name in names)
-        self.lower, self.upper = np.minimum(margin, 0.5 * at_start), np.full(count, np.inf)
+        self.lower, self.upper = (
+            np.minimum(margin, 0.5 * at_start),
+            np.full(count, np.inf),
+        )
 
     @property
     def bounds(self) -> tuple[Bound, ...]:
         """See `Limit`."""
-        return tuple(Bound(c, least, least, 1.0, "lower") for c, least in enumerate(self.lower.tolist()))
+        return tuple(
+            Bound(c, least, least, 1.0, "lower")
+            for c, least in enumerate(self.lower.tolist())
+        )
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`; the motion is a state of the joint map."""
@@ -50,7 +58,9 @@ class BranchMargin(Limit):
         return Partials(q=by_q, s=by_s)
 
 
-def build_branch_margins(joint_map: JointMap, margin: float = MARGIN) -> tuple[BranchMargin, ...]:
+def build_branch_margins(
+    joint_map: JointMap, margin: float = MARGIN
+) -> tuple[BranchMargin, ...]:
     """Build the limit, where the joint map has margins: what keeps the motion where it can be computed."""
     at_start = joint_map.start_margins()
     return (BranchMargin(joint_map, at_start, margin),) if len(at_start) else ()

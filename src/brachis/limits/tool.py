@@ -24,7 +24,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials, PhaseLines, Role
+from brachis.limits.protocol import (
+    Bound,
+    JointMotion,
+    Label,
+    Limit,
+    Partials,
+    PhaseLines,
+    Role,
+)
 from brachis.robot import ROLL_JOINT, Robot, task_map_of
 from brachis.task import SpeedTable as SpeedTableModel
 from brachis.task import Task
@@ -33,7 +41,9 @@ from brachis.task import Task
 def direction(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sizes, (K,), of vectors (K, 3), and their directions, (K, 3); zero where there is none."""
     size = np.linalg.norm(vectors, axis=1)
-    return size, np.divide(vectors, size[:, None], out=np.zeros_like(vectors), where=size[:, None] > 0.0)
+    return size, np.divide(
+        vectors, size[:, None], out=np.zeros_like(vectors), where=size[:, None] > 0.0
+    )
 
 
 class ToolSpeed:
@@ -54,15 +64,21 @@ class ToolSpeed:
     def slope(self, q: np.ndarray, q_ds: np.ndarray) -> np.ndarray:
         """Size of the origin's displacement per unit of the path, (S,), from postures and their derivatives."""
         jacobian = self._tool.jacobian(self._tool.twists(q))
-        return np.asarray(np.linalg.norm(np.einsum("kij,kj->ki", jacobian, q_ds), axis=1))
+        return np.asarray(
+            np.linalg.norm(np.einsum("kij,kj->ki", jacobian, q_ds), axis=1)
+        )
 
-    def derivatives(self, motion: JointMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def derivatives(
+        self, motion: JointMotion
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Speeds, (K,), and their derivatives by q and by qdot, (K, n)."""
         twists = self._tool.twists(motion.q)
         jacobian = self._tool.jacobian(twists)
         speed, along = direction(np.einsum("kij,kj->ki", jacobian, motion.qdot))
         by_q = self._tool.velocity_slopes(twists, motion.qdot)
-        return speed, *(np.einsum("ki,kij->kj", along, part) for part in (by_q, jacobian))
+        return speed, *(
+            np.einsum("ki,kij->kj", along, part) for part in (by_q, jacobian)
+        )
 
 
 class ToolAccelerationLimit(Limit):
@@ -82,7 +98,13 @@ class ToolAccelerationLimit(Limit):
     def __init__(self, robot: Robot, figure: float) -> None:
         self._tool, self._figure = task_map_of(robot, "position"), figure
         self.labels = (
-            Label("tool", "acceleration", "m/s^2", "tool_limits.acceleration", share="tool acceleration / limit"),
+            Label(
+                "tool",
+                "acceleration",
+                "m/s^2",
+                "tool_limits.acceleration",
+                share="tool acceleration / limit",
+            ),
         )
         self.lower, self.upper = np.full(1, -np.inf), np.ones(1)
 
@@ -91,14 +113,20 @@ class ToolAccelerationLimit(Limit):
         """See `Limit`."""
         return (Bound(0, self._figure, self._figure, 1.0 / self._figure),)
 
-    def _acceleration(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+    def _acceleration(
+        self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+    ) -> np.ndarray:
         """Accelerations over the limit, (K, 3), world frame."""
         jacobian = self._tool.jacobian(twists)
-        return (np.einsum("kij,kj->ki", jacobian, qddot) + self._tool.bias(twists, qdot)) / self._figure
+        return (
+            np.einsum("kij,kj->ki", jacobian, qddot) + self._tool.bias(twists, qdot)
+        ) / self._figure
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        found = self._acceleration(self._tool.twists(motion.q), motion.qdot, motion.qddot)
+        found = self._acceleration(
+            self._tool.twists(motion.q), motion.qdot, motion.qddot
+        )
         return np.linalg.norm(found, axis=1)[:, None]
 
     def partials(self, motion: JointMotion) -> Partials:
@@ -106,14 +134,27 @@ class ToolAccelerationLimit(Limit):
         twists = self._tool.twists(motion.q)
         _, along = direction(self._acceleration(twists, motion.qdot, motion.qddot))
         exact = self._tool.derivatives(twists, motion.qdot, motion.qddot)
-        by = (exact.acceleration_q, exact.acceleration_qdot, self._tool.jacobian(twists))
-        return Partials(*(np.einsum("ki,kij->kj", along, part)[:, None] / self._figure for part in by))
+        by = (
+            exact.acceleration_q,
+            exact.acceleration_qdot,
+            self._tool.jacobian(twists),
+        )
+        return Partials(
+            *(
+                np.einsum("ki,kij->kj", along, part)[:, None] / self._figure
+                for part in by
+            )
+        )
 
-    def lines(self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
+    def lines(
+        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
+    ) -> PhaseLines:
         """See `Limit.lines`: the components along the world's axes, each within the whole."""
         twists, still = self._tool.twists(q), np.zeros_like(q)
         by_u = self._acceleration(twists, still, q_ds)
-        return PhaseLines(by_u, self._acceleration(twists, q_ds, q_dds), np.zeros_like(by_u))
+        return PhaseLines(
+            by_u, self._acceleration(twists, q_ds, q_dds), np.zeros_like(by_u)
+        )
 
 
 def build_tool_acceleration(robot: Robot, task: Task) -> ToolAccelerationLimit | None:
@@ -142,9 +183,20 @@ class ToolAngularSpeedLimit(Limit):
 
     def __init__(self, robot: Robot, figure: float) -> None:
         self._tool, self._figure = task_map_of(robot, "pose"), figure
-        self._turning = np.array([not (robot.rolls_freely and name == ROLL_JOINT) for name in robot.joint_names])
+        self._turning = np.array(
+            [
+                not (robot.rolls_freely and name == ROLL_JOINT)
+                for name in robot.joint_names
+            ]
+        )
         self.labels = (
-            Label("tool", "angular speed", "rad/s", "tool_limits.angular_speed", share="tool angular speed / limit"),
+            Label(
+                "tool",
+                "angular speed",
+                "rad/s",
+                "tool_limits.angular_speed",
+                share="tool angular speed / limit",
+            ),
         )
         self.lower, self.upper = np.full(1, -np.inf), np.ones(1)
 
@@ -171,9 +223,16 @@ class ToolAngularSpeedLimit(Limit):
         jacobian = self._jacobian(twists)
         _, along = direction(np.einsum("kij,kj->ki", jacobian, qdot))
         by_q = self._tool.velocity_slopes(twists, qdot)[:, _ANGULAR] / self._figure
-        return Partials(*(np.einsum("ki,kij->kj", along, part)[:, None] for part in (by_q, jacobian)))
+        return Partials(
+            *(
+                np.einsum("ki,kij->kj", along, part)[:, None]
+                for part in (by_q, jacobian)
+            )
+        )
 
-    def lines(self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
+    def lines(
+        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
+    ) -> PhaseLines:
         """See `Limit.lines`: the square of the ratio."""
         return PhaseLines(None, self._speed(q, q_ds) ** 2, np.zeros((len(q), 1)))
 
@@ -214,7 +273,9 @@ class SpeedTable:
         Of the given ones, m/s.
     """
 
-    def __init__(self, s: Sequence[float], speed: Sequence[float], *, whole: bool = True) -> None:
+    def __init__(
+        self, s: Sequence[float], speed: Sequence[float], *, whole: bool = True
+    ) -> None:
         places, speeds = np.array(s, dtype=float), np.array(speed, dtype=float)
         given, steps = places.copy(), np.flatnonzero(np.diff(places) == 0.0)
         for first in steps.tolist():
@@ -234,17 +295,23 @@ class SpeedTable:
         if not whole:
             first, last = self.places[[0, -1]]
             self.places = np.concatenate([[first - _RAMP], self.places, [last + _RAMP]])
-            self.speeds = np.concatenate([self.speeds[:1] * _BEYOND, self.speeds, self.speeds[-1:] * _BEYOND])
+            self.speeds = np.concatenate(
+                [self.speeds[:1] * _BEYOND, self.speeds, self.speeds[-1:] * _BEYOND]
+            )
 
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Largest speeds, (K,), m/s, at path coordinates s, (K,), and their derivatives by s; none off the path."""
         if len(self.places) == 1:
             return np.full(len(s), self.speeds[0]), np.zeros(len(s))
-        slopes = np.concatenate([[0.0], np.diff(self.speeds) / np.diff(self.places), [0.0]])
+        slopes = np.concatenate(
+            [[0.0], np.diff(self.speeds) / np.diff(self.places), [0.0]]
+        )
         piece = np.searchsorted(self.places, s, side="right")
         beyond = (s < self.places[0]) | (s > self.places[-1])
         nowhere = np.isnan(s) | (beyond & (not self._whole))
-        return np.where(nowhere, np.inf, np.interp(s, self.places, self.speeds)), slopes[piece]
+        return np.where(
+            nowhere, np.inf, np.interp(s, self.places, self.speeds)
+        ), slopes[piece]
 
 
 def _bends(places: np.ndarray, speeds: np.ndarray) -> np.ndarray:
@@ -268,16 +335,25 @@ class ToolSpeedLimit(Limit):
     role = Role.PROCESS
     time_scaling = True
 
-    def __init__(self, robot: Robot, tables: Sequence[SpeedTable], labels: Sequence[Label]) -> None:
+    def __init__(
+        self, robot: Robot, tables: Sequence[SpeedTable], labels: Sequence[Label]
+    ) -> None:
         self._tool, self._tables, self.labels = ToolSpeed(robot), tables, tuple(labels)
         self.lower, self.upper = np.full(len(tables), -np.inf), np.ones(len(tables))
-        self.breaks = np.unique(np.concatenate([table.places for table in tables if len(table.places) > 1] or [[]]))
+        self.breaks = np.unique(
+            np.concatenate(
+                [table.places for table in tables if len(table.places) > 1] or [[]]
+            )
+        )
 
     @property
     def bounds(self) -> tuple[Bound, ...]:
         """See `Limit`: the largest figure of a table stands for all of them."""
         figures = [table.largest for table in self._tables]
-        return tuple(Bound(column, figure, figure, 1.0 / figure) for column, figure in enumerate(figures))
+        return tuple(
+            Bound(column, figure, figure, 1.0 / figure)
+            for column, figure in enumerate(figures)
+        )
 
     def largest_at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Largest speeds, (K, c), m/s, at path coordinates s, (K,), and their derivatives by s."""
@@ -286,7 +362,9 @@ class ToolSpeedLimit(Limit):
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        return np.asarray(self._tool.speed(motion)[:, None] / self.largest_at(motion.s)[0])
+        return np.asarray(
+            self._tool.speed(motion)[:, None] / self.largest_at(motion.s)[0]
+        )
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
@@ -295,7 +373,9 @@ class ToolSpeedLimit(Limit):
         q, qdot = (part[:, None] / largest[:, :, None] for part in (by_q, by_qdot))
         return Partials(q=q, qdot=qdot, s=-speed[:, None] * slope / largest**2)
 
-    def lines(self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
+    def lines(
+        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
+    ) -> PhaseLines:
         """See `Limit.lines`: the square of the ratio."""
         squares = (self._tool.slope(q, q_ds)[:, None] / self.largest_at(s)[0]) ** 2
         return PhaseLines(None, squares, np.zeros_like(squares))
@@ -306,10 +386,25 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolSpeedLimit | None:
     speed, feed = task.tool_limits.speed, task.tool_limits.feed
     tables, labels = [], []
     if speed is not None:
-        given = (speed.s, speed.speed) if isinstance(speed, SpeedTableModel) else ((0.0,), (speed,))
+        given = (
+            (speed.s, speed.speed)
+            if isinstance(speed, SpeedTableModel)
+            else ((0.0,), (speed,))
+        )
         tables.append(SpeedTable(*given))
-        labels.append(Label("tool", "speed", "m/s", "tool_limits.speed", share="tool speed / limit"))
+        labels.append(
+            Label(
+                "tool", "speed", "m/s", "tool_limits.speed", share="tool speed / limit"
+            )
+        )
     for part in feed:
         tables.append(SpeedTable(part.s, part.speed, whole=False))
-        labels.append(Label(f"tool, s = {part.s[0]:g} to {part.s[-1]:g},", "feed rate", "m/s", "tool_limits.feed"))
+        labels.append(
+            Label(
+                f"tool, s = {part.s[0]:g} to {part.s[-1]:g},",
+                "feed rate",
+                "m/s",
+                "tool_limits.feed",
+            )
+        )
     return ToolSpeedLimit(robot, tables, labels) if tables else None

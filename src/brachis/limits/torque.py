@@ -44,7 +44,14 @@ import numpy as np
 
 from brachis.common.arrays import rates
 from brachis.limits.joint import JointRatioLimit, in_words
-from brachis.limits.protocol import Bound, JointMotion, Label, Limit, Partials, PhaseLines
+from brachis.limits.protocol import (
+    Bound,
+    JointMotion,
+    Label,
+    Limit,
+    Partials,
+    PhaseLines,
+)
 from brachis.robot import Robot, dynamics
 from brachis.robot.limits import Curve
 from brachis.task import Task
@@ -65,7 +72,12 @@ class TorqueLimit(JointRatioLimit):
     refusal = "cannot hold the arm against gravity"
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
-        super().__init__(robot, joints, robot.limits.both_ways("torque")[:, joints], robot.torque_units)
+        super().__init__(
+            robot,
+            joints,
+            robot.limits.both_ways("torque")[:, joints],
+            robot.torque_units,
+        )
         self._robot = robot
 
     def values(self, motion: JointMotion) -> np.ndarray:
@@ -75,21 +87,36 @@ class TorqueLimit(JointRatioLimit):
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
         exact = motion.torque_derivatives(self._robot)
-        parts = (part[:, self._joints] * self._scale[:, None] for part in (exact.q, exact.qdot, exact.qddot))
+        parts = (
+            part[:, self._joints] * self._scale[:, None]
+            for part in (exact.q, exact.qdot, exact.qddot)
+        )
         return Partials(*parts)
 
-    def lines(self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray) -> PhaseLines:  # noqa: ARG002
+    def lines(
+        self, s: np.ndarray, q: np.ndarray, q_ds: np.ndarray, q_dds: np.ndarray
+    ) -> PhaseLines:
         """See `Limit.lines`: a = M q_ds, b = M q_dds + C(q, q_ds) q_ds, c the torque at rest; no velocity friction."""
         robot, still = self._robot, np.zeros_like(q)
         held = dynamics.rigid_torque(robot, q, still, still)
-        by_u = dynamics.rigid_torque(robot, q, still, q_ds) - held + robot.friction.armature * q_ds
-        by_x = dynamics.rigid_torque(robot, q, q_ds, q_dds) - held + robot.friction.armature * q_dds
+        by_u = (
+            dynamics.rigid_torque(robot, q, still, q_ds)
+            - held
+            + robot.friction.armature * q_ds
+        )
+        by_x = (
+            dynamics.rigid_torque(robot, q, q_ds, q_dds)
+            - held
+            + robot.friction.armature * q_dds
+        )
         slope, curve = (part[:, self._joints] * self._scale for part in (by_u, by_x))
         return PhaseLines(slope, curve, self._normalised(held))
 
     def step_rows(self, q: np.ndarray) -> tuple[np.ndarray, None]:
         """See `Limit.step_rows`: M over half the way between both limits."""
-        return dynamics.mass_matrices(self._robot, q)[:, self._joints] * self._scale[:, None], None
+        return dynamics.mass_matrices(self._robot, q)[:, self._joints] * self._scale[
+            :, None
+        ], None
 
 
 def build_torque(robot: Robot, _task: Task) -> TorqueLimit | None:
@@ -125,15 +152,21 @@ class TorqueRateLimit(JointRatioLimit):
         """See `Limit.values`."""
         slopes = self._slopes(motion.torque_derivatives(self._robot))
         pairs = zip(slopes, (motion.qdot, motion.qddot, motion.qdddot), strict=True)
-        return np.asarray(sum(np.einsum("kcj,kj->kc", slope, part) for slope, part in pairs))
+        return np.asarray(
+            sum(np.einsum("kcj,kj->kc", slope, part) for slope, part in pairs)
+        )
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
         by_q, by_qdot, by_qddot = self._slopes(motion.torque_derivatives(self._robot))
         whole = motion.q, motion.qdot, motion.qddot, motion.qdddot
 
-        def slopes(q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, ...]:
-            return self._slopes(dynamics.torque_derivatives(self._robot, q, qdot, qddot))
+        def slopes(
+            q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, _: np.ndarray
+        ) -> tuple[np.ndarray, ...]:
+            return self._slopes(
+                dynamics.torque_derivatives(self._robot, q, qdot, qddot)
+            )
 
         q, qdot, qddot = rates(slopes, whole)
         return Partials(q, qdot + by_q, qddot + by_qdot, by_qddot)
@@ -182,29 +215,45 @@ class RoundedCurve:
         speed, torque = np.array(curve).T
         slope = np.diff(torque) / np.diff(speed)
         if slope[-1] < 0.0 and torque[-1] > _NOTHING * torque[0]:
-            speed, torque = np.append(speed, speed[-1] - torque[-1] / slope[-1]), np.append(torque, 0.0)
+            speed, torque = (
+                np.append(speed, speed[-1] - torque[-1] / slope[-1]),
+                np.append(torque, 0.0),
+            )
             slope = np.append(slope, slope[-1])
         if not np.any(slope < 0.0):
             return None
         first = int(np.argmax(slope < 0.0))
         lengths, slope = np.diff(speed), np.append(slope, 0.0)
-        widths = WIDTH * np.minimum(np.append(lengths[0], lengths), np.append(lengths, lengths[-1]))
+        widths = WIDTH * np.minimum(
+            np.append(lengths[0], lengths), np.append(lengths, lengths[-1])
+        )
         moved = np.where(np.diff(slope, prepend=0.0) > 0.0, widths, 0.0)
         speed, torque = speed - moved, torque - slope * moved
         slope = np.append(np.diff(torque) / np.diff(speed), 0.0)[first:]
         corners = np.append(0.0, speed[first + 1 :])
-        return cls(torque[first] - slope[0] * speed[first], corners, widths[first:], np.diff(slope, prepend=0.0))
+        return cls(
+            torque[first] - slope[0] * speed[first],
+            corners,
+            widths[first:],
+            np.diff(slope, prepend=0.0),
+        )
 
     def values(self, velocity: np.ndarray) -> np.ndarray:
         """Values (K,) at velocities (K,)."""
         x = np.array([velocity, -velocity])[..., None] - self.corners
         y = np.clip(x / self.widths, -1.0, 1.0)
-        ramp = self.widths * (3.0 + y * (8.0 + y * (6.0 - y * y))) / 16.0 + np.maximum(x - self.widths, 0.0)
+        ramp = self.widths * (3.0 + y * (8.0 + y * (6.0 - y * y))) / 16.0 + np.maximum(
+            x - self.widths, 0.0
+        )
         return np.asarray(self.at_rest + (ramp @ self.bends).sum(axis=0))
 
     def slopes(self, velocity: np.ndarray) -> np.ndarray:
         """Differentiate `values` by the velocities, (K,)."""
-        y = np.clip((np.array([velocity, -velocity])[..., None] - self.corners) / self.widths, -1.0, 1.0)
+        y = np.clip(
+            (np.array([velocity, -velocity])[..., None] - self.corners) / self.widths,
+            -1.0,
+            1.0,
+        )
         forward, backward = (2.0 + y * (3.0 - y * y)) @ self.bends / 4.0
         return np.asarray(forward - backward)
 
@@ -226,13 +275,23 @@ class TorqueSpeedLimit(Limit):
         self._robot, self._curves = robot, tuple(curves.values())
         self._joints = np.repeat(list(curves), 2)
         self._signs = np.tile([1.0, -1.0], len(curves))
-        self._at_rest = np.array([robot.limits.torque_speed[joint][0][1] for joint in self._joints])
-        self.labels = tuple(self._label(*row) for row in zip(self._joints, self._signs, strict=True))
-        self.lower, self.upper = np.full(len(self._joints), -np.inf), np.zeros(len(self._joints))
+        self._at_rest = np.array(
+            [robot.limits.torque_speed[joint][0][1] for joint in self._joints]
+        )
+        self.labels = tuple(
+            self._label(*row) for row in zip(self._joints, self._signs, strict=True)
+        )
+        self.lower, self.upper = (
+            np.full(len(self._joints), -np.inf),
+            np.zeros(len(self._joints)),
+        )
 
     def _label(self, joint: int, sign: float) -> Label:
         name, unit = self._robot.joint_names[joint], self._robot.position_units[joint]
-        side, torque = "positive" if sign > 0.0 else "negative", in_words("torque", unit)
+        side, torque = (
+            "positive" if sign > 0.0 else "negative",
+            in_words("torque", unit),
+        )
         return Label(
             f"{name} {side}",
             in_words("torque at speed", unit),
@@ -246,27 +305,50 @@ class TorqueSpeedLimit(Limit):
     def bounds(self) -> tuple[Bound, ...]:
         """See `Limit`: the torque at rest, with which the whole curve rises."""
         levels = enumerate(self._at_rest.tolist())
-        return tuple(Bound(column, level, level, 1.0 / level, "upper") for column, level in levels)
+        return tuple(
+            Bound(column, level, level, 1.0 / level, "upper")
+            for column, level in levels
+        )
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
-        tau, qdot = (part[:, self._joints] for part in (motion.torque(self._robot), motion.qdot))
-        allowed = [curve.values(part) for curve, part in zip(self._curves, qdot.T[::2], strict=True)]
-        return np.asarray((self._signs * tau - np.repeat(allowed, 2, axis=0).T) / self._at_rest)
+        tau, qdot = (
+            part[:, self._joints] for part in (motion.torque(self._robot), motion.qdot)
+        )
+        allowed = [
+            curve.values(part)
+            for curve, part in zip(self._curves, qdot.T[::2], strict=True)
+        ]
+        return np.asarray(
+            (self._signs * tau - np.repeat(allowed, 2, axis=0).T) / self._at_rest
+        )
 
     def partials(self, motion: JointMotion) -> Partials:
         """See `Limit.partials`."""
-        exact, scale = motion.torque_derivatives(self._robot), (self._signs / self._at_rest)[:, None]
-        by_q, by_qdot, by_qddot = (part[:, self._joints] * scale for part in (exact.q, exact.qdot, exact.qddot))
+        exact, scale = (
+            motion.torque_derivatives(self._robot),
+            (self._signs / self._at_rest)[:, None],
+        )
+        by_q, by_qdot, by_qddot = (
+            part[:, self._joints] * scale for part in (exact.q, exact.qdot, exact.qddot)
+        )
         qdot = motion.qdot[:, self._joints[::2]]
-        slopes = [curve.slopes(part) for curve, part in zip(self._curves, qdot.T, strict=True)]
-        by_qdot[:, np.arange(len(self._joints)), self._joints] -= np.repeat(slopes, 2, axis=0).T / self._at_rest
+        slopes = [
+            curve.slopes(part) for curve, part in zip(self._curves, qdot.T, strict=True)
+        ]
+        by_qdot[:, np.arange(len(self._joints)), self._joints] -= (
+            np.repeat(slopes, 2, axis=0).T / self._at_rest
+        )
         return Partials(by_q, by_qdot, by_qddot)
 
 
 def build_torque_speed(robot: Robot, _task: Task) -> TorqueSpeedLimit | None:
     """Build the limit where a joint's torque falls with its speed."""
-    rounded = {joint: RoundedCurve.below(curve) for joint, curve in enumerate(robot.limits.torque_speed) if curve}
+    rounded = {
+        joint: RoundedCurve.below(curve)
+        for joint, curve in enumerate(robot.limits.torque_speed)
+        if curve
+    }
     falling = {joint: curve for joint, curve in rounded.items() if curve is not None}
     return TorqueSpeedLimit(robot, falling) if falling else None
 
@@ -285,14 +367,18 @@ class RmsTorqueLimit(JointRatioLimit):
     where = "whole"
 
     def __init__(self, robot: Robot, joints: np.ndarray) -> None:
-        super().__init__(robot, joints, robot.limits.rms_torque[joints], robot.torque_units)
+        super().__init__(
+            robot, joints, robot.limits.rms_torque[joints], robot.torque_units
+        )
         self._robot = robot
         self.lower = np.full(len(joints), -np.inf)
 
     @property
     def bounds(self) -> tuple[Bound, ...]:
         """See `Limit`: a figure moves its square, to first order by twice as much."""
-        return tuple(replace(bound, per_unit=2.0 * bound.per_unit) for bound in super().bounds)
+        return tuple(
+            replace(bound, per_unit=2.0 * bound.per_unit) for bound in super().bounds
+        )
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """See `Limit.values`."""
@@ -304,7 +390,12 @@ class RmsTorqueLimit(JointRatioLimit):
         tau = motion.torque(self._robot)[:, self._joints]
         exact = motion.torque_derivatives(self._robot)
         factors = (2.0 * tau * self._scale**2)[:, :, None]
-        return Partials(*(factors * part[:, self._joints] for part in (exact.q, exact.qdot, exact.qddot)))
+        return Partials(
+            *(
+                factors * part[:, self._joints]
+                for part in (exact.q, exact.qdot, exact.qddot)
+            )
+        )
 
     def violation(self, values: np.ndarray) -> np.ndarray:
         """See `Limit.violation`: of the root mean square itself."""

@@ -68,15 +68,22 @@ class BoundarySpline:
     rate: np.ndarray
 
     @classmethod
-    def between(cls, knots: np.ndarray, degree: int, start: EndCondition, end: EndCondition) -> BoundarySpline:
+    def between(
+        cls, knots: np.ndarray, degree: int, start: EndCondition, end: EndCondition
+    ) -> BoundarySpline:
         """Build a spline with conditions at both ends."""
         abscissae = greville(knots, degree)
         count = len(abscissae)
         group = np.arange(count)
         fixed, rate = np.zeros(count), np.zeros(count)
-        first, last = (1 if np.isnan(each.rate) else 1 + each.derivatives for each in (start, end))
+        first, last = (
+            1 if np.isnan(each.rate) else 1 + each.derivatives for each in (start, end)
+        )
         ends = slice(None, first), slice(count - last, None)
-        for condition, anchor, own, other in ((start, 0, *ends), (end, count - 1, *ends[::-1])):
+        for condition, anchor, own, other in (
+            (start, 0, *ends),
+            (end, count - 1, *ends[::-1]),
+        ):
             group[own] = anchor if np.isnan(condition.value) else -1
             fixed[own] = np.nan_to_num(condition.value)
             away = abscissae - abscissae[anchor]
@@ -102,7 +109,9 @@ class BoundarySpline:
         """S, (N + d, free)."""
         matrix = np.zeros((len(self.fixed), self.free))
         point, entry = np.nonzero(self.variable >= 0)
-        np.add.at(matrix, (point, self.variable[point, entry]), self.weight[point, entry])
+        np.add.at(
+            matrix, (point, self.variable[point, entry]), self.weight[point, entry]
+        )
         return matrix
 
     def control_points(self, free: np.ndarray, duration: float) -> np.ndarray:
@@ -113,7 +122,11 @@ class BoundarySpline:
     def free_from(self, control_points: np.ndarray, duration: float) -> np.ndarray:
         """Free variables that come nearest to given control points: means over those that are one variable each."""
         own_part = control_points - self.fixed - duration * self.rate
-        alone = ((self.variable >= 0).sum(axis=1) == 1) & (self.weight[:, 0] == 1.0) & (self.variable[:, 0] >= 0)
+        alone = (
+            ((self.variable >= 0).sum(axis=1) == 1)
+            & (self.weight[:, 0] == 1.0)
+            & (self.variable[:, 0] >= 0)
+        )
         own = self.variable[alone, 0]
         return np.asarray(np.bincount(own, weights=own_part[alone]) / np.bincount(own))
 
@@ -124,7 +137,9 @@ def greville(knots: np.ndarray, degree: int) -> np.ndarray:
     return np.asarray(windows.mean(axis=1))
 
 
-def periodic(knots: np.ndarray, degree: int, start: float, jump: float) -> BoundarySpline:
+def periodic(
+    knots: np.ndarray, degree: int, start: float, jump: float
+) -> BoundarySpline:
     """Build a spline whose value at the end is that at the start plus a jump, and whose derivatives are the same.
 
     These are all that continue within the spline, the first three at most. With A and B the derivatives, from the value
@@ -145,14 +160,25 @@ def periodic(knots: np.ndarray, degree: int, start: float, jump: float) -> Bound
     count = len(knots) - degree - 1
     variable, weight = np.full((count, orders), -1), np.zeros((count, orders))
     fixed = np.zeros(count)
-    variable[: count - orders, 0], weight[: count - orders, 0] = np.arange(count - orders), 1.0
-    variable[count - orders :], weight[count - orders :] = np.arange(orders), np.linalg.solve(last, first)
+    variable[: count - orders, 0], weight[: count - orders, 0] = (
+        np.arange(count - orders),
+        1.0,
+    )
+    variable[count - orders :], weight[count - orders :] = (
+        np.arange(orders),
+        np.linalg.solve(last, first),
+    )
     fixed[count - orders :] = jump
-    weight[-1], variable[-1, 1:] = np.eye(orders)[0], -1  # the value itself, without rounding
+    weight[-1], variable[-1, 1:] = (
+        np.eye(orders)[0],
+        -1,
+    )  # the value itself, without rounding
     if not np.isnan(start):
         fixed += start * np.where(variable == 0, weight, 0.0).sum(axis=1)
         variable -= 1
-    return BoundarySpline(knots, degree, np.maximum(variable, -1), weight, fixed, np.zeros(count))
+    return BoundarySpline(
+        knots, degree, np.maximum(variable, -1), weight, fixed, np.zeros(count)
+    )
 
 
 @dataclass(frozen=True)
@@ -184,14 +210,26 @@ class Boundary:
         if self.periodic:
             ahead = np.nan_to_num(self.end - self.start)
             pairs = zip(self.start, ahead, strict=True)
-            return tuple(periodic(knots, degree, float(start), float(jump)) for start, jump in pairs)
+            return tuple(
+                periodic(knots, degree, float(start), float(jump))
+                for start, jump in pairs
+            )
         rest = np.zeros(len(self.start))
-        rates = (rest if each is None else each for each in (self.start_rates, self.end_rates))
+        rates = (
+            rest if each is None else each
+            for each in (self.start_rates, self.end_rates)
+        )
         starts, ends = (
-            [EndCondition(float(value), float(rate), self.derivatives) for value, rate in zip(*pair, strict=True)]
+            [
+                EndCondition(float(value), float(rate), self.derivatives)
+                for value, rate in zip(*pair, strict=True)
+            ]
             for pair in zip((self.start, self.end), rates, strict=True)
         )
-        return tuple(BoundarySpline.between(knots, degree, *pair) for pair in zip(starts, ends, strict=True))
+        return tuple(
+            BoundarySpline.between(knots, degree, *pair)
+            for pair in zip(starts, ends, strict=True)
+        )
 
 
 @dataclass(frozen=True)
@@ -213,14 +251,20 @@ class LocalBasis:
     def of(cls, knots: np.ndarray, degree: int, t_norm: np.ndarray) -> LocalBasis:
         """Sample the basis at normalised times `t_norm`, (K,); at knots behind them."""
         breaks = np.unique(knots)
-        near = breaks[np.searchsorted(breaks, t_norm - _SAME_TIME).clip(max=len(breaks) - 1)]
+        near = breaks[
+            np.searchsorted(breaks, t_norm - _SAME_TIME).clip(max=len(breaks) - 1)
+        ]
         # Rounding must not choose the side of a knot: the highest derivative jumps there.
-        first, values = local_basis(knots, degree, np.where(np.abs(near - t_norm) <= _SAME_TIME, near, t_norm))
+        first, values = local_basis(
+            knots, degree, np.where(np.abs(near - t_norm) <= _SAME_TIME, near, t_norm)
+        )
         return cls(first[:, None] + np.arange(degree + 1), values)
 
     def curves(self, control_points: np.ndarray) -> np.ndarray:
         """Value and three derivatives (4, K, c) of c splines with control points (c, N + d)."""
-        return np.asarray(np.einsum("okw,ckw->okc", self.values, control_points[:, self.columns]))
+        return np.asarray(
+            np.einsum("okw,ckw->okc", self.values, control_points[:, self.columns])
+        )
 
 
 @dataclass(frozen=True)
@@ -243,11 +287,24 @@ class SparsityPattern:
         """Find the places of a spline's local basis, whose `columns` are (K, d + 1)."""
         variable = spline.variable[columns]
         kept = variable >= 0
-        numbers = (np.arange(len(variable))[:, None, None] * spline.free + variable)[kept]
+        numbers = (np.arange(len(variable))[:, None, None] * spline.free + variable)[
+            kept
+        ]
         unique, place = np.unique(numbers, return_inverse=True)
-        return cls(unique // spline.free, unique % spline.free, kept, place, spline.weight[columns][kept])
+        return cls(
+            unique // spline.free,
+            unique % spline.free,
+            kept,
+            place,
+            spline.weight[columns][kept],
+        )
 
     def entries(self, values: np.ndarray) -> np.ndarray:
         """Differentiate value and three derivatives by the free variables, (4, z); `values` are (4, K, d + 1)."""
         spread = np.broadcast_to(values[..., None], (len(values), *self._kept.shape))
-        return np.array([np.bincount(self._place, weights=self._weight * value[self._kept]) for value in spread])
+        return np.array(
+            [
+                np.bincount(self._place, weights=self._weight * value[self._kept])
+                for value in spread
+            ]
+        )

@@ -25,7 +25,9 @@ ORDERS = 4
 _STEP = 1e-30
 
 
-def local_basis(knots: np.ndarray, degree: int, t_norm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def local_basis(
+    knots: np.ndarray, degree: int, t_norm: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Value and three derivatives of the basis functions that differ from zero at given times.
 
     Parameters
@@ -46,9 +48,13 @@ def local_basis(knots: np.ndarray, degree: int, t_norm: np.ndarray) -> tuple[np.
     """
     breaks = knots[degree : len(knots) - degree]
     t_norm = np.clip(t_norm, breaks[0], breaks[-1])
-    first = np.clip(np.searchsorted(breaks, t_norm, side="right") - 1, 0, len(breaks) - 2)
+    first = np.clip(
+        np.searchsorted(breaks, t_norm, side="right") - 1, 0, len(breaks) - 2
+    )
     lengths = np.diff(knots)[first[:, None] + np.arange(1, 2 * degree)]
-    return first, basis_functions(lengths, (t_norm - breaks[first]) / lengths[:, degree - 1])
+    return first, basis_functions(
+        lengths, (t_norm - breaks[first]) / lengths[:, degree - 1]
+    )
 
 
 def basis_matrix(knots: np.ndarray, degree: int, t_norm: np.ndarray) -> np.ndarray:
@@ -79,8 +85,12 @@ def basis_functions(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     own = lengths[..., middle : middle + 1]
     part = fraction[..., None] * own
     # left[m]: from the m-th knot before the point to the point; right[m]: from it to the m-th knot behind.
-    left = np.cumsum(np.concatenate([part, lengths[..., :middle][..., ::-1]], axis=-1), axis=-1)
-    right = np.cumsum(np.concatenate([own - part, lengths[..., middle + 1 :]], axis=-1), axis=-1)
+    left = np.cumsum(
+        np.concatenate([part, lengths[..., :middle][..., ::-1]], axis=-1), axis=-1
+    )
+    right = np.cumsum(
+        np.concatenate([own - part, lengths[..., middle + 1 :]], axis=-1), axis=-1
+    )
     value = [np.ones_like(part)]
     for p in range(1, degree + 1):
         value.append(_raised(value[-1], left, right, p))
@@ -106,17 +116,23 @@ def basis_derivatives(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     (4, 2 d - 1, K, d + 1) ndarray
     """
     steps = 1j * _STEP * np.eye(lengths.shape[-1])
-    return np.asarray(basis_functions(lengths + steps[:, None], fraction[None]).imag / _STEP)
+    return np.asarray(
+        basis_functions(lengths + steps[:, None], fraction[None]).imag / _STEP
+    )
 
 
-def _raised(value: np.ndarray, left: np.ndarray, right: np.ndarray, p: int) -> np.ndarray:
+def _raised(
+    value: np.ndarray, left: np.ndarray, right: np.ndarray, p: int
+) -> np.ndarray:
     """Basis functions of degree p from those of degree p - 1."""
     before, behind = left[..., :p][..., ::-1], right[..., :p]
     share = value / (before + behind)
     return _shifted(before * share) + _padded(behind * share)
 
 
-def _slope(lower: np.ndarray, left: np.ndarray, right: np.ndarray, p: int) -> np.ndarray:
+def _slope(
+    lower: np.ndarray, left: np.ndarray, right: np.ndarray, p: int
+) -> np.ndarray:
     """Differentiate functions of degree p, given `lower`, the same functions of degree p - 1."""
     share = p * lower / (left[..., :p][..., ::-1] + right[..., :p])
     return _shifted(share) - _padded(share)
@@ -178,11 +194,16 @@ def spread(breaks: np.ndarray, points: int | np.ndarray) -> np.ndarray:
     (sum of points + 1,) ndarray
     """
     steps = np.broadcast_to(points, len(breaks) - 1)
-    parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(breaks[:-1], breaks[1:], steps, strict=True)]
+    parts = [
+        np.linspace(a, b, n, endpoint=False)
+        for a, b, n in zip(breaks[:-1], breaks[1:], steps, strict=True)
+    ]
     return np.append(np.concatenate(parts), breaks[-1])
 
 
-def insert_knots(control_points: np.ndarray, knots: np.ndarray, finer: np.ndarray, degree: int) -> np.ndarray:
+def insert_knots(
+    control_points: np.ndarray, knots: np.ndarray, finer: np.ndarray, degree: int
+) -> np.ndarray:
     """Control points of the same curves over more knots.
 
     Parameters

@@ -132,16 +132,29 @@ class Attempt(Summary):
     undone: str = ""
 
     @classmethod
-    def of(cls, start: Start, status: str, **more: Any) -> Attempt:  # noqa: ANN401  (fields of the class)
+    def of(cls, start: Start, status: str, **more: Any) -> Attempt:
         """Begin an attempt."""
         joint_map = start.joint_map
         names, branch = joint_map.redundant_joints, joint_map.branch_label
-        return cls(names, branch, start.origin, start.solver, start.estimate, status, start, **more)
+        return cls(
+            names,
+            branch,
+            start.origin,
+            start.solver,
+            start.estimate,
+            status,
+            start,
+            **more,
+        )
 
     @property
     def usable(self) -> bool:
         """True where there is a first plan that can be finished."""
-        return self.program is not None and bool(self.reports) and self.reports[-1].status.usable
+        return (
+            self.program is not None
+            and bool(self.reports)
+            and self.reports[-1].status.usable
+        )
 
     @property
     def in_chart(self) -> bool:
@@ -154,7 +167,11 @@ class Attempt(Summary):
         if self.start is None or self.program is None or self.target is None:
             return False
         spline = self.start.problem.task.spline
-        return spline.knots != "free" and spline.intervals != "auto" and self.program.intervals == self.target.intervals
+        return (
+            spline.knots != "free"
+            and spline.intervals != "auto"
+            and self.program.intervals == self.target.intervals
+        )
 
     @property
     def t_end(self) -> float:
@@ -215,9 +232,15 @@ class Attempt(Summary):
             if refined.violation > tolerance:
                 found = f"limits exceeded by {100.0 * refined.violation:.2g} %"
             else:
-                found = "too sharp for a trajectory" if verification is None else "the verification fails"
+                found = (
+                    "too sharp for a trajectory"
+                    if verification is None
+                    else "the verification fails"
+                )
             rounds = write_count(len(refined.reports) - 1, "refinement round")
-            status = f"{last.solver}: t_E = {refined.t_end:.4f} s after {rounds}, {found}"
+            status = (
+                f"{last.solver}: t_E = {refined.t_end:.4f} s after {rounds}, {found}"
+            )
         (phase,) = refined.program.phases
         return dataclasses.replace(
             self,
@@ -236,7 +259,10 @@ class Attempt(Summary):
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown: what was tried and what came of it."""
-        tried = {"joints": coordinates(self.redundant_joints, self.branch), "origin": self.origin}
+        tried = {
+            "joints": coordinates(self.redundant_joints, self.branch),
+            "origin": self.origin,
+        }
         ended = {"t_end": f"{self.t_end:.4f} s"} if np.isfinite(self.t_end) else {}
         return {**tried, **ended, "status": self.status}
 

@@ -41,13 +41,19 @@ def extract(start: Start, refined: Refined) -> Trajectory:
     """
     (phase,), (motion,) = refined.program.phases, refined.program.motions(refined.x)
     joint_map, task = phase.joint_map, start.problem.task
-    assert joint_map.path is not None  # noqa: S101  (a task has a path)
+    assert joint_map.path is not None
     joins = motion.times_of(joint_map.path.breaks[1:-1])
     gaps = np.abs(joins[:, None] - motion.breaks).min(axis=1, initial=np.inf)
     breaks = np.union1d(motion.breaks, joins[gaps > _SAME_TIME * motion.t_end])
-    nodes = interpolate(joint_map, motion.at, breaks, jumps=motion.degree < CONTINUOUS_TORQUE)
+    nodes = interpolate(
+        joint_map, motion.at, breaks, jumps=motion.degree < CONTINUOUS_TORQUE
+    )
     robot = joint_map.robot
-    rows, knots = joint_map.rows.arrays() if isinstance(joint_map, ChartMap) else (np.empty((0, 0, 0)), np.empty(0))
+    rows, knots = (
+        joint_map.rows.arrays()
+        if isinstance(joint_map, ChartMap)
+        else (np.empty((0, 0, 0)), np.empty(0))
+    )
     return Trajectory(
         task=task,
         urdf=robot.urdf,
@@ -78,7 +84,9 @@ def where_it_failed(attempt: Attempt) -> Program | None:
     t_norm = np.array([check.time for check in failed]) / trajectory.t_end
     near = t_norm[:, None] + _BESIDE * np.array([-1.0, 0.0, 1.0])
     (phase,) = refined.program.phases
-    return refined.program.resampled([np.union1d(phase.t_norm, np.clip(near.ravel(), 0.0, 1.0))])
+    return refined.program.resampled(
+        [np.union1d(phase.t_norm, np.clip(near.ravel(), 0.0, 1.0))]
+    )
 
 
 _SECOND_LOOKS = 4
@@ -86,7 +94,11 @@ _SECOND_LOOKS = 4
 
 
 def completed(
-    attempt: Attempt, program: Program, reports: tuple[SolverReport, ...], solve: Solve, options: RefinementOptions
+    attempt: Attempt,
+    program: Program,
+    reports: tuple[SolverReport, ...],
+    solve: Solve,
+    options: RefinementOptions,
 ) -> Attempt:
     """Refine and verify; only verify where the time is up.
 
@@ -119,10 +131,12 @@ def completed(
     return done
 
 
-def _verified(attempt: Attempt, before: tuple[SolverReport, ...], refined: Refined) -> Attempt:
+def _verified(
+    attempt: Attempt, before: tuple[SolverReport, ...], refined: Refined
+) -> Attempt:
     """Make the trajectory of a refined program and verify it; `before` are the reports of earlier solves."""
     start = attempt.start
-    assert start is not None  # noqa: S101
+    assert start is not None
     problem, trajectory, verification = start.problem, None, None
     if refined.converged and np.isfinite(refined.violation):
         with contextlib.suppress(UnreachableError):

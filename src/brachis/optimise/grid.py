@@ -20,7 +20,12 @@ from typing import Protocol
 import numpy as np
 
 from brachis.optimise.boundary import LocalBasis
-from brachis.optimise.bspline import ORDERS, basis_derivatives, basis_functions, clamped_knots
+from brachis.optimise.bspline import (
+    ORDERS,
+    basis_derivatives,
+    basis_functions,
+    clamped_knots,
+)
 
 _SAME_TIME = 1e-12
 _STENCIL = 4
@@ -49,7 +54,9 @@ def interval_weights(breaks: np.ndarray, t_norm: np.ndarray, degree: int) -> np.
     """
     weights = np.zeros((len(breaks) - 1, len(t_norm)))
     for row, low, high in zip(weights, breaks[:-1], breaks[1:], strict=True):
-        inside = np.flatnonzero((t_norm > low - _SAME_TIME) & (t_norm < high + _SAME_TIME))
+        inside = np.flatnonzero(
+            (t_norm > low - _SAME_TIME) & (t_norm < high + _SAME_TIME)
+        )
         if degree < _CONTINUOUS_ACCELERATION and high < breaks[-1]:
             inside = inside[:-1]
         kept = inside[_spaced((t_norm[inside] - low) / (high - low))]
@@ -75,8 +82,16 @@ def _weights(u: np.ndarray) -> np.ndarray:
     for step in range(len(ends) - 1):
         first = int(np.clip(step - 1, 0, len(u) - count))
         stencil, middle = slice(first, first + count), ends[step]
-        moments = np.diff([(end - middle) ** (powers + 1) / (powers + 1) for end in ends[step : step + 2]], axis=0)[0]
-        weights[stencil] += np.linalg.solve(np.vander(u[stencil] - middle, count, increasing=True).T, moments)
+        moments = np.diff(
+            [
+                (end - middle) ** (powers + 1) / (powers + 1)
+                for end in ends[step : step + 2]
+            ],
+            axis=0,
+        )[0]
+        weights[stencil] += np.linalg.solve(
+            np.vander(u[stencil] - middle, count, increasing=True).T, moments
+        )
     return weights
 
 
@@ -187,7 +202,9 @@ class FixedGrid:
     @cached_property
     def _weights(self) -> np.ndarray:
         breaks = self.knots[self.degree : len(self.knots) - self.degree]
-        return np.asarray(np.diff(breaks) @ interval_weights(breaks, self.t_norm, self.degree))
+        return np.asarray(
+            np.diff(breaks) @ interval_weights(breaks, self.t_norm, self.degree)
+        )
 
 
 class FreeGrid:
@@ -203,16 +220,24 @@ class FreeGrid:
 
     total = np.ones(1)
 
-    def __init__(self, knots: np.ndarray, degree: int, t_norm: np.ndarray, shortest: float) -> None:
+    def __init__(
+        self, knots: np.ndarray, degree: int, t_norm: np.ndarray, shortest: float
+    ) -> None:
         self.knots, self.degree, self.t_norm = knots, degree, t_norm
         breaks = knots[degree : len(knots) - degree]
         count = len(breaks) - 1
         self.lower, self.upper = np.full(count, shortest), np.ones(count)
-        self._interval = np.clip(np.searchsorted(breaks, t_norm, side="right") - 1, 0, count - 1)
-        self._fraction = (t_norm - breaks[self._interval]) / np.diff(breaks)[self._interval]
+        self._interval = np.clip(
+            np.searchsorted(breaks, t_norm, side="right") - 1, 0, count - 1
+        )
+        self._fraction = (t_norm - breaks[self._interval]) / np.diff(breaks)[
+            self._interval
+        ]
         around = self._interval[:, None] + np.arange(1 - degree, degree)
         self._inside = (around >= 0) & (around < count)
-        self._around = np.where(self._inside, around, count)  # beyond the ends: an interval without length
+        self._around = np.where(
+            self._inside, around, count
+        )  # beyond the ends: an interval without length
         self._columns = self._interval[:, None] + np.arange(degree + 1)
         self.point, _ = np.nonzero(self._inside)
         self.variable = around[self._inside]
@@ -245,7 +270,9 @@ class FreeGrid:
     def slopes(self, h: np.ndarray, control_points: np.ndarray) -> np.ndarray:
         """See `Grid`."""
         derivatives = basis_derivatives(self._lengths_around(h), self._fraction)
-        slopes = np.einsum("oikw,ckw->okic", derivatives, control_points[:, self._columns])
+        slopes = np.einsum(
+            "oikw,ckw->okic", derivatives, control_points[:, self._columns]
+        )
         return np.asarray(slopes[:, self._inside])
 
     def frozen(self, h: np.ndarray) -> FixedGrid:

@@ -28,7 +28,11 @@ TimeLaw = Callable[[np.ndarray], np.ndarray]
 
 
 def starting_point(
-    program: Program, joint_paths: Sequence[np.ndarray], duration: float | None = None, *, keep: bool = False
+    program: Program,
+    joint_paths: Sequence[np.ndarray],
+    duration: float | None = None,
+    *,
+    keep: bool = False,
 ) -> np.ndarray | None:
     """Fit splines to a joint path of every phase, and scale the time until the limits hold.
 
@@ -52,9 +56,14 @@ def starting_point(
         None where the fit is out of reach at a collocation point.
     """
     pairs = list(zip(program.phases, joint_paths, strict=True))
-    for paced, fit in itertools.product((True, False) if keep else (False,), (_smoothed, _followed)):
+    for paced, fit in itertools.product(
+        (True, False) if keep else (False,), (_smoothed, _followed)
+    ):
         with contextlib.suppress(UnreachableError):
-            parts = [fit(phase, _closed(phase, joint_path), duration) for phase, joint_path in pairs]
+            parts = [
+                fit(phase, _closed(phase, joint_path), duration)
+                for phase, joint_path in pairs
+            ]
             x = np.concatenate(parts)
             if not paced:
                 return shortest_time(program, x)
@@ -75,14 +84,25 @@ def _fast_enough(program: Program, x: np.ndarray) -> bool:
     return max(missed, default=0.0) <= _MISSED
 
 
-def _smoothed(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
+def _smoothed(
+    phase: Phase, joint_path: np.ndarray, duration: float | None
+) -> np.ndarray:
     points = _values(joint_path, _law(phase, duration)(phase.splines[0].greville))
-    return phase.variables_from(Motion(_first_duration(phase, duration), phase.knots, phase.degree, points.T))
+    return phase.variables_from(
+        Motion(_first_duration(phase, duration), phase.knots, phase.degree, points.T)
+    )
 
 
-def _followed(phase: Phase, joint_path: np.ndarray, duration: float | None) -> np.ndarray:
+def _followed(
+    phase: Phase, joint_path: np.ndarray, duration: float | None
+) -> np.ndarray:
     t_norm = spread(phase.breaks, _FIT_DENSITY)
-    return fitted(phase, _first_duration(phase, duration), t_norm, _values(joint_path, _law(phase, duration)(t_norm)))
+    return fitted(
+        phase,
+        _first_duration(phase, duration),
+        t_norm,
+        _values(joint_path, _law(phase, duration)(t_norm)),
+    )
 
 
 def _rates(phase: Phase) -> tuple[float, float]:
@@ -108,7 +128,9 @@ def _law(phase: Phase, duration: float | None) -> TimeLaw:
         return lambda t_norm: t_norm
     if first == last == 0.0:
         return lambda t_norm: t_norm**3 * (10.0 - 15.0 * t_norm + 6.0 * t_norm**2)
-    return lambda t_norm: t_norm * (2.0 * first + (last - first) * t_norm) / (first + last)
+    return lambda t_norm: (
+        t_norm * (2.0 * first + (last - first) * t_norm) / (first + last)
+    )
 
 
 def _closed(phase: Phase, joint_path: np.ndarray) -> np.ndarray:
@@ -126,7 +148,9 @@ def _values(joint_path: np.ndarray, places: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(places, grid, column) for column in joint_path.T])
 
 
-def fitted(phase: Phase, duration: float, t_norm: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def fitted(
+    phase: Phase, duration: float, t_norm: np.ndarray, wanted: np.ndarray
+) -> np.ndarray:
     """Point x whose curves come nearest to given values, by least squares; exact where the splines contain them.
 
     Parameters
@@ -147,7 +171,9 @@ def fitted(phase: Phase, duration: float, t_norm: np.ndarray, wanted: np.ndarray
     parts = [np.array([duration])]
     for spline, values in zip(phase.splines, wanted.T, strict=True):
         given = basis @ (spline.fixed + duration * spline.rate)
-        parts.append(np.linalg.lstsq(basis @ spline.matrix, values - given, rcond=None)[0])
+        parts.append(
+            np.linalg.lstsq(basis @ spline.matrix, values - given, rcond=None)[0]
+        )
     parts.append(phase.grid.lengths_of(phase.knots))
     return np.clip(np.concatenate(parts), phase.x_lower, phase.x_upper)
 
@@ -187,4 +213,9 @@ def shortest_time(program: Program, x: np.ndarray) -> np.ndarray:
 
 def worst_time_scaling_ratio(program: Program, x: np.ndarray) -> float:
     """Largest ratio to a limit that a longer time relieves, such as those of velocity, acceleration and torque."""
-    return float(max(np.abs(phase.time_scaling_ratios(part)).max() for phase, part in program.split(x)))
+    return float(
+        max(
+            np.abs(phase.time_scaling_ratios(part)).max()
+            for phase, part in program.split(x)
+        )
+    )

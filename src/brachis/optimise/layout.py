@@ -82,22 +82,37 @@ class Progress:
     def of(cls, spline: BoundarySpline, first: int) -> Progress:
         """Take the differences of a spline whose free variables begin at `first`; the duration is variable 0."""
         point, entry = np.nonzero(spline.variable >= 0)
-        variable, weight = first + spline.variable[point, entry], spline.weight[point, entry]
+        variable, weight = (
+            first + spline.variable[point, entry],
+            spline.weight[point, entry],
+        )
         every = np.arange(len(spline.rate))
-        point, variable = np.append(point, every), np.append(variable, np.zeros_like(every))
+        point, variable = (
+            np.append(point, every),
+            np.append(variable, np.zeros_like(every)),
+        )
         weight = np.append(weight, spline.rate)
         # Control point i is in difference i - 1, and with the other sign in difference i.
         number = np.concatenate([point - 1, point])
         places = number * (first + spline.free) + np.tile(variable, 2)
-        unique, place = np.unique(places[(number >= 0) & (number < len(every) - 1)], return_inverse=True)
-        signed = np.concatenate([weight, -weight])[(number >= 0) & (number < len(every) - 1)]
+        unique, place = np.unique(
+            places[(number >= 0) & (number < len(every) - 1)], return_inverse=True
+        )
+        signed = np.concatenate([weight, -weight])[
+            (number >= 0) & (number < len(every) - 1)
+        ]
         total = np.bincount(place, weights=signed)
         unique, total = unique[total != 0.0], total[total != 0.0]
         number, variable = np.divmod(unique, first + spline.free)
         several = np.bincount(number, minlength=len(every) - 1) > 1
         kept = several[number]
         row = np.cumsum(several) - 1
-        return cls(np.diff(spline.fixed)[several], row[number[kept]], variable[kept], total[kept])
+        return cls(
+            np.diff(spline.fixed)[several],
+            row[number[kept]],
+            variable[kept],
+            total[kept],
+        )
 
     @classmethod
     def none(cls) -> Progress:
@@ -107,7 +122,9 @@ class Progress:
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """Values of the rows, (p,)."""
-        parts = np.bincount(self.row, weights=self.weight * x[self.variable], minlength=len(self.offset))
+        parts = np.bincount(
+            self.row, weights=self.weight * x[self.variable], minlength=len(self.offset)
+        )
         return np.asarray(self.offset + parts)
 
 
@@ -148,7 +165,14 @@ class Layout:
     jacobian_columns: np.ndarray
 
     @classmethod
-    def of(cls, grid: Grid, splines: Sequence[BoundarySpline], limits: Sequence[Limit], *, path: bool) -> Layout:
+    def of(
+        cls,
+        grid: Grid,
+        splines: Sequence[BoundarySpline],
+        limits: Sequence[Limit],
+        *,
+        path: bool,
+    ) -> Layout:
         """Lay a phase out over a grid; the first of its `splines` is s where there is a path."""
         ends = np.cumsum([1, *(spline.free for spline in splines)])
         slices = tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
@@ -163,7 +187,9 @@ class Layout:
         places = tuple(SparsityPattern.of(basis.columns, spline) for spline in splines)
         pattern = _pattern(grid, limits, slices, progress, lengths, places)
         bounds = _bounds(grid, limits, len(progress.offset))
-        return cls(slices, progress, lengths, places, x_lower, x_upper, *bounds, *pattern)
+        return cls(
+            slices, progress, lengths, places, x_lower, x_upper, *bounds, *pattern
+        )
 
 
 def height(limit: Limit, count: int) -> int:
@@ -177,11 +203,21 @@ def batches(limits: Sequence[Limit]) -> list[list[Limit]]:
     return [[limit for limit in limits if limit.where == where] for where in kinds]
 
 
-def _bounds(grid: Grid, limits: Sequence[Limit], steps: int) -> tuple[np.ndarray, np.ndarray]:
+def _bounds(
+    grid: Grid, limits: Sequence[Limit], steps: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Bounds of the rows, (c,) each, with `steps` differences of control points of s."""
     count = len(grid.t_norm)
-    lower = [*(np.tile(each.lower, height(each, count)) for each in limits), np.zeros(steps), grid.total]
-    upper = [*(np.tile(each.upper, height(each, count)) for each in limits), np.full(steps, np.inf), grid.total]
+    lower = [
+        *(np.tile(each.lower, height(each, count)) for each in limits),
+        np.zeros(steps),
+        grid.total,
+    ]
+    upper = [
+        *(np.tile(each.upper, height(each, count)) for each in limits),
+        np.full(steps, np.inf),
+        grid.total,
+    ]
     return np.concatenate(lower), np.concatenate(upper)
 
 
@@ -196,13 +232,26 @@ def _pattern(
     """Rows and columns of the Jacobian's entries, (nnz,) each."""
     count = len(grid.t_norm)
     patterns = [(np.arange(count), np.zeros(count, dtype=int))]
-    patterns += [(place.point, place.variable + part.start) for place, part in zip(places, slices, strict=True)]
+    patterns += [
+        (place.point, place.variable + part.start)
+        for place, part in zip(places, slices, strict=True)
+    ]
     patterns.append((grid.point, grid.variable + lengths.start))
     counts = [height(limit, count) for limit in limits]
-    ends = np.cumsum([0, *(times * len(limit.lower) for times, limit in zip(counts, limits, strict=True))])
+    ends = np.cumsum(
+        [
+            0,
+            *(
+                times * len(limit.lower)
+                for times, limit in zip(counts, limits, strict=True)
+            ),
+        ]
+    )
     numbers = {
         id(limit): np.arange(*pair).reshape(times, -1)
-        for limit, times, pair in zip(limits, counts, itertools.pairwise(ends), strict=True)
+        for limit, times, pair in zip(
+            limits, counts, itertools.pairwise(ends), strict=True
+        )
     }
     rows, columns = [], []
     for batch in batches(limits):
@@ -212,7 +261,9 @@ def _pattern(
             columns.append(np.tile(np.arange(lengths.stop), together.size))
         else:
             rows += [together[point].ravel() for point, _ in patterns]
-            columns += [np.repeat(variable, together.shape[1]) for _, variable in patterns]
+            columns += [
+                np.repeat(variable, together.shape[1]) for _, variable in patterns
+            ]
     first = int(ends[-1])
     of_h = np.arange(lengths.start, lengths.stop)
     rows += [first + progress.row, np.full(len(of_h), first + len(progress.offset))]

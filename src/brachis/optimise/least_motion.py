@@ -24,7 +24,12 @@ from brachis.common.progress import Iteration, Listener
 from brachis.common.summary import Summary
 from brachis.errors import UnreachableError
 from brachis.limits.joint import reciprocals_near
-from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus, solver_named
+from brachis.optimise.backends import (
+    SolverOptions,
+    SolverReport,
+    SolveStatus,
+    solver_named,
+)
 from brachis.optimise.candidate import Attempt
 from brachis.optimise.completion import completed
 from brachis.optimise.program import LeastAcceleration, Program
@@ -113,7 +118,7 @@ def calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMo
 def _calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastMotion:
     """Solve, and complete what came of it if it is worth it."""
     start, before = fastest.start, fastest.refined
-    assert start is not None and before is not None  # noqa: PT018, S101  (it is finished)
+    assert start is not None and before is not None
     task = start.problem.task
     slower = max(task.search.slower, AS_FAST)
     if not fastest.verified:
@@ -126,51 +131,91 @@ def _calmest(fastest: Attempt, deadline: Deadline, listener: Listener) -> LeastM
     solve = _solver(name, soon, listener, _PATIENCE)
     first = solve(program, program.time_scaled(before.x, 1.0 + slower - _KEPT_BACK))
     if not first.status.usable:
-        return _kept(fastest, f"the fastest motion stays: {first.status.value}", (first,))
+        return _kept(
+            fastest, f"the fastest motion stays: {first.status.value}", (first,)
+        )
     if 1.0 - np.sqrt(first.objective) < _WORTH_IT:
-        return _kept(fastest, "the fastest motion stays: hardly any other is calmer", (first,))
+        return _kept(
+            fastest, "the fastest motion stays: hardly any other is calmer", (first,)
+        )
     settings = task.refinement
     options = RefinementOptions(
-        settings.tolerance, settings.density, settings.max_rounds, soon, before.t_end * (1.0 + slower)
+        settings.tolerance,
+        settings.density,
+        settings.max_rounds,
+        soon,
+        before.t_end * (1.0 + slower),
     )
     solve = _solver(name, soon, listener, _ROUND)
     found = completed(fastest, program, (first,), solve, options)
-    return _better(fastest, found, 1.0 - np.sqrt(program.objective(found.refined.x)) if found.refined else 0.0)
+    return _better(
+        fastest,
+        found,
+        1.0 - np.sqrt(program.objective(found.refined.x)) if found.refined else 0.0,
+    )
 
 
 def _better(fastest: Attempt, found: Attempt, reduction: float) -> LeastMotion:
     """Take the motion that was found if it is verified and calmer by a fraction that is worth it."""
     if found.trajectory is None or found.verification is None or not found.verified:
-        return _kept(fastest, "the fastest motion stays: a calmer one was not verified", found.reports)
+        return _kept(
+            fastest,
+            "the fastest motion stays: a calmer one was not verified",
+            found.reports,
+        )
     if reduction < _WORTH_IT:
-        return _kept(fastest, "the fastest motion stays: hardly any other is calmer", found.reports)
+        return _kept(
+            fastest,
+            "the fastest motion stays: hardly any other is calmer",
+            found.reports,
+        )
     later = found.t_end / fastest.t_end - 1.0
     status = f"joint accelerations (rms) {100.0 * reduction:.2g} % lower at {100.0 * later:+.2g} % end time"
-    return LeastMotion(found.trajectory, found.verification, float(reduction), later, status, found.reports)
+    return LeastMotion(
+        found.trajectory,
+        found.verification,
+        float(reduction),
+        later,
+        status,
+        found.reports,
+    )
 
 
-def _kept(fastest: Attempt, status: str, reports: tuple[SolverReport, ...] = ()) -> LeastMotion:
+def _kept(
+    fastest: Attempt, status: str, reports: tuple[SolverReport, ...] = ()
+) -> LeastMotion:
     """Keep the fastest motion."""
-    assert fastest.trajectory is not None and fastest.verification is not None  # noqa: PT018, S101  (it is finished)
-    return LeastMotion(fastest.trajectory, fastest.verification, 0.0, 0.0, status, reports)
+    assert fastest.trajectory is not None and fastest.verification is not None
+    return LeastMotion(
+        fastest.trajectory, fastest.verification, 0.0, 0.0, status, reports
+    )
 
 
-def least_acceleration(program: Program, x: np.ndarray, slower: float) -> LeastAcceleration:
+def least_acceleration(
+    program: Program, x: np.ndarray, slower: float
+) -> LeastAcceleration:
     """Make the objective that is 1 at x, (v,), and with which phases last longer by a fraction of up to `slower`.
 
     Every joint's acceleration counts in proportion to its largest velocity: that of its limit; without one the largest
     that any such joint of its unit has at x. Joints that nothing limits, the virtual roll of a tool, do not count.
     """
     robot, states = program.phases[0].joint_map.robot, program.states(x)
-    by_acceleration, weights = reciprocals_near(robot, program.limits, states[0].q[len(states[0].q) // 2])
-    speeds, units = np.max([np.abs(state.qdot).max(axis=0) for state in states], axis=0), np.array(robot.position_units)
+    by_acceleration, weights = reciprocals_near(
+        robot, program.limits, states[0].q[len(states[0].q) // 2]
+    )
+    speeds, units = (
+        np.max([np.abs(state.qdot).max(axis=0) for state in states], axis=0),
+        np.array(robot.position_units),
+    )
     for unit in set(robot.position_units):
         own = (units == unit) & (weights == 0.0) & (by_acceleration > 0.0)
         if speeds[own].any():
             weights[own] = 1.0 / speeds[own].max()
     longest = np.array([part[0] for _, part in program.split(x)]) * (1.0 + slower)
     size = program.minimising(LeastAcceleration(weights, longest)).objective(x)
-    return LeastAcceleration(weights / np.sqrt(size) if size > 0.0 else weights, longest)
+    return LeastAcceleration(
+        weights / np.sqrt(size) if size > 0.0 else weights, longest
+    )
 
 
 def _solver(name: str, deadline: Deadline, listener: Listener, patience: int) -> Solve:
@@ -179,12 +224,22 @@ def _solver(name: str, deadline: Deadline, listener: Listener, patience: int) ->
 
     def progress(iteration: int, objective: float) -> None:
         rms = 100.0 * objective**0.5
-        listener(Iteration(f"least motion: iteration {iteration}, joint accelerations (rms) {rms:.1f} %"))
+        listener(
+            Iteration(
+                f"least motion: iteration {iteration}, joint accelerations (rms) {rms:.1f} %"
+            )
+        )
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
         most = _FEW_ITERATIONS if name == _FOR_MANY else _ITERATIONS
-        options = SolverOptions(_TOLERANCE, most, deadline.left, _PROGRESS, patience, anywhere=True)
+        options = SolverOptions(
+            _TOLERANCE, most, deadline.left, _PROGRESS, patience, anywhere=True
+        )
         report = backend.solve(program, x, options, progress)
-        return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if report.feasible else report
+        return (
+            dataclasses.replace(report, status=SolveStatus.ACCEPTABLE)
+            if report.feasible
+            else report
+        )
 
     return solve

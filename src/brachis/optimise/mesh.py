@@ -54,7 +54,12 @@ class Answer(NamedTuple):
     undone: str = ""
 
 
-_EARLY = (SolveStatus.ITERATION_LIMIT, SolveStatus.TIME_LIMIT, SolveStatus.STALLED, SolveStatus.FAILED)
+_EARLY = (
+    SolveStatus.ITERATION_LIMIT,
+    SolveStatus.TIME_LIMIT,
+    SolveStatus.STALLED,
+    SolveStatus.FAILED,
+)
 """How a solve ends that is not done; a solver that breaks down at last may have come far."""
 
 
@@ -62,12 +67,16 @@ def accepted(report: SolverReport, before: SolverReport) -> SolverReport:
     """Accept a solve that ended early with a feasible motion faster than the one that it began with."""
     better = report.feasible and report.objective < before.objective
     early = report.status in _EARLY
-    return replace(report, status=SolveStatus.ACCEPTABLE) if better and early else report
+    return (
+        replace(report, status=SolveStatus.ACCEPTABLE) if better and early else report
+    )
 
 
 def end_time(refined: Refined, refinement: RefinementOptions) -> float:
     """End time of a motion that holds the limits, infinite for others."""
-    holds = refined.converged and (refined.violation <= refinement.tolerance or not refinement.max_rounds)
+    holds = refined.converged and (
+        refined.violation <= refinement.tolerance or not refinement.max_rounds
+    )
     return refined.t_end if holds else np.inf
 
 
@@ -78,7 +87,9 @@ def gain(before: Refined, after: Refined, refinement: RefinementOptions) -> floa
     return 1.0 - end_time(after, refinement) / end_time(before, refinement)
 
 
-def ending_with(last: SolverReport, reports: list[SolverReport]) -> tuple[SolverReport, ...]:
+def ending_with(
+    last: SolverReport, reports: list[SolverReport]
+) -> tuple[SolverReport, ...]:
     """Move one of the reports to the end."""
     return (*(report for report in reports if report is not last), last)
 
@@ -93,7 +104,11 @@ def coarsest(program: Program) -> Program:
 
 
 def solve_nested(
-    target: Program, coarse: Program, report: SolverReport, solve: Solve, deadline: Deadline = NEVER
+    target: Program,
+    coarse: Program,
+    report: SolverReport,
+    solve: Solve,
+    deadline: Deadline = NEVER,
 ) -> Answer:
     """Solve a program from the answer of its coarsest one, level by level.
 
@@ -122,31 +137,49 @@ def solve_nested(
         if deadline.passed:
             break
         pairs = list(zip(coarse.split(solved.x), level.phases, strict=True))
-        finer = coarse.with_phases(own.with_knots(fine.knots, fine.t_norm) for (own, _), fine in pairs)
-        start = finer.variables_from([own.motion(part).over(fine.knots) for (own, part), fine in pairs])
+        finer = coarse.with_phases(
+            own.with_knots(fine.knots, fine.t_norm) for (own, _), fine in pairs
+        )
+        start = finer.variables_from(
+            [own.motion(part).over(fine.knots) for (own, part), fine in pairs]
+        )
         report = accepted(solve(finer, start), solved)
         reports.append(report)
         if not report.status.usable:
             break
         coarse, solved = finer, report
     reached, asked = coarse.intervals, target.intervals
-    undone = f"the motion has {reached} of {asked} intervals, of which more were not solved" if reached < asked else ""
+    undone = (
+        f"the motion has {reached} of {asked} intervals, of which more were not solved"
+        if reached < asked
+        else ""
+    )
     return Answer(coarse, ending_with(solved, reports), undone)
 
 
 def _levels(program: Program) -> Iterator[Program]:
     """Programs over ever more of the knots, from the coarsest to the given one, with as many points an interval."""
-    fewest = _WITH_LEAST_SPEED if any(limit.least_speed for limit in program.limits) else _FEWEST
-    steps = [int(np.log2(max(phase.intervals / fewest, 1.0))) for phase in program.phases]
+    fewest = (
+        _WITH_LEAST_SPEED
+        if any(limit.least_speed for limit in program.limits)
+        else _FEWEST
+    )
+    steps = [
+        int(np.log2(max(phase.intervals / fewest, 1.0))) for phase in program.phases
+    ]
     for k in range(max(steps), 0, -1):
         pairs = zip(program.phases, steps, strict=True)
-        yield program.with_phases(_thinned(phase, 2 ** min(k, own)) for phase, own in pairs)
+        yield program.with_phases(
+            _thinned(phase, 2 ** min(k, own)) for phase, own in pairs
+        )
     yield program
 
 
 def _thinned(phase: Phase, every: int) -> Phase:
     """Keep every so many-th knot and collocation point, and the last ones."""
-    breaks, t_norm = (values[_every(len(values), every)] for values in (phase.breaks, phase.t_norm))
+    breaks, t_norm = (
+        values[_every(len(values), every)] for values in (phase.breaks, phase.t_norm)
+    )
     return phase.with_knots(clamped_knots(phase.degree, breaks), t_norm)
 
 
@@ -190,7 +223,11 @@ class MeshOptions:
 
 
 def refine_mesh(
-    program: Program, first: SolverReport, solve: Solve, options: MeshOptions, deadline: Deadline
+    program: Program,
+    first: SolverReport,
+    solve: Solve,
+    options: MeshOptions,
+    deadline: Deadline,
 ) -> Answer:
     """Insert knots into a solved program until that gains little.
 
@@ -218,7 +255,11 @@ def refine_mesh(
     for _ in range(_MOST_ROUNDS):
         if _GROWTH * last.wall_time > deadline.left:
             return Answer(program, ending_with(last, reports), _UNDONE)
-        intervals = _every_h_refinement(program) if is_settled else _losers(program, last.x, options)
+        intervals = (
+            _every_h_refinement(program)
+            if is_settled
+            else _losers(program, last.x, options)
+        )
         finer, x = _halved(program, last.x, intervals, options)
         if finer.variables > _MOST_VARIABLES:
             return Answer(program, ending_with(last, reports), _UNDONE)
@@ -241,7 +282,8 @@ def _losers(program: Program, x: np.ndarray, options: MeshOptions) -> list[np.nd
     whole = program.end_time(x)
     try:
         lost = [
-            _lost(phase, part) * (part[0] / whole) * _can_be_halved(phase, options) for phase, part in program.split(x)
+            _lost(phase, part) * (part[0] / whole) * _can_be_halved(phase, options)
+            for phase, part in program.split(x)
         ]
     except UnreachableError:  # between the collocation points
         return _every_h_refinement(program)
@@ -249,7 +291,10 @@ def _losers(program: Program, x: np.ndarray, options: MeshOptions) -> list[np.nd
     order = np.argsort(-together, kind="stable")
     most = np.searchsorted(np.cumsum(together[order]), _SHARE * together.sum()) + 1
     chosen = np.isin(np.arange(len(together)), order[:most])
-    return [np.flatnonzero(own) for own in np.split(chosen, np.cumsum([len(own) for own in lost])[:-1])]
+    return [
+        np.flatnonzero(own)
+        for own in np.split(chosen, np.cumsum([len(own) for own in lost])[:-1])
+    ]
 
 
 def _lost(phase: Phase, x: np.ndarray) -> np.ndarray:
@@ -257,7 +302,9 @@ def _lost(phase: Phase, x: np.ndarray) -> np.ndarray:
     breaks = phase.breaks
     ratios = np.abs(phase.resampled(spread(breaks, _SAMPLES)).time_scaling_ratios(x))
     slack = 1.0 - np.sort(ratios, axis=1)[:, -len(phase.splines) :].clip(max=1.0)
-    within = np.lib.stride_tricks.sliding_window_view(slack, _SAMPLES + 1, axis=0)[::_SAMPLES]
+    within = np.lib.stride_tricks.sliding_window_view(slack, _SAMPLES + 1, axis=0)[
+        ::_SAMPLES
+    ]
     return np.asarray(np.ptp(within, axis=2).sum(axis=1) * np.diff(breaks))
 
 
@@ -270,9 +317,13 @@ def _halved(
 ) -> tuple[Program, np.ndarray]:
     """Halve intervals of every phase: the finer program, and the same motion as its point."""
     pairs = zip(program.phases, intervals, strict=True)
-    finer = program.with_phases(_with_halves(phase, own, options) for phase, own in pairs)
+    finer = program.with_phases(
+        _with_halves(phase, own, options) for phase, own in pairs
+    )
     motions = zip(program.motions(x), finer.phases, strict=True)
-    return finer, finer.variables_from([motion.over(phase.knots) for motion, phase in motions])
+    return finer, finer.variables_from(
+        [motion.over(phase.knots) for motion, phase in motions]
+    )
 
 
 def _can_be_halved(phase: Phase, options: MeshOptions) -> np.ndarray:
@@ -285,7 +336,8 @@ def _with_halves(phase: Phase, intervals: np.ndarray, options: MeshOptions) -> P
     intervals = intervals[_can_be_halved(phase, options)[intervals]]
     finer = np.union1d(breaks, 0.5 * (breaks[intervals] + breaks[intervals + 1]))
     return phase.with_knots(
-        clamped_knots(phase.degree, finer), merged(phase, spread(finer, options.points_per_interval))
+        clamped_knots(phase.degree, finer),
+        merged(phase, spread(finer, options.points_per_interval)),
     )
 
 
@@ -327,7 +379,9 @@ def optimise_knots(
     """
     given = program
     reports, best, x = [first], None, first.x
-    shortest = max(shortest, SHORTEST * max(phase.intervals for phase in program.phases))
+    shortest = max(
+        shortest, SHORTEST * max(phase.intervals for phase in program.phases)
+    )
     for _ in range(_ROUNDS):
         if refinement.deadline.passed:
             break
@@ -347,7 +401,11 @@ def optimise_knots(
         if not gained > _WORTH_IT:
             break
         program, x = refined.program, refined.x
-    undone = "the knots were not moved as far as that pays" if refinement.deadline.passed else ""
+    undone = (
+        "the knots were not moved as far as that pays"
+        if refinement.deadline.passed
+        else ""
+    )
     if best is None or not np.isfinite(end_time(best, refinement)):
         return Answer(given, ending_with(first, reports), undone)
     return Answer(best.program, ending_with(best.reports[-1], reports), undone)
@@ -389,11 +447,15 @@ def adapt_mesh(
         nested = solve_nested(target, program, reports[-1], solve, refinement.deadline)
     last = nested.reports[-1]
     if spline.knots == "free":
-        adapted = optimise_knots(nested.program, last, solve, spline.shortest_interval, refinement)
+        adapted = optimise_knots(
+            nested.program, last, solve, spline.shortest_interval, refinement
+        )
     elif spline.intervals == "auto":
         options = MeshOptions(spline.tolerance, spline.points_per_interval)
         adapted = refine_mesh(nested.program, last, solve, options, refinement.deadline)
     else:
         adapted = Answer(nested.program, (last,))
     undone = "; ".join(filter(None, (nested.undone, adapted.undone)))
-    return Answer(adapted.program, (*reports[:-1], *nested.reports[:-1], *adapted.reports), undone)
+    return Answer(
+        adapted.program, (*reports[:-1], *nested.reports[:-1], *adapted.reports), undone
+    )

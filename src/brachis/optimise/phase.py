@@ -119,7 +119,13 @@ class Phase:
         How often states and Jacobians were computed.
     """
 
-    def __init__(self, joint_map: JointMap, limits: Sequence[Limit], grid: Grid, boundary: Boundary) -> None:
+    def __init__(
+        self,
+        joint_map: JointMap,
+        limits: Sequence[Limit],
+        grid: Grid,
+        boundary: Boundary,
+    ) -> None:
         self.joint_map = joint_map
         self.limits = (*limits, *build_branch_margins(joint_map, MARGIN))
         self._lay_out(grid, boundary)
@@ -128,12 +134,21 @@ class Phase:
         """Set grid and boundary conditions, and all that depends on them."""
         self.grid, self.boundary = grid, boundary
         self.splines = boundary.splines(grid.knots, grid.degree)
-        layout = Layout.of(grid, self.splines, self.limits, path=self.joint_map.path is not None)
-        self.slices, self._lengths, self._places = layout.slices, layout.lengths, layout.places
+        layout = Layout.of(
+            grid, self.splines, self.limits, path=self.joint_map.path is not None
+        )
+        self.slices, self._lengths, self._places = (
+            layout.slices,
+            layout.lengths,
+            layout.places,
+        )
         self._progress = layout.progress
         self.x_lower, self.x_upper = layout.x_lower, layout.x_upper
         self.lower, self.upper = layout.lower, layout.upper
-        self.jacobian_rows, self.jacobian_columns = layout.jacobian_rows, layout.jacobian_columns
+        self.jacobian_rows, self.jacobian_columns = (
+            layout.jacobian_rows,
+            layout.jacobian_columns,
+        )
         self._entries: tuple[LocalBasis, list[np.ndarray]] | None = None
         self._last: tuple[bytes, JointState] | None = None
         self.evaluations = {"states": 0, "jacobians": 0}
@@ -157,7 +172,9 @@ class Phase:
 
     def with_free_knots(self, shortest: float) -> Phase:
         """Return the same phase with interval lengths as variables, each at least `shortest` mean intervals."""
-        return self.over(FreeGrid(self.knots, self.degree, self.t_norm, shortest / self.intervals))
+        return self.over(
+            FreeGrid(self.knots, self.degree, self.t_norm, shortest / self.intervals)
+        )
 
     def frozen(self, x: np.ndarray) -> Phase:
         """Return the phase with its knots fixed where they are at x."""
@@ -215,25 +232,36 @@ class Phase:
         """Variables that are the curves' values at the start (`point` 0) or end (-1), (c,); -1 where fixed."""
         pairs = zip(self.splines, self.slices, strict=True)
         found = ((int(spline.variable[point, 0]), part.start) for spline, part in pairs)
-        return np.array([first + own if own >= 0 else -1 for own, first in found], dtype=int)
+        return np.array(
+            [first + own if own >= 0 else -1 for own, first in found], dtype=int
+        )
 
     def motion(self, x: np.ndarray) -> Motion:
         """Curves that belong to x."""
         h = x[self._lengths]
         # Should the lengths add up to a little more or less than 1, so much longer or shorter is the motion.
         span = self.grid.t_norm_at(h)[-1]
-        return Motion(float(x[0] * span), self.grid.knots_at(h), self.degree, self._control_points(x))
+        return Motion(
+            float(x[0] * span),
+            self.grid.knots_at(h),
+            self.degree,
+            self._control_points(x),
+        )
 
     def _control_points(self, x: np.ndarray) -> np.ndarray:
         """Control points (c, N + d)."""
         parts = zip(self.splines, self.slices, strict=True)
-        return np.array([spline.control_points(x[part], x[0]) for spline, part in parts])
+        return np.array(
+            [spline.control_points(x[part], x[0]) for spline, part in parts]
+        )
 
     def variables_from(self, motion: Motion) -> np.ndarray:
         """Point x nearest to given curves over the same knots, or over as many where these are free."""
         pairs = zip(self.splines, motion.control_points, strict=True)
         free = [spline.free_from(points, motion.t_end) for spline, points in pairs]
-        return np.concatenate([[motion.t_end], *free, self.grid.lengths_of(motion.knots)])
+        return np.concatenate(
+            [[motion.t_end], *free, self.grid.lengths_of(motion.knots)]
+        )
 
     def state(self, x: np.ndarray) -> JointState:
         """Joint motion at the collocation points; kept until x changes, so that rows and Jacobian share it.
@@ -247,8 +275,13 @@ class Phase:
         if self._last is None or self._last[0] != key:
             self.evaluations["states"] += 1
             h = x[self._lengths]
-            curves = per_second(self.grid.basis(h).curves(self._control_points(x)), x[0])
-            self._last = (key, self.joint_map.state(*curves, t=self.grid.t_norm_at(h) * x[0]))
+            curves = per_second(
+                self.grid.basis(h).curves(self._control_points(x)), x[0]
+            )
+            self._last = (
+                key,
+                self.joint_map.state(*curves, t=self.grid.t_norm_at(h) * x[0]),
+            )
         return self._last[1]
 
     def rows(self, x: np.ndarray) -> np.ndarray:
@@ -260,7 +293,11 @@ class Phase:
     def _held(self, limit: Limit, x: np.ndarray) -> np.ndarray:
         """Values of a limit that are rows, (K, c), or (1, c) where their means are."""
         values = limit.values(self.state(x))
-        return self.grid.mean_weights(x[self._lengths])[None] @ values if limit.where == "whole" else values
+        return (
+            self.grid.mean_weights(x[self._lengths])[None] @ values
+            if limit.where == "whole"
+            else values
+        )
 
     def has(self, limit: Limit) -> bool:
         """Tell whether a limit is one of the phase's, the very object."""
@@ -271,11 +308,17 @@ class Phase:
         before = self.limits[: [each is limit for each in self.limits].index(True)]
         count = len(self.t_norm)
         first = sum(height(each, count) * len(each.lower) for each in before)
-        return first + np.arange(height(limit, count) * len(limit.lower)).reshape(-1, len(limit.lower))
+        return first + np.arange(height(limit, count) * len(limit.lower)).reshape(
+            -1, len(limit.lower)
+        )
 
     def violation_of_means(self, x: np.ndarray) -> float:
         """How far the limits that hold over the whole motion are violated; -inf where there are none."""
-        means = [limit.violation(self._held(limit, x)).max() for limit in self.limits if limit.where == "whole"]
+        means = [
+            limit.violation(self._held(limit, x)).max()
+            for limit in self.limits
+            if limit.where == "whole"
+        ]
         return float(max(means, default=-np.inf))
 
     def violation(self, x: np.ndarray) -> np.ndarray:
@@ -288,14 +331,29 @@ class Phase:
 
     def violation_at(self, x: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
         """As `violation`, at other normalised times, (K,); turns of 2 pi follow the nearest collocation point."""
-        motion, known, at = self.motion(x), self.state(x), self.grid.t_norm_at(x[self._lengths])
+        motion, known, at = (
+            self.motion(x),
+            self.state(x),
+            self.grid.t_norm_at(x[self._lengths]),
+        )
         place = np.clip(np.searchsorted(at, t_norm), 0, len(at) - 1)
-        near = known.q[place] + known.qdot[place] * ((t_norm - at[place]) * motion.t_end)[:, None]
-        return self._violation(self.joint_map.state(*motion.at(t_norm * motion.t_end), near=near))
+        near = (
+            known.q[place]
+            + known.qdot[place] * ((t_norm - at[place]) * motion.t_end)[:, None]
+        )
+        return self._violation(
+            self.joint_map.state(*motion.at(t_norm * motion.t_end), near=near)
+        )
 
     def _violation(self, state: JointState) -> np.ndarray:
-        own = [limit for limit in self.limits if limit.role is not Role.SAFEGUARD and limit.where == "points"]
-        return np.concatenate([limit.violation(limit.values(state)) for limit in own], axis=1)
+        own = [
+            limit
+            for limit in self.limits
+            if limit.role is not Role.SAFEGUARD and limit.where == "points"
+        ]
+        return np.concatenate(
+            [limit.violation(limit.values(state)) for limit in own], axis=1
+        )
 
     def time_scaling_ratios(self, x: np.ndarray) -> np.ndarray:
         """Ratios, (K, c), to the limits that a longer time relieves; see `Limit.ratio`.
@@ -304,13 +362,22 @@ class Phase:
         """
         scaling = [limit for limit in self.limits if limit.time_scaling]
         ratios = [limit.ratio(self._held(limit, x)) for limit in scaling]
-        return np.concatenate([np.broadcast_to(own, (len(self.t_norm), own.shape[1])) for own in ratios], axis=1)
+        return np.concatenate(
+            [np.broadcast_to(own, (len(self.t_norm), own.shape[1])) for own in ratios],
+            axis=1,
+        )
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Entries of the rows' Jacobian on its sparsity pattern, (nnz,); raises UnreachableError as `state` does."""
         self.evaluations["jacobians"] += 1
-        entries = [part.ravel() for batch in batches(self.limits) for part in self._of_rows(batch, x)]
-        return np.concatenate([*entries, self._progress.weight, np.ones(len(self.grid.lower))])
+        entries = [
+            part.ravel()
+            for batch in batches(self.limits)
+            for part in self._of_rows(batch, x)
+        ]
+        return np.concatenate(
+            [*entries, self._progress.weight, np.ones(len(self.grid.lower))]
+        )
 
     def gradient(self, partials: Partials, x: np.ndarray) -> np.ndarray:
         """Gradient, (v,), of a sum over the collocation points; raises UnreachableError as `state` does.
@@ -321,7 +388,9 @@ class Phase:
             Of its terms with respect to the joints, one term a point: (K, 1, n).
         x : (v,) ndarray
         """
-        return self._summed(list(self._chained([partials], x)), np.ones(len(self.t_norm)))[0]
+        return self._summed(
+            list(self._chained([partials], x)), np.ones(len(self.t_norm))
+        )[0]
 
     def _of_rows(self, batch: Sequence[Limit], x: np.ndarray) -> list[np.ndarray]:
         """Entries of the rows of limits that are differentiated together."""
@@ -336,38 +405,77 @@ class Phase:
 
     def _summed(self, slopes: Sequence[np.ndarray], weights: np.ndarray) -> np.ndarray:
         """Add up what `_chained` gives over the collocation points, with weights (K,): (c, v)."""
-        points = [np.arange(len(self.t_norm)), *(place.point for place in self._places), self.grid.point]
-        of_curves = [place.variable + part.start for place, part in zip(self._places, self.slices, strict=True)]
-        variables = [np.zeros_like(points[0]), *of_curves, self.grid.variable + self._lengths.start]
+        points = [
+            np.arange(len(self.t_norm)),
+            *(place.point for place in self._places),
+            self.grid.point,
+        ]
+        of_curves = [
+            place.variable + part.start
+            for place, part in zip(self._places, self.slices, strict=True)
+        ]
+        variables = [
+            np.zeros_like(points[0]),
+            *of_curves,
+            self.grid.variable + self._lengths.start,
+        ]
         terms = np.concatenate(slopes) * weights[np.concatenate(points)][:, None]
-        return np.array([np.bincount(np.concatenate(variables), term, self.variables) for term in terms.T])
+        return np.array(
+            [
+                np.bincount(np.concatenate(variables), term, self.variables)
+                for term in terms.T
+            ]
+        )
 
-    def _chained(self, functions: Sequence[Partials], x: np.ndarray) -> Iterator[np.ndarray]:
+    def _chained(
+        self, functions: Sequence[Partials], x: np.ndarray
+    ) -> Iterator[np.ndarray]:
         """Differentiate functions of the joint motion by T, each curve's variables and h, (places, c) all together."""
         state = self.state(x)
         each = [chain(partials, state) for partials in functions]
-        orders = max(len(parts) for parts in each)  # up to the derivative of the curves that any function asks for
-        padded = ((*parts, *[np.zeros_like(parts[0])] * (orders - len(parts))) for parts in each)
+        orders = max(
+            len(parts) for parts in each
+        )  # up to the derivative of the curves that any function asks for
+        padded = (
+            (*parts, *[np.zeros_like(parts[0])] * (orders - len(parts)))
+            for parts in each
+        )
         by = [np.concatenate(parts, axis=1) for parts in zip(*padded, strict=True)]
-        slopes = per_second(self.grid.slopes(x[self._lengths], self._control_points(x))[:orders], x[0])
+        slopes = per_second(
+            self.grid.slopes(x[self._lengths], self._control_points(x))[:orders], x[0]
+        )
         drifts = zip(by, self._drifts(x), strict=False)
-        yield np.asarray(sum(np.einsum("kcj,kj->kc", part, drift) for part, drift in drifts))
-        for j, (places, basis) in enumerate(zip(self._places, self._bases(x), strict=True)):
+        yield np.asarray(
+            sum(np.einsum("kcj,kj->kc", part, drift) for part, drift in drifts)
+        )
+        for j, (places, basis) in enumerate(
+            zip(self._places, self._bases(x), strict=True)
+        ):
             values = per_second(basis[:orders], x[0])
-            parts = (part[places.point, :, j] * own[:, None] for part, own in zip(by, values, strict=True))
+            parts = (
+                part[places.point, :, j] * own[:, None]
+                for part, own in zip(by, values, strict=True)
+            )
             yield sum(parts, start=np.zeros(()))
-        yield (np.concatenate(by, axis=2)[self.grid.point] @ np.hstack(slopes)[:, :, None])[:, :, 0]
+        yield (
+            np.concatenate(by, axis=2)[self.grid.point] @ np.hstack(slopes)[:, :, None]
+        )[:, :, 0]
 
     def _drifts(self, x: np.ndarray) -> list[np.ndarray]:
         """Differentiate the curves and their time derivatives by T, (K, c) each: a longer time slows them down."""
         state, rates = self.state(x), np.array([spline.rate for spline in self.splines])
         moving = per_second(self.grid.basis(x[self._lengths]).curves(rates), x[0])
-        orders = enumerate(zip(moving, (state.y, state.ydot, state.yddot, state.ydddot), strict=True))
+        orders = enumerate(
+            zip(moving, (state.y, state.ydot, state.yddot, state.ydddot), strict=True)
+        )
         return [rate - order / x[0] * part for order, (rate, part) in orders]
 
     def _bases(self, x: np.ndarray) -> list[np.ndarray]:
         """Basis functions of every curve's free variables, (3, z) each; computed anew where the grid's change."""
         basis = self.grid.basis(x[self._lengths])
         if self._entries is None or self._entries[0] is not basis:
-            self._entries = basis, [places.entries(basis.values) for places in self._places]
+            self._entries = (
+                basis,
+                [places.entries(basis.values) for places in self._places],
+            )
         return self._entries[1]

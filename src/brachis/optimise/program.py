@@ -124,9 +124,16 @@ class Link:
     def rows(self, states: Sequence[JointState]) -> np.ndarray:
         """Values of the rows, (j,), from the states of all phases at their collocation points."""
         joints = list(self.joints)
-        return np.asarray(sum(sign * states[phase].q[point, joints] for phase, point, sign in self._sides))
+        return np.asarray(
+            sum(
+                sign * states[phase].q[point, joints]
+                for phase, point, sign in self._sides
+            )
+        )
 
-    def pattern(self, phases: Sequence[Phase], first: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    def pattern(
+        self, phases: Sequence[Phase], first: Sequence[int]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Rows, from 0, and columns of the Jacobian's entries, (nnz,) each.
 
         Parameters
@@ -136,16 +143,26 @@ class Link:
         first : sequence of int
             Where the variables of each one begin.
         """
-        variables = [_free(phases[phase], point)[1] + first[phase] for phase, point, _ in self._sides]
+        variables = [
+            _free(phases[phase], point)[1] + first[phase]
+            for phase, point, _ in self._sides
+        ]
         rows = [np.repeat(np.arange(len(self.joints)), len(own)) for own in variables]
-        return np.concatenate(rows), np.concatenate([np.tile(own, len(self.joints)) for own in variables])
+        return np.concatenate(rows), np.concatenate(
+            [np.tile(own, len(self.joints)) for own in variables]
+        )
 
-    def jacobian(self, phases: Sequence[Phase], states: Sequence[JointState]) -> np.ndarray:
+    def jacobian(
+        self, phases: Sequence[Phase], states: Sequence[JointState]
+    ) -> np.ndarray:
         """Entries of the Jacobian on the pattern, (nnz,): the joint maps' gradients at the ends."""
         joints = list(self.joints)
         return np.concatenate(
             [
-                sign * states[phase].gradient[point][joints][:, _free(phases[phase], point)[0]].ravel()
+                sign
+                * states[phase]
+                .gradient[point][joints][:, _free(phases[phase], point)[0]]
+                .ravel()
                 for phase, point, sign in self._sides
             ]
         )
@@ -190,8 +207,17 @@ class Program(Summary):
             "rows": len(self.lower),
         }
 
-    def __init__(self, phases: Iterable[Phase], links: Sequence[Link] = (), objective: Objective | None = None) -> None:
-        self.phases, self.links, self.minimised = tuple(phases), tuple(links), objective or EndTime()
+    def __init__(
+        self,
+        phases: Iterable[Phase],
+        links: Sequence[Link] = (),
+        objective: Objective | None = None,
+    ) -> None:
+        self.phases, self.links, self.minimised = (
+            tuple(phases),
+            tuple(links),
+            objective or EndTime(),
+        )
         first = np.cumsum([0, *(phase.variables for phase in self.phases)]).tolist()
         self._parts = [slice(a, b) for a, b in itertools.pairwise(first)]
         self._durations = first[:-1]
@@ -202,11 +228,18 @@ class Program(Summary):
         self.lower = np.concatenate([*(phase.lower for phase in self.phases), joined])
         self.upper = np.concatenate([*(phase.upper for phase in self.phases), joined])
         pairs = zip(self.phases, first[:-1], strict=True)
-        patterns = [(phase.jacobian_rows, phase.jacobian_columns + a) for phase, a in pairs]
+        patterns = [
+            (phase.jacobian_rows, phase.jacobian_columns + a) for phase, a in pairs
+        ]
         patterns += [link.pattern(self.phases, first) for link in self.links]
-        heights = [*(len(phase.lower) for phase in self.phases), *(len(link.joints) for link in self.links)]
+        heights = [
+            *(len(phase.lower) for phase in self.phases),
+            *(len(link.joints) for link in self.links),
+        ]
         self._first_rows = np.cumsum([0, *heights[:-1]]).tolist()
-        self.jacobian_rows = np.concatenate([rows + a for (rows, _), a in zip(patterns, self._first_rows, strict=True)])
+        self.jacobian_rows = np.concatenate(
+            [rows + a for (rows, _), a in zip(patterns, self._first_rows, strict=True)]
+        )
         self.jacobian_columns = np.concatenate([columns for _, columns in patterns])
 
     @property
@@ -226,7 +259,10 @@ class Program(Summary):
 
     def split(self, x: np.ndarray) -> list[tuple[Phase, np.ndarray]]:
         """Every phase, and its part of x."""
-        return [(phase, x[part]) for phase, part in zip(self.phases, self._parts, strict=True)]
+        return [
+            (phase, x[part])
+            for phase, part in zip(self.phases, self._parts, strict=True)
+        ]
 
     def end_time(self, x: np.ndarray) -> float:
         """End time t_E, s: the sum of the durations."""
@@ -240,11 +276,15 @@ class Program(Summary):
 
     def objective(self, x: np.ndarray) -> float:
         """Value to be minimised; raises UnreachableError as `states` does where it depends on the joints."""
-        return float(sum(self.minimised.value(phase, part) for phase, part in self.split(x)))
+        return float(
+            sum(self.minimised.value(phase, part) for phase, part in self.split(x))
+        )
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
         """Gradient of the objective, (v,); raises as `objective` does."""
-        return np.concatenate([self.minimised.gradient(phase, part) for phase, part in self.split(x)])
+        return np.concatenate(
+            [self.minimised.gradient(phase, part) for phase, part in self.split(x)]
+        )
 
     def minimising(self, objective: Objective) -> Program:
         """Return the same program with another objective."""
@@ -279,12 +319,20 @@ class Program(Summary):
     @property
     def limits(self) -> tuple[Limit, ...]:
         """The limits of all phases, safeguards included, each once."""
-        return tuple({id(limit): limit for phase in self.phases for limit in phase.limits}.values())
+        return tuple(
+            {
+                id(limit): limit for phase in self.phases for limit in phase.limits
+            }.values()
+        )
 
     def rows_of(self, limit: Limit) -> np.ndarray:
         """Numbers of the rows of a limit, (K, c), at the collocation points of all phases that have it."""
-        pairs = zip(self.phases, self._first_rows, strict=False)  # the links' rows come behind
-        return np.concatenate([first + phase.rows_of(limit) for phase, first in pairs if phase.has(limit)])
+        pairs = zip(
+            self.phases, self._first_rows, strict=False
+        )  # the links' rows come behind
+        return np.concatenate(
+            [first + phase.rows_of(limit) for phase, first in pairs if phase.has(limit)]
+        )
 
     def motions(self, x: np.ndarray) -> list[Motion]:
         """Curves of every phase that belong to x."""
@@ -301,11 +349,15 @@ class Program(Summary):
 
     def resampled(self, t_norm: Sequence[np.ndarray]) -> Program:
         """Return the same program with other collocation points of every phase; see `Phase.resampled`."""
-        return self.with_phases(phase.resampled(own) for phase, own in zip(self.phases, t_norm, strict=True))
+        return self.with_phases(
+            phase.resampled(own) for phase, own in zip(self.phases, t_norm, strict=True)
+        )
 
     def with_free_knots(self, shortest: float) -> Program:
         """Return the same program with interval lengths as variables; see `Phase.with_free_knots`."""
-        return self.with_phases(phase.with_free_knots(shortest) for phase in self.phases)
+        return self.with_phases(
+            phase.with_free_knots(shortest) for phase in self.phases
+        )
 
     def frozen(self, x: np.ndarray) -> tuple[Program, np.ndarray]:
         """Return the program with its knots fixed where they are at x, and the same motion as its point x."""
@@ -315,7 +367,10 @@ class Program(Summary):
     def up_to(self, order: int) -> Program:
         """Return the same program without limits that ask for a higher derivative; x keeps its meaning."""
         return self.with_phases(
-            phase.with_limits(tuple(limit for limit in phase.limits if limit.order <= order)) for phase in self.phases
+            phase.with_limits(
+                tuple(limit for limit in phase.limits if limit.order <= order)
+            )
+            for phase in self.phases
         )
 
     def with_margin(self, margin: float) -> Program:
@@ -326,7 +381,10 @@ class Program(Summary):
         """Return the same program with a figure of one of its limits giving way by `amount`, in the figure's unit."""
         other = limit.relaxed(bound, amount)
         return self.with_phases(
-            phase.with_limits(tuple(other if each is limit else each for each in phase.limits)) for phase in self.phases
+            phase.with_limits(
+                tuple(other if each is limit else each for each in phase.limits)
+            )
+            for phase in self.phases
         )
 
     @property

@@ -59,14 +59,25 @@ def reversals(friction: Friction, times: np.ndarray, state: JointState) -> np.nd
     speed = state.qdot[:, rubbing] / friction.v_eps[rubbing]
     h = np.diff(times)[:, None]
     gain = state.qddot[:, rubbing] / friction.v_eps[rubbing]
-    cubic = np.array([speed[:-1], speed[:-1] + h * gain[:-1] / 3.0, speed[1:] - h * gain[1:] / 3.0, speed[1:]])
-    step, joint = np.nonzero((cubic.min(axis=0) < _NEAR_REVERSALS) & (cubic.max(axis=0) > -_NEAR_REVERSALS))
+    cubic = np.array(
+        [
+            speed[:-1],
+            speed[:-1] + h * gain[:-1] / 3.0,
+            speed[1:] - h * gain[1:] / 3.0,
+            speed[1:],
+        ]
+    )
+    step, joint = np.nonzero(
+        (cubic.min(axis=0) < _NEAR_REVERSALS) & (cubic.max(axis=0) > -_NEAR_REVERSALS)
+    )
     cubic = cubic[:, step, joint]
     first, last = cubic[0, :, None] - _LEVELS, cubic[-1, :, None] - _LEVELS
     which, level = np.nonzero(first * last < 0.0)
     crossing = _place(cubic[:, which] - _LEVELS[level])
     slopes = np.diff(cubic, axis=0)
-    turns = np.flatnonzero((slopes[0] * slopes[-1] < 0.0) & (np.abs(cubic).min(axis=0) < _NEAR_REVERSALS))
+    turns = np.flatnonzero(
+        (slopes[0] * slopes[-1] < 0.0) & (np.abs(cubic).min(axis=0) < _NEAR_REVERSALS)
+    )
     which, u = np.append(which, turns), np.append(crossing, _place(slopes[:, turns]))
     return np.unique(times[step[which]] + u * h[step[which], 0])
 
@@ -110,7 +121,9 @@ def dense_grid(phase: Phase, density: int) -> np.ndarray:
     return np.union1d(grid, phase.jumps - _JUST_BEFORE)
 
 
-def violations(dense: Program, x: np.ndarray, goal: float) -> tuple[float, list[np.ndarray]]:
+def violations(
+    dense: Program, x: np.ndarray, goal: float
+) -> tuple[float, list[np.ndarray]]:
     """Largest violation, and the normalised times of every phase at which collocation points are missing.
 
     Around every peak of the grid that comes near a limit ever finer grids look for the true peak.
@@ -125,40 +138,65 @@ def _of_phase(dense: Phase, x: np.ndarray, goal: float) -> tuple[float, np.ndarr
     try:
         table, of_means = dense.violation(x), dense.violation_of_means(x)
         centres = _suspects(t_norm, table, dense.knots, goal - _NEAR)
-        heights = table.max(axis=1)[np.searchsorted(t_norm, centres - _SAME_TIME).clip(max=len(t_norm) - 1)]
-        if table.max() > _COARSE * goal:  # the grid's own peaks will do until they are nearly held down
+        heights = table.max(axis=1)[
+            np.searchsorted(t_norm, centres - _SAME_TIME).clip(max=len(t_norm) - 1)
+        ]
+        if (
+            table.max() > _COARSE * goal
+        ):  # the grid's own peaks will do until they are nearly held down
             missing = _around(centres[heights > goal], t_norm)
-            return max(float(table.max()), of_means), np.union1d(missing, _beside_breaks(dense, x, missing))
+            return max(float(table.max()), of_means), np.union1d(
+                missing, _beside_breaks(dense, x, missing)
+            )
         reach = _spacing(t_norm, centres)
         for _ in range(_ZOOMS):
             if not len(centres):
                 break
             centres, heights = _zoomed(dense, x, centres, reach)
             kept = heights > goal - 0.1 * _NEAR
-            centres, heights, reach = centres[kept], heights[kept], reach[kept] * 2.0 / (_FINE - 1)
-        places = np.unique(np.concatenate([_within_pieces(dense, x), _within_friction(dense, x), _at_breaks(dense, x)]))
+            centres, heights, reach = (
+                centres[kept],
+                heights[kept],
+                reach[kept] * 2.0 / (_FINE - 1),
+            )
+        places = np.unique(
+            np.concatenate(
+                [
+                    _within_pieces(dense, x),
+                    _within_friction(dense, x),
+                    _at_breaks(dense, x),
+                ]
+            )
+        )
         worst = dense.violation_at(x, places).max(axis=1) if len(places) else places
     except UnreachableError:
         return np.inf, _unreachable(dense, x)
-    largest = max(table.max(), heights.max(initial=-np.inf), worst.max(initial=-np.inf), of_means)
+    largest = max(
+        table.max(), heights.max(initial=-np.inf), worst.max(initial=-np.inf), of_means
+    )
     missing = np.union1d(_around(centres[heights > goal], t_norm), places[worst > goal])
     missing = np.union1d(missing, _beside_breaks(dense, x, missing))
     # A mean that is wrong has too few points everywhere.
-    return float(largest), np.union1d(missing, t_norm[_EVERYWHERE]) if of_means > goal else missing
+    return float(largest), np.union1d(
+        missing, t_norm[_EVERYWHERE]
+    ) if of_means > goal else missing
 
 
 def _within_pieces(dense: Phase, x: np.ndarray) -> np.ndarray:
     """Spread points t_norm over every piece of a path of several: a blend of millimetres lies between grid points."""
     path, motion = dense.joint_map.path, dense.motion(x)
     breaks = np.empty(0) if path is None else path.breaks
-    if len(breaks) <= 2:  # noqa: PLR2004  (a single piece, which the grid sees)
+    if len(breaks) <= 2:
         return np.empty(0)
     return motion.times_of(spread(breaks, _PIECE_POINTS - 1)) / motion.t_end
 
 
 def _at_breaks(dense: Phase, x: np.ndarray) -> np.ndarray:
     """List t_norm at which the path coordinate is where a limit changes abruptly."""
-    breaks, motion = np.concatenate([limit.breaks for limit in dense.limits]), dense.motion(x)
+    breaks, motion = (
+        np.concatenate([limit.breaks for limit in dense.limits]),
+        dense.motion(x),
+    )
     return motion.times_of(breaks) / motion.t_end
 
 
@@ -198,14 +236,25 @@ def _around(centres: np.ndarray, t_norm: np.ndarray) -> np.ndarray:
 def _unreachable(dense: Phase, x: np.ndarray) -> np.ndarray:
     """List the middle of every stretch of the dense grid on which the branch has no answer."""
     motion = dense.motion(x)
-    lost = ~np.all(np.isfinite(dense.joint_map.postures(motion.at(dense.t_norm * motion.t_end)[0])), axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]).astype(int)))
-    if not len(edges):  # reachable, but singular or too far apart to count turns: more points everywhere
+    lost = ~np.all(
+        np.isfinite(
+            dense.joint_map.postures(motion.at(dense.t_norm * motion.t_end)[0])
+        ),
+        axis=1,
+    )
+    edges = np.flatnonzero(
+        np.diff(np.concatenate([[False], lost, [False]]).astype(int))
+    )
+    if not len(
+        edges
+    ):  # reachable, but singular or too far apart to count turns: more points everywhere
         return dense.t_norm[_EVERYWHERE]
     return dense.t_norm[(edges[::2] + edges[1::2] - 1) // 2]
 
 
-def _suspects(t_norm: np.ndarray, table: np.ndarray, knots: np.ndarray, near: float) -> np.ndarray:
+def _suspects(
+    t_norm: np.ndarray, table: np.ndarray, knots: np.ndarray, near: float
+) -> np.ndarray:
     """List times around which a violation may hide: the grid's peaks near a limit, and both sides of knots near one.
 
     A peak between grid points is higher than its neighbours by an eighth of their second difference; four times that
@@ -213,16 +262,31 @@ def _suspects(t_norm: np.ndarray, table: np.ndarray, knots: np.ndarray, near: fl
     """
     padded = np.pad(table, ((1, 1), (0, 0)), mode="edge")
     bend = np.abs(padded[:-2] - 2.0 * table + padded[2:])
-    peaks = (table + 0.5 * bend > near + _NEAR) & (table > near) & (table >= padded[:-2]) & (table >= padded[2:])
+    peaks = (
+        (table + 0.5 * bend > near + _NEAR)
+        & (table > near)
+        & (table >= padded[:-2])
+        & (table >= padded[2:])
+    )
     at_knots = np.searchsorted(t_norm, np.unique(knots) - _SAME_TIME)
     close = t_norm[at_knots[(table[at_knots] > near).any(axis=1)]]
     half = 0.5 * _spacing(t_norm, close)
-    return np.unique(np.clip(np.concatenate([t_norm[peaks.any(axis=1)], close - half, close + half]), 0.0, 1.0))
+    return np.unique(
+        np.clip(
+            np.concatenate([t_norm[peaks.any(axis=1)], close - half, close + half]),
+            0.0,
+            1.0,
+        )
+    )
 
 
-def _zoomed(dense: Phase, x: np.ndarray, centres: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _zoomed(
+    dense: Phase, x: np.ndarray, centres: np.ndarray, reach: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Look on a fine grid within `reach` of every centre: the places of the largest violation, and its size there."""
-    fine = np.clip(centres[:, None] + reach[:, None] * np.linspace(-1.0, 1.0, _FINE), 0.0, 1.0)
+    fine = np.clip(
+        centres[:, None] + reach[:, None] * np.linspace(-1.0, 1.0, _FINE), 0.0, 1.0
+    )
     order = np.argsort(fine.ravel(), kind="stable")
     worst = np.empty(fine.size)
     worst[order] = dense.violation_at(x, fine.ravel()[order]).max(axis=1)
@@ -235,7 +299,9 @@ def merged(phase: Phase, extra: np.ndarray) -> np.ndarray:
     """Collocation points of a phase with extra ones, without pairs so close that their rows would be the same."""
     t_norm, jumps = phase.t_norm, phase.jumps
     sides = [np.searchsorted(jumps, times, side="right") for times in (extra, t_norm)]
-    apart = np.where(sides[0][:, None] == sides[1], np.abs(extra[:, None] - t_norm), np.inf)
+    apart = np.where(
+        sides[0][:, None] == sides[1], np.abs(extra[:, None] - t_norm), np.inf
+    )
     return np.union1d(t_norm, extra[apart.min(axis=1) > _CLOSEST])
 
 
@@ -305,7 +371,9 @@ class Refined(Summary):
         return self.reports[0].status.usable
 
 
-def refine(program: Program, first: SolverReport, solve: Solve, options: RefinementOptions) -> Refined:
+def refine(
+    program: Program, first: SolverReport, solve: Solve, options: RefinementOptions
+) -> Refined:
     """Add collocation points to a solved program until the limits hold on the dense grid.
 
     Parameters
@@ -321,7 +389,9 @@ def refine(program: Program, first: SolverReport, solve: Solve, options: Refinem
     -------
     Refined
     """
-    dense = program.resampled([dense_grid(phase, options.density) for phase in program.phases])
+    dense = program.resampled(
+        [dense_grid(phase, options.density) for phase in program.phases]
+    )
     goal = options.tolerance * _GOAL
     reports = [first]
     if not first.status.usable:
@@ -329,13 +399,27 @@ def refine(program: Program, first: SolverReport, solve: Solve, options: Refinem
     for _ in range(options.max_rounds):
         answer = reports[-1].x
         violation, places = violations(dense, answer, goal)
-        longest = min(program.end_time(answer) * (1.0 + options.tolerance), options.longest)
+        longest = min(
+            program.end_time(answer) * (1.0 + options.tolerance), options.longest
+        )
         x, remaining = _time_scaled(dense, answer, violation, goal, longest)
         if remaining <= goal:
-            return Refined(program, tuple(reports), x, remaining, program.end_time(x) / program.end_time(answer))
-        extended = [merged(phase, extra) for phase, extra in zip(program.phases, places, strict=True)]
+            return Refined(
+                program,
+                tuple(reports),
+                x,
+                remaining,
+                program.end_time(x) / program.end_time(answer),
+            )
+        extended = [
+            merged(phase, extra)
+            for phase, extra in zip(program.phases, places, strict=True)
+        ]
         finer = program.resampled(extended)
-        if finer.collocation_points == program.collocation_points or options.deadline.passed:
+        if (
+            finer.collocation_points == program.collocation_points
+            or options.deadline.passed
+        ):
             break
         report = solve(finer, answer)
         if not report.status.usable and not _still_good(report, reports[-1]):
@@ -344,9 +428,18 @@ def refine(program: Program, first: SolverReport, solve: Solve, options: Refinem
         reports.append(report)
     answer = reports[-1].x
     violation, _ = violations(dense, answer, goal)
-    longest = min(program.end_time(answer) * (1.0 + (_LONGEST if options.max_rounds else 0.0)), options.longest)
+    longest = min(
+        program.end_time(answer) * (1.0 + (_LONGEST if options.max_rounds else 0.0)),
+        options.longest,
+    )
     x, remaining = _time_scaled(dense, answer, violation, goal, longest)
-    return Refined(program, tuple(reports), x, remaining, program.end_time(x) / program.end_time(answer))
+    return Refined(
+        program,
+        tuple(reports),
+        x,
+        remaining,
+        program.end_time(x) / program.end_time(answer),
+    )
 
 
 def _still_good(report: SolverReport, before: SolverReport) -> bool:

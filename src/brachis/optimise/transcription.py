@@ -32,7 +32,11 @@ def program_of(problem: Problem, joint_map: JointMap, breaks: np.ndarray) -> Pro
     Program
     """
     spline = problem.task.spline
-    grid = FixedGrid(clamped_knots(spline.degree, breaks), spline.degree, spread(breaks, spline.points_per_interval))
+    grid = FixedGrid(
+        clamped_knots(spline.degree, breaks),
+        spline.degree,
+        spread(breaks, spline.points_per_interval),
+    )
     return Program([phase_in(problem, joint_map, grid)])
 
 
@@ -51,13 +55,17 @@ def _boundary(problem: Problem, joint_map: JointMap) -> Boundary:
     """Write the task's boundary conditions in the coordinates of a joint map."""
     task, given = problem.task, problem.task.boundary
     free = np.full(problem.robot.n, np.nan)
-    start, end = (free if posture is None else posture for posture in (problem.start, problem.end))
+    start, end = (
+        free if posture is None else posture for posture in (problem.start, problem.end)
+    )
     values = joint_map.coordinates(0.0, start), joint_map.coordinates(1.0, end)
     if not given.periodic:
         first, last = (_rates(rate, len(values[0])) for rate in problem.end_rates)
         return Boundary(*values, task.spline.vanishing, first, last)
     if isinstance(joint_map, ChartMap) and not joint_map.rows.closes:
-        raise UnreachableError("the chart's measure of self-motion is another one at the path's end")
+        raise UnreachableError(
+            "the chart's measure of self-motion is another one at the path's end"
+        )
     return Boundary(*values, task.spline.vanishing, periodic=True)
 
 
@@ -68,5 +76,7 @@ def _rates(rate: float, count: int) -> np.ndarray | None:
 
 def breaks_of(task: Task) -> np.ndarray:
     """Return the ends of the task's uniform intervals, (N + 1,); of the first mesh where their number is left open."""
-    intervals = COARSE_INTERVALS if task.spline.intervals == "auto" else task.spline.intervals
+    intervals = (
+        COARSE_INTERVALS if task.spline.intervals == "auto" else task.spline.intervals
+    )
     return np.linspace(0.0, 1.0, intervals + 1)

@@ -51,7 +51,12 @@ class SepticCurve:
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
         """Return the polynomial and its derivatives by sigma, shape (order + 1, K, m)."""
         u = sigma / self.length
-        return np.stack([_powers(u, k) @ self.coefficients / self.length**k for k in range(order + 1)])
+        return np.stack(
+            [
+                _powers(u, k) @ self.coefficients / self.length**k
+                for k in range(order + 1)
+            ]
+        )
 
 
 def septic(start: Array, end: Array, length: float) -> SepticCurve:
@@ -74,7 +79,9 @@ def septic(start: Array, end: Array, length: float) -> SepticCurve:
 def _powers(u: Array, order: int) -> Array:
     """Return the derivatives of the powers of the normalised parameter, shape (K, 8)."""
     exponents = np.arange(_DEGREE + 1)
-    factors = np.array([perm(k, order) if k >= order else 0 for k in exponents], dtype=float)
+    factors = np.array(
+        [perm(k, order) if k >= order else 0 for k in exponents], dtype=float
+    )
     return factors * u[:, None] ** np.maximum(exponents - order, 0)
 
 
@@ -106,7 +113,9 @@ def blend_rows(first: Curve, second: Curve, size: float, join: Join) -> SepticCu
     return checked_septic(start, end, length, join)
 
 
-def check_neighbours(first: Curve, second: Curve, size: float, join: Join, *, still: str, turning: str) -> None:
+def check_neighbours(
+    first: Curve, second: Curve, size: float, join: Join, *, still: str, turning: str
+) -> None:
     """Refuse a blend where the position stands still, or that is too long.
 
     `still` says what happens where it stands still, and `turning` names what turns there.
@@ -117,10 +126,17 @@ def check_neighbours(first: Curve, second: Curve, size: float, join: Join, *, st
     """
     where, at = f"{join.blend_key}: {join.where}", (join.s, join.s)
     if stands_still(first, join.positions) or stands_still(second, join.positions):
-        problem = f"a blend needs motion of the position on both sides, and {still} on one"
+        problem = (
+            f"a blend needs motion of the position on both sides, and {still} on one"
+        )
         hint = f"Turn {turning} along a line"
         raise PathError(
-            problem, s_interval=at, found=f"{size:g} {join.unit}", allowed="no blend here", where=where, hint=hint
+            problem,
+            s_interval=at,
+            found=f"{size:g} {join.unit}",
+            allowed="no blend here",
+            where=where,
+            hint=hint,
         )
     longest = min(first.length, second.length) / 2
     if size > longest * (1 + _ROUNDING):
@@ -128,10 +144,19 @@ def check_neighbours(first: Curve, second: Curve, size: float, join: Join, *, st
         # Rounded down, to whole nanometres, so that the blend that the message names is accepted.
         allowed = f"at most {floor(longest * 1e9) / 1e9:.10g} {join.unit}"
         looks = position_hint(size, 0.0, longest, join.unit)
-        raise PathError(problem, s_interval=at, found=f"{size:g} {join.unit}", allowed=allowed, where=where, hint=looks)
+        raise PathError(
+            problem,
+            s_interval=at,
+            found=f"{size:g} {join.unit}",
+            allowed=allowed,
+            where=where,
+            hint=looks,
+        )
 
 
-def ends(first: Curve, second: Curve, size: float, positions: int) -> tuple[Array, Array, float]:
+def ends(
+    first: Curve, second: Curve, size: float, positions: int
+) -> tuple[Array, Array, float]:
     """Return the derivatives, (4, m), at the start and the end of a blend, and its length.
 
     The length is the mean of the chord and of the polygon over the corner, which keeps the blend's speed near 1.
@@ -140,7 +165,9 @@ def ends(first: Curve, second: Curve, size: float, positions: int) -> tuple[Arra
     corner = second.derivatives(np.zeros(1), 0)[0, 0]
     end = second.derivatives(np.array([size]))[:, 0]
     chord = _distance(start[0], end[0], positions)
-    polygon = _distance(start[0], corner, positions) + _distance(corner, end[0], positions)
+    polygon = _distance(start[0], corner, positions) + _distance(
+        corner, end[0], positions
+    )
     return start, end, (chord + polygon) / 2
 
 
@@ -153,9 +180,15 @@ def checked_septic(start: Array, end: Array, length: float, join: Join) -> Septi
     """
     curve = septic(start, end, length)
     sigma = np.linspace(0.0, curve.length, _CHECKED_POINTS)
-    speed = float(np.linalg.norm(curve.derivatives(sigma, 1)[1, :, : join.positions], axis=1).min())
+    speed = float(
+        np.linalg.norm(
+            curve.derivatives(sigma, 1)[1, :, : join.positions], axis=1
+        ).min()
+    )
     if not speed > SLOWEST:
-        problem = "the corner is too sharp for a blend, which would all but stop and reverse"
+        problem = (
+            "the corner is too sharp for a blend, which would all but stop and reverse"
+        )
         raise PathError(
             problem,
             s_interval=(join.s, join.s),
@@ -174,7 +207,9 @@ def _distance(one: Array, other: Array, positions: int) -> float:
 _SIGN_POINTS = 9
 
 
-def blend_poses(first: Curve, second: Curve, size: float, join: Join) -> QuaternionPoseCurve:
+def blend_poses(
+    first: Curve, second: Curve, size: float, join: Join
+) -> QuaternionPoseCurve:
     """Return the blend that replaces the last `size` of one curve of poses and the first `size` of the next.
 
     It is the polynomial of the position and the quaternion, which is then divided by its length; see
@@ -185,7 +220,14 @@ def blend_poses(first: Curve, second: Curve, size: float, join: Join) -> Quatern
     PathError
         As for rows; or the tool turns too much in the blend.
     """
-    check_neighbours(first, second, size, join, still="the tool turns on the spot", turning="the tool")
+    check_neighbours(
+        first,
+        second,
+        size,
+        join,
+        still="the tool turns on the spot",
+        turning="the tool",
+    )
     start, end, length = ends(first, second, size, join.positions)
     start, end = _with_quaternion(start), _with_quaternion(end)
     end[:, POSITIONS:] *= _sign(first, second, size)
@@ -206,12 +248,17 @@ def blend_poses(first: Curve, second: Curve, size: float, join: Join) -> Quatern
 
 def _with_quaternion(pose: Array) -> Array:
     """Return the derivatives of position and quaternion, (4, 7), from those of a pose, (4, 12)."""
-    return np.concatenate([pose[:, :POSITIONS], quaternion_derivatives(rotations(pose))], axis=1)
+    return np.concatenate(
+        [pose[:, :POSITIONS], quaternion_derivatives(rotations(pose))], axis=1
+    )
 
 
 def _sign(first: Curve, second: Curve, size: float) -> float:
     """Return the sign of the end's quaternion that continues the start's along both curves."""
     steps = np.linspace(0.0, size, _SIGN_POINTS)
-    poses = [first.derivatives(first.length - size + steps, 0)[0], second.derivatives(steps, 0)[0]]
+    poses = [
+        first.derivatives(first.length - size + steps, 0)[0],
+        second.derivatives(steps, 0)[0],
+    ]
     quaternions = quaternions_of(rotation_of(rotations(np.concatenate(poses))))
     return float(np.sign(with_like_signs(quaternions)[-1] @ quaternions[-1]))

@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 _NOTHING = 1e-11
 
 
-def join_curves(curves: Sequence[Curve], blends: Sequence[float | None], coordinates: Coordinates) -> SequencePath:
+def join_curves(
+    curves: Sequence[Curve], blends: Sequence[float | None], coordinates: Coordinates
+) -> SequencePath:
     """Return the path along curves, with their corners rounded.
 
     Parameters
@@ -54,19 +56,26 @@ def join_curves(curves: Sequence[Curve], blends: Sequence[float | None], coordin
     pieces: list[Piece] = []
     taken = 0.0
     joins = find_joins(curves, coordinates.rows)
-    for join, curve, following, size in zip(joins, curves, curves[1:], blends, strict=False):
+    for join, curve, following, size in zip(
+        joins, curves, curves[1:], blends, strict=False
+    ):
         if size is None:
             corners.append(coordinates.corner(join, curve, following))
             pieces.append(Piece(curve, taken, curve.length, join.index))
             taken = 0.0
         else:
             rounded = coordinates.blend(curve, following, size, join)
-            pieces += [Piece(curve, taken, curve.length - size, join.index), Piece(rounded, 0.0, rounded.length)]
+            pieces += [
+                Piece(curve, taken, curve.length - size, join.index),
+                Piece(rounded, 0.0, rounded.length),
+            ]
             taken = size
     pieces.append(Piece(curves[-1], taken, curves[-1].length, len(curves) - 1))
     refuse_corners([corner for corner in corners if corner is not None])
     # Two blends that meet in the middle of a segment leave nothing of it, but rounding.
-    kept = tuple(piece for piece in pieces if piece.length > _NOTHING * piece.curve.length)
+    kept = tuple(
+        piece for piece in pieces if piece.length > _NOTHING * piece.curve.length
+    )
     return SequencePath.of(kept, len(position_rows(coordinates.rows)))
 
 
@@ -158,11 +167,15 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     """
     placement = task.path_placement
     frame = None if placement is None else PathFrame.of(placement, task_map.rows)
-    given = None if task.path_start is None else task_map.read(task.path_start, "path_start")
+    given = (
+        None
+        if task.path_start is None
+        else task_map.read(task.path_start, "path_start")
+    )
     if given is not None and frame is not None:
         given = frame.to_world(given)
     if task.start == "free":
-        assert given is not None  # noqa: S101  (the task model sees to it)
+        assert given is not None
         return build_path(task.path, given, task_map.rows, frame)
     start = task_map.robot.posture(task.start.joints, "start.joints")
     if given is not None:
@@ -170,7 +183,9 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     return build_path(task.path, task_map.value(start), task_map.rows, frame)
 
 
-def check_on_path(task_map: TaskMap, posture: np.ndarray, target: np.ndarray, name: str) -> None:
+def check_on_path(
+    task_map: TaskMap, posture: np.ndarray, target: np.ndarray, name: str
+) -> None:
     """Refuse a posture, (n,), whose tool is not at the path's beginning or end, `target`, (c,).
 
     Raises

@@ -23,7 +23,14 @@ from brachis.path.rotations import matrices, quaternions_of, rotation_of
 from brachis.path.shapes import curve_of
 from brachis.path.site import Site
 from brachis.robot.task_map.protocol import AXES, POSE_COORDINATES, ROWS, YAW, joints_of
-from brachis.task import BSplineCurve, BSplineSegment, LineSegment, SplineSegment, SplineThrough, TurnSegment
+from brachis.task import (
+    BSplineCurve,
+    BSplineSegment,
+    LineSegment,
+    SplineSegment,
+    SplineThrough,
+    TurnSegment,
+)
 
 if TYPE_CHECKING:
     from brachis.path.joins import Corner, Join
@@ -90,10 +97,20 @@ class RowCoordinates:
         """See `Coordinates.checked`."""
         for row in self.rows:
             if row not in ROWS:
-                raise UnknownNameError(kind="row of the task space", name=row, valid=ROWS, where="task_space")
+                raise UnknownNameError(
+                    kind="row of the task space",
+                    name=row,
+                    valid=ROWS,
+                    where="task_space",
+                )
         if start.shape != (len(self.rows),) or not np.all(np.isfinite(start)):
             problem = "the start of the path needs one finite coordinate for each row of the task space"
-            raise PathError(problem, found=start.tolist(), allowed=f"[{', '.join(self.rows)}]", where="start")
+            raise PathError(
+                problem,
+                found=start.tolist(),
+                allowed=f"[{', '.join(self.rows)}]",
+                where="start",
+            )
         return start
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
@@ -103,11 +120,17 @@ class RowCoordinates:
             problem = "a turn is for task spaces of poses"
             if YAW in self.rows:
                 hint = "Use line: {by: [0, 0, ...]} to turn yaw"
-            raise PathError(problem, found=found, where=f"path[{index}].turn", hint=hint)
+            raise PathError(
+                problem, found=found, where=f"path[{index}].turn", hint=hint
+            )
         if segment.orientation is not None:
             problem = "an orientation along a segment is for task spaces of poses"
-            raise PathError(problem, found=found, where=f"path[{index}].orientation", hint=hint)
-        return curve_of(segment.shape, Site(f"path[{index}].{segment.kind}", start, self.rows))
+            raise PathError(
+                problem, found=found, where=f"path[{index}].orientation", hint=hint
+            )
+        return curve_of(
+            segment.shape, Site(f"path[{index}].{segment.kind}", start, self.rows)
+        )
 
     def path(self, sequence: SequencePath) -> SequencePath:
         """See `Coordinates.path`: the task velocity is the coordinates' own derivative."""
@@ -134,7 +157,9 @@ class JointCoordinates(RowCoordinates):
                 hint=f"A turn of one joint by 90 degrees is line: {{by: [{by}]}}",
             )
         shape = segment.shape
-        names = shape.joints if isinstance(shape, SplineThrough | BSplineCurve) else None
+        names = (
+            shape.joints if isinstance(shape, SplineThrough | BSplineCurve) else None
+        )
         if names is None:
             return super().curve(segment, index, start)
         own, where = joints_of(self.rows), f"path[{index}].{segment.kind}.joints"
@@ -142,11 +167,17 @@ class JointCoordinates(RowCoordinates):
         if unknown:
             raise UnknownNameError("joint", unknown[0], own, where=where)
         if len(names) != len(own):
-            raise PathError("joints are missing", found=list(names), allowed=", ".join(own), where=where)
+            raise PathError(
+                "joints are missing",
+                found=list(names),
+                allowed=", ".join(own),
+                where=where,
+            )
         order = [own.index(name) for name in names]
         other = JointCoordinates(tuple(self.rows[place] for place in order))
         return Reordered(
-            super(JointCoordinates, other).curve(segment, index, start[order]), [names.index(joint) for joint in own]
+            super(JointCoordinates, other).curve(segment, index, start[order]),
+            [names.index(joint) for joint in own],
         )
 
 
@@ -197,11 +228,15 @@ class PoseCoordinates:
         allowed = "the position (3), then a rotation matrix row by row (9)"
         if start.shape != (POSE_COORDINATES,) or not np.all(np.isfinite(start)):
             problem = "the start of a path of poses needs 12 finite coordinates"
-            raise PathError(problem, found=start.tolist(), allowed=allowed, where="start")
+            raise PathError(
+                problem, found=start.tolist(), allowed=allowed, where="start"
+            )
         rotation = rotations(start)
         stretch = np.abs(rotation @ rotation.T - np.eye(3)).max()
         if stretch > 2.0 * _ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:
             problem = "the start of the path has no rotation matrix"
-            raise PathError(problem, found=rotation.tolist(), allowed=allowed, where="start")
+            raise PathError(
+                problem, found=rotation.tolist(), allowed=allowed, where="start"
+            )
         nearest = matrices(quaternions_of(rotation_of(rotation))[None])[0]
         return np.concatenate([start[:POSITIONS], nearest.ravel()])

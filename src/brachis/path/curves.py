@@ -18,7 +18,15 @@ from brachis.path.site import ZERO_LENGTH, Site
 if TYPE_CHECKING:
     from brachis.path.protocol import Array
     from brachis.path.site import Site
-    from brachis.task import ArcCenter, ArcVia, Circle, Helix, LineBy, LineHeading, LineTo
+    from brachis.task import (
+        ArcCenter,
+        ArcVia,
+        Circle,
+        Helix,
+        LineBy,
+        LineHeading,
+        LineTo,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +63,19 @@ class LineCurve:
 
 def line_to(shape: LineTo, site: Site) -> LineCurve:
     """Return the line to a point."""
-    return _line(site.coordinates(shape.to, "to", site.rows) - site.start, site, ".to", list(shape.to))
+    return _line(
+        site.coordinates(shape.to, "to", site.rows) - site.start,
+        site,
+        ".to",
+        list(shape.to),
+    )
 
 
 def line_by(shape: LineBy, site: Site) -> LineCurve:
     """Return the line by a displacement."""
-    return _line(site.coordinates(shape.by, "by", site.rows), site, ".by", list(shape.by))
+    return _line(
+        site.coordinates(shape.by, "by", site.rows), site, ".by", list(shape.by)
+    )
 
 
 def line_heading(shape: LineHeading, site: Site) -> LineCurve:
@@ -134,7 +149,9 @@ class ArcCurve:
         for k in range(order + 1):
             # Each derivative turns the position vector by a quarter and divides it by the radius.
             turned = angle + k * np.pi / 2
-            result[k, :, :rows] = (np.cos(turned) * self.outward + np.sin(turned) * self.forward) / self.radius**k
+            result[k, :, :rows] = (
+                np.cos(turned) * self.outward + np.sin(turned) * self.forward
+            ) / self.radius**k
         result[0, :, :rows] += self.center
         if self.yaw is not None:
             result[0, :, rows] = self.yaw[0] + self.yaw[1] * sigma
@@ -152,7 +169,9 @@ def arc_center(shape: ArcCenter, site: Site) -> ArcCurve:
 
 def circle(shape: Circle, site: Site) -> ArcCurve:
     """Return the turns about a centre."""
-    return _with_yaw(about_center(shape, 2 * np.pi * shape.turns, site), shape.yaw, site)
+    return _with_yaw(
+        about_center(shape, 2 * np.pi * shape.turns, site), shape.yaw, site
+    )
 
 
 def arc_via(shape: ArcVia, site: Site) -> ArcCurve:
@@ -185,29 +204,47 @@ def arc_via(shape: ArcVia, site: Site) -> ArcCurve:
     if np.linalg.norm(forward) < _COLLINEAR * radius:  # via is opposite to the start
         forward = -(to_end - (to_end @ outward) / radius**2 * outward)
     forward *= radius / np.linalg.norm(forward)
-    angles = [_angle_of(point - to_center, outward, forward) for point in (to_via, to_end)]
+    angles = [
+        _angle_of(point - to_center, outward, forward) for point in (to_via, to_end)
+    ]
     if angles[0] > angles[1]:
         forward = -forward
         angles[1] = 2 * np.pi - angles[1]
-    return _with_yaw(ArcCurve(site.position + to_center, outward, forward, radius * angles[1]), shape.yaw, site)
+    return _with_yaw(
+        ArcCurve(site.position + to_center, outward, forward, radius * angles[1]),
+        shape.yaw,
+        site,
+    )
 
 
 def _angle_of(vector: Array, outward: Array, forward: Array) -> float:
     return float(np.arctan2(vector @ forward, vector @ outward) % (2 * np.pi))
 
 
-def about_center(shape: ArcCenter | Circle | Helix, angle: float, site: Site) -> ArcCurve:
+def about_center(
+    shape: ArcCenter | Circle | Helix, angle: float, site: Site
+) -> ArcCurve:
     """Return the arc by a signed angle, rad, about the centre of a shape; yaw is left out."""
     site.need_plane("an arc")
     center = site.coordinates(shape.center, "center", site.positions)
     outward = site.position - center
     if np.linalg.norm(outward) < ZERO_LENGTH:
         problem = "the arc has zero length: its centre is its start, so that the radius is zero"
-        raise PathError(problem, found=list(shape.center), allowed="another point", where=f"{site.key}.center")
+        raise PathError(
+            problem,
+            found=list(shape.center),
+            allowed="another point",
+            where=f"{site.key}.center",
+        )
     if center.size == _PLANE_ROWS:
         if shape.normal is not None:
             problem = "a normal is for three position rows; here the plane is that of the task space"
-            raise PathError(problem, found=list(shape.normal), allowed="no normal", where=f"{site.key}.normal")
+            raise PathError(
+                problem,
+                found=list(shape.normal),
+                allowed="no normal",
+                where=f"{site.key}.normal",
+            )
         forward = np.array([-outward[1], outward[0]])
     else:
         normal = _normal(shape.normal, outward, site)
@@ -219,11 +256,15 @@ def about_center(shape: ArcCenter | Circle | Helix, angle: float, site: Site) ->
     return ArcCurve(center, outward, np.sign(angle) * forward, length)
 
 
-def _normal(normal: tuple[float, float, float] | None, outward: Array, site: Site) -> Array:
+def _normal(
+    normal: tuple[float, float, float] | None, outward: Array, site: Site
+) -> Array:
     """Return the unit normal of an arc in three rows."""
     where = f"{site.key}.normal"
     if normal is None:
-        problem = "with three position rows a centre does not determine the plane of the arc"
+        problem = (
+            "with three position rows a centre does not determine the plane of the arc"
+        )
         raise PathError(
             problem,
             found="no normal",
@@ -234,7 +275,9 @@ def _normal(normal: tuple[float, float, float] | None, outward: Array, site: Sit
     size = float(np.linalg.norm(normal))
     if size < ZERO_LENGTH:
         problem = "the normal has zero length"
-        raise PathError(problem, found=list(normal), allowed="any other vector", where=where)
+        raise PathError(
+            problem, found=list(normal), allowed="any other vector", where=where
+        )
     unit = np.asarray(normal) / size
     slope = float(unit @ outward / np.linalg.norm(outward))
     if abs(slope) > _PERPENDICULAR:
@@ -252,11 +295,25 @@ def _normal(normal: tuple[float, float, float] | None, outward: Array, site: Sit
 def _with_yaw(arc: ArcCurve, turning: str, site: Site) -> ArcCurve:
     """Return the arc with the yaw that the segment asks for."""
     if site.has_yaw:
-        sense = float(np.sign(arc.outward[0] * arc.forward[1] - arc.outward[1] * arc.forward[0]))
-        return replace(arc, yaw=(float(site.start[-1]), sense / arc.radius if turning == "tangent" else 0.0))
+        sense = float(
+            np.sign(arc.outward[0] * arc.forward[1] - arc.outward[1] * arc.forward[0])
+        )
+        return replace(
+            arc,
+            yaw=(
+                float(site.start[-1]),
+                sense / arc.radius if turning == "tangent" else 0.0,
+            ),
+        )
     if turning == "tangent":
         problem = "yaw is not a row of the task space"
-        raise PathError(problem, found="tangent", allowed="fixed", where=f"{site.key}.yaw", hint=site.along_tangent)
+        raise PathError(
+            problem,
+            found="tangent",
+            allowed="fixed",
+            where=f"{site.key}.yaw",
+            hint=site.along_tangent,
+        )
     return arc
 
 
@@ -296,7 +353,10 @@ class HelixCurve:
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
         """Return the helix and its derivatives by sigma, shape (order + 1, K, 3)."""
         part = self.arc.length / self.length
-        result = self.arc.derivatives(part * sigma, order) * (part ** np.arange(order + 1))[:, None, None]
+        result = (
+            self.arc.derivatives(part * sigma, order)
+            * (part ** np.arange(order + 1))[:, None, None]
+        )
         result[0] += (sigma / self.length)[:, None] * self.rise
         result[1:2] += self.rise / self.length
         return result

@@ -53,7 +53,10 @@ class PathFrame:
             return cls(coordinates, np.concatenate([placement.xyz, np.zeros(9)]))
         axes = [AXES.index(row) for row in position_rows(rows)]
         block = rotation[np.ix_(axes, axes)]
-        if np.abs(block @ block.T - np.eye(len(axes))).max() > _ROUNDED or np.linalg.det(block) < 0.0:
+        if (
+            np.abs(block @ block.T - np.eye(len(axes))).max() > _ROUNDED
+            or np.linalg.det(block) < 0.0
+        ):
             raise PathError(
                 "the frame of the path turns it out of the rows of the task space",
                 where="path_frame",

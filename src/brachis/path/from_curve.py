@@ -31,7 +31,10 @@ _COARSEST, _FINEST = 8, 4096
 
 
 def bspline_segment(
-    curve: Callable[[Any], Any], interval: tuple[float, float] | None = None, *, tolerance: float = 1e-9
+    curve: Callable[[Any], Any],
+    interval: tuple[float, float] | None = None,
+    *,
+    tolerance: float = 1e-9,
 ) -> dict[str, Any]:
     """Turn a curve into a segment of a task's path.
 
@@ -64,7 +67,7 @@ def bspline_segment(
     >>> segment["bspline"]["degree"]
     5
     """
-    from scipy.interpolate import BSpline, PPoly  # noqa: PLC0415  (imports in 0.3 s)
+    from scipy.interpolate import BSpline, PPoly
 
     if isinstance(curve, BSpline):
         own = curve.t[curve.k : len(curve.t) - curve.k]
@@ -72,21 +75,39 @@ def bspline_segment(
     elif isinstance(curve, PPoly):
         spline = _of_pieces(curve, curve.x, len(curve.c) - 1, interval)
     elif interval is None:
-        raise InputError("the interval of a function is not known", where="interval", allowed="(first, last)")
+        raise InputError(
+            "the interval of a function is not known",
+            where="interval",
+            allowed="(first, last)",
+        )
     else:
         spline = _of_function(curve, _checked(interval), tolerance)
-    parts = {"degree": int(spline.k), "knots": spline.t.tolist(), "control_points": spline.c.tolist()}
+    parts = {
+        "degree": int(spline.k),
+        "knots": spline.t.tolist(),
+        "control_points": spline.c.tolist(),
+    }
     return {"bspline": parts}
 
 
 def _checked(interval: tuple[float, float]) -> tuple[float, float]:
     first, last = (float(end) for end in interval)
     if not (np.isfinite([first, last]).all() and first < last):
-        raise InputError("is not an interval", where="interval", found=interval, allowed="(first, last), first < last")
+        raise InputError(
+            "is not an interval",
+            where="interval",
+            found=interval,
+            allowed="(first, last), first < last",
+        )
     return first, last
 
 
-def _of_pieces(pieces: BSpline | PPoly, breaks: Array, degree: int, interval: tuple[float, float] | None) -> BSpline:
+def _of_pieces(
+    pieces: BSpline | PPoly,
+    breaks: Array,
+    degree: int,
+    interval: tuple[float, float] | None,
+) -> BSpline:
     """Write piecewise polynomials, C3, as a clamped B-spline over the same breaks."""
     first, last = _checked(interval or (breaks[0], breaks[-1]))
     inner = np.unique(breaks[(breaks > first) & (breaks < last)])
@@ -106,16 +127,24 @@ def _of_pieces(pieces: BSpline | PPoly, breaks: Array, degree: int, interval: tu
                 "themselves (spline: {through: ...})",
             )
     degree = max(degree, _LEAST_DEGREE)
-    return _interpolating(lambda u: _rows(pieces(u)), first, last, inner, degree, degree - _SMOOTH)
+    return _interpolating(
+        lambda u: _rows(pieces(u)), first, last, inner, degree, degree - _SMOOTH
+    )
 
 
-def _of_function(curve: Callable[[Any], Any], interval: tuple[float, float], tolerance: float) -> BSpline:
+def _of_function(
+    curve: Callable[[Any], Any], interval: tuple[float, float], tolerance: float
+) -> BSpline:
     """Fit a spline of degree 5 to a function, with ever more intervals, until it is met in between as well."""
 
     def values(u: Array) -> Array:
         points = np.array([np.asarray(curve(float(each)), dtype=float) for each in u])
-        if points.ndim != 2 or not np.isfinite(points).all():  # noqa: PLR2004
-            raise InputError("the function's values are no points", where="curve", allowed="m finite numbers each")
+        if points.ndim != 2 or not np.isfinite(points).all():
+            raise InputError(
+                "the function's values are no points",
+                where="curve",
+                allowed="m finite numbers each",
+            )
         return points
 
     count, miss = _COARSEST, np.inf
@@ -137,14 +166,23 @@ def _of_function(curve: Callable[[Any], Any], interval: tuple[float, float], tol
 
 
 def _interpolating(
-    values: Callable[[Array], Array], first: float, last: float, inner: Array, degree: int, multiplicity: int
+    values: Callable[[Array], Array],
+    first: float,
+    last: float,
+    inner: Array,
+    degree: int,
+    multiplicity: int,
 ) -> BSpline:
     """Interpolate at the Greville abscissae, which is exact where the spline space has the function."""
-    from scipy.interpolate import make_interp_spline  # noqa: PLC0415
+    from scipy.interpolate import make_interp_spline
 
     ends = np.ones(degree + 1)
     knots = np.concatenate([first * ends, np.repeat(inner, multiplicity), last * ends])
-    sites = np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree).mean(axis=1).clip(first, last)
+    sites = (
+        np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree)
+        .mean(axis=1)
+        .clip(first, last)
+    )
     return make_interp_spline(sites, values(sites), k=degree, t=knots)
 
 
@@ -170,22 +208,32 @@ def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ..
         return ()
     tables: list[tuple[Array, Array]] = []
     goes_on = False
-    for begin, end, piece in zip(sequence.breaks, sequence.breaks[1:], sequence.pieces, strict=False):
+    for begin, end, piece in zip(
+        sequence.breaks, sequence.breaks[1:], sequence.pieces, strict=False
+    ):
         if piece.segment is None:
             continue
         segment = segments[piece.segment]
-        for sigma, speed in map(np.transpose, segment.bspline.speeds if isinstance(segment, BSplineSegment) else ()):
+        for sigma, speed in map(
+            np.transpose,
+            segment.bspline.speeds if isinstance(segment, BSplineSegment) else (),
+        ):
             at = np.unique(np.clip(sigma, piece.first, piece.last))
             if len(at) > 1:
                 s = np.interp(at, [piece.first, piece.last], [begin, end])
                 at_start = goes_on and sigma[0] <= piece.first
-                before = tables.pop() if at_start and tables else (np.empty(0), np.empty(0))
+                before = (
+                    tables.pop() if at_start and tables else (np.empty(0), np.empty(0))
+                )
                 values = np.interp(at, sigma, speed)
                 tables.append((np.append(before[0], s), np.append(before[1], values)))
             goes_on = bool(sigma[-1] >= piece.last)
         if not isinstance(segment, BSplineSegment) or not segment.bspline.speeds:
             goes_on = False
-    return tuple(SpeedTable(s=tuple(s.tolist()), speed=tuple(speed.tolist())) for s, speed in tables)
+    return tuple(
+        SpeedTable(s=tuple(s.tolist()), speed=tuple(speed.tolist()))
+        for s, speed in tables
+    )
 
 
 def with_feed_rates(task: Task, path: Path) -> Task:
@@ -193,4 +241,6 @@ def with_feed_rates(task: Task, path: Path) -> Task:
     tables = feed_tables(task.path, path)
     if not tables:
         return task
-    return task.model_copy(update={"tool_limits": task.tool_limits.model_copy(update={"feed": tables})})
+    return task.model_copy(
+        update={"tool_limits": task.tool_limits.model_copy(update={"feed": tables})}
+    )

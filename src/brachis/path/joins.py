@@ -98,7 +98,10 @@ def find_joins(curves: Sequence[Curve], rows: tuple[str, ...]) -> list[Join]:
     """Return the joins between consecutive curves."""
     ends = np.cumsum([curve.length for curve in curves])
     points = [curve.derivatives(np.zeros(1), 0)[0, 0] for curve in curves[1:]]
-    return [Join(i, float(ends[i] / ends[-1]), point, rows) for i, point in enumerate(points)]
+    return [
+        Join(i, float(ends[i] / ends[-1]), point, rows)
+        for i, point in enumerate(points)
+    ]
 
 
 def at_join(first: Curve, second: Curve) -> tuple[Array, Array, float]:
@@ -128,7 +131,9 @@ def mismatch(before: Array, after: Array, length: float, positions: int) -> str 
     """
     # The k-th derivative times length^(k - 1) compares with the speed, which is about 1.
     size = max(float(np.linalg.norm(before[1])), 1.0)
-    jumps = np.linalg.norm(after - before, axis=1) * length ** np.arange(-1.0, 3.0) / size
+    jumps = (
+        np.linalg.norm(after - before, axis=1) * length ** np.arange(-1.0, 3.0) / size
+    )
     if np.all(jumps <= TOLERANCE):
         return None
     if jumps[1] > TOLERANCE:
@@ -168,7 +173,10 @@ def angle_between(one: Array, other: Array) -> float:
 
 def _of_yaw(before: Array, after: Array, positions: int) -> str:
     """Say that it is yaw's slope that jumps where the position goes straight on."""
-    if before.shape[1] == positions or np.linalg.norm((after - before)[1, :positions]) > TOLERANCE:
+    if (
+        before.shape[1] == positions
+        or np.linalg.norm((after - before)[1, :positions]) > TOLERANCE
+    ):
         return ""
     return f" in yaw alone, which turns by {before[1, -1]:.4g} rad/m before and {after[1, -1]:.4g} rad/m after"
 
@@ -178,17 +186,29 @@ def pose_corner(join: Join, first: Curve, second: Curve) -> Corner | None:
     on_the_spot = [stands_still(curve, POSITIONS) for curve in (first, second)]
     if on_the_spot[0] != on_the_spot[1]:
         found = "a stop: the position moves on one side, and the tool turns on the spot on the other"
-        return Corner(join, found, "Turn the tool along a segment, by its orientation, or in a task of its own")
+        return Corner(
+            join,
+            found,
+            "Turn the tool along a segment, by its orientation, or in a task of its own",
+        )
     before, after, length = at_join(first, second)
     jump = mismatch(before[:, :POSITIONS], after[:, :POSITIONS], length, POSITIONS)
     if jump:
         return Corner(join, jump, f"Set {join.rounding}")
     jump = _turning_mismatch(before, after, length, "rad" if on_the_spot[0] else "m")
     smooth = "Set profile: smooth where the tool turns"
-    return Corner(join, jump, smooth if on_the_spot[0] else f"{smooth}, or {join.rounding}") if jump else None
+    return (
+        Corner(
+            join, jump, smooth if on_the_spot[0] else f"{smooth}, or {join.rounding}"
+        )
+        if jump
+        else None
+    )
 
 
-def _turning_mismatch(before: Array, after: Array, length: float, unit: str) -> str | None:
+def _turning_mismatch(
+    before: Array, after: Array, length: float, unit: str
+) -> str | None:
     """Return in words what jumps in the turning of the tool, or None where three derivatives continue.
 
     Parameters
@@ -230,9 +250,13 @@ def smallest(function: Callable[[Array], Array], knots: Array) -> tuple[float, f
         Values of sigma between which the function is smooth.
     """
     fractions = np.arange(_POINTS) / _POINTS
-    grid = np.append((knots[:-1, None] + fractions * np.diff(knots)[:, None]).ravel(), knots[-1])
+    grid = np.append(
+        (knots[:-1, None] + fractions * np.diff(knots)[:, None]).ravel(), knots[-1]
+    )
     near = int(np.argmin(function(grid)))
-    fine = np.linspace(grid[max(near - 1, 0)], grid[min(near + 1, len(grid) - 1)], 2 * _POINTS + 1)
+    fine = np.linspace(
+        grid[max(near - 1, 0)], grid[min(near + 1, len(grid) - 1)], 2 * _POINTS + 1
+    )
     values = function(fine)
     best = int(np.argmin(values))
     return float(fine[best]), float(values[best])

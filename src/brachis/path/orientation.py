@@ -14,7 +14,14 @@ from brachis.errors import PathError
 from brachis.path.blends import septic
 from brachis.path.curves import ArcCurve, HelixCurve, LineCurve
 from brachis.path.joins import smallest
-from brachis.path.rotations import hat, product, rotation_from, rotation_of, sine_cosine, unit
+from brachis.path.rotations import (
+    hat,
+    product,
+    rotation_from,
+    rotation_of,
+    sine_cosine,
+    unit,
+)
 from brachis.path.site import ZERO_LENGTH, place
 from brachis.task import AlongTangent, Rotate, TurnTo
 
@@ -49,7 +56,9 @@ class AboutAxis:
         """Return the rotation matrix and its derivatives by sigma, shape (order + 1, K, 3, 3)."""
         sine, cosine = sine_cosine(self.angle.derivatives(sigma, order)[..., 0])
         aside = hat(self.axis)
-        result = sine[..., None, None] * (self.start @ aside) - cosine[..., None, None] * (self.start @ aside @ aside)
+        result = sine[..., None, None] * (self.start @ aside) - cosine[
+            ..., None, None
+        ] * (self.start @ aside @ aside)
         result[0] += self.start @ (np.eye(3) + aside @ aside)
         return result
 
@@ -85,7 +94,11 @@ class Turn:
             start, end = np.zeros((2, 4, 1))
             end[0] = self.angle
             return AboutAxis(self.start, self.axis, septic(start, end, length))
-        return AboutAxis(self.start, self.axis, LineCurve(np.zeros(1), np.array([self.angle / length]), length))
+        return AboutAxis(
+            self.start,
+            self.axis,
+            LineCurve(np.zeros(1), np.array([self.angle / length]), length),
+        )
 
 
 def turn_of(turning: Rotate | TurnTo, start: Array, key: str) -> Turn:
@@ -110,11 +123,20 @@ def turn_of(turning: Rotate | TurnTo, start: Array, key: str) -> Turn:
         axis = np.array(rotate.axis) / np.linalg.norm(rotate.axis)
         if rotate.frame == "path":
             axis = start.T @ axis
-        return Turn(start, axis, float(np.deg2rad(rotate.angle_deg)), rotate.profile == "smooth")
-    return turn_between(start, rotation_from(turning.to), f"{key}.to", smooth=turning.to.profile == "smooth")
+        return Turn(
+            start, axis, float(np.deg2rad(rotate.angle_deg)), rotate.profile == "smooth"
+        )
+    return turn_between(
+        start,
+        rotation_from(turning.to),
+        f"{key}.to",
+        smooth=turning.to.profile == "smooth",
+    )
 
 
-def turn_between(start: Array, target: Rotation, key: str, *, smooth: bool = False) -> Turn:
+def turn_between(
+    start: Array, target: Rotation, key: str, *, smooth: bool = False
+) -> Turn:
     """Return the shortest turn from a rotation matrix to another rotation.
 
     Raises
@@ -194,7 +216,10 @@ class WithTangent:
 
 
 def orientation_along(
-    mode: str | Rotate | TurnTo | AlongTangent | None, curve: Curve, start: Array, key: str
+    mode: str | Rotate | TurnTo | AlongTangent | None,
+    curve: Curve,
+    start: Array,
+    key: str,
 ) -> Orientation:
     """Return the orientation of the tool along a segment.
 
@@ -225,11 +250,18 @@ def orientation_along(
 def _up(given: tuple[float, float, float] | None, curve: Curve) -> Array:
     if given is not None:
         return np.array(given) / np.linalg.norm(given)
-    return curve.normal if isinstance(curve, ArcCurve | HelixCurve) else np.array([0.0, 0.0, 1.0])
+    return (
+        curve.normal
+        if isinstance(curve, ArcCurve | HelixCurve)
+        else np.array([0.0, 0.0, 1.0])
+    )
 
 
 def _with_tangent(curve: Curve, up: Array, start: Array, key: str) -> WithTangent:
-    sigma, speed = smallest(lambda sigma: np.linalg.norm(curve.derivatives(sigma, 1)[1], axis=1), curve.knots)
+    sigma, speed = smallest(
+        lambda sigma: np.linalg.norm(curve.derivatives(sigma, 1)[1], axis=1),
+        curve.knots,
+    )
     if speed < _STOPS:
         problem = "the curve all but stops, so that it has no tangent"
         hint = "Use orientation: fixed, or other waypoints"

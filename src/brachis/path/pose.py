@@ -48,7 +48,10 @@ class PoseCurve:
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
         """Return the curve and its derivatives by sigma, shape (order + 1, K, 12)."""
-        return _coordinates(self.position.derivatives(sigma, order), self.orientation.matrices(sigma, order))
+        return _coordinates(
+            self.position.derivatives(sigma, order),
+            self.orientation.matrices(sigma, order),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +82,18 @@ class QuaternionPoseCurve:
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
         """Return the curve and its derivatives by sigma, shape (order + 1, K, 12)."""
         columns = self.columns.derivatives(sigma, order)
-        return _coordinates(columns[..., :POSITIONS], matrices(unit(columns[..., POSITIONS:])))
+        return _coordinates(
+            columns[..., :POSITIONS], matrices(unit(columns[..., POSITIONS:]))
+        )
 
     def quality(self, sigma: Array) -> Array:
         """Return how near to 1 the quaternions' lengths are before they are divided by them, shape (K,).
 
         It is the length, or where this is greater than 1 its reciprocal.
         """
-        lengths: Array = np.linalg.norm(self.columns.derivatives(sigma, 0)[0, :, POSITIONS:], axis=1)
+        lengths: Array = np.linalg.norm(
+            self.columns.derivatives(sigma, 0)[0, :, POSITIONS:], axis=1
+        )
         return np.minimum(lengths, 1.0 / np.maximum(lengths, 1.0))
 
 
@@ -146,4 +153,6 @@ def rotations(coordinates: Array) -> Array:
 
 
 def _coordinates(position: Array, rotation: Array) -> Array:
-    return np.concatenate([position, rotation.reshape(*position.shape[:-1], 9)], axis=-1)
+    return np.concatenate(
+        [position, rotation.reshape(*position.shape[:-1], 9)], axis=-1
+    )

@@ -13,8 +13,20 @@ from brachis.common.arrays import with_like_signs
 from brachis.errors import PathError
 from brachis.path.curves import LineCurve
 from brachis.path.joins import smallest
-from brachis.path.orientation import AMBIGUOUS, half_turn, orientation_along, turn_between, turn_of
-from brachis.path.pose import LEAST_QUALITY, POSITIONS, PoseCurve, QuaternionPoseCurve, rotations
+from brachis.path.orientation import (
+    AMBIGUOUS,
+    half_turn,
+    orientation_along,
+    turn_between,
+    turn_of,
+)
+from brachis.path.pose import (
+    LEAST_QUALITY,
+    POSITIONS,
+    PoseCurve,
+    QuaternionPoseCurve,
+    rotations,
+)
 from brachis.path.rotations import quaternions_of, rotation_from, rotation_of
 from brachis.path.shapes import curve_of
 from brachis.path.site import ZERO_LENGTH, Site
@@ -73,16 +85,25 @@ def pose_spline(
     if repeats_start(np.hypot(chords, angles)):
         kept = np.delete(np.arange(len(points)), 1)
         points, turned = points[kept], turned[kept]
-        chords, angles = np.linalg.norm(np.diff(points, axis=0), axis=1), _angles(turned)
+        chords, angles = (
+            np.linalg.norm(np.diff(points, axis=0), axis=1),
+            _angles(turned),
+        )
     for i in np.flatnonzero(angles > np.pi - AMBIGUOUS):
         raise half_turn(f"{site.key}.orientations[{i + len(attitudes) - len(angles)}]")
     knots = chord_knots(chords, angles, shape, site)
-    if len(points) == 2:  # noqa: PLR2004 - the start and one waypoint
-        turn = turn_between(rotation, turned[1], f"{site.key}.orientations[{len(attitudes) - 1}]")
-        position = LineCurve(points[0], (points[1] - points[0]) / knots[1], float(knots[1]))
+    if len(points) == 2:
+        turn = turn_between(
+            rotation, turned[1], f"{site.key}.orientations[{len(attitudes) - 1}]"
+        )
+        position = LineCurve(
+            points[0], (points[1] - points[0]) / knots[1], float(knots[1])
+        )
         return PoseCurve(position, turn.over(position.length))
     quaternions = with_like_signs(quaternions_of(turned))
-    curve = QuaternionPoseCurve(interpolate(knots, np.concatenate([points, quaternions], axis=1)))
+    curve = QuaternionPoseCurve(
+        interpolate(knots, np.concatenate([points, quaternions], axis=1))
+    )
     _check_quaternions(curve, site)
     return curve
 
@@ -92,16 +113,30 @@ def _angles(turned: Rotation) -> Array:
     return np.asarray((turned[:-1].inv() * turned[1:]).magnitude())
 
 
-def _rotations(shape: SplineThrough, attitudes: Sequence[Attitude], site: Site, matrix: Array) -> Rotation:
+def _rotations(
+    shape: SplineThrough, attitudes: Sequence[Attitude], site: Site, matrix: Array
+) -> Rotation:
     """Return the n rotations at the start and the waypoints."""
-    start, given = rotation_of(matrix), [rotation_from(attitude) for attitude in attitudes]
-    expected = None if shape.starts_oriented is None else rotation_from(shape.starts_oriented)
+    start, given = (
+        rotation_of(matrix),
+        [rotation_from(attitude) for attitude in attitudes],
+    )
+    expected = (
+        None if shape.starts_oriented is None else rotation_from(shape.starts_oriented)
+    )
     if shape.relative:
         change = start if expected is None else start * expected.inv()
         given = [change * one for one in given]
-    elif expected is not None and (angle := (start.inv() * expected).magnitude()) > START_TOLERANCE:
+    elif (
+        expected is not None
+        and (angle := (start.inv() * expected).magnitude()) > START_TOLERANCE
+    ):
         hint = turn_hint(matrix, expected.as_matrix())
-        raise starts_elsewhere(f"{site.key}.starts_oriented", f"an orientation that is {angle:.4g} rad off", hint)
+        raise starts_elsewhere(
+            f"{site.key}.starts_oriented",
+            f"an orientation that is {angle:.4g} rad off",
+            hint,
+        )
     return start.concatenate([start, *given])
 
 
@@ -141,12 +176,19 @@ def pose_curve(segment: Segment, index: int, start: Array) -> Curve:
         The segment has zero length, or position or orientation is not defined.
     """
     position, rotation = start[:POSITIONS], rotations(start)
-    site = Site(f"path[{index}].{segment.kind}", position, AXES, _TO_TURN, _ALONG_TANGENT)
+    site = Site(
+        f"path[{index}].{segment.kind}", position, AXES, _TO_TURN, _ALONG_TANGENT
+    )
     if isinstance(segment, TurnSegment):
         turn = turn_of(segment.turn, rotation, site.key)
         if abs(turn.angle) < ZERO_LENGTH:
             problem = "the turn has zero length"
-            raise PathError(problem, found="0 degrees", allowed="another orientation than before", where=site.key)
+            raise PathError(
+                problem,
+                found="0 degrees",
+                allowed="another orientation than before",
+                where=site.key,
+            )
         still = LineCurve(position, np.zeros(POSITIONS), abs(turn.angle))
         return PoseCurve(still, turn.over(still.length))
     shape = segment.shape
@@ -155,4 +197,9 @@ def pose_curve(segment: Segment, index: int, start: Array) -> Curve:
     if isinstance(shape, BSplineCurve) and len(shape.control_points[0]) == POSE_COLUMNS:
         return pose_bspline(shape, site, rotation)
     curve = curve_of(shape, site)
-    return PoseCurve(curve, orientation_along(segment.orientation, curve, rotation, f"path[{index}].orientation"))
+    return PoseCurve(
+        curve,
+        orientation_along(
+            segment.orientation, curve, rotation, f"path[{index}].orientation"
+        ),
+    )

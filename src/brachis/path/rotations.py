@@ -35,7 +35,12 @@ def product(one: Array, other: Array, how: str) -> Array:
         The product of two values, in the notation of `numpy.einsum`, for example ``"...ij,...j->...i"``.
     """
     orders = range(min(len(one), len(other)))
-    return np.stack([sum(comb(k, i) * np.einsum(how, one[i], other[k - i]) for i in range(k + 1)) for k in orders])
+    return np.stack(
+        [
+            sum(comb(k, i) * np.einsum(how, one[i], other[k - i]) for i in range(k + 1))
+            for k in orders
+        ]
+    )
 
 
 def unit(vector: Array) -> Array:
@@ -47,8 +52,13 @@ def unit(vector: Array) -> Array:
     inverse = np.zeros_like(squared)
     inverse[0] = 1.0 / np.sqrt(squared[0])
     for k in range(len(vector) - 1):
-        right = sum(comb(k, i) * squared[i + 1] * inverse[k - i] for i in range(k + 1)) / -2.0
-        left = sum(comb(k, i) * squared[i] * inverse[k + 1 - i] for i in range(1, k + 1))
+        right = (
+            sum(comb(k, i) * squared[i + 1] * inverse[k - i] for i in range(k + 1))
+            / -2.0
+        )
+        left = sum(
+            comb(k, i) * squared[i] * inverse[k + 1 - i] for i in range(1, k + 1)
+        )
         inverse[k + 1] = (right - left) / squared[0]
     return product(vector, inverse, "...i,...->...i")
 
@@ -58,8 +68,12 @@ def sine_cosine(angle: Array) -> tuple[Array, Array]:
     sine, cosine = np.zeros_like(angle), np.zeros_like(angle)
     sine[0], cosine[0] = np.sin(angle[0]), np.cos(angle[0])
     for k in range(len(angle) - 1):
-        sine[k + 1] = sum(comb(k, i) * angle[i + 1] * cosine[k - i] for i in range(k + 1))
-        cosine[k + 1] = -sum(comb(k, i) * angle[i + 1] * sine[k - i] for i in range(k + 1))
+        sine[k + 1] = sum(
+            comb(k, i) * angle[i + 1] * cosine[k - i] for i in range(k + 1)
+        )
+        cosine[k + 1] = -sum(
+            comb(k, i) * angle[i + 1] * sine[k - i] for i in range(k + 1)
+        )
     return sine, cosine
 
 
@@ -77,7 +91,9 @@ def matrices(quaternions: Array) -> Array:
     products = product(quaternions, quaternions, "...i,...j->...ij")
     of_vector = products[..., 1:, 1:]
     diagonal = products[..., 0, 0] - np.trace(of_vector, axis1=-2, axis2=-1)
-    return 2.0 * (of_vector + hat(products[..., 0, 1:])) + diagonal[..., None, None] * np.eye(3)
+    return 2.0 * (of_vector + hat(products[..., 0, 1:])) + diagonal[
+        ..., None, None
+    ] * np.eye(3)
 
 
 def quaternion_derivatives(rotation: Array) -> Array:
@@ -89,7 +105,10 @@ def quaternion_derivatives(rotation: Array) -> Array:
     result[0] = quaternions_of(rotation_of(rotation[0]))
     rate = angular_velocity(rotation)
     for k in range(len(rotation) - 1):
-        result[k + 1] = sum(comb(k, i) * _turning(result[i], rate[k - i]) for i in range(k + 1)) / 2.0
+        result[k + 1] = (
+            sum(comb(k, i) * _turning(result[i], rate[k - i]) for i in range(k + 1))
+            / 2.0
+        )
     return result
 
 
@@ -109,7 +128,7 @@ def angular_velocity(rotation: Array) -> Array:
 
 def rotation_of(matrix: Array) -> Rotation:
     """Return the rotation, or rotations, of matrices (..., 3, 3)."""
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415
+    from scipy.spatial.transform import Rotation
 
     return Rotation.from_matrix(matrix)
 

@@ -73,7 +73,11 @@ class SequencePath:
     def of(cls, pieces: tuple[Piece, ...], positions: int) -> SequencePath:
         """Put pieces together whose first `positions` rows are those of the position."""
         ends = np.cumsum([0.0, *(piece.length for piece in pieces)])
-        return cls(pieces, ends / ends[-1], sum(piece.arc_length(positions) for piece in pieces))
+        return cls(
+            pieces,
+            ends / ends[-1],
+            sum(piece.arc_length(positions) for piece in pieces),
+        )
 
     @property
     def total(self) -> float:
@@ -93,12 +97,20 @@ class SequencePath:
     def derivatives(self, s: Sequence[float] | Array) -> Array:
         """Return the coordinates in the world and their derivatives by s up to the third, shape (4, K, m)."""
         values = np.atleast_1d(np.asarray(s, dtype=float))
-        which = np.clip(np.searchsorted(self.breaks, values, side="right") - 1, 0, len(self.pieces) - 1)
+        which = np.clip(
+            np.searchsorted(self.breaks, values, side="right") - 1,
+            0,
+            len(self.pieces) - 1,
+        )
         total = self.total
         rows = self.pieces[0].curve.derivatives(np.zeros(1), 0).shape[2]
         result = np.empty((4, values.size, rows))
         order = np.argsort(which, kind="stable")
-        for here in np.split(order, np.flatnonzero(np.diff(which[order])) + 1) if len(order) else ():
+        for here in (
+            np.split(order, np.flatnonzero(np.diff(which[order])) + 1)
+            if len(order)
+            else ()
+        ):
             i = int(which[here[0]])
             sigma = self.pieces[i].first + (values[here] - self.breaks[i]) * total
             result[:, here] = self.pieces[i].curve.derivatives(sigma)
@@ -119,7 +131,9 @@ def path_speed(task_map: TaskMap, path: Path, s: float) -> float:
 
     Of a path of joints it is the norm of their derivatives.
     """
-    position, angle = (float(size[0]) for size in task_map.norms(path.sample(np.array([s])).xi))
+    position, angle = (
+        float(size[0]) for size in task_map.norms(path.sample(np.array([s])).xi)
+    )
     return position if position > _STILL else angle
 
 
@@ -135,11 +149,20 @@ def check_closed(task_map: TaskMap, path: Path) -> None:
     worst = int(np.argmax(gap))
     allowed = f"an end where the path begins, to {_CLOSED:g} m and rad"
     if gap[worst] > _CLOSED:
-        found = f"{gap[worst]:.3g} {task_map.units[worst]} off in {task_map.rows[worst]}"
-        raise PathError("the path does not close", found=found, allowed=allowed, where="boundary.periodic")
+        found = (
+            f"{gap[worst]:.3g} {task_map.units[worst]} off in {task_map.rows[worst]}"
+        )
+        raise PathError(
+            "the path does not close",
+            found=found,
+            allowed=allowed,
+            where="boundary.periodic",
+        )
     for derivative, name in ((ends.xi, "tangent"), (ends.xi_ds, "curvature")):
         jump = float(np.linalg.norm(derivative[1] - derivative[0]))
-        if jump > _CLOSED * max(float(np.linalg.norm(ends.xi[0])), float(np.linalg.norm(derivative))):
+        if jump > _CLOSED * max(
+            float(np.linalg.norm(ends.xi[0])), float(np.linalg.norm(derivative))
+        ):
             raise PathError(
                 f"the path's {name} jumps where it closes",
                 found=f"a jump of {jump:.3g} in {np.linalg.norm(derivative[0]):.3g} (by s)",

@@ -6,7 +6,15 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from brachis.errors import PathError
-from brachis.path.curves import arc_center, arc_via, circle, helix, line_by, line_heading, line_to
+from brachis.path.curves import (
+    arc_center,
+    arc_via,
+    circle,
+    helix,
+    line_by,
+    line_heading,
+    line_to,
+)
 from brachis.path.splines import bspline_curve, spline_through
 from brachis.task import (
     ArcCenter,
@@ -30,7 +38,13 @@ if TYPE_CHECKING:
 def _unread(shape: PointFile, site: Site) -> NoReturn:
     problem = "the file has not been read"
     hint = "brachis.load_task reads it and makes a curve of it"
-    raise PathError(problem, found=shape.file, allowed="a curve", where=f"{site.key}.file", hint=hint)
+    raise PathError(
+        problem,
+        found=shape.file,
+        allowed="a curve",
+        where=f"{site.key}.file",
+        hint=hint,
+    )
 
 
 BUILDERS: Final[dict[type[Shape], Callable[[Any, Site], Curve]]] = {

@@ -62,7 +62,9 @@ class Site:
         """Return the start in words."""
         return place(self.rows, self.start)
 
-    def coordinates(self, values: Sequence[float], key: str, rows: Sequence[str]) -> Array:
+    def coordinates(
+        self, values: Sequence[float], key: str, rows: Sequence[str]
+    ) -> Array:
         """Return values as an array, after a check that there is one for each of `rows`.
 
         Raises
@@ -111,7 +113,10 @@ class Site:
 
 def place(rows: Sequence[str], point: Array) -> str:
     """Return coordinates in words, to the nanometre; of a pose its position."""
-    return ", ".join(f"{row} = {round(value, 9) + 0.0:.6g}" for row, value in zip(rows, point, strict=False))
+    return ", ".join(
+        f"{row} = {round(value, 9) + 0.0:.6g}"
+        for row, value in zip(rows, point, strict=False)
+    )
 
 
 def stands_still(curve: Curve, positions: int) -> bool:

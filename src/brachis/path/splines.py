@@ -64,13 +64,20 @@ def spline_through(shape: SplineThrough, site: Site) -> SplineCurve | LineCurve:
     if shape.orientations is not None:
         problem = "orientations are for task spaces of poses"
         where = f"{site.key}.orientations"
-        raise PathError(problem, found=f"task_space [{', '.join(site.rows)}]", where=where, hint="Set task_space: pose")
+        raise PathError(
+            problem,
+            found=f"task_space [{', '.join(site.rows)}]",
+            where=where,
+            hint="Set task_space: pose",
+        )
     waypoints = waypoints_of(shape, site)
     if repeats_start(np.linalg.norm(np.diff(waypoints, axis=0), axis=1)):
         waypoints = np.delete(waypoints, 1, axis=0)
     steps = np.diff(waypoints, axis=0)
     chords = np.linalg.norm(steps[:, : len(site.positions)], axis=1)
-    return interpolate(chord_knots(chords, np.linalg.norm(steps, axis=1), shape, site), waypoints)
+    return interpolate(
+        chord_knots(chords, np.linalg.norm(steps, axis=1), shape, site), waypoints
+    )
 
 
 def waypoints_of(shape: SplineThrough, site: Site) -> Array:
@@ -81,10 +88,20 @@ def waypoints_of(shape: SplineThrough, site: Site) -> Array:
     PathError
         A waypoint has the wrong number of coordinates, or the segment does not start where the waypoints expect.
     """
-    points = [site.coordinates(point, f"through[{i}]", site.rows) for i, point in enumerate(shape.through)]
-    expected = None if shape.starts_at is None else site.coordinates(shape.starts_at, "starts_at", site.rows)
+    points = [
+        site.coordinates(point, f"through[{i}]", site.rows)
+        for i, point in enumerate(shape.through)
+    ]
+    expected = (
+        None
+        if shape.starts_at is None
+        else site.coordinates(shape.starts_at, "starts_at", site.rows)
+    )
     if shape.relative:
-        points = [point + site.start - (0.0 if expected is None else expected) for point in points]
+        points = [
+            point + site.start - (0.0 if expected is None else expected)
+            for point in points
+        ]
     elif expected is not None:
         off = site.start - expected
         count = len(site.positions)
@@ -92,15 +109,24 @@ def waypoints_of(shape: SplineThrough, site: Site) -> Array:
         if distance > START_TOLERANCE:
             hint = place_hint(site.position, expected[:count], site.positions)
             unit = "rad or m" if joints_of(site.rows) else "m"
-            raise starts_elsewhere(f"{site.key}.starts_at", f"{site.describe()}, {distance:.4g} {unit} off", hint)
+            raise starts_elsewhere(
+                f"{site.key}.starts_at",
+                f"{site.describe()}, {distance:.4g} {unit} off",
+                hint,
+            )
         if np.any(np.abs(off[count:]) > START_TOLERANCE):
-            raise starts_elsewhere(f"{site.key}.starts_at", f"{site.describe()}, {abs(off[-1]):.4g} rad off")
+            raise starts_elsewhere(
+                f"{site.key}.starts_at",
+                f"{site.describe()}, {abs(off[-1]):.4g} rad off",
+            )
     return np.stack([site.start, *points])
 
 
 def repeats_start(steps: Array) -> bool:
     """Tell whether the first waypoint is the segment's start, from the steps between it and all waypoints, (n - 1,)."""
-    return len(steps) > 1 and bool(steps[0] < START_TOLERANCE and steps[0] <= _OF_NEXT * steps[1])
+    return len(steps) > 1 and bool(
+        steps[0] < START_TOLERANCE and steps[0] <= _OF_NEXT * steps[1]
+    )
 
 
 def starts_elsewhere(where: str, found: str, hint: str | None = None) -> PathError:
@@ -111,11 +137,14 @@ def starts_elsewhere(where: str, found: str, hint: str | None = None) -> PathErr
         found=found,
         allowed=f"at most {START_TOLERANCE:g} m and rad off",
         where=where,
-        hint=hint or "Set relative: true to count from the segment's start, or begin the path there",
+        hint=hint
+        or "Set relative: true to count from the segment's start, or begin the path there",
     )
 
 
-def chord_knots(chords: Array, otherwise: Array, shape: SplineThrough, site: Site) -> Array:
+def chord_knots(
+    chords: Array, otherwise: Array, shape: SplineThrough, site: Site
+) -> Array:
     """Return the cumulative chord lengths, shape (n,), of n waypoints.
 
     Parameters
@@ -137,9 +166,13 @@ def chord_knots(chords: Array, otherwise: Array, shape: SplineThrough, site: Sit
     if np.all(chords < ZERO_LENGTH):
         chords = otherwise
     if np.all(chords < ZERO_LENGTH):
-        raise site.zero_length(key=".through", found=[list(point) for point in shape.through])
+        raise site.zero_length(
+            key=".through", found=[list(point) for point in shape.through]
+        )
     if np.any(chords < ZERO_LENGTH):
-        repeated = int(np.argmax(chords < ZERO_LENGTH)) + len(shape.through) - len(chords)
+        repeated = (
+            int(np.argmax(chords < ZERO_LENGTH)) + len(shape.through) - len(chords)
+        )
         raise PathError(
             "a waypoint repeats its predecessor",
             found=list(shape.through[repeated]),
@@ -158,7 +191,9 @@ def interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
         The distances of the waypoints differ so much that no spline can be computed.
     """
     if len(waypoints) < _FEWEST_WAYPOINTS:
-        return LineCurve(waypoints[0], (waypoints[1] - waypoints[0]) / knots[1], float(knots[1]))
+        return LineCurve(
+            waypoints[0], (waypoints[1] - waypoints[0]) / knots[1], float(knots[1])
+        )
     try:
         return SplineCurve(_natural(knots, waypoints), float(knots[-1]), knots)
     except ValueError as error:  # knots that fall together, or singular equations
@@ -173,7 +208,7 @@ def interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
 
 def _natural(knots: Array, waypoints: Array) -> BSpline:
     # Imported here: it takes half a second, which tasks without a spline need not wait for.
-    from scipy.interpolate import make_interp_spline  # noqa: PLC0415
+    from scipy.interpolate import make_interp_spline
 
     # Over a parameter in [0, 1], so that the derivatives at the ends are of the same magnitude as the values.
     unit = knots / knots[-1]
@@ -206,11 +241,17 @@ def bspline_curve(shape: BSplineCurve, site: Site) -> SplineCurve:
     if not shape.relative:
         _check_start(off[: len(site.positions)], off[len(site.positions) :], site)
     if not np.ptp(points, axis=0).any():
-        raise PathError("the segment has zero length", allowed="control points that differ", where=site.key)
+        raise PathError(
+            "the segment has zero length",
+            allowed="control points that differ",
+            where=site.key,
+        )
     return _curve(shape, points + off)
 
 
-def pose_bspline(shape: BSplineCurve, site: Site, rotation: Array) -> QuaternionPoseCurve:
+def pose_bspline(
+    shape: BSplineCurve, site: Site, rotation: Array
+) -> QuaternionPoseCurve:
     """Return the curve of poses, moved and turned to the segment's start.
 
     Parameters
@@ -229,7 +270,9 @@ def pose_bspline(shape: BSplineCurve, site: Site, rotation: Array) -> Quaternion
     """
     points = np.array(shape.control_points)
     first = points[0, POSITIONS:] / np.linalg.norm(points[0, POSITIONS:])
-    turn = _product(quaternions_of(rotation_of(rotation)), first * [1.0, -1.0, -1.0, -1.0])
+    turn = _product(
+        quaternions_of(rotation_of(rotation)), first * [1.0, -1.0, -1.0, -1.0]
+    )
     off = site.start - points[0, :POSITIONS]
     if not shape.relative:
         _check_start(off, 2.0 * turn[1:], site)
@@ -244,12 +287,14 @@ def _check_start(off: Array, turned: Array, site: Site) -> None:
         distance = float(np.linalg.norm(away))
         if distance > START_TOLERANCE:
             where = f"{site.key}.control_points[0]"
-            raise starts_elsewhere(where, f"{site.describe()}, {distance:.4g} {unit} off", hint)
+            raise starts_elsewhere(
+                where, f"{site.describe()}, {distance:.4g} {unit} off", hint
+            )
 
 
 def _curve(shape: BSplineCurve, points: Array) -> SplineCurve:
     """Return the curve of control points, (n, m), from sigma = 0 on."""
-    from scipy.interpolate import BSpline  # noqa: PLC0415  (imports in half a second)
+    from scipy.interpolate import BSpline
 
     spline = BSpline(np.array(shape.knots) - shape.knots[0], points, shape.degree)
     breaks = np.unique(spline.t)
@@ -260,4 +305,7 @@ def _product(one: Array, other: Array) -> Array:
     """Return the products, (..., 4), of quaternions (w, x, y, z)."""
     w, v = one[..., :1], one[..., 1:]
     scalar = w * other[..., :1] - np.sum(v * other[..., 1:], axis=-1, keepdims=True)
-    return np.concatenate([scalar, w * other[..., 1:] + other[..., :1] * v + np.cross(v, other[..., 1:])], axis=-1)
+    return np.concatenate(
+        [scalar, w * other[..., 1:] + other[..., :1] * v + np.cross(v, other[..., 1:])],
+        axis=-1,
+    )

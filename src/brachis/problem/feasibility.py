@@ -8,7 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from brachis.errors import InputError, PathError, Remedy, StartError, UnknownNameError, write_apart
+from brachis.errors import (
+    InputError,
+    PathError,
+    Remedy,
+    StartError,
+    UnknownNameError,
+    write_apart,
+)
 from brachis.ik import Match
 from brachis.limits import Limit, Moments
 from brachis.limits.joint import PositionLimit, position_measure
@@ -70,7 +77,10 @@ def check_postures(
         along = path.sample(np.linspace(0.0, 1.0, _STATIONS)).target
         _check_range_along(robot, along, tolerance)
         ranges = [limit for limit in limits if isinstance(limit, PositionLimit)]
-        limits = [_widen(limit, along, tolerance) if limit in ranges else limit for limit in limits]
+        limits = [
+            _widen(limit, along, tolerance) if limit in ranges else limit
+            for limit in limits
+        ]
     return tuple(limits)
 
 
@@ -84,17 +94,28 @@ def _widen(limit: Limit, postures: np.ndarray, tolerance: float) -> Limit:
     if not near.any():
         return limit
     wider = copy.copy(limit)
-    wider.lower = np.where(near, np.minimum(limit.lower, values.min(axis=0)), limit.lower)
-    wider.upper = np.where(near, np.maximum(limit.upper, values.max(axis=0)), limit.upper)
+    wider.lower = np.where(
+        near, np.minimum(limit.lower, values.min(axis=0)), limit.lower
+    )
+    wider.upper = np.where(
+        near, np.maximum(limit.upper, values.max(axis=0)), limit.upper
+    )
     return wider
 
 
-def _check_range(robot: Robot, posture: np.ndarray, name: str, tolerance: float) -> None:
+def _check_range(
+    robot: Robot, posture: np.ndarray, name: str, tolerance: float
+) -> None:
     beyond = _beyond_range(robot, posture[None], tolerance)
     if beyond is not None:
         _, joint, facts = beyond
-        facts["hint"] = facts["hint"] or f"Change the posture, or the range with robot.limits.position.{joint}"
-        raise StartError(f"joint {joint!r} is out of its range", where=f"{name}.joints", **facts)
+        facts["hint"] = (
+            facts["hint"]
+            or f"Change the posture, or the range with robot.limits.position.{joint}"
+        )
+        raise StartError(
+            f"joint {joint!r} is out of its range", where=f"{name}.joints", **facts
+        )
 
 
 def _check_range_along(robot: Robot, along: np.ndarray, tolerance: float) -> None:
@@ -103,20 +124,32 @@ def _check_range_along(robot: Robot, along: np.ndarray, tolerance: float) -> Non
     if beyond is not None:
         station, joint, facts = beyond
         facts["found"] = f"{facts['found']} at s = {station / (len(along) - 1):.3g}"
-        facts["hint"] = facts["hint"] or f"Lead the path elsewhere, or raise robot.limits.position.{joint}"
+        facts["hint"] = (
+            facts["hint"]
+            or f"Lead the path elsewhere, or raise robot.limits.position.{joint}"
+        )
         raise PathError(f"joint {joint!r} is out of its range", where="path", **facts)
 
 
-def _beyond_range(robot: Robot, postures: np.ndarray, tolerance: float) -> tuple[int, str, dict[str, Any]] | None:
+def _beyond_range(
+    robot: Robot, postures: np.ndarray, tolerance: float
+) -> tuple[int, str, dict[str, Any]] | None:
     """Find the first joint that is out of its range in postures, (K, n): where most, its name, and what is told."""
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
-    beyond = np.maximum(lower - postures, postures - upper) - tolerance * position_measure(lower, upper)
+    beyond = np.maximum(
+        lower - postures, postures - upper
+    ) - tolerance * position_measure(lower, upper)
     joints = np.flatnonzero(beyond.max(axis=0) > 0.0)
     if not len(joints):
         return None
     i = int(joints[0])
     k = int(np.argmax(beyond[:, i]))
-    value, unit, low, high = float(postures[k, i]), robot.position_units[i], float(lower[i]), float(upper[i])
+    value, unit, low, high = (
+        float(postures[k, i]),
+        robot.position_units[i],
+        float(lower[i]),
+        float(upper[i]),
+    )
     found, first, last = write_apart(value, low, high, digits=6)
     facts: dict[str, Any] = {
         "found": f"{found} {unit}",
@@ -126,13 +159,21 @@ def _beyond_range(robot: Robot, postures: np.ndarray, tolerance: float) -> tuple
     return k, robot.joint_names[i], facts
 
 
-def beyond_at_rest(limit: Limit, q: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+def beyond_at_rest(
+    limit: Limit, q: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Values of a limit in postures (K, n) at rest, (K, c), and how far beyond its tolerance they are, if positive."""
     values = limit.values(Moments.at_rest(q))
     return values, limit.violation(values) - tolerance
 
 
-def _check_at_rest(robot: Robot, limits: Sequence[Limit], posture: np.ndarray, name: str, tolerance: float) -> None:
+def _check_at_rest(
+    robot: Robot,
+    limits: Sequence[Limit],
+    posture: np.ndarray,
+    name: str,
+    tolerance: float,
+) -> None:
     """Refuse a posture in which a limit is exceeded although the arm stands still."""
     for limit in limits:
         if not limit.static:
@@ -149,7 +190,11 @@ def _check_at_rest(robot: Robot, limits: Sequence[Limit], posture: np.ndarray, n
                 # No number for one of several joints is enough.
                 more = f"; too low as well: {', '.join(str(one.subject) for one in weak if one is not label)}"
                 remedies = [remedy for remedy in remedies if remedy.key != label.key]
-            keys = {one.key: None for one in weak if one.key} if label.key not in {one.key for one in remedies} else {}
+            keys = (
+                {one.key: None for one in weak if one.key}
+                if label.key not in {one.key for one in remedies}
+                else {}
+            )
             error = StartError(
                 f"the {label.kind} limit of {label.subject!r} {limit.refusal}",
                 where=f"{name}.joints",
@@ -160,15 +205,27 @@ def _check_at_rest(robot: Robot, limits: Sequence[Limit], posture: np.ndarray, n
             raise error.with_remedies(*remedies)
 
 
-def load_remedies(robot: Robot, limit: Limit, column: int, ratio: float) -> list[Remedy]:
+def load_remedies(
+    robot: Robot, limit: Limit, column: int, ratio: float
+) -> list[Remedy]:
     """List what may help where holding the arm takes so many times a limit: a larger limit, a smaller payload."""
     label = limit.labels[column]
-    figures = [bound.figure for bound in limit.bounds if bound.column == column and bound.end is None]
+    figures = [
+        bound.figure
+        for bound in limit.bounds
+        if bound.column == column and bound.end is None
+    ]
     scale = getattr(robot.settings.limits.scale, limit.kind, 1.0)
-    found = [Remedy(label.key, one / scale, _ROOM * ratio * one / scale, label.unit) for one in figures if label.key]
+    found = [
+        Remedy(label.key, one / scale, _ROOM * ratio * one / scale, label.unit)
+        for one in figures
+        if label.key
+    ]
     payload = robot.settings.payload
     if payload is not None and payload.mass:
-        found.append(Remedy("robot.payload.mass", payload.mass, payload.mass / ratio, "kg"))
+        found.append(
+            Remedy("robot.payload.mass", payload.mass, payload.mass / ratio, "kg")
+        )
     return found
 
 
@@ -184,10 +241,14 @@ def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:
         asked = f"the {limit.name} limit asks for a continuous {jumping}"
         if spline.degree < limit.order:
             found = f"{spline.degree}, with which it jumps at knots"
-            raise InputError(asked, where="spline.degree", found=found, allowed=f">= {limit.order}")
+            raise InputError(
+                asked, where="spline.degree", found=found, allowed=f">= {limit.order}"
+            )
         if spline.vanishing + 1 < limit.order:
             found = f"{spline.rest}, with which it jumps at the ends"
-            raise InputError(asked, where="spline.rest", found=found, allowed="full or jerk")
+            raise InputError(
+                asked, where="spline.rest", found=found, allowed="full or jerk"
+            )
 
 
 def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
@@ -201,14 +262,21 @@ def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
         found, allowed = write_apart(abs(value) * first.figure, first.figure)
         return found, allowed
     level = limit.lower[column] if first.end == "lower" else limit.upper[column]
-    found, *figures = write_apart(first.figure + (value - level) / first.per_unit, *(bound.figure for bound in bounds))
+    found, *figures = write_apart(
+        first.figure + (value - level) / first.per_unit,
+        *(bound.figure for bound in bounds),
+    )
     ends = dict(zip((bound.end for bound in bounds), figures, strict=True))
     words = {"lower": "at least ", "upper": "at most "} if len(ends) == 1 else {}
-    allowed = " to ".join(f"{words.get(end, '')}{ends[end]}" for end in ("lower", "upper") if end in ends)
+    allowed = " to ".join(
+        f"{words.get(end, '')}{ends[end]}" for end in ("lower", "upper") if end in ends
+    )
     return found, allowed
 
 
-def check_regular(task_map: TaskMap, start: np.ndarray | None, end: np.ndarray | None) -> None:
+def check_regular(
+    task_map: TaskMap, start: np.ndarray | None, end: np.ndarray | None
+) -> None:
     """Refuse a start or end posture that is a singularity of the arm: no coordinates describe motions from there.
 
     Raises
@@ -216,7 +284,10 @@ def check_regular(task_map: TaskMap, start: np.ndarray | None, end: np.ndarray |
     StartError
     """
     for name, posture in (("start", start), ("end", end)):
-        if posture is not None and _least_singular_values(task_map, posture[None])[0] < _REGULAR:
+        if (
+            posture is not None
+            and _least_singular_values(task_map, posture[None])[0] < _REGULAR
+        ):
             raise StartError(
                 f"the {name} posture is singular",
                 where=f"{name}.joints",
@@ -238,7 +309,14 @@ def _least_singular_values(task_map: TaskMap, postures: np.ndarray) -> np.ndarra
     return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[:, -1])
 
 
-def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, wanted: str, *, name: str = "start") -> int:
+def branch_of(
+    task_map: TaskMap,
+    match: Match,
+    posture: np.ndarray,
+    wanted: str,
+    *,
+    name: str = "start",
+) -> int:
     """Index of the closed form's branch on which the given posture, at the path's start or end, lies.
 
     Raises
@@ -263,7 +341,9 @@ def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, wanted: str,
     return branch
 
 
-def check_end_branch(task_map: TaskMap, match: Match, end: np.ndarray, branch: int) -> None:
+def check_end_branch(
+    task_map: TaskMap, match: Match, end: np.ndarray, branch: int
+) -> None:
     """Refuse an end posture on another branch than the start posture's.
 
     Raises
@@ -289,7 +369,9 @@ def _branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, name: str) 
     target = task_map.value(posture)
     answers = solver.solve(target[None], posture[None, redundant])[0]
     gap = difference(answers, posture[rest], robot.revolute[rest])
-    gaps = np.where(np.isfinite(gap).all(axis=2), np.abs(gap).max(axis=2), np.inf).min(axis=1)
+    gaps = np.where(np.isfinite(gap).all(axis=2), np.abs(gap).max(axis=2), np.inf).min(
+        axis=1
+    )
     branch = int(np.argmin(gaps))
     margins = solver.branch_margins(posture[None], branch)[0]
     if gaps[branch] > _SAME_POSTURE or np.any(margins <= 0.0):

@@ -60,7 +60,9 @@ class Problem(Summary):
     further: tuple[LimitModel, ...] = ()
 
     @classmethod
-    def of(cls, robot: Robot, task: Task, further: Sequence[LimitModel] = ()) -> Problem:
+    def of(
+        cls, robot: Robot, task: Task, further: Sequence[LimitModel] = ()
+    ) -> Problem:
         """Bind robot and task, and check the postures that the task gives.
 
         Parameters
@@ -77,17 +79,32 @@ class Problem(Summary):
             for a limit.
         """
         robot, task_map = bind(robot, task.task_space)
-        start = None if task.start == "free" else robot.posture(task.start.joints, "start.joints")
-        end = None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
+        start = (
+            None
+            if task.start == "free"
+            else robot.posture(task.start.joints, "start.joints")
+        )
+        end = (
+            None if task.end == "free" else robot.posture(task.end.joints, "end.joints")
+        )
         path = path_of(task_map, task)
         task = with_feed_rates(task, path)
         if task.boundary.periodic:
             check_closed(task_map, path)
             end = start
-        approach = approach_of(task, robot, task_map, path, end if start is None else start, own=bool(further))
+        approach = approach_of(
+            task,
+            robot,
+            task_map,
+            path,
+            end if start is None else start,
+            own=bool(further),
+        )
         limits = limits_of(robot, task, further, approach)
         check_smoothness(limits, task.spline)
-        limits = check_postures(task_map, limits, start, end, path, task.refinement.tolerance)
+        limits = check_postures(
+            task_map, limits, start, end, path, task.refinement.tolerance
+        )
         if end is not None and not task.boundary.periodic:
             end = _on_path(task_map, end, path)
         return cls(task, robot, task_map, path, start, end, limits, tuple(further))
@@ -153,10 +170,14 @@ class Decomposition(Summary):
         """Put robot, path and closed form together for a motion that begins at, or near, `start`, (n,)."""
         given = self.problem
         solver = self.match.solver
-        return ClosedFormMap(given.task_map, given.path, solver, self.redundant, branch, start)
+        return ClosedFormMap(
+            given.task_map, given.path, solver, self.redundant, branch, start
+        )
 
 
-def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> list[Decomposition]:
+def decompositions_of(
+    problem: Problem, families: Sequence[ik.Family] = ()
+) -> list[Decomposition]:
     """List the choices that the task allows.
 
     Parameters
@@ -187,17 +208,26 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
         return []
     if task.redundant_joints != "auto":
         wanted = _with_roll(task_map, task.redundant_joints)
-        return [_decomposition(problem, ik.find(robot, task_map, wanted, families=families))]
+        return [
+            _decomposition(problem, ik.find(robot, task_map, wanted, families=families))
+        ]
     found = ik.find_all(robot, task_map, families=families)
     matches = [candidate for candidate in found if isinstance(candidate, ik.Match)]
     asked = task.branch != "auto" or task.search.guesses != "lattice"
     if not matches and (asked or robot.n < task_map.m or lacks_a_direction(task_map)):
-        if len(found) <= 1:  # nothing to choose: the reasons of the only choice, or the wrong number of joints
-            return [_decomposition(problem, ik.find(robot, task_map, (), families=families))]
+        if (
+            len(found) <= 1
+        ):  # nothing to choose: the reasons of the only choice, or the wrong number of joints
+            return [
+                _decomposition(problem, ik.find(robot, task_map, (), families=families))
+            ]
         raise DecompositionError(
             "no choice of redundant joints has a closed form",
             redundant_joints=(),
-            reasons={", ".join(c.redundant_joints): "; ".join(c.reasons.values()) for c in found},
+            reasons={
+                ", ".join(c.redundant_joints): "; ".join(c.reasons.values())
+                for c in found
+            },
             available=[],
         )
     allowed: list[Decomposition] = []
@@ -212,7 +242,11 @@ def decompositions_of(problem: Problem, families: Sequence[ik.Family] = ()) -> l
     if not allowed:
         check_regular(task_map, problem.start, problem.end)
     return sorted(
-        allowed, key=lambda decomposition: (decomposition.match.solver.kind != "closed_form", -decomposition.clearance)
+        allowed,
+        key=lambda decomposition: (
+            decomposition.match.solver.kind != "closed_form",
+            -decomposition.clearance,
+        ),
     )
 
 
@@ -220,7 +254,11 @@ def _with_roll(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
     """Add the free roll where it is the one redundant joint that is left out."""
     robot = task_map.robot
     missing = robot.n - task_map.m - len(names)
-    return (*names, ROLL_JOINT) if robot.rolls_freely and missing == 1 and ROLL_JOINT not in names else names
+    return (
+        (*names, ROLL_JOINT)
+        if robot.rolls_freely and missing == 1 and ROLL_JOINT not in names
+        else names
+    )
 
 
 def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
@@ -238,5 +276,7 @@ def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
         return Decomposition(problem, match, redundant, (branch,))
     if wanted != "auto" and wanted not in labels:
         raise UnknownNameError("branch", wanted, labels, where="branch")
-    allowed = tuple(branch for branch, label in enumerate(labels) if wanted in ("auto", label))
+    allowed = tuple(
+        branch for branch, label in enumerate(labels) if wanted in ("auto", label)
+    )
     return Decomposition(problem, match, redundant, allowed)

@@ -20,7 +20,7 @@ GROUP = "brachis.limits"
 class LimitModel(Protocol):
     """A limit as a user gives it, which does not know the robot yet."""
 
-    def bind(self, robot: Robot, /) -> Any:  # noqa: ANN401
+    def bind(self, robot: Robot, /) -> Any:
         """Return the limit for a robot, a `brachis.limits.Limit`."""
         ...
 
@@ -35,14 +35,20 @@ def custom_limits(task: Task) -> tuple[LimitModel, ...]:
     InputError
         The package cannot be loaded, or refuses the parameters.
     """
-    if not task.custom_limits:  # looking through the installed packages takes milliseconds
+    if (
+        not task.custom_limits
+    ):  # looking through the installed packages takes milliseconds
         return ()
-    installed = {entry.name: entry for entry in importlib.metadata.entry_points(group=GROUP)}
+    installed = {
+        entry.name: entry for entry in importlib.metadata.entry_points(group=GROUP)
+    }
     made = []
     for kind, parameters in task.custom_limits.items():
         where = f"custom_limits.{kind}"
         if kind not in installed:
-            raise UnknownNameError("kind of limit", kind, installed, where="custom_limits")
+            raise UnknownNameError(
+                "kind of limit", kind, installed, where="custom_limits"
+            )
         try:
             factory = installed[kind].load()
         except Exception as error:
@@ -51,5 +57,9 @@ def custom_limits(task: Task) -> tuple[LimitModel, ...]:
         try:
             made.append(factory(**parameters))
         except (TypeError, ValueError) as error:
-            raise InputError(f"the plug-in refuses its parameters: {error}", where=where, found=parameters) from error
+            raise InputError(
+                f"the plug-in refuses its parameters: {error}",
+                where=where,
+                found=parameters,
+            ) from error
     return tuple(made)

@@ -49,8 +49,13 @@ class SharedTorques:
     def torque(self, robot: Robot) -> np.ndarray:
         """See `torque`; not to be written to."""
         known = self._torques.get(id(robot))
-        if known is None or known[0] is not robot:  # a number says nothing in another process
-            known = self._torques[id(robot)] = robot, torque(robot, self.q, self.qdot, self.qddot)
+        if (
+            known is None or known[0] is not robot
+        ):  # a number says nothing in another process
+            known = self._torques[id(robot)] = (
+                robot,
+                torque(robot, self.q, self.qdot, self.qddot),
+            )
         return known[1]
 
     def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
@@ -62,7 +67,9 @@ class SharedTorques:
         return known[1]
 
 
-def torque(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+def torque(
+    robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+) -> np.ndarray:
     """Joint torques of K states.
 
     Parameters
@@ -79,7 +86,9 @@ def torque(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> 
     return rigid_torque(robot, q, qdot, qddot) + robot.friction.torque(qdot, qddot)
 
 
-def rigid_torque(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+def rigid_torque(
+    robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+) -> np.ndarray:
     """Joint torques of K states without friction and armature; parameters as for `torque`."""
     model, data, rnea = robot.model, robot.model.createData(), pin.rnea
     rigid = np.empty_like(q)
@@ -101,12 +110,20 @@ def mass_matrices(robot: Robot, q: np.ndarray) -> np.ndarray:
     return matrices
 
 
-def torque_derivatives(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TorqueDerivatives:
+def torque_derivatives(
+    robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+) -> TorqueDerivatives:
     """Exact derivatives of `torque`; parameters as there."""
-    model, data, derivatives = robot.model, robot.model.createData(), pin.computeRNEADerivatives
+    model, data, derivatives = (
+        robot.model,
+        robot.model.createData(),
+        pin.computeRNEADerivatives,
+    )
     by_q, by_qdot, by_qddot = (np.empty((len(q), robot.n, robot.n)) for _ in range(3))
     for k in range(len(q)):
-        by_q[k], by_qdot[k], by_qddot[k] = derivatives(model, data, q[k], qdot[k], qddot[k])
+        by_q[k], by_qdot[k], by_qddot[k] = derivatives(
+            model, data, q[k], qdot[k], qddot[k]
+        )
     # Some versions of Pinocchio fill the upper triangle of the mass matrix only.
     upper = np.triu(by_qddot)
     by_qddot = upper + np.swapaxes(np.triu(by_qddot, 1), 1, 2)

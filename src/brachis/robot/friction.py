@@ -75,17 +75,33 @@ class Friction(Summary):
         InputError, UnknownNameError
         """
         names = list(joint_names)
-        urdf = {kind: np.zeros(len(names)) for kind in ("viscous", "coulomb")} | dict(stated or {})
+        urdf = {kind: np.zeros(len(names)) for kind in ("viscous", "coulomb")} | dict(
+            stated or {}
+        )
         given = {"armature": armature, "rotor_inertia": rotor_inertia}
-        terms = {key: _spread(key, value, names, np.zeros(len(names))) for key, value in given.items()}
+        terms = {
+            key: _spread(key, value, names, np.zeros(len(names)))
+            for key, value in given.items()
+        }
         rubbing = {"viscous": viscous, "coulomb": coulomb}
-        terms |= {key: _spread(key, value, names, urdf[key]) for key, value in rubbing.items()}
-        geared = _geared(terms.pop("rotor_inertia"), gear_ratio, terms["armature"], names)
+        terms |= {
+            key: _spread(key, value, names, urdf[key]) for key, value in rubbing.items()
+        }
+        geared = _geared(
+            terms.pop("rotor_inertia"), gear_ratio, terms["armature"], names
+        )
         where = "robot.friction.coulomb_velocity"
-        v_eps = np.array(per_joint_values(where, coulomb_velocity, names, 0.01), dtype=float)
+        v_eps = np.array(
+            per_joint_values(where, coulomb_velocity, names, 0.01), dtype=float
+        )
         if not np.all((v_eps >= _LEAST_SPEED) & (v_eps <= LARGEST)):
             allowed = f"{_LEAST_SPEED:g} to {LARGEST:g} rad/s or m/s"
-            raise InputError("is not a usable speed", where=where, found=coulomb_velocity, allowed=allowed)
+            raise InputError(
+                "is not a usable speed",
+                where=where,
+                found=coulomb_velocity,
+                allowed=allowed,
+            )
         return cls(**(terms | {"armature": terms["armature"] + geared}), v_eps=v_eps)
 
     def check_against(self, model: pin.Model, limits: np.ndarray) -> None:
@@ -98,7 +114,11 @@ class Friction(Summary):
         names = list(model.names)[1:]
         for name, coulomb, limit in zip(names, self.coulomb, limits, strict=True):
             if coulomb >= limit:
-                carrier = model.frames[model.frames[model.getFrameId(name, pin.FrameType.JOINT)].parentFrame].name
+                carrier = model.frames[
+                    model.frames[
+                        model.getFrameId(name, pin.FrameType.JOINT)
+                    ].parentFrame
+                ].name
                 first = name == names[0]
                 shorter = (
                     ""
@@ -115,18 +135,30 @@ class Friction(Summary):
 
     def torque(self, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
         """Torque of these terms, (..., n), for velocities and accelerations (..., n)."""
-        return self.armature * qddot + self.viscous * qdot + self.coulomb * np.tanh(qdot / self.v_eps)
+        return (
+            self.armature * qddot
+            + self.viscous * qdot
+            + self.coulomb * np.tanh(qdot / self.v_eps)
+        )
 
     def velocity_derivative(self, qdot: np.ndarray) -> np.ndarray:
         """Differentiate `torque` with respect to qdot (diagonal), (..., n)."""
-        return self.viscous + self.coulomb / self.v_eps / np.cosh(np.clip(qdot / self.v_eps, -350.0, 350.0)) ** 2
+        return (
+            self.viscous
+            + self.coulomb
+            / self.v_eps
+            / np.cosh(np.clip(qdot / self.v_eps, -350.0, 350.0)) ** 2
+        )
 
 
 def _spread(key: str, value: object, names: list[str], urdf: np.ndarray) -> np.ndarray:
     """Spread one term over the joints, (n,); `urdf` where it is not given, nothing where it is None."""
     where = f"robot.friction.{key}"
     listed = per_joint_values(where, value, names, FROM_URDF)
-    chosen = [stated if entry == FROM_URDF else entry for entry, stated in zip(listed, urdf, strict=True)]
+    chosen = [
+        stated if entry == FROM_URDF else entry
+        for entry, stated in zip(listed, urdf, strict=True)
+    ]
     terms = np.array([0.0 if entry is None else entry for entry in chosen], dtype=float)
     for name, term, entry in zip(names, terms, listed, strict=True):
         if not 0.0 <= term <= LARGEST:
@@ -139,10 +171,15 @@ def _spread(key: str, value: object, names: list[str], urdf: np.ndarray) -> np.n
     return terms
 
 
-def _geared(rotor: np.ndarray, gear_ratio: object, armature: np.ndarray, names: list[str]) -> np.ndarray:
+def _geared(
+    rotor: np.ndarray, gear_ratio: object, armature: np.ndarray, names: list[str]
+) -> np.ndarray:
     """Inertias of rotors, (n,), as the joints feel them through their gears."""
     key = "robot.friction.gear_ratio"
-    ratios = [0.0 if ratio is None else ratio for ratio in per_joint_values(key, gear_ratio, names, None)]
+    ratios = [
+        0.0 if ratio is None else ratio
+        for ratio in per_joint_values(key, gear_ratio, names, None)
+    ]
     ratio = np.array(ratios, dtype=float)
     for name, inertia, turns, other in zip(names, rotor, ratio, armature, strict=True):
         if inertia > 0.0 and not 0.0 < turns <= LARGEST:

@@ -25,7 +25,9 @@ def principal(angles: np.ndarray) -> np.ndarray:
     return np.asarray(np.remainder(angles + np.pi, TURN) - np.pi)
 
 
-def difference(first: np.ndarray, second: np.ndarray, revolute: np.ndarray) -> np.ndarray:
+def difference(
+    first: np.ndarray, second: np.ndarray, revolute: np.ndarray
+) -> np.ndarray:
     """Displacement (..., n) from `second` to `first`; of revolute joints, a mask (n,), the shortest, in [-pi, pi)."""
     gap = first - second
     return np.where(revolute, principal(gap), gap)

@@ -46,7 +46,9 @@ def first_limb(text: str, where: str) -> Limb:
     chains = {leaf: joints_between(tree.root, leaf, parents, where) for leaf in leaves}
     most = max(_moving(chain) for chain in chains.values())
     if not most:
-        raise UrdfError("no joint moves", where=where, found=f"chains to {', '.join(leaves)}")
+        raise UrdfError(
+            "no joint moves", where=where, found=f"chains to {', '.join(leaves)}"
+        )
     longest = [chain for chain in chains.values() if _moving(chain) == most]
     first = longest[0]
     limb = {leaf: chain for leaf, chain in chains.items() if _is_of(first, chain)}

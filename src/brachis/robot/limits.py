@@ -27,7 +27,9 @@ _LEVEL = 1e-12
 """Torques that rise by less, as a part of the torque at rest, are rounded figures of the same torque."""
 
 
-def resolve_curves(stated: object, names: Sequence[str], factor: float) -> tuple[Curve, ...]:
+def resolve_curves(
+    stated: object, names: Sequence[str], factor: float
+) -> tuple[Curve, ...]:
     """Check the curves of a chain's joints and scale their torques.
 
     Parameters
@@ -53,7 +55,10 @@ def resolve_curves(stated: object, names: Sequence[str], factor: float) -> tuple
         return ((),) * len(names)
     if not isinstance(stated, Mapping):
         raise InputError(
-            "is no mapping of joint names", where=_KEY, found=stated, allowed="{joint: [[speed, torque], ...]}"
+            "is no mapping of joint names",
+            where=_KEY,
+            found=stated,
+            allowed="{joint: [[speed, torque], ...]}",
         )
     for name in stated:
         if name not in names:
@@ -70,17 +75,26 @@ def _checked(points: object, joint: str, factor: float) -> Curve:
         table = np.array(points, dtype=float)
     except (TypeError, ValueError):
         table = np.empty(0)
-    if table.ndim != 2 or table.shape[1] != 2 or len(table) < _FEWEST or not np.isfinite(table).all():  # noqa: PLR2004
+    if (
+        table.ndim != 2
+        or table.shape[1] != 2
+        or len(table) < _FEWEST
+        or not np.isfinite(table).all()
+    ):
         allowed = "two or more points [speed, torque]"
         raise InputError("is no torque curve", where=key, found=points, allowed=allowed)
     speed, torque = table.T
     found = ", ".join(f"[{v:g}, {tau:g}]" for v, tau in table)
     if speed[0] != 0.0 or not np.all(np.diff(speed) > 0.0) or not speed[-1] <= _LARGEST:
         allowed = "speeds that begin at 0 and ascend"
-        raise InputError("speeds are out of order", where=key, found=found, allowed=allowed)
+        raise InputError(
+            "speeds are out of order", where=key, found=found, allowed=allowed
+        )
     if not (_LEAST <= torque[0] * factor <= _LARGEST and np.all(torque >= 0.0)):
         allowed = f"torques >= 0, at rest from {_LEAST:g} to {_LARGEST:g}, scaled too"
-        raise InputError("torques are none of a drive", where=key, found=found, allowed=allowed)
+        raise InputError(
+            "torques are none of a drive", where=key, found=found, allowed=allowed
+        )
     rising = np.flatnonzero(np.diff(torque) > _LEVEL * torque[0])
     if len(rising):
         raise InputError(
@@ -90,7 +104,13 @@ def _checked(points: object, joint: str, factor: float) -> Curve:
             allowed="torques that stay or fall from point to point",
             hint="Leave out the points to which it rises; the curve then lies below them",
         )
-    return tuple(zip(speed.tolist(), (np.minimum.accumulate(torque) * factor).tolist(), strict=True))
+    return tuple(
+        zip(
+            speed.tolist(),
+            (np.minimum.accumulate(torque) * factor).tolist(),
+            strict=True,
+        )
+    )
 
 
 LEAST, LARGEST = 1e-6, 1e12
@@ -160,7 +180,9 @@ class Limits(Summary):
     def both_ways(self, kind: str) -> np.ndarray:
         """Lower and upper limits, (2, n), of one of `MAGNITUDES`."""
         if kind in PAIRS:
-            return np.array([getattr(self, f"{kind}_lower"), getattr(self, f"{kind}_upper")])
+            return np.array(
+                [getattr(self, f"{kind}_lower"), getattr(self, f"{kind}_upper")]
+            )
         return np.array([-getattr(self, kind), getattr(self, kind)])
 
     def with_magnitudes(self, **magnitudes: np.ndarray) -> Limits:
@@ -168,26 +190,43 @@ class Limits(Summary):
         ends: dict[str, Any] = {
             name: sign * values
             for kind, values in magnitudes.items()
-            for name, sign in (((f"{kind}_lower", -1.0), (f"{kind}_upper", 1.0)) if kind in PAIRS else ((kind, 1.0),))
+            for name, sign in (
+                ((f"{kind}_lower", -1.0), (f"{kind}_upper", 1.0))
+                if kind in PAIRS
+                else ((kind, 1.0),)
+            )
         }
         return replace(self, **ends)
 
     def with_free_joint(self) -> Limits:
         """Return the limits with those of a further joint, which has none."""
         free: dict[str, Any] = {
-            name: np.append(getattr(self, name), -np.inf if name.endswith("_lower") else np.inf) for name in _ARRAYS
+            name: np.append(
+                getattr(self, name), -np.inf if name.endswith("_lower") else np.inf
+            )
+            for name in _ARRAYS
         }
         return replace(self, **free, torque_speed=(*self.torque_speed, ()))
 
 
 PAIRS = ("velocity", "torque")
 """Kinds of limits that may differ in both directions: a number > 0 for each joint, or [lower, upper] around zero."""
-MAGNITUDES = ("velocity", "acceleration", "torque", "power", "rms_torque", "jerk", "torque_rate")
+MAGNITUDES = (
+    "velocity",
+    "acceleration",
+    "torque",
+    "power",
+    "rms_torque",
+    "jerk",
+    "torque_rate",
+)
 """These, and the kinds that are one number > 0 for each joint."""
 _ARRAYS = tuple(
     name
     for kind in ("position", *MAGNITUDES)
-    for name in ((f"{kind}_lower", f"{kind}_upper") if kind in ("position", *PAIRS) else (kind,))
+    for name in (
+        (f"{kind}_lower", f"{kind}_upper") if kind in ("position", *PAIRS) else (kind,)
+    )
 )
 STATED = {"torque": "effort", "velocity": "velocity"}
 """Those of them that a URDF states, and its words for them."""
@@ -206,7 +245,10 @@ class UrdfLimit:
 
 
 def resolve_limits(
-    spec: LimitSpec, joint_names: Sequence[str], urdf: Sequence[UrdfLimit], speed_override: float = 1.0
+    spec: LimitSpec,
+    joint_names: Sequence[str],
+    urdf: Sequence[UrdfLimit],
+    speed_override: float = 1.0,
 ) -> Limits:
     """Combine the user's limits with the URDF's.
 
@@ -239,14 +281,24 @@ def resolve_limits(
     names = list(joint_names)
     _check_scale(spec.scale)
     found = {
-        kind: _per_joint(kind, getattr(spec, kind), names, [getattr(u, STATED.get(kind, ""), None) for u in urdf])
+        kind: _per_joint(
+            kind,
+            getattr(spec, kind),
+            names,
+            [getattr(u, STATED.get(kind, ""), None) for u in urdf],
+        )
         for kind in MAGNITUDES
     }
-    curves, factor = resolve_curves(spec.torque_speed, names, spec.scale.torque), spec.scale.torque
+    curves, factor = (
+        resolve_curves(spec.torque_speed, names, spec.scale.torque),
+        spec.scale.torque,
+    )
     # A torque that falls with speed is at its largest at rest, which is a plain limit.
     at_rest = np.array([curve[0][1] / factor if curve else np.inf for curve in curves])
     found["torque"] = np.clip(found["torque"], -at_rest, at_rest)
-    for name, tau, acc in zip(names, found["torque"][1], found["acceleration"][1], strict=True):
+    for name, tau, acc in zip(
+        names, found["torque"][1], found["acceleration"][1], strict=True
+    ):
         if np.isinf(tau) and np.isinf(acc):
             raise LimitError(
                 "has neither a torque nor an acceleration limit, so its time would go to zero",
@@ -254,7 +306,9 @@ def resolve_limits(
                 key=f"robot.limits.torque.{name} or robot.limits.acceleration.{name}",
             )
     lower, upper = _ranges(spec.position, names, urdf)
-    scaled = {kind: _scaled(kind, limits, spec.scale, names) for kind, limits in found.items()}
+    scaled = {
+        kind: _scaled(kind, limits, spec.scale, names) for kind, limits in found.items()
+    }
     if speed_override != 1.0 and np.isinf(scaled["velocity"]).all():
         raise InputError(
             "has no velocity limit to act on",
@@ -263,9 +317,13 @@ def resolve_limits(
             hint="Give robot.limits.velocity, or leave the override away",
         )
     scaled["velocity"] = scaled["velocity"] * speed_override
-    values: dict[str, Any] = {kind: limits[1] for kind, limits in scaled.items() if kind not in PAIRS}
+    values: dict[str, Any] = {
+        kind: limits[1] for kind, limits in scaled.items() if kind not in PAIRS
+    }
     for kind in PAIRS:
-        values |= dict(zip((f"{kind}_lower", f"{kind}_upper"), scaled[kind], strict=True))
+        values |= dict(
+            zip((f"{kind}_lower", f"{kind}_upper"), scaled[kind], strict=True)
+        )
     values |= {"total_power": _total_power(spec), "torque_speed": curves}
     return Limits(position_lower=lower, position_upper=upper, **values)
 
@@ -285,15 +343,29 @@ def spelled_out(limits: Limits, names: Sequence[str]) -> LimitSpec:
     """State limits joint by joint; joints beyond `names` are left out."""
 
     def finite(values: np.ndarray) -> list[float | None]:
-        return [float(value) if np.isfinite(value) else None for value in values[: len(names)]]
+        return [
+            float(value) if np.isfinite(value) else None
+            for value in values[: len(names)]
+        ]
 
-    ranges = zip(finite(limits.position_lower), finite(limits.position_upper), strict=True)
+    ranges = zip(
+        finite(limits.position_lower), finite(limits.position_upper), strict=True
+    )
     spelled: dict[str, Any] = {"position": ranges}
     for kind in MAGNITUDES:
         pairs = zip(*(finite(ends) for ends in limits.both_ways(kind)), strict=True)
-        spelled[kind] = [upper if lower is None or -lower == upper else (lower, upper) for lower, upper in pairs]
-    by_name = {kind: dict(zip(names, values, strict=True)) for kind, values in spelled.items()}
-    curves = {name: curve for name, curve in zip(names, limits.torque_speed, strict=False) if curve}
+        spelled[kind] = [
+            upper if lower is None or -lower == upper else (lower, upper)
+            for lower, upper in pairs
+        ]
+    by_name = {
+        kind: dict(zip(names, values, strict=True)) for kind, values in spelled.items()
+    }
+    curves = {
+        name: curve
+        for name, curve in zip(names, limits.torque_speed, strict=False)
+        if curve
+    }
     total = limits.total_power if np.isfinite(limits.total_power) else None
     return LimitSpec(**by_name, total_power=total, torque_speed=curves or None)
 
@@ -301,10 +373,15 @@ def spelled_out(limits: Limits, names: Sequence[str]) -> LimitSpec:
 def _check_scale(scale: LimitScale) -> None:
     for kind, factor in vars(scale).items():
         if kind not in MAGNITUDES:
-            raise UnknownNameError("limit to scale", kind, MAGNITUDES, where="robot.limits.scale")
+            raise UnknownNameError(
+                "limit to scale", kind, MAGNITUDES, where="robot.limits.scale"
+            )
         if not (_is_number(factor) and 0.0 < factor < np.inf):
             raise InputError(
-                "is not a factor", where=f"robot.limits.scale.{kind}", found=factor, allowed="a finite number > 0"
+                "is not a factor",
+                where=f"robot.limits.scale.{kind}",
+                found=factor,
+                allowed="a finite number > 0",
             )
 
 
@@ -312,12 +389,20 @@ def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float)
 
 
-def _scaled(kind: str, limits: np.ndarray, scale: LimitScale, names: Sequence[str]) -> np.ndarray:
+def _scaled(
+    kind: str, limits: np.ndarray, scale: LimitScale, names: Sequence[str]
+) -> np.ndarray:
     """Multiply limits, (2, n), by their factor."""
     factor = getattr(scale, kind)
     for name, pair in zip(names, limits.T, strict=True):
         for limit in pair[np.isfinite(pair)]:
-            _check_size(kind, abs(float(limit)) * factor, name, f"robot.limits.scale.{kind}", "scaled ")
+            _check_size(
+                kind,
+                abs(float(limit)) * factor,
+                name,
+                f"robot.limits.scale.{kind}",
+                "scaled ",
+            )
     return np.asarray(limits * factor)
 
 
@@ -327,7 +412,9 @@ def _total_power(spec: LimitSpec) -> float:
     if stated is None:
         return np.inf
     if not (_is_number(stated) and LEAST <= stated * spec.scale.power <= LARGEST):
-        allowed = f"a number from {LEAST:g} to {LARGEST:g}, scaled too, or null for no limit"
+        allowed = (
+            f"a number from {LEAST:g} to {LARGEST:g}, scaled too, or null for no limit"
+        )
         raise InputError("is no power in W", where=key, found=stated, allowed=allowed)
     return float(stated) * spec.scale.power
 
@@ -344,7 +431,9 @@ def _check_size(kind: str, limit: float, joint: str, key: str, what: str) -> Non
         )
 
 
-def per_joint_values(key: str, value: object, names: Sequence[str], missing: object) -> list[object]:
+def per_joint_values(
+    key: str, value: object, names: Sequence[str], missing: object
+) -> list[object]:
     """Spread a scalar, list or mapping over the joints; `missing` where a mapping leaves a joint out.
 
     Raises
@@ -371,7 +460,9 @@ def per_joint_values(key: str, value: object, names: Sequence[str], missing: obj
     return [value] * len(names)
 
 
-def _per_joint(kind: str, value: object, names: list[str], urdf: Sequence[float | None]) -> np.ndarray:
+def _per_joint(
+    kind: str, value: object, names: list[str], urdf: Sequence[float | None]
+) -> np.ndarray:
     """Spread one kind of limit over the joints: lower and upper ones, (2, n); infinite where not limited."""
     key = f"robot.limits.{kind}"
     listed = per_joint_values(key, value, names, FROM_URDF)
@@ -380,12 +471,22 @@ def _per_joint(kind: str, value: object, names: list[str], urdf: Sequence[float 
         chosen = stated if isinstance(entry, str) and entry == FROM_URDF else entry
         if chosen is None:
             continue
-        pair = list(chosen) if kind in PAIRS and isinstance(chosen, Sequence) and not isinstance(chosen, str) else None
+        pair = (
+            list(chosen)
+            if kind in PAIRS
+            and isinstance(chosen, Sequence)
+            and not isinstance(chosen, str)
+            else None
+        )
         ends = pair or [-chosen if _is_number(chosen) else chosen, chosen]
-        numbers = len(ends) == 2 and all(_is_number(end) for end in ends)  # noqa: PLR2004
+        numbers = len(ends) == 2 and all(_is_number(end) for end in ends)
         if not (numbers and ends[0] < 0.0 < ends[1]):
             where = "the URDF" if chosen is not entry else "the task"
-            problem = "is no pair around zero" if pair else f"is not {'positive' if numbers else 'a number'}"
+            problem = (
+                "is no pair around zero"
+                if pair
+                else f"is not {'positive' if numbers else 'a number'}"
+            )
             raise LimitError(
                 f"{kind} limit in {where} {problem}",
                 joint=name,
@@ -402,7 +503,9 @@ def _per_joint(kind: str, value: object, names: list[str], urdf: Sequence[float 
     return limits
 
 
-def _ranges(value: object, names: list[str], urdf: Sequence[UrdfLimit]) -> tuple[np.ndarray, np.ndarray]:
+def _ranges(
+    value: object, names: list[str], urdf: Sequence[UrdfLimit]
+) -> tuple[np.ndarray, np.ndarray]:
     """Spread the position ranges over the joints; infinite where not limited."""
     listed = per_joint_values("robot.limits.position", value, names, FROM_URDF)
     lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
@@ -418,7 +521,7 @@ def _ranges(value: object, names: list[str], urdf: Sequence[UrdfLimit]) -> tuple
         if chosen is None:
             continue
         ends = list(chosen) if isinstance(chosen, Sequence) else []
-        if len(ends) != 2 or not all(end is None or _is_number(end) for end in ends):  # noqa: PLR2004
+        if len(ends) != 2 or not all(end is None or _is_number(end) for end in ends):
             raise LimitError(
                 "position range is not a pair",
                 joint=name,
@@ -436,8 +539,22 @@ def _check_range(lower: float, upper: float, joint: str) -> None:
     """Refuse a range that is empty, or ends where positions are no longer exact."""
     key, found = f"robot.limits.position.{joint}", f"[{lower:g}, {upper:g}]"
     if not upper - lower >= _NARROWEST:
-        allowed = f"[lower, upper] with lower < upper, {_NARROWEST:g} rad or m apart at least"
-        raise LimitError("position range is empty", joint=joint, key=key, found=found, allowed=allowed)
+        allowed = (
+            f"[lower, upper] with lower < upper, {_NARROWEST:g} rad or m apart at least"
+        )
+        raise LimitError(
+            "position range is empty",
+            joint=joint,
+            key=key,
+            found=found,
+            allowed=allowed,
+        )
     if any(np.isfinite(end) and abs(end) > FARTHEST for end in (lower, upper)):
         allowed = f"ends within {FARTHEST:g} rad or m of zero, null for an open end"
-        raise LimitError("position range ends too far away", joint=joint, key=key, found=found, allowed=allowed)
+        raise LimitError(
+            "position range ends too far away",
+            joint=joint,
+            key=key,
+            found=found,
+            allowed=allowed,
+        )

@@ -73,17 +73,31 @@ def _together(remarks: tuple[Remark, ...]) -> tuple[Remark, ...]:
     """Make one remark of those that say the same of several joints."""
     groups: dict[tuple[str, str], list[Remark]] = {}
     for remark in remarks:
-        groups.setdefault((remark.where.rpartition(".")[0], remark.message), []).append(remark)
-    return tuple(group[0] if len(group) == 1 else _of_all(stem, group) for (stem, _), group in groups.items())
+        groups.setdefault((remark.where.rpartition(".")[0], remark.message), []).append(
+            remark
+        )
+    return tuple(
+        group[0] if len(group) == 1 else _of_all(stem, group)
+        for (stem, _), group in groups.items()
+    )
 
 
 def _of_all(stem: str, group: list[Remark]) -> Remark:
     """Make one remark of several below a key."""
-    found = ", ".join(f"{remark.where.removeprefix(f'{stem}.')} {remark.found}" for remark in group)
-    return Remark(stem, group[0].message, found, "; ".join(dict.fromkeys(remark.usual for remark in group)))
+    found = ", ".join(
+        f"{remark.where.removeprefix(f'{stem}.')} {remark.found}" for remark in group
+    )
+    return Remark(
+        stem,
+        group[0].message,
+        found,
+        "; ".join(dict.fromkeys(remark.usual for remark in group)),
+    )
 
 
-def tell(remarks: tuple[Remark, ...], *, strict: bool | None, stacklevel: int = 2) -> tuple[Remark, ...]:
+def tell(
+    remarks: tuple[Remark, ...], *, strict: bool | None, stacklevel: int = 2
+) -> tuple[Remark, ...]:
     """Warn of remarks, or refuse some or all of them; return them, one for all joints of which they say the same.
 
     Parameters
@@ -99,7 +113,11 @@ def tell(remarks: tuple[Remark, ...], *, strict: bool | None, stacklevel: int = 
     PlausibilityError
     """
     remarks = _together(remarks)
-    refused = [str(each) for each in remarks if strict or (strict is None and each.where.startswith("start.joints"))]
+    refused = [
+        str(each)
+        for each in remarks
+        if strict or (strict is None and each.where.startswith("start.joints"))
+    ]
     if refused:
         raise PlausibilityError(refused)
     for remark in remarks:
@@ -146,14 +164,21 @@ def remarks(figures: Iterable[Figure]) -> Iterator[Remark]:
 
 def link_lengths(robot: Robot) -> list[float]:
     """Distances from joint to joint, and from the last joint to the tool frame, m."""
-    placements = [*list(robot.model.jointPlacements)[2:], robot.model.frames[robot.frame_id].placement]
+    placements = [
+        *list(robot.model.jointPlacements)[2:],
+        robot.model.frames[robot.frame_id].placement,
+    ]
     return [float(np.linalg.norm(placement.translation)) for placement in placements]
 
 
 def reach(robot: Robot) -> float:
     """How far the tool frame can be from the first joint at most, m, in the ranges of slides that the URDF states."""
     slides = [
-        max(abs(end) for end in (lower, upper, stated.lower, stated.upper) if end is not None)
+        max(
+            abs(end)
+            for end in (lower, upper, stated.lower, stated.upper)
+            if end is not None
+        )
         for lower, upper, stated, unit in zip(
             robot.limits.position_lower,
             robot.limits.position_upper,
@@ -178,9 +203,15 @@ _STATIONS = 401
 def position_hint(value: float, lower: float, upper: float, unit: str) -> str | None:
     """Say what a position, rad or m, beyond its range looks like, if it would be within it in degrees or mm."""
     if unit == "rad" and abs(value) > _TURN and lower <= math.radians(value) <= upper:
-        return f"It looks like degrees: {value:.6g} deg are {math.radians(value):.6g} rad"
+        return (
+            f"It looks like degrees: {value:.6g} deg are {math.radians(value):.6g} rad"
+        )
     largest = max(abs(lower), abs(upper))
-    if unit == "m" and abs(value) > 10.0 * largest and lower <= value / _THOUSAND <= upper:
+    if (
+        unit == "m"
+        and abs(value) > 10.0 * largest
+        and lower <= value / _THOUSAND <= upper
+    ):
         return f"It looks like mm: {value:.6g} mm are {value / _THOUSAND:.6g} m"
     return None
 
@@ -191,7 +222,9 @@ def place_hint(here: np.ndarray, stated: np.ndarray, rows: Sequence[str]) -> str
         return None
     if np.abs(here - stated / _THOUSAND).max() <= _ROUNDED:
         return "The path looks like mm: divided by 1000 it is where the tool is"
-    for order in itertools.permutations(range(len(here))) if len(here) <= len(AXES) else ():
+    for order in (
+        itertools.permutations(range(len(here))) if len(here) <= len(AXES) else ()
+    ):
         if np.abs(here[list(order)] - stated).max() <= _ROUNDED:
             found = ", ".join(rows[i] for i in order)
             return f"It looks like the order {found}: the tool is there if they are read so"

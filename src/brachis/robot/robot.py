@@ -33,7 +33,15 @@ from brachis.robot.model import build_model
 from brachis.robot.urdf import read_chain, read_file
 from brachis.robot.urdf_bodies import StatedChain
 from brachis.robot.urdf_elements import read_tree
-from brachis.task import FROM_URDF, LimitKeywords, LimitSpec, Payload, Placement, RobotSettings, check_robot_settings
+from brachis.task import (
+    FROM_URDF,
+    LimitKeywords,
+    LimitSpec,
+    Payload,
+    Placement,
+    RobotSettings,
+    check_robot_settings,
+)
 
 
 def kept_settings(
@@ -49,7 +57,8 @@ def kept_settings(
 ) -> RobotSettings:
     """Keep the arguments of `Robot.from_urdf` as the ``robot`` part of a task; `added` has those that it checked."""
     by_name: dict[str, Any] = {
-        each.name: _by_name(getattr(limits, each.name), names, each.default) for each in fields(limits)
+        each.name: _by_name(getattr(limits, each.name), names, each.default)
+        for each in fields(limits)
     }
     content = {
         "urdf": str(Path(path).absolute()),
@@ -59,11 +68,18 @@ def kept_settings(
         "locked_joints": dict(locked_joints or {}),
         "limits": replace(limits, **by_name),
         "friction": dict(friction or {}),
-        **{name: getattr(added, name) for name in ("payload", "tool_offset", "mounting", "speed_override")},
+        **{
+            name: getattr(added, name)
+            for name in ("payload", "tool_offset", "mounting", "speed_override")
+        },
     }
     made, default = check_robot_settings(content), RobotSettings()
     # What is as by default counts as left out where the settings meet those of another robot or task.
-    stated = {key: value for key, value in content.items() if getattr(made, key) != getattr(default, key)}
+    stated = {
+        key: value
+        for key, value in content.items()
+        if getattr(made, key) != getattr(default, key)
+    }
     return check_robot_settings(stated)
 
 
@@ -72,7 +88,11 @@ def _by_name(value: object, names: Sequence[str], absent: object) -> object:
     if not isinstance(value, tuple | dict):
         return value
     listed = per_joint_values("limits", value, names, FROM_URDF)
-    kept = {name: entry for name, entry in zip(names, listed, strict=True) if not isinstance(entry, str)}
+    kept = {
+        name: entry
+        for name, entry in zip(names, listed, strict=True)
+        if not isinstance(entry, str)
+    }
     return kept or absent
 
 
@@ -136,7 +156,10 @@ class Robot(Summary):
         if given or (named_fields and "model" not in named_fields):
             allowed = 'brachis.Robot.from_urdf("robot.urdf")'
             raise InputError(
-                "a robot is not made of these", where="Robot", found=given or named_fields, allowed=allowed
+                "a robot is not made of these",
+                where="Robot",
+                found=given or named_fields,
+                allowed=allowed,
             )
         return super().__new__(cls)
 
@@ -205,11 +228,19 @@ class Robot(Summary):
                 "speed_override": speed_override,
             }
         )
-        spec = check_robot_settings({"limits": limits}).limits if isinstance(limits, Mapping) else limits or LimitSpec()
+        spec = (
+            check_robot_settings({"limits": limits}).limits
+            if isinstance(limits, Mapping)
+            else limits or LimitSpec()
+        )
         vector = _vector(gravity)
         text = read_file(Path(path)) if urdf_text is None else urdf_text
         chain = read_chain(
-            text, str(path), tool_frame=tool_frame, base_frame=base_frame, locked_joints=dict(locked_joints or {})
+            text,
+            str(path),
+            tool_frame=tool_frame,
+            base_frame=base_frame,
+            locked_joints=dict(locked_joints or {}),
         )
         spec = without_joints(spec, chain.locked)
         model, names = build_model(chain, vector, added, str(path)), chain.joint_names
@@ -225,7 +256,17 @@ class Robot(Summary):
             stated_limits=chain.limits,
             stated=chain.stated,
             friction=terms,
-            settings=kept_settings(added, path, names, tool_frame, base_frame, vector, locked_joints, spec, friction),
+            settings=kept_settings(
+                added,
+                path,
+                names,
+                tool_frame,
+                base_frame,
+                vector,
+                locked_joints,
+                spec,
+                friction,
+            ),
             source=str(path),
             urdf=text,
         )
@@ -256,7 +297,9 @@ class Robot(Summary):
         changes: dict[str, Any] = {}
         for kind, value in limits.items():
             if kind not in LimitKeywords.__annotations__:
-                raise UnknownNameError("limit", kind, LimitKeywords.__annotations__, where="with_limits")
+                raise UnknownNameError(
+                    "limit", kind, LimitKeywords.__annotations__, where="with_limits"
+                )
             stated = getattr(kept, kind)
             if isinstance(value, Mapping) and isinstance(stated, Mapping):
                 changes[kind] = {**stated, **value}
@@ -266,12 +309,18 @@ class Robot(Summary):
         resolved = resolve_limits(spec, own, self.stated_limits[: len(own)])
         resolved = resolved.with_free_joint() if self.rolls_freely else resolved
         self.friction.check_against(self.model, resolved.torque)
-        settings = self.settings.model_copy(update={"limits": spec, "speed_override": 1.0})
+        settings = self.settings.model_copy(
+            update={"limits": spec, "speed_override": 1.0}
+        )
         return replace(self, limits=resolved, settings=settings)
 
     @named
     def with_payload(
-        self, mass: float | None, *, com: Sequence[float] = (0.0, 0.0, 0.0), inertia: Mapping[str, float] | None = None
+        self,
+        mass: float | None,
+        *,
+        com: Sequence[float] = (0.0, 0.0, 0.0),
+        inertia: Mapping[str, float] | None = None,
     ) -> Robot:
         """Return the robot with another payload, in place of the one that it has.
 
@@ -296,7 +345,9 @@ class Robot(Summary):
         Payload(mass=5, com=[0, 0, 0.1])
         """
         settings = self.settings
-        payload = None if mass is None else {"mass": mass, "com": com, "inertia": inertia}
+        payload = (
+            None if mass is None else {"mass": mass, "com": com, "inertia": inertia}
+        )
         made = Robot.from_urdf(
             self.source,
             urdf_text=self.urdf,
@@ -311,7 +362,11 @@ class Robot(Summary):
             mounting=settings.mounting,
             speed_override=settings.speed_override,
         )
-        return made if self.rolls_freely else replace(made, limits=self.limits, friction=self.friction)
+        return (
+            made
+            if self.rolls_freely
+            else replace(made, limits=self.limits, friction=self.friction)
+        )
 
     def summary(self) -> Mapping[str, object]:
         """Return what is shown."""
@@ -334,7 +389,9 @@ class Robot(Summary):
         if len(set(units)) == 1:
             return f"{', '.join(numbers)} {units[0]}"
         pairs = zip(numbers, units, strict=True)
-        return ", ".join(number if number == "none" else f"{number} {unit}" for number, unit in pairs)
+        return ", ".join(
+            number if number == "none" else f"{number} {unit}" for number, unit in pairs
+        )
 
     @property
     def name(self) -> str:
@@ -355,7 +412,10 @@ class Robot(Summary):
     @property
     def position_units(self) -> tuple[str, ...]:
         """Unit of every joint's position, ``rad`` or ``m``."""
-        return tuple("m" if "P" in joint.shortname() else "rad" for joint in list(self.model.joints)[1:])
+        return tuple(
+            "m" if "P" in joint.shortname() else "rad"
+            for joint in list(self.model.joints)[1:]
+        )
 
     @property
     def torque_units(self) -> tuple[str, ...]:
@@ -380,13 +440,24 @@ class Robot(Summary):
         if self.rolls_freely:
             joints = _with_roll(joints, self.n)
         values = per_joint_values(where, joints, list(self.joint_names), None)
-        missing = [name for name, value in zip(self.joint_names, values, strict=True) if value is None]
+        missing = [
+            name
+            for name, value in zip(self.joint_names, values, strict=True)
+            if value is None
+        ]
         if missing:
-            raise InputError("joints are missing", where=where, found=", ".join(missing), allowed="a position for each")
+            raise InputError(
+                "joints are missing",
+                where=where,
+                found=", ".join(missing),
+                allowed="a position for each",
+            )
         q = np.array(values, dtype=float)
         if not np.all(np.abs(q) <= FARTHEST):
             allowed = f"finite numbers, within {FARTHEST:g} rad or m of zero"
-            raise InputError("is no posture", where=where, found=q.tolist(), allowed=allowed)
+            raise InputError(
+                "is no posture", where=where, found=q.tolist(), allowed=allowed
+            )
         return q
 
     def tool_placement(self, q: np.ndarray) -> pin.SE3:
@@ -410,7 +481,9 @@ class Robot(Summary):
 
         The plane goes through the base frame; its normal is the z axis of the URDF's root link.
         """
-        base = self.model.frames[self.model.getFrameId(self.base_frame, pin.FrameType.BODY)].placement
+        base = self.model.frames[
+            self.model.getFrameId(self.base_frame, pin.FrameType.BODY)
+        ].placement
         up = pin.rpy.rpyToMatrix(*np.radians(self.settings.mounting.rpy_deg))[:, 2]
         return np.asarray((self.tool_placements(q)[0] - base.translation) @ up)
 
@@ -432,5 +505,7 @@ def _vector(gravity: Sequence[float]) -> np.ndarray:
         vector = np.empty(0)
     if vector.shape != (3,) or not np.all(np.abs(vector) <= LARGEST):
         allowed = f"[x, y, z] in m/s^2, finite, at most {LARGEST:g} in size"
-        raise InputError("is not a vector", where="robot.gravity", found=gravity, allowed=allowed)
+        raise InputError(
+            "is not a vector", where="robot.gravity", found=gravity, allowed=allowed
+        )
     return vector

@@ -29,7 +29,9 @@ MOVING_TYPES = ("revolute", "continuous", "prismatic")
 _LEAST_AXIS = 1e-9
 
 
-def check_joints(chain: Sequence[Any], names: set[str], by_name: Mapping[str, Any], where: str) -> None:
+def check_joints(
+    chain: Sequence[Any], names: set[str], by_name: Mapping[str, Any], where: str
+) -> None:
     """Refuse joints that a serial chain of one-coordinate joints cannot have."""
     for joint in chain:
         if joint.type not in MOVING_TYPES:
@@ -48,7 +50,9 @@ def check_joints(chain: Sequence[Any], names: set[str], by_name: Mapping[str, An
                 allowed="a direction, any length but zero",
             )
     for joint in by_name.values():
-        if joint.mimic is not None and (joint.name in names or joint.mimic.joint in names):
+        if joint.mimic is not None and (
+            joint.name in names or joint.mimic.joint in names
+        ):
             raise UrdfError(
                 f"joint {joint.name!r} mimics {joint.mimic.joint!r}",
                 where=where,
@@ -58,7 +62,9 @@ def check_joints(chain: Sequence[Any], names: set[str], by_name: Mapping[str, An
             )
 
 
-def check_inertias(urdf: yourdfpy.URDF, chain: Sequence[Any], parents: Mapping[str, Any], where: str) -> None:
+def check_inertias(
+    urdf: yourdfpy.URDF, chain: Sequence[Any], parents: Mapping[str, Any], where: str
+) -> None:
     """Refuse moving bodies without mass and inertias that no body can have.
 
     A body is the links that move as one, that is, up to the next moving joint of the chain. Massless links (frames)
@@ -87,12 +93,15 @@ def check_inertias(urdf: yourdfpy.URDF, chain: Sequence[Any], parents: Mapping[s
             )
 
 
-def _check_inertia(link: Any, where: str) -> None:  # noqa: ANN401
+def _check_inertia(link: Any, where: str) -> None:
     """Refuse a negative mass and an inertia matrix that breaks the triangle inequality."""
     mass, matrix = link.inertial.mass or 0.0, link.inertial.inertia
     if not np.isfinite(mass) or mass < 0.0:
         raise UrdfError(
-            f"link {link.name!r} has a non-physical mass", where=where, found=f"{mass:g} kg", allowed=">= 0 kg"
+            f"link {link.name!r} has a non-physical mass",
+            where=where,
+            found=f"{mass:g} kg",
+            allowed=">= 0 kg",
         )
     if matrix is None and mass == 0.0:
         return
@@ -103,19 +112,36 @@ def _check_inertia(link: Any, where: str) -> None:  # noqa: ANN401
             found=f"{mass:g} kg",
             allowed="<inertia> with the moments about the centre of mass",
         )
-    moments = np.linalg.eigvalsh(np.asarray(matrix, dtype=float)) if np.all(np.isfinite(matrix)) else np.array([np.nan])
+    moments = (
+        np.linalg.eigvalsh(np.asarray(matrix, dtype=float))
+        if np.all(np.isfinite(matrix))
+        else np.array([np.nan])
+    )
     slack = 1e-3 * max(abs(moments).max(), 1e-12)  # figures from CAD are rounded
-    physical = moments[0] >= -slack and (len(moments) < 3 or moments[0] + moments[1] >= moments[2] - slack)  # noqa: PLR2004
+    physical = moments[0] >= -slack and (
+        len(moments) < 3 or moments[0] + moments[1] >= moments[2] - slack
+    )
     if not physical:
         raise UrdfError(
             f"link {link.name!r} has a non-physical inertia",
             where=where,
-            found="principal moments " + ", ".join(f"{m:.4g}" for m in moments) + " kg m^2",
+            found="principal moments "
+            + ", ".join(f"{m:.4g}" for m in moments)
+            + " kg m^2",
             allowed="moments >= 0, none above the sum of the other two",
         )
 
 
-_NEEDED = ("inertial", "parent", "child", "origin", "axis", "limit", "dynamics", "mimic")
+_NEEDED = (
+    "inertial",
+    "parent",
+    "child",
+    "origin",
+    "axis",
+    "limit",
+    "dynamics",
+    "mimic",
+)
 """Parts of links and joints that say how the robot moves and what it weighs."""
 
 
@@ -187,10 +213,14 @@ def read_chain(
     if base not in links:
         raise UnknownNameError("frame", base, links, where=f"{where}: base_frame")
     path_joints = joints_between(base, tool, parents, where)
-    by_name = {joint.name: joint for joint in urdf.robot.joints if joint.type != "fixed"}
+    by_name = {
+        joint.name: joint for joint in urdf.robot.joints if joint.type != "fixed"
+    }
     for name in locked_joints:
         if name not in by_name:
-            raise UnknownNameError("moving joint", name, by_name, where=f"{where}: locked_joints")
+            raise UnknownNameError(
+                "moving joint", name, by_name, where=f"{where}: locked_joints"
+            )
         if not abs(locked_joints[name]) <= FARTHEST:
             raise UrdfError(
                 "the position of a locked joint is no position",
@@ -198,17 +228,33 @@ def read_chain(
                 found=locked_joints[name],
                 allowed=f"finite, within {FARTHEST:g} rad or m of zero",
             )
-    chain = [joint for joint in path_joints if joint.type != "fixed" and joint.name not in locked_joints]
+    chain = [
+        joint
+        for joint in path_joints
+        if joint.type != "fixed" and joint.name not in locked_joints
+    ]
     check_joints(chain, {joint.name for joint in chain}, by_name, where)
     if not chain:
-        raise UrdfError("no joint moves the tool", where=where, found=f"chain {base} -> {tool}")
+        raise UrdfError(
+            "no joint moves the tool", where=where, found=f"chain {base} -> {tool}"
+        )
     locked = {
-        name: _lock_position(by_name[name], locked_joints) for name in by_name if name not in {j.name for j in chain}
+        name: _lock_position(by_name[name], locked_joints)
+        for name in by_name
+        if name not in {j.name for j in chain}
     }
     check_inertias(urdf, chain, parents, where)
     limits = tuple(_limit_of(joint) for joint in chain)
     names = tuple(joint.name for joint in chain)
-    return UrdfChain(names, limits, locked, tool, base, _plain_xml(urdf), stated_chain(tree, names, locked, tool))
+    return UrdfChain(
+        names,
+        limits,
+        locked,
+        tool,
+        base,
+        _plain_xml(urdf),
+        stated_chain(tree, names, locked, tool),
+    )
 
 
 def read_file(path: Path) -> str:
@@ -224,12 +270,22 @@ def read_file(path: Path) -> str:
         return files.read_file(path).decode()
     except FileNotFoundError as error:
         ours = files.shipped("robots") / path.name / "robot.urdf"
-        hint = f"The robot of this name that comes with brachis is {ours}" if files.is_file(ours) else ""
-        raise UrdfError("the URDF file does not exist", where=str(path), hint=hint) from error
+        hint = (
+            f"The robot of this name that comes with brachis is {ours}"
+            if files.is_file(ours)
+            else ""
+        )
+        raise UrdfError(
+            "the URDF file does not exist", where=str(path), hint=hint
+        ) from error
     except UnicodeDecodeError as error:
-        raise UrdfError("the URDF file cannot be read", where=str(path), found=str(error)) from error
+        raise UrdfError(
+            "the URDF file cannot be read", where=str(path), found=str(error)
+        ) from error
     except OSError as error:
-        raise UrdfError(f"the URDF file cannot be read: {error.strerror}", where=str(path)) from error
+        raise UrdfError(
+            f"the URDF file cannot be read: {error.strerror}", where=str(path)
+        ) from error
 
 
 def parse_urdf(text: str, where: str) -> tuple[UrdfTree, yourdfpy.URDF]:
@@ -240,16 +296,23 @@ def parse_urdf(text: str, where: str) -> tuple[UrdfTree, yourdfpy.URDF]:
     UrdfError
         See `read_tree` and `check_numbers`.
     """
-    import yourdfpy  # noqa: PLC0415  (imports trimesh: one second that only this stage needs)
+    import yourdfpy
 
     tree = read_tree(text, where)
     check_numbers(tree, where)
     try:
         urdf = yourdfpy.URDF.load(
-            io.BytesIO(_needed(tree)), build_scene_graph=False, build_collision_scene_graph=False, load_meshes=False
+            io.BytesIO(_needed(tree)),
+            build_scene_graph=False,
+            build_collision_scene_graph=False,
+            load_meshes=False,
         )
     except (ValueError, TypeError, KeyError, AttributeError, IndexError) as error:
-        raise UrdfError("the URDF cannot be read", where=where, found=f"{type(error).__name__}: {error}") from error
+        raise UrdfError(
+            "the URDF cannot be read",
+            where=where,
+            found=f"{type(error).__name__}: {error}",
+        ) from error
     return tree, urdf
 
 
@@ -257,7 +320,11 @@ def _needed(tree: UrdfTree) -> bytes:
     """Write links and joints without what does not move or weigh: shapes, drives, plugins."""
     robot = etree.Element("robot", name="robot")
     for owner in (*tree.links.values(), *tree.joints.values()):
-        kept = etree.SubElement(robot, owner.tag, {key: owner.get(key) for key in ("name", "type") if owner.get(key)})
+        kept = etree.SubElement(
+            robot,
+            owner.tag,
+            {key: owner.get(key) for key in ("name", "type") if owner.get(key)},
+        )
         kept.extend(copy.deepcopy(part) for part in owner if part.tag in _NEEDED)
     return bytes(etree.tostring(robot))
 
@@ -267,7 +334,9 @@ def _tool(urdf: yourdfpy.URDF, tool_frame: str | None, where: str) -> str:
     links = [link.name for link in urdf.robot.links]
     if tool_frame is not None:
         if tool_frame not in links:
-            raise UnknownNameError("frame", tool_frame, links, where=f"{where}: tool_frame")
+            raise UnknownNameError(
+                "frame", tool_frame, links, where=f"{where}: tool_frame"
+            )
         return tool_frame
     inner = {joint.parent for joint in urdf.robot.joints}
     leaves = [name for name in links if name not in inner]
@@ -281,20 +350,26 @@ def _tool(urdf: yourdfpy.URDF, tool_frame: str | None, where: str) -> str:
     return leaves[0]
 
 
-def joints_between(base: str, tool: str, parents: Mapping[str, Any], where: str) -> list[Any]:
+def joints_between(
+    base: str, tool: str, parents: Mapping[str, Any], where: str
+) -> list[Any]:
     """List the joints from base to tool, in chain order."""
     joints: list[Any] = []
     link = tool
     while link != base:
         joint = parents.get(link)
         if joint is None or joint in joints:
-            raise UrdfError("the tool frame is not below the base frame", where=where, found=f"{base} -> {tool}")
+            raise UrdfError(
+                "the tool frame is not below the base frame",
+                where=where,
+                found=f"{base} -> {tool}",
+            )
         joints.append(joint)
         link = joint.parent
     return joints[::-1]
 
 
-def _lock_position(joint: Any, locked_joints: Mapping[str, float]) -> float:  # noqa: ANN401 (yourdfpy is untyped)
+def _lock_position(joint: Any, locked_joints: Mapping[str, float]) -> float:
     """Position at which a joint off the chain is held: the user's, else zero or the range's nearest end."""
     if joint.name in locked_joints:
         return float(locked_joints[joint.name])
@@ -305,7 +380,7 @@ def _lock_position(joint: Any, locked_joints: Mapping[str, float]) -> float:  # 
     return float(np.clip(0.0, low, high)) if low <= high else 0.0
 
 
-def _limit_of(joint: Any) -> UrdfLimit:  # noqa: ANN401
+def _limit_of(joint: Any) -> UrdfLimit:
     """Read the limits of one joint; the range of a revolute or prismatic joint may have to come from the task."""
     limit = joint.limit
     velocity, effort = (limit.velocity, limit.effort) if limit else (None, None)
@@ -318,7 +393,7 @@ def _limit_of(joint: Any) -> UrdfLimit:  # noqa: ANN401
 
 def _plain_xml(urdf: yourdfpy.URDF) -> str:
     """Write the URDF with one-coordinate joints only; Pinocchio gives a continuous joint two coordinates."""
-    from yourdfpy import Limit  # noqa: PLC0415
+    from yourdfpy import Limit
 
     taken = {link.name for link in urdf.robot.links}
     for joint in urdf.robot.joints:
@@ -330,7 +405,9 @@ def _plain_xml(urdf: yourdfpy.URDF) -> str:
             joint.type = "fixed"
         elif joint.type != "fixed":
             joint.limit = Limit(effort=0.0, velocity=0.0, lower=-1e9, upper=1e9)
-        while joint.type == "fixed" and joint.name in taken:  # Pinocchio looks frames up by name
+        while (
+            joint.type == "fixed" and joint.name in taken
+        ):  # Pinocchio looks frames up by name
             joint.name += "_joint"
         taken.add(joint.name)
     for link in urdf.robot.links:

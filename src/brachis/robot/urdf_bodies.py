@@ -70,7 +70,9 @@ class StatedChain(Summary):
     friction: dict[str, np.ndarray]
 
 
-def stated_chain(tree: UrdfTree, chain: Sequence[str], locked: Mapping[str, float], tool: str) -> StatedChain:
+def stated_chain(
+    tree: UrdfTree, chain: Sequence[str], locked: Mapping[str, float], tool: str
+) -> StatedChain:
     """Read a chain of a checked URDF, and sum up the inertias of what each joint moves.
 
     Parameters
@@ -95,11 +97,16 @@ def stated_chain(tree: UrdfTree, chain: Sequence[str], locked: Mapping[str, floa
             carried[carrier].append(link)
     bodies = []
     for name in chain:
-        joint, links = tree.joints[name], [(link, tree.links[link], placed[link][1]) for link in carried[name]]
+        joint, links = (
+            tree.joints[name],
+            [(link, tree.links[link], placed[link][1]) for link in carried[name]],
+        )
         before = placed[str(end_of(joint, "parent"))][1] @ _origin(joint, "origin")
         bodies.append(_body(name, before, joint, links))
     friction = {
-        kind: np.array([numbers_of(tree.joints[name], "dynamics", word, "0")[0] for name in chain])
+        kind: np.array(
+            [numbers_of(tree.joints[name], "dynamics", word, "0")[0] for name in chain]
+        )
         for kind, word in (("viscous", "damping"), ("coulomb", "friction"))
     }
     return StatedChain(tuple(bodies), placed[tool][1], friction)
@@ -127,7 +134,9 @@ def _placement(
         return name, np.eye(4)
     joint = tree.joints[name]
     carrier, parent = placed[str(end_of(joint, "parent"))]
-    return carrier, parent @ _origin(joint, "origin") @ _held(joint, locked.get(name, 0.0))
+    return carrier, parent @ _origin(joint, "origin") @ _held(
+        joint, locked.get(name, 0.0)
+    )
 
 
 def check_bodies(model: pin.Model, bodies: Sequence[Body], where: str) -> None:
@@ -164,7 +173,12 @@ def check_bodies(model: pin.Model, bodies: Sequence[Body], where: str) -> None:
                 )
 
 
-def _body(name: str, placement: np.ndarray, joint: Element, links: Sequence[tuple[str, Element, np.ndarray]]) -> Body:
+def _body(
+    name: str,
+    placement: np.ndarray,
+    joint: Element,
+    links: Sequence[tuple[str, Element, np.ndarray]],
+) -> Body:
     """Sum up links with their placements in the joint's frame."""
     mass, moment, second = 0.0, np.zeros(3), np.zeros((3, 3))
     for _, element, placed in links:
@@ -200,7 +214,8 @@ def _axis(joint: Element) -> np.ndarray:
 def _inertia(inertial: Element) -> np.ndarray:
     """Matrix of moments and products, kg m^2."""
     xx, xy, xz, yy, yz, zz = (
-        numbers_of(inertial, "inertia", key, "0")[0] for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        numbers_of(inertial, "inertia", key, "0")[0]
+        for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
@@ -215,7 +230,11 @@ def _origin(owner: Element, path: str) -> np.ndarray:
     placed = np.eye(4)
     roll, pitch, yaw = numbers_of(owner, path, "rpy", _ZEROS)
     placed[:3, :3] = _turn(np.array([0.0, 0.0, 1.0]), yaw)
-    placed[:3, :3] = placed[:3, :3] @ _turn(np.array([0.0, 1.0, 0.0]), pitch) @ _turn(np.array([1.0, 0.0, 0.0]), roll)
+    placed[:3, :3] = (
+        placed[:3, :3]
+        @ _turn(np.array([0.0, 1.0, 0.0]), pitch)
+        @ _turn(np.array([1.0, 0.0, 0.0]), roll)
+    )
     placed[:3, 3] = numbers_of(owner, path, "xyz", _ZEROS)
     return placed
 
@@ -235,5 +254,9 @@ def _held(joint: Element, position: float) -> np.ndarray:
 
 def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
     """Rotation matrix, (3, 3), about a unit vector (Rodrigues)."""
-    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
+    cross = np.array(
+        [[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]]
+    )
+    return np.asarray(
+        np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    )

@@ -74,7 +74,11 @@ def read_tree(text: str, where: str) -> UrdfTree:
 def place_of(element: Element, where: str) -> str:
     """Say where an element is: the file, its line, and the link or joint that it is part of."""
     text = f"{where}, line {element.sourceline}"
-    owners = (each for each in (element, *element.iterancestors()) if each.tag in ("link", "joint"))
+    owners = (
+        each
+        for each in (element, *element.iterancestors())
+        if each.tag in ("link", "joint")
+    )
     owner = next(owners, None)
     return text if owner is None else f"{text}: {owner.tag} {owner.get('name')!r}"
 
@@ -95,19 +99,39 @@ def _robot_element(text: str, where: str) -> Element:
             allowed="XML, with the root element <robot>",
             hint="brachis inspect takes a URDF, the name of a robot, or a task file (.yaml)",
         )
-    parser = etree.XMLParser(remove_blank_text=True, resolve_entities=False, encoding="utf-8")
+    parser = etree.XMLParser(
+        remove_blank_text=True, resolve_entities=False, encoding="utf-8"
+    )
     try:
         robot = etree.fromstring(text.encode("utf-8", "surrogatepass"), parser)
     except etree.XMLSyntaxError as error:
         hint = _EXPAND if "xacro" in str(error) else None
-        raise UrdfError("the URDF file is not well-formed XML", where=where, found=str(error), hint=hint) from error
+        raise UrdfError(
+            "the URDF file is not well-formed XML",
+            where=where,
+            found=str(error),
+            hint=hint,
+        ) from error
     if robot.tag != "robot":
         raise UrdfError(
-            "the file is not a URDF", where=where, found=f"root element <{robot.tag}>", allowed="<robot>", hint=_EXPAND
+            "the file is not a URDF",
+            where=where,
+            found=f"root element <{robot.tag}>",
+            allowed="<robot>",
+            hint=_EXPAND,
         )
     for element in robot.iter(etree.Element):
-        macro = "xacro" in (etree.QName(element).namespace or "") or str(element.tag).startswith("xacro:")
-        expression = next((f"{key}={value!r}" for key, value in element.attrib.items() if "${" in value), None)
+        macro = "xacro" in (etree.QName(element).namespace or "") or str(
+            element.tag
+        ).startswith("xacro:")
+        expression = next(
+            (
+                f"{key}={value!r}"
+                for key, value in element.attrib.items()
+                if "${" in value
+            ),
+            None,
+        )
         if macro or expression:
             prefix = f"{element.prefix}:" if element.prefix else ""
             shown = f"<{prefix}{etree.QName(element).localname}{' ' + expression if expression else ''}>"
@@ -126,11 +150,18 @@ def _by_name(robot: Element, kind: str, where: str) -> dict[str, Element]:
     elements = robot.findall(kind)
     for element in elements:
         if not element.get("name"):
-            raise UrdfError(f"a <{kind}> has no name", where=f"{where}, line {element.sourceline}")
+            raise UrdfError(
+                f"a <{kind}> has no name", where=f"{where}, line {element.sourceline}"
+            )
     names = Counter(str(element.get("name")) for element in elements)
     repeated = [name for name, count in names.items() if count > 1]
     if repeated:
-        raise UrdfError(f"{kind}s share a name", where=where, found=", ".join(repeated), allowed="each name once")
+        raise UrdfError(
+            f"{kind}s share a name",
+            where=where,
+            found=", ".join(repeated),
+            allowed="each name once",
+        )
     return {str(element.get("name")): element for element in elements}
 
 
@@ -147,7 +178,9 @@ def _check_type(name: str, kind: str | None, where: str) -> None:
     )
 
 
-def _joints_above(links: Mapping[str, Element], joints: Mapping[str, Element], where: str) -> dict[str, str]:
+def _joints_above(
+    links: Mapping[str, Element], joints: Mapping[str, Element], where: str
+) -> dict[str, str]:
     """Find the joint that every link hangs from."""
     above: dict[str, str] = {}
     for name, joint in joints.items():
@@ -160,7 +193,11 @@ def _joints_above(links: Mapping[str, Element], joints: Mapping[str, Element], w
                     where=f"{where}, line {joint.sourceline}",
                     found=link or "none",
                     allowed=", ".join(links),
-                    hint=f"Did you mean {near!r}?" if near else f"Add <link name={link!r}/>" if link else None,
+                    hint=f"Did you mean {near!r}?"
+                    if near
+                    else f"Add <link name={link!r}/>"
+                    if link
+                    else None,
                 )
         child = str(end_of(joint, "child"))
         if child in above:
@@ -174,7 +211,12 @@ def _joints_above(links: Mapping[str, Element], joints: Mapping[str, Element], w
     return above
 
 
-def _root(links: Mapping[str, Element], joints: Mapping[str, Element], above: Mapping[str, str], where: str) -> str:
+def _root(
+    links: Mapping[str, Element],
+    joints: Mapping[str, Element],
+    above: Mapping[str, str],
+    where: str,
+) -> str:
     """Find the only link that hangs from no joint."""
     roots = [name for name in links if name not in above]
     if len(roots) != 1:
@@ -194,7 +236,11 @@ def _root(links: Mapping[str, Element], joints: Mapping[str, Element], above: Ma
         waiting += found
     if len(reached) < len(links):
         looped = ", ".join(name for name in links if name not in reached)
-        raise UrdfError("the links do not form one tree", where=where, found=f"a loop of links: {looped}")
+        raise UrdfError(
+            "the links do not form one tree",
+            where=where,
+            found=f"a loop of links: {looped}",
+        )
     return roots[0]
 
 
@@ -234,8 +280,14 @@ ENTRIES: dict[str, tuple[Entry, ...]] = {
         Entry("inertial/origin", "xyz", "m", 3),
         Entry("inertial/origin", "rpy", "rad", 3),
         Entry("inertial/mass", "value", "kg", required=True),
-        *(Entry("inertial/inertia", moment, "kg m^2", required=True) for moment in ("ixx", "iyy", "izz")),
-        *(Entry("inertial/inertia", product, "kg m^2") for product in ("ixy", "ixz", "iyz")),
+        *(
+            Entry("inertial/inertia", moment, "kg m^2", required=True)
+            for moment in ("ixx", "iyy", "izz")
+        ),
+        *(
+            Entry("inertial/inertia", product, "kg m^2")
+            for product in ("ixy", "ixz", "iyz")
+        ),
     ),
     "joint": (
         Entry("origin", "xyz", "m", 3),
@@ -277,7 +329,9 @@ def check_numbers(tree: UrdfTree, where: str) -> None:
                 _check_entry(owner, entry, where)
 
 
-def numbers_of(owner: Element, path: str, attribute: str, absent: str) -> tuple[float, ...]:
+def numbers_of(
+    owner: Element, path: str, attribute: str, absent: str
+) -> tuple[float, ...]:
     """Numbers of a checked attribute of a link or joint; those of `absent` where it is not there."""
     element = owner.find(path)
     text = absent if element is None else element.get(attribute, absent)
@@ -287,7 +341,9 @@ def numbers_of(owner: Element, path: str, attribute: str, absent: str) -> tuple[
 def _check_single(elements: list[Element], where: str) -> None:
     if len(elements) > 1:
         raise UrdfError(
-            f"<{elements[1].tag}> is there twice", where=place_of(elements[1], where), allowed="one, or none"
+            f"<{elements[1].tag}> is there twice",
+            where=place_of(elements[1], where),
+            allowed="one, or none",
         )
 
 
@@ -301,13 +357,23 @@ def _check_entry(owner: Element, entry: Entry, where: str) -> None:
     if text is None and not entry.required:
         return
     words = [] if text is None else text.split()
-    if len(words) == entry.count and all(_is_number(word, entry.largest) for word in words):
+    if len(words) == entry.count and all(
+        _is_number(word, entry.largest) for word in words
+    ):
         return
     tag = entry.path.rsplit("/", 1)[-1]
-    kind = "a finite number" if entry.count == 1 else f"{entry.count} finite numbers separated by spaces"
-    bound = f", at most {entry.largest:g} in size" if math.isfinite(entry.largest) else ""
+    kind = (
+        "a finite number"
+        if entry.count == 1
+        else f"{entry.count} finite numbers separated by spaces"
+    )
+    bound = (
+        f", at most {entry.largest:g} in size" if math.isfinite(entry.largest) else ""
+    )
     raise UrdfError(
-        f"<{tag} {entry.attribute}> is missing" if text is None else f"<{tag} {entry.attribute}> is wrong",
+        f"<{tag} {entry.attribute}> is missing"
+        if text is None
+        else f"<{tag} {entry.attribute}> is wrong",
         where=place_of(elements[0], where),
         found=None if text is None else f'{entry.attribute}="{text}"',
         allowed=f"{kind}, {entry.unit}{bound}",
@@ -316,7 +382,11 @@ def _check_entry(owner: Element, entry: Entry, where: str) -> None:
 
 
 def _is_number(word: str, largest: float) -> bool:
-    return _NUMBER.fullmatch(word) is not None and math.isfinite(float(word)) and abs(float(word)) <= largest
+    return (
+        _NUMBER.fullmatch(word) is not None
+        and math.isfinite(float(word))
+        and abs(float(word)) <= largest
+    )
 
 
 def _instead(text: str, entry: Entry) -> str | None:
@@ -324,7 +394,9 @@ def _instead(text: str, entry: Entry) -> str | None:
     spaced = text.replace(",", " ").replace(";", " ").split()
     pointed = text.replace(",", ".").split()
     for words in (spaced, pointed):
-        if len(words) == entry.count and all(_is_number(word, entry.largest) for word in words):
+        if len(words) == entry.count and all(
+            _is_number(word, entry.largest) for word in words
+        ):
             return f'Write {entry.attribute}="{" ".join(words)}"'
     bare = [match.group() for match in _NUMBER.finditer(text)]
     if len(bare) == entry.count:

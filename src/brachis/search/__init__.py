@@ -6,7 +6,14 @@ from brachis.search.phase_plane import first_breaks, first_point
 from brachis.search.portfolio import Stages, find_fastest, is_planned
 from brachis.search.record import Record
 from brachis.search.remedies import try_remedies
-from brachis.search.solving import MARGINS, best_of_joints, continued, eased, solve_with, solved_in_chart
+from brachis.search.solving import (
+    MARGINS,
+    best_of_joints,
+    continued,
+    eased,
+    solve_with,
+    solved_in_chart,
+)
 
 __all__ = [
     "GIVEN",

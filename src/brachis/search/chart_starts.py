@@ -20,7 +20,14 @@ from brachis.search.levels import SEARCH_LEVELS, SearchLevel
 from brachis.search.phase_plane import least_time
 from brachis.search.posture_lattice import PostureLattice
 from brachis.search.screening import screened
-from brachis.search.starts import PIECES, fine_places, joint_space_start, lattice_starts, smoothed, varied
+from brachis.search.starts import (
+    PIECES,
+    fine_places,
+    joint_space_start,
+    lattice_starts,
+    smoothed,
+    varied,
+)
 from brachis.search.too_fast import refuse_hopeless_speeds
 
 _FINER = 2
@@ -74,25 +81,42 @@ def chart_starts(
     if not found:
         return []
     newton = Newton(problem.task_map)
-    named = [(_origin(number, joint_path), joint_path) for number, joint_path in enumerate(found, 1)]
+    named = [
+        (_origin(number, joint_path), joint_path)
+        for number, joint_path in enumerate(found, 1)
+    ]
     if problem.robot.n - problem.task_map.m > 1 and level.in_charts > 1:
-        more = varied(found, _AT_LEAST * level.in_charts - len(found), problem.task.search.seed)
-        named += [(f"varied {number}", joint_path) for number, joint_path in enumerate(more, 1)]
+        more = varied(
+            found, _AT_LEAST * level.in_charts - len(found), problem.task.search.seed
+        )
+        named += [
+            (f"varied {number}", joint_path)
+            for number, joint_path in enumerate(more, 1)
+        ]
     starts = (
         None if number and deadline.passed else _start_along(newton, joint_path, origin)
         for number, (origin, joint_path) in enumerate(named)
     )
-    ranked = sorted((start for start in starts if start is not None), key=lambda start: start.estimate)
+    ranked = sorted(
+        (start for start in starts if start is not None),
+        key=lambda start: start.estimate,
+    )
     if not ranked and not deadline.passed:
         return DeadEnd(0.0, {NO_CHART: len(named)})
     check_holding(ranked)
     refuse_hopeless_speeds(ranked)
-    hopeful = [start for start in ranked if start.estimate <= _HOPELESS * ranked[0].estimate or start is ranked[0]]
+    hopeful = [
+        start
+        for start in ranked
+        if start.estimate <= _HOPELESS * ranked[0].estimate or start is ranked[0]
+    ]
     return screened(hopeful, level.in_charts, deadline, listener) if hopeful else []
 
 
 def _origin(number: int, joint_path: JointPath) -> str:
-    return f"lattice {number}" + (f", from {joint_path.seed}" if joint_path.seed else "")
+    return f"lattice {number}" + (
+        f", from {joint_path.seed}" if joint_path.seed else ""
+    )
 
 
 def _start_along(newton: Newton, joint_path: JointPath, origin: str) -> Start | None:
@@ -114,10 +138,14 @@ def _start_along(newton: Newton, joint_path: JointPath, origin: str) -> Start | 
     return None
 
 
-def _followed(newton: Newton, joint_path: JointPath, places: np.ndarray, pieces: int | None) -> np.ndarray | None:
+def _followed(
+    newton: Newton, joint_path: JointPath, places: np.ndarray, pieces: int | None
+) -> np.ndarray | None:
     """Postures (S, n) on the path nearest to a smoothed joint path; `pieces` None: to the joint path as it is."""
     if pieces is None:
-        q = np.column_stack([np.interp(places, joint_path.s, joint) for joint in joint_path.q.T])
+        q = np.column_stack(
+            [np.interp(places, joint_path.s, joint) for joint in joint_path.q.T]
+        )
     else:
         q = smoothed(joint_path.s, joint_path.q, places, pieces)
     q = newton.nearest(joint_path.problem.path.sample(places).target, q)
@@ -125,11 +153,16 @@ def _followed(newton: Newton, joint_path: JointPath, places: np.ndarray, pieces:
     for place, posture in zip((0, -1), given, strict=True):
         if posture is not None:
             q[place] = posture
-    follows = np.isfinite(q).all() and np.abs(np.diff(q, axis=0)).max(initial=0.0) <= LARGEST_STEP
+    follows = (
+        np.isfinite(q).all()
+        and np.abs(np.diff(q, axis=0)).max(initial=0.0) <= LARGEST_STEP
+    )
     return q if follows else None
 
 
-def first_map(problem: Problem, decompositions: Sequence[Decomposition]) -> tuple[PathMap, str]:
+def first_map(
+    problem: Problem, decompositions: Sequence[Decomposition]
+) -> tuple[PathMap, str]:
     """Return a joint map of the problem, of a closed form where there is one, and its family.
 
     It begins at the given start posture, or where that is free at that of the first joint path.
@@ -153,5 +186,5 @@ def first_map(problem: Problem, decompositions: Sequence[Decomposition]) -> tupl
     )
     if isinstance(found, DeadEnd):
         raise PathError(f"no joint path was found: {found}", s_interval=found.interval)
-    assert found  # noqa: S101  (there is no time limit here)
+    assert found
     return found[0].joint_map, found[0].family

@@ -52,7 +52,12 @@ class Cells:
     window: int
 
     @classmethod
-    def of(cls, decomposition: Decomposition, cells_per_turn: int, posture: np.ndarray | None) -> Cells:
+    def of(
+        cls,
+        decomposition: Decomposition,
+        cells_per_turn: int,
+        posture: np.ndarray | None,
+    ) -> Cells:
         """Lay out the cells of a choice of redundant joints.
 
         The posture, (n,), from which joint paths begin is the middle of a cell. Where none is given, the cells cover
@@ -61,19 +66,37 @@ class Cells:
         """
         given, joints = decomposition.problem, list(decomposition.redundant)
         turning = given.robot.revolute[joints]
-        low, high = given.robot.limits.position_lower[joints], given.robot.limits.position_upper[joints]
+        low, high = (
+            given.robot.limits.position_lower[joints],
+            given.robot.limits.position_upper[joints],
+        )
         size = cell_sizes(turning, cells_per_turn)
         if posture is not None:
             origin = posture[joints]
         else:
-            places = [0.0 if turns else _nearby(given, joint) for joint, turns in zip(joints, turning, strict=True)]
+            places = [
+                0.0 if turns else _nearby(given, joint)
+                for joint, turns in zip(joints, turning, strict=True)
+            ]
             origin = np.clip(places, low, high)
         closed = np.isfinite(low) & np.isfinite(high)
         reach = np.where(turning, 0.5 * TURN, _REACH + given.path.length)
         reach = np.where(closed, np.maximum(reach, _FAR), reach)
-        lowest, highest = np.maximum(low, origin - reach), np.minimum(high, origin + reach)
-        first, last = np.ceil((lowest - origin) / size), np.floor((highest - origin) / size)
-        return cls(origin, size, first.astype(int), last.astype(int), round(_WINDOW * cells_per_turn))
+        lowest, highest = (
+            np.maximum(low, origin - reach),
+            np.minimum(high, origin + reach),
+        )
+        first, last = (
+            np.ceil((lowest - origin) / size),
+            np.floor((highest - origin) / size),
+        )
+        return cls(
+            origin,
+            size,
+            first.astype(int),
+            last.astype(int),
+            round(_WINDOW * cells_per_turn),
+        )
 
     @property
     def r(self) -> int:
@@ -102,9 +125,16 @@ class Cells:
             return np.zeros((1, 0), dtype=int)
         if self.r == 1:
             return np.arange(-self.window, self.window + 1)[:, None]
-        single = [sign * step * row for row in np.eye(self.r, dtype=int) for step in _SINGLE for sign in (-1, 1)]
+        single = [
+            sign * step * row
+            for row in np.eye(self.r, dtype=int)
+            for step in _SINGLE
+            for sign in (-1, 1)
+        ]
         random = np.rint(rng.normal(0.0, _SPREAD, (_RANDOM, self.r))).astype(int)
-        return np.unique(np.vstack([np.zeros((1, self.r), dtype=int), single, random]), axis=0)
+        return np.unique(
+            np.vstack([np.zeros((1, self.r), dtype=int), single, random]), axis=0
+        )
 
 
 def cell_sizes(revolute: np.ndarray, cells_per_turn: int) -> np.ndarray:
@@ -126,9 +156,13 @@ def _nearby(given: Problem, joint: int) -> float:
     q = np.zeros(given.robot.n)
     there = np.array(given.robot.tool_placement(q).translation)
     q[joint] = 1.0
-    axis = (np.array(given.robot.tool_placement(q).translation) - there)[list(given.task_map.axes)]
+    axis = (np.array(given.robot.tool_placement(q).translation) - there)[
+        list(given.task_map.axes)
+    ]
     wanted = given.path.sample(np.zeros(1)).target[0, : len(given.task_map.axes)]
-    return float(axis @ (wanted - there[list(given.task_map.axes)]) / max(axis @ axis, 1e-12))
+    return float(
+        axis @ (wanted - there[list(given.task_map.axes)]) / max(axis @ axis, 1e-12)
+    )
 
 
 _CLEAR = 0.02
@@ -159,20 +193,26 @@ class ClosedFormLattice(Lattice):
     ) -> None:
         given = decomposition.problem
         self._redundant = list(decomposition.redundant)
-        self._rest = np.array(complement(given.robot.n, decomposition.redundant), dtype=int)
+        self._rest = np.array(
+            complement(given.robot.n, decomposition.redundant), dtype=int
+        )
         turning = given.robot.revolute & np.isin(np.arange(given.robot.n), self._rest)
-        super().__init__(given, turning, density=density, nodes=nodes, seed=seed, deadline=deadline)
+        super().__init__(
+            given, turning, density=density, nodes=nodes, seed=seed, deadline=deadline
+        )
         self.decomposition, self._solver = decomposition, decomposition.match.solver
         self._turns = np.flatnonzero(turning)
         self._cells = Cells.of(decomposition, cells_per_turn, self._origin)
         self._clear = _CLEAR
         if self._origin is not None:
-            at_origin = self._solver.branch_margins(self._origin[None], decomposition.branches[0])[0]
+            at_origin = self._solver.branch_margins(
+                self._origin[None], decomposition.branches[0]
+            )[0]
             self._clear = float(np.minimum(_CLEAR, 0.5 * at_origin.min(initial=np.inf)))
 
     def _at_end(self, last: Layer) -> np.ndarray:
         """See `Lattice`: the motion ends in another posture of the end's cell, from which the plan goes on to it."""
-        assert self.problem.end is not None  # noqa: S101
+        assert self.problem.end is not None
         allowed = np.full(self._robot.n, LARGEST_STEP)
         allowed[self._redundant] = self._cells.size
         return np.asarray(np.all(np.abs(last.q - self.problem.end) <= allowed, axis=1))
@@ -182,7 +222,15 @@ class ClosedFormLattice(Lattice):
         r = self._cells.r
         if self._origin is not None:
             none, q = np.zeros(1, dtype=int), self._origin[None].astype(float)
-            return Layer(np.zeros((1, r), dtype=int), none + self.decomposition.branches[0], q, q, q, np.zeros(1), none)
+            return Layer(
+                np.zeros((1, r), dtype=int),
+                none + self.decomposition.branches[0],
+                q,
+                q,
+                q,
+                np.zeros(1),
+                none,
+            )
         cells = self._cells.everywhere(_STARTS * self._nodes, rng)
         answers = self._answers(cells, 0)[:, self.decomposition.branches]
         which, branch, alternative = np.nonzero(np.isfinite(answers).all(axis=3))
@@ -195,7 +243,11 @@ class ClosedFormLattice(Lattice):
         inside = within.all(axis=1)
         if not inside.any():
             return beyond_ranges(self._robot, within)
-        cell, branch, q = cells[which[inside]], np.array(self.decomposition.branches)[branch[inside]], q[inside]
+        cell, branch, q = (
+            cells[which[inside]],
+            np.array(self.decomposition.branches)[branch[inside]],
+            q[inside],
+        )
         nothing = np.zeros(len(q))
         return self._kept(Layer(cell, branch, q, q, q, nothing, nothing.astype(int)))
 
@@ -204,19 +256,25 @@ class ClosedFormLattice(Lattice):
         target = np.repeat(self._targets[station][None], len(cells), axis=0)
         return self._solver.solve(target, self._cells.positions(cells))
 
-    def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    def _edges(
+        self, before: Layer, station: int, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Pairs of parents, (E,), and cells, (E, r), that may be joined; at the very end the given end's, too."""
         offsets = self._cells.neighbours(rng)
         parent = np.repeat(np.arange(len(before.branch)), len(offsets))
         edges = before.cell[parent] + np.tile(offsets, (len(before.branch), 1))
         end = self.problem.end
         if self._to_end and end is not None and station == len(self.s) - 1:
-            aim = np.tile(self._cells.near(end[self._redundant]), (len(before.branch), 1))
+            aim = np.tile(
+                self._cells.near(end[self._redundant]), (len(before.branch), 1)
+            )
             parent = np.append(parent, np.arange(len(before.branch)))
             edges = np.vstack([edges, aim])
         return parent, edges
 
-    def _next(self, before: Layer, station: int, rng: np.random.Generator) -> Layer | dict[str, int]:
+    def _next(
+        self, before: Layer, station: int, rng: np.random.Generator
+    ) -> Layer | dict[str, int]:
         """Join the nodes of a layer to the next station, or say why none can be."""
         parent, edges = self._edges(before, station, rng)
         cells, where = unique(edges)
@@ -232,19 +290,33 @@ class ClosedFormLattice(Lattice):
         turn = -np.round(step[:, self._turns] / TURN)
         step[:, self._turns] += TURN * turn
         q = before.q[parent] + step
-        low, high = np.minimum(before.low[parent], q), np.maximum(before.high[parent], q)
+        low, high = (
+            np.minimum(before.low[parent], q),
+            np.maximum(before.high[parent], q),
+        )
         found = exists[where, branch, alternative]
         with np.errstate(invalid="ignore"):
             inside = self._inside(low, high)
             near = np.all(np.abs(step) <= LARGEST_STEP, axis=1)
         good = found & inside.all(axis=1) & near
         if not good.any():
-            return causes_of(self._robot, exists.any(axis=(1, 2))[where], found, inside, near)
+            return causes_of(
+                self._robot, exists.any(axis=(1, 2))[where], found, inside, near
+            )
         parent, where, step = parent[good], where[good], step[good]
         length = before.length[parent] + self._lengths(before.q, step, parent)
-        layer = Layer(cells[where], branch[good], q[good], low[good], high[good], length, parent)
+        layer = Layer(
+            cells[where], branch[good], q[good], low[good], high[good], length, parent
+        )
         turn = np.where(self._telling[self._turns], turn[good], 0.0)
-        return self._kept(layer[shortest(length, np.column_stack([where, layer.branch, alternative[good], turn]))])
+        return self._kept(
+            layer[
+                shortest(
+                    length,
+                    np.column_stack([where, layer.branch, alternative[good], turn]),
+                )
+            ]
+        )
 
     def _kept(self, layer: Layer) -> Layer | dict[str, int]:
         """Keep nodes clear of the branch boundary that can be held against gravity, not too many of them."""
@@ -255,6 +327,14 @@ class ClosedFormLattice(Lattice):
             clear[own] = margins.min(axis=1, initial=np.inf) >= self._clear
         held, refused = self._held(layer.q[clear])
         if not held.any():
-            return refused | ({OTHER_BRANCH: int((~clear).sum())} if not clear.all() else {})
+            return refused | (
+                {OTHER_BRANCH: int((~clear).sum())} if not clear.all() else {}
+            )
         kept = layer[np.flatnonzero(clear)[held]]
-        return kept if self._cells.r <= 1 else kept.bounded(self._nodes, kept.length, self._robot, self.problem.limits)
+        return (
+            kept
+            if self._cells.r <= 1
+            else kept.bounded(
+                self._nodes, kept.length, self._robot, self.problem.limits
+            )
+        )

@@ -58,7 +58,9 @@ STRATEGIES = (
 )
 
 
-def differential_ik_paths(joint_map: ClosedFormMap, deadline: Deadline = NEVER) -> Iterator[np.ndarray]:
+def differential_ik_paths(
+    joint_map: ClosedFormMap, deadline: Deadline = NEVER
+) -> Iterator[np.ndarray]:
     """Yield joint paths one after the other; where the first one comes near a branch boundary, the roomiest ones first.
 
     Parameters
@@ -74,7 +76,9 @@ def differential_ik_paths(joint_map: ClosedFormMap, deadline: Deadline = NEVER) 
     """
     strategies = STRATEGIES if joint_map.r else STRATEGIES[:1]
     joint_paths = (
-        differential_ik_path(joint_map, strategy, deadline) for strategy in strategies if not deadline.passed
+        differential_ik_path(joint_map, strategy, deadline)
+        for strategy in strategies
+        if not deadline.passed
     )
     found = (joint_path for joint_path in joint_paths if joint_path is not None)
     first = next(found, None)
@@ -84,7 +88,9 @@ def differential_ik_paths(joint_map: ClosedFormMap, deadline: Deadline = NEVER) 
         yield first
         yield from found
     else:
-        yield from sorted((first, *found), key=lambda joint_path: -_room(joint_map, joint_path))
+        yield from sorted(
+            (first, *found), key=lambda joint_path: -_room(joint_map, joint_path)
+        )
 
 
 def _room(joint_map: ClosedFormMap, joint_path: np.ndarray) -> float:
@@ -95,7 +101,9 @@ def _room(joint_map: ClosedFormMap, joint_path: np.ndarray) -> float:
     return float(joint_map.branch_margins(q).min(initial=np.inf))
 
 
-def differential_ik_path(joint_map: ClosedFormMap, strategy: Strategy, deadline: Deadline = NEVER) -> np.ndarray | None:
+def differential_ik_path(
+    joint_map: ClosedFormMap, strategy: Strategy, deadline: Deadline = NEVER
+) -> np.ndarray | None:
     """Redundant joints along the path by numeric inverse kinematics from the start posture.
 
     Near a branch boundary the posture is unfolded first, while the tool stays where it is: there any motion of the tool
@@ -114,14 +122,21 @@ def differential_ik_path(joint_map: ClosedFormMap, strategy: Strategy, deadline:
     """
     if joint_map.r == 0:
         return np.array([[0.0], [1.0]])
-    steps = int(np.clip(np.ceil(joint_map.path.length / _STEP_LENGTH), _FEWEST_STEPS, _MOST_STEPS))
+    steps = int(
+        np.clip(
+            np.ceil(joint_map.path.length / _STEP_LENGTH), _FEWEST_STEPS, _MOST_STEPS
+        )
+    )
     s = np.linspace(0.0, 1.0, steps + 1)
     targets = joint_map.path.sample(s).target
     q = joint_map.start.astype(float)
     previous = np.zeros_like(q)
     joint_path = [np.append(0.0, q[joint_map.redundant])]
     for _ in range(_UNFOLDING_STEPS):
-        if joint_map.branch_margins(q[None]).min(initial=1.0) > 0.5 * strategy.threshold:
+        if (
+            joint_map.branch_margins(q[None]).min(initial=1.0)
+            > 0.5 * strategy.threshold
+        ):
             break
         moved = _follow(joint_map, strategy, q, previous, targets[0], step_s=None)
         if moved is None or deadline.passed:
@@ -153,7 +168,7 @@ def _follow(
     task_map = joint_map.task_map
     for correction in range(_CORRECTIONS):
         miss = task_map.difference(target, task_map.value(q))
-        if correction and np.abs(miss).max() < 1e-3:  # noqa: PLR2004  (the closed form takes it from here)
+        if correction and np.abs(miss).max() < 1e-3:
             return q, previous
         jacobian = task_map.jacobian(task_map.twists(q[None]))[0]
         square = jacobian @ jacobian.T + _DAMPING * np.eye(len(miss))
@@ -170,7 +185,9 @@ def _follow(
     return None
 
 
-def _wish(joint_map: ClosedFormMap, strategy: Strategy, q: np.ndarray, previous: np.ndarray) -> np.ndarray:
+def _wish(
+    joint_map: ClosedFormMap, strategy: Strategy, q: np.ndarray, previous: np.ndarray
+) -> np.ndarray:
     """Joint motion per unit s that the null space may realise, (n,)."""
     limits = joint_map.robot.limits
     wish = np.zeros_like(q)
@@ -189,6 +206,8 @@ def _wish(joint_map: ClosedFormMap, strategy: Strategy, q: np.ndarray, previous:
         middle = limits.position_lower[ranged] + 0.5 * stroke[ranged]
         wish[ranged] += strategy.centre * (middle - q[ranged])
     if strategy.drift:
-        direction = previous if previous.any() else np.eye(len(q))[joint_map.redundant[0]]
+        direction = (
+            previous if previous.any() else np.eye(len(q))[joint_map.redundant[0]]
+        )
         wish += strategy.drift * direction / np.linalg.norm(direction)
     return wish

@@ -66,8 +66,12 @@ def reason_out_of_reach(
     found = _answers_along(joint_map, s, deadline, opened=False)
     if found is None:
         return _NO_TIME
-    branches = slice(None) if any_branch else slice(joint_map.branch, joint_map.branch + 1)
-    own = _Answers(*(part[:, :, branches] for part in (found.q, found.exists, found.inside)))
+    branches = (
+        slice(None) if any_branch else slice(joint_map.branch, joint_map.branch + 1)
+    )
+    own = _Answers(
+        *(part[:, :, branches] for part in (found.q, found.exists, found.inside))
+    )
     # Where the redundant joints' ranges leave no answer, wider ones tell whether the ranges or the arm are to blame.
     reached = found.exists.any(axis=(1, 2, 3)).all()
     anywhere = found if reached else _answers_along(joint_map, s, deadline, opened=True)
@@ -109,8 +113,13 @@ def reason_out_of_reach(
     )
     for possible, problem, hint, remedies in reasons:
         if not possible.all():
-            first, last = float(s[int(np.argmin(possible))]), float(s[np.flatnonzero(~possible)[-1]])
-            error = PathError(problem.format(first=first), s_interval=(first, last), hint=hint)
+            first, last = (
+                float(s[int(np.argmin(possible))]),
+                float(s[np.flatnonzero(~possible)[-1]]),
+            )
+            error = PathError(
+                problem.format(first=first), s_interval=(first, last), hint=hint
+            )
             return error.with_remedies(*remedies)
     others = f"try {'other redundant joints, ' if joint_map.r else ''}another {given} posture"
     return f"Every point of the path is within reach of this branch, but no joint path through them was found; {others}"
@@ -138,31 +147,51 @@ class _Answers:
         return np.asarray(self.exists & self.inside.all(axis=4))
 
 
-def _answers_along(joint_map: ClosedFormMap, s: np.ndarray, deadline: Deadline, *, opened: bool) -> _Answers | None:
+def _answers_along(
+    joint_map: ClosedFormMap, s: np.ndarray, deadline: Deadline, *, opened: bool
+) -> _Answers | None:
     """Postures that reach stations s, (S,), with random redundant joints, angles turned into their ranges.
 
     None where the time is up.
 
     `opened` takes the ranges of the redundant joints for open ones; otherwise the start posture's are tried as well.
     """
-    robot, redundant, rest = joint_map.robot, joint_map.redundant, joint_map.nonredundant
+    robot, redundant, rest = (
+        joint_map.robot,
+        joint_map.redundant,
+        joint_map.nonredundant,
+    )
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
     turning = robot.revolute
     wide = np.isin(np.arange(robot.n), redundant) & opened
     near = np.clip(joint_map.start, lower, upper)
     low = np.where(turning, -np.pi, near - _FAR)
     high = np.where(turning, np.pi, near + _FAR)
-    low = np.where(np.isfinite(lower) & ~wide, np.where(turning, lower, np.maximum(lower, low)), low)
-    high = np.where(np.isfinite(upper) & ~wide, np.where(turning, upper, np.minimum(upper, high)), high)
+    low = np.where(
+        np.isfinite(lower) & ~wide,
+        np.where(turning, lower, np.maximum(lower, low)),
+        low,
+    )
+    high = np.where(
+        np.isfinite(upper) & ~wide,
+        np.where(turning, upper, np.minimum(upper, high)),
+        high,
+    )
     tries = _SEARCHED * len(redundant) ** 2 if redundant else 1
-    q_r = np.random.default_rng(0).uniform(low[redundant], high[redundant], (tries, len(redundant)))
+    q_r = np.random.default_rng(0).uniform(
+        low[redundant], high[redundant], (tries, len(redundant))
+    )
     if not opened:
         q_r[0] = np.clip(joint_map.start, low, high)[redundant]
     parts = []
-    for targets in np.array_split(joint_map.path.sample(s).target, min(len(s), -(-len(s) * tries // _TOGETHER))):
+    for targets in np.array_split(
+        joint_map.path.sample(s).target, min(len(s), -(-len(s) * tries // _TOGETHER))
+    ):
         if deadline.passed:
             return None
-        answers = joint_map.solver.solve(np.repeat(targets, tries, axis=0), np.tile(q_r, (len(targets), 1)))
+        answers = joint_map.solver.solve(
+            np.repeat(targets, tries, axis=0), np.tile(q_r, (len(targets), 1))
+        )
         answers = answers.reshape(len(targets), tries, *answers.shape[1:])
         postures = np.empty((*answers.shape[:-1], robot.n))
         postures[..., redundant] = q_r[:, None, None]
@@ -182,10 +211,15 @@ def _beyond(joint_map: ClosedFormMap, within: np.ndarray, *found: _Answers) -> s
     if within.all():
         return ""
     station = int(np.argmin(within))
-    q = np.concatenate([answers.q[station][answers.exists[station]] for answers in found])
+    q = np.concatenate(
+        [answers.q[station][answers.exists[station]] for answers in found]
+    )
     if not len(q):
         return ""
-    beyond = np.maximum(np.maximum(robot.limits.position_lower - q, q - robot.limits.position_upper), 0.0)
+    beyond = np.maximum(
+        np.maximum(robot.limits.position_lower - q, q - robot.limits.position_upper),
+        0.0,
+    )
     nearest = beyond[np.argmin(beyond.max(axis=1))]
     joint = int(np.argmax(nearest))
     unit, low, high = (
@@ -199,7 +233,9 @@ def _beyond(joint_map: ClosedFormMap, within: np.ndarray, *found: _Answers) -> s
     )
 
 
-def _allowed(robot: Robot, limit: Limit, found: _Answers) -> tuple[np.ndarray, str, list[Remedy]]:
+def _allowed(
+    robot: Robot, limit: Limit, found: _Answers
+) -> tuple[np.ndarray, str, list[Remedy]]:
     """Tell at which stations a limit allows some posture at rest, (S,) bool; in words what is lacking, and what to do.
 
     What is lacking is told of the station whose best posture is farthest beyond the limit.
@@ -208,7 +244,9 @@ def _allowed(robot: Robot, limit: Limit, found: _Answers) -> tuple[np.ndarray, s
     worst = 0.0
     lack = ""
     remedies: list[Remedy] = []
-    for station, (postures, exist) in enumerate(zip(found.q, found.within, strict=True)):
+    for station, (postures, exist) in enumerate(
+        zip(found.q, found.within, strict=True)
+    ):
         values = limit.values(Moments.at_rest(postures[exist][:_HELD_CHECKS]))
         beyond = limit.violation(values)
         if not len(beyond):
@@ -233,7 +271,9 @@ _SLOWER = 0.7
 
 
 def refuse_what_is_out_of_reach(
-    decompositions: Sequence[Decomposition], candidates: Sequence[Attempt], deadline: Deadline
+    decompositions: Sequence[Decomposition],
+    candidates: Sequence[Attempt],
+    deadline: Deadline,
 ) -> None:
     """Raise the reason where the path is out of reach, so that further attempts would be in vain.
 
@@ -253,7 +293,10 @@ def refuse_what_is_out_of_reach(
     """
     if not decompositions or _some_joint_path(candidates):
         return
-    reasons = [_reason(decomposition, deadline) for decomposition in decompositions[:_LOOKED_AT]]
+    reasons = [
+        _reason(decomposition, deadline)
+        for decomposition in decompositions[:_LOOKED_AT]
+    ]
     clear = [
         (reason.s_interval, reason)
         for reason in reasons
@@ -261,7 +304,9 @@ def refuse_what_is_out_of_reach(
     ]
     if len(clear) < len(reasons):
         return
-    if _lattices(candidates) or all(end - begin > _GOOD_PART for (begin, end), _ in clear):
+    if _lattices(candidates) or all(
+        end - begin > _GOOD_PART for (begin, end), _ in clear
+    ):
         raise max(clear, key=lambda item: item[0][0])[1]
 
 
@@ -290,28 +335,48 @@ def no_motion(
     """
     joint_path = _some_joint_path(candidates)
     search = bool(decompositions) and not joint_path
-    reason = _reason(decompositions[0], deadline) if search else _advice(problem.task, candidates)
+    reason = (
+        _reason(decompositions[0], deadline)
+        if search
+        else _advice(problem.task, candidates)
+    )
     if isinstance(reason, BrachisError):
         return reason
     if dead_ends and not joint_path:
-        name, furthest = min(dead_ends.items(), key=lambda item: np.diff(item[1].interval)[0])
+        name, furthest = min(
+            dead_ends.items(), key=lambda item: np.diff(item[1].interval)[0]
+        )
         own = name if name == ALL_POSTURES else f"redundant joints {name}"
-        others = f" ({own}; the furthest of {len(dead_ends)} lattices)" if len(dead_ends) > 1 else ""
+        others = (
+            f" ({own}; the furthest of {len(dead_ends)} lattices)"
+            if len(dead_ends) > 1
+            else ""
+        )
         start = "" if problem.start is None else "start in another posture, "
         return PathError(
             f"no joint path was found: {furthest}{others}",
             s_interval=furthest.interval,
-            hint=f"{start}shorten or move the path, or widen the joint ranges".capitalize() + _what_is_missing(problem),
+            hint=f"{start}shorten or move the path, or widen the joint ranges".capitalize()
+            + _what_is_missing(problem),
         )
     counts = Counter(candidate.status for candidate in candidates)
-    outcomes = "; ".join(status if n == 1 else f"{status} ({n} times)" for status, n in counts.items())
+    outcomes = "; ".join(
+        status if n == 1 else f"{status} ({n} times)" for status, n in counts.items()
+    )
     along = " along any joint path" if joint_path else ""
     error = PlanningError(
         f"no motion within the limits was found{along}: {outcomes or 'no initial guess'}",
         hint=reason + _what_is_missing(problem),
     )
-    ends = {f"boundary.{key}": getattr(problem.task.boundary, key) for key in ("start_speed", "end_speed")}
-    remedies = [Remedy(key, speed, _SLOWER * speed, problem.task.speed_unit) for key, speed in ends.items() if speed]
+    ends = {
+        f"boundary.{key}": getattr(problem.task.boundary, key)
+        for key in ("start_speed", "end_speed")
+    }
+    remedies = [
+        Remedy(key, speed, _SLOWER * speed, problem.task.speed_unit)
+        for key, speed in ends.items()
+        if speed
+    ]
     return error.with_remedies(*remedies)
 
 
@@ -326,11 +391,20 @@ def _advice(task: Task, candidates: Sequence[Attempt]) -> str:
     statuses = " ".join(candidate.status for candidate in candidates)
     few = SolverSettings.model_fields
     tried = []
-    if "iteration limit" in statuses and task.solver.max_iterations < few["max_iterations"].default:
-        tried.append(f"raise solver.max_iterations, which is {task.solver.max_iterations}")
+    if (
+        "iteration limit" in statuses
+        and task.solver.max_iterations < few["max_iterations"].default
+    ):
+        tried.append(
+            f"raise solver.max_iterations, which is {task.solver.max_iterations}"
+        )
     if "time limit" in statuses:
-        name = "solver" if task.solver.time_limit < few["time_limit"].default else "search"
-        tried.append(f"raise {name}.time_limit, which is {getattr(task, name).time_limit:g} s")
+        name = (
+            "solver" if task.solver.time_limit < few["time_limit"].default else "search"
+        )
+        tried.append(
+            f"raise {name}.time_limit, which is {getattr(task, name).time_limit:g} s"
+        )
     if not tried and task.search.effort != _MOST_EFFORT:
         tried.append(f"raise search.effort, which is {task.search.effort}")
     if not tried:
@@ -348,7 +422,9 @@ def _what_is_missing(problem: Problem) -> str:
 
 
 def _lattices(candidates: Sequence[Attempt]) -> list[Attempt]:
-    return [candidate for candidate in candidates if candidate.origin.startswith("lattice")]
+    return [
+        candidate for candidate in candidates if candidate.origin.startswith("lattice")
+    ]
 
 
 def _some_joint_path(candidates: Sequence[Attempt]) -> bool:

@@ -34,7 +34,9 @@ GIVEN = "given motion"
 _TIMES = 401
 
 
-def given_start(problem: Problem, decompositions: Sequence[Decomposition], motion: Trajectory) -> Start | str:
+def given_start(
+    problem: Problem, decompositions: Sequence[Decomposition], motion: Trajectory
+) -> Start | str:
     """Make a start of a known motion.
 
     Parameters
@@ -55,7 +57,9 @@ def given_start(problem: Problem, decompositions: Sequence[Decomposition], motio
     s = np.clip(motion.path_coordinate(t), 0.0, 1.0)
     s[[0, -1]] = 0.0, 1.0
     try:
-        joint_map, curves, family = _in_coordinates(problem, decompositions, motion, s, motion.position(t))
+        joint_map, curves, family = _in_coordinates(
+            problem, decompositions, motion, s, motion.position(t)
+        )
         reached = np.isfinite(joint_map.postures(curves)).all()
     except UnreachableError as error:
         return str(error)
@@ -65,7 +69,11 @@ def given_start(problem: Problem, decompositions: Sequence[Decomposition], motio
 
 
 def _in_coordinates(
-    problem: Problem, decompositions: Sequence[Decomposition], motion: Trajectory, s: np.ndarray, q: np.ndarray
+    problem: Problem,
+    decompositions: Sequence[Decomposition],
+    motion: Trajectory,
+    s: np.ndarray,
+    q: np.ndarray,
 ) -> tuple[PathMap, np.ndarray, str]:
     """Joint map, its curves (S, 1 + r), and family, for path coordinates (S,) and postures (S, n)."""
     if isinstance(problem.task_map, JointSpace):
@@ -74,19 +82,40 @@ def _in_coordinates(
     if charts_allowed(problem, decompositions):
         chart = _chart(problem, motion, s, q)
         return chart, chart.curves(s, q), CHART
-    same = [each for each in decompositions if each.match.redundant_joints == motion.redundant_joints]
+    same = [
+        each
+        for each in decompositions
+        if each.match.redundant_joints == motion.redundant_joints
+    ]
     chosen = (same or list(decompositions))[0]
     labels = chosen.match.solver.branches
-    branch = next((each for each in chosen.branches if labels[each] == motion.branch), chosen.branches[0])
-    return chosen.joint_map(q[0], branch), np.column_stack([s, q[:, list(chosen.redundant)]]), chosen.match.family
+    branch = next(
+        (each for each in chosen.branches if labels[each] == motion.branch),
+        chosen.branches[0],
+    )
+    return (
+        chosen.joint_map(q[0], branch),
+        np.column_stack([s, q[:, list(chosen.redundant)]]),
+        chosen.match.family,
+    )
 
 
-def _chart(problem: Problem, motion: Trajectory, s: np.ndarray, q: np.ndarray) -> ChartMap:
+def _chart(
+    problem: Problem, motion: Trajectory, s: np.ndarray, q: np.ndarray
+) -> ChartMap:
     """Lay a chart around postures, with the motion's own rows where these do for it."""
     robot, names = problem.robot, motion.redundant_joints
     selected = np.eye(robot.n)[[robot.joint_names.index(name) for name in names]]
-    saved = ChartRows.of_arrays(motion.chart_rows, motion.chart_knots) if len(motion.chart_rows) else None
-    own = saved or (ChartRows.constant(selected) if len(names) == robot.n - problem.task_map.m else None)
+    saved = (
+        ChartRows.of_arrays(motion.chart_rows, motion.chart_knots)
+        if len(motion.chart_rows)
+        else None
+    )
+    own = saved or (
+        ChartRows.constant(selected)
+        if len(names) == robot.n - problem.task_map.m
+        else None
+    )
     if own is not None:
         null = null_spaces(Newton(problem.task_map).placed(q)[1])
         if transversality(own.at(s)[0], null).min() < SELECTABLE:
@@ -102,7 +131,9 @@ def _on_path(problem: Problem, s: np.ndarray, q: np.ndarray) -> np.ndarray:
     UnreachableError
     """
     given = problem.start, problem.end
-    ends = [own if one is None else one for one, own in zip(given, q[[0, -1]], strict=True)]
+    ends = [
+        own if one is None else one for one, own in zip(given, q[[0, -1]], strict=True)
+    ]
     q = q + np.outer(1.0 - s, ends[0] - q[0]) + np.outer(s, ends[1] - q[-1])
     if problem.robot.n >= problem.task_map.m:
         q = Newton(problem.task_map).nearest(problem.path.sample(s).target, q)

@@ -31,13 +31,21 @@ def check_holding(starts: Sequence[Start]) -> None:
     if not starts:
         return
     problem = starts[0].problem
-    rubs = bool((problem.robot.friction.viscous + problem.robot.friction.coulomb > 0.0).any())
-    error = None if rubs or any(problem.end_rates) else explain_holding(starts, everywhere=True)
+    rubs = bool(
+        (problem.robot.friction.viscous + problem.robot.friction.coulomb > 0.0).any()
+    )
+    error = (
+        None
+        if rubs or any(problem.end_rates)
+        else explain_holding(starts, everywhere=True)
+    )
     if error is not None:
         raise error
 
 
-def explain_holding(starts: Sequence[Start], *, everywhere: bool = False) -> PlanningError | None:
+def explain_holding(
+    starts: Sequence[Start], *, everywhere: bool = False
+) -> PlanningError | None:
     """Tell which limit of a mean leaves too little for holding the arm along all joint paths; None: none does.
 
     Parameters
@@ -48,7 +56,9 @@ def explain_holding(starts: Sequence[Start], *, everywhere: bool = False) -> Pla
     """
     found: tuple[float, Limit, int, np.ndarray, float] | None = None
     for start in starts:
-        q = start.joint_map.postures(along(start.joint_path, np.linspace(0.0, 1.0, _STATIONS)))
+        q = start.joint_map.postures(
+            along(start.joint_path, np.linspace(0.0, 1.0, _STATIONS))
+        )
         if not np.isfinite(q).all():
             continue
         worst: tuple[float, Limit, int, np.ndarray, float] | None = None
@@ -56,11 +66,20 @@ def explain_holding(starts: Sequence[Start], *, everywhere: bool = False) -> Pla
             if limit.where != "whole":
                 continue
             values = limit.values(Moments.at_rest(q))
-            ratios, means = np.abs(limit.ratio(values)), np.abs(limit.ratio(values.mean(axis=0, keepdims=True)))[0]
+            ratios, means = (
+                np.abs(limit.ratio(values)),
+                np.abs(limit.ratio(values.mean(axis=0, keepdims=True)))[0],
+            )
             measure = ratios.min(axis=0) if everywhere else means
             column = int(np.argmax(measure))
             if worst is None or measure[column] > worst[0]:
-                worst = float(measure[column]), limit, column, ratios[:, column], float(means[column])
+                worst = (
+                    float(measure[column]),
+                    limit,
+                    column,
+                    ratios[:, column],
+                    float(means[column]),
+                )
         if worst is None:
             return None
         if found is None or worst[0] < found[0]:
@@ -71,12 +90,18 @@ def explain_holding(starts: Sequence[Start], *, everywhere: bool = False) -> Pla
     return _error(starts[0], limit, column, ratios, mean)
 
 
-def _error(start: Start, limit: Limit, column: int, ratios: np.ndarray, mean: float) -> PlanningError:
+def _error(
+    start: Start, limit: Limit, column: int, ratios: np.ndarray, mean: float
+) -> PlanningError:
     """Make the error that names the limit."""
     label = limit.labels[column]
     figure = next(bound.figure for bound in limit.bounds if bound.column == column)
     low, high = figure * ratios.min(), figure * ratios.max()
-    taken = f"{low:.4g} to {high:.4g} {label.unit}" if f"{low:.4g}" != f"{high:.4g}" else f"{low:.4g} {label.unit}"
+    taken = (
+        f"{low:.4g} to {high:.4g} {label.unit}"
+        if f"{low:.4g}" != f"{high:.4g}"
+        else f"{low:.4g} {label.unit}"
+    )
     return PlanningError(
         f"the {label.kind} limit of {label.subject!r} is too low to hold the arm against gravity along the path",
         where=label.key or limit.name,

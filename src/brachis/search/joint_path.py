@@ -74,7 +74,11 @@ class DeadEnd:
 
     def __str__(self) -> str:
         """Return the place and its first cause, in words."""
-        place = f"back from the end posture, at s = {self.s:.3g}" if self.backwards else f"from s = {self.s:.3g} on"
+        place = (
+            f"back from the end posture, at s = {self.s:.3g}"
+            if self.backwards
+            else f"from s = {self.s:.3g} on"
+        )
         return f"{place} {next(iter(self.causes))}"
 
 
@@ -107,7 +111,9 @@ def distinct(joint_paths: Sequence[JointPath], most: int) -> list[JointPath]:
     while len(chosen) < min(most, len(joint_paths)):
         chosen.append(best)
         apart = (np.abs(q - q[best]) * weights).max(axis=(1, 2))
-        distance = np.minimum(distance, np.where(branches == branches[best], apart, np.inf))
+        distance = np.minimum(
+            distance, np.where(branches == branches[best], apart, np.inf)
+        )
         best = int(np.argmax(distance / (length + _TINY)))
         if distance[best] <= _APART * distance[np.isfinite(distance)].max(initial=0.0):
             break
@@ -125,7 +131,11 @@ def weights_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> np.nda
 
 
 def causes_of(
-    robot: Robot, anywhere: np.ndarray, found: np.ndarray, inside: np.ndarray, near: np.ndarray
+    robot: Robot,
+    anywhere: np.ndarray,
+    found: np.ndarray,
+    inside: np.ndarray,
+    near: np.ndarray,
 ) -> dict[str, int]:
     """Count why edges, (E,), are impossible, those first that came nearest to being possible.
 
@@ -146,4 +156,6 @@ def beyond_ranges(robot: Robot, inside: np.ndarray) -> dict[str, int]:
     outside = int((~inside.all(axis=1)).sum())
     if not outside:
         return {}
-    return {f"the range of joint {robot.joint_names[int(np.argmin(inside.sum(axis=0)))]!r} ends": outside}
+    return {
+        f"the range of joint {robot.joint_names[int(np.argmin(inside.sum(axis=0)))]!r} ends": outside
+    }

@@ -70,7 +70,9 @@ class Layer:
         """Return some of the nodes, by index or mask."""
         return Layer(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
-    def bounded(self, most: int, cost: np.ndarray, robot: Robot, limits: Sequence[Limit]) -> Layer:
+    def bounded(
+        self, most: int, cost: np.ndarray, robot: Robot, limits: Sequence[Limit]
+    ) -> Layer:
         """Keep `most` nodes: half of them of least `cost`, (K,), the others far from each other and from those."""
         if len(self.branch) <= most:
             return self
@@ -79,7 +81,9 @@ class Layer:
         nearest, others = self[order[:half]], self[order[half:]]
         weights = weights_near(robot, limits, self.q[order[0]])
         chosen = farthest(others.q * weights, nearest.q * weights, most - half)
-        return self[np.sort(np.concatenate([order[:half], order[half:][np.unique(chosen)]]))]
+        return self[
+            np.sort(np.concatenate([order[:half], order[half:][np.unique(chosen)]]))
+        ]
 
 
 def farthest(places: np.ndarray, kept: np.ndarray, count: int) -> list[int]:
@@ -165,9 +169,14 @@ class Lattice(ABC):
         self._origin = problem.end if self._backwards else problem.start
         self._targets = problem.path.sample(self.s).target
         # In which turn the angles of a free origin are is open until the joint path is known.
-        self._static = [limit for limit in problem.limits if limit.static and not limit.whole_turns]
+        self._static = [
+            limit for limit in problem.limits if limit.static and not limit.whole_turns
+        ]
         limits = problem.robot.limits
-        self._lower, self._upper = limits.position_lower - _SLACK, limits.position_upper + _SLACK
+        self._lower, self._upper = (
+            limits.position_lower - _SLACK,
+            limits.position_upper + _SLACK,
+        )
         self._loose = turning & (self._origin is None)
         # Turns of a free origin exist all at once, and nobody asks which turn an angle without a range is in, unless a
         # given end has to be met.
@@ -180,7 +189,9 @@ class Lattice(ABC):
         """Make the nodes with which joint paths begin, or say why there are none: causes and how often each is met."""
 
     @abstractmethod
-    def _next(self, before: Layer, station: int, rng: np.random.Generator) -> Layer | dict[str, int]:
+    def _next(
+        self, before: Layer, station: int, rng: np.random.Generator
+    ) -> Layer | dict[str, int]:
         """Join the nodes of a layer to the next station, or say why none can be."""
 
     @abstractmethod
@@ -206,7 +217,11 @@ class Lattice(ABC):
         for station in reversed(stations) if self._backwards else stations:
             if self._deadline.passed:
                 return []
-            layer = self._next(layers[-1], station, rng) if layers else self._first_layer(rng)
+            layer = (
+                self._next(layers[-1], station, rng)
+                if layers
+                else self._first_layer(rng)
+            )
             if not isinstance(layer, Layer):
                 return DeadEnd(float(self.s[station]), layer, backwards=self._backwards)
             layers.append(layer)
@@ -221,7 +236,9 @@ class Lattice(ABC):
         ]
         return self._chosen(found, layers[-1][ends], most)
 
-    def _chosen(self, found: list[JointPath], _ends: Layer, most: int) -> list[JointPath]:
+    def _chosen(
+        self, found: list[JointPath], _ends: Layer, most: int
+    ) -> list[JointPath]:
         """Choose up to `most` of the joint paths found, which end at these nodes: some that differ."""
         return distinct(found, most)
 
@@ -249,14 +266,22 @@ class Lattice(ABC):
         wanted = np.where(self._loose & np.isfinite(middle), np.round(middle), 0.0)
         return np.clip(wanted, first, last)
 
-    def _turns_within(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _turns_within(
+        self, low: np.ndarray, high: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest multiples of 2 pi, (E, n), that bring joint paths within low and high into the ranges.
 
         Joints that are in a turn already have the multiple 0 or, where it is not within the range, none at all: the
         least is then above the largest.
         """
-        first = np.where(self._loose, np.ceil((self._lower - low) / TURN), low < self._lower)
-        last = np.where(self._loose, np.floor((self._upper - high) / TURN), -1.0 * (high > self._upper))
+        first = np.where(
+            self._loose, np.ceil((self._lower - low) / TURN), low < self._lower
+        )
+        last = np.where(
+            self._loose,
+            np.floor((self._upper - high) / TURN),
+            -1.0 * (high > self._upper),
+        )
         return first, last
 
     def _inside(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -264,11 +289,15 @@ class Lattice(ABC):
         first, last = self._turns_within(low, high)
         return np.asarray(first <= last)
 
-    def _lengths(self, q: np.ndarray, step: np.ndarray, origin: np.ndarray) -> np.ndarray:
+    def _lengths(
+        self, q: np.ndarray, step: np.ndarray, origin: np.ndarray
+    ) -> np.ndarray:
         """Lengths of steps, (E, n), from the postures q[origin]; see the module."""
         by_acceleration, by_velocity = np.zeros(len(step)), np.zeros(len(step))
         for limit in self.problem.limits:
-            for length, rows in zip((by_acceleration, by_velocity), limit.step_rows(q), strict=True):
+            for length, rows in zip(
+                (by_acceleration, by_velocity), limit.step_rows(q), strict=True
+            ):
                 if rows is not None:
                     parts = np.abs(np.einsum("eij,ej->ei", rows[origin], step))
                     np.maximum(length, parts.max(axis=1), out=length)

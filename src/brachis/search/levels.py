@@ -97,7 +97,10 @@ _LEVELS = {
 }
 
 SEARCH_LEVELS = {
-    "single": (_LEVELS["single"], dataclasses.replace(_LEVELS["fast"], last_resort=True)),
+    "single": (
+        _LEVELS["single"],
+        dataclasses.replace(_LEVELS["fast"], last_resort=True),
+    ),
     "fast": (_LEVELS["fast"],),
     "thorough": (_LEVELS["fast"], _LEVELS["thorough"]),
     "exhaustive": (_LEVELS["fast"], _LEVELS["thorough"], _LEVELS["exhaustive"]),

@@ -82,7 +82,11 @@ def least_times(
     """
     places = s if stations is None else stations
     rate = fastest(limits, s, q, rates, places)
-    return None if rate is None else np.append(0.0, np.cumsum(2.0 * np.diff(places) / (rate[1:] + rate[:-1])))
+    return (
+        None
+        if rate is None
+        else np.append(0.0, np.cumsum(2.0 * np.diff(places) / (rate[1:] + rate[:-1])))
+    )
 
 
 def fastest(
@@ -126,7 +130,9 @@ class _Lines:
     ceiling: np.ndarray
 
 
-def _squares(lines: _Lines, steps: np.ndarray, rates: tuple[float, float]) -> np.ndarray | None:
+def _squares(
+    lines: _Lines, steps: np.ndarray, rates: tuple[float, float]
+) -> np.ndarray | None:
     """Find x at the stations, (S,), under the largest u; None where the joint path cannot be followed."""
     first, last = (rate**2 for rate in rates)
     intervals = _controllable(lines, steps, last)
@@ -140,11 +146,16 @@ def _squares(lines: _Lines, steps: np.ndarray, rates: tuple[float, float]) -> np
     return x
 
 
-def _lines(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, places: np.ndarray) -> _Lines:
+def _lines(
+    limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, places: np.ndarray
+) -> _Lines:
     """Collect the lines of all limits at places of a joint path."""
     q_ds = np.gradient(q, s, axis=0, edge_order=2)
     orders = q, q_ds, np.gradient(q_ds, s, axis=0, edge_order=2)
-    joints = [np.column_stack([np.interp(places, s, column) for column in order.T]) for order in orders]
+    joints = [
+        np.column_stack([np.interp(places, s, column) for column in order.T])
+        for order in orders
+    ]
     lines = [limit.lines(places, *joints) for limit in limits]
     floor, ceiling = np.zeros(len(places)), np.full(len(places), np.inf)
     sloped = []
@@ -154,7 +165,9 @@ def _lines(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, places: np.nda
         if line.u is None:
             with np.errstate(divide="ignore", invalid="ignore"):
                 level = (1.0 - line.constant) / line.x
-            ceiling = np.minimum(ceiling, np.where(line.x > 0.0, level, np.inf).min(axis=1))
+            ceiling = np.minimum(
+                ceiling, np.where(line.x > 0.0, level, np.inf).min(axis=1)
+            )
             floor = np.maximum(floor, np.where(line.x < 0.0, level, 0.0).max(axis=1))
         else:
             sloped.append((line.u, line.x, line.constant))
@@ -162,28 +175,50 @@ def _lines(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, places: np.nda
     # A coefficient of zero would make a vertical line; a tiny one gives bounds far out that do no harm.
     a = np.where(np.abs(a) < _SLOWEST, _SLOWEST, a)
     first, second = (1.0 - c) / a, (-1.0 - c) / a
-    return _Lines((-b / a, -b / a), (np.maximum(first, second), np.minimum(first, second)), floor, ceiling)
+    return _Lines(
+        (-b / a, -b / a),
+        (np.maximum(first, second), np.minimum(first, second)),
+        floor,
+        ceiling,
+    )
 
 
-def _controllable(lines: _Lines, steps: np.ndarray, last: float) -> tuple[np.ndarray, np.ndarray] | None:
+def _controllable(
+    lines: _Lines, steps: np.ndarray, last: float
+) -> tuple[np.ndarray, np.ndarray] | None:
     """Go backwards: the intervals of x, (S,), from which the end can be reached with x = `last`; None where empty."""
     slope, offset = lines.slope, lines.offset
     count = len(lines.ceiling)
-    if not lines.floor[-1] * (1.0 - _ROUNDING) <= last <= lines.ceiling[-1] * (1.0 + _ROUNDING):
+    if (
+        not lines.floor[-1] * (1.0 - _ROUNDING)
+        <= last
+        <= lines.ceiling[-1] * (1.0 + _ROUNDING)
+    ):
         return None
     low, high = np.full(count, last), np.full(count, last)
     for i in range(count - 2, -1, -1):
         step = steps[i]
         # u >= (low' - x) / 2 step and u <= (high' - x) / 2 step join the lines.
-        up = np.append(slope[0][i], -0.5 / step), np.append(offset[0][i], 0.5 * high[i + 1] / step)
-        down = np.append(slope[1][i], -0.5 / step), np.append(offset[1][i], 0.5 * low[i + 1] / step)
+        up = (
+            np.append(slope[0][i], -0.5 / step),
+            np.append(offset[0][i], 0.5 * high[i + 1] / step),
+        )
+        down = (
+            np.append(slope[1][i], -0.5 / step),
+            np.append(offset[1][i], 0.5 * low[i + 1] / step),
+        )
         tilt = (up[0][:, None] - down[0][None]).ravel()
         clearance = (up[1][:, None] - down[1][None]).ravel()
         if np.any((clearance < 0.0) & (np.abs(tilt) < _SLOWEST)):
             return None
         falling, rising = tilt < -_SLOWEST, tilt > _SLOWEST
-        high[i] = min(lines.ceiling[i], np.min(clearance[falling] / -tilt[falling], initial=np.inf))
-        low[i] = max(lines.floor[i], np.max(-clearance[rising] / tilt[rising], initial=0.0))
+        high[i] = min(
+            lines.ceiling[i],
+            np.min(clearance[falling] / -tilt[falling], initial=np.inf),
+        )
+        low[i] = max(
+            lines.floor[i], np.max(-clearance[rising] / tilt[rising], initial=0.0)
+        )
         if low[i] > high[i]:
             return None
     return low, high
@@ -231,7 +266,11 @@ def first_breaks(start: Start) -> np.ndarray:
     switches = _switches(*paced)
     if not len(switches):
         return breaks
-    count = _FIRST_INTERVALS if start.problem.task.spline.intervals == "auto" else len(breaks) - 1
+    count = (
+        _FIRST_INTERVALS
+        if start.problem.task.spline.intervals == "auto"
+        else len(breaks) - 1
+    )
     return _graded(np.union1d([0.0, 1.0], switches), count)
 
 
@@ -250,11 +289,15 @@ def _graded(switches: np.ndarray, count: int) -> np.ndarray:
     low, high = _LEAST
     for _ in range(_BISECTIONS):
         least = np.sqrt(low * high)
-        numbers = np.log1p(_GRADING * halves / least) / _GRADING  # of the intervals in every half
+        numbers = (
+            np.log1p(_GRADING * halves / least) / _GRADING
+        )  # of the intervals in every half
         low, high = (least, high) if numbers.sum() > count else (low, least)
     behind = np.append(0.0, np.cumsum(numbers))
     wanted = np.linspace(0.0, behind[-1], count + 1)
-    half = np.clip(np.searchsorted(behind, wanted, side="right") - 1, 0, len(halves) - 1)
+    half = np.clip(
+        np.searchsorted(behind, wanted, side="right") - 1, 0, len(halves) - 1
+    )
     first = half % 2 == 0  # the switch is before it
     away = np.where(first, wanted - behind[half], behind[half + 1] - wanted)
     way = least / _GRADING * np.expm1(_GRADING * away)
@@ -283,12 +326,18 @@ def first_point(program: Program, start: Start) -> np.ndarray | None:
         x = starting_point(program, [motion], times[-1], keep=keep)
         if x is not None:
             return x
-    return starting_point(program, [start.joint_path], start.estimate if start.timed else None)
+    return starting_point(
+        program, [start.joint_path], start.estimate if start.timed else None
+    )
 
 
 def _paced(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     """Curves along the joint path, (S, c), and their times, (S,), s; None where no limit asks for a least speed."""
-    return _timed(start) if any(limit.least_speed for limit in start.problem.limits) else None
+    return (
+        _timed(start)
+        if any(limit.least_speed for limit in start.problem.limits)
+        else None
+    )
 
 
 def _between_speeds(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
@@ -300,7 +349,9 @@ def _between_speeds(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
     curves, times = fastest
     s = curves[:, 0]
     with np.errstate(invalid="ignore"):  # 0 / 0 where the motion starts from rest
-        even = np.nan_to_num(2.0 * s / (first + np.sqrt(first**2 + (last**2 - first**2) * s)))
+        even = np.nan_to_num(
+            2.0 * s / (first + np.sqrt(first**2 + (last**2 - first**2) * s))
+        )
     return curves, 0.5 * (times + even)
 
 
@@ -313,19 +364,27 @@ def _timed(start: Start) -> tuple[np.ndarray, np.ndarray] | None:
         return None
     stations = graded(problem.limits)
     times = least_times(problem.limits, s, q, problem.end_rates, stations)
-    return None if times is None or not np.isfinite(times[-1]) else (along(joint_path, stations), times)
+    return (
+        None
+        if times is None or not np.isfinite(times[-1])
+        else (along(joint_path, stations), times)
+    )
 
 
 def along(joint_path: np.ndarray, s: np.ndarray) -> np.ndarray:
     """Curves, (S, c), of a joint path at path coordinates, (S,)."""
-    return np.column_stack([s, *(np.interp(s, joint_path[:, 0], column) for column in joint_path.T[1:])])
+    return np.column_stack(
+        [s, *(np.interp(s, joint_path[:, 0], column) for column in joint_path.T[1:])]
+    )
 
 
 def graded(limits: Sequence[Limit]) -> np.ndarray:
     """Spread stations evenly, and ever closer towards where a least speed sets in or ends."""
     even = np.linspace(0.0, 1.0, _STATIONS)
     steps = even[1] * 0.5 ** np.arange(_HALVINGS)
-    breaks = np.concatenate([np.empty(0), *(limit.breaks for limit in limits if limit.least_speed)])
+    breaks = np.concatenate(
+        [np.empty(0), *(limit.breaks for limit in limits if limit.least_speed)]
+    )
     near = breaks[:, None] + np.r_[-steps, 0.0, steps]
     places = np.union1d(even, np.clip(near, 0.0, 1.0))
     return places[np.append(np.diff(places) > 0.5 * steps[-1], True)]

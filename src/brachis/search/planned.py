@@ -53,7 +53,11 @@ class PlannedMotion(Summary):
         """Return what is shown."""
         trajectory, last = self.trajectory, self.solver_report
         left = {"undone": "; ".join(self.undone)} if self.undone else {}
-        remarks = {"warnings": "; ".join(remark.message for remark in self.warnings)} if self.warnings else {}
+        remarks = (
+            {"warnings": "; ".join(remark.message for remark in self.warnings)}
+            if self.warnings
+            else {}
+        )
         return {
             **trajectory.summary(),
             "verified": "yes" if self.verified else "NO",
@@ -110,7 +114,9 @@ class PlannedMotion(Summary):
             "refinement_rounds": last.refinement_rounds,
             "collocation_points": last.collocation_points,
             "time_scaled": last.time_scaled,
-            "least_motion": None if self.least_motion is None else self.least_motion.to_dict(),
+            "least_motion": None
+            if self.least_motion is None
+            else self.least_motion.to_dict(),
             "fits": [fit.to_dict() for fit in self.fits],
             "candidates": [candidate.to_dict() for candidate in self.candidates],
             "interrupted": self.interrupted,

@@ -98,7 +98,11 @@ def find_fastest(
         if first is not None:
             search.run([Batch((first,), 1)])
         if not record.content:
-            search.run(batches(problem, decompositions, deadline, listener, record.note_lattice))
+            search.run(
+                batches(
+                    problem, decompositions, deadline, listener, record.note_lattice
+                )
+            )
     except KeyboardInterrupt:
         interrupts.forget()
         record.interrupted = True
@@ -109,13 +113,17 @@ def find_fastest(
         return record
     if record.too_fast is not None:
         raise record.too_fast.error
-    heavy = explain_holding([attempt.start for attempt in record.attempts if attempt.start is not None])
+    heavy = explain_holding(
+        [attempt.start for attempt in record.attempts if attempt.start is not None]
+    )
     if heavy is not None:
         raise heavy
     if record.interrupted or record.cut_short(problem.task.solver.time_limit):
         record.interrupted = True
         raise out_of_time(problem.task, record.undone())
-    raise no_motion(problem, decompositions, record.attempts, record.dead_ends, deadline)
+    raise no_motion(
+        problem, decompositions, record.attempts, record.dead_ends, deadline
+    )
 
 
 def is_planned(
@@ -144,7 +152,9 @@ def is_planned(
         """Hear nothing."""
 
     search = _Search(problem, decompositions, stages, deadline, listener)
-    schedule = batches(problem, decompositions, deadline, listener, search.record.note_lattice)
+    schedule = batches(
+        problem, decompositions, deadline, listener, search.record.note_lattice
+    )
     search.run(itertools.islice(schedule, most))
     best = search.record.best
     if best is not None and best.verified:
@@ -163,7 +173,12 @@ class _Search:
         deadline: Deadline,
         listener: Listener,
     ) -> None:
-        self._decompositions, self._stages, self._deadline, self._listener = decompositions, stages, deadline, listener
+        self._decompositions, self._stages, self._deadline, self._listener = (
+            decompositions,
+            stages,
+            deadline,
+            listener,
+        )
         self._task = problem.task
         self.record = Record(refined=self._task.refinement.max_rounds > 0)
 
@@ -174,7 +189,9 @@ class _Search:
     @property
     def _latest(self) -> Deadline:
         """When the last work ends: later while nothing is verified."""
-        return self._deadline if self.record.content else self._deadline.extended(_GRACE)
+        return (
+            self._deadline if self.record.content else self._deadline.extended(_GRACE)
+        )
 
     def run(self, schedule: Iterable[Batch]) -> None:
         """Try batch after batch."""
@@ -187,7 +204,9 @@ class _Search:
                 self.record.interrupted = True
                 break
             if batch.last_resort and not refused:
-                refuse_what_is_out_of_reach(self._decompositions, self.record.attempts, self._deadline)
+                refuse_what_is_out_of_reach(
+                    self._decompositions, self.record.attempts, self._deadline
+                )
                 self._refuse_what_is_too_fast()
                 refused = True
             self._finish(self._solve(batch), batch.refined)
@@ -198,7 +217,10 @@ class _Search:
         """Find out whether a least speed is to blame that nothing was found, and refuse one that is far too high."""
         limit = self._deadline.part(_COARSE_SHARE).within(_LEAST_SHARE)
         record = self.record
-        record.too_fast = out_of_reach(record.attempts, lambda start: self._stages.solve(start, limit, self._listener))
+        record.too_fast = out_of_reach(
+            record.attempts,
+            lambda start: self._stages.solve(start, limit, self._listener),
+        )
         if record.too_fast is not None and unlikely(record.too_fast):
             raise record.too_fast.error
 
@@ -207,8 +229,16 @@ class _Search:
         record, known = self.record, len(self.record.solved)
         record.begin(len(batch.starts))
         limit = self._deadline if record.content else self._deadline.part(_COARSE_SHARE)
-        share = self._task.search.time_limit * min(_LARGEST_SHARE, _COARSE_SHARE / max(1, len(batch.starts)))
-        work = _solved_in_time, batch.starts, self._stages.solve, limit, max(_LEAST_SHARE, share)
+        share = self._task.search.time_limit * min(
+            _LARGEST_SHARE, _COARSE_SHARE / max(1, len(batch.starts))
+        )
+        work = (
+            _solved_in_time,
+            batch.starts,
+            self._stages.solve,
+            limit,
+            max(_LEAST_SHARE, share),
+        )
         with closing(each(*work, jobs=self._jobs, listener=self._listener)) as outcomes:
             for attempt in outcomes:
                 record.add(attempt)
@@ -229,7 +259,9 @@ class _Search:
                         return
                     left -= 1
                     self.record.finish(batch[place][0], attempt)
-                    self._listener(f"{attempt.solver}: t_E = {attempt.t_end:.4f} s, {attempt.status}")
+                    self._listener(
+                        f"{attempt.solver}: t_E = {attempt.t_end:.4f} s, {attempt.status}"
+                    )
 
     def _goes_on(self, ranked: Sequence[Numbered], left: int) -> bool:
         """Tell whether the first one of the attempts that are left is worth finishing."""
@@ -244,10 +276,14 @@ class _Search:
     def take_what_there_is(self) -> None:
         """Verify the best attempts as they are until one gives a motion, where none is known."""
         over = Deadline(0.0)
-        for number, attempt in sorted(self.record.solved, key=lambda item: rounded(item[1].coarse))[:_LAST_CHANCES]:
+        for number, attempt in sorted(
+            self.record.solved, key=lambda item: rounded(item[1].coarse)
+        )[:_LAST_CHANCES]:
             if self.record.best is not None:
                 return
-            self.record.finish(number, self._stages.finish(attempt, over, lambda _text: None))
+            self.record.finish(
+                number, self._stages.finish(attempt, over, lambda _text: None)
+            )
 
 
 def _solved_in_time(

@@ -26,7 +26,11 @@ _Made = TypeVar("_Made")
 
 
 def each(
-    function: Callable[..., _Made], given: Sequence[_Given], *others: object, jobs: int, listener: Listener
+    function: Callable[..., _Made],
+    given: Sequence[_Given],
+    *others: object,
+    jobs: int,
+    listener: Listener,
 ) -> Generator[_Made, None, None]:
     """Do a piece of work for every item, in up to `jobs` processes.
 
@@ -59,7 +63,7 @@ def each(
             yield function(item, *others, listener)
         return
     interrupts.check()
-    from joblib import Parallel, delayed  # noqa: PLC0415  (a fifth of a second that a single process need not wait)
+    from joblib import Parallel, delayed
 
     made: Any = None
     try:
@@ -76,7 +80,10 @@ def each(
             hint="Plan with jobs: 1; a limit or closed form of your own has to be in a module that they can import",
         ) from error
     finally:
-        with interrupts.postponed(), warnings.catch_warnings():  # that work is thrown away is meant
+        with (
+            interrupts.postponed(),
+            warnings.catch_warnings(),
+        ):  # that work is thrown away is meant
             warnings.simplefilter("ignore")
             if made is not None:
                 made.close()
@@ -92,9 +99,12 @@ def processes(jobs: int, deadline: Deadline = NEVER) -> int:
 
 def _within_a_worker() -> bool:
     """Tell whether this is somebody's worker process: processes of processes would multiply."""
-    from joblib.parallel import get_active_backend  # noqa: PLC0415
+    from joblib.parallel import get_active_backend
 
-    return bool(get_active_backend()[0].nesting_level) or multiprocessing.current_process().name != _MAIN
+    return (
+        bool(get_active_backend()[0].nesting_level)
+        or multiprocessing.current_process().name != _MAIN
+    )
 
 
 def _apart(function: Callable[..., _Made], *arguments: object) -> _Made:

@@ -66,11 +66,15 @@ class Record:
 
     def _merit(self, attempt: Attempt) -> tuple[float, float]:
         """By what finished attempts are compared: violation of a limit, -inf where it will do, and end time, s."""
-        assert attempt.verification is not None  # noqa: S101  (it is finished)
+        assert attempt.verification is not None
         will_do = attempt.verified or not self._refined
-        return (-np.inf if will_do else attempt.verification.worst_ratio - 1.0), attempt.t_end
+        return (
+            -np.inf if will_do else attempt.verification.worst_ratio - 1.0
+        ), attempt.t_end
 
-    def note_lattice(self, decomposition: Decomposition | None, dead_end: DeadEnd | None) -> None:
+    def note_lattice(
+        self, decomposition: Decomposition | None, dead_end: DeadEnd | None
+    ) -> None:
         """Put down that a lattice has no joint path, or that there was no time for it; None: that of all postures."""
         name = ALL_POSTURES if decomposition is None else decomposition.name
         if dead_end is None:
@@ -99,7 +103,9 @@ class Record:
         """Order attempts by their end times, without those that are a motion known before; `again` lets these in."""
         known = [] if again else self._known
         self._waiting = []
-        for number, attempt in sorted(solved, key=lambda item: (rounded(item[1].coarse), item[0])):
+        for number, attempt in sorted(
+            solved, key=lambda item: (rounded(item[1].coarse), item[0])
+        ):
             if any(_agree(attempt, other) for other in known):
                 self.attempts[number] = dataclasses.replace(attempt, status=SAME_MOTION)
             else:
@@ -111,8 +117,15 @@ class Record:
         """Tell whether an attempt may be faster than the best motion."""
         if self.best is None or not self.content:
             return True
-        if attempt.keeps_knots and self.best.keeps_knots and attempt.in_chart and self.best.in_chart:
-            return attempt.coarse < (1.0 - _WORTH_IT) * self.best.coarse  # what else they gain, both gain
+        if (
+            attempt.keeps_knots
+            and self.best.keeps_knots
+            and attempt.in_chart
+            and self.best.in_chart
+        ):
+            return (
+                attempt.coarse < (1.0 - _WORTH_IT) * self.best.coarse
+            )  # what else they gain, both gain
         return attempt.coarse * self._gain < (1.0 - _WORTH_IT) * self.best.t_end
 
     def drop(self, solved: Sequence[Numbered]) -> None:
@@ -127,14 +140,19 @@ class Record:
         if attempt.trajectory is None:
             return
         if not attempt.keeps_knots:
-            self._gain = min(self._gain, (1.0 - _GAIN_SLACK) * attempt.t_end / attempt.coarse)
+            self._gain = min(
+                self._gain, (1.0 - _GAIN_SLACK) * attempt.t_end / attempt.coarse
+            )
         if self.best is None or self._merit(attempt) < self._merit(self.best):
             self.best = attempt
 
     def cut_short(self, time_limit: float) -> bool:
         """Tell whether the time for the search ended every solve, of which each may take so long by itself, s."""
         last = [attempt.reports[-1] for attempt in self.attempts if attempt.reports]
-        cut = [each.status is SolveStatus.TIME_LIMIT and each.wall_time < time_limit for each in last]
+        cut = [
+            each.status is SolveStatus.TIME_LIMIT and each.wall_time < time_limit
+            for each in last
+        ]
         return bool(cut) and all(cut)
 
     def best_in_words(self) -> str:
@@ -150,21 +168,36 @@ class Record:
         if not self.interrupted:
             return tuple(parts)
         if self._left_out:
-            parts.append(f"the lattice of {' | '.join(self._left_out)} was not searched to its end")
+            parts.append(
+                f"the lattice of {' | '.join(self._left_out)} was not searched to its end"
+            )
         total, waiting = len(self.attempts), len(self._waiting)
-        counts = [f"{self._unsolved} not planned"] * bool(self._unsolved) + [f"{waiting} not refined"] * bool(waiting)
+        counts = [f"{self._unsolved} not planned"] * bool(self._unsolved) + [
+            f"{waiting} not refined"
+        ] * bool(waiting)
         if counts:
-            unseen = max(0, self._unsolved - sum(attempt.status == NOT_TRIED for attempt in self.attempts))
-            parts.append(f"of {write_count(total + unseen, 'candidate')} {', '.join(counts)}")
+            unseen = max(
+                0,
+                self._unsolved
+                - sum(attempt.status == NOT_TRIED for attempt in self.attempts),
+            )
+            parts.append(
+                f"of {write_count(total + unseen, 'candidate')} {', '.join(counts)}"
+            )
         return (*parts, "what search.effort asks for was not tried to its end")
 
     def in_order(self) -> tuple[Attempt, ...]:
         """All attempts, the fastest verified one first, without their programs."""
 
         def rank(attempt: Attempt) -> tuple[float, ...]:
-            return (not attempt.verified, *map(rounded, (attempt.t_end, attempt.coarse, attempt.estimate)))
+            return (
+                not attempt.verified,
+                *map(rounded, (attempt.t_end, attempt.coarse, attempt.estimate)),
+            )
 
-        return tuple(attempt.without_programs() for attempt in sorted(self.attempts, key=rank))
+        return tuple(
+            attempt.without_programs() for attempt in sorted(self.attempts, key=rank)
+        )
 
 
 def rounded(time: float) -> float:
@@ -174,9 +207,15 @@ def rounded(time: float) -> float:
 
 def _agree(first: Attempt, second: Attempt) -> bool:
     """Tell whether an attempt is the same motion as another, and not faster."""
-    same = (first.redundant_joints, first.branch) == (second.redundant_joints, second.branch)
+    same = (first.redundant_joints, first.branch) == (
+        second.redundant_joints,
+        second.branch,
+    )
     slower = (_SAME_TIME_IN_CHARTS if first.in_chart else _SAME_TIME) * second.coarse
-    if not same or not -_WORTH_IT * second.coarse <= first.coarse - second.coarse <= slower:
+    if (
+        not same
+        or not -_WORTH_IT * second.coarse <= first.coarse - second.coarse <= slower
+    ):
         return False
     postures = []
     for attempt in (first, second):
@@ -189,7 +228,11 @@ def _agree(first: Attempt, second: Attempt) -> bool:
     return bool(np.abs(postures[0] - postures[1]).max() < _SAME_MOTION)
 
 
-WORDS, TIMES, STATUS = ("joints", "branch", "origin"), ("coarse [s]", "t_end [s]"), "status"
+WORDS, TIMES, STATUS = (
+    ("joints", "branch", "origin"),
+    ("coarse [s]", "t_end [s]"),
+    "status",
+)
 """The columns; named as in the JSON."""
 
 
@@ -197,7 +240,9 @@ def candidate_rows(candidates: Sequence[Mapping[str, Any]]) -> list[tuple[str, .
     """Return a row of text for each candidate, as `Attempt.to_dict` gives it; the same motion is listed once."""
     return [
         (
-            coordinates(candidate.get("redundant_joints", ()), str(candidate.get("branch", ""))),
+            coordinates(
+                candidate.get("redundant_joints", ()), str(candidate.get("branch", ""))
+            ),
             *(str(candidate.get(key, "")) for key in ("branch", "origin")),
             *(_seconds(candidate.get(key)) for key in ("coarse", "t_end")),
             str(candidate.get("status", "")),
@@ -208,4 +253,8 @@ def candidate_rows(candidates: Sequence[Mapping[str, Any]]) -> list[tuple[str, .
 
 
 def _seconds(value: object) -> str:
-    return f"{value:.4f}" if isinstance(value, int | float) and math.isfinite(value) else ""
+    return (
+        f"{value:.4f}"
+        if isinstance(value, int | float) and math.isfinite(value)
+        else ""
+    )

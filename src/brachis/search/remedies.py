@@ -31,7 +31,13 @@ Trial = Callable[[Task, Deadline, int | None], bool | None]
 The last argument is how many batches of the search are tried; None: all. It returns None where a plan may exist."""
 
 
-def try_remedies(error: BrachisError, task: Task, joints: Sequence[str], is_planned: Trial, deadline: Deadline) -> None:
+def try_remedies(
+    error: BrachisError,
+    task: Task,
+    joints: Sequence[str],
+    is_planned: Trial,
+    deadline: Deadline,
+) -> None:
     """Try the changes of numbers that an error names, and say in its hint what came out.
 
     Parameters
@@ -51,7 +57,9 @@ def try_remedies(error: BrachisError, task: Task, joints: Sequence[str], is_plan
     for number, remedy in enumerate(error.remedies):
         own = deadline.part(weights[number] / sum(weights[number:]))
 
-        def is_enough(value: float, most: int | None, remedy: Remedy = remedy, own: Deadline = own) -> bool | None:
+        def is_enough(
+            value: float, most: int | None, remedy: Remedy = remedy, own: Deadline = own
+        ) -> bool | None:
             limit = own.part(_SHARE) if most else own
             found: bool | None = False
             try:
@@ -65,13 +73,21 @@ def try_remedies(error: BrachisError, task: Task, joints: Sequence[str], is_plan
         if found:
             advice.append(f"{remedy.verb} {remedy.key} to {found}")
     # One number alone may not be enough.
-    untried = " and ".join(f"{remedy.verb} {remedy.key}" for remedy in error.remedies if remedy.is_refined)
-    text = ", or ".join(advice) or (untried and f"{untried} (how far was not found out)")
+    untried = " and ".join(
+        f"{remedy.verb} {remedy.key}" for remedy in error.remedies if remedy.is_refined
+    )
+    text = ", or ".join(advice) or (
+        untried and f"{untried} (how far was not found out)"
+    )
     if text:
         error.put_advice(text[:1].upper() + text[1:])
 
 
-def _try_numbers(remedy: Remedy, is_enough: Callable[[float, int | None], bool | None], deadline: Deadline) -> str:
+def _try_numbers(
+    remedy: Remedy,
+    is_enough: Callable[[float, int | None], bool | None],
+    deadline: Deadline,
+) -> str:
     """Look for the smallest change that is enough, and say which it is; empty where none was found.
 
     `is_enough` takes a number and how many batches of the search are tried, as a `Trial` does.
@@ -97,7 +113,11 @@ def _try_numbers(remedy: Remedy, is_enough: Callable[[float, int | None], bool |
         else:
             middle = math.sqrt(good * bad)
             back = good / step**away
-            value = back if bad == remedy.asked and abs(back - good) < abs(middle - good) else middle
+            value = (
+                back
+                if bad == remedy.asked and abs(back - good) < abs(middle - good)
+                else middle
+            )
         value = _round(value, down=lowers)
         step = min(step**_FASTER, _LARGEST_STEP)
     if good is None:
@@ -121,7 +141,9 @@ def _round(value: float, *, down: bool) -> float:
     return (math.floor if down else math.ceil)(value * 10.0**digits) / 10.0**digits
 
 
-def _with_number(content: Mapping[str, Any], joints: Sequence[str], key: str, value: float) -> dict[str, Any]:
+def _with_number(
+    content: Mapping[str, Any], joints: Sequence[str], key: str, value: float
+) -> dict[str, Any]:
     """Return a task, not checked yet, with a number changed; one for all joints is written joint by joint."""
     above, _, last = key.rpartition(".")
     if last not in joints or not above.startswith("robot.limits."):

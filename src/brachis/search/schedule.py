@@ -55,7 +55,11 @@ class Batch:
 
 
 def batches(
-    problem: Problem, decompositions: Sequence[Decomposition], deadline: Deadline, listener: Listener, note: Note
+    problem: Problem,
+    decompositions: Sequence[Decomposition],
+    deadline: Deadline,
+    listener: Listener,
+    note: Note,
 ) -> Iterator[Batch]:
     """Yield batches: level by level the most promising starts with the first solver, then what is tried where all fail.
 
@@ -74,16 +78,22 @@ def batches(
     Batch
     """
     curved = any(limit.where == "whole" for limit in problem.limits)
-    solvers = [solver.name for solver in solver_named(problem.task.solver.name, curved=curved)]
+    solvers = [
+        solver.name for solver in solver_named(problem.task.solver.name, curved=curved)
+    ]
     levels = SEARCH_LEVELS[problem.task.search.effort]
     if isinstance(problem.task_map, JointSpace):
         yield from _timings(problem, solvers)
         return
     if charts_allowed(problem, decompositions):
-        yield from _in_charts(problem, decompositions, solvers, deadline, listener, note)
+        yield from _in_charts(
+            problem, decompositions, solvers, deadline, listener, note
+        )
         levels = tuple(dataclasses.replace(level, last_resort=True) for level in levels)
     if decompositions:
-        yield from _in_closed_forms(decompositions, levels, solvers, deadline, listener, note)
+        yield from _in_closed_forms(
+            decompositions, levels, solvers, deadline, listener, note
+        )
 
 
 def _timings(problem: Problem, solvers: Sequence[str]) -> Iterator[Batch]:
@@ -108,17 +118,23 @@ def _in_closed_forms(
     known: list[Start] = []
     for level in levels:
         if level.last_resort:
-            yield Batch((), 0, last_resort=True)  # the search may end here, before lattices are looked at
+            yield Batch(
+                (), 0, last_resort=True
+            )  # the search may end here, before lattices are looked at
         allowed = looked_at(decompositions, level)
         starts: list[Start] = []
         rest = allowed or list(decompositions)
-        while rest and not starts:  # decompositions without a joint path make room for others
+        while (
+            rest and not starts
+        ):  # decompositions without a joint path make room for others
             batch, rest = rest[: level.decompositions], rest[level.decompositions :]
             if task.search.guesses == "numeric":
                 starts = [
                     start
                     for decomposition in batch
-                    for start in numeric_starts(decomposition, level.joint_paths, deadline)
+                    for start in numeric_starts(
+                        decomposition, level.joint_paths, deadline
+                    )
                 ]
             else:
                 starts = _from_lattices(batch, level, deadline, listener, note)
@@ -127,26 +143,46 @@ def _in_closed_forms(
         refuse_hopeless_speeds(known)
         for first in range(0, len(starts), _SIZE):
             yield Batch(
-                tuple(start.with_solver(solvers[0]) for start in starts[first : first + _SIZE]),
+                tuple(
+                    start.with_solver(solvers[0])
+                    for start in starts[first : first + _SIZE]
+                ),
                 level.refined,
                 level.last_resort,
             )
-    many, tried = len(known) + len(STRATEGIES), {(start.joint_map.redundant_joints, start.origin) for start in known}
-    again = tuple(start.with_solver(solver) for start in known[:_SIZE] for solver in solvers[1:2])
+    many, tried = (
+        len(known) + len(STRATEGIES),
+        {(start.joint_map.redundant_joints, start.origin) for start in known},
+    )
+    again = tuple(
+        start.with_solver(solver) for start in known[:_SIZE] for solver in solvers[1:2]
+    )
     yield Batch(again, many, last_resort=True)
     for decomposition in (allowed or decompositions)[: level.decompositions]:
         for start in numeric_starts(decomposition, len(STRATEGIES), deadline):
             if (start.joint_map.redundant_joints, start.origin) not in tried:
-                yield Batch(tuple(start.with_solver(solver) for solver in solvers[:2]), many, last_resort=True)
+                yield Batch(
+                    tuple(start.with_solver(solver) for solver in solvers[:2]),
+                    many,
+                    last_resort=True,
+                )
     yield Batch(
-        tuple(start.with_solver(solver) for solver in solvers[2:] for start in known[:2]), many, last_resort=True
+        tuple(
+            start.with_solver(solver) for solver in solvers[2:] for start in known[:2]
+        ),
+        many,
+        last_resort=True,
     )
 
 
 def charts_allowed(problem: Problem, decompositions: Sequence[Decomposition]) -> bool:
     """Tell whether motions may be planned in charts: nobody asks for a choice of joints, and there is redundancy."""
     task = problem.task
-    asked = task.redundant_joints != "auto" or task.branch != "auto" or task.search.guesses != "lattice"
+    asked = (
+        task.redundant_joints != "auto"
+        or task.branch != "auto"
+        or task.search.guesses != "lattice"
+    )
     return not asked and (problem.robot.n > problem.task_map.m or not decompositions)
 
 
@@ -164,27 +200,47 @@ def _in_charts(
         if level.last_resort:
             yield Batch((), 0, last_resort=True)
         listener("looking for joint paths on the lattice of all postures")
-        starts = chart_starts(problem, decompositions, level, deadline.part(_LATTICE_SHARE), listener)
+        starts = chart_starts(
+            problem, decompositions, level, deadline.part(_LATTICE_SHARE), listener
+        )
         if isinstance(starts, DeadEnd):
             note(None, starts)
             continue
         if not starts:
             note(None, None)
         known += starts
-        yield Batch(tuple(start.with_solver(solvers[0]) for start in starts), level.refined, level.last_resort)
+        yield Batch(
+            tuple(start.with_solver(solvers[0]) for start in starts),
+            level.refined,
+            level.last_resort,
+        )
     for solver in solvers[1:]:
-        yield Batch(tuple(start.with_solver(solver) for start in known[:_SIZE]), len(known), last_resort=True)
+        yield Batch(
+            tuple(start.with_solver(solver) for start in known[:_SIZE]),
+            len(known),
+            last_resort=True,
+        )
 
 
-def looked_at(decompositions: Sequence[Decomposition], level: SearchLevel) -> list[Decomposition]:
+def looked_at(
+    decompositions: Sequence[Decomposition], level: SearchLevel
+) -> list[Decomposition]:
     """Return the decompositions of a level: closed forms; polynomials where asked for, or where all are near-singular.
 
     That is where the given start, or else end, posture is near the branch boundary of every closed form.
     """
-    closed = [decomposition for decomposition in decompositions if decomposition.match.solver.kind == "closed_form"]
+    closed = [
+        decomposition
+        for decomposition in decompositions
+        if decomposition.match.solver.kind == "closed_form"
+    ]
     problem = decompositions[0].problem
     given = problem.start is not None or problem.end is not None
-    near_singular = given and max((decomposition.clearance for decomposition in closed), default=0.0) < _NEAR_SINGULAR
+    near_singular = (
+        given
+        and max((decomposition.clearance for decomposition in closed), default=0.0)
+        < _NEAR_SINGULAR
+    )
     return list(decompositions) if level.polynomial or near_singular else closed
 
 
@@ -202,23 +258,48 @@ def _from_lattices(
     number = itertools.count()
     deadline = deadline.part(_LATTICE_SHARE)
     jobs = processes(search.jobs, deadline)
-    outcomes = list(each(_starts_of, decompositions, level, search.seed, deadline, jobs=jobs, listener=listener))
+    outcomes = list(
+        each(
+            _starts_of,
+            decompositions,
+            level,
+            search.seed,
+            deadline,
+            jobs=jobs,
+            listener=listener,
+        )
+    )
     for decomposition, outcome in zip(decompositions, outcomes, strict=True):
         if isinstance(outcome, DeadEnd):
             note(decomposition, outcome)
             continue
         if not outcome:
             note(decomposition, None)
-        own = [dataclasses.replace(start, problem=decomposition.problem) for start in outcome]
-        own = sorted(own, key=lambda start: start.estimate) + numeric_starts(decomposition, level.numeric, deadline)
-        ranked += [(place, start.estimate, next(number), start) for place, start in enumerate(own)]
+        own = [
+            dataclasses.replace(start, problem=decomposition.problem)
+            for start in outcome
+        ]
+        own = sorted(own, key=lambda start: start.estimate) + numeric_starts(
+            decomposition, level.numeric, deadline
+        )
+        ranked += [
+            (place, start.estimate, next(number), start)
+            for place, start in enumerate(own)
+        ]
     return [
-        start for *_, start in sorted(ranked, key=lambda item: item[:-1])[: max(1, level.in_closed_forms // redundancy)]
+        start
+        for *_, start in sorted(ranked, key=lambda item: item[:-1])[
+            : max(1, level.in_closed_forms // redundancy)
+        ]
     ]
 
 
 def _starts_of(
-    decomposition: Decomposition, level: SearchLevel, seed: int, deadline: Deadline, listener: Listener
+    decomposition: Decomposition,
+    level: SearchLevel,
+    seed: int,
+    deadline: Deadline,
+    listener: Listener,
 ) -> list[Start] | DeadEnd:
     if deadline.passed:
         return []

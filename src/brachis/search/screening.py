@@ -17,7 +17,12 @@ from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import UnreachableError
 from brachis.kinematics import ChartMap
-from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus, solver_named
+from brachis.optimise.backends import (
+    SolverOptions,
+    SolverReport,
+    SolveStatus,
+    solver_named,
+)
 from brachis.optimise.candidate import Start
 from brachis.optimise.program import Program
 from brachis.optimise.refine import Solve
@@ -44,7 +49,9 @@ _SLOWER = 1.03
 """Starts that are slower than the fastest one by this factor are left out."""
 
 
-def screened(starts: Sequence[Start], most: int, deadline: Deadline, listener: Listener) -> list[Start]:
+def screened(
+    starts: Sequence[Start], most: int, deadline: Deadline, listener: Listener
+) -> list[Start]:
     """Choose the most promising of starts in charts.
 
     Parameters
@@ -66,7 +73,9 @@ def screened(starts: Sequence[Start], most: int, deadline: Deadline, listener: L
     jobs = processes(starts[0].problem.task.search.jobs, deadline)
     listener(f"solving quickly from {len(starts)} joint paths")
     looked_at: list[Start] = []
-    with closing(each(_quickly, starts, deadline, jobs=jobs, listener=listener)) as solved:
+    with closing(
+        each(_quickly, starts, deadline, jobs=jobs, listener=listener)
+    ) as solved:
         for start in solved:
             looked_at.append(start)
             if _met_again(looked_at, max(_OFTEN, most)):
@@ -75,14 +84,21 @@ def screened(starts: Sequence[Start], most: int, deadline: Deadline, listener: L
     for start in sorted(looked_at, key=lambda start: start.estimate):
         ratio = start.estimate / kept[0].estimate if kept else 1.0
         alike = ratio <= _SAME_LEAST and len(kept) >= max(_ALIKE, most // 2)
-        if len(kept) < most and not alike and not ratio > _SLOWER and not any(_same(start, other) for other in kept):
+        if (
+            len(kept) < most
+            and not alike
+            and not ratio > _SLOWER
+            and not any(_same(start, other) for other in kept)
+        ):
             kept.append(start)
     return kept
 
 
 def _met_again(looked_at: Sequence[Start], often: int) -> bool:
     """Tell whether so many quick solves ended at the least end time that others are unlikely to end below it."""
-    times = np.array([start.estimate for start in looked_at if np.isfinite(start.estimate)])
+    times = np.array(
+        [start.estimate for start in looked_at if np.isfinite(start.estimate)]
+    )
     return bool(np.sum(times <= _SAME_LEAST * times.min(initial=np.inf)) >= often)
 
 
@@ -92,22 +108,30 @@ def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
     if deadline.passed:
         return hopeless
     problem = _roughly(start.problem)
-    program = program_of(problem, start.joint_map, np.linspace(0.0, 1.0, _INTERVALS + 1))
+    program = program_of(
+        problem, start.joint_map, np.linspace(0.0, 1.0, _INTERVALS + 1)
+    )
     x = first_point(program, start)
     if x is None:
         return hopeless
     try:
-        program, reports = solved_in_chart(problem, program, x, _solver(start, deadline))
+        program, reports = solved_in_chart(
+            problem, program, x, _solver(start, deadline)
+        )
     except ImportError:  # the backend is not installed: the plan says so
         return hopeless
     last = reports[-1]
     if not last.status.usable:
         return hopeless
     chart = program.phases[0].joint_map
-    assert isinstance(chart, ChartMap)  # noqa: S101
+    assert isinstance(chart, ChartMap)
     try:
         return dataclasses.replace(
-            start, joint_map=chart, joint_path=_curves(program, last.x), estimate=float(last.objective), timed=True
+            start,
+            joint_map=chart,
+            joint_path=_curves(program, last.x),
+            estimate=float(last.objective),
+            timed=True,
         )
     except UnreachableError:
         return hopeless
@@ -115,9 +139,13 @@ def _quickly(start: Start, deadline: Deadline, _listener: Listener) -> Start:
 
 def _roughly(problem: Problem) -> Problem:
     """Return the problem with parabolas at rest in their velocity alone, without limits that they cannot hold."""
-    spline = problem.task.spline.model_copy(update={"degree": _DEGREE, "rest": "velocity"})
+    spline = problem.task.spline.model_copy(
+        update={"degree": _DEGREE, "rest": "velocity"}
+    )
     limits = tuple(limit for limit in problem.limits if limit.order <= _DEGREE)
-    return dataclasses.replace(problem, task=problem.task.model_copy(update={"spline": spline}), limits=limits)
+    return dataclasses.replace(
+        problem, task=problem.task.model_copy(update={"spline": spline}), limits=limits
+    )
 
 
 def _solver(start: Start, deadline: Deadline) -> Solve:
@@ -126,10 +154,16 @@ def _solver(start: Start, deadline: Deadline) -> Solve:
     backend = solver_named(start.problem.task.solver.name, curved=curved)[0]
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        options = SolverOptions(_TOLERANCE, _ITERATIONS, deadline.left, _PROGRESS, _PATIENCE)
+        options = SolverOptions(
+            _TOLERANCE, _ITERATIONS, deadline.left, _PROGRESS, _PATIENCE
+        )
         report = backend.solve(program, x, options, None)
         nearly = report.violation < _NEARLY and not report.status.usable
-        return dataclasses.replace(report, status=SolveStatus.ACCEPTABLE) if nearly else report
+        return (
+            dataclasses.replace(report, status=SolveStatus.ACCEPTABLE)
+            if nearly
+            else report
+        )
 
     return solve
 

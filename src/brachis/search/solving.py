@@ -20,7 +20,15 @@ import numpy as np
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Iteration, Listener
 from brachis.errors import UnreachableError
-from brachis.kinematics import ChartMap, ChartRows, JointMap, Newton, chart_around, null_spaces, transversality
+from brachis.kinematics import (
+    ChartMap,
+    ChartRows,
+    JointMap,
+    Newton,
+    chart_around,
+    null_spaces,
+    transversality,
+)
 from brachis.limits.safeguards import MARGIN
 from brachis.optimise.backends import Solver, SolverOptions, SolverReport, SolveStatus
 from brachis.optimise.guess import fitted, shortest_time
@@ -75,12 +83,17 @@ def continued(
     bounds: set[tuple[float, ...]] = set()
     for margin in margins:
         tried = program.with_margin(margin)
-        if tried.safeguard_bounds in bounds:  # the closed form has no margins, or the start posture caps them
+        if (
+            tried.safeguard_bounds in bounds
+        ):  # the closed form has no margins, or the start posture caps them
             continue
         bounds.add(tried.safeguard_bounds)
         outcome = tried, solve(tried, x)
         if outcome[1].status.usable:
-            if solved and outcome[1].objective > (1.0 - WORTH_IT) * solved[-1][1].objective:
+            if (
+                solved
+                and outcome[1].objective > (1.0 - WORTH_IT) * solved[-1][1].objective
+            ):
                 failed.append(outcome)
                 break
             solved.append(outcome)
@@ -91,13 +104,17 @@ def continued(
             failed.append(outcome)
             if solved or outcome[1].status is SolveStatus.TIME_LIMIT:
                 break
-            if outcome[1].violation <= _ON_ITS_WAY:  # it ran out of iterations on its way
+            if (
+                outcome[1].violation <= _ON_ITS_WAY
+            ):  # it ran out of iterations on its way
                 x = outcome[1].x
     order = [*failed, *solved]
     return order[-1][0], tuple(report for _, report in order)
 
 
-def eased(program: Program, x: np.ndarray, solve: Solve, margin: float) -> tuple[np.ndarray, tuple[SolverReport, ...]]:
+def eased(
+    program: Program, x: np.ndarray, solve: Solve, margin: float
+) -> tuple[np.ndarray, tuple[SolverReport, ...]]:
     """Find a better starting point where limits ask for the third derivative: the answer without them, time-scaled.
 
     Where the motion must slow down, such limits have local optima in which it all but stops. The fastest motion without
@@ -130,7 +147,11 @@ def eased(program: Program, x: np.ndarray, solve: Solve, margin: float) -> tuple
 
 
 def solve_with(
-    solver: Solver, settings: SolverSettings, joint_map: JointMap, deadline: Deadline, listener: Listener
+    solver: Solver,
+    settings: SolverSettings,
+    joint_map: JointMap,
+    deadline: Deadline,
+    listener: Listener,
 ) -> Solve:
     """Make a function that runs one backend under the task's bounds.
 
@@ -149,12 +170,17 @@ def solve_with(
     callable
     """
     most = settings.max_iterations
-    if settings.name == "auto" and most == SolverSettings.model_fields["max_iterations"].default:
+    if (
+        settings.name == "auto"
+        and most == SolverSettings.model_fields["max_iterations"].default
+    ):
         most = _ITERATIONS * max(joint_map.r, 1)
     stagnation = _STAGNATION if isinstance(joint_map, ChartMap) else ()
 
     def progress(iteration: int, objective: float) -> None:
-        listener(Iteration(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s"))
+        listener(
+            Iteration(f"{solver.name}: iteration {iteration}, t_E = {objective:.4f} s")
+        )
 
     def solve(program: Program, x: np.ndarray) -> SolverReport:
         remaining = deadline.within(settings.time_limit).left
@@ -179,7 +205,9 @@ _OUT_OF_TIME = (SolveStatus.TIME_LIMIT, SolveStatus.ITERATION_LIMIT)
 Solved = tuple[Program, tuple[SolverReport, ...]]
 
 
-def solved_in_chart(problem: Problem, program: Program, x: np.ndarray, solve: Solve) -> Solved:
+def solved_in_chart(
+    problem: Problem, program: Program, x: np.ndarray, solve: Solve
+) -> Solved:
     """Solve in a chart, and go on in one around the motion where that is needed.
 
     Parameters
@@ -217,7 +245,10 @@ def solved_in_chart(problem: Problem, program: Program, x: np.ndarray, solve: So
         program, reports = other, reports + more
         if not gained:
             break
-    if reports[-1].status.usable and program.safeguard_slack(reports[-1].x) <= HELD_BACK:
+    if (
+        reports[-1].status.usable
+        and program.safeguard_slack(reports[-1].x) <= HELD_BACK
+    ):
         other, more = continued(program, reports[-1].x, solve, further)
         if more[-1].status.usable:
             return other, reports + more
@@ -225,7 +256,9 @@ def solved_in_chart(problem: Problem, program: Program, x: np.ndarray, solve: So
     return program, reports
 
 
-def best_of_joints(problem: Problem, program: Program, report: SolverReport, solve: Solve) -> Solved:
+def best_of_joints(
+    problem: Problem, program: Program, report: SolverReport, solve: Solve
+) -> Solved:
     """Solve again with joints in place of the chart's rows, and keep the fastest; see the module.
 
     Parameters
@@ -279,7 +312,9 @@ def moved_to(
     (phase,), (motion,) = program.phases, program.motions(x)
     t_norm = np.linspace(0.0, 1.0, _DENSE * len(phase.t_norm) + 1)
     try:
-        state = phase.joint_map.state(*motion.at(t_norm * motion.t_end), t=t_norm * motion.t_end)
+        state = phase.joint_map.state(
+            *motion.at(t_norm * motion.t_end), t=t_norm * motion.t_end
+        )
         s = state.y[:, 0]
         chart = chart_around(problem.task_map, problem.path, s, state.q, rows)
         other = Program([phase_in(problem, chart, phase.grid)])
@@ -293,7 +328,7 @@ def _self_motion(program: Program, x: np.ndarray) -> np.ndarray:
     """Bases of the null spaces of the task Jacobian, (K, n, r), along a motion."""
     (state,), (phase,) = program.states(x), program.phases
     chart = phase.joint_map
-    assert isinstance(chart, ChartMap)  # noqa: S101
+    assert isinstance(chart, ChartMap)
     return null_spaces(Newton(chart.task_map).placed(state.q)[1])
 
 
@@ -302,7 +337,7 @@ def _follows(program: Program, x: np.ndarray) -> bool:
     try:
         (phase,), null = program.phases, _self_motion(program, x)
         chart, s = phase.joint_map, program.states(x)[0].y[:, 0]
-        assert isinstance(chart, ChartMap)  # noqa: S101
+        assert isinstance(chart, ChartMap)
         own = transversality(chart.rows.at(s)[0], null).min()
         return program.safeguard_slack(x) > HELD_BACK and bool(own >= _TRANSVERSAL)
     except UnreachableError:
@@ -313,7 +348,18 @@ def _selections(program: Program, x: np.ndarray) -> list[ChartRows]:
     """Rows that select joints and are transversal along the motion, the most transversal ones first."""
     null = _self_motion(program, x)
     n, r = null.shape[1:]
-    choices = [list(joints) for joints in itertools.islice(itertools.combinations(range(n), r), _CHOICES)]
-    least = [float(transversality(np.eye(n)[joints][None], null).min()) for joints in choices]
-    ranked = sorted(range(len(choices)), key=lambda number: -least[number])[: _SELECTED[min(r, 2)]]
-    return [ChartRows.constant(np.eye(n)[choices[number]]) for number in ranked if least[number] >= SELECTABLE]
+    choices = [
+        list(joints)
+        for joints in itertools.islice(itertools.combinations(range(n), r), _CHOICES)
+    ]
+    least = [
+        float(transversality(np.eye(n)[joints][None], null).min()) for joints in choices
+    ]
+    ranked = sorted(range(len(choices)), key=lambda number: -least[number])[
+        : _SELECTED[min(r, 2)]
+    ]
+    return [
+        ChartRows.constant(np.eye(n)[choices[number]])
+        for number in ranked
+        if least[number] >= SELECTABLE
+    ]

@@ -39,7 +39,10 @@ _FINEST = 96
 
 
 def lattice_starts(
-    decomposition: Decomposition, level: SearchLevel, seed: int, deadline: Deadline = NEVER
+    decomposition: Decomposition,
+    level: SearchLevel,
+    seed: int,
+    deadline: Deadline = NEVER,
 ) -> list[Start] | DeadEnd:
     """Take the shortest distinct joint paths from a decomposition's lattice; from a finer one where the first one ends.
 
@@ -59,9 +62,12 @@ def lattice_starts(
     cells, nodes, most = (
         level.cells_per_turn,
         level.nodes,
-        max(1, level.joint_paths // max(1, len(decomposition.redundant))) * len(decomposition.branches),
+        max(1, level.joint_paths // max(1, len(decomposition.redundant)))
+        * len(decomposition.branches),
     )
-    lattice = ClosedFormLattice(decomposition, cells_per_turn=cells, nodes=nodes, seed=seed, deadline=deadline)
+    lattice = ClosedFormLattice(
+        decomposition, cells_per_turn=cells, nodes=nodes, seed=seed, deadline=deadline
+    )
     found = lattice.joint_paths(most)
     if isinstance(found, DeadEnd):
         finer = ClosedFormLattice(
@@ -75,10 +81,15 @@ def lattice_starts(
         found = finer.joint_paths(most)
     if isinstance(found, DeadEnd):
         return found
-    return [_start_along(decomposition, joint_path, f"lattice {number}") for number, joint_path in enumerate(found, 1)]
+    return [
+        _start_along(decomposition, joint_path, f"lattice {number}")
+        for number, joint_path in enumerate(found, 1)
+    ]
 
 
-def _start_along(decomposition: Decomposition, joint_path: JointPath, origin: str) -> Start:
+def _start_along(
+    decomposition: Decomposition, joint_path: JointPath, origin: str
+) -> Start:
     """Smooth a joint path, as far as the closed form can follow, and estimate its time."""
     s, redundant = joint_path.s, joint_path.q[:, list(decomposition.redundant)]
     joint_map = decomposition.joint_map(joint_path.q[0], joint_path.branch)
@@ -91,7 +102,14 @@ def _start_along(decomposition: Decomposition, joint_path: JointPath, origin: st
     else:
         places, stations, q = s, np.column_stack([s, redundant]), joint_path.q
     estimate = least_time(decomposition.problem.limits, places, q)
-    return Start(decomposition.problem, joint_map, stations, estimate, origin, decomposition.match.family)
+    return Start(
+        decomposition.problem,
+        joint_map,
+        stations,
+        estimate,
+        origin,
+        decomposition.match.family,
+    )
 
 
 def fine_places(s: np.ndarray) -> np.ndarray:
@@ -99,9 +117,11 @@ def fine_places(s: np.ndarray) -> np.ndarray:
     return np.linspace(0.0, 1.0, max(2 * len(s) - 1, _FINEST + 1))
 
 
-def smoothed(s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int) -> np.ndarray:
+def smoothed(
+    s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int
+) -> np.ndarray:
     """Least-squares cubic splines through values (S, r), nearly exact at both ends, at the places `fine`."""
-    from scipy.interpolate import make_lsq_spline  # noqa: PLC0415  (imports in 0.3 s)
+    from scipy.interpolate import make_lsq_spline
 
     if not values.shape[1]:
         return np.zeros((len(fine), 0))
@@ -114,10 +134,15 @@ def smoothed(s: np.ndarray, values: np.ndarray, fine: np.ndarray, pieces: int) -
 def _clear(joint_map: ClosedFormMap, q: np.ndarray) -> bool:
     """Tell whether a joint path keeps clear of the branch boundary, (K, n)."""
     margins = joint_map.branch_margins(q)
-    return bool(margins.min(initial=np.inf) > 0.5 * min(0.02, float(margins[0].min(initial=np.inf))))
+    return bool(
+        margins.min(initial=np.inf)
+        > 0.5 * min(0.02, float(margins[0].min(initial=np.inf)))
+    )
 
 
-def numeric_starts(decomposition: Decomposition, most: int, deadline: Deadline) -> list[Start]:
+def numeric_starts(
+    decomposition: Decomposition, most: int, deadline: Deadline
+) -> list[Start]:
     """Carry the given start posture along the path by numeric inverse kinematics, in up to `most` ways.
 
     Parameters
@@ -137,7 +162,14 @@ def numeric_starts(decomposition: Decomposition, most: int, deadline: Deadline) 
     joint_map = decomposition.joint_map(start, decomposition.branches[0])
     joint_paths = itertools.islice(differential_ik_paths(joint_map, deadline), most)
     return [
-        Start(decomposition.problem, joint_map, joint_path, np.inf, f"numeric {number}", decomposition.match.family)
+        Start(
+            decomposition.problem,
+            joint_map,
+            joint_path,
+            np.inf,
+            f"numeric {number}",
+            decomposition.match.family,
+        )
         for number, joint_path in enumerate(joint_paths, 1)
     ]
 
@@ -170,8 +202,14 @@ def varied(joint_paths: Sequence[JointPath], most: int, seed: int) -> list[Joint
     for number in range(most):
         given = joint_paths[number % len(joint_paths)]
         waves = _waves(given)
-        heights = rng.normal(0.0, size / 2.0 ** (number // len(joint_paths) % _SIZES), (len(waves), robot.n))
-        q = np.clip(given.q + waves.T @ heights, limits.position_lower, limits.position_upper)
+        heights = rng.normal(
+            0.0,
+            size / 2.0 ** (number // len(joint_paths) % _SIZES),
+            (len(waves), robot.n),
+        )
+        q = np.clip(
+            given.q + waves.T @ heights, limits.position_lower, limits.position_upper
+        )
         found.append(dataclasses.replace(given, q=q))
     return found
 
@@ -214,7 +252,9 @@ def joint_space_start(problem: Problem) -> Start:
     for limit in problem.limits:
         # In motion an arm may pass postures that it cannot hold.
         if limit.static and (times is None or not limit.time_scaling):
-            _refuse_beyond(problem.robot, limit, s, q, problem.task.refinement.tolerance)
+            _refuse_beyond(
+                problem.robot, limit, s, q, problem.task.refinement.tolerance
+            )
     joint_map = JointSpaceMap(problem.robot, problem.path)
     if times is None:
         return Start(problem, joint_map, s[:, None], np.inf, FAMILY, FAMILY)
@@ -223,10 +263,14 @@ def joint_space_start(problem: Problem) -> Start:
     return Start(problem, joint_map, timed, estimate, FAMILY, FAMILY, timed=True)
 
 
-def _refuse_beyond(robot: Robot, limit: Limit, s: np.ndarray, q: np.ndarray, tolerance: float) -> None:
+def _refuse_beyond(
+    robot: Robot, limit: Limit, s: np.ndarray, q: np.ndarray, tolerance: float
+) -> None:
     """Refuse a path along which the arm at rest is beyond a limit."""
     values, beyond = beyond_at_rest(limit, q, tolerance)
-    station, column = (int(place) for place in np.unravel_index(np.argmax(beyond), beyond.shape))
+    station, column = (
+        int(place) for place in np.unravel_index(np.argmax(beyond), beyond.shape)
+    )
     if beyond[station, column] <= 0.0:
         return
     where, label = s[beyond[:, column] > 0.0], limit.labels[column]
@@ -239,4 +283,6 @@ def _refuse_beyond(robot: Robot, limit: Limit, s: np.ndarray, q: np.ndarray, tol
         allowed=f"{allowed} {label.unit}",
         hint="Lead the path elsewhere",
     )
-    raise error.with_remedies(*load_remedies(robot, limit, column, 1.0 + float(beyond[station, column])))
+    raise error.with_remedies(
+        *load_remedies(robot, limit, column, 1.0 + float(beyond[station, column]))
+    )

@@ -66,7 +66,9 @@ def refuse_hopeless_speeds(starts: Sequence[Start]) -> None:
     found = None
     for start in starts:
         possible = _in_phase_plane(start)
-        if possible is None or possible.share >= (_EXACT if _is_bound(start) else _HOPELESS):
+        if possible is None or possible.share >= (
+            _EXACT if _is_bound(start) else _HOPELESS
+        ):
             return
         found = possible if found is None or possible.share > found.share else found
     if found is not None:
@@ -76,11 +78,15 @@ def refuse_hopeless_speeds(starts: Sequence[Start]) -> None:
 def _is_bound(start: Start) -> bool:
     """Tell whether the phase plane bounds the speed: no other joint path is there, and no friction helps to brake."""
     robot = start.problem.robot
-    rubs = (robot.friction.viscous + robot.friction.coulomb > 0.0) & np.isfinite(robot.limits.torque_upper)
+    rubs = (robot.friction.viscous + robot.friction.coulomb > 0.0) & np.isfinite(
+        robot.limits.torque_upper
+    )
     return not start.joint_map.r and not rubs.any()
 
 
-def out_of_reach(attempts: Sequence[Attempt], solve: Callable[[Start], Attempt]) -> TooFast | None:
+def out_of_reach(
+    attempts: Sequence[Attempt], solve: Callable[[Start], Attempt]
+) -> TooFast | None:
     """Tell which least speed no attempt could hold, by a plan without it from the start of the most promising one.
 
     Parameters
@@ -95,7 +101,11 @@ def out_of_reach(attempts: Sequence[Attempt], solve: Callable[[Start], Attempt])
     TooFast or None
         None where no least speed is asked for, or another reason is to blame.
     """
-    starts = [attempt.start for attempt in attempts if attempt.start is not None and attempt.solver]
+    starts = [
+        attempt.start
+        for attempt in attempts
+        if attempt.start is not None and attempt.solver
+    ]
     if not starts or not any(limit.least_speed for limit in starts[0].problem.limits):
         return None
     start = min(starts, key=lambda start: start.estimate)
@@ -103,7 +113,10 @@ def out_of_reach(attempts: Sequence[Attempt], solve: Callable[[Start], Attempt])
     attempt = solve(dataclasses.replace(start, problem=problem))
     if not attempt.usable or attempt.program is None:
         return None
-    (phase,), (motion,) = attempt.program.phases, attempt.program.motions(attempt.reports[-1].x)
+    (phase,), (motion,) = (
+        attempt.program.phases,
+        attempt.program.motions(attempt.reports[-1].x),
+    )
     t = np.linspace(0.0, motion.t_end, _SAMPLES)
     try:
         moments = phase.joint_map.state(*motion.at(t), t=t)
@@ -140,14 +153,23 @@ def _in_phase_plane(start: Start) -> TooFast | None:
     if rate is None:
         return _ends_too_fast(problem, s, q, stations)
     q_ds = np.gradient(q, s, axis=0, edge_order=2)
-    places, slopes = (np.column_stack([np.interp(stations, s, joint) for joint in part.T]) for part in (q, q_ds))
+    places, slopes = (
+        np.column_stack([np.interp(stations, s, joint) for joint in part.T])
+        for part in (q, q_ds)
+    )
     still = np.zeros_like(places)
     moments = Moments(places, slopes * rate[:, None], still, still, stations)
-    best = "along the best joint path that was found" if start.joint_map.r else "in the fastest motion"
+    best = (
+        "along the best joint path that was found"
+        if start.joint_map.r
+        else "in the fastest motion"
+    )
     return _falling_short(start, moments, best, s, q)
 
 
-def _ends_too_fast(problem: Problem, s: np.ndarray, q: np.ndarray, stations: np.ndarray) -> TooFast | None:
+def _ends_too_fast(
+    problem: Problem, s: np.ndarray, q: np.ndarray, stations: np.ndarray
+) -> TooFast | None:
     """Tell at which end the path cannot be passed as fast as asked for; the other is at rest, or slower likewise."""
     others = list(_others(problem))
     if fastest(others, s, q, _AT_REST, stations) is None:
@@ -160,7 +182,10 @@ def _ends_too_fast(problem: Problem, s: np.ndarray, q: np.ndarray, stations: np.
             middle = 0.5 * (low + high)
             # On a short path a speed may ask for one at the other end.
             both = (middle * alone, middle * np.array(problem.end_rates))
-            possible = any(fastest(others, s, q, (rates[0], rates[1]), stations) is not None for rates in both)
+            possible = any(
+                fastest(others, s, q, (rates[0], rates[1]), stations) is not None
+                for rates in both
+            )
             low, high = (middle, high) if possible else (low, middle)
         if alone.any():
             found.append((low, key))
@@ -177,14 +202,21 @@ def _ends_too_fast(problem: Problem, s: np.ndarray, q: np.ndarray, stations: np.
     )
     given = problem.task.boundary
     remedies = [
-        Remedy(f"boundary.{name}", getattr(given, name), _FIRST * part * getattr(given, name), unit)
+        Remedy(
+            f"boundary.{name}",
+            getattr(given, name),
+            _FIRST * part * getattr(given, name),
+            unit,
+        )
         for part, name in found
         if part < _EXACT
     ]
     return TooFast(share, error.with_remedies(*remedies))
 
 
-def _falling_short(start: Start, motion: JointMotion, how: str, s: np.ndarray, q: np.ndarray) -> TooFast | None:
+def _falling_short(
+    start: Start, motion: JointMotion, how: str, s: np.ndarray, q: np.ndarray
+) -> TooFast | None:
     """Tell where a motion, whose places ascend, falls short of a least speed most; None where it does not.
 
     Its joint path is q, (S, n), at s, (S,).
@@ -195,10 +227,20 @@ def _falling_short(start: Start, motion: JointMotion, how: str, s: np.ndarray, q
         if not limit.least_speed:
             continue
         values = limit.values(motion)
-        beyond = np.where(_within(limit, motion.s).any(axis=1, keepdims=True), limit.violation(values), -np.inf)
+        beyond = np.where(
+            _within(limit, motion.s).any(axis=1, keepdims=True),
+            limit.violation(values),
+            -np.inf,
+        )
         column = int(np.argmax(beyond.max(axis=0)))
         if worst is None or beyond[:, column].max() > worst[0]:
-            worst = float(beyond[:, column].max()), limit, column, values[:, column], beyond[:, column]
+            worst = (
+                float(beyond[:, column].max()),
+                limit,
+                column,
+                values[:, column],
+                beyond[:, column],
+            )
     if worst is None or worst[0] <= 0.0:
         return None
     share, limit, column, values, beyond = 1.0 - worst[0], *worst[1:]
@@ -222,8 +264,18 @@ def _falling_short(start: Start, motion: JointMotion, how: str, s: np.ndarray, q
             there = f"{cap.speed:.3g} m/s at s = {cap.s:.3g}{' on that joint path' if start.joint_map.r else ''}"
             what = f"the {cap.limit} limit lets the tool keep no more than {there}"
             cuts = {}
-        remedies.append(Remedy(f"{key}.speed", part.speed, _FIRST * part.speed * possible / figure, "m/s"))
-        remedies += [Remedy(f"{key}.s[{end}]", part.s[end], cut, is_refined=False) for end, cut in cuts.items()]
+        remedies.append(
+            Remedy(
+                f"{key}.speed",
+                part.speed,
+                _FIRST * part.speed * possible / figure,
+                "m/s",
+            )
+        )
+        remedies += [
+            Remedy(f"{key}.s[{end}]", part.s[end], cut, is_refined=False)
+            for end, cut in cuts.items()
+        ]
     error = PlanningError(
         f"no motion was found with the {label.kind} that is asked for: {what}",
         where=f"{label.key or limit.name} ({label.subject})",
@@ -243,7 +295,9 @@ class _SpeedCap:
     limit: str = ""
 
 
-def _find_speed_cap(problem: Problem, s: np.ndarray, q: np.ndarray, part: tuple[float, float]) -> _SpeedCap:
+def _find_speed_cap(
+    problem: Problem, s: np.ndarray, q: np.ndarray, part: tuple[float, float]
+) -> _SpeedCap:
     """Find the largest speed that the tool can keep on a part of a joint path, q, (S, n), at s, (S,)."""
     q_ds = np.gradient(q, s, axis=0, edge_order=2)
     slope = ToolSpeed(problem.robot).slope(q, q_ds)
@@ -261,8 +315,14 @@ def _find_speed_cap(problem: Problem, s: np.ndarray, q: np.ndarray, part: tuple[
         if lines.u is not None:
             slant, lower = lines.x + lines.u * bend[inside, None], -1.0
         with np.errstate(divide="ignore", invalid="ignore"):
-            level = np.where(slant > 0.0, 1.0 - lines.constant, lower - lines.constant) / slant
-        squares = np.where(slant == 0.0, np.inf, np.maximum(level, 0.0)) * slope[inside, None] ** 2
+            level = (
+                np.where(slant > 0.0, 1.0 - lines.constant, lower - lines.constant)
+                / slant
+            )
+        squares = (
+            np.where(slant == 0.0, np.inf, np.maximum(level, 0.0))
+            * slope[inside, None] ** 2
+        )
         row, column = np.unravel_index(int(np.argmin(squares)), squares.shape)
         speed = math.sqrt(squares[row, column])
         if speed < worst.speed:
@@ -274,7 +334,11 @@ def _find_speed_cap(problem: Problem, s: np.ndarray, q: np.ndarray, part: tuple[
 def _within(limit: Limit, s: np.ndarray) -> np.ndarray:
     """Tell which places, (P,), are within which parts between breaks of a limit, (P, p) bool; breaks come in pairs."""
     breaks = np.sort(limit.breaks)
-    ends = breaks.reshape(-1, 2) if len(breaks) and len(breaks) % 2 == 0 else np.array([[0.0, 1.0]])
+    ends = (
+        breaks.reshape(-1, 2)
+        if len(breaks) and len(breaks) % 2 == 0
+        else np.array([[0.0, 1.0]])
+    )
     return np.asarray((s[:, None] >= ends[:, 0]) & (s[:, None] <= ends[:, 1]))
 
 
@@ -288,5 +352,11 @@ def _explain_reach(s: np.ndarray, reached: np.ndarray) -> tuple[str, dict[int, f
     before, behind = not reached[0], not reached[-1]
     ways = [f"before s = {s[0]:.2g}"] * before + [f"behind s = {s[-1]:.2g}"] * behind
     # One end alone: a number is tried by itself.
-    cuts = {} if before and behind else {0: float(first) + _ROOM} if before else {1: float(last) - _ROOM}
+    cuts = (
+        {}
+        if before and behind
+        else {0: float(first) + _ROOM}
+        if before
+        else {1: float(last) - _ROOM}
+    )
     return f"the path {' and '.join(ways)} is too short for the way to it", cuts

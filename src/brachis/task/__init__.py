@@ -12,12 +12,39 @@ from brachis.task.limit_models import (
     ToolLimits,
 )
 from brachis.task.limits_file import LimitsFile, read_limits
-from brachis.task.load import Source, check_robot_settings, load_task, read_assignment, set_key, with_keys
+from brachis.task.load import (
+    Source,
+    check_robot_settings,
+    load_task,
+    read_assignment,
+    set_key,
+    with_keys,
+)
 from brachis.task.models import BoundarySettings, Posture, Task
-from brachis.task.orientation import AlongTangent, Attitude, Rotate, Rotation, Tangent, Target, ToolPose, TurnTo
-from brachis.task.planning_models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings
+from brachis.task.orientation import (
+    AlongTangent,
+    Attitude,
+    Rotate,
+    Rotation,
+    Tangent,
+    Target,
+    ToolPose,
+    TurnTo,
+)
+from brachis.task.planning_models import (
+    RefinementSettings,
+    SearchSettings,
+    SolverSettings,
+    SplineSettings,
+)
 from brachis.task.point_data import FileUnits, FitReport, FitTolerance, PointFile
-from brachis.task.robot_models import FrictionSettings, InertiaMatrix, Payload, Placement, RobotSettings
+from brachis.task.robot_models import (
+    FrictionSettings,
+    InertiaMatrix,
+    Payload,
+    Placement,
+    RobotSettings,
+)
 from brachis.task.schema import json_schema
 from brachis.task.segments import (
     ArcCenter,

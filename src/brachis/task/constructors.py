@@ -36,7 +36,7 @@ class Transform(Protocol):
     """A pose such as Pinocchio's ``SE3``."""
 
     @property
-    def homogeneous(self) -> Any:  # noqa: ANN401
+    def homogeneous(self) -> Any:
         """Return the homogeneous matrix, (4, 4)."""
 
 
@@ -86,7 +86,16 @@ def Line(  # noqa: N802
     if hasattr(to, "homogeneous"):
         ((place, turn),) = poses_of([to], "Line.to")
         to, orientation = place, orientation or {"to": turn}
-    return _segment(LineSegment, "line", blend, orientation, to=to, by=by, length=length, angle_deg=angle_deg)
+    return _segment(
+        LineSegment,
+        "line",
+        blend,
+        orientation,
+        to=to,
+        by=by,
+        length=length,
+        angle_deg=angle_deg,
+    )
 
 
 @named
@@ -129,7 +138,14 @@ def Arc(  # noqa: N802
     >>> brachis.Arc(center=[0.5, 0.0], angle_deg=90)
     Arc(center=[0.5, 0], angle_deg=90)
     """
-    shape = {"center": center, "angle_deg": angle_deg, "normal": normal, "via": via, "to": to, "yaw": yaw}
+    shape = {
+        "center": center,
+        "angle_deg": angle_deg,
+        "normal": normal,
+        "via": via,
+        "to": to,
+        "yaw": yaw,
+    }
     return _segment(ArcSegment, "arc", blend, orientation, **shape)
 
 
@@ -165,7 +181,16 @@ def Circle(  # noqa: N802
     >>> brachis.Circle([0.5, 0.0], turns=2)
     Circle(center=[0.5, 0], turns=2)
     """
-    return _segment(CircleSegment, "circle", blend, orientation, center=center, turns=turns, normal=normal, yaw=yaw)
+    return _segment(
+        CircleSegment,
+        "circle",
+        blend,
+        orientation,
+        center=center,
+        turns=turns,
+        normal=normal,
+        yaw=yaw,
+    )
 
 
 @named
@@ -204,7 +229,16 @@ def Helix(  # noqa: N802
     >>> brachis.Helix([0.5, 0.0, 0.3], pitch=0.02, turns=3)
     Helix(center=[0.5, 0, 0.3], turns=3, pitch=0.02, normal=[0, 0, 1])
     """
-    return _segment(HelixSegment, "helix", blend, orientation, center=center, pitch=pitch, normal=normal, turns=turns)
+    return _segment(
+        HelixSegment,
+        "helix",
+        blend,
+        orientation,
+        center=center,
+        pitch=pitch,
+        normal=normal,
+        turns=turns,
+    )
 
 
 @named
@@ -247,23 +281,39 @@ def Spline(  # noqa: N802
     """
     if orientations is None and _are_positions(through):
         points = [_vector(point) for point in through]  # type: ignore[union-attr]
-        return _segment(SplineSegment, "spline", blend, orientation, through=points, relative=relative)
+        return _segment(
+            SplineSegment,
+            "spline",
+            blend,
+            orientation,
+            through=points,
+            relative=relative,
+        )
     poses = poses_of(through, "Spline.through", orientations)
-    shape = {"through": [place for place, _ in poses], "orientations": [turn for _, turn in poses]}
-    return _segment(SplineSegment, "spline", blend, orientation, relative=relative, **shape)
+    shape = {
+        "through": [place for place, _ in poses],
+        "orientations": [turn for _, turn in poses],
+    }
+    return _segment(
+        SplineSegment, "spline", blend, orientation, relative=relative, **shape
+    )
 
 
 def _are_positions(through: object) -> bool:
     """Tell rows of numbers from transforms."""
     rows = plain(through)
     first = rows[0] if isinstance(rows, list) and rows else None
-    return isinstance(first, int | float) or (isinstance(first, list) and not any(isinstance(c, list) for c in first))
+    return isinstance(first, int | float) or (
+        isinstance(first, list) and not any(isinstance(c, list) for c in first)
+    )
 
 
-def poses_of(transforms: Any, source: str, orientations: Any = None) -> list[tuple[list[float], dict[str, Any]]]:  # noqa: ANN401
+def poses_of(
+    transforms: Any, source: str, orientations: Any = None
+) -> list[tuple[list[float], dict[str, Any]]]:
     """Positions, m, and orientations as a task file writes them."""
-    from brachis.task.points.points import points_from  # noqa: PLC0415  (NumPy, for those who need it)
-    from brachis.task.points.units import Units  # noqa: PLC0415
+    from brachis.task.points.points import points_from
+    from brachis.task.points.units import Units
 
     points = points_from(transforms, orientations, None, Units(), source, least=1)
     turns = [{"quaternion_wxyz": turn} for turn in points.turning.tolist()]
@@ -276,12 +326,24 @@ def _vector(value: object) -> object:
     return [value] if isinstance(value, int | float) else value
 
 
-def _segment(model: type[_S], kind: str, blend: float | None, orientation: Orientation, **shape: object) -> _S:
+def _segment(
+    model: type[_S],
+    kind: str,
+    blend: float | None,
+    orientation: Orientation,
+    **shape: object,
+) -> _S:
     """Validate what is given of a segment."""
-    given = {key: _vector(value) if key in {"to", "by"} else value for key, value in shape.items() if value is not None}
+    given = {
+        key: _vector(value) if key in {"to", "by"} else value
+        for key, value in shape.items()
+        if value is not None
+    }
     content = {kind: given, "blend": blend, "orientation": orientation}
     try:
-        return model.model_validate(plain({key: value for key, value in content.items() if value is not None}))
+        return model.model_validate(
+            plain({key: value for key, value in content.items() if value is not None})
+        )
     except ValidationError as error:
         raise task_error(error, kind.capitalize(), model) from None
 
@@ -291,11 +353,11 @@ _M = TypeVar("_M", bound=Model)
 
 
 def fit_path(
-    points: Any,  # noqa: ANN401  (arrays, lists, transforms of several libraries)
+    points: Any,
     *,
     tolerance: Mapping[str, float | str] | FitTolerance | None = None,
-    orientations: Any = None,  # noqa: ANN401
-    speed: Any = None,  # noqa: ANN401
+    orientations: Any = None,
+    speed: Any = None,
     units: Mapping[str, str] | FileUnits | None = None,
     corner: Literal["blend", "refuse"] = "blend",
     orientation: OrientationMode = None,
@@ -344,13 +406,21 @@ def fit_path(
     >>> path[0].bspline.fit.intervals < 5
     True
     """
-    from brachis.task.points.points import points_from  # noqa: PLC0415  (NumPy, for those who need it)
-    from brachis.task.points.units import Units  # noqa: PLC0415
+    from brachis.task.points.points import points_from
+    from brachis.task.points.units import Units
 
     stated = _checked(FileUnits, units or {}, "units")
-    given = points_from(points, orientations, speed, Units(**stated.model_dump()), _SOURCE)
-    allowed = None if tolerance is None else _checked(FitTolerance, tolerance, "tolerance")
-    return tuple(segments_along(given, Wanted(_SOURCE, _SOURCE, allowed, corner, relative, orientation)))
+    given = points_from(
+        points, orientations, speed, Units(**stated.model_dump()), _SOURCE
+    )
+    allowed = (
+        None if tolerance is None else _checked(FitTolerance, tolerance, "tolerance")
+    )
+    return tuple(
+        segments_along(
+            given, Wanted(_SOURCE, _SOURCE, allowed, corner, relative, orientation)
+        )
+    )
 
 
 def _checked(model: type[_M], value: object, key: str) -> _M:

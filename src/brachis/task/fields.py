@@ -12,7 +12,15 @@ import re
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Strict, WithJsonSchema
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Strict,
+    WithJsonSchema,
+)
 from pydantic_core import PydanticCustomError
 
 from brachis.common.summary import shown
@@ -33,11 +41,13 @@ class Model(BaseModel):
     """Base class of all parts of a task: frozen, without unknown keys, without NaN or infinity."""
 
     # Instances are checked again, because a program can make limits that nobody has checked.
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, revalidate_instances="always")
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, revalidate_instances="always"
+    )
 
     if not TYPE_CHECKING:
 
-        def __getattr__(self, name: str) -> Any:  # noqa: ANN401
+        def __getattr__(self, name: str) -> Any:
             """Refuse a name that is not there, and name the one that may be meant."""
             try:
                 return super().__getattr__(name)
@@ -47,8 +57,16 @@ class Model(BaseModel):
     def __repr_args__(self) -> list[tuple[str | None, Any]]:
         """Leave out what is as by default; `__repr__` is pydantic's and shows these."""
         fields = type(self).model_fields
-        given = [(name, getattr(self, name)) for name in fields if name in self.model_fields_set]
-        return [(name, _Shown(value)) for name, value in given if value != fields[name].default]
+        given = [
+            (name, getattr(self, name))
+            for name in fields
+            if name in self.model_fields_set
+        ]
+        return [
+            (name, _Shown(value))
+            for name, value in given
+            if value != fields[name].default
+        ]
 
     def __str__(self) -> str:
         """Show it as `repr` does."""
@@ -62,7 +80,11 @@ class _Shown:
         self._value = value
 
     def __repr__(self) -> str:
-        return repr(self._value) if isinstance(self._value, str | Model) else shown(self._value)
+        return (
+            repr(self._value)
+            if isinstance(self._value, str | Model)
+            else shown(self._value)
+        )
 
 
 _PERCENT = re.compile(r"^(100(\.0*)?|[0-9]{1,2}(\.[0-9]*)?) ?%$")
@@ -74,7 +96,9 @@ def _from_percent(value: object) -> object:
         return value
     percent = _PERCENT.match(value)
     if percent is None:
-        raise refuse("no share", found=value, allowed="from 0 to 100 %, or a number from 0 to 1")
+        raise refuse(
+            "no share", found=value, allowed="from 0 to 100 %, or a number from 0 to 1"
+        )
     return float(percent[1]) / 100.0
 
 
@@ -103,7 +127,9 @@ Name = Annotated[str, Strict(), Field(min_length=1)]
 Vector = Annotated[tuple[Number, ...], Field(min_length=1)]
 
 
-def plain(value: object, sequence: type[list[object] | tuple[object, ...]] = list) -> object:
+def plain(
+    value: object, sequence: type[list[object] | tuple[object, ...]] = list
+) -> object:
     """Return `value` with arrays and sequences as `sequence`, array scalars as numbers, and path objects as strings."""
     # An array is known by its method and not by its class: this stage has no need for NumPy.
     to_list = getattr(value, "tolist", None)
@@ -116,7 +142,12 @@ def plain(value: object, sequence: type[list[object] | tuple[object, ...]] = lis
 
 
 def refuse(
-    problem: str, *, key: str = "", found: object = None, allowed: str = "", absent: bool = False
+    problem: str,
+    *,
+    key: str = "",
+    found: object = None,
+    allowed: str = "",
+    absent: bool = False,
 ) -> PydanticCustomError:
     """Return the error that a validator raises to refuse a value.
 
@@ -135,7 +166,15 @@ def refuse(
     """
     # Pydantic fills braces of the template from the context; the facts travel in the context, not in the text.
     return PydanticCustomError(
-        REFUSED, "{problem}", {"problem": problem, "key": key, "found": found, "allowed": allowed, "absent": absent}
+        REFUSED,
+        "{problem}",
+        {
+            "problem": problem,
+            "key": key,
+            "found": found,
+            "allowed": allowed,
+            "absent": absent,
+        },
     )
 
 
@@ -143,7 +182,11 @@ def or_form(form: dict[str, Any]) -> Callable[[dict[str, Any]], None]:
     """Return what adds a form of a field's value to its JSON schema, and of a list one item; for json_schema_extra."""
 
     def add(schema: dict[str, Any]) -> None:
-        kept = {key: schema.pop(key) for key in ("$ref", "type", "items", "minItems") if key in schema}
+        kept = {
+            key: schema.pop(key)
+            for key in ("$ref", "type", "items", "minItems")
+            if key in schema
+        }
         schema["anyOf"] = [kept, *([kept["items"]] if "items" in kept else []), form]
 
     return add
@@ -204,12 +247,18 @@ def by_key(problem: str, members: Mapping[str, tuple[str, ...]]) -> Discriminato
             return f"<{type(value).__name__}>"
         if not isinstance(value, Mapping):
             return None
-        chosen = [name for name, keys in members.items() if any(key in value for key in keys)]
+        chosen = [
+            name for name, keys in members.items() if any(key in value for key in keys)
+        ]
         return f"<{chosen[0]}>" if len(chosen) == 1 else None
 
     return _Chooser(
         member,
         custom_error_type=WRONG_KEYS,
         custom_error_message="{problem}",
-        custom_error_context={"problem": problem, "allowed": allowed, "known": " ".join(known)},
+        custom_error_context={
+            "problem": problem,
+            "allowed": allowed,
+            "known": " ".join(known),
+        },
     )

@@ -16,7 +16,14 @@ from brachis.errors import TaskError, write_count
 from brachis.task.models import Task
 from brachis.task.orientation import Attitude, OrientationMode, Rotate, TurnTo
 from brachis.task.point_data import FitReport, FitTolerance, PointFile
-from brachis.task.segments import BSplineCurve, BSplineSegment, CsvSegment, Segment, SplineSegment, SplineThrough
+from brachis.task.segments import (
+    BSplineCurve,
+    BSplineSegment,
+    CsvSegment,
+    Segment,
+    SplineSegment,
+    SplineThrough,
+)
 
 if TYPE_CHECKING:
     from brachis.task.points.curves import FittedCurve, Report
@@ -54,7 +61,9 @@ class Wanted:
     blend: float | None = None
 
 
-def segments_along(points: Points, wanted: Wanted, told: tuple[str, ...] = ()) -> list[SplineSegment | BSplineSegment]:
+def segments_along(
+    points: Points, wanted: Wanted, told: tuple[str, ...] = ()
+) -> list[SplineSegment | BSplineSegment]:
     """Return the segments along points, whose first one is where they start.
 
     Parameters
@@ -70,27 +79,41 @@ def segments_along(points: Points, wanted: Wanted, told: tuple[str, ...] = ()) -
         Points are wrong, or there is no smooth curve within the tolerance; the message names the row.
     """
     # Imported here: tasks without points need neither NumPy nor SciPy.
-    from brachis.task.points.curves import fit_curves, interpolated  # noqa: PLC0415
-    from brachis.task.points.least_squares import Tolerance  # noqa: PLC0415
+    from brachis.task.points.curves import fit_curves, interpolated
+    from brachis.task.points.least_squares import Tolerance
 
     if points.turning.shape[1] == _QUATERNION and wanted.orientation is not None:
         problem = "the points' orientations say already how the tool turns"
         where = f"{wanted.where}.orientation"
-        raise TaskError(problem, found="orientations", allowed="no orientation", where=where)
+        raise TaskError(
+            problem, found="orientations", allowed="no orientation", where=where
+        )
     if wanted.tolerance is None:
         if points.speed is not None:
             problem = "feed rates are read along a fitted path alone"
             hint = "Give a tolerance, or leave the feed rates out"
             raise TaskError(
-                problem, found="feed rates", allowed="a tolerance beside them", where=wanted.where, hint=hint
+                problem,
+                found="feed rates",
+                allowed="a tolerance beside them",
+                where=wanted.where,
+                hint=hint,
             )
-        return [_spline_through(points, _named(interpolated(points, told), wanted), wanted)]
-    position, orientation, corner = (getattr(wanted.tolerance, name) for name in FitTolerance.model_fields)
-    curves, report = fit_curves(points, Tolerance(position, orientation, corner or position), told)
+        return [
+            _spline_through(points, _named(interpolated(points, told), wanted), wanted)
+        ]
+    position, orientation, corner = (
+        getattr(wanted.tolerance, name) for name in FitTolerance.model_fields
+    )
+    curves, report = fit_curves(
+        points, Tolerance(position, orientation, corner or position), told
+    )
     if len(curves) > 1:
         _check_corners(report, wanted)
     named = _named(report, wanted)
-    return [_segment(i, curve, len(curves), named, wanted) for i, curve in enumerate(curves)]
+    return [
+        _segment(i, curve, len(curves), named, wanted) for i, curve in enumerate(curves)
+    ]
 
 
 def _named(report: Report, wanted: Wanted) -> FitReport:
@@ -99,8 +122,14 @@ def _named(report: Report, wanted: Wanted) -> FitReport:
 
 def _spline_through(points: Points, report: FitReport, wanted: Wanted) -> SplineSegment:
     poses = points.turning.shape[1] == _QUATERNION
-    places = [tuple(row) for row in (points.position if poses else points.columns).tolist()]
-    turned = [Attitude(quaternion_wxyz=turn) for turn in points.turning.tolist()] if poses else None
+    places = [
+        tuple(row) for row in (points.position if poses else points.columns).tolist()
+    ]
+    turned = (
+        [Attitude(quaternion_wxyz=turn) for turn in points.turning.tolist()]
+        if poses
+        else None
+    )
     spline = SplineThrough(
         through=tuple(places[1:]),
         orientations=tuple(turned[1:]) if turned else None,
@@ -109,10 +138,14 @@ def _spline_through(points: Points, report: FitReport, wanted: Wanted) -> Spline
         starts_oriented=turned[0] if turned else None,
         fit=report,
     )
-    return SplineSegment(blend=wanted.blend, orientation=wanted.orientation, spline=spline)
+    return SplineSegment(
+        blend=wanted.blend, orientation=wanted.orientation, spline=spline
+    )
 
 
-def _segment(i: int, curve: FittedCurve, count: int, report: FitReport, wanted: Wanted) -> BSplineSegment:
+def _segment(
+    i: int, curve: FittedCurve, count: int, report: FitReport, wanted: Wanted
+) -> BSplineSegment:
     """Return the segment of curve `i`; the first one has the report, all but the last one a blend of their own."""
     control_points: Any = curve.spline.c.tolist()  # SciPy's stubs take it for a vector
     shape = BSplineCurve(
@@ -135,18 +168,35 @@ def _check_corners(report: Report, wanted: Wanted) -> None:
     TaskError
         It lists the corners.
     """
-    found = [f"{degrees(corner.angle):.3g} deg at row {corner.row}" for corner in report.corners]
-    listed = ", ".join([*found[:_LISTED], *([f"{len(found) - _LISTED} more"] if len(found) > _LISTED else [])])
+    found = [
+        f"{degrees(corner.angle):.3g} deg at row {corner.row}"
+        for corner in report.corners
+    ]
+    listed = ", ".join(
+        [
+            *found[:_LISTED],
+            *([f"{len(found) - _LISTED} more"] if len(found) > _LISTED else []),
+        ]
+    )
     if wanted.corner == "refuse":
         hint = "Set corner: blend to round them within the tolerance"
         where = f"{wanted.where}.corner"
         raise TaskError(
-            f"the points have {write_count(len(found), 'corner')}", found=listed, allowed="none", where=where, hint=hint
+            f"the points have {write_count(len(found), 'corner')}",
+            found=listed,
+            allowed="none",
+            where=where,
+            hint=hint,
         )
     if isinstance(wanted.orientation, Rotate | TurnTo):
         hint = "Give an orientation for every point, or orientation: tangent"
         where = f"{wanted.where}.orientation"
-        raise TaskError("the tool cannot turn at a constant rate over corners", found=listed, where=where, hint=hint)
+        raise TaskError(
+            "the tool cannot turn at a constant rate over corners",
+            found=listed,
+            where=where,
+            hint=hint,
+        )
 
 
 _FEWEST_ROWS = 2
@@ -175,11 +225,17 @@ def expand_csv_files(task: Task, source: str, folder: Path) -> Task:
         return task
     path: list[Segment] = []
     for i, segment in enumerate(task.path):
-        path += _read(segment, task, f"{source}: path[{i}]", folder) if isinstance(segment, CsvSegment) else [segment]
+        path += (
+            _read(segment, task, f"{source}: path[{i}]", folder)
+            if isinstance(segment, CsvSegment)
+            else [segment]
+        )
     return task.model_copy(update={"path": tuple(path)})
 
 
-def _read(segment: CsvSegment, task: Task, where: str, folder: Path) -> list[SplineSegment | BSplineSegment]:
+def _read(
+    segment: CsvSegment, task: Task, where: str, folder: Path
+) -> list[SplineSegment | BSplineSegment]:
     settings = segment.csv
     if task.task_space == "joints":
         return [_along_joints(segment, where, folder)]
@@ -196,29 +252,40 @@ def _read(segment: CsvSegment, task: Task, where: str, folder: Path) -> list[Spl
     return segments_along(points, wanted, told)
 
 
-def _points_of(settings: PointFile, task: Task, where: str, folder: Path) -> tuple[Points, tuple[str, ...]]:
-    from brachis.task.points.gcode import SUFFIXES, read_gcode  # noqa: PLC0415
-    from brachis.task.points.tables import (  # noqa: PLC0415
+def _points_of(
+    settings: PointFile, task: Task, where: str, folder: Path
+) -> tuple[Points, tuple[str, ...]]:
+    from brachis.task.points.gcode import SUFFIXES, read_gcode
+    from brachis.task.points.tables import (
         allowed_columns,
         points_of,
         read_table,
         understood,
     )
-    from brachis.task.points.units import Units  # noqa: PLC0415
+    from brachis.task.points.units import Units
 
     path = folder / settings.file
-    text = read_text(path, where=where, folder=folder, found=settings.file, largest=_LARGEST_FILE)
+    text = read_text(
+        path, where=where, folder=folder, found=settings.file, largest=_LARGEST_FILE
+    )
     if path.suffix.lower() in SUFFIXES:
         if settings.orientation is not None:
             problem = "G-code has no orientations"
-            raise TaskError(problem, found=settings.orientation, allowed="no csv.orientation", where=where)
+            raise TaskError(
+                problem,
+                found=settings.orientation,
+                allowed="no csv.orientation",
+                where=where,
+            )
         points, told = read_gcode(text, task.task_space, str(path))
     else:
         rows = task.task_space
         check = partial(understood, rows=rows, stated=settings.orientation)
         table = read_table(text, str(path), allowed_columns(rows), check)
         units = Units(**settings.units.model_dump())
-        points, of_units = points_of(table, rows, units, str(path), settings.orientation)
+        points, of_units = points_of(
+            table, rows, units, str(path), settings.orientation
+        )
         told = (*table.told, *of_units)
     _check_count(len(points), path)
     return points, told
@@ -226,9 +293,9 @@ def _points_of(settings: PointFile, task: Task, where: str, folder: Path) -> tup
 
 def _along_joints(segment: CsvSegment, where: str, folder: Path) -> SplineSegment:
     """Return the spline through all rows of a file whose columns are joints, in rad and m."""
-    from brachis.task.points.checks import refuse_repetitions  # noqa: PLC0415
-    from brachis.task.points.points import Points  # noqa: PLC0415
-    from brachis.task.points.tables import read_table  # noqa: PLC0415
+    from brachis.task.points.checks import refuse_repetitions
+    from brachis.task.points.points import Points
+    from brachis.task.points.tables import read_table
 
     settings, plain = segment.csv, PointFile(file=segment.csv.file)
     for key in ("orientation", "units", "tolerance", "corner"):
@@ -236,16 +303,38 @@ def _along_joints(segment: CsvSegment, where: str, folder: Path) -> SplineSegmen
             problem = "a path of joints passes all rows, which are in rad and m"
             raise TaskError(problem, allowed=f"no {key}", where=f"{where}.csv.{key}")
     path = folder / settings.file
-    text = read_text(path, where=f"{where}.csv.file", folder=folder, found=settings.file, largest=_LARGEST_FILE)
-    table = read_table(text, str(path), "the names of the joints", lambda _header, _where: None)
+    text = read_text(
+        path,
+        where=f"{where}.csv.file",
+        folder=folder,
+        found=settings.file,
+        largest=_LARGEST_FILE,
+    )
+    table = read_table(
+        text, str(path), "the names of the joints", lambda _header, _where: None
+    )
     _check_count(len(table.values), path)
-    refuse_repetitions(Points(table.values, table.values[:, :0], None, table.lines, str(path)))
+    refuse_repetitions(
+        Points(table.values, table.values[:, :0], None, table.lines, str(path))
+    )
     start, *through = (tuple(row) for row in table.values.tolist())
-    spline = SplineThrough(through=tuple(through), relative=settings.relative, starts_at=start, joints=table.header)
-    return SplineSegment(blend=segment.blend, orientation=segment.orientation, spline=spline)
+    spline = SplineThrough(
+        through=tuple(through),
+        relative=settings.relative,
+        starts_at=start,
+        joints=table.header,
+    )
+    return SplineSegment(
+        blend=segment.blend, orientation=segment.orientation, spline=spline
+    )
 
 
 def _check_count(rows: int, path: Path) -> None:
     if rows < _FEWEST_ROWS:
         problem = "a path needs its start and at least one waypoint"
-        raise TaskError(problem, found=f"{write_count(rows, 'row')} of numbers", allowed="2 or more", where=str(path))
+        raise TaskError(
+            problem,
+            found=f"{write_count(rows, 'row')} of numbers",
+            allowed="2 or more",
+            where=str(path),
+        )

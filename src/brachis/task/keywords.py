@@ -13,11 +13,22 @@ from brachis.task.load import Source, load_task
 from brachis.task.messages import key_paths
 from brachis.task.models import BoundarySettings, Task
 from brachis.task.orientation import ToolPose
-from brachis.task.planning_models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings
+from brachis.task.planning_models import (
+    RefinementSettings,
+    SearchSettings,
+    SolverSettings,
+    SplineSettings,
+)
 from brachis.task.robot_models import Payload, Placement, RobotSettings
 from brachis.task.segments import SegmentModel
 
-Posture = Array | Sequence[float] | Mapping[str, float] | Mapping[str, Sequence[float]] | Literal["free"]
+Posture = (
+    Array
+    | Sequence[float]
+    | Mapping[str, float]
+    | Mapping[str, Sequence[float]]
+    | Literal["free"]
+)
 Settings = Mapping[str, Any]
 
 
@@ -28,12 +39,19 @@ class TaskKeywords(TypedDict, total=False):
     which the first one is where the path begins.
     """
 
-    path: SegmentModel | Mapping[str, Any] | Sequence[SegmentModel | Mapping[str, Any] | Sequence[float]] | Array
+    path: (
+        SegmentModel
+        | Mapping[str, Any]
+        | Sequence[SegmentModel | Mapping[str, Any] | Sequence[float]]
+        | Array
+    )
     start: Posture
     end: Posture
     frames: Mapping[str, Placement | Settings | Transform]
     path_frame: str | None
-    path_start: Array | Sequence[float] | Mapping[str, Any] | ToolPose | Transform | None
+    path_start: (
+        Array | Sequence[float] | Mapping[str, Any] | ToolPose | Transform | None
+    )
     task_space: str | Sequence[str]
     redundant_joints: Sequence[str] | Literal["auto"]
     branch: str
@@ -82,10 +100,14 @@ _SECTIONS: dict[str, type[Model]] = {
     "spline": SplineSettings,
     "search": SearchSettings,
 }
-_SECTION_OF = {key: section for section, model in _SECTIONS.items() for key in model.model_fields}
+_SECTION_OF = {
+    key: section for section, model in _SECTIONS.items() for key in model.model_fields
+}
 
 
-def task_with(source: Source | None = None, /, **keywords: Unpack[TaskKeywords]) -> Task:
+def task_with(
+    source: Source | None = None, /, **keywords: Unpack[TaskKeywords]
+) -> Task:
     """Return a task made of keywords, or one with some of its keys changed.
 
     Parameters
@@ -117,14 +139,24 @@ def task_with(source: Source | None = None, /, **keywords: Unpack[TaskKeywords])
     if source is not None and not keywords:
         return load_task(source)
     check_keywords(keywords)
-    content = {"brachis": 1} if source is None else load_task(source).model_dump(exclude_unset=True)
+    content = (
+        {"brachis": 1}
+        if source is None
+        else load_task(source).model_dump(exclude_unset=True)
+    )
     for key, value in keywords.items():
-        whole = {_SECTION_OF[key]: {key: value}} if key in _SECTION_OF else {key: _in_full(key, value)}
+        whole = (
+            {_SECTION_OF[key]: {key: value}}
+            if key in _SECTION_OF
+            else {key: _in_full(key, value)}
+        )
         content = _merged(content, whole)
     return load_task(content)
 
 
-def check_keywords(keywords: Iterable[str], where: str = "plan", own: Sequence[str] = ()) -> None:
+def check_keywords(
+    keywords: Iterable[str], where: str = "plan", own: Sequence[str] = ()
+) -> None:
     """Refuse names that are no keywords, and say where keys of these names belong, or which is meant.
 
     Parameters
@@ -145,11 +177,20 @@ def check_keywords(keywords: Iterable[str], where: str = "plan", own: Sequence[s
 
 
 def _no_keyword(name: str, where: str, own: Sequence[str]) -> UnknownNameError:
-    words = [name, *(word for word in name.split("_") if word in LimitKeywords.__annotations__)]
+    words = [
+        name,
+        *(word for word in name.split("_") if word in LimitKeywords.__annotations__),
+    ]
     paths = next(filter(None, (key_paths(word, Task) for word in words)), [])
     hint = " or ".join(_as_keyword(path.split(".")) for path in paths)
     valid = sorted((*TaskKeywords.__annotations__, *own))
-    return UnknownNameError("keyword", name, valid, where=where, hint=hint and f"It is a key of others: {hint}")
+    return UnknownNameError(
+        "keyword",
+        name,
+        valid,
+        where=where,
+        hint=hint and f"It is a key of others: {hint}",
+    )
 
 
 def _as_keyword(parts: Sequence[str]) -> str:
@@ -171,7 +212,11 @@ def _in_full(key: str, value: object) -> object:
         return {"position": place, **turn}
     if key not in {"start", "end"} or isinstance(value, str | Model):
         return value
-    return value if isinstance(value, Mapping) and set(value) == {"joints"} else {"joints": plain(value)}
+    return (
+        value
+        if isinstance(value, Mapping) and set(value) == {"joints"}
+        else {"joints": plain(value)}
+    )
 
 
 def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -182,6 +227,8 @@ def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str,
     both = {
         key: _merged(content[key], value)
         for key, value in changes.items()
-        if isinstance(value, Mapping) and isinstance(content.get(key), Mapping) and key != "path_start"
+        if isinstance(value, Mapping)
+        and isinstance(content.get(key), Mapping)
+        and key != "path_start"
     }
     return {**content, **changes, **both}

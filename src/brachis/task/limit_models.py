@@ -16,10 +16,27 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, Final, Literal, Protocol, TypedDict
 
-from pydantic import AfterValidator, BeforeValidator, Field, Tag, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    Tag,
+    field_validator,
+    model_validator,
+)
 
 from brachis.errors import write_count
-from brachis.task.fields import Model, Name, NonNegative, Number, Positive, Share, by_form, plain, refuse
+from brachis.task.fields import (
+    Model,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    Share,
+    by_form,
+    plain,
+    refuse,
+)
 
 FROM_URDF: Final = "urdf"
 """The value of a limit whose key is absent: the URDF supplies it."""
@@ -28,16 +45,19 @@ FROM_URDF: Final = "urdf"
 class Array(Protocol):
     """What a NumPy array or scalar is to this stage, which does not import NumPy."""
 
-    def tolist(self) -> Any:  # noqa: ANN401
+    def tolist(self) -> Any:
         """Return plain numbers."""
 
 
 _LIMIT_FORMS = (
-    "a number > 0 for all joints, a list of numbers > 0, a mapping of joint name to number > 0 or null, null (no limit)"
+    "a number > 0 for all joints, a list of numbers > 0, "
+    "a mapping of joint name to number > 0 or null, null (no limit)"
 )
 
 
-def _increasing(pair: tuple[float | None, float | None]) -> tuple[float | None, float | None]:
+def _increasing(
+    pair: tuple[float | None, float | None],
+) -> tuple[float | None, float | None]:
     if None not in pair and not pair[0] < pair[1]:  # type: ignore[operator]
         problem = "the lower limit must be below the upper one"
         raise refuse(problem, found=list(pair), allowed="[low, high] with low < high")
@@ -50,13 +70,19 @@ Interval = Annotated[tuple[Number | None, Number | None], AfterValidator(_increa
 def _around_zero(pair: tuple[float, float]) -> tuple[float, float]:
     if not pair[0] < 0.0 < pair[1]:
         problem = "a pair of limits lies around zero"
-        raise refuse(problem, found=list(pair), allowed="[lower, upper] with lower < 0 < upper")
+        raise refuse(
+            problem, found=list(pair), allowed="[lower, upper] with lower < 0 < upper"
+        )
     return pair
 
 
 OneNumber = Annotated[Positive, Tag("<number>")]
-_Pair = Annotated[Annotated[tuple[Number, Number], AfterValidator(_around_zero)], Tag("<list>")]
-_Entry = Annotated[OneNumber | _Pair, by_form("a number > 0, or a pair [lower, upper] around zero")]
+_Pair = Annotated[
+    Annotated[tuple[Number, Number], AfterValidator(_around_zero)], Tag("<list>")
+]
+_Entry = Annotated[
+    OneNumber | _Pair, by_form("a number > 0, or a pair [lower, upper] around zero")
+]
 _EntryOrNull = Annotated[
     OneNumber | _Pair | Annotated[None, Tag("<null>")],
     by_form("a number > 0, a pair [lower, upper] around zero, null (no limit)"),
@@ -89,12 +115,21 @@ PositionLimit = Annotated[
         FROM_URDF,
     ),
 ]
-TorqueCurve = Annotated[tuple[tuple[NonNegative, NonNegative], ...], Field(min_length=2)]
+TorqueCurve = Annotated[
+    tuple[tuple[NonNegative, NonNegative], ...], Field(min_length=2)
+]
 """Points [speed, torque]."""
 
 # What a program may give: NumPy arrays stand for lists and numbers too.
 _StatedPair = Array | Sequence[float | None] | None
-StatedLimit = float | Array | Sequence[float | _StatedPair] | Mapping[str, float | _StatedPair] | str | None
+StatedLimit = (
+    float
+    | Array
+    | Sequence[float | _StatedPair]
+    | Mapping[str, float | _StatedPair]
+    | str
+    | None
+)
 StatedCurves = Mapping[str, Array | Sequence[_StatedPair] | None] | None
 StatedRange = Array | Sequence[_StatedPair] | Mapping[str, _StatedPair] | str | None
 
@@ -118,13 +153,25 @@ class LimitKeywords(TypedDict, total=False):
 class LimitScale(Model):
     """Factors on the limits, to keep a distance from them."""
 
-    torque: Positive = Field(default=1.0, description="Factor on all torque and force limits, curves too.")
-    velocity: Positive = Field(default=1.0, description="Factor on all velocity limits.")
-    acceleration: Positive = Field(default=1.0, description="Factor on all acceleration limits.")
-    power: Positive = Field(default=1.0, description="Factor on all power limits, the total one too.")
-    rms_torque: Positive = Field(default=1.0, description="Factor on all limits of root-mean-square torques.")
+    torque: Positive = Field(
+        default=1.0, description="Factor on all torque and force limits, curves too."
+    )
+    velocity: Positive = Field(
+        default=1.0, description="Factor on all velocity limits."
+    )
+    acceleration: Positive = Field(
+        default=1.0, description="Factor on all acceleration limits."
+    )
+    power: Positive = Field(
+        default=1.0, description="Factor on all power limits, the total one too."
+    )
+    rms_torque: Positive = Field(
+        default=1.0, description="Factor on all limits of root-mean-square torques."
+    )
     jerk: Positive = Field(default=1.0, description="Factor on all jerk limits.")
-    torque_rate: Positive = Field(default=1.0, description="Factor on all limits of torque rates.")
+    torque_rate: Positive = Field(
+        default=1.0, description="Factor on all limits of torque rates."
+    )
 
 
 @dataclass(frozen=True, init=False)
@@ -140,25 +187,42 @@ class LimitSpec:
 
     torque: Annotated[
         UrdfLimit,
-        Field(description="Largest torque, N m (force, N), or [lower, upper] by joint. Absent: URDF. Null: none."),
+        Field(
+            description="Largest torque, N m (force, N), or [lower, upper] by joint. Absent: URDF. Null: none."
+        ),
     ] = FROM_URDF
     velocity: Annotated[
         UrdfLimit,
-        Field(description="Largest speed, rad/s (m/s), or [lower, upper] by joint. Absent: URDF. Null: none."),
+        Field(
+            description="Largest speed, rad/s (m/s), or [lower, upper] by joint. Absent: URDF. Null: none."
+        ),
     ] = FROM_URDF
     acceleration: Annotated[
-        OwnLimit, Field(description="Largest acceleration, rad/s^2 (m/s^2). Absent or null: none.")
+        OwnLimit,
+        Field(
+            description="Largest acceleration, rad/s^2 (m/s^2). Absent or null: none."
+        ),
     ] = None
     position: Annotated[
-        PositionLimit, Field(description="[low, high], rad (m); null for an open end. Absent: URDF. Null: none.")
+        PositionLimit,
+        Field(
+            description="[low, high], rad (m); null for an open end. Absent: URDF. Null: none."
+        ),
     ] = FROM_URDF
-    scale: Annotated[LimitScale, Field(description="Factors on the limits.")] = field(default_factory=LimitScale)
+    scale: Annotated[LimitScale, Field(description="Factors on the limits.")] = field(
+        default_factory=LimitScale
+    )
     power: Annotated[
-        OwnLimit, Field(description="Largest mechanical power, torque x speed either way, W. Absent or null: none.")
+        OwnLimit,
+        Field(
+            description="Largest mechanical power, torque x speed either way, W. Absent or null: none."
+        ),
     ] = None
     total_power: Annotated[
         Positive | None,
-        Field(description="Largest sum of the joints' powers, drawn or returned, W. Absent or null: none."),
+        Field(
+            description="Largest sum of the joints' powers, drawn or returned, W. Absent or null: none."
+        ),
     ] = None
     rms_torque: Annotated[
         OwnLimit,
@@ -175,9 +239,15 @@ class LimitSpec:
             "torque. The same both ways, driving and braking. Absent or null: none."
         ),
     ] = None
-    jerk: Annotated[OwnLimit, Field(description="Largest jerk, rad/s^3 (m/s^3). Absent or null: none.")] = None
+    jerk: Annotated[
+        OwnLimit,
+        Field(description="Largest jerk, rad/s^3 (m/s^3). Absent or null: none."),
+    ] = None
     torque_rate: Annotated[
-        OwnLimit, Field(description="Largest rate of change of the torque, N m/s (force, N/s). Absent or null: none.")
+        OwnLimit,
+        Field(
+            description="Largest rate of change of the torque, N m/s (force, N/s). Absent or null: none."
+        ),
     ] = None
 
     __pydantic_config__ = Model.model_config
@@ -218,7 +288,9 @@ class LimitSpec:
             rad/s^3 or m/s^3; Nm/s or N/s. As `acceleration`. They need ``spline.degree`` >= 3 and acceleration at rest.
         """
         if not isinstance(scale, LimitScale):
-            scale = LimitScale().model_copy(update={kind: plain(factor) for kind, factor in (scale or {}).items()})
+            scale = LimitScale().model_copy(
+                update={kind: plain(factor) for kind, factor in (scale or {}).items()}
+            )
         stated = (torque, velocity, acceleration, position, scale)
         further = (power, total_power, rms_torque, torque_speed, jerk, torque_rate)
         for each, value in zip(fields(self), (*stated, *further), strict=True):
@@ -230,7 +302,9 @@ _SPEED = {"ge": 1e-6, "le": 1e12}
 _MOST_AT_A_PLACE = 2
 
 Speed = Annotated[Positive, Field(**_SPEED)]
-_PathCoordinates = Annotated[tuple[Annotated[Number, Field(ge=0.0, le=1.0)], ...], BeforeValidator(plain)]
+_PathCoordinates = Annotated[
+    tuple[Annotated[Number, Field(ge=0.0, le=1.0)], ...], BeforeValidator(plain)
+]
 
 
 class SpeedTable(Model):
@@ -250,15 +324,30 @@ class SpeedTable(Model):
     def _is_a_table(self) -> SpeedTable:
         if len(self.speed) != len(self.s):
             problem = "there is not one speed for every path coordinate"
-            raise refuse(problem, key=".speed", found=write_count(len(self.speed), "speed"), allowed=f"{len(self.s)}")
+            raise refuse(
+                problem,
+                key=".speed",
+                found=write_count(len(self.speed), "speed"),
+                allowed=f"{len(self.s)}",
+            )
         for row in range(1, len(self.s)):
             if self.s[row] < self.s[row - 1]:
                 problem = "the path coordinates do not ascend"
-                raise refuse(problem, key=f".s[{row}]", found=self.s[row], allowed=f">= {self.s[row - 1]:g}")
+                raise refuse(
+                    problem,
+                    key=f".s[{row}]",
+                    found=self.s[row],
+                    allowed=f">= {self.s[row - 1]:g}",
+                )
         for place, same in itertools.groupby(self.s):
             if len(list(same)) > _MOST_AT_A_PLACE:
                 problem = "a place has more than two speeds"
-                raise refuse(problem, key=".s", found=place, allowed="a place at most twice, which is a step")
+                raise refuse(
+                    problem,
+                    key=".s",
+                    found=place,
+                    allowed="a place at most twice, which is a step",
+                )
         return self
 
 
@@ -270,7 +359,11 @@ def _as_sequence(value: object) -> object:
 
 def _between(pair: tuple[float, float]) -> tuple[float, float]:
     if not pair[0] < pair[1]:
-        raise refuse("the part of the path is empty", found=list(pair), allowed="[begin, end] with begin < end")
+        raise refuse(
+            "the part of the path is empty",
+            found=list(pair),
+            allowed="[begin, end] with begin < end",
+        )
     return pair
 
 
@@ -279,7 +372,10 @@ class ProcessSpeed(Model):
 
     speed: Speed = Field(description="Speed of the tool frame's origin, m/s.")
     s: Annotated[
-        tuple[Annotated[Number, Field(ge=0.0, lt=1.0)], Annotated[Number, Field(gt=0.0, le=1.0)]],
+        tuple[
+            Annotated[Number, Field(ge=0.0, lt=1.0)],
+            Annotated[Number, Field(gt=0.0, le=1.0)],
+        ],
         AfterValidator(_between),
     ] = Field(
         description="[begin, end], path coordinates between which it is held; outside, as fast as the limits allow. "
@@ -287,7 +383,8 @@ class ProcessSpeed(Model):
         "periodic."
     )
     tolerance: Annotated[Share, Field(ge=_LEAST_TOLERANCE, le=0.5)] = Field(
-        default=0.01, description="Largest deviation either way, as a share of the speed: 1 %, or 0.01."
+        default=0.01,
+        description="Largest deviation either way, as a share of the speed: 1 %, or 0.01.",
     )
 
 
@@ -295,7 +392,9 @@ class ToolLimits(Model):
     """Limits on the motion of the tool frame's origin, and on how fast the tool turns."""
 
     speed: Annotated[
-        Annotated[Speed, Tag("<number>")] | Annotated[SpeedTable, Tag("<mapping>")] | Annotated[None, Tag("<null>")],
+        Annotated[Speed, Tag("<number>")]
+        | Annotated[SpeedTable, Tag("<mapping>")]
+        | Annotated[None, Tag("<null>")],
         by_form("a number > 0, a table {s: [...], speed: [...]}, or null (no limit)"),
     ] = Field(
         default=None,
@@ -307,12 +406,16 @@ class ToolLimits(Model):
         description="Tables of largest speeds over parts of the path, and none beyond their first and last places; "
         "written by brachis from the feed rates of the path's points.",
     )
-    acceleration: Speed | None = Field(default=None, description="Largest acceleration, m/s^2. Null: none.")
+    acceleration: Speed | None = Field(
+        default=None, description="Largest acceleration, m/s^2. Null: none."
+    )
     angular_speed: Speed | None = Field(
         default=None,
         description="Largest speed at which the tool turns, rad/s; its free roll does not count. Null: none.",
     )
-    process_speed: Annotated[tuple[ProcessSpeed, ...], BeforeValidator(_as_sequence)] = Field(
+    process_speed: Annotated[
+        tuple[ProcessSpeed, ...], BeforeValidator(_as_sequence)
+    ] = Field(
         default=(),
         description="Parts of the path with a constant speed: {speed, s, tolerance}, or a list of such, in order and "
         "with a gap in between in which the speed may change.",
@@ -324,28 +427,46 @@ class ToolLimits(Model):
         for number in range(1, len(parts)):
             if parts[number].s[0] <= parts[number - 1].s[1]:
                 problem = "the parts of the path overlap, meet or are out of order"
-                allowed = (
-                    f"a begin above {parts[number - 1].s[1]:g}; the part before ends there, and speeds change in a gap"
+                end = parts[number - 1].s[1]
+                allowed = f"a begin above {end:g}; the part before ends there, and speeds change in a gap"
+                raise refuse(
+                    problem,
+                    key=f"[{number}].s",
+                    found=list(parts[number].s),
+                    allowed=allowed,
                 )
-                raise refuse(problem, key=f"[{number}].s", found=list(parts[number].s), allowed=allowed)
         return parts
 
     @model_validator(mode="after")
     def _speeds_agree(self) -> ToolLimits:
         for number, part in enumerate(self.process_speed):
-            cap, slowest = _least_between(self.speed, part.s), part.speed * (1.0 - part.tolerance)
+            cap, slowest = (
+                _least_between(self.speed, part.s),
+                part.speed * (1.0 - part.tolerance),
+            )
             if cap is not None and cap < slowest:
                 problem = "the tool's largest speed is below the process speed"
                 allowed = f"at most {cap:g} m/s there, or a higher tool_limits.speed"
-                raise refuse(problem, key=f".process_speed[{number}].speed", found=part.speed, allowed=allowed)
+                raise refuse(
+                    problem,
+                    key=f".process_speed[{number}].speed",
+                    found=part.speed,
+                    allowed=allowed,
+                )
         return self
 
 
-def _least_between(cap: float | SpeedTable | None, part: Sequence[float]) -> float | None:
+def _least_between(
+    cap: float | SpeedTable | None, part: Sequence[float]
+) -> float | None:
     """Least of the largest speeds over a part of the path."""
     if not isinstance(cap, SpeedTable):
         return cap
-    inside = [speed for s, speed in zip(cap.s, cap.speed, strict=True) if part[0] <= s <= part[1]]
+    inside = [
+        speed
+        for s, speed in zip(cap.s, cap.speed, strict=True)
+        if part[0] <= s <= part[1]
+    ]
     return min([*inside, *(_at(cap, place) for place in part)])
 
 

@@ -28,7 +28,9 @@ class LimitsFile(Model):
 
     brachis_limits: Literal[1] = Field(description="Version of the format.")
     source: Name = Field(description="Where the figures are from.")
-    joints: Annotated[tuple[Name, ...], Field(min_length=1)] = Field(description="The joints that the file limits.")
+    joints: Annotated[tuple[Name, ...], Field(min_length=1)] = Field(
+        description="The joints that the file limits."
+    )
     limits: LimitSpec = Field(
         description="As robot.limits, without scale; a list is in the order of joints, one number holds for all."
     )
@@ -73,9 +75,19 @@ class RosJointLimits(Model):
                 continue
             for key, value in figures.items():
                 if value is None:
-                    raise refuse("this figure is missing", key=f".{key}", absent=True, allowed=f"or {switch}: false")
+                    raise refuse(
+                        "this figure is missing",
+                        key=f".{key}",
+                        absent=True,
+                        allowed=f"or {switch}: false",
+                    )
                 if kind != "position" and value <= 0.0:
-                    raise refuse("out of range", key=f".{key}", found=value, allowed=f"> 0, or {switch}: false")
+                    raise refuse(
+                        "out of range",
+                        key=f".{key}",
+                        found=value,
+                        allowed=f"> 0, or {switch}: false",
+                    )
         return self
 
     def by_kind(self) -> dict[str, Any]:
@@ -97,16 +109,21 @@ class RosLimitsFile(Model):
         description="Limits by joint: has_velocity_limits, max_velocity and so on."
     )
     default_velocity_scaling_factor: Annotated[Positive, Field(le=1)] = Field(
-        default=1.0, description="Counts as limits.scale.velocity, where the task does not give it."
+        default=1.0,
+        description="Counts as limits.scale.velocity, where the task does not give it.",
     )
     default_acceleration_scaling_factor: Annotated[Positive, Field(le=1)] = Field(
-        default=1.0, description="Counts as limits.scale.acceleration, where the task does not give it."
+        default=1.0,
+        description="Counts as limits.scale.acceleration, where the task does not give it.",
     )
 
     @property
     def joints(self) -> dict[str, RosJointLimits]:
         """Limits by the names of the joints in the URDF."""
-        short = {name.removesuffix(_SUFFIX): limits for name, limits in self.joint_limits.items()}
+        short = {
+            name.removesuffix(_SUFFIX): limits
+            for name, limits in self.joint_limits.items()
+        }
         if set(short) == _UR_JOINTS:
             return {name + _SUFFIX: limits for name, limits in short.items()}
         return self.joint_limits
@@ -119,7 +136,9 @@ class RosLimitsFile(Model):
                 stated.setdefault(kind, {})[name] = value
         factors = {"velocity": self.default_velocity_scaling_factor}
         factors["acceleration"] = self.default_acceleration_scaling_factor
-        return {**stated, "scale": factors} if set(factors.values()) != {1.0} else stated
+        return (
+            {**stated, "scale": factors} if set(factors.values()) != {1.0} else stated
+        )
 
 
 def read_limits(path: str | os.PathLike[str]) -> LimitSpec:
@@ -142,7 +161,9 @@ def read_limits(path: str | os.PathLike[str]) -> LimitSpec:
     return LimitSpec(**_by_joint(Path(path), str(path), Path.cwd(), None))
 
 
-def with_limits_of_file(content: Mapping[str, Any], source: str, folder: Path) -> Mapping[str, Any]:
+def with_limits_of_file(
+    content: Mapping[str, Any], source: str, folder: Path
+) -> Mapping[str, Any]:
     """Return a task as it is written with the limits of the file that it names in its ``robot.limits``.
 
     What the task itself says counts, joint by joint where it names joints.
@@ -157,15 +178,27 @@ def with_limits_of_file(content: Mapping[str, Any], source: str, folder: Path) -
         What the file's path is relative to.
     """
     robot = content.get("robot")
-    if not isinstance(robot, Mapping) or not isinstance(robot.get("limits_file"), str | os.PathLike):
+    if not isinstance(robot, Mapping) or not isinstance(
+        robot.get("limits_file"), str | os.PathLike
+    ):
         return content
     file = Path(robot["limits_file"])
     own = robot.get("limits") or {}
     if isinstance(own, LimitSpec):
-        own = {each.name: getattr(own, each.name) for each in fields(own) if getattr(own, each.name) != each.default}
+        own = {
+            each.name: getattr(own, each.name)
+            for each in fields(own)
+            if getattr(own, each.name) != each.default
+        }
     if not isinstance(own, Mapping):
         return content
-    merged = _by_joint(folder / file, f"{source}: robot.limits_file", folder, str(file), {**robot, "limits": own})
+    merged = _by_joint(
+        folder / file,
+        f"{source}: robot.limits_file",
+        folder,
+        str(file),
+        {**robot, "limits": own},
+    )
     for kind, value in own.items():
         both = isinstance(value, Mapping) and isinstance(merged.get(kind), Mapping)
         merged[kind] = {**merged[kind], **value} if both else value
@@ -174,7 +207,11 @@ def with_limits_of_file(content: Mapping[str, Any], source: str, folder: Path) -
 
 
 def _by_joint(
-    path: Path, where: str, folder: Path, found: str | None, robot: Mapping[str, Any] | None = None
+    path: Path,
+    where: str,
+    folder: Path,
+    found: str | None,
+    robot: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Read and check a file, for the ``robot`` part of a task where there is one.
 
@@ -185,7 +222,12 @@ def _by_joint(
     content = read_yaml(text, str(path))
     if not isinstance(content, Mapping):
         allowed = ", ".join(LimitsFile.model_fields)
-        raise TaskError("a limits file is a mapping", found=show(content), allowed=allowed, where=str(path))
+        raise TaskError(
+            "a limits file is a mapping",
+            found=show(content),
+            allowed=allowed,
+            where=str(path),
+        )
     model = RosLimitsFile if "joint_limits" in content else LimitsFile
     try:
         file = model.model_validate(plain(content))
@@ -212,46 +254,77 @@ def _by_joint(
     }
 
 
-def _check_joints(limited: set[str], robot: Mapping[str, Any], folder: Path, where: str) -> None:
+def _check_joints(
+    limited: set[str], robot: Mapping[str, Any], folder: Path, where: str
+) -> None:
     """Refuse joints that the URDF does not have, and joints that move the tool and have no entry.
 
     Raises
     ------
     UnknownNameError, TaskError
     """
-    tool, base, locked = (robot.get(key) for key in ("tool_frame", "base_frame", "locked_joints"))
-    if not (isinstance(tool, str | None) and isinstance(base, str | None) and isinstance(locked, Mapping | None)):
+    tool, base, locked = (
+        robot.get(key) for key in ("tool_frame", "base_frame", "locked_joints")
+    )
+    if not (
+        isinstance(tool, str | None)
+        and isinstance(base, str | None)
+        and isinstance(locked, Mapping | None)
+    ):
         return  # the robot's model says so
     names, moving = _joints_of(folder / robot["urdf"], tool, base)
     for name in sorted(limited if names else ()):
         if name not in names:
-            raise UnknownNameError("joint of the URDF", name, names, where=f"{where}: joint_limits")
+            raise UnknownNameError(
+                "joint of the URDF", name, names, where=f"{where}: joint_limits"
+            )
     own = robot["limits"]
-    own_names = {name for kind, each in own.items() if kind != "scale" and isinstance(each, Mapping) for name in each}
+    own_names = {
+        name
+        for kind, each in own.items()
+        if kind != "scale" and isinstance(each, Mapping)
+        for name in each
+    }
     stated = {*limited, *(locked or ()), *own_names}
-    for_all = any(kind != "scale" and isinstance(each, int | float | list | tuple) for kind, each in own.items())
+    for_all = any(
+        kind != "scale" and isinstance(each, int | float | list | tuple)
+        for kind, each in own.items()
+    )
     missing = [] if for_all else [name for name in moving if name not in stated]
     if missing:
         hint = f"Add it there, or state its limits in the task: robot.limits: {{velocity: {{{missing[0]}: ...}}}}"
         problem = f"joint {missing[0]!r}, which moves the tool, has no entry"
-        raise TaskError(problem, found=", ".join(sorted(limited)), where=f"{where}: joint_limits", hint=hint)
+        raise TaskError(
+            problem,
+            found=", ".join(sorted(limited)),
+            where=f"{where}: joint_limits",
+            hint=hint,
+        )
 
 
-def _joints_of(urdf: Path, tool: str | None, base: str | None) -> tuple[list[str], list[str]]:
+def _joints_of(
+    urdf: Path, tool: str | None, base: str | None
+) -> tuple[list[str], list[str]]:
     """Return the joints of a URDF, and those that move the tool.
 
     Both are empty where the URDF cannot be read, which the robot says when it is made; the latter where the tool is
     left open.
     """
-    from lxml import etree  # noqa: PLC0415  (for those who need it)
+    from lxml import etree
 
     try:
-        joints = etree.parse(str(urdf), etree.XMLParser(resolve_entities=False)).getroot().findall("joint")
+        joints = (
+            etree.parse(str(urdf), etree.XMLParser(resolve_entities=False))
+            .getroot()
+            .findall("joint")
+        )
     except (OSError, ValueError, etree.XMLSyntaxError):
         return [], []
     ends = [(joint, joint.find("parent"), joint.find("child")) for joint in joints]
     above = {
-        child.get("link"): (joint, parent.get("link")) for joint, parent, child in ends if None not in (parent, child)
+        child.get("link"): (joint, parent.get("link"))
+        for joint, parent, child in ends
+        if None not in (parent, child)
     }
     leaves = set(above) - {parent for _, parent in above.values()}
     link = leaves.pop() if tool is None and len(leaves) == 1 else tool
@@ -270,11 +343,18 @@ def _spread(value: object, joints: tuple[str, ...], where: str) -> dict[str, Any
     if isinstance(value, Mapping):
         for name in value:
             if name not in joints:
-                raise UnknownNameError("joint of the limits file", name, joints, where=where)
+                raise UnknownNameError(
+                    "joint of the limits file", name, joints, where=where
+                )
         return dict(value)
     if isinstance(value, tuple):
         if len(value) != len(joints):
             allowed = f"{len(joints)}, one for each of {', '.join(joints)}"
-            raise TaskError("has the wrong number of values", where=where, found=len(value), allowed=allowed)
+            raise TaskError(
+                "has the wrong number of values",
+                where=where,
+                found=len(value),
+                allowed=allowed,
+            )
         return dict(zip(joints, value, strict=True))
     return dict.fromkeys(joints, value)

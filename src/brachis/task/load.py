@@ -56,7 +56,11 @@ def set_key(content: MutableMapping[str, Any], key: str, value: object) -> None:
     """
     parts = _INDEX.sub(r".\1", key).split(".")
     if not all(parts):
-        raise TaskError("no key", found=repr(key), allowed="names and indices joined by dots, such as path.0.line.by")
+        raise TaskError(
+            "no key",
+            found=repr(key),
+            allowed="names and indices joined by dots, such as path.0.line.by",
+        )
     place: Any = content
     for i, part in enumerate(parts[:-1]):
         step = _step(place, part, parts[:i], key)
@@ -73,10 +77,21 @@ def _step(place: object, part: str, before: list[str], key: str) -> str | int:
     where = ".".join(before)
     if not isinstance(place, list):
         hint = f"Set {where} itself"
-        raise TaskError(f"{where} has no keys of its own", where=key, found=show(place), hint=hint)
+        raise TaskError(
+            f"{where} has no keys of its own", where=key, found=show(place), hint=hint
+        )
     if not part.isdecimal() or int(part) >= len(place):
-        allowed = f"{where}.0" + (f" to {where}.{len(place) - 1}" if len(place) > 1 else "") if place else "none"
-        raise TaskError(f"{where} is a list of {len(place)}", where=key, found=f"{where}.{part}", allowed=allowed)
+        allowed = (
+            f"{where}.0" + (f" to {where}.{len(place) - 1}" if len(place) > 1 else "")
+            if place
+            else "none"
+        )
+        raise TaskError(
+            f"{where} is a list of {len(place)}",
+            where=key,
+            found=f"{where}.{part}",
+            allowed=allowed,
+        )
     return int(part)
 
 
@@ -95,11 +110,17 @@ def read_assignment(text: str) -> tuple[str, object]:
     """
     key, equals, value = text.partition("=")
     if not equals:
-        raise TaskError("a key is set by key=value", found=repr(text), allowed="such as spline.intervals=40")
+        raise TaskError(
+            "a key is set by key=value",
+            found=repr(text),
+            allowed="such as spline.intervals=40",
+        )
     return key.strip(), read_yaml(value, f"value of {key.strip()}")
 
 
-def with_keys(content: Mapping[str, Any], changes: Mapping[str, object]) -> dict[str, Any]:
+def with_keys(
+    content: Mapping[str, Any], changes: Mapping[str, object]
+) -> dict[str, Any]:
     """Return a task, not checked yet, with dotted keys set; `content` is left as it is."""
     changed = _copy(content)
     for key, value in changes.items():
@@ -107,7 +128,7 @@ def with_keys(content: Mapping[str, Any], changes: Mapping[str, object]) -> dict
     return changed
 
 
-def _copy(value: Any) -> Any:  # noqa: ANN401
+def _copy(value: Any) -> Any:
     """Copy mappings and lists, which are what `set_key` writes into, and nothing else."""
     if isinstance(value, Mapping):
         return {key: _copy(each) for key, each in value.items()}
@@ -165,14 +186,24 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
         return task_from(source, "task", Path.cwd(), changes or {})
     if not isinstance(source, str | os.PathLike):
         problem = "a task is loaded from a file or a mapping"
-        raise TaskError(problem, found=type(source).__name__, allowed="a file name, a mapping, or a Task")
+        raise TaskError(
+            problem,
+            found=type(source).__name__,
+            allowed="a file name, a mapping, or a Task",
+        )
     if isinstance(source, str) and "\n" in source:
-        allowed = "a file name; of the text of a URDF Robot.from_urdf(name, urdf_text=text)"
-        raise TaskError("a text is not the name of a file", found=show(source), allowed=allowed)
+        allowed = (
+            "a file name; of the text of a URDF Robot.from_urdf(name, urdf_text=text)"
+        )
+        raise TaskError(
+            "a text is not the name of a file", found=show(source), allowed=allowed
+        )
     path = Path(source)
     check_kind(path, Kind.TASK, TaskError)
     hint = "Long lists of waypoints belong in a CSV file"
-    text = read_text(path, where=str(path), folder=Path.cwd(), largest=LARGEST_TASK, hint=hint)
+    text = read_text(
+        path, where=str(path), folder=Path.cwd(), largest=LARGEST_TASK, hint=hint
+    )
     try:
         content = read_yaml(text, str(path))
     except TaskError as error:
@@ -181,12 +212,20 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
         allowed = f"a YAML file ({' or '.join(TASK_SUFFIXES)})"
         hint = "brachis new writes a first task"
         raise TaskError(
-            "the file is not a task", where=str(path), found=str(error), allowed=allowed, hint=hint
+            "the file is not a task",
+            where=str(path),
+            found=str(error),
+            allowed=allowed,
+            hint=hint,
         ) from error
     task = task_from(content, str(path), path.absolute().parent, changes or {})
     if task.robot.urdf is None:
         problem = "this key is required in a task file, and missing"
-        raise TaskError(problem, where=f"{path}: robot.urdf", hint="Give the URDF's path, relative to the task file")
+        raise TaskError(
+            problem,
+            where=f"{path}: robot.urdf",
+            hint="Give the URDF's path, relative to the task file",
+        )
     return task
 
 
@@ -204,7 +243,9 @@ def check_robot_settings(content: Mapping[str, object]) -> RobotSettings:
         raise task_error(error, "robot", RobotSettings) from None
 
 
-def task_from(content: object, source: str, folder: Path, changes: Mapping[str, object]) -> Task:
+def task_from(
+    content: object, source: str, folder: Path, changes: Mapping[str, object]
+) -> Task:
     """Return the task that has this content.
 
     Parameters
@@ -225,7 +266,12 @@ def task_from(content: object, source: str, folder: Path, changes: Mapping[str, 
     """
     if not isinstance(content, Mapping):
         problem = "a task is a mapping"
-        raise TaskError(problem, found=show(content), allowed=", ".join(Task.model_fields), where=source)
+        raise TaskError(
+            problem,
+            found=show(content),
+            allowed=", ".join(Task.model_fields),
+            where=source,
+        )
     if changes:
         content = with_keys(content, changes)
         source = f"{source} with {', '.join(changes)} set"
@@ -241,7 +287,9 @@ def task_from(content: object, source: str, folder: Path, changes: Mapping[str, 
         return task
     # Not Path.resolve: a linked folder keeps its name, beside which the URDF's meshes may be.
     urdf = os.path.abspath(folder / task.robot.urdf)  # noqa: PTH100
-    return task.model_copy(update={"robot": task.robot.model_copy(update={"urdf": urdf})})
+    return task.model_copy(
+        update={"robot": task.robot.model_copy(update={"urdf": urdf})}
+    )
 
 
 def _with_start(task: Task, source: str) -> Task:
@@ -258,7 +306,11 @@ def _with_start(task: Task, source: str) -> Task:
     changes: dict[str, object] = {"path_start": place}
     if task.task_space == "joints" and place is not None:
         names = getattr(getattr(first, first.kind), "joints", None)
-        changes = {"start": {"joints": dict(zip(names, place, strict=True)) if names else place}}
+        changes = {
+            "start": {
+                "joints": dict(zip(names, place, strict=True)) if names else place
+            }
+        }
     try:
         return Task.model_validate(task.model_copy(update=changes))
     except ValidationError as error:

@@ -74,7 +74,11 @@ def _one(detail: ErrorDetails, source: str, model: type[Model]) -> TaskError:
     key = _dotted(detail["loc"]) + complaint.key
     where = f"{source}: {key}" if key else source
     return TaskError(
-        complaint.problem, found=complaint.found, allowed=complaint.allowed, where=where, hint=complaint.hint
+        complaint.problem,
+        found=complaint.found,
+        allowed=complaint.allowed,
+        where=where,
+        hint=complaint.hint,
     )
 
 
@@ -93,7 +97,9 @@ def _dotted(location: tuple[str | int, ...]) -> str:
 
 
 def _models_in(annotation: object) -> Iterator[type]:
-    if isinstance(annotation, type) and (issubclass(annotation, Model) or is_dataclass(annotation)):
+    if isinstance(annotation, type) and (
+        issubclass(annotation, Model) or is_dataclass(annotation)
+    ):
         yield annotation
     for part in get_args(annotation):
         yield from _models_in(part)
@@ -113,9 +119,13 @@ def _keys_at(location: tuple[str | int, ...], model: type[Model]) -> list[str]:
         if _is_tag(part):
             chosen = [one for one in models if f"<{one.__name__}>" == part]
             models = chosen or models
-        elif isinstance(part, str) and any(part in _fields_of(one) for one in models):  # else a name in a mapping
+        elif isinstance(part, str) and any(
+            part in _fields_of(one) for one in models
+        ):  # else a name in a mapping
             fields = [_fields_of(one).get(part) for one in models]
-            models = [found for annotation in fields for found in _models_in(annotation)]
+            models = [
+                found for annotation in fields for found in _models_in(annotation)
+            ]
     return [name for one in models for name in _fields_of(one)]
 
 
@@ -126,31 +136,48 @@ def key_paths(name: str, model: type[Model]) -> list[str]:
         found = [f"{path}{name}" for path, one in level if name in _fields_of(one)]
         if found:
             return list(dict.fromkeys(found))
-        inside = ((f"{path}{key}.", kind) for path, one in level for key, kind in _fields_of(one).items())
-        level = [(path, each) for path, annotation in inside for each in _models_in(annotation)]
+        inside = (
+            (f"{path}{key}.", kind)
+            for path, one in level
+            for key, kind in _fields_of(one).items()
+        )
+        level = [
+            (path, each)
+            for path, annotation in inside
+            for each in _models_in(annotation)
+        ]
     return []
 
 
 def _description_at(location: tuple[str | int, ...], model: type[Model]) -> str | None:
     """Return what is said of the key at a location."""
-    *before, last = [part for part in location if isinstance(part, str) and not _is_tag(part)] or [""]
+    *before, last = [
+        part for part in location if isinstance(part, str) and not _is_tag(part)
+    ] or [""]
     models: list[type] = [model]
     for part in before:
         fields = [_fields_of(one).get(part) for one in models]
         models = [found for annotation in fields for found in _models_in(annotation)]
     known = [one.model_fields.get(last) for one in models if issubclass(one, Model)]
-    found = [field.description for field in known if field is not None and field.description]
+    found = [
+        field.description for field in known if field is not None and field.description
+    ]
     return f"{last}: {found[0].removesuffix('.')}" if len(found) == 1 else None
 
 
 def _is_echo(detail: ErrorDetails) -> bool:
     """Whether a list is called too short only because pydantic does not count its wrong items."""
-    return detail["type"] == "too_short" and len(detail["input"]) >= detail["ctx"]["min_length"]
+    return (
+        detail["type"] == "too_short"
+        and len(detail["input"]) >= detail["ctx"]["min_length"]
+    )
 
 
 def _missing(detail: ErrorDetails, model: type[Model]) -> _Complaint:
     if isinstance(detail["loc"][-1], int):
-        return _Complaint("the list is too short: this item is missing", show(detail["input"]))
+        return _Complaint(
+            "the list is too short: this item is missing", show(detail["input"])
+        )
     hint = (_description_at(detail["loc"], model) or "").partition("; ")[0]
     return _Complaint("this key is required, and missing", hint=hint or None)
 
@@ -159,7 +186,11 @@ def _unknown(detail: ErrorDetails, model: type[Model]) -> _Complaint:
     name = str(detail["loc"][-1])
     keys = _keys_at(detail["loc"][:-1], model)
     elsewhere, near = key_paths(name, model), nearest(name, keys)
-    hint = f"It is a key of its own: {' or '.join(elsewhere)}" if elsewhere else near and f"Did you mean {near!r}?"
+    hint = (
+        f"It is a key of its own: {' or '.join(elsewhere)}"
+        if elsewhere
+        else near and f"Did you mean {near!r}?"
+    )
     return _Complaint("unknown key", name, ", ".join(keys), hint)
 
 
@@ -167,7 +198,9 @@ def _refused(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
     facts = detail["ctx"]
     found = detail["input"] if facts["found"] is None else facts["found"]
     shown = None if facts["absent"] else show(found)
-    return _Complaint(facts["problem"], shown, facts["allowed"] or None, key=facts["key"])
+    return _Complaint(
+        facts["problem"], shown, facts["allowed"] or None, key=facts["key"]
+    )
 
 
 def _wrong_form(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
@@ -180,21 +213,36 @@ def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
     near = None
     if isinstance(found, Mapping) and not any(key in found for key in known):
         near = next(filter(None, (nearest(str(key), known) for key in found)), None)
-    return _Complaint(facts["problem"], show(found), facts["allowed"], f"Did you mean {near!r}?" if near else None)
+    return _Complaint(
+        facts["problem"],
+        show(found),
+        facts["allowed"],
+        f"Did you mean {near!r}?" if near else None,
+    )
 
 
 def _unforeseen(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
     return _Complaint(detail["msg"], show(detail["input"]))
 
 
-def _plain(problem: str, allowed: str | None = None) -> Callable[[ErrorDetails, type[Model]], _Complaint]:
+def _plain(
+    problem: str, allowed: str | None = None
+) -> Callable[[ErrorDetails, type[Model]], _Complaint]:
     """Return a description whose texts may name pydantic's facts in braces, such as ``{gt}``."""
 
     def describe(detail: ErrorDetails, _model: type[Model]) -> _Complaint:
         facts: dict[str, Any] = detail.get("ctx", {})
         if detail["loc"] and detail["loc"][-1] == "[key]":
-            return _Complaint("a name must be a string", show(detail["input"]), "a string, in quotes if need be")
-        return _Complaint(problem.format(**facts), show(detail["input"]), allowed and allowed.format(**facts))
+            return _Complaint(
+                "a name must be a string",
+                show(detail["input"]),
+                "a string, in quotes if need be",
+            )
+        return _Complaint(
+            problem.format(**facts),
+            show(detail["input"]),
+            allowed and allowed.format(**facts),
+        )
 
     return describe
 
@@ -206,8 +254,12 @@ def _wrong_type(form: str) -> Callable[[ErrorDetails, type[Model]], _Complaint]:
     def describe(detail: ErrorDetails, model: type[Model]) -> _Complaint:
         complaint = plainly(detail, model)
         keys = _keys_at(detail["loc"], model) if form == _MAPPING else []
-        allowed = f"{form} with keys out of {', '.join(keys)}" if keys else complaint.allowed
-        return replace(complaint, allowed=allowed, hint=_description_at(detail["loc"], model))
+        allowed = (
+            f"{form} with keys out of {', '.join(keys)}" if keys else complaint.allowed
+        )
+        return replace(
+            complaint, allowed=allowed, hint=_description_at(detail["loc"], model)
+        )
 
     return describe
 
@@ -236,5 +288,7 @@ _DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Complaint]
     "literal_error": _plain("not one of the allowed values", "{expected}"),
     "too_short": _plain("too few items", "at least {min_length}"),
     "too_long": _plain("too many items", "at most {max_length}"),
-    "string_too_short": _plain("the string is empty", "a string of at least one character"),
+    "string_too_short": _plain(
+        "the string is empty", "a string of at least one character"
+    ),
 }

@@ -11,16 +11,45 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, JsonValue, Tag, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    JsonValue,
+    Tag,
+    field_validator,
+    model_validator,
+)
 
-from brachis.task.fields import Flag, Model, Name, NonNegative, Number, by_form, or_form, plain, refuse
+from brachis.task.fields import (
+    Flag,
+    Model,
+    Name,
+    NonNegative,
+    Number,
+    by_form,
+    or_form,
+    plain,
+    refuse,
+)
 from brachis.task.limit_models import ToolLimits
 from brachis.task.orientation import ToolPose
-from brachis.task.planning_models import RefinementSettings, SearchSettings, SolverSettings, SplineSettings
+from brachis.task.planning_models import (
+    RefinementSettings,
+    SearchSettings,
+    SolverSettings,
+    SplineSettings,
+)
 from brachis.task.point_data import FitReport
 from brachis.task.points.units import choices
 from brachis.task.robot_models import Placement, RobotSettings
-from brachis.task.segments import BSplineCurve, CsvSegment, Segment, SegmentModel, SplineThrough
+from brachis.task.segments import (
+    BSplineCurve,
+    CsvSegment,
+    Segment,
+    SegmentModel,
+    SplineThrough,
+)
 
 
 class BoundarySettings(Model):
@@ -33,7 +62,9 @@ class BoundarySettings(Model):
         "joints the norm of their velocities). At an end in motion the redundant joints' velocities are free, and "
         "spline.rest: full says that the speed begins, or ends, constant.",
     )
-    end_speed: NonNegative = Field(default=0.0, le=1e6, description="As start_speed, at the path's end.")
+    end_speed: NonNegative = Field(
+        default=0.0, le=1e6, description="As start_speed, at the path's end."
+    )
     periodic: Flag = Field(
         default=False,
         description="Whether a closed path is gone round for ever: posture, velocity and acceleration at its end are "
@@ -44,8 +75,15 @@ class BoundarySettings(Model):
     def _periodic_has_no_ends(self) -> BoundarySettings:
         if self.periodic and (self.start_speed or self.end_speed):
             key = ".start_speed" if self.start_speed else ".end_speed"
-            problem = "a periodic motion has no ends: how fast it passes the seam is planned"
-            raise refuse(problem, key=key, found=self.start_speed or self.end_speed, allowed="0, or periodic: false")
+            problem = (
+                "a periodic motion has no ends: how fast it passes the seam is planned"
+            )
+            raise refuse(
+                problem,
+                key=key,
+                found=self.start_speed or self.end_speed,
+                allowed="0, or periodic: false",
+            )
         return self
 
     @property
@@ -79,7 +117,10 @@ def _check_rows(rows: tuple[str, ...]) -> tuple[str, ...]:
 
 TaskSpace = Annotated[
     Annotated[Literal["position", "pose", "pose_free_roll", "joints"], Tag("<word>")]
-    | Annotated[Annotated[tuple[Row, ...], Field(min_length=1), AfterValidator(_check_rows)], Tag("<list>")],
+    | Annotated[
+        Annotated[tuple[Row, ...], Field(min_length=1), AfterValidator(_check_rows)],
+        Tag("<list>"),
+    ],
     by_form(_SPACE_FORMS, "position", "pose", "pose_free_roll", "joints"),
     AfterValidator(_expand_position),
 ]
@@ -88,21 +129,27 @@ TaskSpace = Annotated[
 JointValues = Annotated[
     Annotated[Annotated[tuple[Number, ...], Field(min_length=1)], Tag("<list>")]
     | Annotated[Annotated[dict[Name, Number], Field(min_length=1)], Tag("<mapping>")],
-    by_form("a list of numbers in the order of the chain, or a mapping of joint name to number"),
+    by_form(
+        "a list of numbers in the order of the chain, or a mapping of joint name to number"
+    ),
 ]
 
 
 class Posture(Model):
     """A configuration of the robot."""
 
-    joints: JointValues = Field(description="Joint positions, rad (m): in the order of the chain, or by joint name.")
+    joints: JointValues = Field(
+        description="Joint positions, rad (m): in the order of the chain, or by joint name."
+    )
 
 
 PathStart = Annotated[
     Annotated[tuple[Number, ...], Tag("<list>")]
     | Annotated[ToolPose, Tag("<mapping>")]
     | Annotated[None, Tag("<null>")],
-    by_form("a list of the rows of the task space, or of a pose a mapping {position: [x, y, z], rpy_deg: [...]}"),
+    by_form(
+        "a list of the rows of the task space, or of a pose a mapping {position: [x, y, z], rpy_deg: [...]}"
+    ),
 ]
 FreePosture = Annotated[
     Annotated[Literal["free"], Tag("<word>")] | Annotated[Posture, Tag("<mapping>")],
@@ -112,7 +159,9 @@ FreePosture = Annotated[
 
 def _each_once(joints: tuple[str, ...]) -> tuple[str, ...]:
     if len(set(joints)) < len(joints):
-        raise refuse("a joint occurs twice", found=list(joints), allowed="each joint once")
+        raise refuse(
+            "a joint occurs twice", found=list(joints), allowed="each joint once"
+        )
     return joints
 
 
@@ -137,7 +186,12 @@ def _add_forms_of_paths(schema: dict[str, Any]) -> None:
     numbers = {"type": "array", "items": {"type": "number"}}
     or_form({"type": "array", "minItems": 2, "items": numbers})(schema)
     parts = {"frame": {"type": "string"}, "segments": schema["anyOf"][0]}
-    in_frame = {"type": "object", "required": list(parts), "additionalProperties": False, "properties": parts}
+    in_frame = {
+        "type": "object",
+        "required": list(parts),
+        "additionalProperties": False,
+        "properties": parts,
+    }
     schema["anyOf"].append(in_frame)
 
 
@@ -155,7 +209,9 @@ class Task(Model):
     """
 
     brachis: Literal[1] = Field(description="Version of the task format.")
-    robot: RobotSettings = Field(default_factory=RobotSettings, description="The robot.")
+    robot: RobotSettings = Field(
+        default_factory=RobotSettings, description="The robot."
+    )
     start: FreePosture = Field(
         description="Configuration at the start of the path: {joints: ...}, or free, which needs path_start. A path of "
         "joints that begins with a waypoint needs none."
@@ -177,7 +233,9 @@ class Task(Model):
         "of x, y, z); pose; pose_free_roll, a pose that may roll about the tool frame's z axis; or joints: the path is "
         "one of all joints, in the order of the chain (rad, m), and only its timing is planned."
     )
-    path: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=_MOST_SEGMENTS)] = Field(
+    path: Annotated[
+        tuple[Segment, ...], Field(min_length=1, max_length=_MOST_SEGMENTS)
+    ] = Field(
         description="Segments of the path, in order; a list of points, all rows of the task space each, is the spline "
         "through them that begins at the first one. For a file of points: [{csv: {file: ...}}]. Segments in a frame "
         "of their own: {frame: NAME, segments: [...]}.",
@@ -193,9 +251,12 @@ class Task(Model):
         "Null: the world.",
     )
     boundary: BoundarySettings = Field(
-        default_factory=BoundarySettings, description="Speeds at both ends, or a motion that goes round for ever."
+        default_factory=BoundarySettings,
+        description="Speeds at both ends, or a motion that goes round for ever.",
     )
-    tool_limits: ToolLimits = Field(default_factory=ToolLimits, description="Limits on the motion of the tool.")
+    tool_limits: ToolLimits = Field(
+        default_factory=ToolLimits, description="Limits on the motion of the tool."
+    )
     custom_limits: dict[Name, dict[str, JsonValue]] = Field(
         default={},
         description="Limits of kinds that installed packages add (see docs/own_limit.md): their parameters, by kind.",
@@ -209,14 +270,20 @@ class Task(Model):
         default="auto",
         description="Label of the branch of the closed form; auto: the start's, and all of them with start: free.",
     )
-    search: SearchSettings = Field(default_factory=SearchSettings, description="Search.")
-    spline: SplineSettings = Field(default_factory=SplineSettings, description="B-splines.")
+    search: SearchSettings = Field(
+        default_factory=SearchSettings, description="Search."
+    )
+    spline: SplineSettings = Field(
+        default_factory=SplineSettings, description="B-splines."
+    )
     solver: Annotated[SolverSettings, BeforeValidator(_with_name)] = Field(
         default_factory=SolverSettings,
         description="Solver: its name, or a mapping.",
         json_schema_extra=or_form({"type": "string"}),
     )
-    refinement: RefinementSettings = Field(default_factory=RefinementSettings, description="Refinement.")
+    refinement: RefinementSettings = Field(
+        default_factory=RefinementSettings, description="Refinement."
+    )
     strict: bool | None = Field(
         default=None,
         description="Whether implausible figures (degrees for rad, mm for m) are errors: true, all of them; false: all "
@@ -243,15 +310,29 @@ class Task(Model):
     @classmethod
     def _a_path_may_say_its_frame(cls, content: object) -> object:
         path = content.get("path") if isinstance(content, Mapping) else None
-        if not isinstance(path, Mapping) or "frame" not in path or not isinstance(content, Mapping):
+        if (
+            not isinstance(path, Mapping)
+            or "frame" not in path
+            or not isinstance(content, Mapping)
+        ):
             return content
         if set(path) != {"frame", "segments"}:
             problem = "a path in a frame is the frame's name and the segments"
-            raise refuse(problem, key="path", found=path, allowed="{frame: NAME, segments: [...]}")
+            raise refuse(
+                problem,
+                key="path",
+                found=path,
+                allowed="{frame: NAME, segments: [...]}",
+            )
         other = content.get("path_frame")
         if other not in (None, path["frame"]):
             allowed = f"{path['frame']}, or one of both keys"
-            raise refuse("another frame than in path.frame", key="path_frame", found=other, allowed=allowed)
+            raise refuse(
+                "another frame than in path.frame",
+                key="path_frame",
+                found=other,
+                allowed=allowed,
+            )
         return {**content, "path": path["segments"], "path_frame": path["frame"]}
 
     @field_validator("path", mode="before")
@@ -264,7 +345,9 @@ class Task(Model):
             allowed = "brachis.bspline_segment(curve, (first, last)), or the curve's points as an array"
             raise refuse(problem, found=path, allowed=allowed)
         rows = plain(path)
-        if not isinstance(rows, list) or any(isinstance(row, SegmentModel | Mapping) for row in rows):
+        if not isinstance(rows, list) or any(
+            isinstance(row, SegmentModel | Mapping) for row in rows
+        ):
             return path
         if any(hasattr(row, "homogeneous") or _is_matrix(row) for row in rows):
             allowed = "brachis.Spline(through=poses), or brachis.fit_path(poses)"
@@ -273,7 +356,9 @@ class Task(Model):
             return ({"spline": {"starts_at": rows[0], "through": rows[1:]}},)
         if rows and all(isinstance(row, list | int | float) for row in rows):
             allowed = "two points or more, [[...], [...]], or a segment such as {line: {to: [...]}}"
-            raise refuse("a path cannot be made of these numbers", found=rows, allowed=allowed)
+            raise refuse(
+                "a path cannot be made of these numbers", found=rows, allowed=allowed
+            )
         return path
 
     @field_validator("path")
@@ -282,7 +367,10 @@ class Task(Model):
         if path[-1].blend is not None:
             problem = "the last segment has no corner to blend"
             raise refuse(
-                problem, key=f"[{len(path) - 1}].blend", found=path[-1].blend, allowed="no blend on the last segment"
+                problem,
+                key=f"[{len(path) - 1}].blend",
+                found=path[-1].blend,
+                allowed="no blend on the last segment",
             )
         return path
 
@@ -290,15 +378,26 @@ class Task(Model):
     def _free_start_needs_a_place(self) -> Task:
         first = self.path[0]
         unread = isinstance(first, CsvSegment) and not first.csv.relative
-        if self.start == "free" and self.path_start is None and not unread and self.start_place is None:
+        if (
+            self.start == "free"
+            and self.path_start is None
+            and not unread
+            and self.start_place is None
+        ):
             problem = "a free start posture leaves open where the path begins"
             if self.task_space == "joints":
                 problem = "a path of joints that does not begin with a waypoint needs a start posture"
-                raise refuse(problem, key="start", absent=True, allowed="{joints: [...]}")
-            raise refuse(problem, key="path_start", absent=True, allowed=self._start_forms)
+                raise refuse(
+                    problem, key="start", absent=True, allowed="{joints: [...]}"
+                )
+            raise refuse(
+                problem, key="path_start", absent=True, allowed=self._start_forms
+            )
         if self.start == "free" and self.search.guesses == "numeric":
             problem = "numeric inverse kinematics needs a posture to begin with, and start is free"
-            raise refuse(problem, key="search.guesses", found="numeric", allowed="lattice")
+            raise refuse(
+                problem, key="search.guesses", found="numeric", allowed="lattice"
+            )
         return self
 
     @model_validator(mode="after")
@@ -307,10 +406,17 @@ class Task(Model):
             problem = "this frame is not among frames"
             missing = f"frames: {{{self.path_frame}: {{xyz: [...], rpy_deg: [...]}}}} beside it"
             allowed = ", ".join(self.frames) or missing
-            raise refuse(problem, key="path_frame", found=self.path_frame, allowed=allowed)
+            raise refuse(
+                problem, key="path_frame", found=self.path_frame, allowed=allowed
+            )
         if self.path_frame is not None and self.task_space == "joints":
             problem = "a path of joints is in no frame"
-            raise refuse(problem, key="path_frame", found=self.path_frame, allowed="null, with task_space: joints")
+            raise refuse(
+                problem,
+                key="path_frame",
+                found=self.path_frame,
+                allowed="null, with task_space: joints",
+            )
         return self
 
     @property
@@ -323,35 +429,66 @@ class Task(Model):
         """How ``path_start`` is written in this task space."""
         if self.of_poses:
             return f"{{position: [x, y, z], ...}} with one of {choices(suffix='_deg')}"
-        return f"[{', '.join(self.task_space)}]" if isinstance(self.task_space, tuple) else "a list of all joints"
+        return (
+            f"[{', '.join(self.task_space)}]"
+            if isinstance(self.task_space, tuple)
+            else "a list of all joints"
+        )
 
     @model_validator(mode="after")
     def _path_start_fits(self) -> Task:
-        if self.path_start is not None and isinstance(self.path_start, ToolPose) != self.of_poses:
+        if (
+            self.path_start is not None
+            and isinstance(self.path_start, ToolPose) != self.of_poses
+        ):
             problem = "a list does not say how an orientation is meant, as whether w of a quaternion is first or last"
             if not self.of_poses:
                 problem = "a position with an orientation is for task spaces of poses"
-            found = self.path_start.model_dump() if isinstance(self.path_start, ToolPose) else list(self.path_start)
-            raise refuse(problem, key="path_start", found=found, allowed=self._start_forms)
+            found = (
+                self.path_start.model_dump()
+                if isinstance(self.path_start, ToolPose)
+                else list(self.path_start)
+            )
+            raise refuse(
+                problem, key="path_start", found=found, allowed=self._start_forms
+            )
         return self
 
     @model_validator(mode="after")
     def _ends_in_motion(self) -> Task:
         if self.boundary.in_motion and self.spline.knots == "free":
             problem = "ends in motion tie control points by the knots, which may not move then"
-            raise refuse(problem, key="spline.knots", found="free", allowed="uniform, or a boundary at rest")
+            raise refuse(
+                problem,
+                key="spline.knots",
+                found="free",
+                allowed="uniform, or a boundary at rest",
+            )
         if self.boundary.periodic and self.end != "free":
             problem = "the end posture of a periodic motion is its start posture"
-            raise refuse(problem, key="end", found=self.end.model_dump(), allowed="free")
+            raise refuse(
+                problem, key="end", found=self.end.model_dump(), allowed="free"
+            )
         return self
 
     @model_validator(mode="after")
     def _splines_are_free_between_their_ends(self) -> Task:
         spline = self.spline
-        least = 2 * spline.vanishing + 3 - spline.degree  # both ends fix a value and the derivatives that vanish
-        if not self.boundary.periodic and spline.intervals != "auto" and spline.intervals < least:
+        least = (
+            2 * spline.vanishing + 3 - spline.degree
+        )  # both ends fix a value and the derivatives that vanish
+        if (
+            not self.boundary.periodic
+            and spline.intervals != "auto"
+            and spline.intervals < least
+        ):
             problem = f"rest: {spline.rest} leaves splines of degree {spline.degree} no freedom with so few intervals"
-            raise refuse(problem, key="spline.intervals", found=spline.intervals, allowed=f">= {least}, or auto")
+            raise refuse(
+                problem,
+                key="spline.intervals",
+                found=spline.intervals,
+                allowed=f">= {least}, or auto",
+            )
         return self
 
     @model_validator(mode="after")
@@ -364,7 +501,12 @@ class Task(Model):
             ):
                 if given != default:
                     problem = "a path of joints leaves no choice of postures"
-                    raise refuse(problem, key=key, found=given, allowed=f"{default}, with task_space: joints")
+                    raise refuse(
+                        problem,
+                        key=key,
+                        found=given,
+                        allowed=f"{default}, with task_space: joints",
+                    )
         return self
 
     @property
@@ -387,7 +529,11 @@ class Task(Model):
     def fits(self) -> tuple[FitReport, ...]:
         """Where the path comes from points, one for each file or array: what they were, and how near it is to them."""
         shapes = (getattr(segment, segment.kind) for segment in self.path)
-        curves = (shape.fit for shape in shapes if isinstance(shape, SplineThrough | BSplineCurve))
+        curves = (
+            shape.fit
+            for shape in shapes
+            if isinstance(shape, SplineThrough | BSplineCurve)
+        )
         return tuple(fit for fit in curves if fit is not None)
 
     def to_dict(self) -> dict[str, Any]:

@@ -36,7 +36,11 @@ _LEAST_LENGTH = 1e-9
 def _check_direction(vector: Vector3) -> Vector3:
     if math.hypot(*vector) < _LEAST_LENGTH:
         problem = "a direction cannot have zero length"
-        raise refuse(problem, found=list(vector), allowed="any other vector; its length is of no importance")
+        raise refuse(
+            problem,
+            found=list(vector),
+            allowed="any other vector; its length is of no importance",
+        )
     return vector
 
 
@@ -58,14 +62,22 @@ def _unit_length(quaternion: tuple[float, ...] | None) -> tuple[float, ...] | No
     return quaternion
 
 
-_Quaternion = Annotated[tuple[Number, Number, Number, Number] | None, AfterValidator(_unit_length)]
+_Quaternion = Annotated[
+    tuple[Number, Number, Number, Number] | None, AfterValidator(_unit_length)
+]
 _DEGREES = "_deg"
 
 
-def _about(name: str) -> Any:  # noqa: ANN401  (what pydantic's Field returns)
+def _about(name: str) -> Any:
     """Return the field of a convention, with its meaning."""
     convention = CONVENTIONS[name]
-    unit = ", degrees" if convention.euler else ", rad" if name == "rotation_vector" else " (length 1, to 1 %)"
+    unit = (
+        ", degrees"
+        if convention.euler
+        else ", rad"
+        if name == "rotation_vector"
+        else " (length 1, to 1 %)"
+    )
     return Field(
         default=None,
         description=f"{convention.meaning[0].upper()}{convention.meaning[1:]}{unit}. Used by {convention.makers}.",
@@ -75,7 +87,9 @@ def _about(name: str) -> Any:  # noqa: ANN401  (what pydantic's Field returns)
 class Attitude(Model):
     """An orientation, in exactly one of these conventions."""
 
-    model_config = ConfigDict(json_schema_extra=lambda schema: schema.update(oneOf=_ONE_OF))
+    model_config = ConfigDict(
+        json_schema_extra=lambda schema: schema.update(oneOf=_ONE_OF)
+    )
 
     quaternion_wxyz: _Quaternion = _about("quaternion_wxyz")
     quaternion_xyzw: _Quaternion = _about("quaternion_xyzw")
@@ -96,15 +110,23 @@ class Attitude(Model):
         return value
 
     @model_serializer(mode="wrap")
-    def _without_the_others(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _without_the_others(
+        self, dump: SerializerFunctionWrapHandler
+    ) -> dict[str, Any]:
         return {key: value for key, value in dump(self).items() if value is not None}
 
     @property
     def convention_and_numbers(self) -> tuple[str, tuple[float, ...]]:
         """Name of the convention in `brachis.task.points.units`, and the numbers: quaternions, or angles in rad."""
-        key, values = next((key, value) for key in Attitude.model_fields if (value := getattr(self, key)) is not None)
+        key, values = next(
+            (key, value)
+            for key in Attitude.model_fields
+            if (value := getattr(self, key)) is not None
+        )
         if key.endswith(_DEGREES):
-            return key.removesuffix(_DEGREES), tuple(math.radians(angle) for angle in values)
+            return key.removesuffix(_DEGREES), tuple(
+                math.radians(angle) for angle in values
+            )
         return key, values
 
 
@@ -126,8 +148,12 @@ class ToolPose(Attitude):
 class Rotation(Model):
     """A rotation about an axis."""
 
-    axis: Direction = Field(description="Axis of the rotation, right-hand rule; any length but zero.")
-    angle_deg: Number = Field(description="Angle of the rotation, degrees, signed; it may exceed a turn.")
+    axis: Direction = Field(
+        description="Axis of the rotation, right-hand rule; any length but zero."
+    )
+    angle_deg: Number = Field(
+        description="Angle of the rotation, degrees, signed; it may exceed a turn."
+    )
     frame: Literal["path", "tool"] = Field(
         default="path",
         description="Frame in which the axis is given: that of the path (the world, or path_frame), or the tool's.",
@@ -165,7 +191,10 @@ class AlongTangent(Model):
 
 Turning = Annotated[
     Annotated[Rotate, Tag("<Rotate>")] | Annotated[TurnTo, Tag("<TurnTo>")],
-    by_key("a turn needs exactly one of its forms", {"Rotate": ("rotate",), "TurnTo": ("to",)}),
+    by_key(
+        "a turn needs exactly one of its forms",
+        {"Rotate": ("rotate",), "TurnTo": ("to",)},
+    ),
 ]
 OrientationMode = Annotated[
     Annotated[Literal["fixed", "tangent"], Tag("<word>")]
@@ -177,10 +206,18 @@ OrientationMode = Annotated[
             | Annotated[AlongTangent, Tag("<AlongTangent>")],
             by_key(
                 "an orientation along a segment needs exactly one of its forms",
-                {"Rotate": ("rotate",), "TurnTo": ("to",), "AlongTangent": ("tangent",)},
+                {
+                    "Rotate": ("rotate",),
+                    "TurnTo": ("to",),
+                    "AlongTangent": ("tangent",),
+                },
             ),
         ],
         Tag("<mapping>"),
     ],
-    by_form("fixed | tangent | {rotate: ...} | {to: ...} | {tangent: ...}", "fixed", "tangent"),
+    by_form(
+        "fixed | tangent | {rotate: ...} | {to: ...} | {tangent: ...}",
+        "fixed",
+        "tangent",
+    ),
 ]

@@ -6,11 +6,21 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field, Tag, model_validator
 
-from brachis.task.fields import Count, Flag, Model, Name, Positive, Share, by_form, refuse
+from brachis.task.fields import (
+    Count,
+    Flag,
+    Model,
+    Name,
+    Positive,
+    Share,
+    by_form,
+    refuse,
+)
 
 _VANISHING: Final = {"velocity": 1, "full": 2, "jerk": 3}
 Intervals = Annotated[
-    Annotated[Literal["auto"], Tag("<word>")] | Annotated[Annotated[Count, Field(ge=4, le=10_000)], Tag("<number>")],
+    Annotated[Literal["auto"], Tag("<word>")]
+    | Annotated[Annotated[Count, Field(ge=4, le=10_000)], Tag("<number>")],
     by_form("auto, or a whole number", "auto"),
 ]
 
@@ -19,7 +29,10 @@ class SplineSettings(Model):
     """The B-splines of the path coordinate and the redundant joints."""
 
     degree: Count = Field(
-        default=3, ge=2, le=7, description="Degree; 3 gives continuous torque, 4 continuous torque rate."
+        default=3,
+        ge=2,
+        le=7,
+        description="Degree; 3 gives continuous torque, 4 continuous torque rate.",
     )
     intervals: Intervals = Field(
         default="auto",
@@ -32,7 +45,8 @@ class SplineSettings(Model):
         description="With intervals: auto, how near, as a fraction of t_E, the end time is to be to that of many.",
     )
     knots: Literal["uniform", "free"] = Field(
-        default="uniform", description="Equal intervals, or their lengths as variables of the optimisation."
+        default="uniform",
+        description="Equal intervals, or their lengths as variables of the optimisation.",
     )
     shortest_interval: Positive = Field(
         default=0.1,
@@ -44,7 +58,9 @@ class SplineSettings(Model):
         description="What vanishes at both ends: velocity alone; velocity and acceleration (full); or velocity, "
         "acceleration and jerk, and with them the rates of the torques (jerk; degree 4 at least).",
     )
-    points_per_interval: Count = Field(default=3, ge=1, le=100, description="Collocation points per knot interval.")
+    points_per_interval: Count = Field(
+        default=3, ge=1, le=100, description="Collocation points per knot interval."
+    )
 
     @property
     def vanishing(self) -> int:
@@ -61,16 +77,28 @@ class SplineSettings(Model):
                 f"degree {self.degree} cannot give it"
             )
             lower = " or ".join(
-                f"rest: {word}" for word, level in _VANISHING.items() if level < min(order, self.degree)
+                f"rest: {word}"
+                for word, level in _VANISHING.items()
+                if level < min(order, self.degree)
             )
-            raise refuse(problem, key=".degree", found=self.degree, allowed=f">= {order + 1}, or {lower}")
+            raise refuse(
+                problem,
+                key=".degree",
+                found=self.degree,
+                allowed=f">= {order + 1}, or {lower}",
+            )
         return self
 
     @model_validator(mode="after")
     def _free_knots_are_counted(self) -> SplineSettings:
         if self.knots == "free" and self.intervals == "auto":
             problem = "knots: free needs a number of intervals; auto is the default"
-            raise refuse(problem, key=".intervals", found="auto", allowed="a number such as 12, or knots: uniform")
+            raise refuse(
+                problem,
+                key=".intervals",
+                found="auto",
+                allowed="a number such as 12, or knots: uniform",
+            )
         return self
 
 
@@ -88,7 +116,9 @@ class SearchSettings(Model):
         "from the start posture.",
     )
     jobs: Count = Field(
-        default=1, ge=1, description="Processes that plan at the same time; no more than there are processors are used."
+        default=1,
+        ge=1,
+        description="Processes that plan at the same time; no more than there are processors are used.",
     )
     time_limit: Positive = Field(
         default=60.0,
@@ -103,26 +133,40 @@ class SearchSettings(Model):
         "with the least joint accelerations.",
     )
     slower: Share = Field(
-        default=0.0, description="How much slower the calmest motion may be, for example 1 %, or 0.01."
+        default=0.0,
+        description="How much slower the calmest motion may be, for example 1 %, or 0.01.",
     )
 
     @model_validator(mode="after")
     def _slower_is_for_least_motion(self) -> SearchSettings:
         if self.slower and not self.least_motion:
             problem = "a slower motion is of use for least motion alone"
-            raise refuse(problem, key=".slower", found=self.slower, allowed="0, or least_motion: true")
+            raise refuse(
+                problem,
+                key=".slower",
+                found=self.slower,
+                allowed="0, or least_motion: true",
+            )
         return self
 
 
 class SolverSettings(Model):
     """The solver of the optimisation problem and its bounds."""
 
-    name: Name = Field(default="auto", description="Solver; auto takes the best one installed.")
-    max_iterations: Count = Field(default=300, ge=1, le=1_000_000, description="Largest number of iterations.")
-    time_limit: Positive = Field(
-        default=20.0, le=1e6, description="Largest time of one solve, s; search.time_limit bounds the whole plan."
+    name: Name = Field(
+        default="auto", description="Solver; auto takes the best one installed."
     )
-    tolerance: Positive = Field(default=1.0e-6, description="Tolerance of the optimality conditions.")
+    max_iterations: Count = Field(
+        default=300, ge=1, le=1_000_000, description="Largest number of iterations."
+    )
+    time_limit: Positive = Field(
+        default=20.0,
+        le=1e6,
+        description="Largest time of one solve, s; search.time_limit bounds the whole plan.",
+    )
+    tolerance: Positive = Field(
+        default=1.0e-6, description="Tolerance of the optimality conditions."
+    )
 
 
 class RefinementSettings(Model):
@@ -136,8 +180,14 @@ class RefinementSettings(Model):
         "in half ranges where these are shorter. What is less than 1e-5 the checks do not show.",
     )
     density: Count = Field(
-        default=10, ge=10, le=1000, description="Grid points for checking limits, per collocation point."
+        default=10,
+        ge=10,
+        le=1000,
+        description="Grid points for checking limits, per collocation point.",
     )
     max_rounds: Count = Field(
-        default=10, ge=0, le=1000, description="Largest number of rounds; 0 switches refinement off."
+        default=10,
+        ge=0,
+        le=1000,
+        description="Largest number of rounds; 0 switches refinement off.",
     )

@@ -5,7 +5,14 @@ from __future__ import annotations
 from math import degrees
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, Strict, WithJsonSchema, field_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    Strict,
+    WithJsonSchema,
+    field_validator,
+)
 
 from brachis.errors import write_count
 from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, refuse
@@ -22,26 +29,53 @@ def _quantity_of(units: dict[str, float], example: str) -> BeforeValidator:
             return value
         number = quantity(value, units)
         if number is None:
-            raise refuse("no quantity", found=value, allowed=f"a number with a unit ({', '.join(units)}), as {example}")
+            raise refuse(
+                "no quantity",
+                found=value,
+                allowed=f"a number with a unit ({', '.join(units)}), as {example}",
+            )
         return number
 
     return BeforeValidator(read)
 
 
 _QUANTITY_SCHEMA = WithJsonSchema(
-    {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"type": "string", "pattern": "^[0-9.eE+-]+ *[a-z/]+$"}]}
+    {
+        "anyOf": [
+            {"type": "number", "exclusiveMinimum": 0},
+            {"type": "string", "pattern": "^[0-9.eE+-]+ *[a-z/]+$"},
+        ]
+    }
 )
-Length = Annotated[float, _quantity_of(LENGTHS, "0.05 mm"), Strict(), Field(ge=1e-7, le=1.0), _QUANTITY_SCHEMA]
-Angle = Annotated[float, _quantity_of(ANGLES, "0.1 deg"), Strict(), Field(ge=1e-7, le=0.5), _QUANTITY_SCHEMA]
+Length = Annotated[
+    float,
+    _quantity_of(LENGTHS, "0.05 mm"),
+    Strict(),
+    Field(ge=1e-7, le=1.0),
+    _QUANTITY_SCHEMA,
+]
+Angle = Annotated[
+    float,
+    _quantity_of(ANGLES, "0.1 deg"),
+    Strict(),
+    Field(ge=1e-7, le=0.5),
+    _QUANTITY_SCHEMA,
+]
 
 
 def _check_convention(word: str) -> str:
     if word not in CONVENTIONS:
-        raise refuse("this convention of an orientation is not known", found=word, allowed=choices())
+        raise refuse(
+            "this convention of an orientation is not known",
+            found=word,
+            allowed=choices(),
+        )
     return word
 
 
-OrientationWord = Annotated[Name, AfterValidator(_check_convention), WithJsonSchema({"enum": list(CONVENTIONS)})]
+OrientationWord = Annotated[
+    Name, AfterValidator(_check_convention), WithJsonSchema({"enum": list(CONVENTIONS)})
+]
 
 
 class FileUnits(Model):
@@ -55,8 +89,11 @@ class FileUnits(Model):
         description="Of yaw and orientations. Null: as the header says; else rad, but for roll, pitch and yaw and the "
         "angles of KUKA, Staubli and Fanuc, whose unit must be stated.",
     )
-    speed: Literal["m/s", "mm/s", "m/min", "mm/min", "in/min", "inch/min"] | None = Field(
-        default=None, description="Of a column of feed rates. Null: as the header says, which then must."
+    speed: Literal["m/s", "mm/s", "m/min", "mm/min", "in/min", "inch/min"] | None = (
+        Field(
+            default=None,
+            description="Of a column of feed rates. Null: as the header says, which then must.",
+        )
     )
 
 
@@ -91,7 +128,9 @@ class PointFile(Model):
         description="What the columns of the orientation mean (task spaces of poses), where their names do not say "
         f"it: {', '.join(CONVENTIONS)}.",
     )
-    units: FileUnits = Field(default_factory=FileUnits, description="Units of its numbers.")
+    units: FileUnits = Field(
+        default_factory=FileUnits, description="Units of its numbers."
+    )
     tolerance: FitTolerance | None = Field(
         default=None,
         description="How far the rows may be from the path, which is then a fit with as few knots as that takes; for "
@@ -106,9 +145,13 @@ class PointFile(Model):
     @classmethod
     def _no_stops(cls, corner: object) -> object:
         if corner == "stop":
-            problem = "a path cannot stop at a corner: it is one motion from rest to rest"
+            problem = (
+                "a path cannot stop at a corner: it is one motion from rest to rest"
+            )
             raise refuse(
-                problem, found=corner, allowed="blend or refuse; or two tasks, one to the corner and one from it"
+                problem,
+                found=corner,
+                allowed="blend or refuse; or two tasks, one to the corner and one from it",
             )
         return corner
 
@@ -128,33 +171,64 @@ class FitReport(Model):
     source: Name = Field(description="File, or what the points were given as.")
     points: Count = Field(description="Number of points.")
     length: NonNegative = Field(description="Length of the path, m.")
-    position_error: NonNegative = Field(description="Largest distance of a point from the path, m, beside corners.")
-    position_rms: NonNegative = Field(description="Root mean square of the distances, m.")
-    position_tolerance: NonNegative = Field(description="What was allowed, m; 0 where all points are passed.")
-    orientation_error: NonNegative = Field(description="Largest angle between given and fitted orientation, rad.")
+    position_error: NonNegative = Field(
+        description="Largest distance of a point from the path, m, beside corners."
+    )
+    position_rms: NonNegative = Field(
+        description="Root mean square of the distances, m."
+    )
+    position_tolerance: NonNegative = Field(
+        description="What was allowed, m; 0 where all points are passed."
+    )
+    orientation_error: NonNegative = Field(
+        description="Largest angle between given and fitted orientation, rad."
+    )
     orientation_tolerance: NonNegative = Field(description="What was allowed, rad.")
-    intervals: Count = Field(description="Number of knot intervals of all curves of these points.")
-    corners: tuple[FoundCorner, ...] = Field(default=(), description="Corners, in order.")
-    told: tuple[str, ...] = Field(default=(), description="What was found out about the data.")
-    doubt: str | None = Field(default=None, description="What of the data is hardly meant.")
+    intervals: Count = Field(
+        description="Number of knot intervals of all curves of these points."
+    )
+    corners: tuple[FoundCorner, ...] = Field(
+        default=(), description="Corners, in order."
+    )
+    told: tuple[str, ...] = Field(
+        default=(), description="What was found out about the data."
+    )
+    doubt: str | None = Field(
+        default=None, description="What of the data is hardly meant."
+    )
     profile: tuple[tuple[Number, Number, Number], ...] = Field(
-        default=(), description="Along the path, m: the largest distance, m, and angle, rad, of the points there."
+        default=(),
+        description="Along the path, m: the largest distance, m, and angle, rad, of the points there.",
     )
 
     def __str__(self) -> str:
         """Say it in one line, lengths in mm."""
-        off, rms, allowed = (1e3 * x for x in (self.position_error, self.position_rms, self.position_tolerance))
-        turned, turned_allowed = map(degrees, (self.orientation_error, self.orientation_tolerance))
+        off, rms, allowed = (
+            1e3 * x
+            for x in (self.position_error, self.position_rms, self.position_tolerance)
+        )
+        turned, turned_allowed = map(
+            degrees, (self.orientation_error, self.orientation_tolerance)
+        )
         text = (
             f"{self.source}: {self.points} points along {1e3 * self.length:.5g} mm, "
             f"{write_count(self.intervals, 'knot interval')}; "
         )
         text += f"at most {off:.3g} mm off (allowed {allowed:.3g} mm), rms {rms:.3g} mm"
-        text += f"; orientation at most {turned:.2g} deg off (allowed {turned_allowed:.3g} deg)" if turned else ""
-        corners = [f"row {corner.row} ({degrees(corner.angle):.3g} deg)" for corner in self.corners[:_LISTED]]
+        text += (
+            f"; orientation at most {turned:.2g} deg off (allowed {turned_allowed:.3g} deg)"
+            if turned
+            else ""
+        )
+        corners = [
+            f"row {corner.row} ({degrees(corner.angle):.3g} deg)"
+            for corner in self.corners[:_LISTED]
+        ]
         corners += ["..."] if len(self.corners) > _LISTED else []
         count = write_count(len(self.corners), "corner")
-        text += f"; {count} blended: {', '.join(corners)}" if corners else "; no corners"
+        text += (
+            f"; {count} blended: {', '.join(corners)}" if corners else "; no corners"
+        )
         return f"{text}; {'; '.join(self.told)}" if self.told else text
 
     def to_dict(self) -> dict[str, Any]:

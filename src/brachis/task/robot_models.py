@@ -12,15 +12,34 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Field, Tag, model_validator
 
-from brachis.task.fields import Model, Name, NonNegative, Number, Positive, Share, by_form, plain, refuse
-from brachis.task.limit_models import FROM_URDF, LimitSpec, Null, Numbers, OneNumber, UrdfWord
+from brachis.task.fields import (
+    Model,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    Share,
+    by_form,
+    plain,
+    refuse,
+)
+from brachis.task.limit_models import (
+    FROM_URDF,
+    LimitSpec,
+    Null,
+    Numbers,
+    OneNumber,
+    UrdfWord,
+)
 from brachis.task.orientation import Vector3
 
 
 class Placement(Model):
     """Where a frame is in another one."""
 
-    xyz: Vector3 = Field(default=(0.0, 0.0, 0.0), description="Position of the origin, m.")
+    xyz: Vector3 = Field(
+        default=(0.0, 0.0, 0.0), description="Position of the origin, m."
+    )
     rpy_deg: Vector3 = Field(
         default=(0.0, 0.0, 0.0),
         description="Roll, pitch, yaw, degrees, as in a URDF: about the fixed x, then y, then z axis.",
@@ -38,7 +57,9 @@ class Placement(Model):
         pitch = math.atan2(-m[2][0], math.hypot(m[0][0], m[1][0]))
         sine = math.sin(yaw)
         cosine = math.cos(yaw)
-        roll = math.atan2(sine * m[0][2] - cosine * m[1][2], cosine * m[1][1] - sine * m[0][1])
+        roll = math.atan2(
+            sine * m[0][2] - cosine * m[1][2], cosine * m[1][1] - sine * m[0][1]
+        )
         angles = [math.degrees(angle) for angle in (roll, pitch, yaw)]
         return {"xyz": [row[3] for row in m[:3]], "rpy_deg": angles}
 
@@ -49,7 +70,9 @@ class InertiaMatrix(Model):
     ixx: NonNegative = Field(description="Moment, kg m^2.")
     iyy: NonNegative = Field(description="Moment, kg m^2.")
     izz: NonNegative = Field(description="Moment, kg m^2.")
-    ixy: Number = Field(default=0.0, description="Product, kg m^2, with the sign that URDFs have.")
+    ixy: Number = Field(
+        default=0.0, description="Product, kg m^2, with the sign that URDFs have."
+    )
     ixz: Number = Field(default=0.0, description="Product, kg m^2.")
     iyz: Number = Field(default=0.0, description="Product, kg m^2.")
 
@@ -58,13 +81,21 @@ class Payload(Model):
     """A rigid body that is held to the tool frame."""
 
     mass: Positive = Field(description="kg.")
-    com: Vector3 = Field(default=(0.0, 0.0, 0.0), description="Centre of mass in the tool frame as the URDF has it, m.")
+    com: Vector3 = Field(
+        default=(0.0, 0.0, 0.0),
+        description="Centre of mass in the tool frame as the URDF has it, m.",
+    )
     inertia: InertiaMatrix | None = Field(
-        default=None, description="Moments about the centre of mass, axes of the tool frame. Null: a point mass."
+        default=None,
+        description="Moments about the centre of mass, axes of the tool frame. Null: a point mass.",
     )
 
 
-_WORDS: Final = {"floor": (0.0, 0.0, 0.0), "wall": (0.0, 90.0, 0.0), "ceiling": (180.0, 0.0, 0.0)}
+_WORDS: Final = {
+    "floor": (0.0, 0.0, 0.0),
+    "wall": (0.0, 90.0, 0.0),
+    "ceiling": (180.0, 0.0, 0.0),
+}
 """Roll, pitch and yaw of the usual mountings, degrees."""
 
 
@@ -80,7 +111,10 @@ def _spelled_out(mounting: object) -> object:
 
 Mounting = Annotated[
     Placement,
-    BeforeValidator(_spelled_out, json_schema_input_type=Literal["floor", "wall", "ceiling"] | Placement),
+    BeforeValidator(
+        _spelled_out,
+        json_schema_input_type=Literal["floor", "wall", "ceiling"] | Placement,
+    ),
 ]
 
 
@@ -88,11 +122,15 @@ PerJoint = Annotated[
     Annotated[NonNegative, Tag("<number>")]
     | Annotated[Annotated[tuple[NonNegative, ...], Field(min_length=1)], Tag("<list>")]
     | Annotated[dict[Name, NonNegative], Tag("<mapping>")],
-    by_form("a number >= 0 for all joints, a list of numbers, a mapping of joint name to number"),
+    by_form(
+        "a number >= 0 for all joints, a list of numbers, a mapping of joint name to number"
+    ),
 ]
 PerJointPositive = Annotated[
     OneNumber | Numbers | Annotated[dict[Name, Positive], Tag("<mapping>")],
-    by_form("a number > 0 for all joints, a list of numbers, a mapping of joint name to number"),
+    by_form(
+        "a number > 0 for all joints, a list of numbers, a mapping of joint name to number"
+    ),
 ]
 UrdfFriction = Annotated[
     UrdfWord
@@ -111,23 +149,29 @@ UrdfFriction = Annotated[
 class FrictionSettings(Model):
     """Drive inertia and friction at the joints: each a number for all joints, a list, or a mapping by joint name."""
 
-    armature: PerJoint = Field(default=0.0, description="Inertia of the drive seen at the joint, kg m^2 (kg).")
+    armature: PerJoint = Field(
+        default=0.0, description="Inertia of the drive seen at the joint, kg m^2 (kg)."
+    )
     rotor_inertia: PerJoint = Field(
         default=0.0,
         description="Inertia of the rotor about its own axis, kg m^2. With gear_ratio it takes the place of armature, "
         "which is rotor_inertia * gear_ratio^2.",
     )
     gear_ratio: PerJointPositive | None = Field(
-        default=None, description="Turns of the rotor per turn of the joint (prismatic: rad per m). Null: none."
+        default=None,
+        description="Turns of the rotor per turn of the joint (prismatic: rad per m). Null: none.",
     )
     viscous: UrdfFriction = Field(
-        default=FROM_URDF, description="Viscous friction, N m s/rad (N s/m). Absent: URDF's damping. Null: none."
+        default=FROM_URDF,
+        description="Viscous friction, N m s/rad (N s/m). Absent: URDF's damping. Null: none.",
     )
     coulomb: UrdfFriction = Field(
-        default=FROM_URDF, description="Coulomb friction, N m (N). Absent: URDF's friction. Null: none."
+        default=FROM_URDF,
+        description="Coulomb friction, N m (N). Absent: URDF's friction. Null: none.",
     )
     coulomb_velocity: PerJointPositive = Field(
-        default=0.01, description="Speed at which Coulomb friction is developed to 76 % (tanh 1), rad/s (m/s)."
+        default=0.01,
+        description="Speed at which Coulomb friction is developed to 76 % (tanh 1), rad/s (m/s).",
     )
 
 
@@ -135,14 +179,21 @@ class RobotSettings(Model):
     """The robot: its URDF and what the task adds to it."""
 
     urdf: Name | None = Field(
-        default=None, description="URDF file, relative to the task file's folder. Required in a task file."
+        default=None,
+        description="URDF file, relative to the task file's folder. Required in a task file.",
     )
-    tool_frame: Name | None = Field(default=None, description="Frame that follows the path. Null: the only leaf link.")
+    tool_frame: Name | None = Field(
+        default=None,
+        description="Frame that follows the path. Null: the only leaf link.",
+    )
     tool_offset: Placement = Field(
         default_factory=Placement,
         description="Where the frame that follows the path is in the tool frame of the URDF: {xyz: ..., rpy_deg: ...}.",
     )
-    base_frame: Name | None = Field(default=None, description="First frame of the chain. Null: the root of the URDF.")
+    base_frame: Name | None = Field(
+        default=None,
+        description="First frame of the chain. Null: the root of the URDF.",
+    )
     mounting: Mounting = Field(
         default_factory=Placement,
         description="Where the URDF's root link is in the world: floor, wall (its z axis along the world's x axis), "
@@ -151,8 +202,12 @@ class RobotSettings(Model):
     gravity: tuple[Number, Number, Number] = Field(
         default=(0.0, 0.0, -9.81), description="Gravity [x, y, z], m/s^2, world frame."
     )
-    locked_joints: dict[Name, Number] = Field(default={}, description="Joints that stay at a value, rad (m), by name.")
-    payload: Payload | None = Field(default=None, description="Rigid body held to the tool frame. Null: none.")
+    locked_joints: dict[Name, Number] = Field(
+        default={}, description="Joints that stay at a value, rad (m), by name."
+    )
+    payload: Payload | None = Field(
+        default=None, description="Rigid body held to the tool frame. Null: none."
+    )
     limits_file: Name | None = Field(
         default=None,
         description="File of joint limits, relative to the task file's folder, such as a maker's, or MoveIt's "
@@ -165,4 +220,6 @@ class RobotSettings(Model):
         "planned anew for the slower joints, and is not the same motion played more slowly; torque, acceleration and "
         "tool limits stay what they are.",
     )
-    friction: FrictionSettings = Field(default_factory=FrictionSettings, description="Drive inertia and friction.")
+    friction: FrictionSettings = Field(
+        default_factory=FrictionSettings, description="Drive inertia and friction."
+    )

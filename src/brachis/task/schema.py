@@ -10,7 +10,9 @@ from typing import Any
 from brachis.task.models import Task
 
 _UNITS = r"kg m\^2|kg|N m s/rad|N m|N|m/s\^2|m/s|m|rad/s\^[23]|rad/s|rad|s|W|degrees"
-_STATED = re.compile(rf"(?:^|[,(] ?)((?:{_UNITS})(?: \((?:force, )?[^) ]*\))?)(?=[.,;: )]|$)")
+_STATED = re.compile(
+    rf"(?:^|[,(] ?)((?:{_UNITS})(?: \((?:force, )?[^) ]*\))?)(?=[.,;: )]|$)"
+)
 """A unit as descriptions of keys state it: ``Length, m.``; that of prismatic joints follows in brackets."""
 
 
@@ -26,7 +28,9 @@ def json_schema() -> dict[str, Any]:
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "urn:brachis:task:1",
         **schema,
-        "required": [key for key in schema["required"] if key != "start"],  # a path of joints may begin without it
+        "required": [
+            key for key in schema["required"] if key != "start"
+        ],  # a path of joints may begin without it
         "title": "brachis task",
     }
 
@@ -47,8 +51,18 @@ def unit_of(key: str) -> str:
     stated = ""
     for part in key.split("."):
         found = [below for each in found for below in _below(each, part, schema)]
-        units = [match[1] for each in found if (match := _STATED.search(each.get("description", "")))]
-        stated = units[0] if units else "" if any("description" in each for each in found) else stated
+        units = [
+            match[1]
+            for each in found
+            if (match := _STATED.search(each.get("description", "")))
+        ]
+        stated = (
+            units[0]
+            if units
+            else ""
+            if any("description" in each for each in found)
+            else stated
+        )
     return stated
 
 
@@ -57,7 +71,9 @@ def _task_schema() -> dict[str, Any]:
     return json_schema()
 
 
-def _below(schema: dict[str, Any], part: str, whole: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def _below(
+    schema: dict[str, Any], part: str, whole: dict[str, Any]
+) -> Iterator[dict[str, Any]]:
     """Yield what the schema says of a key, or of an entry of a list; every alternative of it."""
     if "$ref" in schema:
         yield from _below(whole["$defs"][schema["$ref"].rsplit("/", 1)[1]], part, whole)

@@ -18,13 +18,32 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, Tag, model_validator
 
-from brachis.task.fields import Count, Flag, Model, Name, NonNegative, Number, Positive, Vector, by_key, refuse
-from brachis.task.orientation import Attitude, Direction, OrientationMode, ToolPose, Turning
+from brachis.task.fields import (
+    Count,
+    Flag,
+    Model,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    Vector,
+    by_key,
+    refuse,
+)
+from brachis.task.orientation import (
+    Attitude,
+    Direction,
+    OrientationMode,
+    ToolPose,
+    Turning,
+)
 from brachis.task.point_data import FitReport, PointFile
 
 JointOrder = Annotated[
     tuple[Name, ...] | None,
-    Field(description="With task_space: joints, the joint of each coordinate; null: in the order of the chain."),
+    Field(
+        description="With task_space: joints, the joint of each coordinate; null: in the order of the chain."
+    ),
 ]
 _SMOOTH = 3
 """Derivatives that a path must have."""
@@ -33,17 +52,22 @@ _SMOOTH = 3
 class BSplineCurve(Model):
     """A clamped B-spline, three times continuously differentiable; `brachis.bspline_segment` makes one of a curve."""
 
-    degree: Annotated[Count, Field(ge=_SMOOTH + 1, le=15)] = Field(default=5, description="Degree.")
+    degree: Annotated[Count, Field(ge=_SMOOTH + 1, le=15)] = Field(
+        default=5, description="Degree."
+    )
     knots: Vector = Field(
         description="Knots, ascending: the first and the last one degree + 1 times, others up to degree - 3 times; "
         "in m along the curve, where blends and speeds are to be so."
     )
-    control_points: Annotated[tuple[Vector, ...], Field(min_length=_SMOOTH + 2)] = Field(
-        description="Control points: all rows of the task space (m, yaw in rad); in task spaces of poses x, y, z, or "
-        "x, y, z, qw, qx, qy, qz, whose orientation is that of the quaternion divided by its length."
+    control_points: Annotated[tuple[Vector, ...], Field(min_length=_SMOOTH + 2)] = (
+        Field(
+            description="Control points: all rows of the task space (m, yaw in rad); in task spaces of poses "
+            "x, y, z, or x, y, z, qw, qx, qy, qz, whose orientation is that of the quaternion divided by its length."
+        )
     )
     relative: Flag = Field(
-        default=False, description="Whether the curve is moved to the segment's start, wherever that is; as for csv."
+        default=False,
+        description="Whether the curve is moved to the segment's start, wherever that is; as for csv.",
     )
     joints: JointOrder = None
     speeds: tuple[tuple[tuple[Number, Positive], ...], ...] = Field(
@@ -51,37 +75,65 @@ class BSplineCurve(Model):
         description="Tables of the speed of the tool that is prescribed along the curve: [m along it, m/s], linear in "
         "between; where there is none, none is prescribed.",
     )
-    fit: FitReport | None = Field(default=None, description="What the curve was fitted to; written by brachis.")
+    fit: FitReport | None = Field(
+        default=None, description="What the curve was fitted to; written by brachis."
+    )
 
     @model_validator(mode="after")
     def _knots_fit(self) -> BSplineCurve:
         knots, outer = self.knots, self.degree + 1
         if len({len(point) for point in self.control_points}) > 1:
-            raise refuse("control points differ in their number of coordinates", key=".control_points", allowed="one")
+            raise refuse(
+                "control points differ in their number of coordinates",
+                key=".control_points",
+                allowed="one",
+            )
         if len(knots) != len(self.control_points) + outer:
             allowed = f"{len(self.control_points) + outer}: control points + degree + 1"
-            raise refuse("wrong number of knots", key=".knots", found=len(knots), allowed=allowed)
+            raise refuse(
+                "wrong number of knots", key=".knots", found=len(knots), allowed=allowed
+            )
         ends = set(knots[:outer]), set(knots[-outer:])
         inner = knots[outer:-outer]
         most = max((inner.count(knot) for knot in inner), default=0)
-        if list(knots) != sorted(knots) or any(len(end) > 1 for end in ends) or ends[0] == ends[1]:
+        if (
+            list(knots) != sorted(knots)
+            or any(len(end) > 1 for end in ends)
+            or ends[0] == ends[1]
+        ):
             allowed = "ascending knots, the first and the last one degree + 1 times"
-            raise refuse("the B-spline is not clamped", key=".knots", found=list(knots), allowed=allowed)
+            raise refuse(
+                "the B-spline is not clamped",
+                key=".knots",
+                found=list(knots),
+                allowed=allowed,
+            )
         if most > self.degree - _SMOOTH or {*inner} & (ends[0] | ends[1]):
             problem = "a knot occurs so often that a derivative up to the third jumps"
-            raise refuse(problem, key=".knots", found=most, allowed=f"{self.degree - _SMOOTH} times at most")
+            raise refuse(
+                problem,
+                key=".knots",
+                found=most,
+                allowed=f"{self.degree - _SMOOTH} times at most",
+            )
         return self
 
 
 Yaw = Annotated[
     Literal["fixed", "tangent"],
-    Field(description="Yaw along the segment: as at its start, or turning with the tangent (task spaces with yaw)."),
+    Field(
+        description="Yaw along the segment: as at its start, or turning with the tangent (task spaces with yaw)."
+    ),
 ]
 Normal = Annotated[
     tuple[Number, Number, Number] | None,
-    Field(description="Axis of rotation, for three position rows; right-hand rule. Any length but zero."),
+    Field(
+        description="Axis of rotation, for three position rows; right-hand rule. Any length but zero."
+    ),
 ]
-Centre = Annotated[Vector, Field(description="Centre, m: the position rows, without yaw.")]
+Centre = Annotated[
+    Vector, Field(description="Centre, m: the position rows, without yaw.")
+]
 
 
 def _not_zero(turns: float) -> float:
@@ -94,20 +146,26 @@ def _not_zero(turns: float) -> float:
 class LineTo(Model):
     """A straight line to a point."""
 
-    to: Vector = Field(description="End point: all rows of the task space (m, yaw in rad).")
+    to: Vector = Field(
+        description="End point: all rows of the task space (m, yaw in rad)."
+    )
 
 
 class LineBy(Model):
     """A straight line by a displacement."""
 
-    by: Vector = Field(description="Displacement: all rows of the task space (m, yaw in rad).")
+    by: Vector = Field(
+        description="Displacement: all rows of the task space (m, yaw in rad)."
+    )
 
 
 class LineHeading(Model):
     """A straight line of given length and direction, in the plane of two position rows; yaw stays."""
 
     length: NonNegative = Field(description="Length, m.")
-    angle_deg: Number = Field(description="Direction, degrees, from the first towards the second position row.")
+    angle_deg: Number = Field(
+        description="Direction, degrees, from the first towards the second position row."
+    )
 
 
 class ArcCenter(Model):
@@ -125,7 +183,9 @@ class ArcCenter(Model):
 class ArcVia(Model):
     """A circular arc through a point to another one."""
 
-    via: Vector = Field(description="A point between start and end, m: the position rows, without yaw.")
+    via: Vector = Field(
+        description="A point between start and end, m: the position rows, without yaw."
+    )
     to: Vector = Field(description="End point, m: the position rows, without yaw.")
     yaw: Yaw = "fixed"
 
@@ -148,8 +208,12 @@ class Helix(Model):
     turns: Annotated[Number, AfterValidator(_not_zero)] = Field(
         default=1.0, description="Number of turns, signed about the normal; not zero."
     )
-    pitch: Number = Field(description="Climb of each turn along the normal, m; negative: against it.")
-    normal: Direction = Field(description="Axis of rotation; right-hand rule. Any length but zero.")
+    pitch: Number = Field(
+        description="Climb of each turn along the normal, m; negative: against it."
+    )
+    normal: Direction = Field(
+        description="Axis of rotation; right-hand rule. Any length but zero."
+    )
 
 
 class SplineThrough(Model):
@@ -174,9 +238,12 @@ class SplineThrough(Model):
         "elsewhere (by more than 1e-4 m or rad) is refused; with `relative` it is what the waypoints are relative to.",
     )
     starts_oriented: Attitude | None = Field(
-        default=None, description="As `starts_at`, the orientation of the tool; beside `orientations`."
+        default=None,
+        description="As `starts_at`, the orientation of the tool; beside `orientations`.",
     )
-    fit: FitReport | None = Field(default=None, description="Where the waypoints come from; written by brachis.")
+    fit: FitReport | None = Field(
+        default=None, description="Where the waypoints come from; written by brachis."
+    )
     joints: JointOrder = None
 
     @model_validator(mode="after")
@@ -184,11 +251,18 @@ class SplineThrough(Model):
         if self.orientations is None:
             if self.starts_oriented is not None:
                 problem = "the orientation at the start stands beside the orientations at the waypoints"
-                raise refuse(problem, key=".starts_oriented", allowed="orientations as well")
+                raise refuse(
+                    problem, key=".starts_oriented", allowed="orientations as well"
+                )
         elif len(self.orientations) != len(self.through):
             problem = "a spline needs an orientation for each of its waypoints, or none"
             allowed = f"{len(self.through)}, as there are waypoints in through"
-            raise refuse(problem, key=".orientations", found=len(self.orientations), allowed=allowed)
+            raise refuse(
+                problem,
+                key=".orientations",
+                found=len(self.orientations),
+                allowed=allowed,
+            )
         return self
 
 
@@ -208,7 +282,18 @@ Arc = Annotated[
         {"ArcCenter": ("center", "angle_deg"), "ArcVia": ("via", "to")},
     ),
 ]
-Shape = LineTo | LineBy | LineHeading | ArcCenter | ArcVia | Circle | Helix | SplineThrough | BSplineCurve | PointFile
+Shape = (
+    LineTo
+    | LineBy
+    | LineHeading
+    | ArcCenter
+    | ArcVia
+    | Circle
+    | Helix
+    | SplineThrough
+    | BSplineCurve
+    | PointFile
+)
 
 
 _POSE_COLUMNS = 7
@@ -223,7 +308,9 @@ class SegmentModel(Model):
         description="Rounds the corner at the END of this segment: metres taken from it and from the next one.",
     )
 
-    def __add__(self, other: SegmentModel | tuple[SegmentModel, ...]) -> tuple[SegmentModel, ...]:
+    def __add__(
+        self, other: SegmentModel | tuple[SegmentModel, ...]
+    ) -> tuple[SegmentModel, ...]:
         """Join a segment, or a path, to the end of this segment."""
         if isinstance(other, SegmentModel):
             return (self, other)
@@ -236,11 +323,15 @@ class SegmentModel(Model):
     def __repr__(self) -> str:
         """Show it as a program makes it."""
         shape = getattr(self, self.kind)
-        rest = [(name, value) for name, value in self.__repr_args__() if name != self.kind]
-        given = ", ".join(f"{name}={value!r}" for name, value in (*shape.__repr_args__(), *rest))
+        rest = [
+            (name, value) for name, value in self.__repr_args__() if name != self.kind
+        ]
+        given = ", ".join(
+            f"{name}={value!r}" for name, value in (*shape.__repr_args__(), *rest)
+        )
         return f"{type(self).__name__.removesuffix('Segment')}({given})"
 
-    def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:  # noqa: ARG002  (others ask)
+    def start_place(self, *, of_poses: bool) -> tuple[float, ...] | ToolPose | None:
         """Where the segment says that it begins, as ``path_start`` of a task; None where it leaves that open.
 
         Without relative waypoints and another word on it, that is the first waypoint.
@@ -250,7 +341,11 @@ class SegmentModel(Model):
     @property
     def kind(self) -> str:
         """The key that names the segment in the task file: ``line``, ``arc``, ``circle``, ``spline``, ..."""
-        return next(name for name in type(self).model_fields if name not in {"blend", "orientation"})
+        return next(
+            name
+            for name in type(self).model_fields
+            if name not in {"blend", "orientation"}
+        )
 
 
 class MovingSegment(SegmentModel):
@@ -305,7 +400,10 @@ class SplineSegment(MovingSegment):
             return None
         place, oriented = spline.starts_at, spline.starts_oriented
         if place is None:
-            place, oriented = spline.through[0], spline.orientations[0] if spline.orientations else None
+            place, oriented = (
+                spline.through[0],
+                spline.orientations[0] if spline.orientations else None,
+            )
         if oriented is None or not of_poses or len(place) != _POSITIONS:
             return place
         return ToolPose.model_validate({"position": place, **oriented.model_dump()})
@@ -314,7 +412,11 @@ class SplineSegment(MovingSegment):
     def _one_word_on_orientation(self) -> SplineSegment:
         if self.orientation is not None and self.spline.orientations is not None:
             problem = "the spline's orientations say already how the tool turns"
-            raise refuse(problem, key=".orientation", allowed="orientation or spline.orientations, not both")
+            raise refuse(
+                problem,
+                key=".orientation",
+                allowed="orientation or spline.orientations, not both",
+            )
         return self
 
 
@@ -336,14 +438,21 @@ class BSplineSegment(MovingSegment):
             return None if self.bspline.relative else first
         length = math.hypot(*first[_POSITIONS:]) or 1.0
         turn = [number / length for number in first[_POSITIONS:]]
-        return ToolPose.model_validate({"position": first[:_POSITIONS], "quaternion_wxyz": turn})
+        return ToolPose.model_validate(
+            {"position": first[:_POSITIONS], "quaternion_wxyz": turn}
+        )
 
     @model_validator(mode="after")
     def _one_word_on_orientation(self) -> BSplineSegment:
-        if self.orientation is not None and len(self.bspline.control_points[0]) == _POSE_COLUMNS:
+        if (
+            self.orientation is not None
+            and len(self.bspline.control_points[0]) == _POSE_COLUMNS
+        ):
             problem = "the curve's quaternions say already how the tool turns"
             raise refuse(
-                problem, key=".orientation", allowed="orientation or control points with quaternions, not both"
+                problem,
+                key=".orientation",
+                allowed="orientation or control points with quaternions, not both",
             )
         return self
 

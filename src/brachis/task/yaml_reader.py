@@ -39,7 +39,11 @@ _BROKEN = (
 class _Loader(yaml.SafeLoader):
     """A safe loader that refuses duplicate keys."""
 
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:  # noqa: FBT001, FBT002 - PyYAML's signature
+    def construct_mapping(
+        self,
+        node: yaml.MappingNode,
+        deep: bool = False,  # noqa: FBT002
+    ) -> dict[Hashable, Any]:
         """Make a mapping of a node, as PyYAML does, unless a key occurs twice (ConstructorError)."""
         # Before merge keys (<<) are expanded: what they bring in may be overridden.
         seen: set[str] = set()
@@ -47,7 +51,10 @@ class _Loader(yaml.SafeLoader):
             if isinstance(key, yaml.ScalarNode):
                 if key.value in seen:
                     raise yaml.constructor.ConstructorError(
-                        None, None, f"the key {key.value!r} occurs twice", key.start_mark
+                        None,
+                        None,
+                        f"the key {key.value!r} occurs twice",
+                        key.start_mark,
                     )
                 seen.add(key.value)
         return super().construct_mapping(node, deep=deep)
@@ -69,7 +76,11 @@ def _size(node: yaml.Node, known: dict[int, float]) -> float:
         return 1.0
     if id(node) not in known:
         known[id(node)] = math.inf  # while inside
-        parts = node.value if isinstance(node, yaml.SequenceNode) else [each for pair in node.value for each in pair]
+        parts = (
+            node.value
+            if isinstance(node, yaml.SequenceNode)
+            else [each for pair in node.value for each in pair]
+        )
         known[id(node)] = 1.0 + sum(_size(part, known) for part in parts)
     return known[id(node)]
 
@@ -81,7 +92,9 @@ def _with_unit(_loader: _Loader, node: yaml.Node) -> float:
         return float(text) * _UNITS[node.tag]
     except ValueError:
         problem = f"{node.tag} stands before a number, and not before {text!r}"
-        raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark) from None
+        raise yaml.constructor.ConstructorError(
+            None, None, problem, node.start_mark
+        ) from None
 
 
 for _tag in _UNITS:
@@ -109,7 +122,11 @@ def read_yaml(text: str, source: str) -> object:
         return yaml.load(text, Loader=_Loader)  # noqa: S506
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        where = f"{source}: line {mark.line + 1}, column {mark.column + 1}" if mark else source
+        where = (
+            f"{source}: line {mark.line + 1}, column {mark.column + 1}"
+            if mark
+            else source
+        )
         message = error.problem or "not valid YAML"
     except _BROKEN as error:
         where, message = source, (str(error) or type(error).__name__).splitlines()[0]

@@ -3,7 +3,13 @@
 from brachis.trajectory.recovered import Recovered, check_tolerance
 from brachis.trajectory.result_file import SCHEMA
 from brachis.trajectory.samples import Samples
-from brachis.trajectory.trajectory import CONTINUOUS_TORQUE, Motion, Trajectory, motion_of, of_motion
+from brachis.trajectory.trajectory import (
+    CONTINUOUS_TORQUE,
+    Motion,
+    Trajectory,
+    motion_of,
+    of_motion,
+)
 
 __all__ = [
     "CONTINUOUS_TORQUE",

@@ -24,13 +24,23 @@ _ROUNDING = float(np.finfo(float).eps)
 """Of a number that is the difference of two, as a part of the larger one."""
 
 
-def travel_without_bend(times: np.ndarray, qdot: np.ndarray, after: np.ndarray, before: np.ndarray) -> np.ndarray:
+def travel_without_bend(
+    times: np.ndarray, qdot: np.ndarray, after: np.ndarray, before: np.ndarray
+) -> np.ndarray:
     """Travel of every piece, (L, n), if its jerk were linear in time; parameters as `relative_coefficients`."""
     h = np.diff(times)[:, None]
-    return np.asarray(0.5 * h * (qdot[:-1] + qdot[1:]) - h**2 / 12.0 * (before[1:] - after[:-1]))
+    return np.asarray(
+        0.5 * h * (qdot[:-1] + qdot[1:]) - h**2 / 12.0 * (before[1:] - after[:-1])
+    )
 
 
-def _misses(times: np.ndarray, q: np.ndarray, qdot: np.ndarray, after: np.ndarray, before: np.ndarray) -> np.ndarray:
+def _misses(
+    times: np.ndarray,
+    q: np.ndarray,
+    qdot: np.ndarray,
+    after: np.ndarray,
+    before: np.ndarray,
+) -> np.ndarray:
     """Return the part of every piece's travel, (L, n), that bends its jerk: what remains beyond rounding."""
     miss = np.diff(q, axis=0) - travel_without_bend(times, qdot, after, before)
     far, fast = (np.maximum(np.abs(part[1:]), np.abs(part[:-1])) for part in (q, qdot))
@@ -39,7 +49,11 @@ def _misses(times: np.ndarray, q: np.ndarray, qdot: np.ndarray, after: np.ndarra
 
 
 def relative_coefficients(
-    times: np.ndarray, q: np.ndarray, qdot: np.ndarray, after: np.ndarray, before: np.ndarray
+    times: np.ndarray,
+    q: np.ndarray,
+    qdot: np.ndarray,
+    after: np.ndarray,
+    before: np.ndarray,
 ) -> np.ndarray:
     """Bernstein coefficients of ``q(t) - q[i]`` on every piece i between nodes i and i + 1.
 
@@ -61,14 +75,28 @@ def relative_coefficients(
     """
     h = np.diff(times)[:, None]
     slope, bend = h / 5.0, h**2 / 20.0
-    way = travel_without_bend(times, qdot, after, before) + _misses(times, q, qdot, after, before)
-    left = [np.zeros_like(way), slope * qdot[:-1], 2.0 * slope * qdot[:-1] + bend * after[:-1]]
-    right = [way - 2.0 * slope * qdot[1:] + bend * before[1:], way - slope * qdot[1:], way]
+    way = travel_without_bend(times, qdot, after, before) + _misses(
+        times, q, qdot, after, before
+    )
+    left = [
+        np.zeros_like(way),
+        slope * qdot[:-1],
+        2.0 * slope * qdot[:-1] + bend * after[:-1],
+    ]
+    right = [
+        way - 2.0 * slope * qdot[1:] + bend * before[1:],
+        way - slope * qdot[1:],
+        way,
+    ]
     return np.stack([*left, *right])
 
 
 def jerk_coefficients(
-    times: np.ndarray, q: np.ndarray, qdot: np.ndarray, after: np.ndarray, before: np.ndarray
+    times: np.ndarray,
+    q: np.ndarray,
+    qdot: np.ndarray,
+    after: np.ndarray,
+    before: np.ndarray,
 ) -> np.ndarray:
     """Bernstein coefficients of the jerk of every piece, (3, L, n); parameters as `relative_coefficients`.
 

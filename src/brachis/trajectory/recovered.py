@@ -26,7 +26,12 @@ def check_tolerance(tolerance: float) -> float:
     tolerance = number(tolerance, "tolerance", "m and rad")
     if not SMALLEST <= tolerance <= LARGEST:
         allowed = f"{SMALLEST:g} to {LARGEST:g} m and rad"
-        raise InputError("is no tolerance of a path", where="tolerance", found=tolerance, allowed=allowed)
+        raise InputError(
+            "is no tolerance of a path",
+            where="tolerance",
+            found=tolerance,
+            allowed=allowed,
+        )
     return tolerance
 
 
@@ -67,11 +72,19 @@ class Recovered:
 
     def to_dict(self) -> dict[str, Any]:
         """Return what is known as plain data for JSON, without the rows."""
-        return {"source": self.source, "tolerance": self.tolerance, "told": list(self.told)}
+        return {
+            "source": self.source,
+            "tolerance": self.tolerance,
+            "told": list(self.told),
+        }
 
     def to_file(self) -> dict[str, Any]:
         """Return all as plain data for JSON."""
-        return {**self.to_dict(), "rows": self.rows.tolist(), "error": self.error.tolist()}
+        return {
+            **self.to_dict(),
+            "rows": self.rows.tolist(),
+            "error": self.error.tolist(),
+        }
 
     @classmethod
     def of_file(cls, data: object, n: int) -> Recovered | None:
@@ -85,21 +98,43 @@ class Recovered:
         if data is None:
             return None
         parts = dict(data) if isinstance(data, Mapping) else {}
-        source, tolerance, told = (parts.get(name) for name in ("source", "tolerance", "told"))
+        source, tolerance, told = (
+            parts.get(name) for name in ("source", "tolerance", "told")
+        )
         listed = isinstance(told, list) and all(isinstance(line, str) for line in told)
         if not isinstance(source, str) or type(tolerance) is not float or not listed:
             allowed = "source, tolerance, told, rows, error; or null"
             raise InputError(
-                "wrong type", where="recovered", found=", ".join(parts) or type(data).__name__, allowed=allowed
+                "wrong type",
+                where="recovered",
+                found=", ".join(parts) or type(data).__name__,
+                allowed=allowed,
             )
-        rows = numbers(parts.get("rows", np.empty((0, 1 + n))), "recovered.rows", "s, then rad or m")
+        rows = numbers(
+            parts.get("rows", np.empty((0, 1 + n))),
+            "recovered.rows",
+            "s, then rad or m",
+        )
         error = numbers(parts.get("error", np.zeros(n)), "recovered.error", "rad or m")
         if not rows.size:
-            return cls(source, tolerance, tuple(told or ()), rows.reshape(0, 1 + n), error)
-        fits = rows.shape == (len(np.atleast_1d(rows)), 1 + n) and len(rows) > 1 and error.shape == (n,)
+            return cls(
+                source, tolerance, tuple(told or ()), rows.reshape(0, 1 + n), error
+            )
+        fits = (
+            rows.shape == (len(np.atleast_1d(rows)), 1 + n)
+            and len(rows) > 1
+            and error.shape == (n,)
+        )
         finite = np.isfinite(rows).all() and np.isfinite(error).all()
         if not fits or not finite or not (np.diff(rows[:, 0]) > 0.0).all():
             found = f"rows {rows.shape}, error {error.shape}"
-            allowed = f"rows (K, {1 + n}) with ascending times, error ({n},); finite numbers"
-            raise InputError("not the rows of a file", where="recovered", found=found, allowed=allowed)
+            allowed = (
+                f"rows (K, {1 + n}) with ascending times, error ({n},); finite numbers"
+            )
+            raise InputError(
+                "not the rows of a file",
+                where="recovered",
+                found=found,
+                allowed=allowed,
+            )
         return cls(source, tolerance, tuple(told or ()), rows, error)

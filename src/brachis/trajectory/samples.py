@@ -74,14 +74,21 @@ class Samples(Summary):
             pandas is not installed.
         """
         try:
-            import pandas  # noqa: PLC0415, ICN001  (an extra)
+            import pandas  # noqa: ICN001  (an extra)
         except ImportError:
             raise NotInstalledError("a table", "pandas", "pandas") from None
         columns = {"t": self.t, "s": self.s}
         for prefix, name in COLUMNS.items():
-            columns |= {f"{prefix}_{joint}": getattr(self, name)[:, i] for i, joint in enumerate(joint_names)}
-        columns |= {f"tool_{row}": self.tool_position[:, i] for i, row in enumerate("xyz")}
-        columns |= {f"tool_q{row}": self.tool_quaternion[:, i] for i, row in enumerate("wxyz")}
+            columns |= {
+                f"{prefix}_{joint}": getattr(self, name)[:, i]
+                for i, joint in enumerate(joint_names)
+            }
+        columns |= {
+            f"tool_{row}": self.tool_position[:, i] for i, row in enumerate("xyz")
+        }
+        columns |= {
+            f"tool_q{row}": self.tool_quaternion[:, i] for i, row in enumerate("wxyz")
+        }
         return pandas.DataFrame({**columns, "tool_speed": self.tool_speed})
 
     def summary(self) -> Mapping[str, object]:

@@ -34,7 +34,9 @@ if TYPE_CHECKING:
     from scipy.interpolate import BPoly, BSpline
 
 
-def tool_motion(robot: Robot, q: np.ndarray, qdot: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def tool_motion(
+    robot: Robot, q: np.ndarray, qdot: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pose and speed of the tool frame in the world.
 
     Parameters
@@ -52,7 +54,11 @@ def tool_motion(robot: Robot, q: np.ndarray, qdot: np.ndarray) -> tuple[np.ndarr
         m/s.
     """
     model, data, frame = robot.model, robot.model.createData(), robot.frame_id
-    position, quaternion, speed = np.empty((len(q), 3)), np.empty((len(q), 4)), np.empty(len(q))
+    position, quaternion, speed = (
+        np.empty((len(q), 3)),
+        np.empty((len(q), 4)),
+        np.empty(len(q)),
+    )
     for k in range(len(q)):
         pin.forwardKinematics(model, data, q[k], qdot[k])
         placement = pin.updateFramePlacement(model, data, frame)
@@ -150,9 +156,11 @@ class Trajectory(Summary):
     @cached_property
     def pieces(self) -> BPoly:
         """Joint positions less those of the node before, as SciPy's piecewise polynomial over time; see `position`."""
-        from scipy.interpolate import BPoly  # noqa: PLC0415  (imports in 0.3 s)
+        from scipy.interpolate import BPoly
 
-        coefficients = relative_coefficients(self.times, self.q, self.qdot, self.qddot, self.qddot_before)
+        coefficients = relative_coefficients(
+            self.times, self.q, self.qdot, self.qddot, self.qddot_before
+        )
         pieces = BPoly(coefficients, self.times)
         pieces.c.setflags(write=False)
         return pieces
@@ -160,9 +168,11 @@ class Trajectory(Summary):
     @cached_property
     def jerk_pieces(self) -> BPoly:
         """Joint jerks as SciPy's piecewise polynomial over time: the third derivative of `pieces`, to rounding."""
-        from scipy.interpolate import BPoly  # noqa: PLC0415
+        from scipy.interpolate import BPoly
 
-        coefficients = jerk_coefficients(self.times, self.q, self.qdot, self.qddot, self.qddot_before)
+        coefficients = jerk_coefficients(
+            self.times, self.q, self.qdot, self.qddot, self.qddot_before
+        )
         pieces = BPoly(coefficients, self.times)
         pieces.c.setflags(write=False)
         return pieces
@@ -170,14 +180,14 @@ class Trajectory(Summary):
     @cached_property
     def path_spline(self) -> BSpline:
         """s(t) as SciPy's B-spline over time in seconds."""
-        from scipy.interpolate import BSpline  # noqa: PLC0415
+        from scipy.interpolate import BSpline
 
         return BSpline(self.knots * self.t_end, self.control_points[0], self.degree)
 
     @cached_property
     def redundant_spline(self) -> BSpline:
         """Positions of the r redundant joints, or sigma of the chart, as SciPy's B-spline over time in seconds."""
-        from scipy.interpolate import BSpline  # noqa: PLC0415
+        from scipy.interpolate import BSpline
 
         return BSpline(self.knots * self.t_end, self.control_points[1:].T, self.degree)
 
@@ -194,7 +204,9 @@ class Trajectory(Summary):
             A time lies outside [0, t_end].
         """
         times = self._checked(t)
-        node = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
+        node = np.clip(
+            np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2
+        )
         return self.q[node] + np.asarray(self.pieces(times))
 
     def velocity(self, t: ArrayLike) -> np.ndarray:
@@ -212,7 +224,10 @@ class Trajectory(Summary):
     def torque(self, t: ArrayLike) -> np.ndarray:
         """Joint torques, as `position`; Nm or N."""
         t = self._checked(t)
-        states = (np.atleast_2d(part(t)) for part in (self.position, self.velocity, self.acceleration))
+        states = (
+            np.atleast_2d(part(t))
+            for part in (self.position, self.velocity, self.acceleration)
+        )
         tau = dynamics.torque(self.robot, *states)
         return tau if np.ndim(t) else tau[0]
 
@@ -222,7 +237,14 @@ class Trajectory(Summary):
         states = self.position(times), self.velocity(times), self.acceleration(times)
         return self._samples(times, self.path_coordinate(times), *states)
 
-    def _samples(self, t: np.ndarray, s: np.ndarray, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> Samples:
+    def _samples(
+        self,
+        t: np.ndarray,
+        s: np.ndarray,
+        q: np.ndarray,
+        qdot: np.ndarray,
+        qddot: np.ndarray,
+    ) -> Samples:
         tau = dynamics.torque(self.robot, q, qdot, qddot)
         return Samples(t, s, q, qdot, qddot, tau, *tool_motion(self.robot, q, qdot))
 
@@ -254,21 +276,35 @@ class Trajectory(Summary):
         if last not in ENDINGS:
             raise UnknownNameError("ending", last, ENDINGS, where="last")
         dt = number(dt, "dt", "s")
-        if not (np.isfinite(dt) and dt > 0.0 and self.t_end / dt < 1e7):  # noqa: PLR2004
+        if not (np.isfinite(dt) and dt > 0.0 and self.t_end / dt < 1e7):
             raise InputError(
-                "is not a usable period", where="dt", found=f"{dt} s", allowed="> 0 s, at most 1e7 samples"
+                "is not a usable period",
+                where="dt",
+                found=f"{dt} s",
+                allowed="> 0 s, at most 1e7 samples",
             )
         whole = int(np.ceil(self.t_end / dt * (1.0 - 1e-12)))
         before = np.arange(whole) * dt
-        if last == "hold" and (self.task.boundary.periodic or self.task.boundary.end_speed):
-            raise InputError("a motion that does not end at rest cannot be held", where="last", allowed="exact")
+        if last == "hold" and (
+            self.task.boundary.periodic or self.task.boundary.end_speed
+        ):
+            raise InputError(
+                "a motion that does not end at rest cannot be held",
+                where="last",
+                allowed="exact",
+            )
         if last == "exact":
             return self.at(np.append(before, self.t_end))
         moving, rest = self.at(before), np.zeros((1, self.robot.n))
         end = self.position(self.t_end)[None]
         held = self._samples(np.array([whole * dt]), np.ones(1), end, rest, rest)
         names = (field.name for field in fields(moving))
-        return Samples(*(np.concatenate([getattr(moving, name), getattr(held, name)]) for name in names))
+        return Samples(
+            *(
+                np.concatenate([getattr(moving, name), getattr(held, name)])
+                for name in names
+            )
+        )
 
     def to_dataframe(self, dt: float) -> pd.DataFrame:
         """Return a pandas table, a row every `dt` seconds; see `sample`.
@@ -291,7 +327,8 @@ class Trajectory(Summary):
             "end time": f"{self.t_end:.4f} s",
             "robot": f"{Path(self.robot.source).parent.name}/{Path(self.robot.source).name}",
             "joints": ", ".join(self.joint_names),
-            "redundant joints": ", ".join(self.redundant_joints) or ("none by name: a chart" if in_chart else "none"),
+            "redundant joints": ", ".join(self.redundant_joints)
+            or ("none by name: a chart" if in_chart else "none"),
             "branch": self.branch or "none",
             "start posture": self.robot.in_words(self.q[0]),
             "end posture": self.robot.in_words(self.q[-1]),
@@ -345,10 +382,14 @@ class Trajectory(Summary):
         """Refuse times outside the trajectory; rounding at the ends is forgiven."""
         times = numbers(t, "t", "s")
         slack = 1e-9 * self.t_end
-        if times.size and not (times.min() >= -slack and times.max() <= self.t_end + slack):
+        if times.size and not (
+            times.min() >= -slack and times.max() <= self.t_end + slack
+        ):
             last, t_end = write_apart(times.max(), self.t_end, digits=6)
             found, allowed = f"{times.min():g} s to {last} s", f"0 s to {t_end} s"
-            raise InputError("time outside the trajectory", found=found, allowed=allowed)
+            raise InputError(
+                "time outside the trajectory", found=found, allowed=allowed
+            )
         return np.clip(times, 0.0, self.t_end)
 
 
@@ -384,11 +425,15 @@ def motion_of(given: Motion, where: str = "trajectory") -> Trajectory:
     motion = getattr(given, "trajectory", None)
     if not isinstance(motion, Trajectory):
         allowed = "a Trajectory, a Result, or the npz file of one"
-        raise InputError("no motion", where=where, found=type(given).__name__, allowed=allowed)
+        raise InputError(
+            "no motion", where=where, found=type(given).__name__, allowed=allowed
+        )
     return motion
 
 
-def of_motion(function: Callable[Concatenate[Trajectory, _P], _R]) -> Callable[Concatenate[Motion, _P], _R]:
+def of_motion(
+    function: Callable[Concatenate[Trajectory, _P], _R],
+) -> Callable[Concatenate[Motion, _P], _R]:
     """Let a function of a trajectory take all that `motion_of` does."""
 
     @wraps(function)

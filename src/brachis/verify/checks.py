@@ -23,28 +23,43 @@ _ROUNDING = 1e-6
 """m or rad by which a task's postures may be off its path, since they are written with so many digits."""
 
 
-def progress_checks(trajectory: Trajectory, t: np.ndarray, options: VerifyOptions) -> list[Check]:
+def progress_checks(
+    trajectory: Trajectory, t: np.ndarray, options: VerifyOptions
+) -> list[Check]:
     """Check that the path is travelled once, forwards, from its beginning to its end.
 
     ds/dt is looked at where it is smallest: at the times t, (K,), at knots, and where its derivative vanishes.
     """
-    from scipy.interpolate import PPoly  # noqa: PLC0415  (imports in 0.3 s)
+    from scipy.interpolate import PPoly
 
     spline, allowed = trajectory.path_spline, options.progress_tolerance
-    turning = PPoly.from_spline(spline.derivative(2).tck).roots(discontinuity=True, extrapolate=False)
+    turning = PPoly.from_spline(spline.derivative(2).tck).roots(
+        discontinuity=True, extrapolate=False
+    )
     times = np.concatenate([t, np.unique(spline.t), turning[np.isfinite(turning)]])
     velocity = spline(times, nu=1)
     backwards = float(np.maximum(0.0, -velocity).max())
     ends = float(np.abs([spline(0.0), spline(trajectory.t_end) - 1.0]).max())
     time = float(times[int(np.argmin(velocity))]) if backwards else None
     return [
-        Check("ds/dt below zero", backwards, allowed, "1/s", backwards <= allowed, time=time),
+        Check(
+            "ds/dt below zero",
+            backwards,
+            allowed,
+            "1/s",
+            backwards <= allowed,
+            time=time,
+        ),
         Check("s at the ends", ends, allowed, "-", ends <= allowed),
     ]
 
 
 def end_checks(
-    trajectory: Trajectory, robot: Robot, task_map: TaskMap, path: Path, options: VerifyOptions
+    trajectory: Trajectory,
+    robot: Robot,
+    task_map: TaskMap,
+    path: Path,
+    options: VerifyOptions,
 ) -> list[Check]:
     """Check that the motion begins and ends as the task says."""
     task, boundary = trajectory.task, trajectory.task.boundary
@@ -58,20 +73,54 @@ def end_checks(
             given = robot.posture(posture.joints, f"{name}.joints")
             place = path.sample(np.array([time / trajectory.t_end])).target
             miss = np.abs(trajectory.position(time) - _on_path(given, task_map, place))
-            checks.append(_worst_joint(f"{name} posture", miss, options.posture_tolerance, "position", robot, time))
+            checks.append(
+                _worst_joint(
+                    f"{name} posture",
+                    miss,
+                    options.posture_tolerance,
+                    "position",
+                    robot,
+                    time,
+                )
+            )
         if boundary.periodic:
             continue
         if given_speed:
-            checks += _moving_end(name, trajectory, task_map, path, given_speed, time, options)
+            checks += _moving_end(
+                name, trajectory, task_map, path, given_speed, time, options
+            )
             continue
-        speed, allowed = np.abs(trajectory.velocity(time)), options.rest_velocity_tolerance
-        checks.append(_worst_joint(f"{name} velocity", speed, allowed, "velocity", robot, time))
+        speed, allowed = (
+            np.abs(trajectory.velocity(time)),
+            options.rest_velocity_tolerance,
+        )
+        checks.append(
+            _worst_joint(f"{name} velocity", speed, allowed, "velocity", robot, time)
+        )
         if task.spline.vanishing > 1:
-            bend, allowed = np.abs(trajectory.acceleration(time)), options.rest_acceleration_tolerance
-            checks.append(_worst_joint(f"{name} acceleration", bend, allowed, "acceleration", robot, time))
-        if task.spline.vanishing > 2:  # noqa: PLR2004  (jerk)
-            jerk = np.abs(trajectory.jerk(time)) / (1.0 + np.abs(trajectory.jerk(trajectory.times)).max())
-            checks.append(_worst_joint(f"{name} jerk", jerk, options.rest_jerk_tolerance, "relative", robot, time))
+            bend, allowed = (
+                np.abs(trajectory.acceleration(time)),
+                options.rest_acceleration_tolerance,
+            )
+            checks.append(
+                _worst_joint(
+                    f"{name} acceleration", bend, allowed, "acceleration", robot, time
+                )
+            )
+        if task.spline.vanishing > 2:
+            jerk = np.abs(trajectory.jerk(time)) / (
+                1.0 + np.abs(trajectory.jerk(trajectory.times)).max()
+            )
+            checks.append(
+                _worst_joint(
+                    f"{name} jerk",
+                    jerk,
+                    options.rest_jerk_tolerance,
+                    "relative",
+                    robot,
+                    time,
+                )
+            )
     return checks
 
 
@@ -87,20 +136,40 @@ def _moving_end(
     """Check that an end is passed at the speed that the task asks for, which is constant there with full rest."""
     q, qdot = trajectory.position(time)[None], trajectory.velocity(time)
     position, angle = task_map.norms(task_map.jacobian(task_map.twists(q))[0] @ qdot)
-    moves = float(task_map.norms(path.sample(trajectory.path_spline([time])).xi)[0][0]) > _ROUNDING
-    off, allowed = abs(float(position if moves else angle) - wanted), options.rest_velocity_tolerance * (1.0 + wanted)
+    moves = (
+        float(task_map.norms(path.sample(trajectory.path_spline([time])).xi)[0][0])
+        > _ROUNDING
+    )
+    off, allowed = (
+        abs(float(position if moves else angle) - wanted),
+        options.rest_velocity_tolerance * (1.0 + wanted),
+    )
     unit = "m/s" if moves else "rad/s"
     checks = [Check(f"{name} speed", off, allowed, unit, off <= allowed, time=time)]
     if trajectory.task.spline.vanishing > 1:
-        rate, bend = (abs(float(trajectory.path_spline(time, nu=order))) for order in (1, 2))
-        change, allowed = wanted * bend / rate if rate else np.inf, options.rest_acceleration_tolerance
+        rate, bend = (
+            abs(float(trajectory.path_spline(time, nu=order))) for order in (1, 2)
+        )
+        change, allowed = (
+            wanted * bend / rate if rate else np.inf,
+            options.rest_acceleration_tolerance,
+        )
         checks.append(
-            Check(f"{name} acceleration along the path", change, allowed, f"{unit}^2", change <= allowed, time=time)
+            Check(
+                f"{name} acceleration along the path",
+                change,
+                allowed,
+                f"{unit}^2",
+                change <= allowed,
+                time=time,
+            )
         )
     return checks
 
 
-def seam_checks(trajectory: Trajectory, pieces: Pieces, robot: Robot, options: VerifyOptions) -> list[Check]:
+def seam_checks(
+    trajectory: Trajectory, pieces: Pieces, robot: Robot, options: VerifyOptions
+) -> list[Check]:
     """Check that a periodic motion goes on where it ends as it begins."""
     if not trajectory.task.boundary.periodic:
         return []
@@ -119,20 +188,30 @@ def _on_path(given: np.ndarray, task_map: TaskMap, place: np.ndarray) -> np.ndar
     return np.asarray(given + np.linalg.lstsq(jacobian, miss, rcond=None)[0])
 
 
-def spline_checks(trajectory: Trajectory, robot: Robot, states: States, options: VerifyOptions) -> list[Check]:
+def spline_checks(
+    trajectory: Trajectory, robot: Robot, states: States, options: VerifyOptions
+) -> list[Check]:
     """Check that the splines of the redundant joints are their motion."""
     if not trajectory.redundant_joints:
         return []
     joints = [robot.joint_names.index(name) for name in trajectory.redundant_joints]
     misses = np.zeros_like(states.q)
-    misses[:, joints] = np.abs(trajectory.redundant_spline(states.t) - states.q[:, joints])
+    misses[:, joints] = np.abs(
+        trajectory.redundant_spline(states.t) - states.q[:, joints]
+    )
     worst = int(np.argmax(misses.max(axis=1)))
     time = float(states.t[worst])
     allowed = options.spline_tolerance
-    return [_worst_joint("redundant joints' splines", misses[worst], allowed, "position", robot, time)]
+    return [
+        _worst_joint(
+            "redundant joints' splines", misses[worst], allowed, "position", robot, time
+        )
+    ]
 
 
-def continuity_checks(trajectory: Trajectory, pieces: Pieces, robot: Robot, options: VerifyOptions) -> list[Check]:
+def continuity_checks(
+    trajectory: Trajectory, pieces: Pieces, robot: Robot, options: VerifyOptions
+) -> list[Check]:
     """Jumps of position, velocity, acceleration and torque where polynomial pieces join, relative to their size."""
     behind = np.arange(1, len(pieces.lengths))
     before = States.at(pieces, robot, behind - 1, np.ones(len(behind)))
@@ -140,9 +219,16 @@ def continuity_checks(trajectory: Trajectory, pieces: Pieces, robot: Robot, opti
     return _jumps(before, after, " jump", trajectory.degree, options)
 
 
-def _jumps(before: States, after: States, what: str, degree: int, options: VerifyOptions) -> list[Check]:
+def _jumps(
+    before: States, after: States, what: str, degree: int, options: VerifyOptions
+) -> list[Check]:
     """Compare the states on both sides of places."""
-    names = {"position": "q", "velocity": "qdot", "acceleration": "qddot", "torque": "tau"}
+    names = {
+        "position": "q",
+        "velocity": "qdot",
+        "acceleration": "qddot",
+        "torque": "tau",
+    }
     if degree < CONTINUOUS_TORQUE:  # the asked degree has them jump
         del names["acceleration"], names["torque"]
     checks, allowed = [], options.jump_tolerance
@@ -152,16 +238,24 @@ def _jumps(before: States, after: States, what: str, degree: int, options: Verif
         jumps = np.abs(right - left).max(axis=1, initial=0.0) / scale
         value = float(jumps.max(initial=0.0))
         time = float(after.t[int(np.argmax(jumps))]) if len(jumps) else None
-        checks.append(Check(f"{name}{what}", value, allowed, "relative", value <= allowed, time=time))
+        checks.append(
+            Check(
+                f"{name}{what}", value, allowed, "relative", value <= allowed, time=time
+            )
+        )
     return checks
 
 
-def _worst_joint(name: str, misses: np.ndarray, allowed: float, kind: str, robot: Robot, time: float) -> Check:
+def _worst_joint(
+    name: str, misses: np.ndarray, allowed: float, kind: str, robot: Robot, time: float
+) -> Check:
     """Make a check of the joint that misses most; `kind` is a key of `UNITS`, or the unit of all joints."""
     joint = int(np.argmax(misses))
     unit = UNITS[kind][robot.position_units[joint]] if kind in UNITS else kind
     value = float(misses[joint])
-    return Check(name, value, allowed, unit, value <= allowed, robot.joint_names[joint], time)
+    return Check(
+        name, value, allowed, unit, value <= allowed, robot.joint_names[joint], time
+    )
 
 
 _LEAST_STEPS = 3
@@ -185,19 +279,31 @@ Places = tuple[np.ndarray, np.ndarray]
 """Pieces (K,) and places u in them (K,)."""
 
 
-def spread_out(trajectory: Trajectory, pieces: Pieces, options: VerifyOptions) -> Places:
+def spread_out(
+    trajectory: Trajectory, pieces: Pieces, options: VerifyOptions
+) -> Places:
     """Both ends of every piece and places between, no two of them further apart than a knot interval allows."""
     times, knots = trajectory.times, np.unique(trajectory.knots) * trajectory.t_end
-    nearest = np.abs(times[np.searchsorted(times, knots).clip(max=len(times) - 1)] - knots)
+    nearest = np.abs(
+        times[np.searchsorted(times, knots).clip(max=len(times) - 1)] - knots
+    )
     before = np.abs(times[(np.searchsorted(times, knots) - 1).clip(min=0)] - knots)
     own = knots[np.minimum(nearest, before) > _SAME_TIME * trajectory.t_end]
     edges = np.union1d(times, own)
     first, _ = pieces.place(edges[:-1])
     low = (edges[:-1] - times[first]) / pieces.lengths[first]
     high = (edges[1:] - times[first]) / pieces.lengths[first]
-    interval = np.searchsorted(knots, 0.5 * (edges[1:] + edges[:-1])).clip(1, len(knots) - 1)
-    per_interval = np.diff(edges) / np.diff(knots)[interval - 1] * options.points_per_interval
-    travel = np.abs(np.diff(pieces.position, axis=0)).sum(axis=0).max(axis=1)[first] * (high - low) / _TRAVEL
+    interval = np.searchsorted(knots, 0.5 * (edges[1:] + edges[:-1])).clip(
+        1, len(knots) - 1
+    )
+    per_interval = (
+        np.diff(edges) / np.diff(knots)[interval - 1] * options.points_per_interval
+    )
+    travel = (
+        np.abs(np.diff(pieces.position, axis=0)).sum(axis=0).max(axis=1)[first]
+        * (high - low)
+        / _TRAVEL
+    )
     wanted = np.nan_to_num(np.maximum(per_interval - _ROUNDING_PLACES, travel))
     steps = np.ceil(np.clip(wanted, _LEAST_STEPS, _MOST_STEPS)).astype(int)
     count = steps + 1
@@ -225,7 +331,9 @@ def check_instants(count: int) -> None:
         )
 
 
-def within_path_pieces(trajectory: Trajectory, pieces: Pieces, breaks: np.ndarray, options: VerifyOptions) -> Places:
+def within_path_pieces(
+    trajectory: Trajectory, pieces: Pieces, breaks: np.ndarray, options: VerifyOptions
+) -> Places:
     """Spread places over every piece of the path, however short: a small blend is not stepped over."""
     parts = np.linspace(0.0, 1.0, options.points_per_interval)
     check_instants(len(breaks) * len(parts))
@@ -243,7 +351,8 @@ def sharpest(pieces: Pieces) -> Places:
     ends = pieces.acceleration[[0, -1]]
     room = _SPIKE * np.abs(ends).max(axis=(0, 1))
     beyond = np.maximum(
-        pieces.acceleration.max(axis=0) - ends.max(axis=0), ends.min(axis=0) - pieces.acceleration.min(axis=0)
+        pieces.acceleration.max(axis=0) - ends.max(axis=0),
+        ends.min(axis=0) - pieces.acceleration.min(axis=0),
     )
     piece, joint = np.nonzero(beyond > room)
     turning, u, _ = turns(pieces.acceleration[:, piece, joint])
@@ -255,11 +364,15 @@ def reversals(pieces: Pieces, robot: Robot) -> Places:
     rubbing = np.flatnonzero(robot.friction.coulomb > 0.0)
     velocity = pieces.velocity[:, :, rubbing] / robot.friction.v_eps[rubbing]
     least, most = velocity.min(axis=0), velocity.max(axis=0)
-    moving = np.maximum(most, -least) > _LEVELS[0]  # a joint that stands still crosses zero by rounding alone
+    moving = (
+        np.maximum(most, -least) > _LEVELS[0]
+    )  # a joint that stands still crosses zero by rounding alone
     piece, joint = np.nonzero(moving & (least < _WIDTHS) & (most > -_WIDTHS))
     slow = velocity[:, piece, joint]
     levels = np.concatenate([-_LEVELS[::-1], [0.0], _LEVELS])
     crossed, u = roots((slow[:, :, None] - levels).reshape(len(slow), -1))
     turning, at, least_speed = turns(slow)
     near = np.abs(least_speed) < _WIDTHS
-    return np.concatenate([piece[crossed // len(levels)], piece[turning[near]]]), np.concatenate([u, at[near]])
+    return np.concatenate(
+        [piece[crossed // len(levels)], piece[turning[near]]]
+    ), np.concatenate([u, at[near]])

@@ -40,25 +40,38 @@ class _Weight:
     com: np.ndarray
     inertia: np.ndarray
 
-    def resistance(self, motion: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray]:
+    def resistance(
+        self, motion: tuple[np.ndarray, ...]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Force, and moment about the joint's origin, (3, K), that its motion takes: w, e and a of the frame."""
         spin, gain, acceleration = motion
-        force = self.mass * (acceleration + cross(gain, self.com) + cross(spin, cross(spin, self.com)))
-        return force, self.inertia @ gain + cross(spin, self.inertia @ spin) + cross(self.com, force)
+        force = self.mass * (
+            acceleration + cross(gain, self.com) + cross(spin, cross(spin, self.com))
+        )
+        return force, self.inertia @ gain + cross(spin, self.inertia @ spin) + cross(
+            self.com, force
+        )
 
 
 def tool_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions (K, 3), m, and rotations (K, 3, 3) of the tool frame, with its offset, in postures q (K, n)."""
     offset, count = _matrix(robot.settings.tool_offset), len(q)
     tool = robot.stated.tool @ offset
-    roll = q[:, -1] if robot.rolls_freely else np.zeros(count)  # about the tool frame's z axis
-    x, y, z = (tool[:3, :3] @ _turned(_Z, roll, np.tile(axis[:, None], count)) for axis in np.eye(3))
+    roll = (
+        q[:, -1] if robot.rolls_freely else np.zeros(count)
+    )  # about the tool frame's z axis
+    x, y, z = (
+        tool[:3, :3] @ _turned(_Z, roll, np.tile(axis[:, None], count))
+        for axis in np.eye(3)
+    )
     origin = np.tile(tool[:3, 3:], count)
     for joint, body in reversed(list(enumerate(robot.stated.bodies))):
         if body.sliding:
             origin = origin + body.axis[:, None] * q[:, joint]
         else:
-            x, y, z, origin = (_turned(body.axis, q[:, joint], part) for part in (x, y, z, origin))
+            x, y, z, origin = (
+                _turned(body.axis, q[:, joint], part) for part in (x, y, z, origin)
+            )
         x, y, z, origin = (body.placement[:3, :3] @ part for part in (x, y, z, origin))
         origin = origin + body.placement[:3, 3, None]
     base = _matrix(robot.settings.mounting)
@@ -66,23 +79,39 @@ def tool_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return (base[:3, :3] @ origin + base[:3, 3, None]).T, np.moveaxis(rotations, 2, 0)
 
 
-def torques(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+def torques(
+    robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+) -> np.ndarray:
     """Joint torques (K, n) from states (K, n), Nm or N; that of a free roll of the tool is zero."""
     f = robot.friction
-    return _rigid(robot, q, qdot, qddot) + f.armature * qddot + f.viscous * qdot + f.coulomb * np.tanh(qdot / f.v_eps)
+    return (
+        _rigid(robot, q, qdot, qddot)
+        + f.armature * qddot
+        + f.viscous * qdot
+        + f.coulomb * np.tanh(qdot / f.v_eps)
+    )
 
 
-def torque_rates(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, qdddot: np.ndarray) -> np.ndarray:
+def torque_rates(
+    robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, qdddot: np.ndarray
+) -> np.ndarray:
     """Rates of the joint torques (K, n): differences along the motion, friction by its derivative; Nm/s or N/s.
 
     Differences of fourth order, over a step in which no joint goes far, nor changes its speed or acceleration much.
     """
-    rates = [np.abs(part).max(axis=1) ** (1.0 / order) for order, part in enumerate((qdot, qddot, qdddot), 1)]
+    rates = [
+        np.abs(part).max(axis=1) ** (1.0 / order)
+        for order, part in enumerate((qdot, qddot, qdddot), 1)
+    ]
     step = _STEP / np.maximum(np.max(rates, axis=0), 1.0)[:, None]
 
     def change(h: np.ndarray) -> np.ndarray:
         ahead, behind = (
-            _rigid(robot, q + t * qdot + t**2 / 2.0 * qddot + t**3 / 6.0 * qdddot, *_on(t, qdot, qddot, qdddot))
+            _rigid(
+                robot,
+                q + t * qdot + t**2 / 2.0 * qddot + t**3 / 6.0 * qdddot,
+                *_on(t, qdot, qddot, qdddot),
+            )
             for t in (h, -h)
         )
         return (ahead - behind) / (2.0 * h)
@@ -93,12 +122,16 @@ def torque_rates(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarra
     return (4.0 * change(step) - change(2.0 * step)) / 3.0 + friction
 
 
-def _on(t: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, qdddot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _on(
+    t: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, qdddot: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Velocity and acceleration after times t, (K, 1), s, under a jerk that stays."""
     return qdot + t * qddot + t**2 / 2.0 * qdddot, qddot + t * qdddot
 
 
-def _rigid(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> np.ndarray:
+def _rigid(
+    robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+) -> np.ndarray:
     """Torques (K, n) without armature and friction."""
     tau, bodies = np.zeros_like(q), robot.stated.bodies
     motions = _motions(robot, q, qdot, qddot)
@@ -112,28 +145,44 @@ def _rigid(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> 
         if body.sliding:
             moment = moment + cross(body.axis[:, None] * q[:, joint], force)
         else:
-            force, moment = (_turned(body.axis, q[:, joint], part) for part in (force, moment))
+            force, moment = (
+                _turned(body.axis, q[:, joint], part) for part in (force, moment)
+            )
         force, moment = (body.placement[:3, :3] @ part for part in (force, moment))
         moment = moment + cross(body.placement[:3, 3, None], force)
     return tau
 
 
-def _motions(robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> list[tuple[np.ndarray, ...]]:
+def _motions(
+    robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+) -> list[tuple[np.ndarray, ...]]:
     """Angular velocity, angular acceleration, and acceleration less gravity of every joint's frame, (3, K) each."""
     still = np.zeros((3, len(q)))
-    upwards = _matrix(robot.settings.mounting)[:3, :3].T @ -np.array(robot.model.gravity.linear)
+    upwards = _matrix(robot.settings.mounting)[:3, :3].T @ -np.array(
+        robot.model.gravity.linear
+    )
     spin, gain, acceleration = still, still, np.tile(upwards[:, None], len(q))
     motions: list[tuple[np.ndarray, ...]] = []
     for joint, body in enumerate(robot.stated.bodies):
         way, axis = body.placement[:3, 3, None], body.axis[:, None]
         acceleration = acceleration + cross(gain, way) + cross(spin, cross(spin, way))
-        spin, gain, acceleration = (body.placement[:3, :3].T @ part for part in (spin, gain, acceleration))
+        spin, gain, acceleration = (
+            body.placement[:3, :3].T @ part for part in (spin, gain, acceleration)
+        )
         rate, push = axis * qdot[:, joint], axis * qddot[:, joint]
         if body.sliding:
             way = axis * q[:, joint]
-            acceleration = acceleration + cross(gain, way) + cross(spin, cross(spin, way) + 2.0 * rate) + push
+            acceleration = (
+                acceleration
+                + cross(gain, way)
+                + cross(spin, cross(spin, way) + 2.0 * rate)
+                + push
+            )
         else:
-            spin, gain, acceleration = (_turned(body.axis, -q[:, joint], part) for part in (spin, gain, acceleration))
+            spin, gain, acceleration = (
+                _turned(body.axis, -q[:, joint], part)
+                for part in (spin, gain, acceleration)
+            )
             gain, spin = gain + push + cross(spin, rate), spin + rate
         motions.append((spin, gain, acceleration))
     return motions
@@ -148,17 +197,25 @@ def _weights(robot: Robot, joint: int) -> list[_Weight]:
         inertia = np.zeros((3, 3))
         if given is not None:
             inertia = np.diag([given.ixx, given.iyy, given.izz])
-            for (row, column), product in {(0, 1): given.ixy, (0, 2): given.ixz, (1, 2): given.iyz}.items():
+            for (row, column), product in {
+                (0, 1): given.ixy,
+                (0, 2): given.ixz,
+                (1, 2): given.iyz,
+            }.items():
                 inertia[row, column] = inertia[column, row] = product
         com = tool[:3, :3] @ payload.com + tool[:3, 3]
-        weights.append(_Weight(payload.mass, com[:, None], tool[:3, :3] @ inertia @ tool[:3, :3].T))
+        weights.append(
+            _Weight(payload.mass, com[:, None], tool[:3, :3] @ inertia @ tool[:3, :3].T)
+        )
     return weights
 
 
 def _matrix(placement: Placement) -> np.ndarray:
     """Placement as a (4, 4) matrix."""
     matrix = np.eye(4)
-    for axis, angle in zip(np.eye(3), np.radians(placement.rpy_deg), strict=True):  # about fixed axes: x, y, z
+    for axis, angle in zip(
+        np.eye(3), np.radians(placement.rpy_deg), strict=True
+    ):  # about fixed axes: x, y, z
         matrix[:3, :3] = _turned(axis, np.full(3, angle), matrix[:3, :3])
     matrix[:3, 3] = placement.xyz
     return matrix
@@ -167,4 +224,8 @@ def _matrix(placement: Placement) -> np.ndarray:
 def _turned(axis: np.ndarray, angles: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Turn vectors (3, K) about a unit vector by angles (K,), rad (Rodrigues)."""
     along, sine, cosine = axis[:, None], np.sin(angles), np.cos(angles)
-    return np.asarray(vectors * cosine + cross(along, vectors) * sine + along * (axis @ vectors) * (1.0 - cosine))
+    return np.asarray(
+        vectors * cosine
+        + cross(along, vectors) * sine
+        + along * (axis @ vectors) * (1.0 - cosine)
+    )

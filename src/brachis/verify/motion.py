@@ -47,9 +47,11 @@ def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     u : (Z,) ndarray
         Root; ascending within a polynomial.
     """
-    kept = np.flatnonzero((coefficients.min(axis=0) < 0.0) & (coefficients.max(axis=0) > 0.0))
+    kept = np.flatnonzero(
+        (coefficients.min(axis=0) < 0.0) & (coefficients.max(axis=0) > 0.0)
+    )
     c = coefficients[:, kept]
-    if len(c) == 2:  # noqa: PLR2004  (linear)
+    if len(c) == 2:
         return kept, c[0] / (c[0] - c[1])
     turns, at = roots(np.diff(c, axis=0))
     every = np.arange(len(kept))
@@ -58,15 +60,28 @@ def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     order = np.lexsort((u, column))
     column, u = column[order], u[order]
     value = values_of(c[:, column], u)
-    crossing = np.flatnonzero((column[1:] == column[:-1]) & (value[1:] * value[:-1] < 0.0))
-    found = _between(c[:, column[crossing]], u[crossing], u[crossing + 1], value[crossing], value[crossing + 1])
+    crossing = np.flatnonzero(
+        (column[1:] == column[:-1]) & (value[1:] * value[:-1] < 0.0)
+    )
+    found = _between(
+        c[:, column[crossing]],
+        u[crossing],
+        u[crossing + 1],
+        value[crossing],
+        value[crossing + 1],
+    )
     exact = (value == 0.0) & (u > 0.0) & (u < 1.0)
-    column, u = np.concatenate([column[crossing], column[exact]]), np.concatenate([found, u[exact]])
+    column, u = (
+        np.concatenate([column[crossing], column[exact]]),
+        np.concatenate([found, u[exact]]),
+    )
     order = np.lexsort((u, column))
     return kept[column[order]], u[order]
 
 
-def _between(c: np.ndarray, a: np.ndarray, b: np.ndarray, at_a: np.ndarray, at_b: np.ndarray) -> np.ndarray:
+def _between(
+    c: np.ndarray, a: np.ndarray, b: np.ndarray, at_a: np.ndarray, at_b: np.ndarray
+) -> np.ndarray:
     """Find the root between a and b, where monotone polynomials have values of opposite sign (the Illinois method)."""
     enough = _ROUNDING * np.abs(c).max(axis=0, initial=0.0)
     powers = _powers(c)
@@ -78,15 +93,22 @@ def _between(c: np.ndarray, a: np.ndarray, b: np.ndarray, at_a: np.ndarray, at_b
             value = value * u + coefficient
         if np.all((np.abs(value) <= enough) | (b - a <= _ROUNDING)):
             break
-        left = value * at_a > 0.0  # the root lies right of u; the value that stays is halved
+        left = (
+            value * at_a > 0.0
+        )  # the root lies right of u; the value that stays is halved
         a, b = np.where(left, u, a), np.where(left, b, u)
-        at_a, at_b = np.where(left, value, 0.5 * at_a), np.where(left, 0.5 * at_b, value)
+        at_a, at_b = (
+            np.where(left, value, 0.5 * at_a),
+            np.where(left, 0.5 * at_b, value),
+        )
     return u
 
 
 def _powers(c: np.ndarray) -> np.ndarray:
     """Coefficients of the powers of u, (m + 1, F), of polynomials in Bernstein form."""
-    return np.array([math.comb(len(c) - 1, k) * np.diff(c, n=k, axis=0)[0] for k in range(len(c))])
+    return np.array(
+        [math.comb(len(c) - 1, k) * np.diff(c, n=k, axis=0)[0] for k in range(len(c))]
+    )
 
 
 def turns(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -138,7 +160,15 @@ class Pieces:
         velocity = 5.0 * np.diff(position, axis=0) / lengths[:, None]
         acceleration = 4.0 * np.diff(velocity, axis=0) / lengths[:, None]
         jerk = trajectory.jerk_pieces.c
-        return cls(trajectory.times, lengths, trajectory.q[:-1], position, velocity, acceleration, jerk)
+        return cls(
+            trajectory.times,
+            lengths,
+            trajectory.q[:-1],
+            position,
+            velocity,
+            acceleration,
+            jerk,
+        )
 
     def time(self, piece: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the times of places, s."""
@@ -146,7 +176,9 @@ class Pieces:
 
     def place(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Piece and place in it of times t, (K,), s; at a node the piece that begins there."""
-        piece = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.lengths) - 1)
+        piece = np.clip(
+            np.searchsorted(self.times, t, side="right") - 1, 0, len(self.lengths) - 1
+        )
         return piece, np.clip((t - self.times[piece]) / self.lengths[piece], 0.0, 1.0)
 
 
@@ -172,17 +204,33 @@ class States:
     tau: np.ndarray
 
     @classmethod
-    def at(cls, pieces: Pieces, robot: Robot, piece: np.ndarray, u: np.ndarray) -> States:
+    def at(
+        cls, pieces: Pieces, robot: Robot, piece: np.ndarray, u: np.ndarray
+    ) -> States:
         """Evaluate pieces at places, in any order; each place once."""
         order = np.lexsort((u, piece))
         piece, u = piece[order], u[order]
-        again = (piece[1:] == piece[:-1]) & (u[1:] - u[:-1] <= _SAME_PLACE) & (u[1:] < 1.0)
+        again = (
+            (piece[1:] == piece[:-1]) & (u[1:] - u[:-1] <= _SAME_PLACE) & (u[1:] < 1.0)
+        )
         first = np.append(True, ~again)[: len(piece)]
         piece, u = piece[first], u[first]
         q = pieces.nodes[piece] + values_of(pieces.position[:, piece], u)
-        qdot, qddot = values_of(pieces.velocity[:, piece], u), values_of(pieces.acceleration[:, piece], u)
+        qdot, qddot = (
+            values_of(pieces.velocity[:, piece], u),
+            values_of(pieces.acceleration[:, piece], u),
+        )
         qdddot = values_of(pieces.jerk[:, piece], u)
-        return cls(piece, u, pieces.time(piece, u), q, qdot, qddot, qdddot, torques(robot, q, qdot, qddot))
+        return cls(
+            piece,
+            u,
+            pieces.time(piece, u),
+            q,
+            qdot,
+            qddot,
+            qdddot,
+            torques(robot, q, qdot, qddot),
+        )
 
     def only(self, chosen: np.ndarray | slice) -> States:
         """Return some of the states, in the order that is chosen."""
@@ -191,6 +239,11 @@ class States:
     def merged(self, other: States) -> tuple[States, np.ndarray]:
         """Return these states and others, ascending, and where each one was among those put one after the other."""
         names = [field.name for field in fields(self)]
-        both = States(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
+        both = States(
+            *(
+                np.concatenate([getattr(self, name), getattr(other, name)])
+                for name in names
+            )
+        )
         order = np.lexsort((both.u, both.piece))
         return both.only(order), order

@@ -57,7 +57,11 @@ class Check:
         ratio = self.of_limit or (self.unit == "-" and self.allowed > 1.0)
         unit, factor = shown_unit(self.unit, degrees=degrees)
         value = factor * self.value
-        return f"{value:.6f}" if ratio else f"{value:.1e}", f"{factor * self.allowed:.6g}", unit
+        return (
+            f"{value:.6f}" if ratio else f"{value:.1e}",
+            f"{factor * self.allowed:.6g}",
+            unit,
+        )
 
     def in_words(self) -> str:
         """Say what was found, and what is allowed."""
@@ -65,7 +69,9 @@ class Check:
         blame = f", {self.subject}" if self.subject else ""
         found, most = write_apart(self.value, self.allowed)
         allowed = f"{'<=' if self.passed else 'FAILED, allowed'} {most}{unit}"
-        return f"{found}{unit} {allowed}{blame}" + (f" at {self.time:.4g} s" if self.time is not None else "")
+        return f"{found}{unit} {allowed}{blame}" + (
+            f" at {self.time:.4g} s" if self.time is not None else ""
+        )
 
 
 @dataclass(frozen=True, repr=False)

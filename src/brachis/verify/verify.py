@@ -76,8 +76,12 @@ def verify_trajectory(
     True
     """
     trajectory = motion_of(trajectory)
-    options = options or VerifyOptions(ratio_tolerance=trajectory.task.refinement.tolerance)
-    robot, task_map = bind(trajectory.robot if robot is None else robot, trajectory.task.task_space)
+    options = options or VerifyOptions(
+        ratio_tolerance=trajectory.task.refinement.tolerance
+    )
+    robot, task_map = bind(
+        trajectory.robot if robot is None else robot, trajectory.task.task_space
+    )
     if robot.joint_names != trajectory.joint_names:
         raise InputError(
             "the robot has other joints than the trajectory",
@@ -122,7 +126,9 @@ def _path_error(
     t, q = states.t[once], states.q[once]
     targets = path.sample(np.clip(trajectory.path_spline(t), 0.0, 1.0)).target
     of_joints = isinstance(task_map, JointSpace)
-    found = q if of_joints else task_map.of_placements(*tool_placements(task_map.robot, q))
+    found = (
+        q if of_joints else task_map.of_placements(*tool_placements(task_map.robot, q))
+    )
     errors = np.maximum(*task_map.norms(task_map.difference(found, targets)))
     worst = int(np.argmax(errors))
     tolerance, remark = options.path_tolerance, ""
@@ -130,4 +136,12 @@ def _path_error(
         tolerance = max(tolerance, trajectory.recovered.tolerance)
         remark = "the path was recovered from the motion"
     passed = bool(errors[worst] <= tolerance)
-    return Check("path error", float(errors[worst]), tolerance, "m, rad", passed, time=float(t[worst]), remark=remark)
+    return Check(
+        "path error",
+        float(errors[worst]),
+        tolerance,
+        "m, rad",
+        passed,
+        time=float(t[worst]),
+        remark=remark,
+    )

@@ -17,7 +17,7 @@ class CoupledRange:
     """Range of the sum of two joints' positions, rad; what a task gives as ``custom_limits: {coupled_range: ...}``."""
 
     def __init__(self, joints: tuple[str, str], lower: float, upper: float) -> None:
-        if len(joints) != 2 or joints[0] == joints[1]:  # noqa: PLR2004
+        if len(joints) != 2 or joints[0] == joints[1]:
             raise ValueError(f"two different joints are coupled, found {list(joints)}")
         if not lower < upper:
             raise ValueError(f"lower must be below upper, found [{lower}, {upper}]")
@@ -27,7 +27,12 @@ class CoupledRange:
         """Return the limit for a robot."""
         for name in self.joints:
             if name not in robot.joint_names:
-                raise UnknownNameError("joint", name, robot.joint_names, where="custom_limits.coupled_range.joints")
+                raise UnknownNameError(
+                    "joint",
+                    name,
+                    robot.joint_names,
+                    where="custom_limits.coupled_range.joints",
+                )
         return BoundRange(self, robot)
 
 
@@ -37,9 +42,15 @@ class BoundRange(Limit):
     kind, static, whole_turns = "coupled_range", True, True
 
     def __init__(self, given: CoupledRange, robot: Robot) -> None:
-        self.labels = (Label(" + ".join(given.joints), "range", "rad", "custom_limits.coupled_range"),)
+        self.labels = (
+            Label(
+                " + ".join(given.joints), "range", "rad", "custom_limits.coupled_range"
+            ),
+        )
         self.lower, self.upper = np.array([given.lower]), np.array([given.upper])
-        self._sum = np.array([[float(name in given.joints) for name in robot.joint_names]])
+        self._sum = np.array(
+            [[float(name in given.joints) for name in robot.joint_names]]
+        )
 
     def values(self, motion: JointMotion) -> np.ndarray:
         """Sum of the two positions, (K, 1)."""

@@ -8,8 +8,17 @@ Examples
 10 % more torque at j1 (1 Nm) saves 3.4 % (87 ms)
 """
 
-from brachis.apps.bottleneck.check import CheckedSensitivity, SensitivityCheck, check_sensitivities
-from brachis.apps.bottleneck.reference import KnotCost, Reference, find_reference, knot_cost
+from brachis.apps.bottleneck.check import (
+    CheckedSensitivity,
+    SensitivityCheck,
+    check_sensitivities,
+)
+from brachis.apps.bottleneck.reference import (
+    KnotCost,
+    Reference,
+    find_reference,
+    knot_cost,
+)
 from brachis.apps.bottleneck.report import BottleneckReport, report, solved_again
 from brachis.apps.bottleneck.saturation import (
     RIPPLE,
@@ -20,7 +29,12 @@ from brachis.apps.bottleneck.saturation import (
     limit_ratios,
     saturations,
 )
-from brachis.apps.bottleneck.sensitivities import BranchBoundary, Sensitivities, Sensitivity, sensitivities
+from brachis.apps.bottleneck.sensitivities import (
+    BranchBoundary,
+    Sensitivities,
+    Sensitivity,
+    sensitivities,
+)
 
 __all__ = [
     "RIPPLE",

@@ -127,11 +127,18 @@ class SensitivityCheck(Summary):
 
     def worst_deviation(self, above: float = 1e-4) -> float:
         """Largest deviation among `larger` changes that were solved to an optimum; 0 where there are none."""
-        return max((entry.deviation for entry in self.larger(above) if entry.optimal), default=0.0)
+        return max(
+            (entry.deviation for entry in self.larger(above) if entry.optimal),
+            default=0.0,
+        )
 
     def larger(self, above: float = 1e-4) -> tuple[CheckedSensitivity, ...]:
         """Entries whose change, as predicted or as solved again, is larger than `above`, s."""
-        return tuple(entry for entry in self.entries if max(abs(entry.predicted), abs(entry.re_solved)) > above)
+        return tuple(
+            entry
+            for entry in self.entries
+            if max(abs(entry.predicted), abs(entry.re_solved)) > above
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -167,11 +174,15 @@ def check_sensitivities(
     PlanningError
         No solver could solve the unchanged problem again.
     """
-    with ThreadpoolController().limit(limits=1, user_api="blas"):  # as in `plan`: batches are small
+    with ThreadpoolController().limit(
+        limits=1, user_api="blas"
+    ):  # as in `plan`: batches are small
         return _checked(refined, predictions or sensitivities(refined), step)
 
 
-def _checked(refined: Refined, predictions: Sensitivities, step: float) -> SensitivityCheck:
+def _checked(
+    refined: Refined, predictions: Sensitivities, step: float
+) -> SensitivityCheck:
     """Compare limit by limit."""
     began = time.perf_counter()
     program = refined.program
@@ -185,11 +196,17 @@ def _checked(refined: Refined, predictions: Sensitivities, step: float) -> Sensi
         else:
             raised = program.relaxed(entry.limit, entry.bound, step * entry.bound.whole)
             checked.append(_compared(entry, entry.change(step), program, raised, base))
-    return SensitivityCheck(step, t_end(base), tuple(checked), time.perf_counter() - began)
+    return SensitivityCheck(
+        step, t_end(base), tuple(checked), time.perf_counter() - began
+    )
 
 
 def _compared(
-    entry: Sensitivity, predicted: float, program: Program, raised: Program, base: np.ndarray
+    entry: Sensitivity,
+    predicted: float,
+    program: Program,
+    raised: Program,
+    base: np.ndarray,
 ) -> CheckedSensitivity:
     """Solve with one limit raised, and back where the change is suspicious."""
     linearised = linearised_change(raised, base)
@@ -234,7 +251,10 @@ def _solved_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
     if residual(program, x) <= _FEASIBLE:
         answers.append(x)
     if not answers:
-        raise PlanningError("the answer could not be solved again", hint="Plan with a smaller solver.tolerance.")
+        raise PlanningError(
+            "the answer could not be solved again",
+            hint="Plan with a smaller solver.tolerance.",
+        )
     return min(answers, key=program.end_time), False
 
 

@@ -27,7 +27,12 @@ from threadpoolctl import ThreadpoolController
 
 from brachis.errors import UnreachableError
 from brachis.limits import Limit, Moments
-from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus, solver_named
+from brachis.optimise.backends import (
+    SolverOptions,
+    SolverReport,
+    SolveStatus,
+    solver_named,
+)
 from brachis.optimise.bspline import clamped_uniform_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import fitted, shortest_time, worst_time_scaling_ratio
@@ -101,7 +106,11 @@ class Reference:
 
 
 def find_reference(
-    refined: Refined, *, tolerance: float = 1e-4, intervals: int = INTERVALS, time_limit: float = 8.0
+    refined: Refined,
+    *,
+    tolerance: float = 1e-4,
+    intervals: int = INTERVALS,
+    time_limit: float = 8.0,
 ) -> Reference | None:
     """Plan again with rest: velocity on a fine mesh, from the answer found.
 
@@ -121,25 +130,46 @@ def find_reference(
     Reference or None
         None where no motion faster than the answer was found.
     """
-    with ThreadpoolController().limit(limits=1, user_api="blas"):  # as in `plan`: batches are small
+    with ThreadpoolController().limit(
+        limits=1, user_api="blas"
+    ):  # as in `plan`: batches are small
         return _found(refined, tolerance, intervals, time_limit)
 
 
-def _found(refined: Refined, tolerance: float, intervals: int, time_limit: float) -> Reference | None:
+def _found(
+    refined: Refined, tolerance: float, intervals: int, time_limit: float
+) -> Reference | None:
     """Try one mesh after the other."""
     began = time.perf_counter()
-    (phase,), (motion,) = refined.program.up_to(_HIGHEST).phases, refined.program.motions(refined.x)
+    (phase,), (motion,) = (
+        refined.program.up_to(_HIGHEST).phases,
+        refined.program.motions(refined.x),
+    )
     best: Reference | None = None
     for degree, count in _meshes(phase.intervals, _fine(phase, intervals)):
         if best is not None and time.perf_counter() > began + time_limit:
             break
-        answer = _planned(_on_mesh(phase, degree, count), motion, tolerance, began + time_limit)
+        answer = _planned(
+            _on_mesh(phase, degree, count), motion, tolerance, began + time_limit
+        )
         violation = np.inf if answer is None else _violation(answer)
         if answer is None or violation > tolerance or answer.t_end >= motion.t_end:
             continue
         (motion,) = answer.program.motions(answer.x)
-        best = Reference(motion.t_end, refined.t_end / motion.t_end - 1.0, degree, count, violation, 0.0, answer)
-    return None if best is None else dataclasses.replace(best, wall_time=time.perf_counter() - began)
+        best = Reference(
+            motion.t_end,
+            refined.t_end / motion.t_end - 1.0,
+            degree,
+            count,
+            violation,
+            0.0,
+            answer,
+        )
+    return (
+        None
+        if best is None
+        else dataclasses.replace(best, wall_time=time.perf_counter() - began)
+    )
 
 
 def _fine(phase: Phase, intervals: int) -> int:
@@ -147,7 +177,9 @@ def _fine(phase: Phase, intervals: int) -> int:
 
     A step of the active-set method takes seconds where there are many more variables.
     """
-    return phase.intervals * max(2, intervals // (phase.intervals * max(1, phase.joint_map.r)))
+    return phase.intervals * max(
+        2, intervals // (phase.intervals * max(1, phase.joint_map.r))
+    )
 
 
 def _meshes(own: int, fine: int) -> tuple[tuple[int, int], ...]:
@@ -165,12 +197,17 @@ def _on_mesh(phase: Phase, degree: int, intervals: int) -> Phase:
     return phase.over(grid, dataclasses.replace(phase.boundary, derivatives=1))
 
 
-def _planned(phase: Phase, motion: Motion, tolerance: float, deadline: float) -> Refined | None:
+def _planned(
+    phase: Phase, motion: Motion, tolerance: float, deadline: float
+) -> Refined | None:
     """Solve from a motion and refine, with one backend after the other, until one gives a motion within the rows.
 
     It need not be an optimum: any motion within the limits is as good a reference as it is fast.
     """
-    program, t_norm = Program([phase]), np.linspace(0.0, 1.0, _FIT_DENSITY * len(phase.knots))
+    program, t_norm = (
+        Program([phase]),
+        np.linspace(0.0, 1.0, _FIT_DENSITY * len(phase.knots)),
+    )
     try:
         x = fitted(phase, motion.t_end, t_norm, motion.at(t_norm * motion.t_end)[0])
         if worst_time_scaling_ratio(program, x) > _AS_GOOD:
@@ -184,17 +221,33 @@ def _planned(phase: Phase, motion: Motion, tolerance: float, deadline: float) ->
             first = solve(program, x)
         except ImportError:
             continue
-        if not first.status.usable and first.feasible and first.objective < motion.t_end:
+        if (
+            not first.status.usable
+            and first.feasible
+            and first.objective < motion.t_end
+        ):
             first = dataclasses.replace(first, status=SolveStatus.ACCEPTABLE)
         if first.status.usable:
-            return refine(program, first, solve, RefinementOptions(tolerance=tolerance, max_rounds=_ROUNDS))
+            return refine(
+                program,
+                first,
+                solve,
+                RefinementOptions(tolerance=tolerance, max_rounds=_ROUNDS),
+            )
     return None
 
 
 def _bounded(backend: Callable[..., SolverReport], deadline: float) -> Solve:
     def solve(program: Program, x: np.ndarray) -> SolverReport:
-        seconds = float(np.clip(deadline - time.perf_counter(), _LEAST_SECONDS, _SECONDS))
-        return backend(program, x, SolverOptions(max_iterations=_ITERATIONS, time_limit=seconds), None)
+        seconds = float(
+            np.clip(deadline - time.perf_counter(), _LEAST_SECONDS, _SECONDS)
+        )
+        return backend(
+            program,
+            x,
+            SolverOptions(max_iterations=_ITERATIONS, time_limit=seconds),
+            None,
+        )
 
     return solve
 
@@ -203,7 +256,11 @@ def _violation(answer: Refined) -> float:
     """Largest violation of a limit on a dense grid and on both sides of every knot; infinite where out of reach."""
     ((phase, x),) = answer.program.split(answer.x)
     grid = np.linspace(0.0, 1.0, _DENSE * phase.intervals + 1)
-    t_norm = np.unique(np.concatenate([grid, phase.breaks, phase.breaks[1:] - 1e-9, phase.breaks[:-1] + 1e-9]))
+    t_norm = np.unique(
+        np.concatenate(
+            [grid, phase.breaks, phase.breaks[1:] - 1e-9, phase.breaks[:-1] + 1e-9]
+        )
+    )
     try:
         return float(phase.violation_at(x, t_norm).max())
     except UnreachableError:
@@ -245,7 +302,9 @@ class KnotCost:
         return {"intervals": self.intervals, "t_end_s": self.t_end, "saved": self.saved}
 
 
-def knot_cost(trajectory: Trajectory, limits: Sequence[Limit], t_end: float) -> KnotCost | None:
+def knot_cost(
+    trajectory: Trajectory, limits: Sequence[Limit], t_end: float
+) -> KnotCost | None:
     """Compare a planned motion with the fastest timing of its own joint path.
 
     Parameters
@@ -289,7 +348,13 @@ def _times_at(trajectory: Trajectory, s: np.ndarray) -> np.ndarray:
     return high
 
 
-def _exceeds(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, rate: np.ndarray, steps: np.ndarray) -> np.ndarray:
+def _exceeds(
+    limits: Sequence[Limit],
+    s: np.ndarray,
+    q: np.ndarray,
+    rate: np.ndarray,
+    steps: np.ndarray,
+) -> np.ndarray:
     """Tell between which stations the motion in the phase plane exceeds a limit, (S - 1,)."""
     q_ds = np.gradient(q, s, axis=0, edge_order=2)
     q_dds = np.gradient(q_ds, s, axis=0, edge_order=2)
@@ -297,5 +362,7 @@ def _exceeds(limits: Sequence[Limit], s: np.ndarray, q: np.ndarray, rate: np.nda
     speed = rate[:-1, None]
     qddot = q_ds[:-1] * acceleration + q_dds[:-1] * speed**2
     moments = Moments(q[:-1], q_ds[:-1] * speed, qddot, np.zeros_like(qddot), s[:-1])
-    ratios = [np.abs(limit.ratios(moments, np.cumsum(steps))).max(axis=1) for limit in limits]
+    ratios = [
+        np.abs(limit.ratios(moments, np.cumsum(steps))).max(axis=1) for limit in limits
+    ]
     return np.max(ratios, axis=0) > 1.0 + _WITHIN

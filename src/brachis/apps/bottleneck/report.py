@@ -19,14 +19,25 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from brachis.apps.bottleneck.check import SensitivityCheck, check_sensitivities
-from brachis.apps.bottleneck.reference import KnotCost, Reference, find_reference, knot_cost
+from brachis.apps.bottleneck.reference import (
+    KnotCost,
+    Reference,
+    find_reference,
+    knot_cost,
+)
 from brachis.apps.bottleneck.saturation import THRESHOLD, Saturation, saturations
 from brachis.apps.bottleneck.sensitivities import Sensitivities, sensitivities
 from brachis.apps.bottleneck.text import in_words
 from brachis.common.deadline import Deadline
 from brachis.common.summary import LINES
 from brachis.errors import InputError, PlanningError, UnreachableError
-from brachis.kinematics import ChartMap, ChartRows, JointMap, JointSpaceMap, chart_around
+from brachis.kinematics import (
+    ChartMap,
+    ChartRows,
+    JointMap,
+    JointSpaceMap,
+    chart_around,
+)
 from brachis.limits import Role
 from brachis.optimise.backends import solver_named
 from brachis.optimise.phase import Motion
@@ -68,13 +79,17 @@ def solved_again(trajectory: Trajectory) -> Refined:
     PlanningError
         The motion is no optimum of its problem: no solver that the task allows came back to it.
     """
-    with ThreadpoolController().limit(limits=1, user_api="blas"):  # as in `plan`: batches are small
+    with ThreadpoolController().limit(
+        limits=1, user_api="blas"
+    ):  # as in `plan`: batches are small
         program, x = _problem(trajectory)
         found = list(_answers(program, x, trajectory))
     for refined in found:
         if _came_back(refined, trajectory):
             return refined
-    ends = ", ".join(f"{refined.reports[-1].solver}: {refined.t_end:.6g} s" for refined in found)
+    ends = ", ".join(
+        f"{refined.reports[-1].solver}: {refined.t_end:.6g} s" for refined in found
+    )
     raise PlanningError(
         "solving again does not come back to the saved motion, so that its multipliers are not known",
         found=ends or "no answer",
@@ -93,13 +108,19 @@ def _problem(trajectory: Trajectory) -> tuple[Program, np.ndarray]:
         problem = Problem.of(trajectory.robot, trajectory.task)
         joint_map = JointSpaceMap(problem.robot, problem.path)
     else:
-        names = tuple(name for name in trajectory.redundant_joints if name != ROLL_JOINT)
-        task = trajectory.task.model_copy(update={"redundant_joints": names, "branch": trajectory.branch})
+        names = tuple(
+            name for name in trajectory.redundant_joints if name != ROLL_JOINT
+        )
+        task = trajectory.task.model_copy(
+            update={"redundant_joints": names, "branch": trajectory.branch}
+        )
         (decomposition,) = decompositions_of(Problem.of(trajectory.robot, task))
         problem = decomposition.problem
         joint_map = decomposition.joint_map(trajectory.q[0], decomposition.branches[0])
     program = program_of(problem, joint_map, np.unique(trajectory.knots))
-    motion = Motion(trajectory.t_end, trajectory.knots, trajectory.degree, trajectory.control_points)
+    motion = Motion(
+        trajectory.t_end, trajectory.knots, trajectory.degree, trajectory.control_points
+    )
     x = program.variables_from([motion])
     for margin in MARGINS:
         program = program.with_margin(margin)
@@ -121,16 +142,26 @@ def _came_back(refined: Refined, trajectory: Trajectory) -> bool:
     return -_SAME <= slower <= trajectory.task.search.slower + _SAME
 
 
-def _answers(program: Program, x: np.ndarray, trajectory: Trajectory) -> Iterator[Refined]:
+def _answers(
+    program: Program, x: np.ndarray, trajectory: Trajectory
+) -> Iterator[Refined]:
     """Solve and refine with one backend after the other, until one comes back to the motion."""
     task = trajectory.task
     deadline, settings = Deadline.after(task.search.time_limit), task.refinement
-    options = RefinementOptions(settings.tolerance, settings.density, settings.max_rounds, deadline)
+    options = RefinementOptions(
+        settings.tolerance, settings.density, settings.max_rounds, deadline
+    )
     curved = any(limit.where == "whole" for limit in program.limits)
     for backend in solver_named(task.solver.name, curved=curved):
         if deadline.passed:
             return
-        solve = solve_with(backend, task.solver, program.phases[0].joint_map, deadline, lambda _text: None)
+        solve = solve_with(
+            backend,
+            task.solver,
+            program.phases[0].joint_map,
+            deadline,
+            lambda _text: None,
+        )
         try:
             refined = refine(program, solve(program, x), solve, options)
         except (ImportError, UnreachableError):
@@ -199,7 +230,9 @@ class BottleneckReport:
         """Return the figures as plain data for JSON."""
         return {
             "t_end_s": self.t_end,
-            "sensitivities": None if self.sensitivities is None else self.sensitivities.to_dict(),
+            "sensitivities": None
+            if self.sensitivities is None
+            else self.sensitivities.to_dict(),
             "active_from_ratio": THRESHOLD,
             "saturations": [entry.to_dict() for entry in self.saturations],
             "knots": None if self.knots is None else self.knots.to_dict(),
@@ -209,7 +242,10 @@ class BottleneckReport:
 
 
 def report(
-    motion: PlannedMotion | Trajectory | str | os.PathLike[str], *, check: bool = False, reference: bool = False
+    motion: PlannedMotion | Trajectory | str | os.PathLike[str],
+    *,
+    check: bool = False,
+    reference: bool = False,
 ) -> BottleneckReport:
     """Find out what holds a planned motion back.
 
@@ -253,11 +289,17 @@ def report(
     if isinstance(motion, Trajectory):
         trajectory, refined = motion, solved_again(motion)
     elif motion.attempt.refined is None:
-        raise InputError("the result holds no solved problem", where="result", allowed="a result of brachis.plan")
+        raise InputError(
+            "the result holds no solved problem",
+            where="result",
+            allowed="a result of brachis.plan",
+        )
     else:
         trajectory, refined = motion.trajectory, motion.attempt.refined
     found, tolerance = sensitivities(refined), trajectory.task.refinement.tolerance
-    limits = [limit for limit in refined.program.limits if limit.role is not Role.SAFEGUARD]
+    limits = [
+        limit for limit in refined.program.limits if limit.role is not Role.SAFEGUARD
+    ]
     return BottleneckReport(
         t_end=trajectory.t_end,
         sensitivities=found,

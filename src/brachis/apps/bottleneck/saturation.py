@@ -44,7 +44,9 @@ class LimitRatios(Summary):
         freeze(self, "t", "values")
 
 
-def limit_ratios(trajectory: Trajectory, limits: Sequence[Limit] | None = None) -> LimitRatios:
+def limit_ratios(
+    trajectory: Trajectory, limits: Sequence[Limit] | None = None
+) -> LimitRatios:
     """Compare a trajectory with every limit at its nodes, its knots and densely between.
 
     Parameters
@@ -63,22 +65,45 @@ def limit_ratios(trajectory: Trajectory, limits: Sequence[Limit] | None = None) 
     knots = np.unique(trajectory.knots) * trajectory.t_end
     steps = np.arange(_POINTS_PER_INTERVAL) / _POINTS_PER_INTERVAL
     grid = (knots[:-1, None] + np.diff(knots)[:, None] * steps).ravel()
-    samples = trajectory.at(np.clip(np.union1d(grid, trajectory.times), 0.0, trajectory.t_end))
-    behind = (samples.t, samples.q, samples.qdot, samples.qddot, trajectory.jerk(samples.t), samples.s)
-    before, jumps = _just_before(trajectory), np.any(trajectory.qddot_before != trajectory.qddot, axis=1)[1:]
+    samples = trajectory.at(
+        np.clip(np.union1d(grid, trajectory.times), 0.0, trajectory.t_end)
+    )
+    behind = (
+        samples.t,
+        samples.q,
+        samples.qdot,
+        samples.qddot,
+        trajectory.jerk(samples.t),
+        samples.s,
+    )
+    before, jumps = (
+        _just_before(trajectory),
+        np.any(trajectory.qddot_before != trajectory.qddot, axis=1)[1:],
+    )
     if trajectory.degree <= max(limit.order for limit in limits):
         jumps[:-1] |= np.isin(trajectory.times[1:-1], knots)
-    t, *motion = (np.concatenate([first[jumps], then]) for first, then in zip(before, behind, strict=True))
+    t, *motion = (
+        np.concatenate([first[jumps], then])
+        for first, then in zip(before, behind, strict=True)
+    )
     order = np.argsort(t, kind="stable")
     moments = Moments(*(part[order] for part in motion))
     values = [limit.ratios(moments, t[order]) for limit in limits]
-    return LimitRatios(t[order], tuple(label for limit in limits for label in limit.labels), np.hstack(values))
+    return LimitRatios(
+        t[order],
+        tuple(label for limit in limits for label in limit.labels),
+        np.hstack(values),
+    )
 
 
 def _just_before(trajectory: Trajectory) -> tuple[np.ndarray, ...]:
     """Return times, positions, three derivatives and path coordinates just before every node but the first."""
     nodes = (trajectory.times, trajectory.q, trajectory.qdot, trajectory.qddot_before)
-    return *(part[1:] for part in nodes), trajectory.jerk_pieces.c[-1], trajectory.path_spline(trajectory.times[1:])
+    return (
+        *(part[1:] for part in nodes),
+        trajectory.jerk_pieces.c[-1],
+        trajectory.path_spline(trajectory.times[1:]),
+    )
 
 
 THRESHOLD = 0.99
@@ -132,7 +157,9 @@ class Saturation(Summary):
             "kind": self.label.kind,
             "share": self.share,
             "peak_ratio": self.peak,
-            "active_s": [[stretch.begin, stretch.end, stretch.side] for stretch in self.active],
+            "active_s": [
+                [stretch.begin, stretch.end, stretch.side] for stretch in self.active
+            ],
         }
 
 
@@ -161,7 +188,9 @@ def saturations(
     tuple of Saturation
         Of all limits, those active longest first.
     """
-    return saturations_of(limit_ratios(trajectory, limits), threshold=threshold, ripple=ripple)
+    return saturations_of(
+        limit_ratios(trajectory, limits), threshold=threshold, ripple=ripple
+    )
 
 
 def saturations_of(
@@ -178,29 +207,44 @@ def saturations_of(
         active.sort(key=lambda stretch: stretch.begin)
         duration = sum(stretch.end - stretch.begin for stretch in active)
         peak = float(np.abs(column).max())
-        found.append(Saturation(label, float(duration / ratios.t[-1]), peak, tuple(active)))
+        found.append(
+            Saturation(label, float(duration / ratios.t[-1]), peak, tuple(active))
+        )
     return tuple(sorted(found, key=lambda entry: (-entry.share, -entry.peak)))
 
 
-def _stretches(t: np.ndarray, values: np.ndarray, threshold: float, ripple: float) -> list[tuple[float, float]]:
+def _stretches(
+    t: np.ndarray, values: np.ndarray, threshold: float, ripple: float
+) -> list[tuple[float, float]]:
     """Stretches of time on which values, linear between the times (K,), keep to the threshold but for ripple."""
     above = np.concatenate([[False], values >= threshold, [False]])
     edges = np.flatnonzero(np.diff(above.astype(int))).reshape(-1, 2)
     if len(edges) == 0:
         return []
-    dips = np.array([values[end:begin].min() for end, begin in zip(edges[:-1, 1], edges[1:, 0], strict=True)])
+    dips = np.array(
+        [
+            values[end:begin].min()
+            for end, begin in zip(edges[:-1, 1], edges[1:, 0], strict=True)
+        ]
+    )
     apart = dips < ripple
     firsts, afters = edges[np.append(True, apart), 0], edges[np.append(apart, True), 1]
     return [
         (
             _crossing(t, values, first - 1, threshold) if first else float(t[0]),
-            _crossing(t, values, after - 1, threshold) if after < len(t) else float(t[-1]),
+            _crossing(t, values, after - 1, threshold)
+            if after < len(t)
+            else float(t[-1]),
         )
         for first, after in zip(firsts.tolist(), afters.tolist(), strict=True)
     ]
 
 
-def _crossing(t: np.ndarray, values: np.ndarray, before: int, threshold: float) -> float:
+def _crossing(
+    t: np.ndarray, values: np.ndarray, before: int, threshold: float
+) -> float:
     """Time between two neighbours at which the line between them meets the threshold, s."""
     low, high = values[before], values[before + 1]
-    return float(t[before] + (t[before + 1] - t[before]) * (threshold - low) / (high - low))
+    return float(
+        t[before] + (t[before + 1] - t[before]) * (threshold - low) / (high - low)
+    )

@@ -52,7 +52,9 @@ _LARGEST_STEP = 1.0
 _TOUCHED = 1e-9
 
 
-def rows_and_jacobian(program: Program, x: np.ndarray) -> tuple[np.ndarray, sparse.csr_array]:
+def rows_and_jacobian(
+    program: Program, x: np.ndarray
+) -> tuple[np.ndarray, sparse.csr_array]:
     """Evaluate the rows of a program, (c,), and their Jacobian, (c, v).
 
     Raises
@@ -60,11 +62,13 @@ def rows_and_jacobian(program: Program, x: np.ndarray) -> tuple[np.ndarray, spar
     UnreachableError
         A collocation point is out of the branch's reach.
     """
-    from scipy import sparse  # noqa: PLC0415
+    from scipy import sparse
 
     places = (program.jacobian_rows, program.jacobian_columns)
     shape = (len(program.lower), len(x))
-    return program.rows(x), sparse.coo_array((program.jacobian(x), places), shape=shape).tocsr()
+    return program.rows(x), sparse.coo_array(
+        (program.jacobian(x), places), shape=shape
+    ).tocsr()
 
 
 def linearised_change(program: Program, x: np.ndarray) -> float | None:
@@ -87,17 +91,28 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
     UnreachableError
         A collocation point is out of the branch's reach.
     """
-    from scipy import sparse  # noqa: PLC0415
+    from scipy import sparse
 
     rows, jacobian = rows_and_jacobian(program, x)
     below, above = np.isfinite(program.lower), np.isfinite(program.upper)
-    slopes = sparse.vstack([-jacobian[np.flatnonzero(below)], jacobian[np.flatnonzero(above)]], format="csr")
-    room = np.concatenate([(rows - program.lower)[below], (program.upper - rows)[above]])
+    slopes = sparse.vstack(
+        [-jacobian[np.flatnonzero(below)], jacobian[np.flatnonzero(above)]],
+        format="csr",
+    )
+    room = np.concatenate(
+        [(rows - program.lower)[below], (program.upper - rows)[above]]
+    )
     lowest = np.clip(program.x_lower - x, -_LARGEST_STEP, 0.0)
     highest = np.clip(program.x_upper - x, 0.0, _LARGEST_STEP)
     kept, gradient = room < _NEAR, program.gradient(x)
     while True:
-        step = _solved(gradient, slopes[np.flatnonzero(kept)].toarray(), room[kept], lowest, highest)
+        step = _solved(
+            gradient,
+            slopes[np.flatnonzero(kept)].toarray(),
+            room[kept],
+            lowest,
+            highest,
+        )
         if step is None:
             return None
         overrun = slopes @ step > room + _TOUCHED
@@ -107,10 +122,14 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
 
 
 def _solved(
-    gradient: np.ndarray, slopes: np.ndarray, room: np.ndarray, lowest: np.ndarray, highest: np.ndarray
+    gradient: np.ndarray,
+    slopes: np.ndarray,
+    room: np.ndarray,
+    lowest: np.ndarray,
+    highest: np.ndarray,
 ) -> np.ndarray | None:
     """Solve the linear program over some of the rows; None where it has no answer."""
-    from scipy.optimize import linprog  # noqa: PLC0415
+    from scipy.optimize import linprog
 
     bounds = list(zip(lowest.tolist(), highest.tolist(), strict=True))
     found = linprog(gradient, A_ub=slopes, b_ub=room, bounds=bounds, method="highs")
@@ -156,33 +175,50 @@ class ActiveSet(Summary):
         values, jacobian = rows_and_jacobian(program, x)
         low = np.flatnonzero(values <= program.lower + near)
         high = np.flatnonzero(values >= program.upper - near)
-        rows, signs = np.concatenate([low, high]), np.repeat([1.0, -1.0], [len(low), len(high)])
+        rows, signs = (
+            np.concatenate([low, high]),
+            np.repeat([1.0, -1.0], [len(low), len(high)]),
+        )
         slopes = signs[:, None] * jacobian[rows].toarray()
-        pressing = slopes.any(axis=1)  # what holds at the given start posture holds whatever x
+        pressing = slopes.any(
+            axis=1
+        )  # what holds at the given start posture holds whatever x
         unit = np.eye(len(x))
         bounds = unit[x <= program.x_lower + near], -unit[x >= program.x_upper - near]
-        return cls(np.vstack([slopes[pressing], *bounds]), rows[pressing], signs[pressing])
+        return cls(
+            np.vstack([slopes[pressing], *bounds]), rows[pressing], signs[pressing]
+        )
 
     @property
     def dependent(self) -> bool:
         """True where several sets of multipliers may balance a gradient."""
-        return bool(np.linalg.matrix_rank(self.slopes, tol=_DEPENDENT) < len(self.slopes))
+        return bool(
+            np.linalg.matrix_rank(self.slopes, tol=_DEPENDENT) < len(self.slopes)
+        )
 
     def stationarity_residual(self, gradient: np.ndarray, weights: np.ndarray) -> float:
         """Norm of the part of a gradient, (v,), that weights, (p,), do not balance; relative to the gradient's."""
-        return float(np.linalg.norm(gradient - weights @ self.slopes) / np.linalg.norm(gradient))
+        return float(
+            np.linalg.norm(gradient - weights @ self.slopes) / np.linalg.norm(gradient)
+        )
 
     def weights_of(self, gradient: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """Weights, (p,), from a solver's multipliers of all rows, (c,); those of variables balance what they can."""
         of_rows = np.maximum(self.signs * multipliers[self.rows], 0.0)
         rest = gradient - of_rows @ self.slopes[: len(of_rows)]
-        return np.concatenate([of_rows, np.maximum(self.slopes[len(of_rows) :] @ rest, 0.0)])
+        return np.concatenate(
+            [of_rows, np.maximum(self.slopes[len(of_rows) :] @ rest, 0.0)]
+        )
 
     def fitted_weights(self, gradient: np.ndarray) -> np.ndarray:
         """Weights, (p,), that balance a gradient best: non-negative least squares (Lawson and Hanson)."""
-        from scipy.optimize import nnls  # noqa: PLC0415
+        from scipy.optimize import nnls
 
-        return np.asarray(nnls(self.slopes.T, gradient)[0]) if len(self.slopes) else np.empty(0)
+        return (
+            np.asarray(nnls(self.slopes.T, gradient)[0])
+            if len(self.slopes)
+            else np.empty(0)
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -229,19 +265,29 @@ class Multipliers(Summary):
         active = self.weights[: len(rates)]
         if self.unique or not (rates @ active):
             return -float(rates @ active)
-        return -self._least(np.concatenate([rates, np.zeros(len(self.weights) - len(rates))]))
+        return -self._least(
+            np.concatenate([rates, np.zeros(len(self.weights) - len(rates))])
+        )
 
     def _least(self, rates: np.ndarray) -> float:
         """Least of ``rates @ w`` over all weights that balance as much as `weights` do."""
-        from scipy.optimize import linprog  # noqa: PLC0415
+        from scipy.optimize import linprog
 
         slopes = self.active_set.slopes
-        found = linprog(rates, A_eq=slopes.T, b_eq=self.weights @ slopes, bounds=(0.0, None), method="highs")
+        found = linprog(
+            rates,
+            A_eq=slopes.T,
+            b_eq=self.weights @ slopes,
+            bounds=(0.0, None),
+            method="highs",
+        )
         best = self.weights if found.x is None else found.x
         return float(rates @ best)
 
 
-def multipliers_of(program: Program, x: np.ndarray, given: np.ndarray | None = None) -> Multipliers:
+def multipliers_of(
+    program: Program, x: np.ndarray, given: np.ndarray | None = None
+) -> Multipliers:
     """Find the multipliers at an answer.
 
     Parameters
@@ -262,20 +308,34 @@ def multipliers_of(program: Program, x: np.ndarray, given: np.ndarray | None = N
     """
     tried: list[Multipliers] = []
     for near in ACTIVE:
-        tried.append(_balancing(ActiveSet.at(program, x, near), program.gradient(x), given))
+        tried.append(
+            _balancing(ActiveSet.at(program, x, near), program.gradient(x), given)
+        )
         if tried[-1].residual <= _GOOD:
             break
     return min(tried, key=lambda multipliers: multipliers.residual)
 
 
-def _balancing(active_set: ActiveSet, gradient: np.ndarray, given: np.ndarray | None) -> Multipliers:
+def _balancing(
+    active_set: ActiveSet, gradient: np.ndarray, given: np.ndarray | None
+) -> Multipliers:
     """Choose the weights of active_set that balance a gradient, (v,), best."""
-    candidates = [] if given is None else [("solver", active_set.weights_of(gradient, given))]
-    if not candidates or active_set.stationarity_residual(gradient, candidates[0][1]) > _GOOD:
+    candidates = (
+        [] if given is None else [("solver", active_set.weights_of(gradient, given))]
+    )
+    if (
+        not candidates
+        or active_set.stationarity_residual(gradient, candidates[0][1]) > _GOOD
+    ):
         candidates.append(("least squares", active_set.fitted_weights(gradient)))
-    source, weights = min(candidates, key=lambda candidate: active_set.stationarity_residual(gradient, candidate[1]))
+    source, weights = min(
+        candidates,
+        key=lambda candidate: active_set.stationarity_residual(gradient, candidate[1]),
+    )
     residual = active_set.stationarity_residual(gradient, weights)
-    return Multipliers(active_set, weights, source, residual, unique=not active_set.dependent)
+    return Multipliers(
+        active_set, weights, source, residual, unique=not active_set.dependent
+    )
 
 
 def multipliers_of_answer(refined: Refined) -> Multipliers:
@@ -354,7 +414,11 @@ class BranchBoundary:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
-        return {"label": self.label, "margin": self.margin, "derivative_s": self.derivative}
+        return {
+            "label": self.label,
+            "margin": self.margin,
+            "derivative_s": self.derivative,
+        }
 
 
 @dataclass(frozen=True, repr=False)
@@ -389,7 +453,11 @@ class Sensitivities(Summary):
     def of(self, subject: str, kind: str, end: str | None = None) -> Sensitivity:
         """Sensitivity to one figure, such as ``of("j1", "torque")``; KeyError where there is none."""
         for entry in self.limits:
-            if (entry.label.subject, entry.label.kind, entry.bound.end) == (subject, kind, end):
+            if (entry.label.subject, entry.label.kind, entry.bound.end) == (
+                subject,
+                kind,
+                end,
+            ):
                 return entry
         raise KeyError((subject, kind, end))
 
@@ -433,12 +501,24 @@ def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivitie
             if limit.role is not Role.SAFEGUARD:
                 found.append(_sensitivity(limit, bound, rates, multipliers))
             elif (slope := -multipliers.change(rates)) > _SMALLEST:
-                boundaries.append(BranchBoundary(limit.labels[bound.column].subject, bound.figure, slope))
+                boundaries.append(
+                    BranchBoundary(
+                        limit.labels[bound.column].subject, bound.figure, slope
+                    )
+                )
     found.sort(key=lambda entry: entry.change(1.0))
-    return Sensitivities(tuple(found), tuple(boundaries), multipliers.source, multipliers.residual, multipliers.unique)
+    return Sensitivities(
+        tuple(found),
+        tuple(boundaries),
+        multipliers.source,
+        multipliers.residual,
+        multipliers.unique,
+    )
 
 
-def _sensitivity(limit: Limit, bound: Bound, rates: np.ndarray, multipliers: Multipliers) -> Sensitivity:
+def _sensitivity(
+    limit: Limit, bound: Bound, rates: np.ndarray, multipliers: Multipliers
+) -> Sensitivity:
     """Sensitivity to a figure that moves the bounds of the rows outwards at `rates`, (c,)."""
     if bound.end is None:
         return Sensitivity(limit, bound, multipliers.change(rates))

@@ -7,7 +7,11 @@ import math
 from brachis.apps.bottleneck.check import CheckedSensitivity, SensitivityCheck
 from brachis.apps.bottleneck.reference import MEANING, KnotCost, Reference
 from brachis.apps.bottleneck.saturation import RIPPLE, THRESHOLD, Saturation
-from brachis.apps.bottleneck.sensitivities import BranchBoundary, Sensitivities, Sensitivity
+from brachis.apps.bottleneck.sensitivities import (
+    BranchBoundary,
+    Sensitivities,
+    Sensitivity,
+)
 from brachis.errors import write_count
 from brachis.robot.joints import shown_unit
 
@@ -34,8 +38,16 @@ def in_words(
 ) -> list[str]:
     """Say what a report found, a line each; see `BottleneckReport` for its parts."""
     lines = [
-        *(["the motion was not planned: what a limit costs is not known"] if sensitivities is None else []),
-        *([] if sensitivities is None else _costs(sensitivities, t_end, degrees=degrees)),
+        *(
+            ["the motion was not planned: what a limit costs is not known"]
+            if sensitivities is None
+            else []
+        ),
+        *(
+            []
+            if sensitivities is None
+            else _costs(sensitivities, t_end, degrees=degrees)
+        ),
         *([] if knots is None else _knots(knots, t_end)),
         *([] if check is None else _checked(check)),
         *active_in_words(saturations),
@@ -60,12 +72,20 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
             f"beware: the multipliers leave {100.0 * found.residual:.2g} % of the gradient of t_E unbalanced, so the "
             "motion is not an optimum, and the savings below are rough"
         )
-    costly = [entry for entry in found.limits if -entry.change(_FRACTION) > _NOTHING * t_end]
+    costly = [
+        entry for entry in found.limits if -entry.change(_FRACTION) > _NOTHING * t_end
+    ]
     lines += [_saving(entry, t_end, degrees=degrees) for entry in costly]
     if len(costly) < len(found.limits):
         lines.append("no other limit costs time" if costly else "no limit costs time")
-    lines.append(f"(to first order, from multipliers by the {found.source}, residual {found.residual:.0e})")
-    return lines + [_boundary(e) for e in found.boundaries if e.derivative * e.margin > _NOTHING * t_end]
+    lines.append(
+        f"(to first order, from multipliers by the {found.source}, residual {found.residual:.0e})"
+    )
+    return lines + [
+        _boundary(e)
+        for e in found.boundaries
+        if e.derivative * e.margin > _NOTHING * t_end
+    ]
 
 
 def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:
@@ -77,20 +97,32 @@ def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:
     if label.room:
         more = f"{amount} more {label.room}"
     elif end is None:
-        more = f"{100.0 * _FRACTION:.0f} % more {label.kind} at {label.subject} ({amount})"
+        more = (
+            f"{100.0 * _FRACTION:.0f} % more {label.kind} at {label.subject} ({amount})"
+        )
     else:
         more = f"{amount} more room at the {end} end of {label}"
-    return f"{more} saves {_figures(100.0 * saved / t_end)} % ({_figures(1e3 * saved)} ms)"
+    return (
+        f"{more} saves {_figures(100.0 * saved / t_end)} % ({_figures(1e3 * saved)} ms)"
+    )
 
 
 def _knots(found: KnotCost, t_end: float) -> list[str]:
     """Say what the knots cost, if it is worth a line."""
     if found.saved < _KNOTS:
         return []
-    saved = f"{_figures(100.0 * found.saved)} % ({_figures(1e3 * found.saved * t_end)} ms)"
-    hint = "; spline.intervals: auto, or more of them, come nearer to that" if found.given else ""
+    saved = (
+        f"{_figures(100.0 * found.saved)} % ({_figures(1e3 * found.saved * t_end)} ms)"
+    )
+    hint = (
+        "; spline.intervals: auto, or more of them, come nearer to that"
+        if found.given
+        else ""
+    )
     again = f"timed anew in the phase plane, where torques jump, the same joint path takes {found.t_end:.4g} s"
-    return [f"the knots cost about {saved} with {write_count(found.intervals, 'interval')}: {again}{hint}"]
+    return [
+        f"the knots cost about {saved} with {write_count(found.intervals, 'interval')}: {again}{hint}"
+    ]
 
 
 def _boundary(entry: BranchBoundary) -> str:
@@ -108,7 +140,9 @@ def _checked(check: SensitivityCheck) -> list[str]:
     for entry in check.entries:
         if not entry.predicted:
             continue
-        what = " ".join(filter(None, (str(entry.sensitivity.label), entry.sensitivity.bound.end)))
+        what = " ".join(
+            filter(None, (str(entry.sensitivity.label), entry.sensitivity.bound.end))
+        )
         line = (
             f"checked, {what} +{percent}: predicted {1e3 * entry.predicted:+.4f} ms, solved again "
             f"{1e3 * entry.re_solved:+.4f} ms, off by {100.0 * entry.deviation:.2g} %"
@@ -117,15 +151,25 @@ def _checked(check: SensitivityCheck) -> list[str]:
         if entry.other_optimum:
             line += f"; from another local optimum, {1e3 * abs(entry.other_optimum):.2g} ms "
             line += "faster" if entry.other_optimum < 0.0 else "slower"
-        lines.append(line if entry.optimal else f"{line} (solved again without reaching an optimum)")
+        lines.append(
+            line
+            if entry.optimal
+            else f"{line} (solved again without reaching an optimum)"
+        )
     if not check.larger():
         return [*lines, "checked: no change is larger than 0.1 ms"]
     if all(not entry.optimal for entry in check.larger()):
-        return [*lines, "checked: no solver brought the changes that are larger than 0.1 ms to an optimum"]
+        return [
+            *lines,
+            "checked: no solver brought the changes that are larger than 0.1 ms to an optimum",
+        ]
     worst = f"{100.0 * check.worst_deviation():.2g} %"
     lost = sum(not entry.optimal for entry in check.larger())
     but = f", but for {lost} that no solver brought to an optimum" if lost else ""
-    return [*lines, f"checked: changes larger than 0.1 ms are predicted to within {worst}{but}"]
+    return [
+        *lines,
+        f"checked: changes larger than 0.1 ms are predicted to within {worst}{but}",
+    ]
 
 
 def _taken_back(entry: CheckedSensitivity) -> str:
@@ -140,9 +184,16 @@ def active_in_words(found: tuple[Saturation, ...]) -> list[str]:
     lines = []
     for entry in found:
         if entry.share >= _MOMENT:
-            times = "once" if len(entry.active) == 1 else f"in {len(entry.active)} stretches"
+            times = (
+                "once"
+                if len(entry.active) == 1
+                else f"in {len(entry.active)} stretches"
+            )
             share = f"{100.0 * entry.share:.1f} % of the time"
-            reached = entry.label.reached or f"{entry.label.subject} is at its {entry.label.kind} limit"
+            reached = (
+                entry.label.reached
+                or f"{entry.label.subject} is at its {entry.label.kind} limit"
+            )
             lines.append(f"{reached} for {share}, {times}")
     if not lines:
         lines = ["nothing stays at a limit"]
@@ -153,7 +204,9 @@ def active_in_words(found: tuple[Saturation, ...]) -> list[str]:
 
 
 def _reference(reference: Reference, t_end: float) -> str:
-    longer = f"{100.0 * reference.distance:.2f} % ({1e3 * (t_end - reference.t_end):.1f} ms)"
+    longer = (
+        f"{100.0 * reference.distance:.2f} % ({1e3 * (t_end - reference.t_end):.1f} ms)"
+    )
     return (
         f"reference {reference.t_end:.4f} s ({MEANING}; degree {reference.degree}, {reference.intervals} intervals): "
         f"the motion takes {longer} longer"

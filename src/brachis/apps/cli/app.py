@@ -52,11 +52,22 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "import": ("brachis import out/motion.csv --robot task.yaml --out out/today.npz",),
     "compare": ("brachis compare out/motion.csv --robot task.yaml",),
     "plot": ("brachis plot out/result.npz --kind torques --out out/torques.svg",),
-    "report": ("brachis report out/result.npz", "brachis report out/result.npz --title 'cell 3' --out out/cell3.html"),
+    "report": (
+        "brachis report out/result.npz",
+        "brachis report out/result.npz --title 'cell 3' --out out/cell3.html",
+    ),
     "view": ("brachis view out", "brachis view out/result.npz --port 0 --no-browser"),
-    "inspect": ("brachis inspect task.yaml", "brachis inspect tx90l_rail --task-space pose"),
-    "compose": ("brachis compose iiwa14 --range -2 2 --velocity 2 --force 1500 --mass 50 --out cell.urdf",),
-    "schema": ("brachis schema --out task.schema.json", "brachis schema --of trajectory"),
+    "inspect": (
+        "brachis inspect task.yaml",
+        "brachis inspect tx90l_rail --task-space pose",
+    ),
+    "compose": (
+        "brachis compose iiwa14 --range -2 2 --velocity 2 --force 1500 --mass 50 --out cell.urdf",
+    ),
+    "schema": (
+        "brachis schema --out task.schema.json",
+        "brachis schema --of trajectory",
+    ),
     "sweep": (
         "brachis sweep lines.yaml --jobs 2",
         "brachis sweep lines.yaml --retry  # goes on where it was ended",
@@ -106,9 +117,11 @@ class _Commands(TyperGroup):
                 return super().invoke(ctx)
         except KeyboardInterrupt as interrupt:
             told = str(interrupt)
-            raise InterruptedByUserError(f"interrupted; {told}" if told else "interrupted") from interrupt
+            raise InterruptedByUserError(
+                f"interrupted; {told}" if told else "interrupted"
+            ) from interrupt
 
-    def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:  # type: ignore[override]  # noqa: ANN401  (Typer's own classes have moved)
+    def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:  # type: ignore[override]
         """Find a command, and give it what all of them have."""
         command = super().get_command(ctx, cmd_name)
         if command is not None and command.epilog is None:
@@ -116,7 +129,7 @@ class _Commands(TyperGroup):
             command.params += [each for each in self.params if each.name in _OF_ALL]
         return command
 
-    def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override]  # noqa: ANN401
+    def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override]
         """Find the command that is named; a file is none."""
         if self.get_command(ctx, args[0]) is None and is_file(args[0]):
             command = "inspect" if Path(args[0]).suffix == ".urdf" else "plan"
@@ -136,25 +149,27 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog=_paragraphs("Examples", EXAMPLES[""]) + "\n\n" + _paragraphs("Exit codes", EXIT_CODES),
+    epilog=_paragraphs("Examples", EXAMPLES[""])
+    + "\n\n"
+    + _paragraphs("Exit codes", EXIT_CODES),
 )
 
 
-def _print_version(asked: bool) -> None:  # noqa: FBT001  (Typer calls it so)
+def _print_version(asked: bool) -> None:
     """Print the version and stop, where asked."""
     if asked:
-        import brachis  # noqa: PLC0415
+        import brachis
 
         typer.echo(f"brachis {brachis.__version__}")
         raise typer.Exit
 
 
-def _be_quiet(asked: bool) -> None:  # noqa: FBT001
+def _be_quiet(asked: bool) -> None:
     if asked:
         choose(Verbosity.QUIET)
 
 
-def _be_verbose(asked: bool) -> None:  # noqa: FBT001
+def _be_verbose(asked: bool) -> None:
     if asked:
         choose(Verbosity.VERBOSE)
 
@@ -162,12 +177,22 @@ def _be_verbose(asked: bool) -> None:  # noqa: FBT001
 @app.callback()
 def options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+        bool,
+        typer.Option(
+            "--version",
+            callback=_print_version,
+            is_eager=True,
+            help="Print the version.",
+        ),
     ] = False,
     quiet: Annotated[
         bool,
         typer.Option(
-            "--quiet", "-q", callback=_be_quiet, expose_value=False, help="Print errors only, and JSON if asked for."
+            "--quiet",
+            "-q",
+            callback=_be_quiet,
+            expose_value=False,
+            help="Print errors only, and JSON if asked for.",
         ),
     ] = False,
     verbose: Annotated[
@@ -202,9 +227,17 @@ Changes = Annotated[
         "Repeatable.",
     ),
 ]
-Degrees = Annotated[bool, typer.Option("--degrees", help="Show angles in degrees; files and JSON stay in rad.")]
+Degrees = Annotated[
+    bool,
+    typer.Option(
+        "--degrees", help="Show angles in degrees; files and JSON stay in rad."
+    ),
+]
 
 
 def with_strict(changes: list[str] | None, *, strict: bool | None) -> list[str]:
     """Add what ``--strict`` or ``--no-strict`` says to the changes of a task."""
-    return [*(changes or []), *([] if strict is None else [f"strict={str(strict).lower()}"])]
+    return [
+        *(changes or []),
+        *([] if strict is None else [f"strict={str(strict).lower()}"]),
+    ]

@@ -12,7 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
-from brachis.common.files import atomic_write, is_folder, status_of, temporary_in, writing_errors
+from brachis.common.files import (
+    atomic_write,
+    is_folder,
+    status_of,
+    temporary_in,
+    writing_errors,
+)
 from brachis.errors import InputError
 
 Writer = Callable[[Path], object]
@@ -54,7 +60,9 @@ class Written:
     failures: tuple[InputError, ...]
 
 
-def check_output(out: Path, suffixes: Iterable[str], inputs: Iterable[Path | None]) -> None:
+def check_output(
+    out: Path, suffixes: Iterable[str], inputs: Iterable[Path | None]
+) -> None:
     """Refuse to write over one of the command's inputs, or over a file that is not of the kind that it writes.
 
     Parameters
@@ -78,7 +86,10 @@ def check_output(out: Path, suffixes: Iterable[str], inputs: Iterable[Path | Non
     for path in inputs:
         if path is not None and _same(out, path):
             raise InputError(
-                "would be written over an input", where=str(out), found="the same file", allowed="another file name"
+                "would be written over an input",
+                where=str(out),
+                found="the same file",
+                allowed="another file name",
             )
     suffix, allowed = out.suffix.lower(), tuple(suffixes)
     if suffix not in allowed:
@@ -119,14 +130,20 @@ def make_folder(out: Path, names: Iterable[str], inputs: Iterable[Path | None]) 
         out.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
         found = getattr(error, "strerror", None) or str(error)
-        raise InputError("the folder cannot be made", where=str(out), found=found) from error
+        raise InputError(
+            "the folder cannot be made", where=str(out), found=found
+        ) from error
     inputs = tuple(inputs)
     for name in names:
         check_output(out / name, (Path(name).suffix,), inputs)
 
 
 def write_files(
-    out: Path, results: Mapping[str, Writer], figures: Mapping[str, Writer], *, stale: Iterable[str] = ()
+    out: Path,
+    results: Mapping[str, Writer],
+    figures: Mapping[str, Writer],
+    *,
+    stale: Iterable[str] = (),
 ) -> Written:
     """Write results, all or none, and then the figures that can be written.
 
@@ -153,7 +170,11 @@ def write_files(
     """
     for name in (*results, *figures):
         if is_folder(out / name):
-            raise InputError("cannot be written", where=str(out / name), found="a folder of this name")
+            raise InputError(
+                "cannot be written",
+                where=str(out / name),
+                found="a folder of this name",
+            )
     with ended_cleanly():
         _write_results(out, results, (*stale, *figures))
         failures = []
@@ -167,7 +188,9 @@ def write_files(
     return Written(tuple(path for path in paths if path not in failed), tuple(failures))
 
 
-def _write_results(out: Path, results: Mapping[str, Writer], others: Iterable[str]) -> None:
+def _write_results(
+    out: Path, results: Mapping[str, Writer], others: Iterable[str]
+) -> None:
     """Write files aside, remove `others`, and move the new files to their places."""
     temporary = temporary_in(out)
     with writing_errors(out):
@@ -177,7 +200,9 @@ def _write_results(out: Path, results: Mapping[str, Writer], others: Iterable[st
             try:
                 write(temporary / name)
             except InputError as error:  # it names the temporary file
-                raise InputError(error.problem, where=str(out / name), found=error.found) from error
+                raise InputError(
+                    error.problem, where=str(out / name), found=error.found
+                ) from error
         for name in others:
             with writing_errors(out / name):
                 (out / name).unlink(missing_ok=True)
@@ -188,7 +213,12 @@ def _write_results(out: Path, results: Mapping[str, Writer], others: Iterable[st
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def write_one(out: Path, write: Writer, suffixes: Iterable[str], inputs: Iterable[Path | None] = ()) -> None:
+def write_one(
+    out: Path,
+    write: Writer,
+    suffixes: Iterable[str],
+    inputs: Iterable[Path | None] = (),
+) -> None:
     """Write one file, unless it would take the place of what `check_output` protects."""
     check_output(out, suffixes, inputs)
     with ended_cleanly():

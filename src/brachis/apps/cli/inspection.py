@@ -44,20 +44,34 @@ def joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
     """
     geometry, limits = ik.ChainGeometry.of(robot), robot.limits
     rows = []
-    for i, (name, unit) in enumerate(zip(robot.joint_names, robot.position_units, strict=True)):
+    for i, (name, unit) in enumerate(
+        zip(robot.joint_names, robot.position_units, strict=True)
+    ):
         friction = {key: getattr(robot.friction, key)[i] for key in _FRICTION}
         rows.append(
             {
                 "joint": name,
                 "type": "revolute" if geometry.revolute[i] else "prismatic",
-                "axis at zero": " ".join(f"{round(component, 6) + 0.0:.4g}" for component in geometry.axes[i]),
-                "range": _range(limits.position_lower[i], limits.position_upper[i], unit, degrees=degrees),
+                "axis at zero": " ".join(
+                    f"{round(component, 6) + 0.0:.4g}" for component in geometry.axes[i]
+                ),
+                "range": _range(
+                    limits.position_lower[i],
+                    limits.position_upper[i],
+                    unit,
+                    degrees=degrees,
+                ),
                 **{
-                    kind.replace("_", " "): _limit(limits.both_ways(kind)[:, i], UNITS[kind][unit], degrees=degrees)
+                    kind.replace("_", " "): _limit(
+                        limits.both_ways(kind)[:, i], UNITS[kind][unit], degrees=degrees
+                    )
                     for kind in MAGNITUDES
                 },
                 "mass": f"{robot.model.inertias[i + 1].mass:.4g} kg",
-                **{key: f"{value:.4g} {UNITS[key][unit]}" if value else NONE for key, value in friction.items()},
+                **{
+                    key: f"{value:.4g} {UNITS[key][unit]}" if value else NONE
+                    for key, value in friction.items()
+                },
             }
         )
     return rows
@@ -76,7 +90,11 @@ def _limit(pair: np.ndarray, unit: str, *, degrees: bool) -> str:
     lower, upper = factor * pair
     if np.isinf(upper):
         return NONE
-    return f"{upper:.4g} {unit}" if -lower == upper else f"{lower:.4g} to {upper:.4g} {unit}"
+    return (
+        f"{upper:.4g} {unit}"
+        if -lower == upper
+        else f"{lower:.4g} to {upper:.4g} {unit}"
+    )
 
 
 def print_points(console: Console, task: Task) -> None:
@@ -98,15 +116,26 @@ def _rows(fit: FitReport) -> list[tuple[str, str]]:
         ("knot intervals", str(fit.intervals)),
         *passes,
         ("position error", f"at most {1e3 * fit.position_error:.4g} mm {position}"),
-        ("orientation error", f"at most {degrees(fit.orientation_error):.3g} deg {orientation}"),
+        (
+            "orientation error",
+            f"at most {degrees(fit.orientation_error):.3g} deg {orientation}",
+        ),
         *(("found", told) for told in (*fit.told, *([fit.doubt] if fit.doubt else []))),
     ]
 
 
 def _print_corners(console: Console, fit: FitReport) -> None:
-    columns = [Column(name, number=True) for name in ("row", "angle [deg]", "at [mm]", "blend [mm]")]
+    columns = [
+        Column(name, number=True)
+        for name in ("row", "angle [deg]", "at [mm]", "blend [mm]")
+    ]
     rows = [
-        (corner.row, f"{degrees(corner.angle):.4g}", f"{1e3 * corner.distance:.6g}", f"{1e3 * corner.blend:.4g}")
+        (
+            corner.row,
+            f"{degrees(corner.angle):.4g}",
+            f"{1e3 * corner.distance:.6g}",
+            f"{1e3 * corner.blend:.4g}",
+        )
         for corner in fit.corners
     ]
     print_table(console, "corners, blended within the tolerance", columns, rows)
@@ -138,14 +167,19 @@ def inspect_command(
     remarks: list[str] = []
     if source.suffix in TASK_SUFFIXES or kind_of(source) is Kind.TASK:
         given = {"--tool-frame": tool_frame, "--base-frame": base_frame, "--lock": lock}
-        task = _task_of(source, changes, [option for option, value in given.items() if value])
+        task = _task_of(
+            source, changes, [option for option, value in given.items() if value]
+        )
         robot = robot_from_settings(task.robot)
     else:
         task, source = None, urdf_of(source)
         base_frame, tool_frame = _frames(source, base_frame, tool_frame, remarks)
         robot = _of_urdf(source, tool_frame, base_frame, lock)
     asked: str | Sequence[str] | None = None if task is None else task.task_space
-    robot, rows = bind(robot, task_space_of(task_space) if task_space else asked or _natural(robot, remarks))
+    robot, rows = bind(
+        robot,
+        task_space_of(task_space) if task_space else asked or _natural(robot, remarks),
+    )
     remarks += [f"warning: {remark}" for remark in of_robot(robot)]
     candidates = ik.find_all(robot, rows)
     remarks += _remarks_on_closed_forms(candidates)
@@ -189,20 +223,28 @@ class _Inspected:
     def show(self, console: Console, *, degrees: bool) -> None:
         """Print all for a person."""
         robot, joints = self.robot, joint_rows(self.robot, degrees=degrees)
-        console.print(f"{self.source}: {robot.base_frame} -> {robot.tool_frame}, {write_count(robot.n, 'joint')}")
+        console.print(
+            f"{self.source}: {robot.base_frame} -> {robot.tool_frame}, {write_count(robot.n, 'joint')}"
+        )
         for remark in self.remarks:
             console.print(remark)
         shown = [key for key in joints[0] if any(row[key] != NONE for row in joints)]
         columns = [Column(key, number=key not in WORDS) for key in shown]
-        print_table(console, "joints", columns, [[row[key] for key in shown] for row in joints])
+        print_table(
+            console, "joints", columns, [[row[key] for key in shown] for row in joints]
+        )
         for name, text in in_use(robot).items():
             console.print(f"{name}: {text}")
         if self.task:
             print_points(console, self.task)
         r = robot.n - self.rows.m
-        console.print(f"task space [{', '.join(self.rows.rows)}]: degree of redundancy {r}")
+        console.print(
+            f"task space [{', '.join(self.rows.rows)}]: degree of redundancy {r}"
+        )
         if r < 0:
-            console.print("The robot has fewer joints than the task space has rows; prescribe fewer rows.")
+            console.print(
+                "The robot has fewer joints than the task space has rows; prescribe fewer rows."
+            )
             return
         _print_decompositions(console, self.decompositions)
 
@@ -211,16 +253,24 @@ def _task_of(path: Path, changes: Sequence[str], options: Sequence[str]) -> Task
     """Read a task file, beside which no options are given."""
     if options:
         hint = "Leave the option away, or inspect the URDF"
-        raise InputError("is for URDFs; a task says it itself", where=options[0], hint=hint)
+        raise InputError(
+            "is for URDFs; a task says it itself", where=options[0], hint=hint
+        )
     return changed_task(path, changes)
 
 
-def _of_urdf(path: Path, tool_frame: str, base_frame: str | None, lock: list[str]) -> Robot:
+def _of_urdf(
+    path: Path, tool_frame: str, base_frame: str | None, lock: list[str]
+) -> Robot:
     """Make the robot of a URDF with the limits that the file states, which need not be usable ones."""
     # Which limits are missing is for the plan to say; here any robot is shown.
     unlimited = LimitSpec(torque=None, velocity=None, acceleration=1.0)
     robot = Robot.from_urdf(
-        path, tool_frame=tool_frame, base_frame=base_frame, locked_joints=_locks(lock), limits=unlimited
+        path,
+        tool_frame=tool_frame,
+        base_frame=base_frame,
+        locked_joints=_locks(lock),
+        limits=unlimited,
     )
     stated = {
         kind: np.array([np.inf if value is None else value for value in values])
@@ -229,16 +279,25 @@ def _of_urdf(path: Path, tool_frame: str, base_frame: str | None, lock: list[str
             ("torque", [limit.effort for limit in robot.stated_limits]),
         )
     }
-    return replace(robot, limits=robot.limits.with_magnitudes(acceleration=np.full(robot.n, np.inf), **stated))
+    return replace(
+        robot,
+        limits=robot.limits.with_magnitudes(
+            acceleration=np.full(robot.n, np.inf), **stated
+        ),
+    )
 
 
-def _frames(urdf: Path, base: str | None, tool: str | None, remarks: list[str]) -> tuple[str | None, str]:
+def _frames(
+    urdf: Path, base: str | None, tool: str | None, remarks: list[str]
+) -> tuple[str | None, str]:
     """Take the first limb of the URDF where base and tool frame are not given, and say so where there is a choice."""
     if tool is not None:
         return base, tool
     limb = first_limb(read_file(urdf), str(urdf))
     if limb.base and base is None:
-        remarks.append(f"base frame: {limb.base}, from which several limbs part; --base-frame names another one")
+        remarks.append(
+            f"base frame: {limb.base}, from which several limbs part; --base-frame names another one"
+        )
     if len(limb.leaves) > 1:
         remarks.append(
             f"tool frame: {limb.tool}, the last link before the chains to {', '.join(limb.leaves)} part; "
@@ -264,7 +323,12 @@ def _locks(lock: list[str]) -> dict[str, float]:
         try:
             locked[name] = float(value)
         except ValueError as error:
-            raise InputError("is not understood", where="--lock", found=text, allowed="name=value, rad or m") from error
+            raise InputError(
+                "is not understood",
+                where="--lock",
+                found=text,
+                allowed="name=value, rad or m",
+            ) from error
     return locked
 
 
@@ -280,8 +344,15 @@ def _decompositions(candidates: Sequence[ik.Candidate]) -> list[dict[str, Any]]:
     rows = []
     for candidate in candidates:
         solver = candidate.solver
-        told = {family: reason for family, reason in candidate.reasons.items() if reason not in _OTHER_TASKS}
-        why = "; ".join(f"{family}: {reason}" for family, reason in (told or candidate.reasons).items())
+        told = {
+            family: reason
+            for family, reason in candidate.reasons.items()
+            if reason not in _OTHER_TASKS
+        }
+        why = "; ".join(
+            f"{family}: {reason}"
+            for family, reason in (told or candidate.reasons).items()
+        )
         rows.append(
             {
                 "redundant joints": ", ".join(candidate.redundant_joints) or "none",
@@ -314,14 +385,21 @@ def _print_decompositions(console: Console, rows: list[dict[str, Any]]) -> None:
     ]
     if solved:
         print_table(
-            console, "choices of redundant joints", columns, [[row[name] for name in columns] for row in solved]
+            console,
+            "choices of redundant joints",
+            columns,
+            [[row[name] for name in columns] for row in solved],
         )
     for labels in dict.fromkeys(row["labels"] for row in solved):
-        choices = "; ".join(row["redundant joints"] for row in solved if row["labels"] == labels)
+        choices = "; ".join(
+            row["redundant joints"] for row in solved if row["labels"] == labels
+        )
         console.print(f"branches with {choices} redundant: {labels}")
     refused = [row for row in rows if row["solver"] == "-"]
     if refused:
-        console.print(f"no closed form with these redundant ({len(refused)} of {write_count(len(rows), 'choice')}):")
+        console.print(
+            f"no closed form with these redundant ({len(refused)} of {write_count(len(rows), 'choice')}):"
+        )
     for row in refused[:_LISTED]:
         console.print(f"  {row['redundant joints']}: {row['why not']}")
     if len(refused) > _LISTED:
@@ -333,7 +411,12 @@ def _tool_pose(robot: Robot, text: str) -> str:
     try:
         values = [float(word) for word in text.replace(",", " ").split()]
     except ValueError as error:
-        raise InputError("is not understood", where="--posture", found=text, allowed="numbers, rad or m") from error
+        raise InputError(
+            "is not understood",
+            where="--posture",
+            found=text,
+            allowed="numbers, rad or m",
+        ) from error
     placement = robot.tool_placement(robot.posture(values, "--posture"))
     x, y, z, qx, qy, qz, qw = pin.SE3ToXYZQUAT(placement)
     position = ", ".join(f"{value:.9g}" for value in (x, y, z))

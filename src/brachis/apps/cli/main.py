@@ -18,9 +18,30 @@ import typer
 
 from brachis.apps.cli.app import Verbosity, app, chosen
 from brachis.apps.cli.composition import VectorCommand, compose
-from brachis.apps.cli.motion_commands import bottleneck, compare, export, import_, plot, report, verify, view
-from brachis.apps.cli.output import StandardOutput, open_streams, print_failure, print_usage_error
-from brachis.apps.cli.task_commands import inspect, list_robots, new, plan, schema, sweep
+from brachis.apps.cli.motion_commands import (
+    bottleneck,
+    compare,
+    export,
+    import_,
+    plot,
+    report,
+    verify,
+    view,
+)
+from brachis.apps.cli.output import (
+    StandardOutput,
+    open_streams,
+    print_failure,
+    print_usage_error,
+)
+from brachis.apps.cli.task_commands import (
+    inspect,
+    list_robots,
+    new,
+    plan,
+    schema,
+    sweep,
+)
 from brachis.errors import BrachisError
 
 _UsageError = cast("type[Exception]", typer.BadParameter.__bases__[0])
@@ -54,7 +75,9 @@ def main() -> None:
     open_streams()
     output = StandardOutput(sys.stdout)
     with redirect_stdout(cast(TextIO, output)):
-        code = copy_context().run(partial(_run, output, as_json="--json" in sys.argv[1:]))
+        code = copy_context().run(
+            partial(_run, output, as_json="--json" in sys.argv[1:])
+        )
     sys.exit(code if output.finish() else 1)
 
 

@@ -15,16 +15,30 @@ from brachis.apps.cli.output import Json
 from brachis.common import interrupts
 
 ResultFile = Annotated[
-    Path, typer.Argument(help="Result file (npz) written by 'brachis plan --out'.", metavar="RESULT")
+    Path,
+    typer.Argument(
+        help="Result file (npz) written by 'brachis plan --out'.", metavar="RESULT"
+    ),
 ]
 Host = Annotated[
-    str, typer.Option(help="Address that the viewer listens on; 0.0.0.0 lets other machines look.", metavar="ADDRESS")
+    str,
+    typer.Option(
+        help="Address that the viewer listens on; 0.0.0.0 lets other machines look.",
+        metavar="ADDRESS",
+    ),
 ]
 Port = Annotated[
-    int | None, typer.Option(help="Port of the viewer; 0 for any free one. Default: the first free one from 8080 on.")
+    int | None,
+    typer.Option(
+        help="Port of the viewer; 0 for any free one. Default: the first free one from 8080 on."
+    ),
 ]
 Browser = Annotated[
-    bool, typer.Option("--browser/--no-browser", help="Open the browser, where there is a screen and a terminal.")
+    bool,
+    typer.Option(
+        "--browser/--no-browser",
+        help="Open the browser, where there is a screen and a terminal.",
+    ),
 ]
 
 
@@ -32,11 +46,15 @@ def bottleneck(
     task: Annotated[
         Path,
         typer.Argument(
-            help="Task file (YAML), or result file (npz) of a motion planned before.", metavar="TASK|RESULT"
+            help="Task file (YAML), or result file (npz) of a motion planned before.",
+            metavar="TASK|RESULT",
         ),
     ],
     check: Annotated[
-        bool, typer.Option("--check", help="Solve again with every limit raised by 1 %, and compare.")
+        bool,
+        typer.Option(
+            "--check", help="Solve again with every limit raised by 1 %, and compare."
+        ),
     ] = False,
     reference: Annotated[
         bool,
@@ -53,7 +71,9 @@ def bottleneck(
             "begin with unverified_."
         ),
     ] = None,
-    urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
+    urdf: Annotated[
+        Path | None, typer.Option(help="URDF file to use instead of the task's.")
+    ] = None,
     changes: Changes = None,
     strict: Strict = None,
     degrees: Degrees = False,
@@ -64,7 +84,7 @@ def bottleneck(
     How much each of them costs, and when it is active, of a task that is planned for it or of a saved motion.
     """
     with interrupts.postponed():
-        from brachis.apps.cli import motions  # noqa: PLC0415  (each command imports what it needs)
+        from brachis.apps.cli import motions
 
     raise typer.Exit(
         motions.bottleneck_command(
@@ -82,15 +102,20 @@ def bottleneck(
 
 def verify(
     result: ResultFile,
-    urdf: Annotated[Path | None, typer.Option(help="Check against this URDF instead of the saved one.")] = None,
+    urdf: Annotated[
+        Path | None,
+        typer.Option(help="Check against this URDF instead of the saved one."),
+    ] = None,
     degrees: Degrees = False,
     json: Json = False,
 ) -> None:
     """Check a saved motion again: path, limits, ends."""
     with interrupts.postponed():
-        from brachis.apps.cli import motions  # noqa: PLC0415
+        from brachis.apps.cli import motions
 
-    raise typer.Exit(motions.verify_command(result, urdf=urdf, degrees=degrees, as_json=json))
+    raise typer.Exit(
+        motions.verify_command(result, urdf=urdf, degrees=degrees, as_json=json)
+    )
 
 
 def export(
@@ -104,7 +129,10 @@ def export(
     ],
     form: Annotated[
         str | None,
-        typer.Option("--format", help="Format, by name: csv, parquet, json, ros2, mcap, urscript, gif or mp4."),
+        typer.Option(
+            "--format",
+            help="Format, by name: csv, parquet, json, ros2, mcap, urscript, gif or mp4.",
+        ),
     ] = None,
     dt: Annotated[
         float | None,
@@ -123,27 +151,38 @@ def export(
         ),
     ] = None,
     joints: Annotated[
-        str | None, typer.Option(help="Joints to write, in this order: j1,j2,... Default: all.", show_default=False)
+        str | None,
+        typer.Option(
+            help="Joints to write, in this order: j1,j2,... Default: all.",
+            show_default=False,
+        ),
     ] = None,
-    slower: Annotated[float, typer.Option(help="How many times slower an animation shows the motion.")] = 1.0,
+    slower: Annotated[
+        float, typer.Option(help="How many times slower an animation shows the motion.")
+    ] = 1.0,
 ) -> None:
     """Sample a saved motion for a controller, or animate it."""
     with interrupts.postponed():
-        from brachis.apps.cli import motions  # noqa: PLC0415
+        from brachis.apps.cli import motions
 
-    motions.export_command(result, out, form=form, dt=dt, last=last, joints=joints, slower=slower)
+    motions.export_command(
+        result, out, form=form, dt=dt, last=last, joints=joints, slower=slower
+    )
 
 
 def plot(
     result: ResultFile,
     out: Annotated[Path, typer.Option(help="Figure to write: png, pdf or svg.")],
     kind: Annotated[
-        str, typer.Option(help="Which figure: torques, postures, motion, overview, timeline or limits.")
+        str,
+        typer.Option(
+            help="Which figure: torques, postures, motion, overview, timeline or limits."
+        ),
     ] = "overview",
 ) -> None:
     """Draw a saved motion."""
     with interrupts.postponed():
-        from brachis.apps.cli import motions  # noqa: PLC0415
+        from brachis.apps.cli import motions
 
     motions.plot_command(result, out=out, kind=kind)
 
@@ -151,24 +190,35 @@ def plot(
 def report(
     result: ResultFile,
     out: Annotated[
-        Path | None, typer.Option(help="HTML file to write; default: beside the result, as result.html.")
+        Path | None,
+        typer.Option(
+            help="HTML file to write; default: beside the result, as result.html."
+        ),
     ] = None,
     title: Annotated[
-        str | None, typer.Option(help="Title of the page; default: the robot's name and the file's.")
+        str | None,
+        typer.Option(
+            help="Title of the page; default: the robot's name and the file's."
+        ),
     ] = None,
     degrees: Degrees = False,
 ) -> None:
     """Write a saved motion as one HTML page to judge it by."""
     with interrupts.postponed():
-        from brachis.apps.cli import motions  # noqa: PLC0415
+        from brachis.apps.cli import motions
 
-    raise typer.Exit(motions.report_command(result, out=out, title=title, degrees=degrees))
+    raise typer.Exit(
+        motions.report_command(result, out=out, title=title, degrees=degrees)
+    )
 
 
 def view(
     result: Annotated[
         Path,
-        typer.Argument(help="Result file (npz) written by 'brachis plan --out', or the folder.", metavar="RESULT"),
+        typer.Argument(
+            help="Result file (npz) written by 'brachis plan --out', or the folder.",
+            metavar="RESULT",
+        ),
     ],
     host: Host = "127.0.0.1",
     port: Port = None,
@@ -180,7 +230,7 @@ def view(
     Robot, path, tool trace and ghost postures, with plots over the limits that follow a slider. Ctrl-C ends it.
     """
     with interrupts.postponed():
-        from brachis.apps.cli import motions  # noqa: PLC0415
+        from brachis.apps.cli import motions
 
     motions.view_command(result, host=host, port=port, browser=browser, degrees=degrees)
 
@@ -195,7 +245,10 @@ RecordedFile = Annotated[
 ]
 RobotFile = Annotated[
     Path,
-    typer.Option("--robot", help="URDF file; or a task file (.yaml), whose robot, limits and settings hold."),
+    typer.Option(
+        "--robot",
+        help="URDF file; or a task file (.yaml), whose robot, limits and settings hold.",
+    ),
 ]
 RecordedSpace = Annotated[
     str | None,
@@ -205,9 +258,18 @@ RecordedSpace = Annotated[
         show_default=False,
     ),
 ]
-AngleUnit = Annotated[str | None, typer.Option("--angle", help="Unit of angles whose column states none: rad, deg.")]
-LengthUnit = Annotated[str | None, typer.Option("--length", help="Unit of lengths whose column states none: m, mm.")]
-TimeUnit = Annotated[str | None, typer.Option("--time", help="Unit of a time whose column states none: s, ms.")]
+AngleUnit = Annotated[
+    str | None,
+    typer.Option("--angle", help="Unit of angles whose column states none: rad, deg."),
+]
+LengthUnit = Annotated[
+    str | None,
+    typer.Option("--length", help="Unit of lengths whose column states none: m, mm."),
+]
+TimeUnit = Annotated[
+    str | None,
+    typer.Option("--time", help="Unit of a time whose column states none: s, ms."),
+]
 PathTolerance = Annotated[
     float | None,
     typer.Option(
@@ -241,9 +303,11 @@ def import_(
 ) -> None:
     """Make a result of a motion that runs today."""
     with interrupts.postponed():
-        from brachis.apps.cli import recordings  # noqa: PLC0415
+        from brachis.apps.cli import recordings
 
-    recorded = recordings.Recorded(csv, robot, task_space, angle, length, time, tolerance, noise)
+    recorded = recordings.Recorded(
+        csv, robot, task_space, angle, length, time, tolerance, noise
+    )
     recordings.import_command(recorded, out=out, degrees=degrees, as_json=json)
 
 
@@ -251,10 +315,17 @@ def compare(
     csv: RecordedFile,
     robot: RobotFile,
     keep_end: Annotated[
-        bool, typer.Option("--keep-end", help="End in today's end posture, not in any whose tool is there.")
+        bool,
+        typer.Option(
+            "--keep-end",
+            help="End in today's end posture, not in any whose tool is there.",
+        ),
     ] = False,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for today.npz, result.npz, comparison.json and comparison.png.")
+        Path | None,
+        typer.Option(
+            help="Folder for today.npz, result.npz, comparison.json and comparison.png."
+        ),
     ] = None,
     task_space: RecordedSpace = None,
     angle: AngleUnit = None,
@@ -266,7 +337,11 @@ def compare(
 ) -> None:
     """Show a motion of today beside a plan along its path."""
     with interrupts.postponed():
-        from brachis.apps.cli import recordings  # noqa: PLC0415
+        from brachis.apps.cli import recordings
 
-    recorded = recordings.Recorded(csv, robot, task_space, angle, length, time, tolerance, noise)
-    raise typer.Exit(recordings.compare_command(recorded, keep_end=keep_end, out=out, as_json=json))
+    recorded = recordings.Recorded(
+        csv, robot, task_space, angle, length, time, tolerance, noise
+    )
+    raise typer.Exit(
+        recordings.compare_command(recorded, keep_end=keep_end, out=out, as_json=json)
+    )

@@ -22,7 +22,14 @@ from typing import Any
 from brachis import planner
 from brachis.apps import bottleneck
 from brachis.apps.cli.app import Verbosity, chosen
-from brachis.apps.cli.folder import Writer, Written, make_folder, write_files, write_one, write_text
+from brachis.apps.cli.folder import (
+    Writer,
+    Written,
+    make_folder,
+    write_files,
+    write_one,
+    write_text,
+)
 from brachis.apps.cli.output import (
     exit_code,
     json_text,
@@ -48,10 +55,14 @@ from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
 
 
-def verify_command(result: Path, *, urdf: Path | None, degrees: bool, as_json: bool) -> int:
+def verify_command(
+    result: Path, *, urdf: Path | None, degrees: bool, as_json: bool
+) -> int:
     """Verify a saved motion; returns the exit code."""
     trajectory = Trajectory.load(motion_file(result))
-    robot = None if urdf is None else robot_from_settings(trajectory.task.robot, urdf=urdf)
+    robot = (
+        None if urdf is None else robot_from_settings(trajectory.task.robot, urdf=urdf)
+    )
     verification = verify_trajectory(trajectory, robot=robot)
     if as_json:
         print_json(verification.to_dict())
@@ -61,10 +72,17 @@ def verify_command(result: Path, *, urdf: Path | None, degrees: bool, as_json: b
 
 
 def export_command(
-    result: Path, out: Path, *, form: str | None, dt: float | None, last: str | None, joints: str | None, slower: float
+    result: Path,
+    out: Path,
+    *,
+    form: str | None,
+    dt: float | None,
+    last: str | None,
+    joints: str | None,
+    slower: float,
 ) -> None:
     """Write a saved motion in one of the formats of `brachis.export.FORMATS`."""
-    from brachis.apps import export  # noqa: PLC0415
+    from brachis.apps import export
 
     result = motion_file(result)
     chosen, trajectory = export.format_of(out, form), Trajectory.load(result)
@@ -72,19 +90,29 @@ def export_command(
     with shown_warnings():
         write_one(
             out,
-            lambda path: export.write(trajectory, path, form=form, dt=dt, last=last, joints=names, slower=slower),
+            lambda path: export.write(
+                trajectory,
+                path,
+                form=form,
+                dt=dt,
+                last=last,
+                joints=names,
+                slower=slower,
+            ),
             (chosen.suffix,),
             _sources(result, trajectory),
         )
     period = chosen.dt if dt is None else dt
     if period > trajectory.t_end:
-        print_error(f"the period of {period:g} s is longer than the motion, which takes {trajectory.t_end:.6g} s")
+        print_error(
+            f"the period of {period:g} s is longer than the motion, which takes {trajectory.t_end:.6g} s"
+        )
     result_console().print(f"wrote {out}")
 
 
 def plot_command(result: Path, *, out: Path, kind: str) -> None:
     """Draw a saved motion."""
-    from brachis.apps.plots import PLOTS, SUFFIXES, check_suffix, save_figure  # noqa: PLC0415
+    from brachis.apps.plots import PLOTS, SUFFIXES, check_suffix, save_figure
 
     if kind not in PLOTS:
         raise UnknownNameError("figure", kind, PLOTS, where="--kind")
@@ -92,7 +120,12 @@ def plot_command(result: Path, *, out: Path, kind: str) -> None:
     result = motion_file(result)
     trajectory = Trajectory.load(result)
     suffixes = [f".{suffix}" for suffix in SUFFIXES]
-    write_one(out, lambda path: save_figure(PLOTS[kind](trajectory), path), suffixes, _sources(result, trajectory))
+    write_one(
+        out,
+        lambda path: save_figure(PLOTS[kind](trajectory), path),
+        suffixes,
+        _sources(result, trajectory),
+    )
     result_console().print(f"wrote {out}")
 
 
@@ -104,7 +137,7 @@ def _sources(result: Path, trajectory: Trajectory) -> list[Path | None]:
 
 def schema_command(out: Path | None, of: str) -> None:
     """Print or write the JSON schema of task files or of exported trajectories."""
-    from brachis.apps.export import samples_schema  # noqa: PLC0415
+    from brachis.apps.export import samples_schema
 
     schemas = {"task": json_schema, "trajectory": samples_schema}
     if of not in schemas:
@@ -120,18 +153,26 @@ def schema_command(out: Path | None, of: str) -> None:
 SUFFIX = ".html"
 
 
-def report_command(result: Path, *, out: Path | None, title: str | None, degrees: bool) -> int:
+def report_command(
+    result: Path, *, out: Path | None, title: str | None, degrees: bool
+) -> int:
     """Write the report of a saved motion beside it, or where asked; returns the exit code."""
     result = motion_file(result)
     out = result.with_suffix(SUFFIX) if out is None else out
     trajectory = Trajectory.load(result)
     urdf = trajectory.task.robot.urdf
-    title = ", ".join(filter(None, (trajectory.robot.name, result.name))) if title is None else title
+    title = (
+        ", ".join(filter(None, (trajectory.robot.name, result.name)))
+        if title is None
+        else title
+    )
     page = make_report(trajectory, title=title, degrees=degrees)
     write_one(out, page.save, (SUFFIX,), [result, None if urdf is None else Path(urdf)])
     result_console().print(f"wrote {out} ({1e-6 * page.size:.1f} MB)")
     if not page.verified:
-        print_error("the motion did not pass the verification; the report says so, and what failed")
+        print_error(
+            "the motion did not pass the verification; the report says so, and what failed"
+        )
     return exit_code(page.verified, ())
 
 
@@ -139,13 +180,23 @@ _LARGEST = 64_000_000
 """Of result.json, bytes."""
 
 
-def view_command(result: Path, *, host: str, port: int | None, browser: bool, degrees: bool) -> None:
+def view_command(
+    result: Path, *, host: str, port: int | None, browser: bool, degrees: bool
+) -> None:
     """Show a saved motion until Ctrl-C."""
     path = motion_file(result)
     trajectory = Trajectory.load(path)
     verified = verify_trajectory(trajectory).passed
     candidates = _candidates_beside(path, trajectory)
-    show(trajectory, candidates, verified=verified, host=host, port=port, browser=browser, degrees=degrees)
+    show(
+        trajectory,
+        candidates,
+        verified=verified,
+        host=host,
+        port=port,
+        browser=browser,
+        degrees=degrees,
+    )
 
 
 def show(
@@ -159,10 +210,14 @@ def show(
     degrees: bool = False,
 ) -> None:
     """Show a motion until Ctrl-C; open the browser where there is a screen, and it is wanted."""
-    viewer = Viewer(trajectory, candidates, verified=verified, degrees=degrees, host=host, port=port)
+    viewer = Viewer(
+        trajectory, candidates, verified=verified, degrees=degrees, host=host, port=port
+    )
     with viewer, interrupts.expected():
         if not viewer.local:
-            print_error(f"warning: whoever reaches {host} can look, and move the slider; leave --host out to be alone")
+            print_error(
+                f"warning: whoever reaches {host} can look, and move the slider; leave --host out to be alone"
+            )
         if chosen() is not Verbosity.QUIET:
             print_error("Ctrl-C stops the viewer")
         print(f"look at {viewer.url}", flush=True)  # noqa: T201  (what the command is for, however quiet)
@@ -184,7 +239,9 @@ def _candidates_beside(path: Path, trajectory: Trajectory) -> list[dict[str, Any
 
 def _has_screen() -> bool:
     """Tell whether a browser would have somewhere to open."""
-    return sys.platform == "darwin" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    return sys.platform == "darwin" or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
 
 
 _FILES = {
@@ -241,21 +298,37 @@ def bottleneck_command(
         _show(motion.trajectory, found.text(degrees=degrees), written.files)
     print_what_was_left(motion.undone, interrupted=motion.interrupted)
     if not motion.verified:
-        print_error("the motion found did not pass the verification; what is said of it may not hold")
+        print_error(
+            "the motion found did not pass the verification; what is said of it may not hold"
+        )
     return exit_code(motion.verified, written.failures)
 
 
 def _planned(task: Task, urdf: Path | None, listener: Callable[[str], None]) -> _Motion:
     result = planner.plan(urdf and urdf_of(urdf), task, listener=listener)
-    return _Motion(result, result.trajectory, result.verified, result.to_dict(), result.interrupted, result.undone)
+    return _Motion(
+        result,
+        result.trajectory,
+        result.verified,
+        result.to_dict(),
+        result.interrupted,
+        result.undone,
+    )
 
 
 def _saved(path: Path, given: Mapping[str, object]) -> _Motion:
     """Load a motion and verify it again; options are for tasks."""
     for option, value in given.items():
         if value:
-            problem = "a saved motion belongs to the robot and task that it was planned for"
-            raise InputError(problem, where=option, found=value, allowed="this option with a task file")
+            problem = (
+                "a saved motion belongs to the robot and task that it was planned for"
+            )
+            raise InputError(
+                problem,
+                where=option,
+                found=value,
+                allowed="this option with a task file",
+            )
     trajectory = Trajectory.load(path)
     verification = verify_trajectory(trajectory)
     data = {
@@ -272,11 +345,15 @@ def _saved(path: Path, given: Mapping[str, object]) -> _Motion:
 
 def _write(motion: _Motion, data: dict[str, Any], out: Path) -> Written:
     """Write the figures and the drawing; those of an unverified motion get names that say so."""
-    from brachis.apps.plots import plot_timeline, save_figure  # noqa: PLC0415  (matplotlib takes 0.7 s)
+    from brachis.apps.plots import plot_timeline, save_figure
 
     figures_of_merit, timeline = _FILES[motion.verified]
-    results: dict[str, Writer] = {figures_of_merit: lambda path: write_text(json_text(data), path)}
-    figures: dict[str, Writer] = {timeline: lambda path: save_figure(plot_timeline(motion.trajectory), path)}
+    results: dict[str, Writer] = {
+        figures_of_merit: lambda path: write_text(json_text(data), path)
+    }
+    figures: dict[str, Writer] = {
+        timeline: lambda path: save_figure(plot_timeline(motion.trajectory), path)
+    }
     return write_files(out, results, figures, stale=_FILES[not motion.verified])
 
 
@@ -284,7 +361,9 @@ def _show(trajectory: Trajectory, found: str, files: tuple[str, ...]) -> None:
     """Print the report for a person."""
     console = result_console()
     redundant = coordinates(trajectory.redundant_joints, trajectory.branch)
-    console.print(f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}")
+    console.print(
+        f"end time t_E: {trajectory.t_end:.4f} s, redundant joints: {redundant}"
+    )
     console.print(found)
     for name in files:
         console.print(f"wrote {name}")

@@ -81,20 +81,41 @@ def print_table(
     """
     named = [Column(each) if isinstance(each, str) else each for each in columns]
     cells = [[str(cell) for cell in row] for row in rows]
-    texts = [([named[i].name] if header else []) + [row[i] for row in cells] for i in range(len(named))]
-    least = [_least(each, text, header=header) for each, text in zip(named, texts, strict=True)]
+    texts = [
+        ([named[i].name] if header else []) + [row[i] for row in cells]
+        for i in range(len(named))
+    ]
+    least = [
+        _least(each, text, header=header)
+        for each, text in zip(named, texts, strict=True)
+    ]
     most = [max(map(cell_len, text), default=0) for text in texts]
     lined = sum(least) + _LINED[0] * len(named) + _LINED[1] <= console.width
     parts = [list(range(len(named)))] if lined else _parts(least, console.width)
     for number, part in enumerate(parts, start=1):
         free = console.width - _around(len(part), lined=lined)
-        widths = _widths([named[i] for i in part], [least[i] for i in part], [most[i] for i in part], free)
+        widths = _widths(
+            [named[i] for i in part],
+            [least[i] for i in part],
+            [most[i] for i in part],
+            free,
+        )
         told = f"{title} ({number} of {len(parts)})" if len(parts) > 1 else title
         look = box.HEAVY_HEAD if lined else None
-        table = Table(title=told, title_justify="left", show_header=header, box=look, padding=(0, 1), pad_edge=lined)
+        table = Table(
+            title=told,
+            title_justify="left",
+            show_header=header,
+            box=look,
+            padding=(0, 1),
+            pad_edge=lined,
+        )
         for i, width in zip(part, widths, strict=True):
             table.add_column(
-                named[i].name, justify="right" if named[i].number else "left", overflow="fold", width=width
+                named[i].name,
+                justify="right" if named[i].number else "left",
+                overflow="fold",
+                width=width,
             )
         for row in cells:
             table.add_row(*(row[i] for i in part))
@@ -104,7 +125,11 @@ def print_table(
 def _least(column: Column, texts: Sequence[str], *, header: bool) -> int:
     """Count the characters that a column needs: whole numbers, whole words unless they are very long."""
     name, body = (texts[:1], texts[1:]) if header else ([], texts)
-    words = [cell_len(word) for text in (*name, *([] if column.number else body)) for word in text.split()]
+    words = [
+        cell_len(word)
+        for text in (*name, *([] if column.number else body))
+        for word in text.split()
+    ]
     numbers = [cell_len(text) for text in body] if column.number else []
     return max((*numbers, *(min(word, _LONGEST_WORD) for word in words)), default=1)
 
@@ -120,14 +145,19 @@ def _parts(least: Sequence[int], width: int) -> list[list[int]]:
     parts = [[0]]
     for i in range(1, len(least)):
         taken = [*parts[-1], i]
-        if len(taken) > 2 and sum(least[k] for k in taken) + _around(len(taken), lined=False) > width:  # noqa: PLR2004 (the first column and this one)
+        if (
+            len(taken) > 2
+            and sum(least[k] for k in taken) + _around(len(taken), lined=False) > width
+        ):
             parts.append([0, i])
         else:
             parts[-1] = taken
     return parts
 
 
-def _widths(columns: Sequence[Column], least: Sequence[int], most: Sequence[int], free: int) -> list[int]:
+def _widths(
+    columns: Sequence[Column], least: Sequence[int], most: Sequence[int], free: int
+) -> list[int]:
     """Give every column what it needs, and while there is room widen those that wish for more, the narrowest first.
 
     Where there is no room for what they need, the widest column of text is narrowed.
@@ -136,13 +166,17 @@ def _widths(columns: Sequence[Column], least: Sequence[int], most: Sequence[int]
     texts = [i for i, column in enumerate(columns) if not column.number]
     while sum(widths) > free and max(widths[i] for i in texts) > 1:
         widths[max(texts, key=lambda i: widths[i])] -= 1
-    while sum(widths) < free and any(width < wish for width, wish in zip(widths, most, strict=True)):
+    while sum(widths) < free and any(
+        width < wish for width, wish in zip(widths, most, strict=True)
+    ):
         wishing = [i for i, width in enumerate(widths) if width < most[i]]
         widths[min(wishing, key=lambda i: widths[i])] += 1
     return widths
 
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+Json = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object on standard output.")
+]
 WRONG_INPUT = 2
 """Exit code of what is refused before anything is done."""
 _NO_FIGURE = 3
@@ -152,7 +186,9 @@ _NO_FIGURE = 3
 def print_error(message: str) -> None:
     """One message on standard error, where that can be written."""
     with suppress(OSError):
-        Console(stderr=True, soft_wrap=True, highlight=False, markup=False, emoji=False).print(f"brachis: {message}")
+        Console(
+            stderr=True, soft_wrap=True, highlight=False, markup=False, emoji=False
+        ).print(f"brachis: {message}")
 
 
 def json_text(data: Mapping[str, object]) -> str:
@@ -172,12 +208,20 @@ def print_failure(message: str, code: int, *, as_json: bool) -> int:
     """
     with suppress(OSError):  # `StandardOutput.finish` says so
         if as_json:
-            print_json({"verified": False, "status": "error", "error": message, "t_end": None, "exit_code": code})
+            print_json(
+                {
+                    "verified": False,
+                    "status": "error",
+                    "error": message,
+                    "t_end": None,
+                    "exit_code": code,
+                }
+            )
     print_error(message)
     return code
 
 
-def print_usage_error(error: Any, *, as_json: bool) -> int:  # noqa: ANN401  (Typer does not name the class)
+def print_usage_error(error: Any, *, as_json: bool) -> int:
     """Say that the command line is not understood, and where help is; the exit code of wrong input."""
     if type(error).__name__ == "NoArgsIsHelpError":
         with suppress(OSError):
@@ -190,7 +234,7 @@ def print_usage_error(error: Any, *, as_json: bool) -> int:  # noqa: ANN401  (Ty
     return print_failure(message + more, WRONG_INPUT, as_json=as_json)
 
 
-def exit_code(verified: bool, failures: Sequence[InputError]) -> int:  # noqa: FBT001  (what the code is of)
+def exit_code(verified: bool, failures: Sequence[InputError]) -> int:
     """Say which figures could not be written, and return the exit code of a motion."""
     for failure in failures:
         print_error(f"the result is written, this figure is not: {failure}")
@@ -212,7 +256,7 @@ class StandardOutput:
         self._stream = stream
         self.failure: OSError | None = None
 
-    def __getattr__(self, name: str) -> Any:  # noqa: ANN401  (whatever the stream has)
+    def __getattr__(self, name: str) -> Any:
         """Pass everything else on."""
         return getattr(self._stream, name)
 
@@ -281,7 +325,13 @@ def _plain(value: object) -> object:
 def result_console() -> Console:
     """Console for results."""
     quiet = chosen() is Verbosity.QUIET
-    return Console(highlight=False, markup=False, emoji=False, soft_wrap=not sys.stdout.isatty(), quiet=quiet)
+    return Console(
+        highlight=False,
+        markup=False,
+        emoji=False,
+        soft_wrap=not sys.stdout.isatty(),
+        quiet=quiet,
+    )
 
 
 @contextmanager
@@ -291,7 +341,7 @@ def shown_warnings() -> Iterator[None]:
         warnings.simplefilter("always", BrachisWarning)
         usual = warnings.showwarning
 
-        def show(message: Warning | str, category: type[Warning], *where: Any) -> None:  # noqa: ANN401
+        def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
             if not issubclass(category, BrachisWarning):
                 usual(message, category, *where)
             elif chosen() is not Verbosity.QUIET:
@@ -335,7 +385,9 @@ def _log() -> Callable[[str], None]:
     return show
 
 
-def print_verification(console: Console, verification: Verification, *, degrees: bool) -> None:
+def print_verification(
+    console: Console, verification: Verification, *, degrees: bool
+) -> None:
     """Print the checks, one a row."""
     title = "verification: passed" if verification.passed else "verification: FAILED"
     rows = [
@@ -344,10 +396,21 @@ def print_verification(console: Console, verification: Verification, *, degrees:
             *check.figures(degrees=degrees),
             check.subject or "",
             "" if check.time is None else f"{check.time:.4f}",
-            ("ok" if check.passed else "FAILED") + (f" ({check.remark})" if check.remark else ""),
+            ("ok" if check.passed else "FAILED")
+            + (f" ({check.remark})" if check.remark else ""),
         )
         for check in verification.checks
     ]
     number = partial(Column, number=True)
-    columns = ("check", number("worst"), number("allowed"), "unit", "of", number("time [s]"), "")
-    print_table(console, f"{title} (checked at {verification.points} instants)", columns, rows)
+    columns = (
+        "check",
+        number("worst"),
+        number("allowed"),
+        "unit",
+        "of",
+        number("time [s]"),
+        "",
+    )
+    print_table(
+        console, f"{title} (checked at {verification.points} instants)", columns, rows
+    )

@@ -16,7 +16,14 @@ from rich.console import Console
 
 from brachis import planner
 from brachis.apps.cli.app import Verbosity, chosen
-from brachis.apps.cli.folder import Writer, Written, ended_cleanly, make_folder, write_files, write_text
+from brachis.apps.cli.folder import (
+    Writer,
+    Written,
+    ended_cleanly,
+    make_folder,
+    write_files,
+    write_text,
+)
 from brachis.apps.cli.motions import show
 from brachis.apps.cli.output import (
     Column,
@@ -46,7 +53,13 @@ from brachis.search.record import STATUS, TIMES, WORDS, candidate_rows
 
 _FILES = {
     True: ("result.npz", "result.json", "overview.png", "candidates.png", "fit.png"),
-    False: ("unverified.npz", "unverified.json", "unverified.png", "unverified_candidates.png", "unverified_fit.png"),
+    False: (
+        "unverified.npz",
+        "unverified.json",
+        "unverified.png",
+        "unverified_candidates.png",
+        "unverified_fit.png",
+    ),
 }
 """Names of the trajectory, the figures of merit, the drawings of motion, search and fit, by whether it was verified."""
 _MANY = 40
@@ -69,7 +82,9 @@ def plan_command(
     if out is not None:
         make_folder(out, (*_FILES[True], *_FILES[False]), (task, urdf))
     with shown_warnings(), progress() as listener:
-        result = planner.plan(urdf and urdf_of(urdf), changed_task(task, changes), listener=listener)
+        result = planner.plan(
+            urdf and urdf_of(urdf), changed_task(task, changes), listener=listener
+        )
     data = {**result.to_dict(), "verification": result.verification.to_dict()}
     failures: tuple[InputError, ...] = ()
     if out is not None:
@@ -81,9 +96,16 @@ def plan_command(
         _show(result, data, degrees=degrees)
     print_what_was_left(result.undone, interrupted=result.interrupted)
     if not result.verified:
-        print_error("the motion found did not pass the verification; it is marked unverified")
+        print_error(
+            "the motion found did not pass the verification; it is marked unverified"
+        )
     if view:
-        show(result.trajectory, data["candidates"], verified=result.verified, degrees=degrees)
+        show(
+            result.trajectory,
+            data["candidates"],
+            verified=result.verified,
+            degrees=degrees,
+        )
     return exit_code(result.verified, failures)
 
 
@@ -92,7 +114,7 @@ def _write(result: Result, data: dict[str, object], out: Path) -> Written:
 
     Files of an earlier plan with the other names are removed: they would be another motion's.
     """
-    from brachis.apps.plots import plot_candidates, plot_fit, plot_overview, save_figure  # noqa: PLC0415  (matplotlib takes 0.7 s)
+    from brachis.apps.plots import plot_candidates, plot_fit, plot_overview, save_figure
 
     trajectory, figures_of_merit, overview, candidates, fit = _FILES[result.verified]
     results: dict[str, Writer] = {
@@ -124,7 +146,9 @@ def _show(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
         "iterations": f"{sum(r.iterations for r in attempt.reports)} in {write_count(len(attempt.reports), 'solve')} "
         f"(refined to {attempt.collocation_points} collocation points)",
         "wall time": f"{1e3 * result.timing['total']:.0f} ms",
-        "least motion": "off" if result.least_motion is None else result.least_motion.status,
+        "least motion": "off"
+        if result.least_motion is None
+        else result.least_motion.status,
         "worst ratio to a limit": f"{result.verification.worst_ratio:.6f}",
         "path error": f"{result.verification.path_error:.1e} m or rad",
         "verified": "yes" if result.verified else "NO",
@@ -145,17 +169,23 @@ def _show(result: Result, data: dict[str, Any], *, degrees: bool) -> None:
 def _posture(data: dict[str, Any], key: str, *, degrees: bool) -> str:
     """Write a posture with names and units."""
     parts = []
-    for name, value, si_unit in zip(data["joint_names"], data[key], data["position_units"], strict=True):
+    for name, value, si_unit in zip(
+        data["joint_names"], data[key], data["position_units"], strict=True
+    ):
         unit, factor = shown_unit(si_unit, degrees=degrees)
         parts.append(f"{name} {factor * value:.4f} {unit}")
     return ", ".join(parts)
 
 
-def _print_candidates(console: Console, candidates: Sequence[Mapping[str, Any]]) -> None:
+def _print_candidates(
+    console: Console, candidates: Sequence[Mapping[str, Any]]
+) -> None:
     """Print what the search looked at, one candidate a row, the fastest first; the same motion is shown once."""
     rows = candidate_rows(candidates)
     others = len(candidates) - len(rows[:_MANY])
-    title = f"candidates ({len(candidates)}" + (f", {others} of them in the JSON only)" if others else ")")
+    title = f"candidates ({len(candidates)}" + (
+        f", {others} of them in the JSON only)" if others else ")"
+    )
     times = (Column(name, number=True) for name in TIMES)
     print_table(console, title, (*WORDS, *times, STATUS), rows[:_MANY])
 
@@ -166,11 +196,19 @@ _FIGURE = "sweep.png"
 
 
 def sweep_command(
-    source: Path, *, out: Path | None, jobs: int | None, scheduler: str | None, retry: bool, as_json: bool
+    source: Path,
+    *,
+    out: Path | None,
+    jobs: int | None,
+    scheduler: str | None,
+    retry: bool,
+    as_json: bool,
 ) -> int:
     """Run a sweep, show, write; returns the exit code."""
     with ended_cleanly(), _progress() as listener:
-        result = sweep(source, out, jobs=jobs, scheduler=scheduler, retry=retry, listener=listener)
+        result = sweep(
+            source, out, jobs=jobs, scheduler=scheduler, retry=retry, listener=listener
+        )
     files, failures = [str(path) for path in result.files], []
     figure = result.folder / _FIGURE
     with writing_errors(figure):
@@ -212,21 +250,42 @@ def _progress() -> Iterator[Callable[[str], None]]:
 def _show_sweep(result: SweepResult, files: Sequence[str]) -> None:
     """Print the sweep for a person."""
     console, found = result_console(), result.summary()
-    counts = ", ".join(f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED))
+    counts = ", ".join(
+        f"{found[status]} {status}" for status in (VERIFIED, UNVERIFIED, FAILED)
+    )
     title = f"sweep: {write_count(found['plans'], 'plan')}, {counts}"
     shown = [name for name in ("best", "median", "worst") if name in found]
     if shown:
-        keys = {"t_end_s": "t_end [s]", "plan": "plan", **{key: key for key in result.keys}}
-        rows = [(words, *(_text(found[name][key]) for name in shown)) for key, words in keys.items()]
-        print_table(console, title, ("", *(Column(name, number=True) for name in shown)), rows)
+        keys = {
+            "t_end_s": "t_end [s]",
+            "plan": "plan",
+            **{key: key for key in result.keys},
+        }
+        rows = [
+            (words, *(_text(found[name][key]) for name in shown))
+            for key, words in keys.items()
+        ]
+        print_table(
+            console, title, ("", *(Column(name, number=True) for name in shown)), rows
+        )
     else:
         console.print(title)
     for error, told in found["failures"].items():
-        console.print(f"{told['plans']} failed with {error}, for example: {told['message']}")
-    console.print(f"planning took {in_words(found['wall_time_s'])} in all processes together")
+        console.print(
+            f"{told['plans']} failed with {error}, for example: {told['message']}"
+        )
+    console.print(
+        f"planning took {in_words(found['wall_time_s'])} in all processes together"
+    )
     for name in files:
         console.print(f"wrote {name}")
 
 
 def _text(value: object) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else "" if value is None else str(value)
+    return (
+        f"{value:.6g}"
+        if isinstance(value, float)
+        else ""
+        if value is None
+        else str(value)
+    )

@@ -29,7 +29,9 @@ def motion_file(result: Path) -> Path:
         if is_file(result / name):
             return result / name
     problem, hint = "is a folder in which there is no motion", "Run brachis plan --out"
-    raise ResultFileError(problem, where=str(result), allowed=" or ".join(_MOTIONS), hint=hint)
+    raise ResultFileError(
+        problem, where=str(result), allowed=" or ".join(_MOTIONS), hint=hint
+    )
 
 
 def task_space_of(text: str) -> str | list[str]:

@@ -6,24 +6,45 @@ from pathlib import Path
 
 from brachis import robots
 from brachis.apps.cli.folder import write_text
-from brachis.apps.cli.output import Column, print_json, print_table, progress, result_console, shown_warnings
+from brachis.apps.cli.output import (
+    Column,
+    print_json,
+    print_table,
+    progress,
+    result_console,
+    shown_warnings,
+)
 from brachis.apps.cli.settings import urdf_of
 from brachis.apps.starter import starter_task
 from brachis.common.files import status_of, writing_errors
 from brachis.errors import InputError
 
 
-def new_command(urdf: Path, out: Path, *, tool_frame: str | None, base_frame: str | None, as_json: bool) -> None:
+def new_command(
+    urdf: Path,
+    out: Path,
+    *,
+    tool_frame: str | None,
+    base_frame: str | None,
+    as_json: bool,
+) -> None:
     """Write a first task, which was planned and verified, and say what is next."""
     with writing_errors(out):
         exists = status_of(out) is not None
     if exists:
         raise InputError(
-            "the file exists; it may be somebody's work", where=str(out), allowed="a new file", hint="Name one by --out"
+            "the file exists; it may be somebody's work",
+            where=str(out),
+            allowed="a new file",
+            hint="Name one by --out",
         )
     with shown_warnings(), progress() as listener:
         starter = starter_task(
-            urdf_of(urdf), folder=out.parent, tool_frame=tool_frame, base_frame=base_frame, listener=listener
+            urdf_of(urdf),
+            folder=out.parent,
+            tool_frame=tool_frame,
+            base_frame=base_frame,
+            listener=listener,
         )
     write_text(starter.text, out)
     result, robot = starter.result, starter.robot
@@ -39,8 +60,12 @@ def new_command(urdf: Path, out: Path, *, tool_frame: str | None, base_frame: st
         )
         return
     console = result_console()
-    console.print(f"wrote {out}: {robot.base_frame} -> {robot.tool_frame} with {', '.join(robot.joint_names)}")
-    console.print(f"a quick plan of it takes {result.t_end:.4f} s and is verified; next: brachis plan {out} --out out")
+    console.print(
+        f"wrote {out}: {robot.base_frame} -> {robot.tool_frame} with {', '.join(robot.joint_names)}"
+    )
+    console.print(
+        f"a quick plan of it takes {result.t_end:.4f} s and is verified; next: brachis plan {out} --out out"
+    )
 
 
 def robots_command(*, as_json: bool) -> None:
@@ -59,11 +84,16 @@ def robots_command(*, as_json: bool) -> None:
         return
     console = result_console()
     columns = ("name", "what it is", Column("joints", number=True), "their names")
-    rows = [(each["name"], each["what"], len(each["joints"]), ", ".join(each["joints"])) for each in listed]
+    rows = [
+        (each["name"], each["what"], len(each["joints"]), ", ".join(each["joints"]))
+        for each in listed
+    ]
     print_table(console, "robots that come with brachis", columns, rows)
     for each in listed:
         console.print(f"{each['name']}: {each['urdf']}")
-    console.print("A name may stand for the URDF: brachis inspect scara3, brachis new scara3")
+    console.print(
+        "A name may stand for the URDF: brachis inspect scara3, brachis new scara3"
+    )
 
 
 def _what(urdf: Path) -> str:

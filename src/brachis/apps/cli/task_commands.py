@@ -17,16 +17,27 @@ TaskFile = Annotated[Path, typer.Argument(help="Task file (YAML).", metavar="TAS
 def list_robots(json: Json = False) -> None:
     """List the robots that come with brachis."""
     with interrupts.postponed():
-        from brachis.apps.cli import starting  # noqa: PLC0415  (each command imports what it needs)
+        from brachis.apps.cli import starting
 
     starting.robots_command(as_json=json)
 
 
 def new(
-    urdf: Annotated[Path, typer.Argument(help="URDF file, or the name of a robot that comes along.", metavar="URDF")],
-    out: Annotated[Path, typer.Option(help="Task file to write, a new one.")] = Path("task.yaml"),
-    tool_frame: Annotated[str | None, typer.Option(help="Link at the chain's end.")] = None,
-    base_frame: Annotated[str | None, typer.Option(help="Link at the chain's beginning.")] = None,
+    urdf: Annotated[
+        Path,
+        typer.Argument(
+            help="URDF file, or the name of a robot that comes along.", metavar="URDF"
+        ),
+    ],
+    out: Annotated[Path, typer.Option(help="Task file to write, a new one.")] = Path(
+        "task.yaml"
+    ),
+    tool_frame: Annotated[
+        str | None, typer.Option(help="Link at the chain's end.")
+    ] = None,
+    base_frame: Annotated[
+        str | None, typer.Option(help="Link at the chain's beginning.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Write a first task for a robot, with comments.
@@ -35,9 +46,11 @@ def new(
     planned and verified.
     """
     with interrupts.postponed():
-        from brachis.apps.cli import starting  # noqa: PLC0415
+        from brachis.apps.cli import starting
 
-    starting.new_command(urdf, out, tool_frame=tool_frame, base_frame=base_frame, as_json=json)
+    starting.new_command(
+        urdf, out, tool_frame=tool_frame, base_frame=base_frame, as_json=json
+    )
 
 
 def plan(
@@ -49,16 +62,21 @@ def plan(
             "fitted to points); of a motion that fails the verification the names begin with unverified."
         ),
     ] = None,
-    urdf: Annotated[Path | None, typer.Option(help="URDF file to use instead of the task's.")] = None,
+    urdf: Annotated[
+        Path | None, typer.Option(help="URDF file to use instead of the task's.")
+    ] = None,
     changes: Changes = None,
-    view: Annotated[bool, typer.Option("--view", help="Show the motion in the browser, until Ctrl-C.")] = False,
+    view: Annotated[
+        bool,
+        typer.Option("--view", help="Show the motion in the browser, until Ctrl-C."),
+    ] = False,
     strict: Strict = None,
     degrees: Degrees = False,
     json: Json = False,
 ) -> None:
     """Plan a task, verify the motion, and show what came out."""
     with interrupts.postponed():
-        from brachis.apps.cli import planning  # noqa: PLC0415
+        from brachis.apps.cli import planning
 
     raise typer.Exit(
         planning.plan_command(
@@ -89,12 +107,22 @@ def inspect(
             "Default: the task's, or all that the robot can."
         ),
     ] = None,
-    tool_frame: Annotated[str | None, typer.Option(help="Link at the chain's end.")] = None,
-    base_frame: Annotated[str | None, typer.Option(help="Link at the chain's beginning.")] = None,
-    posture: Annotated[
-        str | None, typer.Option(help="Say where the tool is at these joint positions, for example '0, 0.3, 1.2'.")
+    tool_frame: Annotated[
+        str | None, typer.Option(help="Link at the chain's end.")
     ] = None,
-    lock: Annotated[list[str] | None, typer.Option(help="Joint held at a position: name=value, repeatable.")] = None,
+    base_frame: Annotated[
+        str | None, typer.Option(help="Link at the chain's beginning.")
+    ] = None,
+    posture: Annotated[
+        str | None,
+        typer.Option(
+            help="Say where the tool is at these joint positions, for example '0, 0.3, 1.2'."
+        ),
+    ] = None,
+    lock: Annotated[
+        list[str] | None,
+        typer.Option(help="Joint held at a position: name=value, repeatable."),
+    ] = None,
     degrees: Degrees = False,
     changes: Changes = None,
     json: Json = False,
@@ -104,7 +132,7 @@ def inspect(
     Limits, masses and friction of every joint, and which choices of redundant joints have a closed form.
     """
     with interrupts.postponed():
-        from brachis.apps.cli import inspection  # noqa: PLC0415
+        from brachis.apps.cli import inspection
 
     inspection.inspect_command(
         source,
@@ -129,7 +157,10 @@ def sweep(
         ),
     ] = None,
     jobs: Annotated[
-        int | None, typer.Option(help="Processes; by default, and at most, as many as there are processors.")
+        int | None,
+        typer.Option(
+            help="Processes; by default, and at most, as many as there are processors."
+        ),
     ] = None,
     scheduler: Annotated[
         str | None,
@@ -138,22 +169,32 @@ def sweep(
             "or ray://host:10001."
         ),
     ] = None,
-    retry: Annotated[bool, typer.Option("--retry", help="Plan stored failures again.")] = False,
+    retry: Annotated[
+        bool, typer.Option("--retry", help="Plan stored failures again.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Plan a task many times, with its keys varied."""
     with interrupts.postponed():
-        from brachis.apps.cli import planning as command  # noqa: PLC0415
+        from brachis.apps.cli import planning as command
 
-    raise typer.Exit(command.sweep_command(source, out=out, jobs=jobs, scheduler=scheduler, retry=retry, as_json=json))
+    raise typer.Exit(
+        command.sweep_command(
+            source, out=out, jobs=jobs, scheduler=scheduler, retry=retry, as_json=json
+        )
+    )
 
 
 def schema(
-    out: Annotated[Path | None, typer.Option(help="File to write instead of standard output.")] = None,
-    of: Annotated[str, typer.Option(help="Of what: task files, or trajectory (exported as JSON).")] = "task",
+    out: Annotated[
+        Path | None, typer.Option(help="File to write instead of standard output.")
+    ] = None,
+    of: Annotated[
+        str, typer.Option(help="Of what: task files, or trajectory (exported as JSON).")
+    ] = "task",
 ) -> None:
     """Print the JSON schema of tasks, or of exported JSON."""
     with interrupts.postponed():
-        from brachis.apps.cli import motions  # noqa: PLC0415
+        from brachis.apps.cli import motions
 
     motions.schema_command(out, of)

@@ -54,45 +54,71 @@ class RatioBounds:
     def worst(self) -> tuple[float, str, float]:
         """Largest ratio, of what, and when, s."""
         row, column = np.unravel_index(np.argmax(self.ratios), self.ratios.shape)
-        return float(self.ratios[row, column]), self.subjects[column], float(self.t[row])
+        return (
+            float(self.ratios[row, column]),
+            self.subjects[column],
+            float(self.t[row]),
+        )
 
 
 def bound_ratios(trajectory: Trajectory) -> tuple[RatioBounds, ...]:
     """Compare the rows of an imported motion with every limit of its task; nothing where the rows are not known."""
-    assert trajectory.recovered is not None  # noqa: S101  (it was imported)
+    assert trajectory.recovered is not None
     t = trajectory.recovered.rows[:, 0]
     if not len(t):
         return ()
     robot, _ = bind(trajectory.robot, trajectory.task.task_space)
     return tuple(
-        RatioBounds(limit.name, tuple(label.subject for label in limit.labels), t, _bound_limit(trajectory, limit))
+        RatioBounds(
+            limit.name,
+            tuple(label.subject for label in limit.labels),
+            t,
+            _bound_limit(trajectory, limit),
+        )
         for limit in limits_of(robot, trajectory.task)
     )
 
 
 def _bound_limit(trajectory: Trajectory, limit: Limit) -> np.ndarray:
     """Return the sizes of the ratios to one limit, (K, c)."""
-    assert trajectory.recovered is not None  # noqa: S101
+    assert trajectory.recovered is not None
     t = trajectory.recovered.rows[:, 0]
     count = len(t)
     found = np.zeros((count, len(limit.labels)))
     order = _order(limit, _means(trajectory, np.arange(1)[:, None])[0])
-    towards = np.where(np.isfinite(limit.centre), limit.centre, np.where(np.isfinite(limit.upper), -np.inf, np.inf))
+    towards = np.where(
+        np.isfinite(limit.centre),
+        limit.centre,
+        np.where(np.isfinite(limit.upper), -np.inf, np.inf),
+    )
     alone = limit.role is not Role.ROBOT or limit.where == "whole"
     for stride in _STRIDES[:1] if alone else _STRIDES:
-        windows = np.arange(max(count - order * stride, 0))[:, None] + stride * np.arange(order + 1)
+        windows = np.arange(max(count - order * stride, 0))[
+            :, None
+        ] + stride * np.arange(order + 1)
         windows = windows[~_across(trajectory, windows, limit.breaks)]
         if not len(windows):
             continue
         moments, errors = _means(trajectory, windows)
         partials = limit.partials(moments)
         slopes = (partials.q, partials.qdot, partials.qddot, partials.qdddot)
-        products = [np.abs(slope) @ error for slope, error in zip(slopes, errors, strict=True) if slope is not None]
+        products = [
+            np.abs(slope) @ error
+            for slope, error in zip(slopes, errors, strict=True)
+            if slope is not None
+        ]
         off = np.sum(products, axis=0)[:, :, 0]
         values = limit.values(moments)
         values = values - np.clip(values - towards, -off, off)
         if limit.where == "whole":
-            return np.abs(limit.ratio(np.trapezoid(values, t[windows[:, order // 2]], axis=0) / t[-1]))[None] + found
+            return (
+                np.abs(
+                    limit.ratio(
+                        np.trapezoid(values, t[windows[:, order // 2]], axis=0) / t[-1]
+                    )
+                )[None]
+                + found
+            )
         np.maximum.at(found, windows[:, order // 2], np.abs(limit.ratio(values)))
     return found
 
@@ -104,14 +130,20 @@ def _order(limit: Limit, moments: Moments) -> int:
     return max(order for order, part in enumerate(asked) if part is not None)
 
 
-def _across(trajectory: Trajectory, windows: np.ndarray, breaks: np.ndarray) -> np.ndarray:
+def _across(
+    trajectory: Trajectory, windows: np.ndarray, breaks: np.ndarray
+) -> np.ndarray:
     """Tell for windows of rows, (W, m + 1), whether the limit changes abruptly within them, (W,)."""
     t = trajectory.recovered.rows[:, 0]  # type: ignore[union-attr]
-    first, last = (trajectory.path_spline(t[windows[:, end]])[:, None] for end in (0, -1))
+    first, last = (
+        trajectory.path_spline(t[windows[:, end]])[:, None] for end in (0, -1)
+    )
     return np.asarray(((first < breaks) & (breaks < last)).any(axis=1))
 
 
-def _means(trajectory: Trajectory, windows: np.ndarray) -> tuple[Moments, list[np.ndarray]]:
+def _means(
+    trajectory: Trajectory, windows: np.ndarray
+) -> tuple[Moments, list[np.ndarray]]:
     """Differentiate the polynomials through m + 1 rows each, in the middle of windows of rows, (W, m + 1).
 
     Returns
@@ -122,14 +154,18 @@ def _means(trajectory: Trajectory, windows: np.ndarray) -> tuple[Moments, list[n
         What the errors of the rows add to q and each derivative at most.
     """
     recovered = trajectory.recovered
-    assert recovered is not None  # noqa: S101
+    assert recovered is not None
     t, q = recovered.rows[windows, 0], recovered.rows[windows, 1:]
     order = windows.shape[1] - 1
     middle = 0.5 * (t[:, order // 2] + t[:, (order + 1) // 2])
     unit = np.max(t[:, -1] - t[:, 0], initial=0.0) or 1.0
     powers = ((t - middle[:, None]) / unit)[:, :, None] ** np.arange(order + 1)
-    weights = np.linalg.inv(powers) * [[factorial(power) / unit**power] for power in range(order + 1)]
-    weights = np.concatenate([weights, np.zeros((len(windows), 3 - order, order + 1))], axis=1)
+    weights = np.linalg.inv(powers) * [
+        [factorial(power) / unit**power] for power in range(order + 1)
+    ]
+    weights = np.concatenate(
+        [weights, np.zeros((len(windows), 3 - order, order + 1))], axis=1
+    )
     errors = np.abs(weights).sum(axis=2)[:, :, None] * recovered.error
     found, qdot, qddot, qdddot = np.moveaxis(weights @ q, 1, 0)
     moments = Moments(found, qdot, qddot, qdddot, trajectory.path_spline(middle))
@@ -170,7 +206,11 @@ class Use:
         """Say how much today's motion uses for certain, and how much it may."""
         proven = f"{100.0 * self.today:.1f} %"
         possible = f"{100.0 * self.today_up_to:.1f} %"
-        return proven if proven == possible else f"{proven}, between the rows up to {possible}"
+        return (
+            proven
+            if proven == possible
+            else f"{proven}, between the rows up to {possible}"
+        )
 
 
 @dataclass(frozen=True, repr=False)
@@ -220,7 +260,9 @@ class Comparison(Summary):
             limit = check.name.removesuffix(" ratio")
             if check.of_limit and limit in today and check.name in found:
                 up_to = max(today[limit][0], found[check.name].value)
-                uses.append(Use(limit, *today[limit], up_to, check.value, check.subject or ""))
+                uses.append(
+                    Use(limit, *today[limit], up_to, check.value, check.subject or "")
+                )
         return tuple(uses)
 
     @property
@@ -248,13 +290,23 @@ class Comparison(Summary):
             for use in self.exceeded
         )
         unknown = "the rows of today's motion are not known: import its CSV file again to compare it with the limits"
-        remarks = {jumps: self.today.task.spline.rest != "full", unknown: not self.proven}
+        remarks = {
+            jumps: self.today.task.spline.rest != "full",
+            unknown: not self.proven,
+        }
         return (*exceeded, *(remark for remark, holds in remarks.items() if holds))
 
     def summary(self) -> dict[str, object]:
         """Return what is shown."""
-        uses = (f"{use.limit} {use.today_in_words} today, {100.0 * use.planned:.1f} % planned" for use in self.uses)
-        return {"verdict": self.verdict, "limits used": "; ".join(uses), "remarks": "; ".join(self.remarks) or "none"}
+        uses = (
+            f"{use.limit} {use.today_in_words} today, {100.0 * use.planned:.1f} % planned"
+            for use in self.uses
+        )
+        return {
+            "verdict": self.verdict,
+            "limits used": "; ".join(uses),
+            "remarks": "; ".join(self.remarks) or "none",
+        }
 
     def __str__(self) -> str:
         """Say all in plain words."""
@@ -264,12 +316,12 @@ class Comparison(Summary):
             f"{100.0 * use.planned:.1f} % in the plan ({use.planned_at})"
             for use in self.uses
         ]
-        assert self.today.recovered is not None  # noqa: S101  (it was imported)
+        assert self.today.recovered is not None
         return "\n".join([*lines, *self.today.recovered.told])
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
-        assert self.today.recovered is not None  # noqa: S101
+        assert self.today.recovered is not None
         return {
             "t_end": self.result.t_end,
             "t_end_today": self.today.t_end,

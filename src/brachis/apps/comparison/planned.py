@@ -105,12 +105,15 @@ def compare(
         except PlanningError as error:
             failure = failure or error
             continue
-        if best is None or (result.verified, -result.t_end) > (best.verified, -best.t_end):
+        if best is None or (result.verified, -result.t_end) > (
+            best.verified,
+            -best.t_end,
+        ):
             best = result
         if best.verified and best.t_end <= today.t_end:
             break
     if best is None:
-        assert failure is not None  # noqa: S101  (else there would be a plan)
+        assert failure is not None
         raise failure
     return Comparison(today, verification, bound_ratios(today), best)
 
@@ -124,7 +127,9 @@ def _tasks(today: Trajectory, *, keep_end: bool) -> Iterator[Task]:
     spline = task.spline
     if spline.intervals != "auto":
         finer = min(_MOST, _FINER * spline.intervals)
-        spline = SplineSettings.model_validate({**spline.model_dump(), "intervals": finer})
+        spline = SplineSettings.model_validate(
+            {**spline.model_dump(), "intervals": finer}
+        )
         task = task.model_copy(update={"spline": spline})
         yield task
     if task.task_space != JOINTS:
@@ -137,7 +142,7 @@ def _tasks(today: Trajectory, *, keep_end: bool) -> Iterator[Task]:
 
 def _along_joints(today: Trajectory, task: Task) -> Task:
     """Return the task of today's own joint path."""
-    from brachis.apps.recording.importing import joint_path_of  # noqa: PLC0415
+    from brachis.apps.recording.importing import joint_path_of
 
     return task.model_copy(update={"task_space": JOINTS, "path": joint_path_of(today)})
 
@@ -160,7 +165,9 @@ def plot_today(comparison: Comparison) -> Figure:
     figure = style.new_figure(style.COLUMN_WIDTH, 130.0)
     panels = figure.subplots(3, 1, sharex=True)
     motions = {"today": comparison.today, "planned": comparison.result.trajectory}
-    for (name, motion), colour, line in zip(motions.items(), style.COLOURS[1::-1], ("--", "-"), strict=True):
+    for (name, motion), colour, line in zip(
+        motions.items(), style.COLOURS[1::-1], ("--", "-"), strict=True
+    ):
         look = {"color": colour, "linestyle": line, "linewidth": style.LINE_WIDTH}
         samples, ratios = dense_samples(motion), limit_ratios(motion)
         label = f"{name}: {motion.t_end:.4f} s"
@@ -168,16 +175,26 @@ def plot_today(comparison: Comparison) -> Figure:
         panels[1].plot(samples.t, samples.tool_speed, **look)
         t, largest = ratios.t, np.abs(ratios.values).max(axis=1, initial=0.0)
         if motion is comparison.today and comparison.proven:
-            proven = np.max([each.ratios.max(axis=1) for each in comparison.proven], axis=0)
+            proven = np.max(
+                [each.ratios.max(axis=1) for each in comparison.proven], axis=0
+            )
             least = np.interp(t, comparison.proven[0].t, proven)
             label = "today, between its rows: up to"
             panels[2].fill_between(
-                t, least, np.maximum(least, largest), color=colour, alpha=0.25, linewidth=0.0, label=label
+                t,
+                least,
+                np.maximum(least, largest),
+                color=colour,
+                alpha=0.25,
+                linewidth=0.0,
+                label=label,
             )
             t, largest = comparison.proven[0].t, proven
         panels[2].plot(t, largest, **look)
     panels[2].axhline(1.0, color=style.GREY, linewidth=0.8)
-    for ax, ylabel in zip(panels, ("$s$", "tool speed (m/s)", "largest ratio to a limit"), strict=True):
+    for ax, ylabel in zip(
+        panels, ("$s$", "tool speed (m/s)", "largest ratio to a limit"), strict=True
+    ):
         style.dress(ax, r"$t$ (s)" if ax is panels[-1] else "", ylabel)
         ax.set_ylim(bottom=0.0)
     panels[0].set_xlim(0.0, max(motion.t_end for motion in motions.values()))

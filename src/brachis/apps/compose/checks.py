@@ -13,7 +13,9 @@ from brachis.errors import InputError
 
 def identifier(value: str, where: str) -> str:
     """Check a name of links and joints."""
-    if not (isinstance(value, str) and re.fullmatch(r"[A-Za-z_][\w.-]*", value, re.ASCII)):
+    if not (
+        isinstance(value, str) and re.fullmatch(r"[A-Za-z_][\w.-]*", value, re.ASCII)
+    ):
         raise InputError(
             "is not a name",
             where=where,
@@ -24,14 +26,23 @@ def identifier(value: str, where: str) -> str:
 
 
 def vector(
-    values: Sequence[float], where: str, allowed: str, *, length: int = 3, above: float = -math.inf
+    values: Sequence[float],
+    where: str,
+    allowed: str,
+    *,
+    length: int = 3,
+    above: float = -math.inf,
 ) -> tuple[float, ...]:
     """Check the number of finite components, and that each lies above a bound."""
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError):
         array = np.empty(0)
-    if array.shape != (length,) or not np.all(np.isfinite(array)) or not np.all(array > above):
+    if (
+        array.shape != (length,)
+        or not np.all(np.isfinite(array))
+        or not np.all(array > above)
+    ):
         raise InputError("is wrong", where=where, found=values, allowed=allowed)
     return tuple(float(value) for value in array)
 
@@ -41,8 +52,15 @@ def direction(values: Sequence[float], where: str) -> tuple[float, ...]:
     array = np.array(vector(values, where, "a direction [x, y, z]"))
     largest = np.abs(array).max()
     if largest == 0.0:
-        raise InputError("has no direction", where=where, found=list(values), allowed="[x, y, z], not all zero")
-    array /= largest  # the squares of very long and very short vectors are not representable
+        raise InputError(
+            "has no direction",
+            where=where,
+            found=list(values),
+            allowed="[x, y, z], not all zero",
+        )
+    array /= (
+        largest  # the squares of very long and very short vectors are not representable
+    )
     return tuple(float(value) for value in array / np.linalg.norm(array))
 
 
@@ -50,7 +68,12 @@ def interval(values: Sequence[float], where: str, unit: str) -> tuple[float, flo
     """Check a range that is finite and not empty."""
     low, high = vector(values, where, f"[low, high] in {unit}, both finite", length=2)
     if not low < high:
-        raise InputError("is empty", where=where, found=f"[{low:g}, {high:g}] {unit}", allowed="low < high")
+        raise InputError(
+            "is empty",
+            where=where,
+            found=f"[{low:g}, {high:g}] {unit}",
+            allowed="low < high",
+        )
     return low, high
 
 
@@ -61,5 +84,10 @@ def positive(value: float, where: str, unit: str) -> float:
     except (TypeError, ValueError):
         number = math.nan
     if not (math.isfinite(number) and number > 0.0):
-        raise InputError("is not positive", where=where, found=f"{value} {unit}", allowed=f"a finite number > 0 {unit}")
+        raise InputError(
+            "is not positive",
+            where=where,
+            found=f"{value} {unit}",
+            allowed=f"a finite number > 0 {unit}",
+        )
     return number

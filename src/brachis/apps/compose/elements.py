@@ -32,7 +32,12 @@ def link(name: str, *parts: Element) -> Element:
     return element
 
 
-def inertial(mass: float, com: Sequence[float], inertia: Sequence[float], rpy: Sequence[float] = ZERO) -> Element:
+def inertial(
+    mass: float,
+    com: Sequence[float],
+    inertia: Sequence[float],
+    rpy: Sequence[float] = ZERO,
+) -> Element:
     """Make an inertia: mass, centre of mass, and ixx, ixy, ixz, iyy, iyz, izz about the centre of mass.
 
     `rpy` turns the axes of the inertia against the link frame.
@@ -41,7 +46,11 @@ def inertial(mass: float, com: Sequence[float], inertia: Sequence[float], rpy: S
     _origin(element, com, rpy)
     etree.SubElement(element, "mass", value=numbers([mass]))
     keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    etree.SubElement(element, "inertia", {key: numbers([value]) for key, value in zip(keys, inertia, strict=True)})
+    etree.SubElement(
+        element,
+        "inertia",
+        {key: numbers([value]) for key, value in zip(keys, inertia, strict=True)},
+    )
     return element
 
 
@@ -68,10 +77,15 @@ def visual(
     """
     element = etree.Element("visual")
     _origin(element, xyz, rpy)
-    attributes = {key: numbers([each] if isinstance(each, (int, float)) else each) for key, each in size.items()}
+    attributes = {
+        key: numbers([each] if isinstance(each, (int, float)) else each)
+        for key, each in size.items()
+    }
     etree.SubElement(etree.SubElement(element, "geometry"), shape, attributes)
     name, rgba = colour
-    etree.SubElement(etree.SubElement(element, "material", name=name), "color", rgba=numbers(rgba))
+    etree.SubElement(
+        etree.SubElement(element, "material", name=name), "color", rgba=numbers(rgba)
+    )
     return element
 
 
@@ -94,7 +108,9 @@ def joint(
     if axis is not None:
         etree.SubElement(element, "axis", xyz=numbers(axis))
     if limit is not None:
-        etree.SubElement(element, "limit", {key: numbers([value]) for key, value in limit.items()})
+        etree.SubElement(
+            element, "limit", {key: numbers([value]) for key, value in limit.items()}
+        )
     return element
 
 
@@ -103,7 +119,10 @@ def robot_text(robot: Element) -> str:
     etree.cleanup_namespaces(robot)
     etree.indent(robot, "  ")
     comments = list(robot.itersiblings(etree.Comment, preceding=True))[::-1]
-    parts = [etree.tostring(each, encoding="unicode", with_tail=False) for each in (*comments, robot)]
+    parts = [
+        etree.tostring(each, encoding="unicode", with_tail=False)
+        for each in (*comments, robot)
+    ]
     return "\n".join(['<?xml version="1.0"?>', *parts, ""])
 
 
@@ -111,4 +130,6 @@ def _origin(element: Element, xyz: Sequence[float], rpy: Sequence[float]) -> Non
     """Add ``<origin>``, unless it would say nothing."""
     parts = {"xyz": xyz, "rpy": rpy} if any(rpy) else {"xyz": xyz}
     if any(xyz) or any(rpy):
-        etree.SubElement(element, "origin", {key: numbers(value) for key, value in parts.items()})
+        etree.SubElement(
+            element, "origin", {key: numbers(value) for key, value in parts.items()}
+        )

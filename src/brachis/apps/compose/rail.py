@@ -96,7 +96,10 @@ def relocate_meshes(robot: Element, source: Path, target: Path | None) -> None:
             path = None if by_ros or scheme != "package" else files.mesh_file(name, old)
         if path is None:
             continue
-        element.set("filename", os.path.normpath(path) if new is None else os.path.relpath(path, new))
+        element.set(
+            "filename",
+            os.path.normpath(path) if new is None else os.path.relpath(path, new),
+        )
 
 
 def check_composed(text: str, joint: str, where: str) -> None:
@@ -110,7 +113,9 @@ def check_composed(text: str, joint: str, where: str) -> None:
     """
     _, urdf = parse_urdf(text, where)
     parents = {each.child: each for each in urdf.robot.joints}
-    check_inertias(urdf, [each for each in urdf.robot.joints if each.name == joint], parents, where)
+    check_inertias(
+        urdf, [each for each in urdf.robot.joints if each.name == joint], parents, where
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,8 +174,12 @@ class Rail:
             "force": checks.positive(self.force, "force", "N"),
             "mass": checks.positive(self.mass, "mass", "kg"),
             "mount_xyz": checks.vector(self.mount_xyz, "mount_xyz", "[x, y, z] in m"),
-            "mount_rpy": checks.vector(self.mount_rpy, "mount_rpy", "[roll, pitch, yaw] in rad"),
-            "carriage_size": checks.vector(self.carriage_size, "carriage_size", "three lengths > 0 m", above=0.0),
+            "mount_rpy": checks.vector(
+                self.mount_rpy, "mount_rpy", "[roll, pitch, yaw] in rad"
+            ),
+            "carriage_size": checks.vector(
+                self.carriage_size, "carriage_size", "three lengths > 0 m", above=0.0
+            ),
         }
         for figure, value in checked.items():
             object.__setattr__(self, figure, value)
@@ -190,10 +199,17 @@ class Rail:
 
     def _check_names(self, arm: Arm, arm_root: str) -> None:
         """Refuse new names that the arm has already, be it for links or joints: frames are looked up by name."""
-        taken = dict.fromkeys(arm.joint_names, "joint") | dict.fromkeys(arm.link_names, "link")
+        taken = dict.fromkeys(arm.joint_names, "joint") | dict.fromkeys(
+            arm.link_names, "link"
+        )
         taken.pop(arm.root_link)
-        new = {self.root: "root", arm_root: "name" if arm_root != arm.root_link else "root"}
-        new |= dict.fromkeys((self.name, f"{self.name}_carriage", f"{self.name}_mount"), "name")
+        new = {
+            self.root: "root",
+            arm_root: "name" if arm_root != arm.root_link else "root",
+        }
+        new |= dict.fromkeys(
+            (self.name, f"{self.name}_carriage", f"{self.name}_mount"), "name"
+        )
         for candidate, parameter in new.items():
             if candidate in taken:
                 raise InputError(
@@ -202,7 +218,7 @@ class Rail:
                     found=f"{taken[candidate]} {candidate!r} in {arm.source}",
                     hint=f"Choose another {parameter}",
                 )
-        if len(new) < 5:  # noqa: PLR2004
+        if len(new) < 5:
             raise InputError(
                 "two of the new names are the same",
                 where="name",
@@ -215,25 +231,63 @@ class Rail:
         carriage = f"{self.name}_carriage"
         low, high = self.range
         height = self.carriage_size[2]
-        down = (pin.rpy.rpyToMatrix(*self.mount_rpy) @ np.array([0.0, 0.0, -1.0])).round(15)  # cos(pi / 2) is not 0
+        down = (
+            pin.rpy.rpyToMatrix(*self.mount_rpy) @ np.array([0.0, 0.0, -1.0])
+        ).round(15)  # cos(pi / 2) is not 0
         centre = np.array(self.mount_xyz) + 0.5 * height * down
-        beam = (centre + height * down + 0.5 * (low + high) * np.array(self.axis)).round(12)
+        beam = (
+            centre + height * down + 0.5 * (low + high) * np.array(self.axis)
+        ).round(12)
         length = high - low + max(self.carriage_size[:2])
-        heading = (0.0, -math.atan2(self.axis[2], math.hypot(*self.axis[:2])), math.atan2(self.axis[1], self.axis[0]))
-        limit = {"lower": low, "upper": high, "velocity": self.velocity, "effort": self.force}
-        colour = (f"{self.name}_grey", elements.GREY)  # a name of its own: the arm may have another grey
+        heading = (
+            0.0,
+            -math.atan2(self.axis[2], math.hypot(*self.axis[:2])),
+            math.atan2(self.axis[1], self.axis[0]),
+        )
+        limit = {
+            "lower": low,
+            "upper": high,
+            "velocity": self.velocity,
+            "effort": self.force,
+        }
+        colour = (
+            f"{self.name}_grey",
+            elements.GREY,
+        )  # a name of its own: the arm may have another grey
         inertia = elements.box_inertia(self.mass, self.carriage_size)
         return [
             elements.link(
-                self.root, elements.visual("box", {"size": (length, height, height)}, colour, xyz=beam, rpy=heading)
+                self.root,
+                elements.visual(
+                    "box",
+                    {"size": (length, height, height)},
+                    colour,
+                    xyz=beam,
+                    rpy=heading,
+                ),
             ),
-            elements.joint(self.name, "prismatic", self.root, carriage, axis=self.axis, limit=limit),
+            elements.joint(
+                self.name, "prismatic", self.root, carriage, axis=self.axis, limit=limit
+            ),
             elements.link(
                 carriage,
                 elements.inertial(self.mass, centre, inertia, self.mount_rpy),
-                elements.visual("box", {"size": self.carriage_size}, colour, xyz=centre, rpy=self.mount_rpy),
+                elements.visual(
+                    "box",
+                    {"size": self.carriage_size},
+                    colour,
+                    xyz=centre,
+                    rpy=self.mount_rpy,
+                ),
             ),
-            elements.joint(f"{self.name}_mount", "fixed", carriage, arm_root, xyz=self.mount_xyz, rpy=self.mount_rpy),
+            elements.joint(
+                f"{self.name}_mount",
+                "fixed",
+                carriage,
+                arm_root,
+                xyz=self.mount_xyz,
+                rpy=self.mount_rpy,
+            ),
         ]
 
 
@@ -287,7 +341,9 @@ def on_rail(
     with writing_errors(target or ""):
         known = None if target is None else status_of(target)
     if known is not None and os.path.samestat(known, source.stat()):
-        raise InputError("is the arm's own file", where=f"output {target}", allowed="another file")
+        raise InputError(
+            "is the arm's own file", where=f"output {target}", allowed="another file"
+        )
     text = rail.mount(arm, target, meshes=meshes)
     check_composed(text, rail.name, str(source))
     if target is not None:

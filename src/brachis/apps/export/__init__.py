@@ -11,7 +11,13 @@ from brachis.apps.export.animation import export_gif, export_mp4
 from brachis.apps.export.formats import FORMATS, Exporter, Format, format_of, write
 from brachis.apps.export.ros2 import TOPIC, export_mcap, export_ros2_yaml
 from brachis.apps.export.rows import LeftOutWarning
-from brachis.apps.export.tables import SCHEMA_ID, export_csv, export_json, export_parquet, samples_schema
+from brachis.apps.export.tables import (
+    SCHEMA_ID,
+    export_csv,
+    export_json,
+    export_parquet,
+    samples_schema,
+)
 from brachis.apps.export.urscript import export_urscript
 
 __all__ = [

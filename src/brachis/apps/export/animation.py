@@ -22,7 +22,12 @@ import numpy as np
 from brachis.apps.plots import style
 from brachis.apps.plots.motion import dense_samples, joint_lines
 from brachis.apps.plots.overview import draw_holding
-from brachis.apps.plots.postures import add_posture_axes, draw_postures, drawing_plane, skeleton
+from brachis.apps.plots.postures import (
+    add_posture_axes,
+    draw_postures,
+    drawing_plane,
+    skeleton,
+)
 from brachis.common.files import atomic_write
 from brachis.errors import InputError
 from brachis.robot import task_map_of
@@ -44,7 +49,9 @@ def frame_times(trajectory: Trajectory, dt: float) -> np.ndarray:
     return np.minimum(times, trajectory.t_end)
 
 
-def frames(trajectory: Trajectory, times: np.ndarray, slower: float = 1.0) -> Iterator[tuple[Figure, np.ndarray]]:
+def frames(
+    trajectory: Trajectory, times: np.ndarray, slower: float = 1.0
+) -> Iterator[tuple[Figure, np.ndarray]]:
     """Yield the figure, ever the same one, and its pixels, (height, width, 4) uint8, at every time.
 
     The robot moves over its tool's path and over postures at regular times, with the time written above. Beside it are
@@ -58,7 +65,7 @@ def frames(trajectory: Trajectory, times: np.ndarray, slower: float = 1.0) -> It
     slower : float, optional
         How many times slower the motion is played, which is written above.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415  (imports in 0.3 s)
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     figure = style.new_figure(_WIDTH, _HEIGHT)
     figure.set_dpi(DPI)
@@ -70,23 +77,39 @@ def frames(trajectory: Trajectory, times: np.ndarray, slower: float = 1.0) -> It
     lines = joint_lines(panels, trajectory)
     style.legend_below(figure, _WIDTH - 10.0, list(lines.values()), list(lines))
     task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
-    view = list(drawing_plane(trajectory.robot, trajectory.q[0], task_map.axes) or (0, 1, 2))
+    view = list(
+        drawing_plane(trajectory.robot, trajectory.q[0], task_map.axes) or (0, 1, 2)
+    )
     bones = skeleton(trajectory.robot, trajectory.position(times)).bones[:, :, view]
     look = {"color": "black", "animated": True}
-    (links,) = ax.plot(*bones[0].T, linewidth=3.0, solid_capstyle="round", zorder=30.0, gid="robot", **look)
-    (tool,) = ax.plot(*bones[0, -1:].T, "o", markersize=6.0, zorder=31.0, gid="tool", **look)
-    cursors = [panel.axvline(0.0, color=style.GREY, linewidth=1.0, animated=True, gid="now") for panel in panels]
+    (links,) = ax.plot(
+        *bones[0].T,
+        linewidth=3.0,
+        solid_capstyle="round",
+        zorder=30.0,
+        gid="robot",
+        **look,
+    )
+    (tool,) = ax.plot(
+        *bones[0, -1:].T, "o", markersize=6.0, zorder=31.0, gid="tool", **look
+    )
+    cursors = [
+        panel.axvline(0.0, color=style.GREY, linewidth=1.0, animated=True, gid="now")
+        for panel in panels
+    ]
     pace = f", {slower:g} times slower" if slower != 1.0 else ""
     title = figure.suptitle(f"t{pace}", fontsize=style.LABEL_SIZE)
     canvas.draw()
-    figure.set_layout_engine("none")  # it would find the same layout for every picture anew
+    figure.set_layout_engine(
+        "none"
+    )  # it would find the same layout for every picture anew
     title.set_animated(True)
     canvas.draw()
     still = canvas.copy_from_bbox(figure.bbox)
     for t, now in zip(times.tolist(), bones, strict=True):
         for artist, points in ((links, now), (tool, now[-1:])):
             artist.set_data(*points.T[:2])
-            if points.shape[1] > 2:  # noqa: PLR2004  (in space)
+            if points.shape[1] > 2:
                 artist.set_3d_properties(points[:, 2])
         title.set_text(f"t = {t:.2f} s of {trajectory.t_end:.3f} s{pace}")
         canvas.restore_region(still)
@@ -98,7 +121,11 @@ def frames(trajectory: Trajectory, times: np.ndarray, slower: float = 1.0) -> It
 
 
 def pictures(
-    trajectory: Trajectory, dt: float, step: float, joints: Sequence[str] | None, slower: float
+    trajectory: Trajectory,
+    dt: float,
+    step: float,
+    joints: Sequence[str] | None,
+    slower: float,
 ) -> Iterator[np.ndarray]:
     """Yield pictures, (height, width, 3) uint8, of a motion.
 
@@ -121,13 +148,22 @@ def pictures(
     """
     if joints is not None:
         problem = "an animation shows the whole robot"
-        raise InputError(problem, where="joints", found=", ".join(joints), allowed="all joints")
+        raise InputError(
+            problem, where="joints", found=", ".join(joints), allowed="all joints"
+        )
     if not 0.0 < slower < np.inf:
-        raise InputError("out of range", where="slower", found=slower, allowed="> 0: 10 is ten times slower")
+        raise InputError(
+            "out of range",
+            where="slower",
+            found=slower,
+            allowed="> 0: 10 is ten times slower",
+        )
     usable = np.isfinite(dt) and dt > 0.0 and slower * trajectory.t_end / dt < MOST
-    if not usable or abs(dt / step - round(dt / step)) > 1e-6:  # noqa: PLR2004
+    if not usable or abs(dt / step - round(dt / step)) > 1e-6:
         allowed = f"a multiple of {step:g} s, for at most {MOST} pictures"
-        raise InputError("is no period of an animation", where="dt", found=f"{dt} s", allowed=allowed)
+        raise InputError(
+            "is no period of an animation", where="dt", found=f"{dt} s", allowed=allowed
+        )
     for _, pixels in frames(trajectory, frame_times(trajectory, dt / slower), slower):
         yield pixels[:, :, :3].copy()
 
@@ -155,15 +191,28 @@ def export_gif(
     InputError
         `dt` is no multiple of 0.01 s, or `joints` are named.
     """
-    from PIL import Image  # noqa: PLC0415  (Matplotlib needs it, too)
+    from PIL import Image
 
-    images = [Image.fromarray(each) for each in pictures(trajectory, dt, _STEP, joints, slower)]
+    images = [
+        Image.fromarray(each)
+        for each in pictures(trajectory, dt, _STEP, joints, slower)
+    ]
     palette = images[len(images) // 2].quantize(_COLOURS)
-    first, *others = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
+    first, *others = (
+        image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images
+    )
     period = round(1e3 * dt)
     durations = [*[period] * len(others), round(1e3 * _PAUSE)]
     with atomic_write(path) as stream:
-        first.save(stream, format="GIF", save_all=True, append_images=others, duration=durations, loop=0, optimize=True)
+        first.save(
+            stream,
+            format="GIF",
+            save_all=True,
+            append_images=others,
+            duration=durations,
+            loop=0,
+            optimize=True,
+        )
 
 
 _STEP_MP4 = 1e-3
@@ -188,19 +237,31 @@ def export_mp4(
     """
     program = shutil.which(_PROGRAM)
     if program is None:
-        raise InputError("an MP4 file needs ffmpeg, which is not installed", hint="Install ffmpeg, or write a GIF")
+        raise InputError(
+            "an MP4 file needs ffmpeg, which is not installed",
+            hint="Install ffmpeg, or write a GIF",
+        )
     with tempfile.TemporaryDirectory(prefix="brachis-") as folder:
-        film = Path(folder) / "film.mp4"  # a file with a name: MP4 is not written from its beginning to its end
+        film = (
+            Path(folder) / "film.mp4"
+        )  # a file with a name: MP4 is not written from its beginning to its end
         _encode(program, pictures(trajectory, dt, _STEP_MP4, joints, slower), dt, film)
         with atomic_write(path) as stream:
             stream.write(film.read_bytes())
 
 
-def _encode(program: str, all_pictures: Iterator[np.ndarray], dt: float, film: Path) -> None:
+def _encode(
+    program: str, all_pictures: Iterator[np.ndarray], dt: float, film: Path
+) -> None:
     """Let ffmpeg make a film of pictures."""
     first = next(all_pictures)
-    height, width = first.shape[0] // 2 * 2, first.shape[1] // 2 * 2  # H.264 halves the colours' resolution
-    given = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r 1000/{round(1e3 * dt)} -i -"
+    height, width = (
+        first.shape[0] // 2 * 2,
+        first.shape[1] // 2 * 2,
+    )  # H.264 halves the colours' resolution
+    given = (
+        f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r 1000/{round(1e3 * dt)} -i -"
+    )
     made = "-an -pix_fmt yuv420p -movflags +faststart"
     with tempfile.TemporaryFile() as told:
         with subprocess.Popen(  # noqa: S603  (no shell, and nothing of the user's in the arguments)
@@ -209,7 +270,7 @@ def _encode(program: str, all_pictures: Iterator[np.ndarray], dt: float, film: P
             stdout=told,
             stderr=told,
         ) as process:
-            assert process.stdin is not None  # noqa: S101
+            assert process.stdin is not None
             try:
                 for picture in (first, *all_pictures):
                     process.stdin.write(picture[:height, :width].tobytes())
@@ -218,4 +279,7 @@ def _encode(program: str, all_pictures: Iterator[np.ndarray], dt: float, film: P
                 pass
         if process.returncode:
             told.seek(0)
-            raise InputError("ffmpeg cannot make the film", found=told.read().decode(errors="replace").strip())
+            raise InputError(
+                "ffmpeg cannot make the film",
+                found=told.read().decode(errors="replace").strip(),
+            )

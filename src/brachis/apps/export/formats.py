@@ -63,11 +63,23 @@ FORMATS: dict[str, Format] = {
     "csv": Format("table of t, q_, qd_, qdd_, tau_ of every joint", ".csv", export_csv),
     "parquet": Format("the same table in binary columns", ".parquet", export_parquet),
     "json": Format("samples, with a schema", ".json", export_json),
-    "ros2": Format("trajectory_msgs/JointTrajectory as YAML", ".yaml", export_ros2_yaml, dt=0.01),
-    "mcap": Format("trajectory_msgs/JointTrajectory in an MCAP bag", ".mcap", export_mcap, dt=0.01),
-    "urscript": Format("program of servoj commands", ".script", export_urscript, dt=0.002, last="hold"),
+    "ros2": Format(
+        "trajectory_msgs/JointTrajectory as YAML", ".yaml", export_ros2_yaml, dt=0.01
+    ),
+    "mcap": Format(
+        "trajectory_msgs/JointTrajectory in an MCAP bag", ".mcap", export_mcap, dt=0.01
+    ),
+    "urscript": Format(
+        "program of servoj commands", ".script", export_urscript, dt=0.002, last="hold"
+    ),
     "gif": Format("animation", ".gif", export_gif, dt=0.04, animated=True),
-    "mp4": Format("animation, where ffmpeg is installed", ".mp4", export_mp4, dt=0.04, animated=True),
+    "mp4": Format(
+        "animation, where ffmpeg is installed",
+        ".mp4",
+        export_mp4,
+        dt=0.04,
+        animated=True,
+    ),
 }
 """Formats by name."""
 
@@ -149,7 +161,12 @@ def write(
     chosen = format_of(path, form)
     if slower != 1.0 and not chosen.animated:
         allowed = ", ".join(each.suffix for each in FORMATS.values() if each.animated)
-        raise InputError("only animations may be slower", where="slower", found=slower, allowed=f"1, or {allowed}")
+        raise InputError(
+            "only animations may be slower",
+            where="slower",
+            found=slower,
+            allowed=f"1, or {allowed}",
+        )
     chosen.export(
         motion_of(trajectory),
         path,

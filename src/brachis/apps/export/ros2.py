@@ -32,9 +32,14 @@ def message_of(rows: JointRows) -> dict[str, Any]:
             "velocities": qdot,
             "accelerations": qddot,
             "effort": [],
-            "time_from_start": dict(zip(("sec", "nanosec"), divmod(round(t * _NANO), _NANO), strict=True)),
+            "time_from_start": dict(
+                zip(("sec", "nanosec"), divmod(round(t * _NANO), _NANO), strict=True)
+            ),
         }
-        for t, q, qdot, qddot in zip(*(part.tolist() for part in (rows.t, rows.q, rows.qdot, rows.qddot)), strict=True)
+        for t, q, qdot, qddot in zip(
+            *(part.tolist() for part in (rows.t, rows.q, rows.qdot, rows.qddot)),
+            strict=True,
+        )
     ]
     header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
     return {"header": header, "joint_names": list(rows.joints), "points": points}
@@ -52,7 +57,11 @@ def export_ros2_yaml(
     rows = rows_of(trajectory, dt, last, joints)
     message = message_of(rows)
     lines = [f"# {MESSAGE}", *(f"# {sentence}" for sentence in rows.left_out)]
-    lines += [f"header: {_flow(message['header'])}", f"joint_names: {_flow(message['joint_names'])}", "points:"]
+    lines += [
+        f"header: {_flow(message['header'])}",
+        f"joint_names: {_flow(message['joint_names'])}",
+        "points:",
+    ]
     for point in message["points"]:
         first, *others = (f"{name}: {_flow(value)}" for name, value in point.items())
         lines += [f"- {first}", *(f"  {other}" for other in others)]
@@ -60,7 +69,7 @@ def export_ros2_yaml(
         stream.write(("\n".join(lines) + "\n").encode())
 
 
-def _flow(value: Any) -> str:  # noqa: ANN401
+def _flow(value: Any) -> str:
     """Write a value in YAML's flow style, which is JSON's but for floats: those of YAML 1.1 have a point."""
     if isinstance(value, float):
         text = repr(value)
@@ -68,7 +77,9 @@ def _flow(value: Any) -> str:  # noqa: ANN401
     if isinstance(value, list):
         return f"[{', '.join(map(_flow, value))}]"
     if isinstance(value, dict):
-        return f"{{{', '.join(f'{key}: {_flow(each)}' for key, each in value.items())}}}"
+        return (
+            f"{{{', '.join(f'{key}: {_flow(each)}' for key, each in value.items())}}}"
+        )
     return json.dumps(value)
 
 

@@ -58,10 +58,16 @@ class JointRows:
         """Yield names and values, (K,), of a table: ``t``, then ``q_``, ``qd_``, ``qdd_``, ``tau_`` of every joint."""
         yield "t", self.t
         for prefix, quantity in COLUMNS.items():
-            yield from zip((f"{prefix}_{joint}" for joint in self.joints), getattr(self, quantity).T, strict=True)
+            yield from zip(
+                (f"{prefix}_{joint}" for joint in self.joints),
+                getattr(self, quantity).T,
+                strict=True,
+            )
 
 
-def rows_of(trajectory: Trajectory, dt: float, last: str, joints: Sequence[str] | None) -> JointRows:
+def rows_of(
+    trajectory: Trajectory, dt: float, last: str, joints: Sequence[str] | None
+) -> JointRows:
     """Sample joints of a trajectory.
 
     Parameters
@@ -87,7 +93,11 @@ def rows_of(trajectory: Trajectory, dt: float, last: str, joints: Sequence[str] 
         A joint that moves is not among them.
     """
     names = trajectory.joint_names
-    chosen = tuple(name for name in names if name != ROLL_JOINT) if joints is None else tuple(joints)
+    chosen = (
+        tuple(name for name in names if name != ROLL_JOINT)
+        if joints is None
+        else tuple(joints)
+    )
     unknown = [name for name in chosen if name not in names]
     if unknown:
         raise UnknownNameError("joint", unknown[0], names, where="joints")
@@ -95,19 +105,25 @@ def rows_of(trajectory: Trajectory, dt: float, last: str, joints: Sequence[str] 
     samples = trajectory.sample(dt, last=last)
     parts = (getattr(samples, quantity)[:, index] for quantity in COLUMNS.values())
     units = tuple(trajectory.robot.position_units[each] for each in index)
-    left_out = tuple(_list_missing(trajectory, np.vstack([trajectory.q, samples.q]), chosen))
+    left_out = tuple(
+        _list_missing(trajectory, np.vstack([trajectory.q, samples.q]), chosen)
+    )
     if left_out:
         hint = "Move what is missing by its own controller at the same time, or write all joints"
         warnings.warn(f"{'; '.join(left_out)}. {hint}", LeftOutWarning, stacklevel=4)
     return JointRows(chosen, units, left_out, samples.t, samples.s, *parts)
 
 
-def _list_missing(trajectory: Trajectory, q: np.ndarray, chosen: Sequence[str]) -> Iterator[str]:
+def _list_missing(
+    trajectory: Trajectory, q: np.ndarray, chosen: Sequence[str]
+) -> Iterator[str]:
     """Yield a sentence, with its travel over postures (K, n), for every joint that moves and is not written."""
     lowest = q.min(axis=0)
     highest = q.max(axis=0)
     units = trajectory.robot.position_units
-    for joint, unit, low, high in zip(trajectory.joint_names, units, lowest, highest, strict=True):
+    for joint, unit, low, high in zip(
+        trajectory.joint_names, units, lowest, highest, strict=True
+    ):
         if joint not in (*chosen, ROLL_JOINT) and high - low > _STILL:
             travel = f"{high - low:.4g} {unit} ({low:.4g} to {high:.4g} {unit})"
             yield f"joint {joint} moves by {travel} and is not in this file"
@@ -130,4 +146,6 @@ def needed(name: str, what: str) -> ModuleType:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        raise NotInstalledError(what, name.split(".", maxsplit=1)[0], "export") from error
+        raise NotInstalledError(
+            what, name.split(".", maxsplit=1)[0], "export"
+        ) from error

@@ -50,7 +50,9 @@ def export_csv(
         text.writelines(f"# brachis: {sentence}\n" for sentence in rows.left_out)
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(names)
-        writer.writerows(np.column_stack(values).tolist())  # floats as repr: the shortest text that reads back the same
+        writer.writerows(
+            np.column_stack(values).tolist()
+        )  # floats as repr: the shortest text that reads back the same
         text.flush()
         text.detach()  # the stream is atomic_write's to close
 
@@ -68,11 +70,16 @@ def export_parquet(
     The file's metadata have a key ``brachis``: joints with their units, the end time in s, and sentences about joints
     that move and are left out.
     """
-    pyarrow, parquet = needed("pyarrow", "a Parquet file"), needed("pyarrow.parquet", "a Parquet file")
+    pyarrow, parquet = (
+        needed("pyarrow", "a Parquet file"),
+        needed("pyarrow.parquet", "a Parquet file"),
+    )
     rows = rows_of(trajectory, dt, last, joints)
     units = dict(zip(rows.joints, rows.units, strict=True))
     about = {"joints": units, "t_end_s": trajectory.t_end, "left_out": rows.left_out}
-    table = pyarrow.table(dict(rows.columns())).replace_schema_metadata({"brachis": json.dumps(about)})
+    table = pyarrow.table(dict(rows.columns())).replace_schema_metadata(
+        {"brachis": json.dumps(about)}
+    )
     with atomic_write(path) as stream:
         parquet.write_table(table, stream)
 
@@ -84,12 +91,19 @@ def samples_schema() -> dict[str, Any]:
     """Return the JSON schema of exported trajectories, draft 2020-12; also ``brachis schema --of trajectory``."""
     names = {"type": "array", "items": {"type": "string"}, "minItems": 1}
     numbers = {"type": "array", "items": {"type": "number"}, "minItems": 2}
-    per_joint = {"type": "array", "items": {"type": "array", "items": {"type": "number"}, "minItems": 1}, "minItems": 2}
+    per_joint = {
+        "type": "array",
+        "items": {"type": "array", "items": {"type": "number"}, "minItems": 1},
+        "minItems": 2,
+    }
     units = {"type": "array", "items": {"enum": ["rad", "m"]}, "minItems": 1}
     said = {
         "t": ("s", numbers),
         "s": ("path coordinate, 0 to 1", numbers),
-        "q": ("positions, rad or m, a row for each t, a column for each joint", per_joint),
+        "q": (
+            "positions, rad or m, a row for each t, a column for each joint",
+            per_joint,
+        ),
         "qdot": ("velocities, rad/s or m/s", per_joint),
         "qddot": ("accelerations, rad/s^2 or m/s^2", per_joint),
         "tau": ("torques, Nm, or forces, N", per_joint),
@@ -98,12 +112,27 @@ def samples_schema() -> dict[str, Any]:
         "$schema": {"const": SCHEMA_ID},
         "joint_names": {**names, "description": "Joints in the order of the columns."},
         "position_units": {**units, "description": "Unit of every joint's position."},
-        "t_end": {"type": "number", "exclusiveMinimum": 0, "description": "End time, s."},
-        "dt": {"type": "number", "exclusiveMinimum": 0, "description": "Period of the samples, s."},
-        "warnings": {"type": "array", "items": {"type": "string"}, "description": "Joints that move and are left out."},
+        "t_end": {
+            "type": "number",
+            "exclusiveMinimum": 0,
+            "description": "End time, s.",
+        },
+        "dt": {
+            "type": "number",
+            "exclusiveMinimum": 0,
+            "description": "Period of the samples, s.",
+        },
+        "warnings": {
+            "type": "array",
+            "items": {"type": "string"},
+            "description": "Joints that move and are left out.",
+        },
         "samples": {
             "type": "object",
-            "properties": {name: {**shape, "description": text} for name, (text, shape) in said.items()},
+            "properties": {
+                name: {**shape, "description": text}
+                for name, (text, shape) in said.items()
+            },
             "required": list(said),
             "additionalProperties": False,
         },
@@ -136,8 +165,13 @@ def export_json(
         "t_end": trajectory.t_end,
         "dt": dt,
         "warnings": rows.left_out,
-        "samples": {name: getattr(rows, name).tolist() for name in ("t", "s", *COLUMNS.values())},
+        "samples": {
+            name: getattr(rows, name).tolist() for name in ("t", "s", *COLUMNS.values())
+        },
     }
-    lines = (f"  {json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in content.items())
+    lines = (
+        f"  {json.dumps(key)}: {json.dumps(value, allow_nan=False)}"
+        for key, value in content.items()
+    )
     with atomic_write(path) as stream:
         stream.write(("{\n" + ",\n".join(lines) + "\n}\n").encode())

@@ -42,7 +42,10 @@ def export_urscript(
         raise InputError(
             "servoj takes the angles of six joints",
             where="joints",
-            found=", ".join(f"{name} ({unit})" for name, unit in zip(rows.joints, rows.units, strict=True)),
+            found=", ".join(
+                f"{name} ({unit})"
+                for name, unit in zip(rows.joints, rows.units, strict=True)
+            ),
             allowed="six revolute joints, from the base on",
             hint="Name the arm's six as joints, and write others, such as a rail, in another format",
         )

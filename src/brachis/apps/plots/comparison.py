@@ -37,7 +37,9 @@ _ROW = 3
 """Case, choice, end time."""
 
 
-def plot_comparison(rows: Sequence[tuple[Case, str, float]], xlabel: str = "", unit: str = "") -> Figure:
+def plot_comparison(
+    rows: Sequence[tuple[Case, str, float]], xlabel: str = "", unit: str = ""
+) -> Figure:
     """Plot the end times of cases, one bar for each choice.
 
     Parameters
@@ -76,10 +78,14 @@ def plot_comparison(rows: Sequence[tuple[Case, str, float]], xlabel: str = "", u
     panels = math.ceil(len(cases) / max(1, _BARS_PER_PANEL // len(choices)))
     per_panel = math.ceil(len(cases) / panels)
     figure = style.new_figure(style.PAGE_WIDTH, 12.0 + 58.0 * panels)
-    height = _HEADROOM * max((t_end for t_end in cells.values() if t_end > 0.0), default=1.0)
+    height = _HEADROOM * max(
+        (t_end for t_end in cells.values() if t_end > 0.0), default=1.0
+    )
     for panel in range(panels):
         ax = figure.add_subplot(panels, 1, panel + 1)
-        _draw(ax, cases[panel * per_panel : (panel + 1) * per_panel], choices, cells, unit)
+        _draw(
+            ax, cases[panel * per_panel : (panel + 1) * per_panel], choices, cells, unit
+        )
         ax.set_xlim(-0.5, per_panel - 0.5)
         ax.set_ylim(0.0, height)
         ax.set_xlabel(xlabel if panel == panels - 1 else "")
@@ -92,22 +98,47 @@ def _cells(rows: Sequence[tuple[Case, str, float]]) -> dict[tuple[Case, str], fl
     """Check the rows and key them by case and choice."""
     if not isinstance(rows, Sequence):
         raise InputError(
-            "wrong type", where="rows", found=repr(rows), allowed="a list of (case, choice, end time in s)"
+            "wrong type",
+            where="rows",
+            found=repr(rows),
+            allowed="a list of (case, choice, end time in s)",
         )
     if not rows:
-        raise InputError("there is nothing to compare", where="rows", found="no rows", allowed="at least one")
+        raise InputError(
+            "there is nothing to compare",
+            where="rows",
+            found="no rows",
+            allowed="at least one",
+        )
     cells: dict[tuple[Case, str], float] = {}
     for number, row in enumerate(rows):
         where = f"rows[{number}]"
         if not isinstance(row, Sequence) or len(row) != _ROW or isinstance(row, str):
-            raise InputError("wrong type", where=where, found=repr(row), allowed="(case, choice, end time in s)")
+            raise InputError(
+                "wrong type",
+                where=where,
+                found=repr(row),
+                allowed="(case, choice, end time in s)",
+            )
         case, choice, t_end = row
         if not isinstance(case, str) and not math.isfinite(case):
-            raise InputError("is not a case", where=where, found=f"{case}", allowed="a finite number, or a name")
+            raise InputError(
+                "is not a case",
+                where=where,
+                found=f"{case}",
+                allowed="a finite number, or a name",
+            )
         if not (math.isnan(t_end) or 0.0 < t_end < math.inf):
-            raise InputError("is not an end time", where=where, found=f"{t_end} s", allowed="> 0 s, or NaN for no plan")
+            raise InputError(
+                "is not an end time",
+                where=where,
+                found=f"{t_end} s",
+                allowed="> 0 s, or NaN for no plan",
+            )
         if (case, choice) in cells:
-            raise InputError("comes twice", where=where, found=f"{_name(case)} with {choice!r}")
+            raise InputError(
+                "comes twice", where=where, found=f"{_name(case)} with {choice!r}"
+            )
         cells[case, choice] = t_end
     return cells
 
@@ -117,22 +148,44 @@ def _name(case: Case) -> str:
 
 
 def _draw(
-    ax: Axes, cases: Sequence[Case], choices: Sequence[str], cells: Mapping[tuple[Case, str], float], unit: str
+    ax: Axes,
+    cases: Sequence[Case],
+    choices: Sequence[str],
+    cells: Mapping[tuple[Case, str], float],
+    unit: str,
 ) -> None:
     """Draw one panel of grouped bars with their values; pairs without a row leave a gap."""
     width = _GROUP_WIDTH / len(choices)
     found = {pair: t_end for pair, t_end in cells.items() if not math.isnan(t_end)}
     for column, choice in enumerate(choices):
         shift = (column - 0.5 * (len(choices) - 1)) * width
-        places = [place + shift for place, case in enumerate(cases) if (case, choice) in found]
+        places = [
+            place + shift for place, case in enumerate(cases) if (case, choice) in found
+        ]
         times = [found[case, choice] for case in cases if (case, choice) in found]
-        ax.bar(places, times, 0.9 * width, label=style.plain(choice), **style.bar_style(column))
+        ax.bar(
+            places,
+            times,
+            0.9 * width,
+            label=style.plain(choice),
+            **style.bar_style(column),
+        )
         for place, case in enumerate(cases):
             if (case, choice) in cells:
-                best = min((found[case, other] for other in choices if (case, other) in found), default=math.nan)
-                _write(ax, place + shift, cells[case, choice], bold=cells[case, choice] == best)
+                best = min(
+                    (found[case, other] for other in choices if (case, other) in found),
+                    default=math.nan,
+                )
+                _write(
+                    ax,
+                    place + shift,
+                    cells[case, choice],
+                    bold=cells[case, choice] == best,
+                )
     style.dress(ax, "", r"$t_\mathrm{E}$ (s)")
-    ax.set_xticks(range(len(cases)), [style.plain(f"{_name(case)}{unit}") for case in cases])
+    ax.set_xticks(
+        range(len(cases)), [style.plain(f"{_name(case)}{unit}") for case in cases]
+    )
     ax.tick_params(axis="x", length=0.0)
 
 
@@ -160,9 +213,22 @@ _MARKS: dict[str, dict[str, Any]] = {
         "edgecolors": style.GREY,
         "label": "planned; as much longer or shorter as refining made the fastest",
     },
-    "refined": {"marker": "s", "color": style.COLOURS[0], "label": "refined and verified"},
-    "failed": {"marker": "x", "color": style.COLOURS[1], "label": "no verified motion (at the right edge without any)"},
-    "fastest": {"marker": "*", "color": style.COLOURS[2], "s": 60.0, "label": "the fastest"},
+    "refined": {
+        "marker": "s",
+        "color": style.COLOURS[0],
+        "label": "refined and verified",
+    },
+    "failed": {
+        "marker": "x",
+        "color": style.COLOURS[1],
+        "label": "no verified motion (at the right edge without any)",
+    },
+    "fastest": {
+        "marker": "*",
+        "color": style.COLOURS[2],
+        "s": 60.0,
+        "label": "the fastest",
+    },
 }
 
 
@@ -186,15 +252,39 @@ def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
     InputError
         There are no candidates, or they are something else.
     """
-    if not isinstance(candidates, Sequence) or not all(isinstance(each, Attempt) for each in candidates):
+    if not isinstance(candidates, Sequence) or not all(
+        isinstance(each, Attempt) for each in candidates
+    ):
         allowed = "the candidates of a result: result.candidates"
-        raise InputError("wrong type", where="candidates", found=type(candidates).__name__, allowed=allowed)
+        raise InputError(
+            "wrong type",
+            where="candidates",
+            found=type(candidates).__name__,
+            allowed=allowed,
+        )
     if not candidates:
-        raise InputError("there is nothing to draw", where="candidates", found="none", allowed="at least one")
-    candidates = [candidates[0], *(each for each in candidates[1:] if each.status != SAME_MOTION)]
+        raise InputError(
+            "there is nothing to draw",
+            where="candidates",
+            found="none",
+            allowed="at least one",
+        )
+    candidates = [
+        candidates[0],
+        *(each for each in candidates[1:] if each.status != SAME_MOTION),
+    ]
     rows = list(dict.fromkeys(_row(candidate) for candidate in candidates))
-    refining = candidates[0].t_end / candidates[0].coarse if math.isfinite(candidates[0].t_end) else 1.0
-    known = [time for each in candidates for time in [_time(each, refining, math.inf)] if math.isfinite(time)]
+    refining = (
+        candidates[0].t_end / candidates[0].coarse
+        if math.isfinite(candidates[0].t_end)
+        else 1.0
+    )
+    known = [
+        time
+        for each in candidates
+        for time in [_time(each, refining, math.inf)]
+        if math.isfinite(time)
+    ]
     edge = 1.05 * max(known, default=1.0)
     figure = style.new_figure(style.PAGE_WIDTH, _FRAME_MM + _ROW_MM * len(rows))
     ax = figure.add_subplot()
@@ -206,7 +296,11 @@ def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
     for kind, places in drawn.items():
         if places:
             times, heights = zip(*places, strict=True)
-            ax.scatter(times, heights, **{"s": 18.0, "linewidths": 0.8, "zorder": 3.0, **_MARKS[kind]})
+            ax.scatter(
+                times,
+                heights,
+                **{"s": 18.0, "linewidths": 0.8, "zorder": 3.0, **_MARKS[kind]},
+            )
     style.dress(ax, r"$t_\mathrm{E}$ (s)", "")
     ax.set_yticks(range(len(rows)), [style.plain(row) for row in rows])
     ax.set_ylim(len(rows) - 0.5, -0.5)
@@ -218,7 +312,11 @@ def plot_candidates(candidates: Sequence[Attempt]) -> Figure:
 def _row(candidate: Attempt) -> str:
     found = coordinates(candidate.redundant_joints, candidate.branch)
     joints = "no redundant joint" if found == "none" else found
-    return f"{joints}: {candidate.branch}" if candidate.branch not in {"", joints} else joints
+    return (
+        f"{joints}: {candidate.branch}"
+        if candidate.branch not in {"", joints}
+        else joints
+    )
 
 
 def _time(candidate: Attempt, refining: float, edge: float) -> float:
@@ -230,7 +328,11 @@ def _time(candidate: Attempt, refining: float, edge: float) -> float:
 def _kind(candidate: Attempt, *, first: bool) -> str:
     if candidate.verified:
         return "fastest" if first else "refined"
-    return "planned" if math.isfinite(candidate.coarse) and not math.isfinite(candidate.t_end) else "failed"
+    return (
+        "planned"
+        if math.isfinite(candidate.coarse) and not math.isfinite(candidate.t_end)
+        else "failed"
+    )
 
 
 _HEIGHT = 45.0
@@ -254,7 +356,14 @@ def plot_fit(trajectory: Trajectory) -> Figure:
     fits = [fit for fit in trajectory.task.fits if fit.profile]
     figure = style.new_figure(style.COLUMN_WIDTH, _HEIGHT * max(len(fits), 1))
     if not fits:
-        figure.text(0.5, 0.5, "the path was not fitted to points", ha="center", va="center", fontsize=style.LABEL_SIZE)
+        figure.text(
+            0.5,
+            0.5,
+            "the path was not fitted to points",
+            ha="center",
+            va="center",
+            fontsize=style.LABEL_SIZE,
+        )
     for i, fit in enumerate(fits):
         _draw_fit(figure.add_subplot(len(fits), 1, i + 1), fit)
     return figure
@@ -263,17 +372,31 @@ def plot_fit(trajectory: Trajectory) -> Figure:
 def _draw_fit(ax: Axes, fit: FitReport) -> None:
     along, distances, angles = np.array(fit.profile).T
     ax.plot(1e3 * along, 1e3 * distances, color=style.COLOURS[0], linewidth=0.6)
-    ax.axhline(1e3 * fit.position_tolerance, color=style.COLOURS[0], linewidth=0.8, linestyle="--")
+    ax.axhline(
+        1e3 * fit.position_tolerance,
+        color=style.COLOURS[0],
+        linewidth=0.8,
+        linestyle="--",
+    )
     for corner in fit.corners:
-        ax.axvline(1e3 * corner.distance, color=style.GREY, linewidth=0.6, linestyle=":")
+        ax.axvline(
+            1e3 * corner.distance, color=style.GREY, linewidth=0.6, linestyle=":"
+        )
     ax.set_xlim(0.0, 1e3 * fit.length)
     ax.set_ylim(0.0, _ROOM * 1e3 * fit.position_tolerance)
     style.dress(ax, "along the path (mm)", "distance (mm)")
     ax.set_title(style.plain(fit.source), fontsize=style.TICK_SIZE)
     if fit.orientation_error > 0.0:
         beside = ax.twinx()
-        beside.plot(1e3 * along, np.rad2deg(angles), color=style.COLOURS[1], linewidth=0.6)
-        beside.axhline(np.rad2deg(fit.orientation_tolerance), color=style.COLOURS[1], linewidth=0.8, linestyle="--")
+        beside.plot(
+            1e3 * along, np.rad2deg(angles), color=style.COLOURS[1], linewidth=0.6
+        )
+        beside.axhline(
+            np.rad2deg(fit.orientation_tolerance),
+            color=style.COLOURS[1],
+            linewidth=0.8,
+            linestyle="--",
+        )
         beside.set_ylim(0.0, _ROOM * np.rad2deg(fit.orientation_tolerance))
         style.dress(beside, "", "angle (deg)")
         beside.yaxis.label.set_color(style.COLOURS[1])

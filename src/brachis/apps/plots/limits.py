@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brachis.apps.bottleneck.saturation import RIPPLE, THRESHOLD, LimitRatios, Saturation, limit_ratios, saturations_of
+from brachis.apps.bottleneck.saturation import (
+    RIPPLE,
+    THRESHOLD,
+    LimitRatios,
+    Saturation,
+    limit_ratios,
+    saturations_of,
+)
 from brachis.apps.plots import style
 from brachis.apps.plots.motion import knot_times
 from brachis.limits import Label, Limit
@@ -26,7 +33,9 @@ _RANGE = 1.15
 
 
 @of_motion
-def plot_limits(trajectory: Trajectory, limits: Sequence[Limit] | None = None) -> Figure:
+def plot_limits(
+    trajectory: Trajectory, limits: Sequence[Limit] | None = None
+) -> Figure:
     """Plot the ratios to all limits, whatever kinds there are; of positions the places in their ranges.
 
     Parameters
@@ -53,27 +62,52 @@ def plot_limits(trajectory: Trajectory, limits: Sequence[Limit] | None = None) -
     figure = style.new_figure(style.COLUMN_WIDTH, _FRAME_MM + _PANEL_MM * len(shown))
     panels = [figure.add_subplot(len(shown), 1, row + 1) for row in range(len(shown))]
     draw_ratios(panels, trajectory, ratios, shown)
-    handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    style.legend_below(figure, style.COLUMN_WIDTH - 10.0, list(handles.values()), list(handles))
+    handles = {
+        label: line
+        for ax in panels
+        for line, label in zip(*ax.get_legend_handles_labels(), strict=True)
+    }
+    style.legend_below(
+        figure, style.COLUMN_WIDTH - 10.0, list(handles.values()), list(handles)
+    )
     style.mark_end(panels[-1], trajectory.t_end)
     figure.align_ylabels(panels)
     return figure
 
 
-def draw_ratios(panels: Sequence[Axes], trajectory: Trajectory, ratios: LimitRatios, shown: Sequence[str]) -> None:
+def draw_ratios(
+    panels: Sequence[Axes],
+    trajectory: Trajectory,
+    ratios: LimitRatios,
+    shown: Sequence[str],
+) -> None:
     """Draw what is limited, by the titles of its labels, a panel each; a subject looks the same in every panel."""
-    subjects = list(dict.fromkeys((*trajectory.joint_names, *(label.subject for label in ratios.labels))))
+    subjects = list(
+        dict.fromkeys(
+            (*trajectory.joint_names, *(label.subject for label in ratios.labels))
+        )
+    )
     for ax, title in zip(panels, shown, strict=True):
-        columns = [column for column, label in enumerate(ratios.labels) if label.axis == title]
+        columns = [
+            column for column, label in enumerate(ratios.labels) if label.axis == title
+        ]
         for column in columns:
             subject = ratios.labels[column].subject
             look = style.joint_style(subjects.index(subject))
-            ax.plot(ratios.t, ratios.values[:, column], label=style.plain(subject), **look)
+            ax.plot(
+                ratios.t, ratios.values[:, column], label=style.plain(subject), **look
+            )
         values = ratios.values[:, columns]
         top = _RANGE * max(1.0, float(np.abs(values).max()))
         for level in (-1.0, 1.0) if values.min() < 0.0 else (1.0,):
             ax.axhline(level, color=style.GREY, **style.LIMIT)
-            ax.axhspan(level, np.sign(level) * top, facecolor=style.FORBIDDEN, edgecolor="none", zorder=0.0)
+            ax.axhspan(
+                level,
+                np.sign(level) * top,
+                facecolor=style.FORBIDDEN,
+                edgecolor="none",
+                zorder=0.0,
+            )
         ax.set_ylim(-top if values.min() < 0.0 else -0.05 * top, top)
         style.dress(ax, r"$t$ (s)" if ax is panels[-1] else "", title)
         style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
@@ -90,7 +124,9 @@ _THICK = 0.84
 
 
 @of_motion
-def plot_timeline(trajectory: Trajectory, limits: Sequence[Limit] | None = None) -> Figure:
+def plot_timeline(
+    trajectory: Trajectory, limits: Sequence[Limit] | None = None
+) -> Figure:
     """Plot how near the motion is to each limit over time.
 
     Parameters
@@ -115,8 +151,14 @@ def plot_timeline(trajectory: Trajectory, limits: Sequence[Limit] | None = None)
     """
     ratios = limit_ratios(trajectory, limits)
     found = {entry.label: entry for entry in saturations_of(ratios)}
-    shown = [column for column, label in enumerate(ratios.labels) if found[label].peak > _SHOWN]
-    figure = style.new_figure(style.PAGE_WIDTH, _FRAME_MM_TIMELINE + _ROW_MM * max(len(shown), 1))
+    shown = [
+        column
+        for column, label in enumerate(ratios.labels)
+        if found[label].peak > _SHOWN
+    ]
+    figure = style.new_figure(
+        style.PAGE_WIDTH, _FRAME_MM_TIMELINE + _ROW_MM * max(len(shown), 1)
+    )
     ax = figure.add_subplot()
     for row, column in enumerate(shown):
         _draw_row(ax, row, ratios, column, found[ratios.labels[column]])
@@ -124,31 +166,64 @@ def plot_timeline(trajectory: Trajectory, limits: Sequence[Limit] | None = None)
     return figure
 
 
-def _draw_row(ax: Axes, row: int, ratios: LimitRatios, column: int, entry: Saturation) -> None:
+def _draw_row(
+    ax: Axes, row: int, ratios: LimitRatios, column: int, entry: Saturation
+) -> None:
     """Draw one limit: its ratio as colour, and the stretches on which it is active."""
     used = np.abs(ratios.values[:, column])
     edges = row - 0.5 * _THICK, row + 0.5 * _THICK
     cells = 0.5 * (used[1:] + used[:-1])[None]
-    ax.pcolormesh(ratios.t, edges, cells, cmap=_COLOURS, vmin=0.0, vmax=1.0, shading="flat", rasterized=True)
+    ax.pcolormesh(
+        ratios.t,
+        edges,
+        cells,
+        cmap=_COLOURS,
+        vmin=0.0,
+        vmax=1.0,
+        shading="flat",
+        rasterized=True,
+    )
     spans = [(stretch.begin, stretch.end - stretch.begin) for stretch in entry.active]
-    ax.broken_barh(spans, (edges[0], _THICK), facecolor=_ACTIVE, edgecolor=_ACTIVE, linewidth=0.8, label="active")
+    ax.broken_barh(
+        spans,
+        (edges[0], _THICK),
+        facecolor=_ACTIVE,
+        edgecolor=_ACTIVE,
+        linewidth=0.8,
+        label="active",
+    )
 
 
-def _dress(figure: Figure, ax: Axes, trajectory: Trajectory, labels: list[Label]) -> None:
+def _dress(
+    figure: Figure, ax: Axes, trajectory: Trajectory, labels: list[Label]
+) -> None:
     """Label rows, time and colours."""
-    from matplotlib.cm import ScalarMappable  # noqa: PLC0415
-    from matplotlib.colors import Normalize  # noqa: PLC0415
-    from matplotlib.patches import Patch  # noqa: PLC0415
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.patches import Patch
 
     style.dress(ax, r"$t$ (s)", "")
     ax.set_ylim(max(len(labels), 1) - 0.5, -0.5)
-    ax.set_yticks(range(len(labels)), [f"{style.plain(label.subject)} {label.kind}" for label in labels])
+    ax.set_yticks(
+        range(len(labels)),
+        [f"{style.plain(label.subject)} {label.kind}" for label in labels],
+    )
     ax.tick_params(axis="y", length=0.0)
     style.dress_time(ax, trajectory.t_end, knot_times(trajectory))
     if not labels:
         text = "no limit is ever used by half"
-        ax.text(0.5, 0.5, text, transform=ax.transAxes, fontsize=style.TICK_SIZE, ha="center", va="center")
-    bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), _COLOURS), ax=ax, pad=0.01, fraction=0.03)
+        ax.text(
+            0.5,
+            0.5,
+            text,
+            transform=ax.transAxes,
+            fontsize=style.TICK_SIZE,
+            ha="center",
+            va="center",
+        )
+    bar = figure.colorbar(
+        ScalarMappable(Normalize(0.0, 1.0), _COLOURS), ax=ax, pad=0.01, fraction=0.03
+    )
     bar.set_label("part of the limit", fontsize=style.LABEL_SIZE)
     bar.ax.tick_params(labelsize=style.TICK_SIZE, width=0.6, length=3.0)
     words = f"active: at {100.0 * THRESHOLD:g} % of the limit or beyond, with ripple down to {100.0 * RIPPLE:g} %"

@@ -34,7 +34,9 @@ def dense_samples(trajectory: Trajectory) -> Samples:
     knots = knot_times(trajectory)
     steps = np.arange(_POINTS_PER_INTERVAL) / _POINTS_PER_INTERVAL
     grid = (knots[:-1, None] + np.diff(knots)[:, None] * steps).ravel()
-    return trajectory.at(np.clip(np.union1d(grid, trajectory.times), 0.0, trajectory.t_end))
+    return trajectory.at(
+        np.clip(np.union1d(grid, trajectory.times), 0.0, trajectory.t_end)
+    )
 
 
 _REACH = 0.3  # of the range of all data
@@ -59,8 +61,16 @@ def plot_motion(trajectory: Trajectory) -> Figure:
         them; the faint ticks are the knots of the splines.
     """
     samples = dense_samples(trajectory)
-    found = [part for kind in ("position", "velocity") for part in quantities(trajectory, samples, kind)]
-    heights = [*(_JOINT_MM * height_of(part) for part in found), _PROGRESS_MM, _PROGRESS_MM]
+    found = [
+        part
+        for kind in ("position", "velocity")
+        for part in quantities(trajectory, samples, kind)
+    ]
+    heights = [
+        *(_JOINT_MM * height_of(part) for part in found),
+        _PROGRESS_MM,
+        _PROGRESS_MM,
+    ]
     figure = style.new_figure(style.COLUMN_WIDTH, sum(heights) + _FRAME_MM)
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     panels = [figure.add_subplot(grid[row]) for row in range(len(heights))]
@@ -96,15 +106,26 @@ def label_time_once(panels: Sequence[Axes]) -> None:
         ax.set_xlabel("")
 
 
-def draw_joints(ax: Axes, trajectory: Trajectory, part: Quantity, values: np.ndarray) -> None:
+def draw_joints(
+    ax: Axes, trajectory: Trajectory, part: Quantity, values: np.ndarray
+) -> None:
     """Draw values, (K, j), of a quantity's joints: one labelled line for each."""
     for joint, column in zip(part.joints.tolist(), values.T, strict=True):
-        ax.plot(part.t, column, label=style.plain(trajectory.joint_names[joint]), **style.joint_style(joint))
+        ax.plot(
+            part.t,
+            column,
+            label=style.plain(trajectory.joint_names[joint]),
+            **style.joint_style(joint),
+        )
 
 
 def joint_lines(panels: Sequence[Axes], trajectory: Trajectory) -> dict[str, Artist]:
     """Collect one line of every joint that the panels show, in chain order, by its label."""
-    found = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    found = {
+        label: line
+        for ax in panels
+        for line, label in zip(*ax.get_legend_handles_labels(), strict=True)
+    }
     names = map(style.plain, trajectory.joint_names)
     return {name: found[name] for name in names if name in found}
 
@@ -124,7 +145,13 @@ def draw_progress(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
 
 def draw_tool_speed(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
     """Draw the tool's speed, and what the task allows where the motion comes near it."""
-    ax.plot(samples.t, samples.tool_speed, label="tool", color="black", linewidth=style.LINE_WIDTH)
+    ax.plot(
+        samples.t,
+        samples.tool_speed,
+        label="tool",
+        color="black",
+        linewidth=style.LINE_WIDTH,
+    )
     reach = (1.0 + _REACH) * max(float(samples.tool_speed.max()), _LEAST_RANGE)
     for allowed in allowed_tool_speeds(trajectory, samples):
         near = np.where(allowed < reach, allowed, np.nan)
@@ -143,12 +170,18 @@ def _draw_limits(ax: Axes, part: Quantity) -> None:
     """Draw every joint's own limits where it comes near them; joints that share a level share its dashes."""
     reach = _REACH * max(float(np.ptp(part.values)), _LEAST_RANGE)
     levels = np.array([part.lower, part.upper])
-    near = (levels >= part.values.min(axis=0) - reach) & (levels <= part.values.max(axis=0) + reach)
+    near = (levels >= part.values.min(axis=0) - reach) & (
+        levels <= part.values.max(axis=0) + reach
+    )
     for level in np.unique(levels[near]):
         sharing = part.joints[np.any((levels == level) & near, axis=0)].tolist()
         for place, joint in enumerate(sharing):
             dashes = style.limit_dashes(place, len(sharing))
-            ax.axhline(level, color=style.joint_style(joint)["color"], **{**style.LIMIT, "linestyle": dashes})
+            ax.axhline(
+                level,
+                color=style.joint_style(joint)["color"],
+                **{**style.LIMIT, "linestyle": dashes},
+            )
 
 
 _RANGE = 1.15
@@ -187,10 +220,16 @@ def shown_torques(trajectory: Trajectory, samples: Samples) -> list[list[Quantit
     """Torques and forces by panels: those with limits in one, all of them apart by unit where no joint has a limit."""
     found = [part.limited() for part in quantities(trajectory, samples, _WHAT)]
     limited = [part for part in found if part is not None]
-    return [limited] if limited else [[part] for part in quantities(trajectory, samples, _WHAT)]
+    return (
+        [limited]
+        if limited
+        else [[part] for part in quantities(trajectory, samples, _WHAT)]
+    )
 
 
-def draw_torques(panels: Sequence[Axes], trajectory: Trajectory, found: Sequence[Sequence[Quantity]]) -> None:
+def draw_torques(
+    panels: Sequence[Axes], trajectory: Trajectory, found: Sequence[Sequence[Quantity]]
+) -> None:
     """Draw what `shown_torques` found into as many axes; one labelled line per joint."""
     for ax, parts in zip(panels, found, strict=True):
         if parts[0].limited() is None:
@@ -216,6 +255,8 @@ def _draw_band(ax: Axes, largest: float) -> None:
     top = _RANGE * max(1.0, largest)
     for sign in (-1.0, 1.0):
         ax.axhline(sign, **style.LIMIT, color=style.GREY)
-        ax.axhspan(sign, sign * top, facecolor=style.FORBIDDEN, edgecolor="none", zorder=0.0)
+        ax.axhspan(
+            sign, sign * top, facecolor=style.FORBIDDEN, edgecolor="none", zorder=0.0
+        )
     ax.axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=0.5)
     ax.set_ylim(-top, top)

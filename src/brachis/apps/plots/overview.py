@@ -54,7 +54,11 @@ def plot_overview(trajectory: Trajectory) -> Figure:
         draw: quantities(trajectory, samples, kind)
         for kind, draw in (("position", draw_progress), ("velocity", draw_tool_speed))
     }
-    heights = [_POSTURES, *(_JOINTS * height_of(part) for part in rows[draw_progress]), _PROGRESS]
+    heights = [
+        _POSTURES,
+        *(_JOINTS * height_of(part) for part in rows[draw_progress]),
+        _PROGRESS,
+    ]
     figure = style.new_figure(style.PAGE_WIDTH, sum(heights) + _FRAME)
     grid = figure.add_gridspec(len(heights), 2, height_ratios=heights)
     postures = add_posture_axes(figure, trajectory, grid[0, 0])
@@ -63,7 +67,9 @@ def plot_overview(trajectory: Trajectory) -> Figure:
     draw_holding(figure, grid[0, 1], trajectory, samples)
     joints = []
     for column, (draw, found) in enumerate(rows.items()):
-        panels = [figure.add_subplot(grid[row + 1, column]) for row in range(len(found) + 1)]
+        panels = [
+            figure.add_subplot(grid[row + 1, column]) for row in range(len(found) + 1)
+        ]
         for ax, part in zip(panels, found, strict=False):
             draw_quantity(ax, trajectory, part)
         draw(panels[-1], trajectory, samples)
@@ -71,11 +77,15 @@ def plot_overview(trajectory: Trajectory) -> Figure:
         figure.align_ylabels(panels)
         joints += panels[:-1]
     lines = joint_lines(joints, trajectory)
-    style.legend_below(figure, style.PAGE_WIDTH - 10.0, list(lines.values()), list(lines))
+    style.legend_below(
+        figure, style.PAGE_WIDTH - 10.0, list(lines.values()), list(lines)
+    )
     return figure
 
 
-def draw_holding(figure: Figure, place: SubplotSpec, trajectory: Trajectory, samples: Samples) -> list[Axes]:
+def draw_holding(
+    figure: Figure, place: SubplotSpec, trajectory: Trajectory, samples: Samples
+) -> list[Axes]:
     """Draw the limits that hold the motion, one panel below the other; see `plot_overview`."""
     ratios = limit_ratios(trajectory)
     shares: dict[str, float] = {}
@@ -83,7 +93,11 @@ def draw_holding(figure: Figure, place: SubplotSpec, trajectory: Trajectory, sam
         shares[found.label.axis] = shares.get(found.label.axis, 0.0) + found.share
     torques = shown_torques(trajectory, samples)
     of_torques = {part.share for parts in torques for part in parts}
-    longest = [title for title in sorted(shares, key=shares.__getitem__, reverse=True) if shares[title] > 0.0][:_MOST]
+    longest = [
+        title
+        for title in sorted(shares, key=shares.__getitem__, reverse=True)
+        if shares[title] > 0.0
+    ][:_MOST]
     held = [title for title in longest if title not in of_torques]
     if longest and held == longest:
         torques = []

@@ -55,13 +55,17 @@ def skeleton(robot: Robot, q: np.ndarray) -> Skeleton:
         pin.framesForwardKinematics(model, data, posture)
         points[0] = data.oMf[base].translation
         for joint in range(1, n + 1):
-            points[2 * joint - 1] = (data.oMi[model.parents[joint]] * model.jointPlacements[joint]).translation
+            points[2 * joint - 1] = (
+                data.oMi[model.parents[joint]] * model.jointPlacements[joint]
+            ).translation
             points[2 * joint] = data.oMi[joint].translation
         points[-1] = data.oMf[robot.frame_id].translation
     return Skeleton(bones, bones[:, 2:-1:2], bones[:, -1])
 
 
-def drawing_plane(robot: Robot, q: np.ndarray, axes: Sequence[int]) -> tuple[int, int] | None:
+def drawing_plane(
+    robot: Robot, q: np.ndarray, axes: Sequence[int]
+) -> tuple[int, int] | None:
     """World axes (0, 1, 2) of the plane in which a planar chain moves; None for other chains.
 
     Parameters
@@ -73,7 +77,9 @@ def drawing_plane(robot: Robot, q: np.ndarray, axes: Sequence[int]) -> tuple[int
         World axes of the task space's position rows. Two of them fix the plane; one leaves a choice.
     """
     data = robot.model.createData()
-    columns = np.asarray(pin.computeJointJacobians(robot.model, data, q)).reshape(6, robot.n)  # (6,) for one joint
+    columns = np.asarray(pin.computeJointJacobians(robot.model, data, q)).reshape(
+        6, robot.n
+    )  # (6,) for one joint
     revolute = robot.revolute
     turning, sliding = columns[3:, revolute], columns[:3, ~revolute]
     for normal in (2, 1, 0):
@@ -95,7 +101,11 @@ _WORLD = "xyz"
 _ROOM = 0.78
 """Part of the frame that the box of axes in space takes; their labels take the rest."""
 _LEAST_SPAN = 1e-3
-_VIEWS = tuple(itertools.product((15.0, 22.0, 30.0), (-75.0, -65.0, -55.0, -45.0, -35.0, -25.0, -15.0)))
+_VIEWS = tuple(
+    itertools.product(
+        (15.0, 22.0, 30.0), (-75.0, -65.0, -55.0, -45.0, -35.0, -25.0, -15.0)
+    )
+)
 """Elevations and azimuths from which axes in space may be seen, degrees."""
 
 
@@ -120,7 +130,9 @@ def plot_postures(trajectory: Trajectory) -> Figure:
     return figure
 
 
-def add_posture_axes(figure: Figure | SubFigure, trajectory: Trajectory, place: SubplotSpec | None = None) -> Axes:
+def add_posture_axes(
+    figure: Figure | SubFigure, trajectory: Trajectory, place: SubplotSpec | None = None
+) -> Axes:
     """Add axes that suit the robot: in its plane, or in space."""
     where = () if place is None else (place,)
     if plane_of(trajectory) is not None:
@@ -135,13 +147,21 @@ def draw_postures(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
     view = list(plane or (0, 1, 2))
     robot = trajectory.robot
     tool = skeleton(robot, samples.q).tool[:, view]
-    figures = skeleton(robot, trajectory.position(np.linspace(0.0, trajectory.t_end, _POSTURES)))
+    figures = skeleton(
+        robot, trajectory.position(np.linspace(0.0, trajectory.t_end, _POSTURES))
+    )
     for k, shade in enumerate(_shades()):
         _draw_links(ax, figures.bones[k][:, view], tuple(shade), k)
         _draw_joints(ax, trajectory, figures.joints[k][:, view], tuple(shade), k)
     ax.plot(*tool.T, color=_PATH_COLOUR, linewidth=1.4, zorder=20.0, gid="tool path")
     ax.plot(*tool[-1:].T, "o", color=_PATH_COLOUR, markersize=3.0, zorder=21.0)
-    ax.plot(*figures.bones[0, :1][:, view].T, marker=_GROUND, color=style.GREY, markersize=12.0, zorder=0.5)
+    ax.plot(
+        *figures.bones[0, :1][:, view].T,
+        marker=_GROUND,
+        color=style.GREY,
+        markersize=12.0,
+        zorder=0.5,
+    )
     style.dress(ax, f"${_WORLD[view[0]]}$ (m)", f"${_WORLD[view[1]]}$ (m)")
     if plane is None:
         _dress_space(ax, figures.bones.reshape(-1, 3), tool)
@@ -152,7 +172,7 @@ def draw_postures(ax: Axes, trajectory: Trajectory, samples: Samples) -> None:
 
 def legend_postures(ax: Axes, trajectory: Trajectory, width: float) -> None:
     """Put the legend above the axes; `width` is its room, mm."""
-    from matplotlib.lines import Line2D  # noqa: PLC0415
+    from matplotlib.lines import Line2D
 
     first, *_, last = _shades()
     handles: list[Artist] = [
@@ -162,8 +182,16 @@ def legend_postures(ax: Axes, trajectory: Trajectory, width: float) -> None:
     ]
     labels = ["start", "end", "tool path"]
     if trajectory.redundant_joints:
-        marker = {"linestyle": "", "markersize": 4.5, "markeredgecolor": tuple(last)}
-        handles.append(Line2D([], [], marker="o", markerfacecolor=_REDUNDANT_COLOUR, **marker))  # type: ignore[arg-type]
+        circle = Line2D(
+            [],
+            [],
+            linestyle="",
+            marker="o",
+            markersize=4.5,
+            markerfacecolor=_REDUNDANT_COLOUR,
+            markeredgecolor=tuple(last),
+        )
+        handles.append(circle)
         labels.append("redundant")
     style.legend_above(ax, width, handles, labels)
 
@@ -192,7 +220,13 @@ def _draw_links(ax: Axes, bones: np.ndarray, shade: tuple[float, ...], k: int) -
     )
 
 
-def _draw_joints(ax: Axes, trajectory: Trajectory, joints: np.ndarray, shade: tuple[float, ...], k: int) -> None:
+def _draw_joints(
+    ax: Axes,
+    trajectory: Trajectory,
+    joints: np.ndarray,
+    shade: tuple[float, ...],
+    k: int,
+) -> None:
     """Draw the joints of posture number `k`."""
     units = trajectory.robot.position_units
     for name, unit, point in zip(trajectory.joint_names, units, joints, strict=True):
@@ -202,23 +236,35 @@ def _draw_joints(ax: Axes, trajectory: Trajectory, joints: np.ndarray, shade: tu
             marker="s" if unit == "m" else "o",
             markersize=4.5,
             markeredgecolor=shade,
-            markerfacecolor=_REDUNDANT_COLOUR if name in trajectory.redundant_joints else "white",
+            markerfacecolor=_REDUNDANT_COLOUR
+            if name in trajectory.redundant_joints
+            else "white",
             zorder=2.5 + k,
         )
 
 
-def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:  # noqa: ANN401  (3-D axes have methods that Axes lacks)
+def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
     """Labels, equal scales and a floor of axes in space, seen from where points, (p, 3), fill the frame best.
 
     The tool's path, (K, 3), has its shadow on the floor.
     """
     floor = min(0.0, float(points[:, 2].min()))
-    ax.plot(*tool[:, :2].T, np.full(len(tool), floor), color=_SHADOW_COLOUR, linewidth=1.4, zorder=1.0, gid="shadow")
+    ax.plot(
+        *tool[:, :2].T,
+        np.full(len(tool), floor),
+        color=_SHADOW_COLOUR,
+        linewidth=1.4,
+        zorder=1.0,
+        gid="shadow",
+    )
     ax.set_zlabel("$z$ (m)", fontsize=style.LABEL_SIZE, labelpad=-4.0)
     ax.xaxis.labelpad = ax.yaxis.labelpad = -4.0
     ax.tick_params(pad=-2.0)
     ax.set_proj_type("ortho")
-    spans = [max(np.ptp(limits), _LEAST_SPAN) for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())]
+    spans = [
+        max(np.ptp(limits), _LEAST_SPAN)
+        for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())
+    ]
     ax.set_box_aspect(spans)
     elevation, azimuth = max(_VIEWS, key=lambda view: _filled(ax, points, *view))
     ax.view_init(elevation, azimuth)
@@ -230,7 +276,7 @@ def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:  # noqa
     _draw_floor(ax, floor)
 
 
-def _draw_floor(ax: Any, z: float) -> None:  # noqa: ANN401
+def _draw_floor(ax: Any, z: float) -> None:
     """Draw a grid of the ticks on the floor, up to the edges of the axes."""
     x, y = ax.get_xlim(), ax.get_ylim()
     inner = [
@@ -245,27 +291,29 @@ def _draw_floor(ax: Any, z: float) -> None:  # noqa: ANN401
     ax.set(xlim=x, ylim=y)
 
 
-def _filled(ax: Any, points: np.ndarray, elevation: float, azimuth: float) -> float:  # noqa: ANN401
+def _filled(ax: Any, points: np.ndarray, elevation: float, azimuth: float) -> float:
     """Tell how much of the frame points take when the axes' box just fits into it; dimensionless."""
     ax.view_init(elevation, azimuth)
     return float(np.prod(_spans(ax, points)) / _extent(ax) ** 2)
 
 
-def _extent(ax: Any) -> float:  # noqa: ANN401
+def _extent(ax: Any) -> float:
     """Part of the axes' frame that the box of 3-D axes takes, in the direction in which it takes more."""
-    corners = np.array(list(itertools.product(ax.get_xlim(), ax.get_ylim(), ax.get_zlim())))
+    corners = np.array(
+        list(itertools.product(ax.get_xlim(), ax.get_ylim(), ax.get_zlim()))
+    )
     return float(_spans(ax, corners).max())
 
 
-def _spans(ax: Any, points: np.ndarray) -> np.ndarray:  # noqa: ANN401
+def _spans(ax: Any, points: np.ndarray) -> np.ndarray:
     """Parts of the frame's width and height that points in space, (p, 3), take."""
-    from mpl_toolkits.mplot3d import proj3d  # noqa: PLC0415
+    from mpl_toolkits.mplot3d import proj3d
 
     across, up, _ = proj3d.proj_transform(*points.T, ax.get_proj())
     return np.array([np.ptp(across) / ax.viewLim.width, np.ptp(up) / ax.viewLim.height])
 
 
-def _few_ticks() -> Any:  # noqa: ANN401
-    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415
+def _few_ticks() -> Any:
+    from matplotlib.ticker import MaxNLocator
 
     return MaxNLocator(4, steps=[1, 2, 5, 10])

@@ -66,8 +66,13 @@ class Quantity:
 
     def of_joints(self, kept: np.ndarray) -> Quantity | None:
         """Return the same of some of its joints, (j,) bool; None where there is none."""
-        parts = {name: getattr(self, name)[kept] for name in ("joints", "lower", "upper", "centre")}
-        return replace(self, values=self.values[:, kept], **parts) if kept.any() else None
+        parts = {
+            name: getattr(self, name)[kept]
+            for name in ("joints", "lower", "upper", "centre")
+        }
+        return (
+            replace(self, values=self.values[:, kept], **parts) if kept.any() else None
+        )
 
     def limited(self) -> Quantity | None:
         """Return the same of the joints with limits in both directions; None where there is no such joint."""
@@ -100,9 +105,13 @@ KINDS = {
     "velocity": _Kind((r"\dot{q}", r"\dot{q}"), lambda _, samples: samples.qdot),
     "acceleration": _Kind((r"\ddot{q}", r"\ddot{q}"), lambda _, samples: samples.qddot),
     "jerk": _Kind(
-        (r"\dddot{q}", r"\dddot{q}"), lambda trajectory, samples: trajectory.jerk(samples.t), if_limited=True
+        (r"\dddot{q}", r"\dddot{q}"),
+        lambda trajectory, samples: trajectory.jerk(samples.t),
+        if_limited=True,
     ),
-    "torque": _Kind((r"\tau", "F"), lambda _, samples: samples.tau, names=("torque", "force")),
+    "torque": _Kind(
+        (r"\tau", "F"), lambda _, samples: samples.tau, names=("torque", "force")
+    ),
 }
 """Kinds of joint quantities by the name that their limits have."""
 
@@ -111,11 +120,15 @@ def kinds_of(trajectory: Trajectory) -> tuple[str, ...]:
     """Return the kinds that are of interest for a motion."""
     limits = trajectory.robot.limits
     return tuple(
-        kind for kind, own in KINDS.items() if not own.if_limited or np.isfinite(limits_of(limits, kind)).any()
+        kind
+        for kind, own in KINDS.items()
+        if not own.if_limited or np.isfinite(limits_of(limits, kind)).any()
     )
 
 
-def quantities(trajectory: Trajectory, samples: Samples, kind: str, *, degrees: bool = False) -> tuple[Quantity, ...]:
+def quantities(
+    trajectory: Trajectory, samples: Samples, kind: str, *, degrees: bool = False
+) -> tuple[Quantity, ...]:
     """Split one kind of quantity by unit: that of revolute joints first, then that of prismatic ones.
 
     Parameters
@@ -137,7 +150,9 @@ def quantities(trajectory: Trajectory, samples: Samples, kind: str, *, degrees: 
     lower, upper = limits_of(robot.limits, kind)
     values = own.values(trajectory, samples)
     found = []
-    for place, (base, of_kind) in enumerate((("rad", robot.revolute), ("m", ~robot.revolute))):
+    for place, (base, of_kind) in enumerate(
+        (("rad", robot.revolute), ("m", ~robot.revolute))
+    ):
         joints = np.flatnonzero(of_kind)
         if not len(joints):
             continue
@@ -173,4 +188,8 @@ def limits_of(limits: Limits, kind: str) -> np.ndarray:
 def allowed_tool_speeds(trajectory: Trajectory, samples: Samples) -> np.ndarray:
     """Largest speeds of the tool that the task allows, (c, K), m/s; infinite where there is no limit."""
     limit = build_tool_speed(trajectory.robot, trajectory.task)
-    return np.empty((0, len(samples.t))) if limit is None else limit.largest_at(samples.s)[0].T
+    return (
+        np.empty((0, len(samples.t)))
+        if limit is None
+        else limit.largest_at(samples.s)[0].T
+    )

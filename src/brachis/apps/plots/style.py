@@ -56,12 +56,18 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     InputError
         The suffix is not one of `SUFFIXES`, or the file cannot be written.
     """
-    import matplotlib as mpl  # noqa: PLC0415  (imports in 0.3 s, and only plots need it)
+    import matplotlib as mpl
 
     suffix = check_suffix(path)
     content = io.BytesIO()  # first, so that only errors of writing are reported as such
-    fonts: dict[Any, Any] = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "brachis"}
-    with mpl.rc_context(fonts):  # these three have no other way in; the context puts them back
+    fonts: dict[Any, Any] = {
+        "pdf.fonttype": 42,
+        "svg.fonttype": "none",
+        "svg.hashsalt": "brachis",
+    }
+    with mpl.rc_context(
+        fonts
+    ):  # these three have no other way in; the context puts them back
         figure.savefig(content, format=suffix, dpi=_DPI, metadata=_METADATA[suffix])
     with atomic_write(path) as stream:
         stream.write(content.getvalue())
@@ -92,7 +98,7 @@ _DPI_NOTEBOOK = 110
 @cache
 def figure_class() -> type[Figure]:
     """Return a class of Matplotlib's figures that notebooks show without further ado."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  (imports in 0.3 s, and only plots need it)
+    from matplotlib.figure import Figure
 
     class NotebookFigure(Figure):
         """A figure that a notebook shows."""
@@ -138,7 +144,12 @@ LINE_STYLES: tuple[Any, ...] = (
 )
 """Told apart in print without colours. One fewer than colours, so that joints far down the chain still differ."""
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----")
-LIMIT: dict[str, Any] = {"linewidth": 0.7, "linestyle": (0, (4.0, 2.0)), "zorder": 1.0, "gid": "limit"}
+LIMIT: dict[str, Any] = {
+    "linewidth": 0.7,
+    "linestyle": (0, (4.0, 2.0)),
+    "zorder": 1.0,
+    "gid": "limit",
+}
 """Line properties of limits."""
 GREY = "#666666"
 FAINT = "#CFCFCF"
@@ -188,7 +199,9 @@ def dress(ax: Axes, xlabel: str, ylabel: str) -> None:
     """Set labels, fonts and spines of one pair of axes."""
     ax.set_xlabel(xlabel, fontsize=LABEL_SIZE)
     ax.set_ylabel(ylabel, fontsize=LABEL_SIZE)
-    ax.tick_params(which="both", labelsize=TICK_SIZE, direction="in", width=0.6, colors="black")
+    ax.tick_params(
+        which="both", labelsize=TICK_SIZE, direction="in", width=0.6, colors="black"
+    )
     ax.tick_params(which="major", length=3.0)
     for spine in ax.spines.values():
         spine.set_linewidth(0.6)
@@ -215,7 +228,10 @@ def mark_end(ax: Axes, t_end: float) -> None:
 
 
 def legend_above(
-    ax: Axes, width: float, handles: Sequence[Artist] | None = None, labels: Sequence[str] | None = None
+    ax: Axes,
+    width: float,
+    handles: Sequence[Artist] | None = None,
+    labels: Sequence[str] | None = None,
 ) -> None:
     """Put a legend above the axes, in as many columns as fit.
 
@@ -246,7 +262,9 @@ def legend_above(
     )
 
 
-def legend_below(figure: Figure, width: float, handles: Sequence[Artist], labels: Sequence[str]) -> None:
+def legend_below(
+    figure: Figure, width: float, handles: Sequence[Artist], labels: Sequence[str]
+) -> None:
     """Put one legend for all axes at the foot of the figure, in as many columns as fit `width`, mm."""
     figure.legend(
         handles,
@@ -265,7 +283,10 @@ def _columns_that_fit(labels: Sequence[str], width: float) -> int:
     for columns in range(len(labels), 1, -1):
         rows, longer = divmod(len(labels), columns)
         starts = [column * rows + min(column, longer) for column in range(columns + 1)]
-        longest = [max(map(len, labels[begin:end])) for begin, end in itertools.pairwise(starts)]
+        longest = [
+            max(map(len, labels[begin:end]))
+            for begin, end in itertools.pairwise(starts)
+        ]
         if columns * _MM_PER_HANDLE + sum(longest) * _MM_PER_CHARACTER <= width:
             return columns
     return 1

@@ -64,7 +64,9 @@ class Followed:
         freeze(self, "s")
 
 
-def path_followed(task_map: TaskMap, q: np.ndarray, qdot: np.ndarray, t: np.ndarray, tolerance: float) -> Followed:
+def path_followed(
+    task_map: TaskMap, q: np.ndarray, qdot: np.ndarray, t: np.ndarray, tolerance: float
+) -> Followed:
     """Recover the path that a motion prescribes in a task space.
 
     Parameters
@@ -83,14 +85,23 @@ def path_followed(task_map: TaskMap, q: np.ndarray, qdot: np.ndarray, t: np.ndar
         The tool does not move, or follows no smooth path within the tolerance: it stops and turns off, for example.
     """
     speed = _speed(task_map, q, qdot)
-    length = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))])
+    length = np.concatenate(
+        [[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))]
+    )
     if length[-1] < tolerance:
         hint = "A task space of joints takes any motion"
-        raise PathError("the tool does not move along a path", found=f"{length[-1]:.3g} m", where="path", hint=hint)
+        raise PathError(
+            "the tool does not move along a path",
+            found=f"{length[-1]:.3g} m",
+            where="path",
+            hint=hint,
+        )
     values = task_map.values(q)
     chosen = _evenly(length)
     try:
-        segments = segments_along(_points(task_map, values[chosen], chosen), _wanted(tolerance))
+        segments = segments_along(
+            _points(task_map, values[chosen], chosen), _wanted(tolerance)
+        )
     except TaskError as error:
         raise PathError(
             "the motion follows no smooth path within the tolerance",
@@ -116,7 +127,9 @@ def _speed(task_map: TaskMap, q: np.ndarray, qdot: np.ndarray) -> np.ndarray:
 
 def _evenly(length: np.ndarray) -> np.ndarray:
     """Choose indices at about equal distances, the first and the last one among them."""
-    places = np.searchsorted(length, np.linspace(0.0, length[-1], _POINTS)).clip(max=len(length) - 1)
+    places = np.searchsorted(length, np.linspace(0.0, length[-1], _POINTS)).clip(
+        max=len(length) - 1
+    )
     chosen = np.unique(np.concatenate([[0], places, [len(length) - 1]]))
     apart = np.diff(length[chosen]) > 1e-3 * length[-1] / _POINTS
     return chosen[np.concatenate([[True], apart[:-1], [True]])]
@@ -126,7 +139,7 @@ def _points(task_map: TaskMap, values: np.ndarray, chosen: np.ndarray) -> Points
     """Make points of task coordinates, (K, c)."""
     turning = values[:, len(task_map.axes) or values.shape[1] :]
     if isinstance(task_map, Pose):
-        from scipy.spatial.transform import Rotation  # noqa: PLC0415  (imports in 0.2 s)
+        from scipy.spatial.transform import Rotation
 
         rotations = Rotation.from_matrix(turning.reshape(-1, 3, 3))
         turning = with_like_signs(np.roll(rotations.as_quat(), 1, axis=1))
@@ -143,7 +156,9 @@ def _wanted(tolerance: float) -> Wanted:
     return Wanted(source, "path", allowed, "refuse", relative=False, orientation=None)
 
 
-def _nearest(task_map: TaskMap, path: Path, values: np.ndarray, s: np.ndarray) -> np.ndarray:
+def _nearest(
+    task_map: TaskMap, path: Path, values: np.ndarray, s: np.ndarray
+) -> np.ndarray:
     """Return the path coordinates nearest to task coordinates, (K, c), from first guesses on; ascending."""
     s = s.copy()
     for _ in range(_STEPS):
@@ -160,7 +175,9 @@ _OFF = 2e-8
 """Root mean square of what the spline may differ from the path coordinates, as a part of the path."""
 
 
-def coordinate_spline(t: np.ndarray, s: np.ndarray, *, at_rest: bool) -> tuple[np.ndarray, np.ndarray]:
+def coordinate_spline(
+    t: np.ndarray, s: np.ndarray, *, at_rest: bool
+) -> tuple[np.ndarray, np.ndarray]:
     """Return knots over [0, 1] and control points of s over normalised time.
 
     Its knots lie where s bends. Control points that do not decrease make a spline that does not.
@@ -172,7 +189,7 @@ def coordinate_spline(t: np.ndarray, s: np.ndarray, *, at_rest: bool) -> tuple[n
     at_rest : bool
         Whether ds/dt vanishes at both ends.
     """
-    from scipy.interpolate import splrep  # noqa: PLC0415  (imports in 0.3 s)
+    from scipy.interpolate import splrep
 
     knots, control_points, _ = splrep(t / t[-1], s, k=DEGREE, s=len(s) * _OFF**2)
     control_points = control_points[: len(knots) - DEGREE - 1].clip(0.0, 1.0)
@@ -257,7 +274,9 @@ def import_motion(
         robot, task = None, robot
     settings = None if task is None else load_task(task)
     if robot is None and (settings is None or settings.robot.urdf is None):
-        allowed = "a URDF file, the name of a robot (brachis.robots), a Robot, or a task file"
+        allowed = (
+            "a URDF file, the name of a robot (brachis.robots), a Robot, or a task file"
+        )
         raise InputError("the robot is missing", where="robot", allowed=allowed)
     made = robot_for(located(robot), (settings or load_task(_BLANK)).robot)  # type: ignore[arg-type]
     space = task_space or (settings.task_space if settings else ik.natural_space(made))
@@ -268,23 +287,40 @@ def import_motion(
     nodes = _with_roll(nodes_of(recording, deviation), bound.n)
     t, q, qdot = _densely(nodes)
     if tolerance is None:
-        moved = np.abs(task_map.jacobian(task_map.twists(nodes.q)))[:, :, : len(deviation)] @ deviation
+        moved = (
+            np.abs(task_map.jacobian(task_map.twists(nodes.q)))[:, :, : len(deviation)]
+            @ deviation
+        )
         tolerance = float(np.clip(_DIGITS * moved.max(), _TOLERANCE, LARGEST))
     followed = path_followed(task_map, q, qdot, t, tolerance)
     if followed.miss > tolerance:
         found, allowed = f"{followed.miss:.3g} m or rad off", f"{tolerance:.3g}"
         hint = "Raise the tolerance"
-        raise PathError("the recovered path misses the motion", found=found, allowed=allowed, where="path", hint=hint)
+        raise PathError(
+            "the recovered path misses the motion",
+            found=found,
+            allowed=allowed,
+            where="path",
+            hint=hint,
+        )
     error = recording.rounding if noise is None else _DIGITS * deviation
     recovered = Recovered(
         recording.source,
         tolerance,
         _told(recording, nodes, followed, tolerance),
-        np.column_stack([recording.t, recording.q, np.zeros((len(recording.t), rolling))]),
+        np.column_stack(
+            [recording.t, recording.q, np.zeros((len(recording.t), rolling))]
+        ),
         np.append(error, np.zeros(rolling)),
     )
     wanted = _task_of(settings, bound, task_map, nodes, followed, space)
-    return _trajectory(wanted, bound, nodes, coordinate_spline(t, followed.s, at_rest=nodes.at_rest[0]), recovered)
+    return _trajectory(
+        wanted,
+        bound,
+        nodes,
+        coordinate_spline(t, followed.s, at_rest=nodes.at_rest[0]),
+        recovered,
+    )
 
 
 _BLANK: dict[str, Any] = {
@@ -300,7 +336,10 @@ def _is_task(given: object) -> bool:
     """Tell a task, or its file, from a robot."""
     return isinstance(given, Task | Mapping) or (
         isinstance(given, str | os.PathLike)
-        and (kind_of(given) is Kind.TASK or pathlib.Path(given).suffix.lower() in TASK_SUFFIXES)
+        and (
+            kind_of(given) is Kind.TASK
+            or pathlib.Path(given).suffix.lower() in TASK_SUFFIXES
+        )
     )
 
 
@@ -313,11 +352,15 @@ def _units(given: Mapping[str, str] | None) -> Units:
     """
     if given is not None and not isinstance(given, Mapping):
         allowed = '{"angle": "deg", "length": "mm", "time": "ms"}, or some of them'
-        raise InputError("wrong type", where="units", found=repr(given), allowed=allowed)
+        raise InputError(
+            "wrong type", where="units", found=repr(given), allowed=allowed
+        )
     return named(Units, "units")(**dict(given or {}))
 
 
-def _deviation(recording: Recording, noise: float | Sequence[float] | None) -> np.ndarray:
+def _deviation(
+    recording: Recording, noise: float | Sequence[float] | None
+) -> np.ndarray:
     """Return the standard deviation of every joint's positions, (n,), rad or m: as it is said, else of the digits.
 
     Raises
@@ -330,28 +373,38 @@ def _deviation(recording: Recording, noise: float | Sequence[float] | None) -> n
     n = recording.q.shape[1]
     if given.shape not in ((), (n,)) or not ((given > 0.0) & (given < np.inf)).all():
         allowed = f"> 0 rad or m, one figure or {n}"
-        raise InputError("is no standard deviation", where="noise", found=noise, allowed=allowed)
+        raise InputError(
+            "is no standard deviation", where="noise", found=noise, allowed=allowed
+        )
     return np.broadcast_to(given, n)
 
 
 def _with_roll(nodes: Nodes, n: int) -> Nodes:
     """Add the virtual joint of a freely rolling tool, which stands still."""
     still = np.zeros((len(nodes.t), n - nodes.q.shape[1]))
-    q, qdot, qddot = (np.hstack([part, still]) for part in (nodes.q, nodes.qdot, nodes.qddot))
+    q, qdot, qddot = (
+        np.hstack([part, still]) for part in (nodes.q, nodes.qdot, nodes.qddot)
+    )
     return Nodes(nodes.t, q, qdot, qddot, nodes.told)
 
 
 def _densely(nodes: Nodes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return times, positions and velocities at the nodes and between."""
-    from scipy.interpolate import BPoly  # noqa: PLC0415  (imports in 0.3 s)
+    from scipy.interpolate import BPoly
 
     steps = np.arange(_BETWEEN) / _BETWEEN
-    t = np.append((nodes.t[:-1, None] + np.diff(nodes.t)[:, None] * steps).ravel(), nodes.t[-1])
-    pieces = BPoly.from_derivatives(nodes.t, np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1))
+    t = np.append(
+        (nodes.t[:-1, None] + np.diff(nodes.t)[:, None] * steps).ravel(), nodes.t[-1]
+    )
+    pieces = BPoly.from_derivatives(
+        nodes.t, np.stack([nodes.q, nodes.qdot, nodes.qddot], axis=1)
+    )
     return t, pieces(t), pieces(t, nu=1)
 
 
-def _told(recording: Recording, nodes: Nodes, followed: Followed, tolerance: float) -> tuple[str, ...]:
+def _told(
+    recording: Recording, nodes: Nodes, followed: Followed, tolerance: float
+) -> tuple[str, ...]:
     h = 1e3 * float(np.median(np.diff(recording.t)))
     return (
         f"{len(recording.t)} rows over {recording.t[-1]:.6g} s, one every {h:.4g} ms",
@@ -374,7 +427,9 @@ def _task_of(
     """Write down the task that the motion fulfils."""
     resting, calm = nodes.at_rest
     jacobian = task_map.jacobian(task_map.twists(nodes.q[[0, -1]]))
-    speeds = task_map.norms(np.einsum("kmn,kn->km", jacobian, nodes.qdot[[0, -1]]))[0].tolist()
+    speeds = task_map.norms(np.einsum("kmn,kn->km", jacobian, nodes.qdot[[0, -1]]))[
+        0
+    ].tolist()
     given: dict[str, Any] = {} if settings is None else settings.to_dict()
     kept = ("tool_limits", "custom_limits", "search", "solver", "refinement")
     content: dict[str, Any] = {
@@ -385,14 +440,20 @@ def _task_of(
         "end": {"joints": nodes.q[-1].tolist()},
         "task_space": space,
         "path": [segment.model_dump() for segment in followed.segments],
-        "boundary": {} if resting else {"start_speed": speeds[0], "end_speed": speeds[1]},
+        "boundary": {}
+        if resting
+        else {"start_speed": speeds[0], "end_speed": speeds[1]},
         "spline": {**given.get("spline", {}), "rest": "full" if calm else "velocity"},
     }
     return load_task(content)
 
 
 def _trajectory(
-    task: Task, robot: Robot, nodes: Nodes, spline: tuple[np.ndarray, np.ndarray], recovered: Recovered
+    task: Task,
+    robot: Robot,
+    nodes: Nodes,
+    spline: tuple[np.ndarray, np.ndarray],
+    recovered: Recovered,
 ) -> Trajectory:
     knots, control_points = spline
     return Trajectory(
@@ -423,7 +484,7 @@ def joint_path_of(trajectory: Trajectory) -> tuple[Segment, ...]:
     PathError
         The joints follow no smooth path within the tolerance.
     """
-    assert trajectory.recovered is not None  # noqa: S101  (it was imported)
+    assert trajectory.recovered is not None
     _, task_map = bind(trajectory.robot, JOINTS)
     nodes = Nodes(trajectory.times, trajectory.q, trajectory.qdot, trajectory.qddot, ())
     t, q, qdot = _densely(nodes)

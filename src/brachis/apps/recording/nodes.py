@@ -82,13 +82,23 @@ def smoothed(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> Smoothed:
         found = _fitted(t, q, deviation, int(count), (0, 0))
     largest = np.abs(found.derivatives).max(axis=1)
     beginning = _vanishing(t - t[0], q, deviation, largest)
-    return _fitted(t, q, deviation, int(count), (beginning, _vanishing(t[-1] - t[::-1], q[::-1], deviation, largest)))
+    return _fitted(
+        t,
+        q,
+        deviation,
+        int(count),
+        (beginning, _vanishing(t[-1] - t[::-1], q[::-1], deviation, largest)),
+    )
 
 
-def _vanishing(t: np.ndarray, q: np.ndarray, deviation: np.ndarray, largest: np.ndarray) -> int:
+def _vanishing(
+    t: np.ndarray, q: np.ndarray, deviation: np.ndarray, largest: np.ndarray
+) -> int:
     """Tell how many derivatives vanish at an end, from which t is counted, by polynomials through the rows near it."""
     away = (np.abs(q - q[0]) > _AT_END * deviation).any(axis=1)
-    rows = slice(0, max(_ROWS_AT_END, int(np.argmax(away)) if away.any() else len(t)) + 1)
+    rows = slice(
+        0, max(_ROWS_AT_END, int(np.argmax(away)) if away.any() else len(t)) + 1
+    )
     u, span = t[rows] / t[rows][-1], float(t[rows][-1])
     for order in (2, 1):
         powers = u[:, None] ** np.array([0, order, order + 1, order + 2])
@@ -101,26 +111,43 @@ def _vanishing(t: np.ndarray, q: np.ndarray, deviation: np.ndarray, largest: np.
     return 0
 
 
-def _fitted(t: np.ndarray, q: np.ndarray, deviation: np.ndarray, count: int, ends: tuple[int, int]) -> Smoothed:
+def _fitted(
+    t: np.ndarray,
+    q: np.ndarray,
+    deviation: np.ndarray,
+    count: int,
+    ends: tuple[int, int],
+) -> Smoothed:
     """Fit a spline of so many intervals, at whose ends so many derivatives vanish."""
-    from scipy.interpolate import BSpline  # noqa: PLC0415  (imports in 0.3 s)
-    from scipy.sparse.linalg import spsolve  # noqa: PLC0415
+    from scipy.interpolate import BSpline
+    from scipy.sparse.linalg import spsolve
 
-    breaks = np.interp(np.linspace(0.0, 1.0, count + 1), np.linspace(0.0, 1.0, len(t)), t)
+    breaks = np.interp(
+        np.linspace(0.0, 1.0, count + 1), np.linspace(0.0, 1.0, len(t)), t
+    )
     knots = np.concatenate([np.full(_DEGREE, t[0]), breaks, np.full(_DEGREE, t[-1])])
     tied = _tied(len(knots) - _DEGREE - 1, ends)
     rows = BSpline.design_matrix(t, knots, _DEGREE) @ tied
-    spline = BSpline(knots, tied @ spsolve(rows.T @ rows, rows.T @ q).reshape(-1, q.shape[1]), _DEGREE)
+    spline = BSpline(
+        knots,
+        tied @ spsolve(rows.T @ rows, rows.T @ q).reshape(-1, q.shape[1]),
+        _DEGREE,
+    )
     found = np.stack([spline(t, nu=order) for order in range(4)])
-    return Smoothed(found, float(np.sqrt(np.mean(((found[0] - q) / deviation) ** 2, axis=0)).max()))
+    return Smoothed(
+        found, float(np.sqrt(np.mean(((found[0] - q) / deviation) ** 2, axis=0)).max())
+    )
 
 
-def _tied(count: int, ends: tuple[int, int]) -> Any:  # noqa: ANN401  (SciPy's sparse arrays)
+def _tied(count: int, ends: tuple[int, int]) -> Any:
     """Return the matrix, (count, free), from free control points to all; at an end the first ones are one."""
-    from scipy.sparse import csr_array  # noqa: PLC0415
+    from scipy.sparse import csr_array
 
     columns = np.clip(np.arange(count) - ends[0], 0, count - 1 - sum(ends))
-    return csr_array((np.ones(count), (np.arange(count), columns)), shape=(count, int(columns[-1]) + 1))
+    return csr_array(
+        (np.ones(count), (np.arange(count), columns)),
+        shape=(count, int(columns[-1]) + 1),
+    )
 
 
 _OVER = 0.01
@@ -157,13 +184,19 @@ def with_jumps(motion: States, jerk: np.ndarray) -> tuple[States, int]:
     """
     scale = np.maximum(np.abs(motion.qddot).max(axis=0), np.finfo(float).tiny)
     over = _overshoot(motion, scale)
-    added = [found for i in np.flatnonzero(over > _OVER).tolist() if (found := _split(motion, jerk, i, scale, over[i]))]
+    added = [
+        found
+        for i in np.flatnonzero(over > _OVER).tolist()
+        if (found := _split(motion, jerk, i, scale, over[i]))
+    ]
     if not added:
         return motion, 0
     t = np.concatenate([motion.t, *(part.t for part in added)])
     order = np.argsort(t, kind="stable")
     parts = (
-        np.concatenate([getattr(motion, name), *(getattr(part, name) for part in added)])[order]
+        np.concatenate(
+            [getattr(motion, name), *(getattr(part, name) for part in added)]
+        )[order]
         for name in ("q", "qdot", "qddot")
     )
     return States(t[order], *parts), len(added)
@@ -173,25 +206,37 @@ def _overshoot(motion: States, scale: np.ndarray) -> np.ndarray:
     """By how much the acceleration in each piece leaves the range between its ends, in parts of `scale`, (K - 1,)."""
     h = np.diff(motion.t)[:, None]
     way = np.diff(motion.q, axis=0)
-    v0, v1, a0, a1 = motion.qdot[:-1], motion.qdot[1:], motion.qddot[:-1], motion.qddot[1:]
-    gain, rest = (v1 - v0) / h - 0.5 * (a0 + a1), (way - v0 * h) / h**2 - a0 / 3.0 - a1 / 6.0
+    v0, v1, a0, a1 = (
+        motion.qdot[:-1],
+        motion.qdot[1:],
+        motion.qddot[:-1],
+        motion.qddot[1:],
+    )
+    gain, rest = (
+        (v1 - v0) / h - 0.5 * (a0 + a1),
+        (way - v0 * h) / h**2 - a0 / 3.0 - a1 / 6.0,
+    )
     # a(u) = a0 + (a1 - a0) u + u (1 - u) (c + d u) with the given velocity gain and way
     d = 60.0 * (gain - 2.0 * rest)
     c = 6.0 * gain - 0.5 * d
     u = _INSIDE[:, None, None]
     values = a0 + (a1 - a0) * u + u * (1.0 - u) * (c + d * u)
-    beyond = np.maximum(values.max(axis=0) - np.maximum(a0, a1), np.minimum(a0, a1) - values.min(axis=0))
+    beyond = np.maximum(
+        values.max(axis=0) - np.maximum(a0, a1), np.minimum(a0, a1) - values.min(axis=0)
+    )
     worst: np.ndarray = (beyond / scale).max(axis=1)
     return worst
 
 
-def _split(motion: States, jerk: np.ndarray, i: int, scale: np.ndarray, before: float) -> States | None:
+def _split(
+    motion: States, jerk: np.ndarray, i: int, scale: np.ndarray, before: float
+) -> States | None:
     """Return two nodes between which the acceleration jumps in the piece after row i; None where they do not help."""
     h = float(motion.t[i + 1] - motion.t[i])
     left, right = (*motion.one(i), jerk[i]), (*motion.one(i + 1), jerk[i + 1])
     place, width = _where(left, right, h, scale)
     first, last = place * h - 0.5 * width, place * h + 0.5 * width
-    if place <= 0.5:  # noqa: PLR2004  (what is left over is for the longer side)
+    if place <= 0.5:
         begin = _going_on(left, first)
         end = _over(begin, _going_on(right, last - h)[2], width)
     else:
@@ -200,14 +245,20 @@ def _split(motion: States, jerk: np.ndarray, i: int, scale: np.ndarray, before: 
     parts = (np.array(pair) for pair in zip(begin, end, strict=True))
     nodes = States(motion.t[i] + np.array([first, last]), *parts)
     both = (
-        np.stack([x, *y, z]) for x, y, z in zip(left[:3], (nodes.q, nodes.qdot, nodes.qddot), right[:3], strict=True)
+        np.stack([x, *y, z])
+        for x, y, z in zip(
+            left[:3], (nodes.q, nodes.qdot, nodes.qddot), right[:3], strict=True
+        )
     )
     whole = States(np.array([motion.t[i], *nodes.t, motion.t[i + 1]]), *both)
     return nodes if _overshoot(whole, scale).max() < 0.5 * before else None
 
 
 def _where(
-    left: tuple[np.ndarray, ...], right: tuple[np.ndarray, ...], h: float, scale: np.ndarray
+    left: tuple[np.ndarray, ...],
+    right: tuple[np.ndarray, ...],
+    h: float,
+    scale: np.ndarray,
 ) -> tuple[float, float]:
     """Return the part of a period after which the velocities of both sides meet best, and the time of the change, s.
 
@@ -217,7 +268,9 @@ def _where(
 
     def apart(place: np.ndarray | float, order: int) -> np.ndarray:
         u = np.asarray(place)[..., None] * h
-        difference: np.ndarray = (_going_on(right, u - h)[order] - _going_on(left, u)[order]) / scale
+        difference: np.ndarray = (
+            _going_on(right, u - h)[order] - _going_on(left, u)[order]
+        ) / scale
         return difference
 
     place = float(_PLACES[int(np.argmin((apart(_PLACES, 1) ** 2).sum(axis=1)))])
@@ -229,7 +282,9 @@ def _where(
     return place, h * float(np.clip(np.sqrt(max(square, 0.0)) / h, 2.0 * _WITHIN, room))
 
 
-def _going_on(state: tuple[np.ndarray, ...], t: np.ndarray | float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _going_on(
+    state: tuple[np.ndarray, ...], t: np.ndarray | float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Position, velocity and acceleration a time t after a state, at constant jerk."""
     q, qdot, qddot, jerk = state
     return (
@@ -239,7 +294,9 @@ def _going_on(state: tuple[np.ndarray, ...], t: np.ndarray | float) -> tuple[np.
     )
 
 
-def _over(state: tuple[np.ndarray, ...], qddot: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _over(
+    state: tuple[np.ndarray, ...], qddot: np.ndarray, t: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Go over to another acceleration within a time t."""
     return _going_on((*state, (qddot - state[2]) / t), t)
 
@@ -299,19 +356,28 @@ def nodes_of(recording: Recording, deviation: np.ndarray) -> Nodes:
         of_unit = ~exact & (np.array(recording.units) == unit)
         if of_unit.any():
             off = f"{deviation[of_unit].max():.2g} {unit} (rms) off"
-            told.append(f"positions in {unit}, velocities and accelerations of a smoothing spline, {off}")
+            told.append(
+                f"positions in {unit}, velocities and accelerations of a smoothing spline, {off}"
+            )
     if not exact.any():
         return _nodes(States(t, *parts[:3]), *told)
     parts[:, :, exact], how = _interpolated(recording, exact)
     motion, jumps = with_jumps(States(t, *parts[:3]), parts[3])
     pairs = write_count(jumps, "pair")
-    return _nodes(motion, *told, how, *([f"accelerations jump between {pairs} of rows"] if jumps else []))
+    return _nodes(
+        motion,
+        *told,
+        how,
+        *([f"accelerations jump between {pairs} of rows"] if jumps else []),
+    )
 
 
 def _smoothed(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> np.ndarray:
     """Return positions and three derivatives of splines, (4, K, n), NaN of joints that need none."""
     parts = np.full((4, *q.shape), np.nan)
-    bends = np.maximum(np.abs(np.diff(q, n=2, axis=0)).max(axis=0), np.finfo(float).tiny)
+    bends = np.maximum(
+        np.abs(np.diff(q, n=2, axis=0)).max(axis=0), np.finfo(float).tiny
+    )
     doubt = _BETWEEN * deviation / bends
     for least in (_ROUNDED, _NOISY):
         rough = doubt > least
@@ -326,7 +392,9 @@ def _smoothed(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> np.ndarray
 def _interpolated(recording: Recording, joints: np.ndarray) -> tuple[np.ndarray, str]:
     """Return positions and three derivatives, (4, K, j), of some joints, and how they were found."""
     parts = _differentiated(recording.t, recording.q[:, joints])
-    told = "velocities and accelerations are those of polynomials through five rows each"
+    told = (
+        "velocities and accelerations are those of polynomials through five rows each"
+    )
     names = {1: ("qdot", "velocities"), 2: ("qddot", "accelerations")}
     for order, (name, words) in names.items():
         given = getattr(recording, name)
@@ -345,7 +413,10 @@ def _interpolated(recording: Recording, joints: np.ndarray) -> tuple[np.ndarray,
 
 
 def _nodes(motion: States, *told: str) -> Nodes:
-    qdot, qddot = (_with_rest(part, least) for part, least in zip((motion.qdot, motion.qddot), _AT_REST, strict=True))
+    qdot, qddot = (
+        _with_rest(part, least)
+        for part, least in zip((motion.qdot, motion.qddot), _AT_REST, strict=True)
+    )
     return Nodes(motion.t, motion.q, qdot, qddot, told)
 
 
@@ -353,7 +424,9 @@ def _with_rest(values: np.ndarray, least: float) -> np.ndarray:
     """Return derivatives, (K, n), whose first and last row are zero where they are small."""
     values, largest = values.copy(), np.abs(values).max(axis=0)
     for end in (0, -1):
-        if np.all(np.abs(values[end]) <= least * np.maximum(largest, largest.max() * least)):
+        if np.all(
+            np.abs(values[end]) <= least * np.maximum(largest, largest.max() * least)
+        ):
             values[end] = 0.0
     return values
 
@@ -365,9 +438,13 @@ def _differentiated(t: np.ndarray, values: np.ndarray) -> np.ndarray:
     first = np.arange(count - FEWEST + 1)[:, None] + np.arange(FEWEST)
     powers = np.arange(FEWEST)
     # Bend of the polynomial through every five rows, each joint beside its own range.
-    around = ((t[first] - t[first].mean(axis=1, keepdims=True)) / h)[:, :, None] ** powers
+    around = ((t[first] - t[first].mean(axis=1, keepdims=True)) / h)[
+        :, :, None
+    ] ** powers
     highest = np.linalg.solve(around, values[first])[:, -1]
-    bend = (np.abs(highest) / np.maximum(np.ptp(values, axis=0), np.finfo(float).tiny)).max(axis=1)
+    bend = (
+        np.abs(highest) / np.maximum(np.ptp(values, axis=0), np.finfo(float).tiny)
+    ).max(axis=1)
     chosen = np.empty(count, dtype=int)
     for i in range(count):
         candidates = np.arange(max(0, i - FEWEST + 1), min(i, count - FEWEST) + 1)
@@ -376,4 +453,11 @@ def _differentiated(t: np.ndarray, values: np.ndarray) -> np.ndarray:
     rows = first[chosen]
     local = ((t[rows] - t[:, None]) / h)[:, :, None] ** powers
     coefficients = np.linalg.solve(local, values[rows])
-    return np.stack([values, coefficients[:, 1] / h, 2.0 * coefficients[:, 2] / h**2, 6.0 * coefficients[:, 3] / h**3])
+    return np.stack(
+        [
+            values,
+            coefficients[:, 1] / h,
+            2.0 * coefficients[:, 2] / h**2,
+            6.0 * coefficients[:, 3] / h**3,
+        ]
+    )

@@ -16,7 +16,12 @@ from brachis.apps.bottleneck import THRESHOLD
 from brachis.apps.plots import style
 from brachis.apps.plots.motion import knot_times
 from brachis.apps.plots.postures import plane_of, skeleton
-from brachis.apps.plots.quantities import Quantity, allowed_tool_speeds, kinds_of, quantities
+from brachis.apps.plots.quantities import (
+    Quantity,
+    allowed_tool_speeds,
+    kinds_of,
+    quantities,
+)
 from brachis.apps.report.motion import ReportedMotion
 from brachis.apps.report.tables import NEAR
 
@@ -47,12 +52,25 @@ def motion_figure(motion: ReportedMotion) -> Figure:
     """
     trajectory, samples = motion.trajectory, motion.samples
     kinds = kinds_of(trajectory)
-    panels = [[part] for kind in kinds for part in quantities(trajectory, samples, kind, degrees=motion.degrees)]
-    panels += [parts] if (parts := _over_their_limits(quantities(trajectory, samples, "torque"))) else []
-    heights = [_PANEL_PX if len(parts[0].joints) > _FEW_JOINTS else _SMALL_PX for parts in panels] + [_SMALL_PX]
+    panels = [
+        [part]
+        for kind in kinds
+        for part in quantities(trajectory, samples, kind, degrees=motion.degrees)
+    ]
+    panels += (
+        [parts]
+        if (parts := _over_their_limits(quantities(trajectory, samples, "torque")))
+        else []
+    )
+    heights = [
+        _PANEL_PX if len(parts[0].joints) > _FEW_JOINTS else _SMALL_PX
+        for parts in panels
+    ] + [_SMALL_PX]
     data, named, last = [], set(), len(heights)
     layout = _layout(trajectory.t_end, sum(heights) + _FRAME_PX)
-    for row, (parts, domain) in enumerate(zip(panels, _domains(heights), strict=False), start=1):
+    for row, (parts, domain) in enumerate(
+        zip(panels, _domains(heights), strict=False), start=1
+    ):
         title = f"{parts[0].name} ({parts[0].unit})"
         layout[_axis("yaxis", row)] = _value_axis(title, domain, _view(parts))
         for part in parts:
@@ -60,17 +78,38 @@ def motion_figure(motion: ReportedMotion) -> Figure:
                 name = trajectory.joint_names[joint]
                 data += _joint_traces(part, column, name, row, shown=name not in named)
                 named.add(name)
-    layout[_axis("yaxis", last)] = _value_axis("tool speed (m/s)", _domains(heights)[-1], None)
-    look = {"line": {"color": style.COLOURS[-1], "width": 1.6}, "name": "tool", "showlegend": False}
+    layout[_axis("yaxis", last)] = _value_axis(
+        "tool speed (m/s)", _domains(heights)[-1], None
+    )
+    look = {
+        "line": {"color": style.COLOURS[-1], "width": 1.6},
+        "name": "tool",
+        "showlegend": False,
+    }
     hover = {"hovertemplate": "%{y:.4g} m/s<extra>tool</extra>"}
     data.append({**_curve(samples.t, samples.tool_speed, last), **look, **hover})
     for allowed in allowed_tool_speeds(trajectory, samples):
-        near = np.where(allowed < (1.0 + _REACH) * samples.tool_speed.max(), allowed, np.nan)
+        near = np.where(
+            allowed < (1.0 + _REACH) * samples.tool_speed.max(), allowed, np.nan
+        )
         thin = {"color": style.GREY, "width": 1, "dash": "4px,4px"}
-        limit = {**_curve(samples.t, near, last), "line": thin, "name": "limit of the tool speed", "showlegend": False}
-        data += [{**limit, "hoverinfo": "skip", "meta": "limit"}] if np.isfinite(near).any() else []
+        limit = {
+            **_curve(samples.t, near, last),
+            "line": thin,
+            "name": "limit of the tool speed",
+            "showlegend": False,
+        }
+        data += (
+            [{**limit, "hoverinfo": "skip", "meta": "limit"}]
+            if np.isfinite(near).any()
+            else []
+        )
     layout["xaxis"] |= {"anchor": f"y{last}", "title": {"text": "t (s)"}}
-    layout["xaxis"]["minor"] = {"tickvals": knot_times(trajectory).tolist(), "ticks": "inside", "ticklen": 3}
+    layout["xaxis"]["minor"] = {
+        "tickvals": knot_times(trajectory).tolist(),
+        "ticks": "inside",
+        "ticklen": 3,
+    }
     return {"data": data, "layout": layout}
 
 
@@ -80,27 +119,53 @@ def _over_their_limits(parts: Sequence[Quantity]) -> list[Quantity]:
     names = ", ".join(part.name for part in found if part is not None)
     ones = ((part, np.ones(len(part.joints))) for part in found if part is not None)
     return [
-        replace(part, name=names, unit="of the limit", values=part.ratios, lower=-one, upper=one) for part, one in ones
+        replace(
+            part,
+            name=names,
+            unit="of the limit",
+            values=part.ratios,
+            lower=-one,
+            upper=one,
+        )
+        for part, one in ones
     ]
 
 
-def _joint_traces(part: Quantity, column: int, name: str, row: int, *, shown: bool) -> list[dict[str, Any]]:
+def _joint_traces(
+    part: Quantity, column: int, name: str, row: int, *, shown: bool
+) -> list[dict[str, Any]]:
     """Draw one joint's curve, and its limits as thin straight lines."""
     joint = style.joint_style(int(part.joints[column]))
     values, levels = part.values[:, column], (part.lower[column], part.upper[column])
-    line = {"color": joint["color"], "width": 1.8, "dash": _dash(joint["linestyle"]), "simplify": False}
+    line = {
+        "color": joint["color"],
+        "width": 1.8,
+        "dash": _dash(joint["linestyle"]),
+        "simplify": False,
+    }
     group = {"name": name, "legendgroup": name, "legendrank": int(part.joints[column])}
     hover, share = f"%{{y:.4g}} {part.unit}", {}
     if np.isfinite(levels).all():
         share = {"customdata": encoded(100.0 * np.abs(part.ratios[:, column]))}
         hover += f", %{{customdata:.1f}} % of {part.of}"
-    curve = {**_curve(part.t, values, row), **group, **share, "line": line, "showlegend": shown}
+    curve = {
+        **_curve(part.t, values, row),
+        **group,
+        **share,
+        "line": line,
+        "showlegend": shown,
+    }
     traces = [{**curve, "hovertemplate": f"{hover}<extra>{_escaped(name)}</extra>"}]
     ends = part.t[[0, -1]]
     for level in levels:
         if np.isfinite(level):
             thin = {"color": joint["color"], "width": 1, "dash": "4px,4px"}
-            limit = {**_curve(ends, np.full(2, level), row), **group, "line": thin, "showlegend": False}
+            limit = {
+                **_curve(ends, np.full(2, level), row),
+                **group,
+                "line": thin,
+                "showlegend": False,
+            }
             traces.append({**limit, "hoverinfo": "skip", "meta": "limit"})
     return traces
 
@@ -112,14 +177,18 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
     entries = [entry for entry in motion.saturations if entry.peak > _SHOWN][::-1]
     once = np.append(np.diff(ratios.t) > 0.0, True)
     t, values = ratios.t[once], np.abs(ratios.values[once])
-    part = np.array([values[:, columns[entry.label]] for entry in entries]).reshape(len(entries), len(t))
+    part = np.array([values[:, columns[entry.label]] for entry in entries]).reshape(
+        len(entries), len(t)
+    )
     colours = part.copy()
     for row, entry in enumerate(entries):
         for stretch in entry.active:  # ripple included
             inside = (t >= stretch.begin) & (t <= stretch.end)
             colours[row, inside] = np.maximum(colours[row, inside], THRESHOLD)
     active, beyond = THRESHOLD / _MOST, (1.0 + tolerance) / _MOST
-    layout = _layout(motion.trajectory.t_end, _ROW_PX * max(len(entries), 1) + _FRAME_PX)
+    layout = _layout(
+        motion.trajectory.t_end, _ROW_PX * max(len(entries), 1) + _FRAME_PX
+    )
     layout["xaxis"] |= {"title": {"text": "t (s)"}}
     layout["yaxis"] = {"automargin": True, "fixedrange": True, "ticks": ""}
     layout["hovermode"] = "closest"
@@ -141,14 +210,24 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
             [beyond, "#C00000"],
             [1.0, "#C00000"],
         ],
-        "colorbar": {"title": {"text": "part of the limit"}, "thickness": 12, "tickvals": [0, 0.25, 0.5, 0.75, 1]},
+        "colorbar": {
+            "title": {"text": "part of the limit"},
+            "thickness": 12,
+            "tickvals": [0, 0.25, 0.5, 0.75, 1],
+        },
         "hovertemplate": "%{y}: %{customdata:.1f} % of its limit at %{x:.4f} s<extra></extra>",
     }
     return {"data": [heat] if entries else [], "layout": layout}
 
 
 def _curve(t: np.ndarray, values: np.ndarray, row: int) -> dict[str, Any]:
-    return {"type": "scatter", "mode": "lines", "x": encoded(t), "y": encoded(values), "yaxis": f"y{row}"}
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": encoded(t),
+        "y": encoded(values),
+        "yaxis": f"y{row}",
+    }
 
 
 def _layout(t_end: float, height: float) -> dict[str, Any]:
@@ -162,16 +241,28 @@ def _layout(t_end: float, height: float) -> dict[str, Any]:
     }
 
 
-def _value_axis(title: str, domain: tuple[float, float], view: tuple[float, float] | None) -> dict[str, Any]:
-    axis: dict[str, Any] = {"domain": domain, "title": {"text": title, "standoff": 8}, "anchor": "x", "zeroline": True}
+def _value_axis(
+    title: str, domain: tuple[float, float], view: tuple[float, float] | None
+) -> dict[str, Any]:
+    axis: dict[str, Any] = {
+        "domain": domain,
+        "title": {"text": title, "standoff": 8},
+        "anchor": "x",
+        "zeroline": True,
+    }
     return axis if view is None else {**axis, "range": view}
 
 
 def _view(parts: Sequence[Quantity]) -> tuple[float, float]:
     """Range of values in view: the motion, and the limits that it comes near."""
-    low, high = min(float(part.values.min()) for part in parts), max(float(part.values.max()) for part in parts)
+    low, high = (
+        min(float(part.values.min()) for part in parts),
+        max(float(part.values.max()) for part in parts),
+    )
     reach = _REACH * max(high - low, 1e-9)
-    levels = np.concatenate([level for part in parts for level in (part.lower, part.upper)])
+    levels = np.concatenate(
+        [level for part in parts for level in (part.lower, part.upper)]
+    )
     near = levels[(levels > low - reach) & (levels < high + reach)]
     low, high = min([low, *near.tolist()]), max([high, *near.tolist()])
     room = 0.06 * max(high - low, 1e-9)
@@ -182,7 +273,10 @@ def _domains(heights: list[int]) -> list[tuple[float, float]]:
     """Parts of the figure's height for panels, from the top down."""
     whole, gap = float(sum(heights)), 0.012
     ends = 1.0 - np.cumsum([0.0, *heights]) / whole
-    return [(float(low) + gap, float(high) - gap) for high, low in zip(ends[:-1], ends[1:].clip(0.0), strict=True)]
+    return [
+        (float(low) + gap, float(high) - gap)
+        for high, low in zip(ends[:-1], ends[1:].clip(0.0), strict=True)
+    ]
 
 
 def _axis(name: str, row: int) -> str:
@@ -218,7 +312,12 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
     samples = trajectory.at(np.linspace(0.0, trajectory.t_end, _FRAMES))
     robot = trajectory.robot
     joints: list[dict[str, Any]] = [
-        {"name": name, "redundant": name in trajectory.redundant_joints, "prismatic": unit == "m", "quantities": []}
+        {
+            "name": name,
+            "redundant": name in trajectory.redundant_joints,
+            "prismatic": unit == "m",
+            "quantities": [],
+        }
         for name, unit in zip(robot.joint_names, robot.position_units, strict=True)
     ]
     kinds = kinds_of(trajectory)
@@ -237,5 +336,9 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
         "plane": plane_of(trajectory),
         "joints": joints,
         "kinds": kinds,
-        "levels": {"near": NEAR, "at": THRESHOLD, "beyond": 1.0 + trajectory.task.refinement.tolerance},
+        "levels": {
+            "near": NEAR,
+            "at": THRESHOLD,
+            "beyond": 1.0 + trajectory.task.refinement.tolerance,
+        },
     }

@@ -63,7 +63,9 @@ class ReportedMotion:
     degrees: bool
 
 
-def reported_motion(motion: PlannedMotion | Trajectory, *, degrees: bool = False) -> ReportedMotion:
+def reported_motion(
+    motion: PlannedMotion | Trajectory, *, degrees: bool = False
+) -> ReportedMotion:
     """Gather what there is to say of a planned or a saved motion; a saved one is verified again."""
     if isinstance(motion, Trajectory):
         return _gathered(
@@ -75,8 +77,18 @@ def reported_motion(motion: PlannedMotion | Trajectory, *, degrees: bool = False
             degrees=degrees,
         )
     refined = motion.attempt.refined
-    limits = None if refined is None else [each for each in refined.program.limits if each.role is not Role.SAFEGUARD]
-    early = ("the search was ended early: a faster motion may have been missed",) if motion.interrupted else ()
+    limits = (
+        None
+        if refined is None
+        else [
+            each for each in refined.program.limits if each.role is not Role.SAFEGUARD
+        ]
+    )
+    early = (
+        ("the search was ended early: a faster motion may have been missed",)
+        if motion.interrupted
+        else ()
+    )
     return _gathered(
         motion,
         motion.trajectory,
@@ -119,7 +131,9 @@ def _gathered(
     )
 
 
-def _held_back(source: PlannedMotion | Trajectory, found: tuple[Saturation, ...], *, degrees: bool) -> tuple[str, ...]:
+def _held_back(
+    source: PlannedMotion | Trajectory, found: tuple[Saturation, ...], *, degrees: bool
+) -> tuple[str, ...]:
     """Say what the limits cost; where that cannot be known, when they are active and why no more is known."""
     try:
         return tuple(bottleneck.report(source).text(degrees=degrees).splitlines())

@@ -64,7 +64,9 @@ class Report:
     @property
     def content(self) -> bytes:
         """What the file holds."""
-        return self.html.encode(errors="backslashreplace")  # names of files need not be text
+        return self.html.encode(
+            errors="backslashreplace"
+        )  # names of files need not be text
 
     def __repr__(self) -> str:
         """Say what it is, not what is in it."""
@@ -76,7 +78,9 @@ class Report:
         return f'<iframe {frame} srcdoc="{html.escape(self.html)}"></iframe>'
 
 
-def make_report(motion: PlannedMotion | Trajectory, *, title: str = "", degrees: bool = False) -> Report:
+def make_report(
+    motion: PlannedMotion | Trajectory, *, title: str = "", degrees: bool = False
+) -> Report:
     """Make a page from which a person decides whether to run a motion.
 
     Parameters
@@ -125,7 +129,11 @@ def make_report(motion: PlannedMotion | Trajectory, *, title: str = "", degrees:
         task=tables.task_text(reported.trajectory.task),
         versions=tables.versions(),
         data=_json(
-            {"motion": motion_figure(reported), "timeline": timeline_figure(reported), "scene": scene(reported)}
+            {
+                "motion": motion_figure(reported),
+                "timeline": timeline_figure(reported),
+                "scene": scene(reported),
+            }
         ),
         plotly=program,
         style=_part("page.css"),
@@ -142,28 +150,43 @@ def _pictures(reported: ReportedMotion) -> Iterator[tuple[str, str]]:
         as_html(plot_overview(trajectory)),
     )
     if len(reported.candidates) > 1:
-        yield "End times of all that the search looked at", as_html(plot_candidates(reported.candidates))
+        yield (
+            "End times of all that the search looked at",
+            as_html(plot_candidates(reported.candidates)),
+        )
     if any(fit.profile for fit in trajectory.task.fits):
-        yield "How far the points are from the path that was fitted to them", as_html(plot_fit(trajectory))
+        yield (
+            "How far the points are from the path that was fitted to them",
+            as_html(plot_fit(trajectory)),
+        )
 
 
 def _json(data: dict[str, Any]) -> str:
     """Write data for a script element, which no text in it can end."""
-    return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    return json.dumps(data, allow_nan=False, separators=(",", ":")).replace(
+        "<", "\\u003c"
+    )
 
 
 def _part(name: str) -> str:
-    return resources.files("brachis.apps.report").joinpath(name).read_text(encoding="utf-8")
+    return (
+        resources.files("brachis.apps.report")
+        .joinpath(name)
+        .read_text(encoding="utf-8")
+    )
 
 
-def _template() -> Any:  # noqa: ANN401  (a Jinja2 template)
+def _template() -> Any:
     """Read the page's template; what is filled in is escaped unless it is said to be safe."""
     try:
-        import jinja2  # noqa: PLC0415  (an extra)
+        import jinja2
     except ImportError:
         raise NotInstalledError(_NEEDED_BY, "Jinja2", _EXTRA) from None
     environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
     )
     return environment.from_string(_part("page.html"))
 
@@ -172,7 +195,7 @@ def _template() -> Any:  # noqa: ANN401  (a Jinja2 template)
 def _plotly() -> str:
     """Pack Plotly's program: 1.5 of 4.8 MB."""
     try:
-        from plotly.offline import get_plotlyjs  # noqa: PLC0415  (an extra)
+        from plotly.offline import get_plotlyjs
     except ImportError:
         raise NotInstalledError(_NEEDED_BY, "Plotly", _EXTRA) from None
     return base64.b64encode(gzip.compress(get_plotlyjs().encode(), mtime=0)).decode()

@@ -76,9 +76,16 @@ class JointRow:
 
 def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
     """Say what a person asks first."""
-    trajectory, samples, verification = motion.trajectory, motion.samples, motion.verification
+    trajectory, samples, verification = (
+        motion.trajectory,
+        motion.samples,
+        motion.verification,
+    )
     boundary = trajectory.task.boundary
-    named = trajectory.branch not in {"", coordinates(trajectory.redundant_joints, trajectory.branch)}
+    named = trajectory.branch not in {
+        "",
+        coordinates(trajectory.redundant_joints, trajectory.branch),
+    }
     fastest = int(np.argmax(samples.tool_speed))
     ends = "goes round for ever" if boundary.periodic else "from rest to rest"
     if boundary.start_speed or boundary.end_speed:
@@ -101,20 +108,28 @@ def identity(motion: ReportedMotion) -> dict[str, str]:
     trajectory = motion.trajectory
     urdf, recovered = trajectory.task.robot.urdf, trajectory.recovered
     file = "" if urdf is None else f" ({_file_name(urdf)})"
-    way = float(np.linalg.norm(np.diff(motion.samples.tool_position, axis=0), axis=1).sum())
+    way = float(
+        np.linalg.norm(np.diff(motion.samples.tool_position, axis=0), axis=1).sum()
+    )
     task_space = trajectory.task.task_space
     rows = task_space if isinstance(task_space, str) else ", ".join(task_space)
     return {
         "robot": f"{trajectory.robot.name}{file}".strip(),
         "path": f"{path_in_words(trajectory.task)}; the tool moves {way:.3f} m; prescribed: {rows}",
-        **({} if recovered is None else {"recovered from": _file_name(recovered.source)}),
+        **(
+            {}
+            if recovered is None
+            else {"recovered from": _file_name(recovered.source)}
+        ),
         "payload": "none",
         "tool offset": "none",
         "mounting": "at the world's origin, upright",
         **in_use(trajectory.robot),
         "report of": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         "SHA-256 of the URDF": hashlib.sha256(trajectory.urdf.encode()).hexdigest(),
-        "SHA-256 of the task as it stands below": hashlib.sha256(task_text(trajectory.task).encode()).hexdigest(),
+        "SHA-256 of the task as it stands below": hashlib.sha256(
+            task_text(trajectory.task).encode()
+        ).hexdigest(),
     }
 
 
@@ -153,7 +168,7 @@ def task_text(task: Task) -> str:
     return str(yaml.safe_dump(_without_folders(task.to_dict()), sort_keys=False))
 
 
-def _without_folders(value: Any) -> Any:  # noqa: ANN401  (of a task)
+def _without_folders(value: Any) -> Any:
     """Replace absolute paths of files, wherever they are, by the files' names."""
     if isinstance(value, dict):
         return {key: _without_folders(each) for key, each in value.items()}
@@ -175,17 +190,24 @@ def what_limits(motion: ReportedMotion) -> str:
     active = [entry for entry in motion.saturations if entry.active][:3]
     if not active:
         return "No limit is active."
-    shares = (f"{entry.label} ({100.0 * entry.share:.0f} % of the time)" for entry in active)
+    shares = (
+        f"{entry.label} ({100.0 * entry.share:.0f} % of the time)" for entry in active
+    )
     return f"At its limits longest: {', '.join(shares)}."
 
 
 def joint_rows(motion: ReportedMotion) -> list[JointRow]:
     """List what every joint does, in chain order."""
-    trajectory, tolerance = motion.trajectory, motion.trajectory.task.refinement.tolerance
+    trajectory, tolerance = (
+        motion.trajectory,
+        motion.trajectory.task.refinement.tolerance,
+    )
     peaks: dict[int, list[Row]] = {joint: [] for joint in range(trajectory.robot.n)}
     positions: dict[int, tuple[np.ndarray, str]] = {}
     for kind in kinds_of(trajectory):
-        for part in quantities(trajectory, motion.samples, kind, degrees=motion.degrees):
+        for part in quantities(
+            trajectory, motion.samples, kind, degrees=motion.degrees
+        ):
             for column, joint in enumerate(part.joints.tolist()):
                 positions.setdefault(joint, (part.values[:, column], part.unit))
                 peaks[joint].append(_peak(part, column, tolerance))
@@ -207,7 +229,11 @@ def joint_rows(motion: ReportedMotion) -> list[JointRow]:
 
 def _peak(part: Quantity, column: int, tolerance: float) -> Row:
     """Find the value of a joint that is nearest to its limit, or the largest one where there is no limit."""
-    values, lower, upper = part.values[:, column], part.lower[column], part.upper[column]
+    values, lower, upper = (
+        part.values[:, column],
+        part.lower[column],
+        part.upper[column],
+    )
     limited = bool(part.is_limited[column])
     ratios = np.abs(part.ratios[:, column]) if limited else np.zeros(1)
     at = int(np.argmax(ratios if limited else np.abs(values)))
@@ -268,4 +294,8 @@ def _check_row(check: Check, *, degrees: bool) -> CheckRow:
 def versions() -> dict[str, str]:
     """Name the versions of what made the report."""
     found = {name: importlib.metadata.version(name) for name in _LIBRARIES}
-    return {"brachis": brachis.__version__, "Python": platform.python_version(), **found}
+    return {
+        "brachis": brachis.__version__,
+        "Python": platform.python_version(),
+        **found,
+    }

@@ -53,14 +53,21 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
         There is no key or more than two, or no plan is verified.
     """
     if len(keys) not in (1, 2):
-        raise InputError("a figure has one axis or two", where="keys", found=len(keys), allowed="1 or 2 keys that vary")
+        raise InputError(
+            "a figure has one axis or two",
+            where="keys",
+            found=len(keys),
+            allowed="1 or 2 keys that vary",
+        )
     cells: dict[tuple[Any, ...], float] = {}
     for row in rows:
         place = tuple(row[key] for key in keys)
         t_end = row["t_end_s"] if row["status"] == VERIFIED else math.inf
         cells[place] = min(t_end, cells.get(place, math.inf))
     if not any(map(math.isfinite, cells.values())):
-        raise InputError("there is nothing to draw", where="plans", found="none that is verified")
+        raise InputError(
+            "there is nothing to draw", where="plans", found="none that is verified"
+        )
     axes = [_values([place[axis] for place in cells]) for axis in range(len(keys))]
     if len(keys) == 1:
         return _line(cells, axes[0], keys[0])
@@ -76,7 +83,10 @@ def _values(found: Sequence[Any]) -> list[Any]:
 
 
 def _are_numbers(values: Sequence[Any]) -> bool:
-    return all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
+    return all(
+        isinstance(value, int | float) and not isinstance(value, bool)
+        for value in values
+    )
 
 
 def _line(cells: _Cells, values: list[Any], key: str) -> Figure:
@@ -101,8 +111,12 @@ def _line(cells: _Cells, values: list[Any], key: str) -> Figure:
 
 def _heat_map(cells: _Cells, axes: Sequence[list[Any]], keys: Sequence[str]) -> Figure:
     columns, rows = axes
-    times = np.array([[cells.get((column, row), math.nan) for column in columns] for row in rows])
-    figure = style.new_figure(style.PAGE_WIDTH, min(_HIGHEST, max(_HEIGHT, 24.0 + _CELL_MM * len(rows))))
+    times = np.array(
+        [[cells.get((column, row), math.nan) for column in columns] for row in rows]
+    )
+    figure = style.new_figure(
+        style.PAGE_WIDTH, min(_HIGHEST, max(_HEIGHT, 24.0 + _CELL_MM * len(rows)))
+    )
     ax = figure.add_subplot()
     shown = np.where(np.isfinite(times), times, np.nan)
     image = ax.imshow(shown, cmap=_COLOURS, aspect="auto", origin="lower")
@@ -135,7 +149,9 @@ def _points(cells: _Cells, axes: Sequence[list[Any]], keys: Sequence[str]) -> Fi
     at = np.array([[where[0][first], where[1][second]] for first, second in cells])
     times = np.array(list(cells.values()))
     found = np.isfinite(times)
-    image = ax.scatter(at[found, 0], at[found, 1], c=times[found], cmap=_COLOURS, s=14.0)
+    image = ax.scatter(
+        at[found, 0], at[found, 1], c=times[found], cmap=_COLOURS, s=14.0
+    )
     _cross(ax, at[~found, 0], at[~found, 1])
     _finish(figure, ax, image, keys)
     _name(ax, "x", axes[0])
@@ -143,7 +159,7 @@ def _points(cells: _Cells, axes: Sequence[list[Any]], keys: Sequence[str]) -> Fi
     return figure
 
 
-def _finish(figure: Figure, ax: Axes, image: Any, keys: Sequence[str]) -> None:  # noqa: ANN401  (any of Matplotlib's)
+def _finish(figure: Figure, ax: Axes, image: Any, keys: Sequence[str]) -> None:
     style.dress(ax, _title(keys[0]), _title(keys[1]))
     bar = figure.colorbar(image, ax=ax)
     style.dress(bar.ax, "", _LABEL)
@@ -159,7 +175,11 @@ def _decimals(times: np.ndarray) -> int:
     """Return how many decimals tell the times, s, apart that differ by more than `_ALIKE`, two at least."""
     apart = np.diff(np.unique(times[np.isfinite(times)]))
     apart = apart[apart > _ALIKE * np.nanmax(times)]
-    return int(np.clip(np.ceil(-np.log10(apart.min()) - 1e-6), 2, _MOST_DECIMALS)) if len(apart) else 2
+    return (
+        int(np.clip(np.ceil(-np.log10(apart.min()) - 1e-6), 2, _MOST_DECIMALS))
+        if len(apart)
+        else 2
+    )
 
 
 def _places(values: Sequence[Any]) -> np.ndarray:
@@ -172,10 +192,15 @@ def _name(ax: Axes, axis: str, values: Sequence[Any], *, always: bool = False) -
     if always or not _are_numbers(values):
         step = math.ceil(len(values) / _MOST_TICKS)
         shown = range(0, len(values), step)
-        ax.set(**{f"{axis}ticks": list(shown), f"{axis}ticklabels": [_write_value(values[place]) for place in shown]})
+        ax.set(
+            **{
+                f"{axis}ticks": list(shown),
+                f"{axis}ticklabels": [_write_value(values[place]) for place in shown],
+            }
+        )
 
 
-def _write_value(value: Any) -> str:  # noqa: ANN401  (of a task)
+def _write_value(value: Any) -> str:
     if value is None:
         return "not set"
     return f"{value:.4g}" if _are_numbers([value]) else style.plain(str(value))
@@ -185,6 +210,13 @@ def _cross(ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
     """Mark plans that are not verified."""
     if len(x):
         ax.scatter(
-            x, y, marker="x", color=style.COLOURS[1], s=18.0, linewidths=0.8, label="no verified plan", zorder=3.0
+            x,
+            y,
+            marker="x",
+            color=style.COLOURS[1],
+            s=18.0,
+            linewidths=0.8,
+            label="no verified plan",
+            zorder=3.0,
         )
         style.legend_above(ax, style.COLUMN_WIDTH)

@@ -106,10 +106,17 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
     if not isinstance(source, Mapping):
         path = file_name(source, "source")
         check_kind(path, Kind.SWEEP, TaskError)
-        content, name, folder = _yaml(path, Path.cwd()), str(path), path.absolute().parent
+        content, name, folder = (
+            _yaml(path, Path.cwd()),
+            str(path),
+            path.absolute().parent,
+        )
     if not isinstance(content, Mapping):
         raise TaskError(
-            "a sweep is a mapping", found=show(content), allowed=", ".join(SweepSettings.model_fields), where=name
+            "a sweep is a mapping",
+            found=show(content),
+            allowed=", ".join(SweepSettings.model_fields),
+            where=name,
         )
     if isinstance(content.get("task"), Task):
         content = {**content, "task": content["task"].to_dict()}
@@ -119,19 +126,26 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
         raise task_error(error, name, SweepSettings) from None
     base, task_name, task_folder = _base(settings, name, folder)
     base = with_keys(base, settings.fixed)
-    rows = tuple(Row(changes, _plan(base, changes, task_name, task_folder)) for changes in settings.changes())
+    rows = tuple(
+        Row(changes, _plan(base, changes, task_name, task_folder))
+        for changes in settings.changes()
+    )
     _check_keys(settings, rows, name)
     return SweepPlan(settings, base, rows)
 
 
 def _yaml(path: Path, folder: Path) -> object:
-    return read_yaml(read_text(path, where=str(path), folder=folder, largest=LARGEST_TASK), str(path))
+    return read_yaml(
+        read_text(path, where=str(path), folder=folder, largest=LARGEST_TASK), str(path)
+    )
 
 
-def _base(settings: SweepSettings, name: str, folder: Path) -> tuple[Mapping[str, Any], str, Path]:
+def _base(
+    settings: SweepSettings, name: str, folder: Path
+) -> tuple[Mapping[str, Any], str, Path]:
     """Return the task that is varied, not checked yet, with what its messages name and its files are relative to."""
     if not isinstance(settings.task, str):
-        assert isinstance(settings.task, dict)  # noqa: S101  (the settings have checked it)
+        assert isinstance(settings.task, dict)
         return settings.task, f"{name}: task", folder
     path = folder / settings.task
     content = _yaml(path, folder)
@@ -140,20 +154,28 @@ def _base(settings: SweepSettings, name: str, folder: Path) -> tuple[Mapping[str
     return content, str(path), path.parent
 
 
-def _plan(base: Mapping[str, Any], changes: Mapping[str, Any], name: str, folder: Path) -> Plan | BrachisError:
+def _plan(
+    base: Mapping[str, Any], changes: Mapping[str, Any], name: str, folder: Path
+) -> Plan | BrachisError:
     try:
         task = task_from(with_keys(base, changes), name, folder, {})
         if task.robot.urdf is None:
-            raise TaskError("no robot", where=f"{name}: robot.urdf", hint="Give the URDF's path")
+            raise TaskError(
+                "no robot", where=f"{name}: robot.urdf", hint="Give the URDF's path"
+            )
         urdf = read_file(Path(task.robot.urdf))
     except BrachisError as error:
         return error
     # Plans are made side by side already; how many processes a single one may use must not tell them apart.
-    task = task.model_copy(update={"search": task.search.model_copy(update={"jobs": 1})})
+    task = task.model_copy(
+        update={"search": task.search.model_copy(update={"jobs": 1})}
+    )
     known = task.to_dict()
     known["robot"].pop("urdf", None)  # its text counts, not where it is
     said = json.dumps([known, urdf, brachis.__version__], sort_keys=True)
-    return Plan(hashlib.sha256(said.encode()).hexdigest()[:16], task, urdf, brachis.__version__)
+    return Plan(
+        hashlib.sha256(said.encode()).hexdigest()[:16], task, urdf, brachis.__version__
+    )
 
 
 def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None:
@@ -174,12 +196,18 @@ def _check_keys(settings: SweepSettings, rows: Sequence[Row], name: str) -> None
             if tried[plan.digest] is None:
                 break
         errors = [tried[plan.digest] for plan in sound if plan.digest in tried]
-        errors = errors or [row.plan for row in having if isinstance(row.plan, BrachisError)]
+        errors = errors or [
+            row.plan for row in having if isinstance(row.plan, BrachisError)
+        ]
         if all(errors):
-            refused[key] = f"refused in every plan that sets it ({len(having)}); the first: {errors[0]}"
+            refused[key] = (
+                f"refused in every plan that sets it ({len(having)}); the first: {errors[0]}"
+            )
     if refused:
         # One wrong key refuses the plans of all others.
-        key = next((each for each in refused if each in refused[each]), next(iter(refused)))
+        key = next(
+            (each for each in refused if each in refused[each]), next(iter(refused))
+        )
         raise TaskError(refused[key], where=f"{name}: {key}")
 
 

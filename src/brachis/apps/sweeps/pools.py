@@ -20,7 +20,13 @@ import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Future,
+    wait,
+)
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,10 +61,19 @@ class Outcome:
     motion: bytes | None = None
 
     @classmethod
-    def of_error(cls, error: BaseException, wall_time: float | None = None, *, message: str = "") -> Outcome:
+    def of_error(
+        cls, error: BaseException, wall_time: float | None = None, *, message: str = ""
+    ) -> Outcome:
         """Return the outcome of a plan that failed; the message is the error's own unless another is given."""
         message = message or str(error) or type(error).__name__
-        return cls({"status": FAILED, "error": type(error).__name__, "message": message, "wall_time_s": wall_time})
+        return cls(
+            {
+                "status": FAILED,
+                "error": type(error).__name__,
+                "message": message,
+                "wall_time_s": wall_time,
+            }
+        )
 
 
 def planned(plan: Plan) -> Outcome:
@@ -71,19 +86,31 @@ def planned(plan: Plan) -> Outcome:
     """
     if plan.version != brachis.__version__:
         problem = "a worker has another version of brachis"
-        raise ClusterError(problem, found=brachis.__version__, allowed=plan.version, hint="Install the same everywhere")
+        raise ClusterError(
+            problem,
+            found=brachis.__version__,
+            allowed=plan.version,
+            hint="Install the same everywhere",
+        )
     began = time.perf_counter()
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PlausibilityWarning)  # they are among the outcome's remarks
-            result = planner.plan(robot_of(plan), plan.task, progress=False, check_advice=False)
+            warnings.simplefilter(
+                "ignore", PlausibilityWarning
+            )  # they are among the outcome's remarks
+            result = planner.plan(
+                robot_of(plan), plan.task, progress=False, check_advice=False
+            )
         return Outcome(_facts(result, time.perf_counter() - began), _saved(result))
     except Exception as error:  # noqa: BLE001  (of thousands of plans one must not end the others, whatever it is)
         return Outcome.of_error(error, time.perf_counter() - began)
 
 
 def _facts(result: Result, wall_time: float) -> dict[str, Any]:
-    remarks = [*map(str, result.warnings), *(f"left undone: {each}" for each in result.undone)]
+    remarks = [
+        *map(str, result.warnings),
+        *(f"left undone: {each}" for each in result.undone),
+    ]
     return {
         "status": VERIFIED if result.verified else UNVERIFIED,
         "t_end_s": result.t_end,
@@ -114,7 +141,10 @@ _ENDED = "the plan ended its worker process each time: a crash, or too little me
 
 
 def as_completed(
-    plans: Iterable[Plan], submit: Submit, width: Callable[[], int], lost: tuple[type[Exception], ...] = ()
+    plans: Iterable[Plan],
+    submit: Submit,
+    width: Callable[[], int],
+    lost: tuple[type[Exception], ...] = (),
 ) -> Iterator[tuple[Plan, Outcome]]:
     """Hand out plans to an executor, a few more than it has workers, and yield what comes back.
 
@@ -151,7 +181,10 @@ def as_completed(
                 outcome = Outcome.of_error(error, message=_ENDED)
             except lost as error:
                 outcome = Outcome.of_error(error, message=_ENDED)
-            except (BrachisError, CancelledError):  # of the connection, in whose words the caller speaks
+            except (
+                BrachisError,
+                CancelledError,
+            ):  # of the connection, in whose words the caller speaks
                 raise
             except Exception as error:
                 found = f"{type(error).__name__}: {error}"
@@ -187,20 +220,26 @@ def on_dask(
         The scheduler does not answer, or was lost.
     """
     try:
-        from dask.distributed import Client, KilledWorker  # noqa: PLC0415  (an extra)
+        from dask.distributed import Client, KilledWorker
     except ImportError as error:
         raise NotInstalledError("a Dask cluster", "dask", "cluster") from error
-    where: dict[str, Any] = {"scheduler_file": address} if is_file(address) else {"address": address}
+    where: dict[str, Any] = (
+        {"scheduler_file": address} if is_file(address) else {"address": address}
+    )
     try:
         client: Any = Client(**where, timeout=_CONNECTING, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:
-        raise ClusterError("no Dask scheduler answers", where=address, found=str(error)) from error
+        raise ClusterError(
+            "no Dask scheduler answers", where=address, found=str(error)
+        ) from error
     with _answering(address), client:
         threads = client.nthreads()
         if not threads:
             listener(f"waiting for workers of {address}")
         if any(number > 1 for number in threads.values()):
-            listener("workers with several threads plan slower than as many workers with one: --nthreads 1")
+            listener(
+                "workers with several threads plan slower than as many workers with one: --nthreads 1"
+            )
         executor = client.get_executor(pure=False)
         yield from as_completed(
             plans,
@@ -217,10 +256,14 @@ def _answering(address: str) -> Iterator[None]:
         yield
     except (OSError, CancelledError) as error:
         hint = "Finished plans are stored: the same sweep goes on once the scheduler runs again"
-        raise ClusterError("the Dask scheduler was lost", where=address, found=str(error), hint=hint) from error
+        raise ClusterError(
+            "the Dask scheduler was lost", where=address, found=str(error), hint=hint
+        ) from error
 
 
-def on_ray(plans: Iterable[Plan], address: str | None) -> Generator[tuple[Plan, Outcome], None, None]:
+def on_ray(
+    plans: Iterable[Plan], address: str | None
+) -> Generator[tuple[Plan, Outcome], None, None]:
     """Make plans through joblib's Ray backend, batch by batch.
 
     Parameters
@@ -241,23 +284,34 @@ def on_ray(plans: Iterable[Plan], address: str | None) -> Generator[tuple[Plan, 
         The cluster does not answer, or was lost, with it the batch that was under way.
     """
     try:
-        import ray  # noqa: PLC0415  (not a dependency)
-        from ray.util.joblib import register_ray  # noqa: PLC0415
+        import ray
+        from ray.util.joblib import register_ray
     except ImportError as error:
-        raise InputError("Ray is not installed", found=str(error), hint="pip install ray") from error
-    from joblib import Parallel, delayed, parallel_config  # noqa: PLC0415
+        raise InputError(
+            "Ray is not installed", found=str(error), hint="pip install ray"
+        ) from error
+    from joblib import Parallel, delayed, parallel_config
 
     started = not ray.is_initialized()
     try:
         ray.init(address=address, ignore_reinit_error=True)
         register_ray()
-        waiting, width = iter(plans), AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1)))
+        waiting, width = (
+            iter(plans),
+            AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1))),
+        )
         with parallel_config(backend="ray", n_jobs=-1), Parallel() as parallel:
             while batch := list(itertools.islice(waiting, width)):
                 interrupts.check()
-                yield from zip(batch, parallel(delayed(planned)(plan) for plan in batch), strict=True)
+                yield from zip(
+                    batch,
+                    parallel(delayed(planned)(plan) for plan in batch),
+                    strict=True,
+                )
     except (ray.exceptions.RayError, OSError, RuntimeError, ValueError) as error:
-        raise ClusterError("Ray does not answer, or was lost", where=address or "ray", found=str(error)) from error
+        raise ClusterError(
+            "Ray does not answer, or was lost", where=address or "ray", found=str(error)
+        ) from error
     finally:
         if started:
             ray.shutdown()
@@ -266,12 +320,21 @@ def on_ray(plans: Iterable[Plan], address: str | None) -> Generator[tuple[Plan, 
 Pool = Callable[[Sequence[Plan]], Generator[tuple[Plan, Outcome], None, None]]
 
 _ONE_THREAD = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS"), "1"
+    (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+        "NUMEXPR_NUM_THREADS",
+    ),
+    "1",
 )
 """Environment of worker processes."""
 
 
-def pool_for(jobs: int | None, scheduler: str | None, listener: Callable[[str], None]) -> Pool:
+def pool_for(
+    jobs: int | None, scheduler: str | None, listener: Callable[[str], None]
+) -> Pool:
     """Choose where plans are made.
 
     Parameters
@@ -291,18 +354,29 @@ def pool_for(jobs: int | None, scheduler: str | None, listener: Callable[[str], 
     """
     if scheduler is None:
         wanted = None if jobs is None else count(jobs, "jobs")
-        processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        return lambda plans: in_processes(plans, min(wanted or processors, processors, max(len(plans), 1)))
+        processors = (
+            len(os.sched_getaffinity(0))
+            if hasattr(os, "sched_getaffinity")
+            else os.cpu_count() or 1
+        )
+        return lambda plans: in_processes(
+            plans, min(wanted or processors, processors, max(len(plans), 1))
+        )
     if jobs is not None:
         raise InputError(
-            "a cluster has as many processes as it has workers", where="jobs", found=jobs, allowed="jobs or scheduler"
+            "a cluster has as many processes as it has workers",
+            where="jobs",
+            found=jobs,
+            allowed="jobs or scheduler",
         )
     if scheduler == "ray" or scheduler.startswith("ray://"):
         return lambda plans: on_ray(plans, None if scheduler == "ray" else scheduler)
     return lambda plans: on_dask(plans, scheduler, listener)
 
 
-def in_processes(plans: Iterable[Plan], jobs: int) -> Generator[tuple[Plan, Outcome], None, None]:
+def in_processes(
+    plans: Iterable[Plan], jobs: int
+) -> Generator[tuple[Plan, Outcome], None, None]:
     """Make plans in processes of this machine.
 
     A plan that ends its process (memory, a crash) fails; those that were made beside it are made again, one at a time.
@@ -317,17 +391,21 @@ def in_processes(plans: Iterable[Plan], jobs: int) -> Generator[tuple[Plan, Outc
     ------
     Plan, Outcome
     """
-    from joblib.externals.loky import ProcessPoolExecutor  # noqa: PLC0415  (a fifth of a second)
+    from joblib.externals.loky import ProcessPoolExecutor
 
-    def executor() -> Any:  # noqa: ANN401
+    def executor() -> Any:
         parent = (os.getpid(),)
-        return ProcessPoolExecutor(jobs, env=_ONE_THREAD, initializer=_end_with_parent, initargs=parent)
+        return ProcessPoolExecutor(
+            jobs, env=_ONE_THREAD, initializer=_end_with_parent, initargs=parent
+        )
 
     processes = executor()
 
     def submit(plan: Plan) -> Future[Outcome]:
         nonlocal processes
-        with interrupts.blocked():  # processes are started here, which are not to hear Ctrl-C
+        with (
+            interrupts.blocked()
+        ):  # processes are started here, which are not to hear Ctrl-C
             try:
                 return processes.submit(planned, plan)
             except BrokenExecutor:

@@ -19,7 +19,13 @@ from typing import TYPE_CHECKING, Any
 
 from brachis.apps.sweeps.pools import FAILED, UNVERIFIED, VERIFIED, Outcome
 from brachis.apps.sweeps.settings import SweepSettings
-from brachis.common.files import atomic_write, is_file, is_folder, read_file, writing_errors
+from brachis.common.files import (
+    atomic_write,
+    is_file,
+    is_folder,
+    read_file,
+    writing_errors,
+)
 from brachis.common.summary import Summary
 from brachis.errors import InputError, NotInstalledError, UnknownNameError
 from brachis.trajectory import Trajectory
@@ -59,9 +65,9 @@ def arrow() -> ModuleType:
         It is not.
     """
     try:
-        import pyarrow as pa  # noqa: PLC0415  (an extra, and only sweeps need it)
-        import pyarrow.csv  # noqa: PLC0415
-        import pyarrow.parquet  # noqa: PLC0415
+        import pyarrow as pa
+        import pyarrow.csv
+        import pyarrow.parquet
     except ImportError as error:
         raise NotInstalledError("a sweep", "pyarrow", "sweep") from error
     return pa
@@ -89,7 +95,11 @@ class Store:
             foreign = any(folder.iterdir()) and not self._is_ours()
         if foreign:
             problem = "the folder holds other files"
-            raise InputError(problem, where=str(folder), allowed=f"a new folder, or one with a sweep's {_ABOUT}")
+            raise InputError(
+                problem,
+                where=str(folder),
+                allowed=f"a new folder, or one with a sweep's {_ABOUT}",
+            )
 
     def _is_ours(self) -> bool:
         try:
@@ -111,7 +121,11 @@ class Store:
             The folder is not a sweep's.
         """
         if not self._is_ours():
-            raise InputError("the folder is not a sweep's", where=str(self.folder), allowed=f"one with its {_ABOUT}")
+            raise InputError(
+                "the folder is not a sweep's",
+                where=str(self.folder),
+                allowed=f"one with its {_ABOUT}",
+            )
         about: dict[str, Any] = json.loads(read_file(self.folder / _ABOUT))
         return about
 
@@ -131,7 +145,9 @@ class Store:
             facts["motion"] = motion.relative_to(self.folder).as_posix()
         schema = self._arrow.schema(COLUMNS.items())
         with atomic_write(part) as stream:
-            self._arrow.parquet.write_table(self._arrow.Table.from_pylist([facts], schema), stream)
+            self._arrow.parquet.write_table(
+                self._arrow.Table.from_pylist([facts], schema), stream
+            )
         return facts
 
     def read(self, digest: str) -> dict[str, Any] | None:
@@ -142,10 +158,16 @@ class Store:
             (facts,) = table.to_pylist()
         except (OSError, ValueError, self._arrow.ArrowException):
             return None
-        whole = set(facts) == set(COLUMNS) and (not facts["motion"] or is_file(self.folder / facts["motion"]))
+        whole = set(facts) == set(COLUMNS) and (
+            not facts["motion"] or is_file(self.folder / facts["motion"])
+        )
         return facts if whole else None
 
-    def table(self, keys: Sequence[str], rows: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> pa.Table:
+    def table(
+        self,
+        keys: Sequence[str],
+        rows: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]],
+    ) -> pa.Table:
         """Make the table of all plans.
 
         Parameters
@@ -156,14 +178,23 @@ class Store:
             What a plan sets of them, and its columns.
         """
         pa = self._arrow
-        varied = {key: _column([changes.get(key) for changes, _ in rows]) for key in keys}
-        found = {name: pa.array([facts[name] for _, facts in rows], kind) for name, kind in COLUMNS.items()}
-        return pa.table({"plan": pa.array(range(len(rows)), "int64"), **varied, **found})
+        varied = {
+            key: _column([changes.get(key) for changes, _ in rows]) for key in keys
+        }
+        found = {
+            name: pa.array([facts[name] for _, facts in rows], kind)
+            for name, kind in COLUMNS.items()
+        }
+        return pa.table(
+            {"plan": pa.array(range(len(rows)), "int64"), **varied, **found}
+        )
 
     def write_table(self, table: pa.Table) -> None:
         """Write the table as Parquet and as CSV."""
         pa = self._arrow
-        for name, write in zip(TABLES, (pa.parquet.write_table, pa.csv.write_csv), strict=True):
+        for name, write in zip(
+            TABLES, (pa.parquet.write_table, pa.csv.write_csv), strict=True
+        ):
             with atomic_write(self.folder / name) as stream:
                 write(table, stream)
 
@@ -179,12 +210,18 @@ class Store:
         try:
             return self._arrow.parquet.read_table(path)
         except (OSError, self._arrow.ArrowException) as error:
-            raise InputError("no table of a sweep", where=str(path), found=str(error)) from error
+            raise InputError(
+                "no table of a sweep", where=str(path), found=str(error)
+            ) from error
 
 
 def _column(values: Sequence[Any]) -> list[Any]:
     """Return values of one kind as they are, and others, lists for example, as JSON."""
-    kinds = {bool if isinstance(value, bool) else type(value) for value in values if value is not None}
+    kinds = {
+        bool if isinstance(value, bool) else type(value)
+        for value in values
+        if value is not None
+    }
     if kinds == {int, float}:
         return [None if value is None else float(value) for value in values]
     if len(kinds) <= 1 and kinds <= {int, float, str, bool}:
@@ -255,7 +292,9 @@ class SweepResult(Summary):
     @property
     def varied(self) -> tuple[str, ...]:
         """Keys that take more than one value."""
-        return tuple(key for key in self.keys if len(set(self.table.column(key).to_pylist())) > 1)
+        return tuple(
+            key for key in self.keys if len(set(self.table.column(key).to_pylist())) > 1
+        )
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -285,15 +324,24 @@ class SweepResult(Summary):
             There is no such plan, or it failed.
         """
         if not 0 <= plan < len(self.table):
-            raise InputError("there is no such plan", found=plan, allowed=f"0 to {len(self.table) - 1}")
+            raise InputError(
+                "there is no such plan",
+                found=plan,
+                allowed=f"0 to {len(self.table) - 1}",
+            )
         row = self.table.slice(plan, 1).to_pylist()[0]
         if row["motion"] is None:
-            raise InputError(f"plan {plan} failed", found=f"{row['error']}: {row['message']}")
+            raise InputError(
+                f"plan {plan} failed", found=f"{row['error']}: {row['message']}"
+            )
         return Trajectory.load(self.folder / row["motion"])
 
     def ranked(self) -> list[dict[str, Any]]:
         """Return the rows of verified plans, the fastest first."""
-        return sorted((row for row in self.rows() if row["status"] == VERIFIED), key=lambda row: row["t_end_s"])
+        return sorted(
+            (row for row in self.rows() if row["status"] == VERIFIED),
+            key=lambda row: row["t_end_s"],
+        )
 
     def count(self, status: str) -> int:
         """Count the plans of a status: verified, unverified or failed."""
@@ -301,25 +349,38 @@ class SweepResult(Summary):
 
     def failures(self) -> dict[str, tuple[int, str]]:
         """Return, for each class of error, the commonest first, how many plans failed with it, and one message."""
-        failed = [(row["error"], row["message"]) for row in self.rows() if row["status"] == FAILED]
+        failed = [
+            (row["error"], row["message"])
+            for row in self.rows()
+            if row["status"] == FAILED
+        ]
         counts = collections.Counter(error for error, _ in failed)
-        return {error: (count, dict(failed)[error]) for error, count in counts.most_common()}
+        return {
+            error: (count, dict(failed)[error]) for error, count in counts.most_common()
+        }
 
     def summary(self) -> dict[str, Any]:
         """Return the sweep in short: numbers of plans, best, median and worst verified ones, failures by cause."""
         ranked = self.ranked()
-        places = {"best": 0, "median": (len(ranked) - 1) // 2, "worst": -1} if ranked else {}
+        places = (
+            {"best": 0, "median": (len(ranked) - 1) // 2, "worst": -1} if ranked else {}
+        )
         return {
             "plans": len(self.table),
             **{status: self.count(status) for status in (VERIFIED, UNVERIFIED, FAILED)},
             **{
-                name: {key: ranked[place][key] for key in ("plan", *self.keys, "t_end_s")}
+                name: {
+                    key: ranked[place][key] for key in ("plan", *self.keys, "t_end_s")
+                }
                 for name, place in places.items()
             },
             "failures": {
-                error: {"plans": count, "message": message} for error, (count, message) in self.failures().items()
+                error: {"plans": count, "message": message}
+                for error, (count, message) in self.failures().items()
             },
-            "wall_time_s": sum(filter(None, self.table.column("wall_time_s").to_pylist())),
+            "wall_time_s": sum(
+                filter(None, self.table.column("wall_time_s").to_pylist())
+            ),
         }
 
     def plot(self, keys: Sequence[str] | None = None) -> Figure:
@@ -336,9 +397,11 @@ class SweepResult(Summary):
         InputError
             No key varies, or no plan is verified.
         """
-        from brachis.apps.sweeps.figure import plot_sweep  # noqa: PLC0415  (matplotlib takes 0.7 s)
+        from brachis.apps.sweeps.figure import plot_sweep
 
         for key in keys or ():
             if key not in self.varied:
-                raise UnknownNameError("key that varies", key, self.varied, where="keys")
+                raise UnknownNameError(
+                    "key that varies", key, self.varied, where="keys"
+                )
         return plot_sweep(self.rows(), tuple(keys or self.varied[:_MOST_AXES]))

@@ -109,15 +109,32 @@ def _sweep(
     pool = pool_for(jobs, scheduler, listener)
     store = Store(Path(out) if out is not None else _folder_for(source))
     settings = planned.settings.model_dump(mode="json", exclude_defaults=True)
-    store.describe({"version": brachis.__version__, "settings": settings, "task": planned.base})
-    plans = {row.plan.digest: row.plan for row in planned.rows if isinstance(row.plan, Plan)}
-    found = {digest: facts for digest in plans if (facts := store.read(digest)) is not None}
+    store.describe(
+        {"version": brachis.__version__, "settings": settings, "task": planned.base}
+    )
+    plans = {
+        row.plan.digest: row.plan for row in planned.rows if isinstance(row.plan, Plan)
+    }
+    found = {
+        digest: facts for digest in plans if (facts := store.read(digest)) is not None
+    }
     if retry:
-        found = {digest: facts for digest, facts in found.items() if facts["status"] != FAILED}
+        found = {
+            digest: facts
+            for digest, facts in found.items()
+            if facts["status"] != FAILED
+        }
     progress = _Progress(len(plans), found, listener)
     try:
-        with closing(pool([plan for digest, plan in plans.items() if digest not in found])) as made:
-            for plan, outcome in made:  # workers end with the block, even where an outcome cannot be stored
+        with closing(
+            pool([plan for digest, plan in plans.items() if digest not in found])
+        ) as made:
+            for (
+                plan,
+                outcome,
+            ) in (
+                made
+            ):  # workers end with the block, even where an outcome cannot be stored
                 found[plan.digest] = store.write(plan.digest, outcome)
                 progress.tell()
     except KeyboardInterrupt as interrupt:
@@ -131,7 +148,9 @@ def _folder_for(source: str | os.PathLike[str] | Mapping[str, Any]) -> Path:
     return Path("sweep" if isinstance(source, Mapping) else Path(source).stem)
 
 
-def _result(planned: SweepPlan, store: Store, found: Mapping[str, Mapping[str, Any]]) -> SweepResult:
+def _result(
+    planned: SweepPlan, store: Store, found: Mapping[str, Mapping[str, Any]]
+) -> SweepResult:
     rows = [
         (
             row.changes,
@@ -158,14 +177,21 @@ class _Progress:
     listener : callable
     """
 
-    def __init__(self, total: int, found: Mapping[str, Mapping[str, Any]], listener: Listener) -> None:
+    def __init__(
+        self, total: int, found: Mapping[str, Mapping[str, Any]], listener: Listener
+    ) -> None:
         self._total, self._found, self._listener = total, found, listener
         self._before, self._began = len(found), time.monotonic()
-        listener(f"{len(found)} of {write_count(total, 'plan')}{' are stored already' if found else ''}")
+        listener(
+            f"{len(found)} of {write_count(total, 'plan')}{' are stored already' if found else ''}"
+        )
 
     def tell(self) -> None:
         """Say it."""
-        done, failed = len(self._found), sum(facts["status"] == FAILED for facts in self._found.values())
+        done, failed = (
+            len(self._found),
+            sum(facts["status"] == FAILED for facts in self._found.values()),
+        )
         each = (time.monotonic() - self._began) / (done - self._before)
         text = f"{done} of {write_count(self._total, 'plan')}"
         text += f", {failed} failed" if failed else ""

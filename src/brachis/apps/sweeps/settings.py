@@ -9,10 +9,26 @@ import zlib
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, JsonValue, Tag, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    JsonValue,
+    Tag,
+    field_validator,
+    model_validator,
+)
 
 from brachis.errors import TaskError
-from brachis.task.fields import Count, Model, Name, Number, Positive, by_form, by_key, refuse
+from brachis.task.fields import (
+    Count,
+    Model,
+    Name,
+    Number,
+    Positive,
+    by_form,
+    by_key,
+    refuse,
+)
 
 MOST_PLANS = 1_000_000
 _HowMany = Annotated[Count, Field(ge=1, le=MOST_PLANS)]
@@ -21,14 +37,20 @@ _Values = Annotated[tuple[JsonValue, ...], Field(min_length=1)]
 
 def _ascending(pair: tuple[float, float]) -> tuple[float, float]:
     if not pair[0] < pair[1]:
-        raise refuse("the first end must be below the second", found=list(pair), allowed="[low, high] with low < high")
+        raise refuse(
+            "the first end must be below the second",
+            found=list(pair),
+            allowed="[low, high] with low < high",
+        )
     return pair
 
 
 class Linear(Model):
     """Values at equal distances."""
 
-    linear: tuple[Number, Number, _HowMany] = Field(description="First value, last value, how many.")
+    linear: tuple[Number, Number, _HowMany] = Field(
+        description="First value, last value, how many."
+    )
 
     def values(self) -> list[JsonValue]:
         """List them."""
@@ -38,7 +60,9 @@ class Linear(Model):
 class Logarithmic(Model):
     """Values at equal ratios."""
 
-    logarithmic: tuple[Positive, Positive, _HowMany] = Field(description="First value, last value, how many.")
+    logarithmic: tuple[Positive, Positive, _HowMany] = Field(
+        description="First value, last value, how many."
+    )
 
     def values(self) -> list[JsonValue]:
         """List them."""
@@ -49,18 +73,23 @@ _SPACED = {"Linear": ("linear",), "Logarithmic": ("logarithmic",)}
 GridValues = Annotated[
     Annotated[_Values, Tag("<list>")]
     | Annotated[
-        Annotated[Linear, Tag("<Linear>")] | Annotated[Logarithmic, Tag("<Logarithmic>")],
+        Annotated[Linear, Tag("<Linear>")]
+        | Annotated[Logarithmic, Tag("<Logarithmic>")],
         by_key("values are spaced in one way", _SPACED),
         Tag("<mapping>"),
     ],
-    by_form("a list of values, {linear: [first, last, count]} or {logarithmic: [first, last, count]}"),
+    by_form(
+        "a list of values, {linear: [first, last, count]} or {logarithmic: [first, last, count]}"
+    ),
 ]
 
 
 class Uniform(Model):
     """Every value of a range is as likely."""
 
-    uniform: Annotated[tuple[Number, Number], AfterValidator(_ascending)] = Field(description="Both ends.")
+    uniform: Annotated[tuple[Number, Number], AfterValidator(_ascending)] = Field(
+        description="Both ends."
+    )
 
     def draw(self, generator: np.random.Generator, count: int) -> list[Any]:
         """Draw values."""
@@ -70,7 +99,9 @@ class Uniform(Model):
 class LogUniform(Model):
     """Every ratio within a range is as likely."""
 
-    log_uniform: Annotated[tuple[Positive, Positive], AfterValidator(_ascending)] = Field(description="Both ends, > 0.")
+    log_uniform: Annotated[tuple[Positive, Positive], AfterValidator(_ascending)] = (
+        Field(description="Both ends, > 0.")
+    )
 
     def draw(self, generator: np.random.Generator, count: int) -> list[Any]:
         """Draw values."""
@@ -95,7 +126,10 @@ class Choice(Model):
 
     def draw(self, generator: np.random.Generator, count: int) -> list[Any]:
         """Draw values."""
-        return [self.choice[place] for place in generator.integers(len(self.choice), size=count)]
+        return [
+            self.choice[place]
+            for place in generator.integers(len(self.choice), size=count)
+        ]
 
 
 _DISTRIBUTIONS = {
@@ -131,44 +165,67 @@ class RandomSettings(Model):
     def draws(self) -> list[dict[str, JsonValue]]:
         """Draw: for each of the draws the values of all keys."""
         columns = {
-            key: distribution.draw(np.random.default_rng([self.seed, zlib.crc32(key.encode())]), self.count)
+            key: distribution.draw(
+                np.random.default_rng([self.seed, zlib.crc32(key.encode())]), self.count
+            )
             for key, distribution in self.keys.items()
         }
-        return [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
+        return [
+            dict(zip(columns, values, strict=True))
+            for values in zip(*columns.values(), strict=True)
+        ]
 
 
 class SweepSettings(Model):
     """A sweep: every combination of the grid, with every row, with every random draw."""
 
     sweep: Literal[1] = Field(description="Version of the format.")
-    task: JsonValue = Field(description="Task file, relative to the sweep file's folder; or a task in place.")
-    fixed: dict[Name, JsonValue] = Field(default={}, description="Keys that all plans set alike.")
+    task: JsonValue = Field(
+        description="Task file, relative to the sweep file's folder; or a task in place."
+    )
+    fixed: dict[Name, JsonValue] = Field(
+        default={}, description="Keys that all plans set alike."
+    )
     grid: dict[Name, GridValues] = Field(
         default={},
         description="For every key its values: a list, {linear: [first, last, count]} or {logarithmic: [first, last, "
         "count]}.",
     )
-    rows: tuple[dict[Name, JsonValue], ...] = Field(default=(), description="Keys that change together.")
-    random: RandomSettings | None = Field(default=None, description="Keys with random values.")
+    rows: tuple[dict[Name, JsonValue], ...] = Field(
+        default=(), description="Keys that change together."
+    )
+    random: RandomSettings | None = Field(
+        default=None, description="Keys with random values."
+    )
 
     @field_validator("task")
     @classmethod
     def _task_is_named_or_given(cls, task: JsonValue) -> JsonValue:
         if not isinstance(task, str | dict) or not task:
-            raise refuse("no task", found=task, allowed="the name of a task file, or a task")
+            raise refuse(
+                "no task", found=task, allowed="the name of a task file, or a task"
+            )
         return task
 
     @model_validator(mode="after")
     def _every_key_in_one_place(self) -> SweepSettings:
         drawn = self.random.keys if self.random else {}
         rows = {key for row in self.rows for key in row}
-        places = {"fixed": set(self.fixed), "grid": set(self.grid), "rows": rows, "random": set(drawn)}
+        places = {
+            "fixed": set(self.fixed),
+            "grid": set(self.grid),
+            "rows": rows,
+            "random": set(drawn),
+        }
         found: dict[str, str] = {}
         for place, keys in places.items():
             for key in keys:
                 if key in found:
                     raise refuse(
-                        f"{key} is varied twice", key=place, found=f"in {found[key]} and in {place}", allowed="once"
+                        f"{key} is varied twice",
+                        key=place,
+                        found=f"in {found[key]} and in {place}",
+                        allowed="once",
                     )
                 found[key] = place
         return self
@@ -187,14 +244,27 @@ class SweepSettings(Model):
         TaskError
             There are more than `MOST_PLANS`.
         """
-        columns = [list(values) if isinstance(values, tuple) else values.values() for values in self.grid.values()]
+        columns = [
+            list(values) if isinstance(values, tuple) else values.values()
+            for values in self.grid.values()
+        ]
         draws = self.random.count if self.random else 1
         many = math.prod(map(len, columns)) * max(1, len(self.rows)) * draws
         if many > MOST_PLANS:
-            raise TaskError("too many plans", where="sweep", found=f"{many:.3g}", allowed=f"at most {MOST_PLANS}")
-        grid = [dict(zip(self.grid, values, strict=True)) for values in itertools.product(*columns)]
+            raise TaskError(
+                "too many plans",
+                where="sweep",
+                found=f"{many:.3g}",
+                allowed=f"at most {MOST_PLANS}",
+            )
+        grid = [
+            dict(zip(self.grid, values, strict=True))
+            for values in itertools.product(*columns)
+        ]
         parts = (grid, self.rows or ({},), self.random.draws() if self.random else [{}])
-        changes = [{**cell, **row, **draw} for cell, row, draw in itertools.product(*parts)]
+        changes = [
+            {**cell, **row, **draw} for cell, row, draw in itertools.product(*parts)
+        ]
         return list({_alike(each): each for each in reversed(changes)}.values())[::-1]
 
 

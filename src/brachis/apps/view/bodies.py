@@ -41,7 +41,9 @@ _LONGEST = 500
 """Letters of a reason."""
 
 
-def link_shapes(urdf: str, folder: Path) -> tuple[dict[str, list[trimesh.Trimesh]], list[str]]:
+def link_shapes(
+    urdf: str, folder: Path
+) -> tuple[dict[str, list[trimesh.Trimesh]], list[str]]:
     """Read the shapes of the links that have any.
 
     Parameters
@@ -80,8 +82,17 @@ def link_shapes(urdf: str, folder: Path) -> tuple[dict[str, list[trimesh.Trimesh
             shapes[name] = found
     if absent:
         count = f"{len(absent)} mesh files are" if len(absent) > 1 else "a mesh file is"
-        where = "; ROS_PACKAGE_PATH may name the folder of its package" if absent[0].startswith("package://") else ""
-        unread.insert(0, f"{count} missing: {absent[0]}{', ...' if len(absent) > 1 else ''}{where}"[:_LONGEST])
+        where = (
+            "; ROS_PACKAGE_PATH may name the folder of its package"
+            if absent[0].startswith("package://")
+            else ""
+        )
+        unread.insert(
+            0,
+            f"{count} missing: {absent[0]}{', ...' if len(absent) > 1 else ''}{where}"[
+                :_LONGEST
+            ],
+        )
     return shapes, unread
 
 
@@ -109,11 +120,21 @@ def _check_size(visual: Element, room: int) -> int:
     for mesh in visual.iter("mesh"):
         path = Path(str(mesh.get("filename")))
         if path.suffix in _PACKED:
-            raise InputError("packed meshes are not read", where=path.name, hint="Unpack it")
+            raise InputError(
+                "packed meshes are not read", where=path.name, hint="Unpack it"
+            )
         size += _size(path)
         if size > room:
-            found, allowed = f"{size / 1e6:.0f} MB", f"{_LARGEST / 1e6:.0f} MB for all meshes of the robot"
-            raise InputError("the mesh is too large to be shown", where=path.name, found=found, allowed=allowed)
+            found, allowed = (
+                f"{size / 1e6:.0f} MB",
+                f"{_LARGEST / 1e6:.0f} MB for all meshes of the robot",
+            )
+            raise InputError(
+                "the mesh is too large to be shown",
+                where=path.name,
+                found=found,
+                allowed=allowed,
+            )
     return size
 
 
@@ -125,7 +146,9 @@ def _size(path: Path) -> int:
         return sum(each.file_size for each in archive.infolist())
 
 
-def _meshes(name: str, visual: Element, materials: list[Element]) -> list[trimesh.Trimesh]:
+def _meshes(
+    name: str, visual: Element, materials: list[Element]
+) -> list[trimesh.Trimesh]:
     """Have yourdfpy read one visual, as the only one of a robot of one link.
 
     Raises
@@ -133,8 +156,8 @@ def _meshes(name: str, visual: Element, materials: list[Element]) -> list[trimes
     InputError
         There is nothing in it, or numbers that are not finite.
     """
-    import trimesh  # noqa: PLC0415  (one second)
-    import yourdfpy  # noqa: PLC0415
+    import trimesh
+    import yourdfpy
 
     robot = etree.Element("robot", name="robot")
     robot.extend([_copied(each) for each in materials])
@@ -150,10 +173,17 @@ def _meshes(name: str, visual: Element, materials: list[Element]) -> list[trimes
         placement, geometry = read.scene.graph.get(node)
         mesh = read.scene.geometry[geometry]
         if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
-            found.append(_placed(trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual), placement))
+            found.append(
+                _placed(
+                    trimesh.Trimesh(mesh.vertices, mesh.faces, visual=mesh.visual),
+                    placement,
+                )
+            )
     if not found or not all(np.isfinite(mesh.vertices).all() for mesh in found):
         file = next((mesh.get("filename") for mesh in visual.iter("mesh")), None)
-        raise InputError("the mesh has no faces, or corners that are not finite", where=file)
+        raise InputError(
+            "the mesh has no faces, or corners that are not finite", where=file
+        )
     return found
 
 
@@ -161,22 +191,31 @@ def _copied(element: Element) -> Element:
     return etree.fromstring(etree.tostring(element))
 
 
-def _placed(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:  # noqa: ANN401  (a matrix)
+def _placed(mesh: trimesh.Trimesh, placement: Any) -> trimesh.Trimesh:
     """Place a mesh, and see to its colour where it has no picture on it."""
-    look = getattr(mesh.visual, "material", mesh.visual)  # a material, or colours of the faces
-    if getattr(look, "baseColorTexture", None) is None and getattr(look, "image", None) is None:
-        mesh = coloured(mesh, tuple(map(int, look.main_color)) if mesh.visual.defined else _STEEL)
+    look = getattr(
+        mesh.visual, "material", mesh.visual
+    )  # a material, or colours of the faces
+    if (
+        getattr(look, "baseColorTexture", None) is None
+        and getattr(look, "image", None) is None
+    ):
+        mesh = coloured(
+            mesh, tuple(map(int, look.main_color)) if mesh.visual.defined else _STEEL
+        )
     mesh.apply_transform(placement)
     return mesh
 
 
 def coloured(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trimesh:
     """Give a mesh one material that is no metal, RGBA from 0 to 255, and sharp edges unless it has too many faces."""
-    import trimesh  # noqa: PLC0415
+    import trimesh
 
     if len(mesh.faces) <= _PRIMITIVE:
         mesh = trimesh.graph.smooth_shade(mesh, angle=_SHARP)
-    material = trimesh.visual.material.PBRMaterial(baseColorFactor=colour, metallicFactor=0.1, roughnessFactor=0.65)
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorFactor=colour, metallicFactor=0.1, roughnessFactor=0.65
+    )
     mesh.visual = trimesh.visual.TextureVisuals(material=material)
     return mesh
 
@@ -205,13 +244,17 @@ class Placements:
 def placements(robot: Robot, q: np.ndarray) -> Placements:
     """Forward kinematics of postures `q`, (K, n)."""
     model, data, frame = robot.model, robot.model.createData(), robot.frame_id
-    found = Placements(np.empty((len(q), robot.n + 2, 3)), np.empty((len(q), robot.n + 2, 4)))
+    found = Placements(
+        np.empty((len(q), robot.n + 2, 3)), np.empty((len(q), robot.n + 2, 4))
+    )
     for k, posture in enumerate(q):
         pin.forwardKinematics(model, data, posture)
         tool = pin.updateFramePlacement(model, data, frame)
         for row, placement in enumerate((*data.oMi, tool)):
             found.positions[k, row] = placement.translation
-            found.quaternions[k, row] = np.roll(pin.Quaternion(placement.rotation).coeffs(), 1)
+            found.quaternions[k, row] = np.roll(
+                pin.Quaternion(placement.rotation).coeffs(), 1
+            )
     return found
 
 
@@ -272,18 +315,31 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
     skeleton = _skeleton(trajectory, max(size, 1e-3) * _THICKNESS)
     drawn = links or skeleton
     moving = {joint: meshes for joint, meshes in drawn.items() if joint}
-    return Bodies(links, skeleton, tuple(unread), *_box(drawn, found), *_box(moving, found))
+    return Bodies(
+        links, skeleton, tuple(unread), *_box(drawn, found), *_box(moving, found)
+    )
 
 
-def _box(bodies: Mapping[int, Sequence[trimesh.Trimesh]], found: Placements) -> tuple[np.ndarray, np.ndarray]:
+def _box(
+    bodies: Mapping[int, Sequence[trimesh.Trimesh]], found: Placements
+) -> tuple[np.ndarray, np.ndarray]:
     """Corners of a box around joints, tool and bodies in all postures."""
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415
+    from scipy.spatial.transform import Rotation
 
     points = [found.positions[:, 1:].reshape(-1, 3)]
     for joint, meshes in bodies.items():
         corners = np.concatenate([_corners(mesh.bounds) for mesh in meshes])
-        turned = Rotation.from_quat(found.quaternions[:, joint], scalar_first=True).as_matrix() @ corners.T
-        points.append((found.positions[:, joint, :, None] + turned).transpose(0, 2, 1).reshape(-1, 3))
+        turned = (
+            Rotation.from_quat(
+                found.quaternions[:, joint], scalar_first=True
+            ).as_matrix()
+            @ corners.T
+        )
+        points.append(
+            (found.positions[:, joint, :, None] + turned)
+            .transpose(0, 2, 1)
+            .reshape(-1, 3)
+        )
     every = np.concatenate(points)
     return every.min(axis=0), every.max(axis=0)
 
@@ -292,28 +348,41 @@ def _corners(bounds: np.ndarray) -> np.ndarray:
     return np.array(np.meshgrid(*bounds.T)).reshape(3, -1).T
 
 
-def _skeleton(trajectory: Trajectory, radius: float) -> dict[int, list[trimesh.Trimesh]]:
+def _skeleton(
+    trajectory: Trajectory, radius: float
+) -> dict[int, list[trimesh.Trimesh]]:
     """Draw every joint, and the link from it to the next one; along the axis of a prismatic joint where it slides."""
     robot = trajectory.robot
     model, tool = robot.model, robot.model.frames[robot.frame_id]
-    base = model.frames[model.getFrameId(robot.base_frame, pin.FrameType.BODY)].placement.translation
+    base = model.frames[
+        model.getFrameId(robot.base_frame, pin.FrameType.BODY)
+    ].placement.translation
     begins = [base, *np.zeros((robot.n, 3))]
-    drawn: dict[int, list[trimesh.Trimesh]] = {joint: [] for joint in range(robot.n + 1)}
+    drawn: dict[int, list[trimesh.Trimesh]] = {
+        joint: [] for joint in range(robot.n + 1)
+    }
     for joint in range(robot.n):
-        placement, axis = model.jointPlacements[joint + 1], _axis(model.joints[joint + 1])
+        placement, axis = (
+            model.jointPlacements[joint + 1],
+            _axis(model.joints[joint + 1]),
+        )
         drawn[joint] += _rod(begins[joint], placement.translation, radius, _BONE)
         if robot.position_units[joint] == "m":
-            low, high = (placement.act(axis * reach) for reach in _range(trajectory, joint))
+            low, high = (
+                placement.act(axis * reach) for reach in _range(trajectory, joint)
+            )
             drawn[joint] += _rod(low, high, 0.5 * radius, _AXIS)
             drawn[joint + 1] += _block(3.0 * radius, _JOINT)
         else:
             half = 2.0 * radius * axis
             drawn[joint + 1] += _rod(-half, half, 1.7 * radius, _JOINT)
-    drawn[tool.parentJoint] += _rod(begins[-1], tool.placement.translation, radius, _BONE)
+    drawn[tool.parentJoint] += _rod(
+        begins[-1], tool.placement.translation, radius, _BONE
+    )
     return {joint: meshes for joint, meshes in drawn.items() if meshes}
 
 
-def _axis(joint: Any) -> np.ndarray:  # noqa: ANN401  (Pinocchio's joint model)
+def _axis(joint: Any) -> np.ndarray:
     """Axis of a joint in its own frame, (3,)."""
     subspace = np.asarray(joint.createData().S).reshape(6, -1)[:, 0]
     return subspace[:3] if np.any(subspace[:3]) else subspace[3:]
@@ -323,19 +392,28 @@ def _range(trajectory: Trajectory, joint: int) -> tuple[float, float]:
     """Positions between which a prismatic joint can move, m; where it has no ends, those of the motion."""
     limits, q = trajectory.robot.limits, trajectory.q[:, joint]
     low, high = float(limits.position_lower[joint]), float(limits.position_upper[joint])
-    return (low if np.isfinite(low) else float(q.min()), high if np.isfinite(high) else float(q.max()))
+    return (
+        low if np.isfinite(low) else float(q.min()),
+        high if np.isfinite(high) else float(q.max()),
+    )
 
 
-def _rod(begin: np.ndarray, end: np.ndarray, radius: float, colour: tuple[int, ...]) -> list[trimesh.Trimesh]:
+def _rod(
+    begin: np.ndarray, end: np.ndarray, radius: float, colour: tuple[int, ...]
+) -> list[trimesh.Trimesh]:
     """Cylinder between two points; nothing where they are one."""
-    import trimesh  # noqa: PLC0415  (one second)
+    import trimesh
 
-    if np.linalg.norm(end - begin) < 1e-9:  # noqa: PLR2004
+    if np.linalg.norm(end - begin) < 1e-9:
         return []
-    return [coloured(trimesh.creation.cylinder(radius, segment=[begin, end], sections=24), colour)]
+    return [
+        coloured(
+            trimesh.creation.cylinder(radius, segment=[begin, end], sections=24), colour
+        )
+    ]
 
 
 def _block(size: float, colour: tuple[int, ...]) -> list[trimesh.Trimesh]:
-    import trimesh  # noqa: PLC0415
+    import trimesh
 
     return [coloured(trimesh.creation.box((size, size, size)), colour)]

@@ -11,7 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from brachis.apps.bottleneck.saturation import limit_ratios
-from brachis.apps.plots.quantities import Quantity, allowed_tool_speeds, kinds_of, quantities
+from brachis.apps.plots.quantities import (
+    Quantity,
+    allowed_tool_speeds,
+    kinds_of,
+    quantities,
+)
 from brachis.apps.view.bodies import Placements, placements
 from brachis.path import path_of
 from brachis.robot import task_map_of
@@ -56,23 +61,41 @@ class Curves:
     high: float
 
 
-def all_curves(trajectory: Trajectory, samples: Samples, *, degrees: bool = False) -> list[Curves]:
+def all_curves(
+    trajectory: Trajectory, samples: Samples, *, degrees: bool = False
+) -> list[Curves]:
     """Return the curves of all plots of a motion; `degrees` for angles of joints without limits."""
     plots = []
     for kind in reversed(kinds_of(trajectory)):
         parts = quantities(trajectory, samples, kind, degrees=degrees)
         limited = [part for each in parts if (part := each.limited()) is not None]
-        free = [part for each in parts if (part := each.of_joints(~each.is_limited)) is not None]
+        free = [
+            part
+            for each in parts
+            if (part := each.of_joints(~each.is_limited)) is not None
+        ]
         if limited:
             values = np.hstack([part.ratios for part in limited])
             top = _TOP * max(1.0, float(np.abs(values).max()))
             title = ", ".join(dict.fromkeys(part.share for part in limited))
-            plots.append(_of(trajectory, title, limited, values, (-1.0, 1.0), -top, top))
+            plots.append(
+                _of(trajectory, title, limited, values, (-1.0, 1.0), -top, top)
+            )
         for part in free if kind in _SHOWN_FREE else ():
             low, high = float(part.values.min()), float(part.values.max())
             margin = 0.1 * (high - low) or 1.0
             title = f"{part.name} ({part.unit}), no limit"
-            plots.append(_of(trajectory, title, [part], part.values, (), low - margin, high + margin))
+            plots.append(
+                _of(
+                    trajectory,
+                    title,
+                    [part],
+                    part.values,
+                    (),
+                    low - margin,
+                    high + margin,
+                )
+            )
     return [*plots, _tool_speed(trajectory, samples), _largest_ratios(trajectory)]
 
 
@@ -89,18 +112,40 @@ def _of(
     joints = np.concatenate([part.joints for part in parts])
     order = np.argsort(joints)
     names = tuple(trajectory.joint_names[joint] for joint in joints[order])
-    return Curves(title, names, tuple(joints[order].tolist()), parts[0].t, values[:, order], bounds, low, high)
+    return Curves(
+        title,
+        names,
+        tuple(joints[order].tolist()),
+        parts[0].t,
+        values[:, order],
+        bounds,
+        low,
+        high,
+    )
 
 
 def _tool_speed(trajectory: Trajectory, samples: Samples) -> Curves:
     """Plot the tool's speed, and the largest one that the task allows where it is near and the same everywhere."""
     speed = samples.tool_speed
     top = _TOP * float(speed.max()) or 1.0
-    levels = [level for level in allowed_tool_speeds(trajectory, samples) if (level == level[0]).all()]
+    levels = [
+        level
+        for level in allowed_tool_speeds(trajectory, samples)
+        if (level == level[0]).all()
+    ]
     bounds = tuple(float(level[0]) for level in levels if level[0] < _NEAR * top)
     top = max([top, *(1.05 * level for level in bounds)])
     colour = len(trajectory.joint_names)
-    return Curves("tool speed (m/s)", ("tool",), (colour,), samples.t, speed[:, None], bounds, 0.0, top)
+    return Curves(
+        "tool speed (m/s)",
+        ("tool",),
+        (colour,),
+        samples.t,
+        speed[:, None],
+        bounds,
+        0.0,
+        top,
+    )
 
 
 def _largest_ratios(trajectory: Trajectory) -> Curves:
@@ -108,15 +153,31 @@ def _largest_ratios(trajectory: Trajectory) -> Curves:
     ratios = limit_ratios(trajectory)
     kinds = tuple(dict.fromkeys(label.kind for label in ratios.labels))
     parts = np.abs(ratios.values)
-    edges = np.unique(np.searchsorted(ratios.t, np.linspace(0.0, trajectory.t_end, _BINS), side="left"))
+    edges = np.unique(
+        np.searchsorted(
+            ratios.t, np.linspace(0.0, trajectory.t_end, _BINS), side="left"
+        )
+    )
     edges = edges[ratios.t[edges] < trajectory.t_end]
     values = np.empty((len(edges), len(kinds)))
     for column, kind in enumerate(kinds):
         largest = parts[:, [label.kind == kind for label in ratios.labels]].max(axis=1)
         values[:, column] = np.maximum.reduceat(largest, edges)
     top = _TOP * max(1.0, float(values.max(initial=0.0)))
-    t, values = np.append(ratios.t[edges], trajectory.t_end), np.vstack([values, values[-1:]])
-    return Curves("largest of every kind / limit", kinds, tuple(range(len(kinds))), t, values, (1.0,), 0.0, top)
+    t, values = (
+        np.append(ratios.t[edges], trajectory.t_end),
+        np.vstack([values, values[-1:]]),
+    )
+    return Curves(
+        "largest of every kind / limit",
+        kinds,
+        tuple(range(len(kinds))),
+        t,
+        values,
+        (1.0,),
+        0.0,
+        top,
+    )
 
 
 _INSTANTS = 401
@@ -151,8 +212,17 @@ class Motion:
         """Evaluate a trajectory."""
         samples = trajectory.at(np.linspace(0.0, trajectory.t_end, _INSTANTS))
         frames = placements(trajectory.robot, samples.q)
-        ghosts = placements(trajectory.robot, trajectory.position(np.linspace(0.0, trajectory.t_end, _GHOSTS)))
-        return cls(trajectory, samples, frames, _path(trajectory, samples.s, frames.tool), ghosts)
+        ghosts = placements(
+            trajectory.robot,
+            trajectory.position(np.linspace(0.0, trajectory.t_end, _GHOSTS)),
+        )
+        return cls(
+            trajectory,
+            samples,
+            frames,
+            _path(trajectory, samples.s, frames.tool),
+            ghosts,
+        )
 
 
 def _path(trajectory: Trajectory, s: np.ndarray, tool: np.ndarray) -> np.ndarray:
@@ -161,5 +231,9 @@ def _path(trajectory: Trajectory, s: np.ndarray, tool: np.ndarray) -> np.ndarray
     axes = list(task_map.axes)
     points = tool.copy()
     if axes:
-        points[:, axes] = path_of(task_map, trajectory.task).sample(np.clip(s, 0.0, 1.0)).target[:, : len(axes)]
+        points[:, axes] = (
+            path_of(task_map, trajectory.task)
+            .sample(np.clip(s, 0.0, 1.0))
+            .target[:, : len(axes)]
+        )
     return points

@@ -54,7 +54,13 @@ class Chart:
             self._series(),
             scales={"x": {"time": False}, "y": {"range": (curves.low, curves.high)}},
             axes=(
-                {"font": _FONT, "size": _BELOW - _LABEL, "label": "time (s)", "labelSize": _LABEL, "labelFont": _FONT},
+                {
+                    "font": _FONT,
+                    "size": _BELOW - _LABEL,
+                    "label": "time (s)",
+                    "labelSize": _LABEL,
+                    "labelFont": _FONT,
+                },
                 {"font": _FONT, "size": _LEFT},
             ),
             legend={"show": False},
@@ -73,23 +79,43 @@ class Chart:
         lines: list[uplot.Series] = [{"label": "time (s)"}]
         hidden: uplot.Series_Points = {"show": False}
         lines += [
-            {"label": "limit", "stroke": _LIMIT, "width": 1.0, "dash": (5.0, 4.0), "points": hidden}
+            {
+                "label": "limit",
+                "stroke": _LIMIT,
+                "width": 1.0,
+                "dash": (5.0, 4.0),
+                "points": hidden,
+            }
             for _ in self._curves.bounds
         ]
         for name, style in zip(self._curves.names, self._curves.styles, strict=True):
             colour, dash = look(style)
-            lines.append({"label": name, "stroke": colour, "width": 1.6, "dash": dash, "points": hidden})
+            lines.append(
+                {
+                    "label": name,
+                    "stroke": colour,
+                    "width": 1.6,
+                    "dash": dash,
+                    "points": hidden,
+                }
+            )
         return tuple(lines)
 
     def _data(self) -> tuple[np.ndarray, ...]:
         """Columns of the plot."""
         t, values = self._curves.t, self._curves.values
-        return (t, *(np.full_like(t, bound) for bound in self._curves.bounds), *values.T)
+        return (
+            t,
+            *(np.full_like(t, bound) for bound in self._curves.bounds),
+            *values.T,
+        )
 
 
 def _line(part: float) -> str:
     """Line over the plot above it, at a part of its width; a plot that is given new data ever so often would blink."""
-    left = f"calc({_EDGE + _LEFT}px + {part:.5f} * (100% - {_EDGES + _LEFT + _RIGHT}px))"
+    left = (
+        f"calc({_EDGE + _LEFT}px + {part:.5f} * (100% - {_EDGES + _LEFT + _RIGHT}px))"
+    )
     style = f"position:absolute;z-index:5;width:1.5px;background:{_NOW};left:{left};bottom:{_BELOW + _GAP}px"
     return (
         '<div style="position:relative;height:0;pointer-events:none">'
@@ -101,7 +127,9 @@ def look(style: int) -> tuple[str, tuple[float, ...]]:
     """Colour and dashes of the curve with this number, as in the figures."""
     turn, colour = divmod(style, len(COLOURS))
     dashes = LINE_STYLES[turn % len(LINE_STYLES)]
-    return COLOURS[colour], () if isinstance(dashes, str) else tuple(2.0 * length for length in dashes[1])
+    return COLOURS[colour], () if isinstance(dashes, str) else tuple(
+        2.0 * length for length in dashes[1]
+    )
 
 
 def legend(names: Sequence[str], styles: Sequence[int]) -> str:
@@ -167,7 +195,10 @@ class Playback:
         if not self.playing:
             return self.time
         if self.time < self.t_end:
-            self.time, self._waited = min(self.time + elapsed * self.rate, self.t_end), 0.0
+            self.time, self._waited = (
+                min(self.time + elapsed * self.rate, self.t_end),
+                0.0,
+            )
             return self.time
         if not self.repeats:
             self.playing = False
@@ -231,12 +262,22 @@ class Panel:
         degrees: bool,
     ) -> None:
         self._degrees = degrees
-        self._gui, self._motion, self._playback, self._show = server.gui, motion, playback, show
+        self._gui, self._motion, self._playback, self._show = (
+            server.gui,
+            motion,
+            playback,
+            show,
+        )
         self._gui.configure_theme(show_logo=False, show_share_button=False)
         self._gui.add_html(tables.summary(motion.trajectory, notes, verified=verified))
         self._add_controls()
-        stops = [f"rgb({red},{green},{blue})" for red, green, blue in speed_colours(np.linspace(0.0, 1.0, _STOPS))]
-        self._gui.add_html(tables.speed_legend(stops, float(motion.samples.tool_speed.max())))
+        stops = [
+            f"rgb({red},{green},{blue})"
+            for red, green, blue in speed_colours(np.linspace(0.0, 1.0, _STOPS))
+        ]
+        self._gui.add_html(
+            tables.speed_legend(stops, float(motion.samples.tool_speed.max()))
+        )
         self._state = self._gui.add_html("")
         self._add_switches(scene)
         self._charts = self._add_plots(candidates)
@@ -247,7 +288,9 @@ class Panel:
         t = self._playback.time
         self.follow()
         now = self._motion.trajectory.at(np.array([t]))
-        self._state.content = tables.state_table(self._motion.trajectory, now, degrees=self._degrees)
+        self._state.content = tables.state_table(
+            self._motion.trajectory, now, degrees=self._degrees
+        )
         for chart in self._charts:
             chart.mark(t)
 
@@ -262,15 +305,25 @@ class Panel:
         step = float(10.0 ** np.floor(np.log10(t_end / _SLIDER_STEPS)))
         self._digits = max(0, round(-np.log10(step)))
         ends = ((0.0, "0"), (t_end, f"{t_end:.4g}"))
-        self._slider = self._gui.add_slider("time (s)", 0.0, t_end, step, initial_value=0.0, marks=ends)
+        self._slider = self._gui.add_slider(
+            "time (s)", 0.0, t_end, step, initial_value=0.0, marks=ends
+        )
         self._slider.on_update(self._drag)
         self._button = self._gui.add_button("Pause")
         self._button.on_click(self._toggle)
         self._rates = {f"{rate:g} x real time": rate for rate in RATES}
-        current = next(name for name, rate in self._rates.items() if rate == self._playback.rate)
-        self._gui.add_dropdown("speed", tuple(self._rates), initial_value=current).on_update(self._set_rate)
-        self._gui.add_checkbox("again and again", self._playback.repeats).on_update(self._set_repeats)
-        self._gui.add_button("Download the report", hint="The motion as one HTML page").on_click(self._send_report)
+        current = next(
+            name for name, rate in self._rates.items() if rate == self._playback.rate
+        )
+        self._gui.add_dropdown(
+            "speed", tuple(self._rates), initial_value=current
+        ).on_update(self._set_rate)
+        self._gui.add_checkbox("again and again", self._playback.repeats).on_update(
+            self._set_repeats
+        )
+        self._gui.add_button(
+            "Download the report", hint="The motion as one HTML page"
+        ).on_click(self._send_report)
 
     def _drag(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
         """Show what the user chose with the slider, and stay there."""
@@ -290,7 +343,7 @@ class Panel:
 
     def _send_report(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
         """Make the report for whoever asks, as a file that the browser keeps."""
-        from brachis.apps.report import make_report  # noqa: PLC0415  (matplotlib takes 0.7 s)
+        from brachis.apps.report import make_report
 
         if event.client is None:
             return
@@ -299,11 +352,15 @@ class Panel:
         except BrachisError as error:
             event.client.add_notification("There is no report", str(error))
             return
-        event.client.send_file_download("report.html", page.content, save_immediately=True)
+        event.client.send_file_download(
+            "report.html", page.content, save_immediately=True
+        )
 
     def _add_switches(self, scene: Scene) -> None:
         """Add a box to tick for every layer of the scene."""
-        with self._gui.add_folder(f"show (a cell of the grid is {scene.cell:g} m)", expand_by_default=False):
+        with self._gui.add_folder(
+            f"show (a cell of the grid is {scene.cell:g} m)", expand_by_default=False
+        ):
             for name, handles in scene.layers.items():
                 if handles:
                     box = self._gui.add_checkbox(name, handles[0].visible)
@@ -315,9 +372,13 @@ class Panel:
         with panel.add_tab("limits"):
             charts = [
                 Chart(self._gui, curves)
-                for curves in all_curves(motion.trajectory, motion.samples, degrees=self._degrees)
+                for curves in all_curves(
+                    motion.trajectory, motion.samples, degrees=self._degrees
+                )
             ]
-        with panel.add_tab(f"candidates ({len(candidates)})" if candidates else "candidates"):
+        with panel.add_tab(
+            f"candidates ({len(candidates)})" if candidates else "candidates"
+        ):
             self._gui.add_html(tables.candidates_table(candidates))
         panel.dock_left()
         panel.set_width(_PLOTS_WIDTH)
@@ -326,7 +387,9 @@ class Panel:
         return charts
 
 
-def _switch(scene: Scene, name: str) -> Callable[[viser.GuiEvent[viser.GuiCheckboxHandle]], None]:
+def _switch(
+    scene: Scene, name: str
+) -> Callable[[viser.GuiEvent[viser.GuiCheckboxHandle]], None]:
     """Return what shows or hides a layer."""
 
     def switch(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:

@@ -16,9 +16,21 @@ if TYPE_CHECKING:
 
     Layer = list[viser.SceneNodeHandle]
 
-LAYERS = ("robot", "skeleton", "ghost postures", "path", "tool trace", "tool frame", "world frame", "ground")
+LAYERS = (
+    "robot",
+    "skeleton",
+    "ghost postures",
+    "path",
+    "tool trace",
+    "tool frame",
+    "world frame",
+    "ground",
+)
 """What can be shown and hidden."""
-_GHOST_FIRST, _GHOST_LAST = np.array([190.0, 214.0, 235.0]), np.array([25.0, 75.0, 125.0])
+_GHOST_FIRST, _GHOST_LAST = (
+    np.array([190.0, 214.0, 235.0]),
+    np.array([25.0, 75.0, 125.0]),
+)
 _GHOST_OPACITY = 0.13
 _SHADES = 32
 """Colours of the trace."""
@@ -44,14 +56,26 @@ class Scene:
     bodies : Bodies
     """
 
-    def __init__(self, server: viser.ViserServer, motion: Motion, bodies: Bodies) -> None:
+    def __init__(
+        self, server: viser.ViserServer, motion: Motion, bodies: Bodies
+    ) -> None:
         self._api, self._motion, self._bodies = server.scene, motion, bodies
-        self._api.configure_environment_map(None)  # a plain light shows pale robots on the white page better
-        self._api.add_light_hemisphere("/light", sky_color=(255, 255, 255), ground_color=(120, 120, 130), intensity=2.0)
+        self._api.configure_environment_map(
+            None
+        )  # a plain light shows pale robots on the white page better
+        self._api.add_light_hemisphere(
+            "/light",
+            sky_color=(255, 255, 255),
+            ground_color=(120, 120, 130),
+            intensity=2.0,
+        )
         self._robot = motion.trajectory.robot
         self._size = float(np.linalg.norm(bodies.moving_upper - bodies.moving_lower))
         self.layers: dict[str, Layer] = {name: [] for name in LAYERS}
-        self._frames = [self._api.add_frame(f"/joint {k}", show_axes=False) for k in range(self._robot.n + 1)]
+        self._frames = [
+            self._api.add_frame(f"/joint {k}", show_axes=False)
+            for k in range(self._robot.n + 1)
+        ]
         self._tool = self._frame("/tool", 0.1)
         self.layers["tool frame"].append(self._tool)
         self.layers["world frame"].append(self._frame("/world", 0.15))
@@ -73,36 +97,57 @@ class Scene:
         """Move the robot into the posture `q`, (n,)."""
         found = placements(self._robot, q[None])
         for handle, position, quaternion in zip(
-            (*self._frames, self._tool), found.positions[0], found.quaternions[0], strict=True
+            (*self._frames, self._tool),
+            found.positions[0],
+            found.quaternions[0],
+            strict=True,
         ):
             handle.position, handle.wxyz = position, quaternion
 
     def _frame(self, name: str, part: float) -> viser.FrameHandle:
         """Add axes whose length is a part of the scene's size."""
         length = part * self._size
-        return self._api.add_frame(name, axes_length=length, axes_radius=0.03 * length, origin_radius=0.06 * length)
+        return self._api.add_frame(
+            name,
+            axes_length=length,
+            axes_radius=0.03 * length,
+            origin_radius=0.06 * length,
+        )
 
     def _draw_bodies(self) -> None:
         """Hang links and skeleton on the joints' frames, one asset for each."""
-        import trimesh  # noqa: PLC0415
+        import trimesh
 
-        for layer, bodies in (("robot", self._bodies.links), ("skeleton", self._bodies.skeleton)):
+        for layer, bodies in (
+            ("robot", self._bodies.links),
+            ("skeleton", self._bodies.skeleton),
+        ):
             for joint, meshes in bodies.items():
                 asset = trimesh.Scene(list(meshes)).export(file_type="glb")
-                self.layers[layer].append(self._api.add_glb(f"/joint {joint}/{layer}", asset))
+                self.layers[layer].append(
+                    self._api.add_glb(f"/joint {joint}/{layer}", asset)
+                )
 
     def _draw_ghosts(self) -> None:
         """Draw what moves a few times, fainter, the later the darker."""
-        import trimesh  # noqa: PLC0415
+        import trimesh
 
-        bodies = self._bodies.links if self._bodies.shows_links else self._bodies.skeleton
+        bodies = (
+            self._bodies.links if self._bodies.shows_links else self._bodies.skeleton
+        )
         ghosts = self._motion.ghosts
-        shades = np.linspace(_GHOST_FIRST, _GHOST_LAST, len(ghosts.positions)).astype(np.uint8)
+        shades = np.linspace(_GHOST_FIRST, _GHOST_LAST, len(ghosts.positions)).astype(
+            np.uint8
+        )
         for joint, meshes in bodies.items():
             if _still(ghosts, joint):
                 continue
-            coarse = [mesh.convex_hull if len(mesh.faces) > _FINE else mesh for mesh in meshes]
-            whole = trimesh.util.concatenate([trimesh.Trimesh(mesh.vertices, mesh.faces) for mesh in coarse])
+            coarse = [
+                mesh.convex_hull if len(mesh.faces) > _FINE else mesh for mesh in meshes
+            ]
+            whole = trimesh.util.concatenate(
+                [trimesh.Trimesh(mesh.vertices, mesh.faces) for mesh in coarse]
+            )
             handle = self._api.add_batched_meshes_simple(
                 f"/ghosts/{joint}",
                 whole.vertices,
@@ -120,21 +165,41 @@ class Scene:
         """Draw the prescribed path with its ends."""
         points, layer = self._motion.path, self.layers["path"]
         layer.append(
-            self._api.add_line_segments("/path", _segments(points), _PATH, thickness=2.5, thickness_units="screen")
+            self._api.add_line_segments(
+                "/path",
+                _segments(points),
+                _PATH,
+                thickness=2.5,
+                thickness_units="screen",
+            )
         )
-        for name, point, colour in (("end", points[-1], _END), ("start", points[0], _START)):
-            ball = self._api.add_icosphere(f"/path/{name}", 0.009 * self._size, color=colour, position=point)
+        for name, point, colour in (
+            ("end", points[-1], _END),
+            ("start", points[0], _START),
+        ):
+            ball = self._api.add_icosphere(
+                f"/path/{name}", 0.009 * self._size, color=colour, position=point
+            )
             layer.append(ball)
 
     def _draw_trace(self) -> None:
         """Draw the way of the tool, coloured by its speed."""
-        speed, segments = self._motion.samples.tool_speed, _segments(self._motion.frames.tool)
+        speed, segments = (
+            self._motion.samples.tool_speed,
+            _segments(self._motion.frames.tool),
+        )
         parts = 0.5 * (speed[:-1] + speed[1:]) / max(float(speed.max()), 1e-9)
         shades = np.round(parts * (_SHADES - 1)).astype(int)
         colours = speed_colours(np.linspace(0.0, 1.0, _SHADES))
-        for shade in np.unique(shades).tolist():  # viser shows colours of single points lighter than they are
+        for shade in np.unique(
+            shades
+        ).tolist():  # viser shows colours of single points lighter than they are
             lines = self._api.add_line_segments(
-                f"/trace/{shade}", segments[shades == shade], colours[shade], thickness=7.0, thickness_units="screen"
+                f"/trace/{shade}",
+                segments[shades == shade],
+                colours[shade],
+                thickness=7.0,
+                thickness_units="screen",
             )
             self.layers["tool trace"].append(lines)
 
@@ -163,7 +228,11 @@ class Scene:
         centre = 0.5 * (self._bodies.moving_lower + self._bodies.moving_upper)
         distance = _ROOM * 0.5 * self._size / np.sin(0.5 * _FIELD_OF_VIEW)
         camera = server.initial_camera
-        camera.fov, camera.near, camera.far = _FIELD_OF_VIEW, 0.005 * distance, 100.0 * distance
+        camera.fov, camera.near, camera.far = (
+            _FIELD_OF_VIEW,
+            0.005 * distance,
+            100.0 * distance,
+        )
         camera.look_at, camera.position = centre, centre + distance * self._direction()
 
     def _direction(self) -> np.ndarray:
@@ -172,11 +241,20 @@ class Scene:
         axes = task_map_of(self._robot, trajectory.task.task_space).axes
         plane = drawing_plane(self._robot, trajectory.q[0], axes)
         if plane is None:
-            base, tool = self._motion.frames.positions[:, 1].mean(axis=0), self._motion.frames.tool.mean(axis=0)
+            base, tool = (
+                self._motion.frames.positions[:, 1].mean(axis=0),
+                self._motion.frames.tool.mean(axis=0),
+            )
             azimuth = np.arctan2(*(tool - base)[1::-1]) - _SIDE
             direction = np.array([np.cos(azimuth), np.sin(azimuth), 0.55])
         else:
-            direction = np.array({(0, 1): (0.0, -0.45, 1.0), (0, 2): (0.0, -1.0, 0.3), (1, 2): (1.0, 0.0, 0.3)}[plane])
+            direction = np.array(
+                {
+                    (0, 1): (0.0, -0.45, 1.0),
+                    (0, 2): (0.0, -1.0, 0.3),
+                    (1, 2): (1.0, 0.0, 0.3),
+                }[plane]
+            )
         return np.asarray(direction / np.linalg.norm(direction))
 
 
@@ -187,7 +265,7 @@ def _segments(points: np.ndarray) -> np.ndarray:
 
 def speed_colours(parts: np.ndarray) -> np.ndarray:
     """Colours (K, 3) from 0 to 255 of speeds (K,) as parts of the largest one: Matplotlib's plasma but its pale end."""
-    from matplotlib import colormaps  # noqa: PLC0415  (0.3 s)
+    from matplotlib import colormaps
 
     return np.asarray(colormaps["plasma"](0.88 * parts, bytes=True)[:, :3])
 
@@ -195,4 +273,4 @@ def speed_colours(parts: np.ndarray) -> np.ndarray:
 def _still(found: Placements, joint: int) -> bool:
     """Whether what this joint moves stays where it is in all postures."""
     frames: Any = np.hstack([found.positions[:, joint], found.quaternions[:, joint]])
-    return bool(np.ptp(frames, axis=0).max() < 1e-9)  # noqa: PLR2004
+    return bool(np.ptp(frames, axis=0).max() < 1e-9)

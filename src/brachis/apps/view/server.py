@@ -41,12 +41,12 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
         viser is not installed.
     """
     require_viser()
-    import viser  # noqa: PLC0415
+    import viser
 
     class Server(viser.ViserServer):  # type: ignore[misc]  # not read by mypy
         """A server that is silent, and whose scene stays here: viser's own can be told by a page to publish it."""
 
-        def request_share_url(self, verbose: bool = True) -> None:  # noqa: FBT001, FBT002  (viser's signature)
+        def request_share_url(self, verbose: bool = True) -> None:  # noqa: FBT002  (viser's signature)
             """Refuse to give the scene a public address."""
 
         def stop(self) -> None:
@@ -78,7 +78,10 @@ def require_viser() -> None:
 
 def is_local(host: str) -> bool:
     """Whether an address that was listened on is reached from this machine alone."""
-    addresses = {str(found[4][0]) for found in socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)}
+    addresses = {
+        str(found[4][0])
+        for found in socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    }
     return all(ipaddress.ip_address(address).is_loopback for address in addresses)
 
 
@@ -89,7 +92,7 @@ def _quiet() -> contextlib.redirect_stdout[io.StringIO]:
 
 def _is_of_a_page(record: logging.LogRecord) -> bool:
     """Whether a record of the server is about a page's request; probes, such as HEAD, are refused without a word."""
-    from websockets.exceptions import InvalidMessage  # noqa: PLC0415  (comes with viser)
+    from websockets.exceptions import InvalidMessage
 
     return record.exc_info is None or not isinstance(record.exc_info[1], InvalidMessage)
 
@@ -103,7 +106,9 @@ def _free_port(host: str) -> int:
             continue
         return port
     raise InputError(
-        "no port is free", where="--port", found=f"all from {FIRST_PORT} to {FIRST_PORT + _TRIED - 1} are in use"
+        "no port is free",
+        where="--port",
+        found=f"all from {FIRST_PORT} to {FIRST_PORT + _TRIED - 1} are in use",
     )
 
 
@@ -124,11 +129,17 @@ def _in_use(host: str, port: int) -> _InUseError:
 def _check(host: str, port: int) -> None:
     """Refuse an address that cannot be listened on."""
     if not 0 <= port <= _HIGHEST:
-        raise InputError("is no port", where="--port", found=port, allowed=f"0 to {_HIGHEST}")
+        raise InputError(
+            "is no port", where="--port", found=port, allowed=f"0 to {_HIGHEST}"
+        )
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM
+        )[0]
         with socket.socket(family, kind, protocol) as trial:
-            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as the server does: none waits for old ones
+            trial.setsockopt(
+                socket.SOL_SOCKET, socket.SO_REUSEADDR, 1
+            )  # as the server does: none waits for old ones
             trial.bind(address)
     except (OSError, UnicodeError) as error:
         if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:

@@ -34,12 +34,18 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
         f"t = {now.t[0]:.4f} s of {trajectory.t_end:.4f} s, s = {now.s[0]:.4f}",
         f"tool at {place} m, {now.tool_speed[0]:.3f} m/s",
     )
-    cells: dict[int, list[str]] = {joint: [name] for joint, name in enumerate(trajectory.joint_names)}
+    cells: dict[int, list[str]] = {
+        joint: [name] for joint, name in enumerate(trajectory.joint_names)
+    }
     for kind, digits in _STATE.items():
         for part in quantities(trajectory, now, kind, degrees=degrees):
-            for joint, value in zip(part.joints.tolist(), part.values[0].tolist(), strict=True):
+            for joint, value in zip(
+                part.joints.tolist(), part.values[0].tolist(), strict=True
+            ):
                 cells[joint].append(f"{_write_number(value, digits)} {part.unit}")
-    return head + _table(("joint", "position", "velocity", "torque, force"), list(cells.values()))
+    return head + _table(
+        ("joint", "position", "velocity", "torque, force"), list(cells.values())
+    )
 
 
 def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
@@ -48,7 +54,9 @@ def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
     The same motion is listed once.
     """
     if not candidates:
-        return _paragraph("The candidates of the search are not known: they are in result.json beside result.npz.")
+        return _paragraph(
+            "The candidates of the search are not known: they are in result.json beside result.npz."
+        )
     rows = candidate_rows(candidates)
     left = len(candidates) - len(rows[:_MANY])
     note = _paragraph(f"{left} more, slower or the same motion again") if left else ""
@@ -57,7 +65,9 @@ def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
 
 def speed_legend(stops: Sequence[str], fastest: float) -> str:
     """Colour bar of the tool's speed from 0 to `fastest`, m/s; `stops` are CSS colours."""
-    marks = "".join(f"<span>{part * fastest:.3g}</span>" for part in (0.0, 0.25, 0.5, 0.75, 1.0))
+    marks = "".join(
+        f"<span>{part * fastest:.3g}</span>" for part in (0.0, 0.25, 0.5, 0.75, 1.0)
+    )
     return (
         '<div style="margin:0.3em 0.8em;font-size:0.8em">tool speed (m/s)'
         f'<div style="height:0.8em;border-radius:2px;background:linear-gradient(to right,{",".join(stops)})"></div>'
@@ -65,9 +75,15 @@ def speed_legend(stops: Sequence[str], fastest: float) -> str:
     )
 
 
-def summary(trajectory: Trajectory, notes: Sequence[str], *, verified: bool | None) -> str:
+def summary(
+    trajectory: Trajectory, notes: Sequence[str], *, verified: bool | None
+) -> str:
     """End time, what is known of the verification, and what else the user should know."""
-    told = {None: "", True: ", verified", False: ', <b style="color:#D00000">NOT verified</b>'}[verified]
+    told = {
+        None: "",
+        True: ", verified",
+        False: ', <b style="color:#D00000">NOT verified</b>',
+    }[verified]
     text = f'<div style="margin:0.3em 0.8em;font-size:0.9em"><b>t_E = {trajectory.t_end:.4f} s</b>{told}</div>'
     return text + (_paragraph(*notes) if notes else "")
 
@@ -82,10 +98,18 @@ def _paragraph(*lines: str) -> str:
     return f'<div style="margin:0.3em 0.8em;font-size:0.8em">{text}</div>'
 
 
-def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], cell: str = _CELL) -> str:
-    head = "".join(f'<th style="{cell};text-align:left">{html.escape(column)}</th>' for column in columns)
+def _table(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], cell: str = _CELL
+) -> str:
+    head = "".join(
+        f'<th style="{cell};text-align:left">{html.escape(column)}</th>'
+        for column in columns
+    )
     body = "".join(
-        "<tr>" + "".join(f'<td style="{cell}">{html.escape(text)}</td>' for text in row) + "</tr>" for row in rows
+        "<tr>"
+        + "".join(f'<td style="{cell}">{html.escape(text)}</td>' for text in row)
+        + "</tr>"
+        for row in rows
     )
     return (
         '<div style="margin:0.3em 0.8em;overflow-x:auto"><table style="font-size:0.78em;border-collapse:collapse">'

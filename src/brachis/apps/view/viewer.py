@@ -75,11 +75,15 @@ class Viewer:
         except BaseException:
             self._server.stop()
             raise
-        shown = {"0.0.0.0": LOOPBACK, "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)  # noqa: S104
+        shown = {"0.0.0.0": LOOPBACK, "::": "[::1]"}.get(  # noqa: S104
+            host, f"[{host}]" if ":" in host else host
+        )
         self.local = is_local(host)
         self.url = f"http://{shown}:{self._server.get_port()}"
         self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="brachis viewer", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, name="brachis viewer", daemon=True
+        )
         self._thread.start()
 
     def _fill(
@@ -92,7 +96,9 @@ class Viewer:
     ) -> None:
         motion, bodies = Motion.of(trajectory), bodies_of(trajectory)
         boundary = trajectory.task.boundary
-        self.playback = Playback(trajectory.t_end, first_rate(trajectory.t_end), loops=boundary.periodic)
+        self.playback = Playback(
+            trajectory.t_end, first_rate(trajectory.t_end), loops=boundary.periodic
+        )
         self._trajectory, self._lock = trajectory, threading.RLock()
         self._scene = Scene(self._server, motion, bodies)
         notes = [f"not shown: {reason}" for reason in bodies.unread]
@@ -133,7 +139,10 @@ class Viewer:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         """Stop."""
         self.stop()
@@ -156,7 +165,9 @@ class Viewer:
             if not self.playback.playing or not self._server.get_clients():
                 continue
             with self._lock, self._server.atomic():
-                self._scene.show(self._trajectory.position(self.playback.advance(elapsed)))
+                self._scene.show(
+                    self._trajectory.position(self.playback.advance(elapsed))
+                )
                 picture += 1
                 if picture % _EVERY == 0:
                     self._panel.update()
@@ -208,7 +219,9 @@ def view(
         viser is not installed.
     """
     trajectory = motion_of(motion)
-    viewer = Viewer(trajectory, candidates, verified=verified, degrees=degrees, host=host, port=port)
+    viewer = Viewer(
+        trajectory, candidates, verified=verified, degrees=degrees, host=host, port=port
+    )
     print(f"the motion is shown at {viewer.url}", file=sys.stderr)  # noqa: T201
     if block if block is not None else not hasattr(sys, "ps1"):
         viewer.wait()

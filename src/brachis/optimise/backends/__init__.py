@@ -1,7 +1,14 @@
 """Solver backends behind one protocol: one per file, listed in `TABLE`, imported when used."""
 
 from brachis.optimise.backends.monitor import residual
-from brachis.optimise.backends.protocol import Problem, Progress, Solver, SolverOptions, SolverReport, SolveStatus
+from brachis.optimise.backends.protocol import (
+    Problem,
+    Progress,
+    Solver,
+    SolverOptions,
+    SolverReport,
+    SolveStatus,
+)
 from brachis.optimise.backends.registry import AUTO_ORDER, NAMES, solver_named
 
 __all__ = [

@@ -25,7 +25,14 @@ from threadpoolctl import ThreadpoolController
 
 from brachis.common import interrupts
 from brachis.optimise.backends.monitor import ended
-from brachis.optimise.backends.protocol import Problem, Progress, Solve, SolverOptions, SolverReport, SolveStatus
+from brachis.optimise.backends.protocol import (
+    Problem,
+    Progress,
+    Solve,
+    SolverOptions,
+    SolverReport,
+    SolveStatus,
+)
 
 ENTRIES = 1_000_000
 """Variables times rows above which a solve runs apart: an iteration takes Uno 0.2 s there, 18 s at nine times that."""
@@ -44,10 +51,18 @@ def apart_if_large(solve: Solve) -> Solve:
     """
 
     @functools.wraps(solve)
-    def solved(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
+    def solved(
+        problem: Problem,
+        x: np.ndarray,
+        options: SolverOptions,
+        progress: Progress | None,
+    ) -> SolverReport:
         # A daemonic process may have none of its own; the backend's limit then holds between its iterations alone.
         entries_allowed = ENTRIES * min(1.0, (options.time_limit / SHORT) ** 2)
-        if len(x) * len(problem.lower) <= entries_allowed or multiprocessing.current_process().daemon:
+        if (
+            len(x) * len(problem.lower) <= entries_allowed
+            or multiprocessing.current_process().daemon
+        ):
             return solve(problem, x, options, progress)
         name = solve.__module__.rpartition(".")[2]
         return _solve_apart(solve.__module__, name, problem, x, options, progress)
@@ -56,16 +71,28 @@ def apart_if_large(solve: Solve) -> Solve:
 
 
 def _solve_apart(
-    module: str, name: str, problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None
+    module: str,
+    name: str,
+    problem: Problem,
+    x: np.ndarray,
+    options: SolverOptions,
+    progress: Progress | None,
 ) -> SolverReport:
     """Start the process, pass on what it says, and end it."""
     began = time.monotonic()
     context: Any = multiprocessing.get_context(_METHOD)
     receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_work, args=(sender, module, problem, x, options), daemon=True)
+    process = context.Process(
+        target=_work, args=(sender, module, problem, x, options), daemon=True
+    )
     try:
-        with interrupts.blocked(), warnings.catch_warnings():  # the fork touches nothing that threads may hold
-            warnings.filterwarnings("ignore", message=".*multi-threaded", category=DeprecationWarning)
+        with (
+            interrupts.blocked(),
+            warnings.catch_warnings(),
+        ):  # the fork touches nothing that threads may hold
+            warnings.filterwarnings(
+                "ignore", message=".*multi-threaded", category=DeprecationWarning
+            )
             process.start()
         sender.close()
         answer = _heard(receiver, began + options.time_limit + _GRACE, progress)
@@ -81,12 +108,16 @@ def _solve_apart(
         return answer
     late = time.monotonic() > began + options.time_limit
     status, message = (
-        (SolveStatus.TIME_LIMIT, "ended: it did not come back in time") if late else (SolveStatus.FAILED, "crashed")
+        (SolveStatus.TIME_LIMIT, "ended: it did not come back in time")
+        if late
+        else (SolveStatus.FAILED, "crashed")
     )
     return ended(name, problem, x, status, message, time.monotonic() - began)
 
 
-def _heard(receiver: Connection, until: float, progress: Progress | None) -> SolverReport | Exception | None:
+def _heard(
+    receiver: Connection, until: float, progress: Progress | None
+) -> SolverReport | Exception | None:
     """Pass on the progress until the answer comes; None where none comes in time, or at all."""
     while receiver.poll(max(until - time.monotonic(), 0.0)):
         try:
@@ -100,7 +131,13 @@ def _heard(receiver: Connection, until: float, progress: Progress | None) -> Sol
     return None
 
 
-def _work(sender: Connection, module: str, problem: Problem, x: np.ndarray, options: SolverOptions) -> None:
+def _work(
+    sender: Connection,
+    module: str,
+    problem: Problem,
+    x: np.ndarray,
+    options: SolverOptions,
+) -> None:
     """Solve within the process.
 
     The system ends it when its time is up, wherever it is then, even if nobody waits for it any more.
@@ -127,7 +164,12 @@ def one_at_a_time(solve: Solve) -> Solve:
     """Let a solve wait until no other thread is in one (decorator)."""
 
     @functools.wraps(solve)
-    def waiting(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
+    def waiting(
+        problem: Problem,
+        x: np.ndarray,
+        options: SolverOptions,
+        progress: Progress | None,
+    ) -> SolverReport:
         with _LOCK:
             return solve(problem, x, options, progress)
 

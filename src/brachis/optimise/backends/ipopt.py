@@ -10,7 +10,13 @@ import numpy as np
 from brachis.errors import UnreachableError
 from brachis.optimise.backends.child_process import apart_if_large, one_at_a_time
 from brachis.optimise.backends.monitor import Watch, from_finite_numbers, objective_at
-from brachis.optimise.backends.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
+from brachis.optimise.backends.protocol import (
+    Problem,
+    Progress,
+    SolverOptions,
+    SolverReport,
+    SolveStatus,
+)
 
 name = "ipopt"
 
@@ -30,9 +36,11 @@ _INFINITY = 2e19  # IPOPT takes bounds beyond 1e19 for none
 @from_finite_numbers
 @one_at_a_time
 @apart_if_large
-def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
+def solve(
+    problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None
+) -> SolverReport:
     """See `brachis.optimise.backends.protocol.Solver`."""
-    import ipyopt  # noqa: PLC0415  (a solver is imported when it is used)
+    import ipyopt
 
     watch = Watch(problem, options, progress)
 
@@ -57,7 +65,9 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
         except UnreachableError:
             out[:] = np.nan
 
-    def intermediate(_mode: int, _iteration: int, objective: float, infeasibility: float, *_: float) -> bool:
+    def intermediate(
+        _mode: int, _iteration: int, objective: float, infeasibility: float, *_: float
+    ) -> bool:
         stop = watch.between_iterations(objective)
         return not (watch.has_settled(objective, infeasibility) or stop)
 
@@ -90,4 +100,6 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
     with watch:
         answer, _, code = backend.solve(x.copy(), mult_g=multipliers)
     status = _STATUS.get(int(code), SolveStatus.FAILED)
-    return watch.report(name, status, np.array(answer), -multipliers, f"return code {code}")
+    return watch.report(
+        name, status, np.array(answer), -multipliers, f"return code {code}"
+    )

@@ -13,7 +13,14 @@ import numpy as np
 
 from brachis.common.interrupts import Presses
 from brachis.errors import UnreachableError
-from brachis.optimise.backends.protocol import Problem, Progress, Solve, SolverOptions, SolverReport, SolveStatus
+from brachis.optimise.backends.protocol import (
+    Problem,
+    Progress,
+    Solve,
+    SolverOptions,
+    SolverReport,
+    SolveStatus,
+)
 
 _EVALUATIONS = 10
 """Evaluations for each iteration allowed, on average: a solver that needs more cannot leave a point out of reach."""
@@ -37,7 +44,9 @@ class Watch:
     progress : Progress or None
     """
 
-    def __init__(self, problem: Problem, options: SolverOptions, progress: Progress | None) -> None:
+    def __init__(
+        self, problem: Problem, options: SolverOptions, progress: Progress | None
+    ) -> None:
         self.problem = problem
         self.options = options
         self.iterations = 0
@@ -58,7 +67,9 @@ class Watch:
         if threading.current_thread() is threading.main_thread():
             self._during = signal.SIG_IGN if ignored else self._keep_interrupt
             self._handler = signal.signal(signal.SIGINT, self._during)
-            if isinstance(self._handler, Presses) and self._handler.pending:  # it went unheard until now
+            if (
+                isinstance(self._handler, Presses) and self._handler.pending
+            ):  # it went unheard until now
                 self.interrupt = KeyboardInterrupt()
         return self
 
@@ -93,10 +104,16 @@ class Watch:
         A redundant joint that no limit touches, the roll of a tool for example, leaves a set of equally fast motions,
         within which a solver wanders without ever seeing its conditions of optimality hold.
         """
-        self._feasible = [*self._feasible, objective] if infeasibility <= _FEASIBLE * self.options.tolerance else []
+        self._feasible = (
+            [*self._feasible, objective]
+            if infeasibility <= _FEASIBLE * self.options.tolerance
+            else []
+        )
         recent = self._feasible[-self.options.patience :]
         spread = max(recent, default=0.0) - min(recent, default=0.0)
-        self.stagnated = len(recent) == self.options.patience and spread <= self.options.progress * abs(objective)
+        self.stagnated = len(
+            recent
+        ) == self.options.patience and spread <= self.options.progress * abs(objective)
         return self.stagnated
 
     def must_stop(self) -> bool:
@@ -121,19 +138,27 @@ class Watch:
         """Jacobian entries at x; raises as `rows` does."""
         return self._evaluate(self.problem.jacobian, x)
 
-    def _evaluate(self, function: Callable[[np.ndarray], Any], x: np.ndarray) -> np.ndarray:
-        if self._handler is not None:  # a backend may have put a handler of its own in place since
+    def _evaluate(
+        self, function: Callable[[np.ndarray], Any], x: np.ndarray
+    ) -> np.ndarray:
+        if (
+            self._handler is not None
+        ):  # a backend may have put a handler of its own in place since
             signal.signal(signal.SIGINT, self._during)
         if self.must_stop():
             raise UnreachableError("the solve has to stop")
         self._evaluations += 1
         return self._finite(function, x)
 
-    def _finite(self, function: Callable[[np.ndarray], Any], x: np.ndarray) -> np.ndarray:
+    def _finite(
+        self, function: Callable[[np.ndarray], Any], x: np.ndarray
+    ) -> np.ndarray:
         if not _usable(x):
             raise UnreachableError("the solver asked for a point that is not finite")
         try:
-            with np.errstate(over="ignore", invalid="ignore"):  # what comes of it is looked at
+            with np.errstate(
+                over="ignore", invalid="ignore"
+            ):  # what comes of it is looked at
                 values = np.asarray(function(np.array(x)))
         except KeyboardInterrupt as interrupt:
             self.interrupt = interrupt
@@ -143,7 +168,12 @@ class Watch:
         return values
 
     def report(
-        self, solver: str, status: SolveStatus, x: np.ndarray, multipliers: np.ndarray | None, message: str
+        self,
+        solver: str,
+        status: SolveStatus,
+        x: np.ndarray,
+        multipliers: np.ndarray | None,
+        message: str,
     ) -> SolverReport:
         """Judge the answer by its own residuals.
 
@@ -172,7 +202,9 @@ class Watch:
             x=x,
             objective=objective_at(self.problem, x),
             violation=violation,
-            multipliers=np.zeros(len(self.problem.lower)) if multipliers is None else multipliers,
+            multipliers=np.zeros(len(self.problem.lower))
+            if multipliers is None
+            else multipliers,
             iterations=self.iterations,
             wall_time=self.elapsed,
             message=message,
@@ -180,7 +212,12 @@ class Watch:
 
 
 def ended(
-    solver: str, problem: Problem, x: np.ndarray, status: SolveStatus, message: str, wall_time: float = 0.0
+    solver: str,
+    problem: Problem,
+    x: np.ndarray,
+    status: SolveStatus,
+    message: str,
+    wall_time: float = 0.0,
 ) -> SolverReport:
     """Report of a solve that gave no answer: the start `x`, (v,), stays.
 
@@ -219,14 +256,25 @@ def from_finite_numbers(solve: Solve) -> Solve:
     """
 
     @functools.wraps(solve)
-    def checked(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
+    def checked(
+        problem: Problem,
+        x: np.ndarray,
+        options: SolverOptions,
+        progress: Progress | None,
+    ) -> SolverReport:
         bounds = (problem.lower, problem.upper, problem.x_lower, problem.x_upper)
         name = solve.__module__.rpartition(".")[2]
         if options.time_limit <= 0.0:
             return ended(name, problem, x, SolveStatus.TIME_LIMIT, "no time was left")
         if _usable(x) and not any(np.isnan(bound).any() for bound in bounds):
             return solve(problem, x, options, progress)
-        return ended(name, problem, x, SolveStatus.EVALUATION_ERROR, "the start or a bound is not a finite number")
+        return ended(
+            name,
+            problem,
+            x,
+            SolveStatus.EVALUATION_ERROR,
+            "the start or a bound is not a finite number",
+        )
 
     return checked
 
@@ -253,6 +301,11 @@ def residual(problem: Problem, x: np.ndarray) -> float:
             rows = problem.rows(x)
     except UnreachableError:
         return np.inf
-    gaps = (problem.lower - rows, rows - problem.upper, problem.x_lower - x, x - problem.x_upper)
+    gaps = (
+        problem.lower - rows,
+        rows - problem.upper,
+        problem.x_lower - x,
+        x - problem.x_upper,
+    )
     worst = float(np.max([gap.max(initial=0.0) for gap in gaps]))
     return np.inf if np.isnan(worst) else worst

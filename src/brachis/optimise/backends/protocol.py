@@ -22,7 +22,9 @@ class SolveStatus(enum.Enum):
     ACCEPTABLE = "acceptable: feasible, but the solver could not confirm optimality; another start may be better"
     STAGNATED = "stagnated: feasible, and the last iterations made it no faster; other motions take as long"
     ITERATION_LIMIT = "iteration limit reached; raise solver.max_iterations"
-    STALLED = "the solver crept on without progress; another start or solver may do better"
+    STALLED = (
+        "the solver crept on without progress; another start or solver may do better"
+    )
     TIME_LIMIT = "time limit reached"
     INFEASIBLE = "no feasible point near this start; check limits, choose another redundant joint or start posture"
     EVALUATION_ERROR = "the motion could not be evaluated near this start; choose another redundant joint"
@@ -31,7 +33,11 @@ class SolveStatus(enum.Enum):
     @property
     def usable(self) -> bool:
         """True where the answer satisfies the rows."""
-        return self in (SolveStatus.OPTIMAL, SolveStatus.STAGNATED, SolveStatus.ACCEPTABLE)
+        return self in (
+            SolveStatus.OPTIMAL,
+            SolveStatus.STAGNATED,
+            SolveStatus.ACCEPTABLE,
+        )
 
 
 class Problem(Protocol):
@@ -141,7 +147,13 @@ class Solver(Protocol):
 
     name: str
 
-    def solve(self, problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
+    def solve(
+        self,
+        problem: Problem,
+        x: np.ndarray,
+        options: SolverOptions,
+        progress: Progress | None,
+    ) -> SolverReport:
         """Solve `problem` from the start `x`.
 
         Raises

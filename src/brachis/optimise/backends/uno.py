@@ -13,7 +13,13 @@ import numpy as np
 
 from brachis.optimise.backends.child_process import apart_if_large, one_at_a_time
 from brachis.optimise.backends.monitor import Watch, from_finite_numbers, objective_at
-from brachis.optimise.backends.protocol import Problem, Progress, SolverOptions, SolverReport, SolveStatus
+from brachis.optimise.backends.protocol import (
+    Problem,
+    Progress,
+    SolverOptions,
+    SolverReport,
+    SolveStatus,
+)
 
 name = "uno"
 
@@ -42,7 +48,9 @@ _STOPPED = {
 @from_finite_numbers
 @one_at_a_time
 @apart_if_large
-def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None) -> SolverReport:
+def solve(
+    problem: Problem, x: np.ndarray, options: SolverOptions, progress: Progress | None
+) -> SolverReport:
     """See `brachis.optimise.backends.protocol.Solver`."""
     with Watch(problem, options, progress) as watch:
         for radius, scaled in _RESTARTS:
@@ -53,7 +61,9 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
             ending, found = result.optimization_status.name, result.solution_status.name
             if ending == "USER_INTERRUPTION":  # Uno has a SIGINT handler of its own
                 watch.interrupt = KeyboardInterrupt()
-            broken_down = ending == "ALGORITHMIC_ERROR" or found == "FEASIBLE_SMALL_STEP"
+            broken_down = (
+                ending == "ALGORITHMIC_ERROR" or found == "FEASIBLE_SMALL_STEP"
+            )
             if not (stall.seen or broken_down) or watch.must_stop():
                 break
     status = _STOPPED.get(ending) or _STATUS.get(found, SolveStatus.FAILED)
@@ -62,7 +72,9 @@ def solve(problem: Problem, x: np.ndarray, options: SolverOptions, progress: Pro
     elif ending == "USER_TERMINATION":
         status = SolveStatus.ITERATION_LIMIT
     message = f"{ending.lower()}, {found.lower()}"
-    return watch.report(name, status, x, np.array(result.constraint_dual_solution), message)
+    return watch.report(
+        name, status, x, np.array(result.constraint_dual_solution), message
+    )
 
 
 def _units(problem: Problem, x: np.ndarray) -> np.ndarray:
@@ -96,9 +108,16 @@ class _Stall:
         # In restoration Uno appends elastic variables.
         objective = objective_at(problem, self._units * point[: len(self._units)])
         self._objectives.append(objective)
-        stop = self._watch.between_iterations(objective) or self._watch.iterations >= self._watch.options.max_iterations
-        counts = settled or (self._watch.options.anywhere and objective_multiplier != 0.0)
-        stop = self._watch.has_settled(objective, infeasibility if counts else np.inf) or stop  # type: ignore[arg-type]
+        stop = (
+            self._watch.between_iterations(objective)
+            or self._watch.iterations >= self._watch.options.max_iterations
+        )
+        counts = settled or (
+            self._watch.options.anywhere and objective_multiplier != 0.0
+        )
+        missed = infeasibility if counts else np.inf
+        is_done = self._watch.has_settled(objective, missed)  # type: ignore[arg-type]
+        stop = is_done or stop
         recent = self._objectives[-_STALL_ITERATIONS:]
         self.seen = (
             not stop
@@ -110,13 +129,17 @@ class _Stall:
         return stop or self.seen
 
 
-def _run(watch: Watch, x: np.ndarray, units: np.ndarray, radius: float, terminate: _Stall) -> Any:  # noqa: ANN401
+def _run(
+    watch: Watch, x: np.ndarray, units: np.ndarray, radius: float, terminate: _Stall
+) -> Any:
     """One call of Uno, which is untyped; its variables are x in units."""
-    import unopy  # noqa: PLC0415  (a solver is imported when it is used)
+    import unopy
 
     problem, options = watch.problem, watch.options
     bounds = (problem.x_lower / units).tolist(), (problem.x_upper / units).tolist()
-    model = unopy.Model(unopy.PROBLEM_NONLINEAR, len(x), *bounds, unopy.ZERO_BASED_INDEXING)
+    model = unopy.Model(
+        unopy.PROBLEM_NONLINEAR, len(x), *bounds, unopy.ZERO_BASED_INDEXING
+    )
     entry_units = units[problem.jacobian_columns]
 
     def objective(point: np.ndarray) -> float:

@@ -65,15 +65,17 @@ class JointSpace(TaskMap):
         """See `TaskMap.jacobian`."""
         return np.broadcast_to(np.eye(self.m), (twists.shape[1], self.m, self.m))
 
-    def bias(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:  # noqa: ARG002
+    def bias(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
         """See `TaskMap.bias`."""
         return np.zeros_like(qdot)
 
-    def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:  # noqa: ARG002
+    def velocity_slopes(self, twists: np.ndarray, qdot: np.ndarray) -> np.ndarray:
         """See `TaskMap.velocity_slopes`."""
         return np.zeros((len(qdot), self.m, self.m))
 
-    def derivatives(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:  # noqa: ARG002
+    def derivatives(
+        self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+    ) -> TaskDerivatives:
         """See `TaskMap.derivatives`."""
         zeros = np.zeros((len(qdot), self.m, self.m))
         return TaskDerivatives(zeros, zeros, zeros)
@@ -114,12 +116,21 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
     names, positions = tuple(rows), position_rows(rows)
     if names == POSE_ROWS:
         return Pose(robot)
-    if any(row not in ROWS for row in names) or len(set(names)) != len(names) or not positions:
+    if (
+        any(row not in ROWS for row in names)
+        or len(set(names)) != len(names)
+        or not positions
+    ):
         allowed = f"{', '.join(ROWS)}, each once"
-        raise InputError("rows are not usable", where="task_space", found=list(names), allowed=allowed)
+        raise InputError(
+            "rows are not usable",
+            where="task_space",
+            found=list(names),
+            allowed=allowed,
+        )
     if YAW not in names:
         return WorldRows(robot, names)
-    if names[-1] != YAW or len(positions) != 2:  # noqa: PLR2004
+    if names[-1] != YAW or len(positions) != 2:
         raise InputError(
             "yaw needs exactly two position rows before it",
             where="task_space",
@@ -199,12 +210,22 @@ def with_free_roll(robot: Robot) -> Robot:
         The robot has a joint of this name.
     """
     if robot.model.existJointName(ROLL_JOINT):
-        raise InputError("the robot has a joint with the name of the virtual one", where="task_space", found=ROLL_JOINT)
+        raise InputError(
+            "the robot has a joint with the name of the virtual one",
+            where="task_space",
+            found=ROLL_JOINT,
+        )
     model = robot.model.copy()
     tool = model.frames[robot.frame_id]
-    joint = model.addJoint(tool.parentJoint, pin.JointModelRZ(), tool.placement, ROLL_JOINT)
+    joint = model.addJoint(
+        tool.parentJoint, pin.JointModelRZ(), tool.placement, ROLL_JOINT
+    )
     frame = f"{robot.tool_frame}/{ROLL_JOINT}"
-    model.addFrame(pin.Frame(frame, joint, robot.frame_id, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    model.addFrame(
+        pin.Frame(
+            frame, joint, robot.frame_id, pin.SE3.Identity(), pin.FrameType.OP_FRAME
+        )
+    )
     old, friction = robot.limits, robot.friction
     return replace(
         robot,

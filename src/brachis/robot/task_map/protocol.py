@@ -94,12 +94,16 @@ class TaskMap(Summary, ABC):
 
     def __post_init__(self) -> None:
         """Look the axes up, and make a workspace."""
-        object.__setattr__(self, "axes", tuple(AXES.index(row) for row in self.rows if row in AXES))
+        object.__setattr__(
+            self, "axes", tuple(AXES.index(row) for row in self.rows if row in AXES)
+        )
         object.__setattr__(self, "_data", self.robot.model.createData())
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Leave Pinocchio's workspace behind."""
-        return type(self), tuple(getattr(self, entry.name) for entry in fields(self) if entry.init)
+        return type(self), tuple(
+            getattr(self, entry.name) for entry in fields(self) if entry.init
+        )
 
     @property
     def m(self) -> int:
@@ -122,7 +126,12 @@ class TaskMap(Summary, ABC):
         if isinstance(stated, ToolPose) or len(stated) != self.m:
             found = "a pose" if isinstance(stated, ToolPose) else len(stated)
             allowed = f"{self.m}: {', '.join(self.rows)}"
-            raise InputError("has the wrong number of coordinates", where=where, found=found, allowed=allowed)
+            raise InputError(
+                "has the wrong number of coordinates",
+                where=where,
+                found=found,
+                allowed=allowed,
+            )
         return np.array(stated, dtype=float)
 
     def value(self, q: np.ndarray) -> np.ndarray:
@@ -151,7 +160,9 @@ class TaskMap(Summary, ABC):
         model, data, frame = self.robot.model, self._data, self.robot.frame_id
         columns = np.empty((len(q), 6, self.robot.n))
         for k in range(len(q)):
-            columns[k].flat = pin.computeFrameJacobian(model, data, q[k], frame, self.frame)  # (6,) for one joint
+            columns[k].flat = pin.computeFrameJacobian(
+                model, data, q[k], frame, self.frame
+            )  # (6,) for one joint
         return np.moveaxis(columns, 1, 0)
 
     @abstractmethod
@@ -171,5 +182,7 @@ class TaskMap(Summary, ABC):
         """V_q alone, (K, m, n), of K states from the `twists` at their postures."""
 
     @abstractmethod
-    def derivatives(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:
+    def derivatives(
+        self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+    ) -> TaskDerivatives:
         """V_q, A_q and A_v of K states from the `twists` at their postures; see `twists`."""

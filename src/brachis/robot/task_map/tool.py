@@ -69,10 +69,14 @@ def tool_motion(twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> Tool
     parts, acceleration = _sums(twists * qddot + velocity_q * qdot)
     acceleration_q = _bracket(parts, twists) + _bracket(velocity_q, velocity - before)
     acceleration_qdot = 2.0 * velocity_q + _bracket(twists, velocity)
-    return ToolMotion(velocity, acceleration, velocity_q, acceleration_q, acceleration_qdot)
+    return ToolMotion(
+        velocity, acceleration, velocity_q, acceleration_q, acceleration_qdot
+    )
 
 
-def velocity_slopes(twists: np.ndarray, qdot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def velocity_slopes(
+    twists: np.ndarray, qdot: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """V, (6, K, 1), and dV/dq, (6, K, n), from the `twists` (6, K, n) at K postures and speeds (K, n)."""
     before, velocity = _sums(twists * qdot)
     return velocity, _bracket(before, twists)
@@ -98,7 +102,9 @@ def _sums(parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _bracket(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Lie bracket of twists (6, K, n or 1)."""
     v, w = first[:3], first[3:]
-    return np.concatenate([cross(w, second[:3]) + cross(v, second[3:]), cross(w, second[3:])])
+    return np.concatenate(
+        [cross(w, second[:3]) + cross(v, second[3:]), cross(w, second[3:])]
+    )
 
 
 _POSITIONS = 3
@@ -122,7 +128,9 @@ class Pose(TaskMap):
         """See `TaskMap.read`."""
         if not isinstance(stated, ToolPose):
             allowed = "a position with an orientation (ToolPose)"
-            raise InputError("has no orientation", where=where, found=list(stated), allowed=allowed)
+            raise InputError(
+                "has no orientation", where=where, found=list(stated), allowed=allowed
+            )
         convention, values = stated.convention_and_numbers
         rotation = rotation_by(convention, np.array(values))
         return np.concatenate([stated.position, rotation.as_matrix().ravel()])
@@ -133,11 +141,15 @@ class Pose(TaskMap):
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """See `TaskMap.difference`: the translation and the rotation vector, in the frame of `second`."""
-        first, second = np.broadcast_arrays(np.asarray(first, dtype=float), np.asarray(second, dtype=float))
+        first, second = np.broadcast_arrays(
+            np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+        )
         shape = first.shape[:-1]
         to = first[..., _POSITIONS:].reshape(*shape, 3, 3)
         back = np.swapaxes(second[..., _POSITIONS:].reshape(*shape, 3, 3), -1, -2)
-        shift = np.einsum("...ij,...j->...i", back, first[..., :_POSITIONS] - second[..., :_POSITIONS])
+        shift = np.einsum(
+            "...ij,...j->...i", back, first[..., :_POSITIONS] - second[..., :_POSITIONS]
+        )
         turn = _rotation_vectors((back @ to).reshape(-1, 3, 3))
         return np.concatenate([shift, turn.reshape(*shape, 3)], axis=-1)
 
@@ -153,7 +165,9 @@ class Pose(TaskMap):
         """See `TaskMap.velocity_slopes`."""
         return self.jacobian(velocity_slopes(twists, qdot)[1])
 
-    def derivatives(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:
+    def derivatives(
+        self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+    ) -> TaskDerivatives:
         """See `TaskMap.derivatives`."""
         tool = tool_motion(twists, qdot, qddot)
         parts = (tool.velocity_q, tool.acceleration_q, tool.acceleration_qdot)
@@ -164,12 +178,18 @@ def _rotation_vectors(rotations: np.ndarray) -> np.ndarray:
     """Rotation vectors (K, 3) of rotation matrices (K, 3, 3); of one near half a turn by SciPy, through quaternions."""
     twice = rotations - np.swapaxes(rotations, 1, 2)
     axes = 0.5 * np.stack([twice[:, 2, 1], twice[:, 0, 2], twice[:, 1, 0]], axis=1)
-    sine, cosine = np.linalg.norm(axes, axis=1), 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0)
+    sine, cosine = (
+        np.linalg.norm(axes, axis=1),
+        0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0),
+    )
     angles = np.arctan2(sine, cosine)
-    vectors = axes * np.divide(angles, sine, out=np.ones_like(sine), where=sine > 0.0)[:, None]
+    vectors = (
+        axes
+        * np.divide(angles, sine, out=np.ones_like(sine), where=sine > 0.0)[:, None]
+    )
     far = angles > _NEARLY_HALF_A_TURN
     if far.any():
-        from scipy.spatial.transform import Rotation  # noqa: PLC0415  (a fifth of a second that most need not wait)
+        from scipy.spatial.transform import Rotation
 
         vectors[far] = Rotation.from_matrix(rotations[far]).as_rotvec()
     return np.asarray(vectors)
@@ -181,7 +201,7 @@ class WorldRows(TaskMap):
 
     frame: ClassVar[pin.ReferenceFrame] = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
-    def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:  # noqa: ARG002
+    def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """See `TaskMap.of_placements`."""
         return positions[:, list(self.axes)]
 
@@ -204,17 +224,28 @@ class WorldRows(TaskMap):
         velocity, slopes = velocity_slopes(twists, qdot)
         return self.jacobian(slopes + turned(twists[3:], velocity))
 
-    def derivatives(self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray) -> TaskDerivatives:
+    def derivatives(
+        self, twists: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
+    ) -> TaskDerivatives:
         """See `TaskMap.derivatives`."""
         tool = tool_motion(twists, qdot, qddot)
         turning, v, w = twists[3:], tool.velocity[:3], tool.velocity[3:]
         acceleration_qdot, acceleration_q = tool.acceleration_qdot, tool.acceleration_q
         acceleration_qdot[:3] += cross(turning, v) + cross(w, twists[:3])
-        acceleration_q[:3] += cross(tool.velocity_q[3:], v) + cross(w, tool.velocity_q[:3])
-        classical = np.concatenate([tool.acceleration[:3] + cross(w, v), tool.acceleration[3:]])
+        acceleration_q[:3] += cross(tool.velocity_q[3:], v) + cross(
+            w, tool.velocity_q[:3]
+        )
+        classical = np.concatenate(
+            [tool.acceleration[:3] + cross(w, v), tool.acceleration[3:]]
+        )
         acceleration_q += turned(turning, classical)
         velocity_q = tool.velocity_q + turned(turning, tool.velocity)
-        return TaskDerivatives(*(self.jacobian(part) for part in (velocity_q, acceleration_q, acceleration_qdot)))
+        return TaskDerivatives(
+            *(
+                self.jacobian(part)
+                for part in (velocity_q, acceleration_q, acceleration_qdot)
+            )
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -246,7 +277,9 @@ class RowsAndYaw(WorldRows):
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """See `TaskMap.of_placements`; yaw is in (-pi, pi]."""
         first, second = self.axes
-        yaw = np.arctan2(rotations[:, second, self.tool_axis], rotations[:, first, self.tool_axis])
+        yaw = np.arctan2(
+            rotations[:, second, self.tool_axis], rotations[:, first, self.tool_axis]
+        )
         return np.column_stack([super().of_placements(positions, rotations), yaw])
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -257,4 +290,6 @@ class RowsAndYaw(WorldRows):
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
         """See `TaskMap.rates`."""
-        return np.concatenate([super().rates(twists), self.sign * twists[3 + self.world_axis, None]])
+        return np.concatenate(
+            [super().rates(twists), self.sign * twists[3 + self.world_axis, None]]
+        )

@@ -37,14 +37,27 @@ def without_repetitions(points: Points) -> tuple[Points, tuple[str, ...]]:
         i = int(again[np.argmax(turned > SAME)])
         problem = f"the position stands still from {points.named(i - 1)} on while the tool turns"
         hint = "A path that stops and turns on the spot is for segments of its own: csv, turn, csv"
-        raise points.wrong(i, problem, found=points.described(i), allowed="a motion of the position", hint=hint)
+        raise points.wrong(
+            i,
+            problem,
+            found=points.described(i),
+            allowed="a motion of the position",
+            hint=hint,
+        )
     kept = points.only(np.setdiff1d(np.arange(len(points)), again))
-    if len(kept) < 2:  # noqa: PLR2004
+    if len(kept) < 2:
         problem = "the position does not move"
-        raise TaskError(problem, found=f"{len(points)} times the same", allowed="a motion", where=points.source)
+        raise TaskError(
+            problem,
+            found=f"{len(points)} times the same",
+            allowed="a motion",
+            where=points.source,
+        )
     if not again.size:
         return points, ()
-    left_out = f"left out {write_count(len(again), 'row')} at the place of the row before"
+    left_out = (
+        f"left out {write_count(len(again), 'row')} at the place of the row before"
+    )
     return kept, (f"{left_out}: {points.row}s {_listed(points, again)}",)
 
 
@@ -57,7 +70,9 @@ def refuse_repetitions(points: Points) -> None:
     ------
     TaskError
     """
-    still = bool(np.all(np.linalg.norm(points.position - points.position[0], axis=1) < SAME))
+    still = bool(
+        np.all(np.linalg.norm(points.position - points.position[0], axis=1) < SAME)
+    )
     if still:
         steps = angles_between(points.turning[1:], points.turning[:-1])
     else:
@@ -67,7 +82,9 @@ def refuse_repetitions(points: Points) -> None:
         problem = f"the row repeats {points.named(i - 1)}"
         allowed = f"rows that differ from their predecessors in {'orientation' if still else 'position'}"
         hint = "With a tolerance repeated rows are left out"
-        raise points.wrong(i, problem, found=points.described(i), allowed=allowed, hint=hint)
+        raise points.wrong(
+            i, problem, found=points.described(i), allowed=allowed, hint=hint
+        )
 
 
 def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
@@ -83,19 +100,34 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
     position = points.position
     before, here, after = position[:-2], position[1:-1], position[2:]
     side = after - before
-    share = np.clip(np.sum((here - before) * side, axis=1) / np.maximum(np.sum(side**2, axis=1), SAME**2), 0.0, 1.0)
+    share = np.clip(
+        np.sum((here - before) * side, axis=1)
+        / np.maximum(np.sum(side**2, axis=1), SAME**2),
+        0.0,
+        1.0,
+    )
     off = np.linalg.norm(here - before - share[:, None] * side, axis=1)
     chords = np.linalg.norm(np.diff(position, axis=0), axis=1)
-    windows = np.lib.stride_tricks.sliding_window_view(np.pad(chords, _AROUND, mode="reflect"), 2 * _AROUND + 2)
+    windows = np.lib.stride_tricks.sliding_window_view(
+        np.pad(chords, _AROUND, mode="reflect"), 2 * _AROUND + 2
+    )
     usual = np.median(windows, axis=1)[: len(off)]
-    allowed = np.maximum(_OF_SPACING * usual, max(_OF_SCATTER * scatter.deviation, 2.0 * tolerance))
+    allowed = np.maximum(
+        _OF_SPACING * usual, max(_OF_SCATTER * scatter.deviation, 2.0 * tolerance)
+    )
     i = int(np.argmax(off / allowed))
     if off[i] > allowed[i]:
         problem = "the point is a spike, far off its neighbours"
         away = f"{1e3 * off[i]:.4g} mm off the line between its neighbours; points are {1e3 * usual[i]:.3g} mm apart"
         found = f"{points.described(i + 1)}, {away}"
         hint = "Correct or remove the row"
-        raise points.wrong(i + 1, problem, found=found, allowed=f"at most {1e3 * allowed[i]:.3g} mm", hint=hint)
+        raise points.wrong(
+            i + 1,
+            problem,
+            found=found,
+            allowed=f"at most {1e3 * allowed[i]:.3g} mm",
+            hint=hint,
+        )
 
 
 def of_size(points: Points) -> str | None:
@@ -115,12 +147,16 @@ def _refuse_factors(points: Points) -> None:
     growth = np.maximum(ratios, 1.0 / np.maximum(ratios, SAME))
     steps = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
     far = steps > _OF_USUAL * np.median(steps)
-    for i in np.flatnonzero(far & (growth > _FACTOR[0]) & (growth < _FACTOR[1])).tolist():
+    for i in np.flatnonzero(
+        far & (growth > _FACTOR[0]) & (growth < _FACTOR[1])
+    ).tolist():
         one, other = points.position[i], points.position[i + 1]
         small, large = (one, other) if ratios[i] > 1.0 else (other, one)
         if np.linalg.norm(large / 1e3 - small) < 0.1 * np.linalg.norm(small):
             word = "larger" if ratios[i] > 1.0 else "smaller"
-            problem = f"the coordinates are a thousand times {word} than in {points.named(i)}"
+            problem = (
+                f"the coordinates are a thousand times {word} than in {points.named(i)}"
+            )
             hint = "mm and m, or a lost decimal point? Write all rows in one unit"
             found, allowed = points.described(i + 1), f"near {points.described(i)}"
             raise points.wrong(i + 1, problem, found=found, allowed=allowed, hint=hint)

@@ -57,7 +57,9 @@ class Corner:
     place: Array
 
 
-def find_corners(points: Points, scatter: Scatter, tolerance: float) -> tuple[Corner, ...]:
+def find_corners(
+    points: Points, scatter: Scatter, tolerance: float
+) -> tuple[Corner, ...]:
     """Return the corners in order.
 
     Parameters
@@ -68,22 +70,32 @@ def find_corners(points: Points, scatter: Scatter, tolerance: float) -> tuple[Co
     tolerance : float
         Corners that are rounded within it are corners, m.
     """
-    if len(points) < 3 or points.position.shape[1] < 2:  # noqa: PLR2004
+    if len(points) < 3 or points.position.shape[1] < 2:
         return ()
     noisy = scatter.deviation > 0.0
     u = lengths_along(points.position, scatter.deviation)
     spacing = u[-1] / (len(points) - 1)
-    for_direction = (12.0 * spacing * (scatter.deviation / _DIRECTION) ** 2) ** (1.0 / 3.0)
-    width, least = max(for_direction, _OF_TOLERANCE * tolerance), _NOISY_POINTS if noisy else 1
+    for_direction = (12.0 * spacing * (scatter.deviation / _DIRECTION) ** 2) ** (
+        1.0 / 3.0
+    )
+    width, least = (
+        max(for_direction, _OF_TOLERANCE * tolerance),
+        _NOISY_POINTS if noisy else 1,
+    )
     angle, doubt = _turning(points.position, u, width, least)
     wide, _ = _turning(points.position, u, 2.0 * width, 2 * least)
     sharp = (wide > 0.0) & (wide < _SHARP * angle) | (angle > _CERTAIN)
     sharp &= angle > np.maximum(LEAST_ANGLE, _DOUBTS * scatter.deviation * doubt)
     peaks = _peaks(angle, sharp, u, width, least)
-    return tuple(_located(points, u, i, float(angle[i]), width, least, tolerance / 4.0) for i in peaks)
+    return tuple(
+        _located(points, u, i, float(angle[i]), width, least, tolerance / 4.0)
+        for i in peaks
+    )
 
 
-def _turning(position: Array, u: Array, width: float, least: int) -> tuple[Array, Array]:
+def _turning(
+    position: Array, u: Array, width: float, least: int
+) -> tuple[Array, Array]:
     """Return the angle between the directions before and after every point, (n,), rad; zero at the ends.
 
     Beside it stands the standard deviation that points which scatter by 1 m give it, (n,), rad.
@@ -91,17 +103,36 @@ def _turning(position: Array, u: Array, width: float, least: int) -> tuple[Array
     count = len(u)
     index = np.arange(count)
     first = np.clip(np.minimum(np.searchsorted(u, u - width), index - least), 0, None)
-    last = np.clip(np.maximum(np.searchsorted(u, u + width, side="right") - 1, index + least), None, count - 1)
-    (before, doubt), (after, other) = (_directions(position, u, *ends) for ends in ((first, index), (index, last)))
-    crossing = np.linalg.norm(before - after, axis=1), np.linalg.norm(before + after, axis=1)
+    last = np.clip(
+        np.maximum(np.searchsorted(u, u + width, side="right") - 1, index + least),
+        None,
+        count - 1,
+    )
+    (before, doubt), (after, other) = (
+        _directions(position, u, *ends) for ends in ((first, index), (index, last))
+    )
+    crossing = (
+        np.linalg.norm(before - after, axis=1),
+        np.linalg.norm(before + after, axis=1),
+    )
     angle = 2.0 * np.arctan2(*crossing)
     angle[(index < least) | (index >= count - least)] = 0.0
     return angle, np.hypot(doubt, other)
 
 
-def _directions(position: Array, u: Array, first: Indices, last: Indices) -> tuple[Array, Array]:
+def _directions(
+    position: Array, u: Array, first: Indices, last: Indices
+) -> tuple[Array, Array]:
     """Return unit vectors along the lines that fit points `first` to `last`, (n, p), and their doubts, (n,)."""
-    moment = np.hstack([np.ones((len(u), 1)), u[:, None], u[:, None] ** 2, position, u[:, None] * position])
+    moment = np.hstack(
+        [
+            np.ones((len(u), 1)),
+            u[:, None],
+            u[:, None] ** 2,
+            position,
+            u[:, None] * position,
+        ]
+    )
     sums = np.concatenate([np.zeros((1, moment.shape[1])), np.cumsum(moment, axis=0)])
     part = sums[last + 1] - sums[first]
     dimension = position.shape[1]
@@ -112,7 +143,9 @@ def _directions(position: Array, u: Array, first: Indices, last: Indices) -> tup
     return slope / sizes[:, None], 1.0 / np.sqrt(spread[:, 0])
 
 
-def _peaks(angle: Array, sharp: np.ndarray, u: Array, width: float, least: int) -> list[int]:
+def _peaks(
+    angle: Array, sharp: np.ndarray, u: Array, width: float, least: int
+) -> list[int]:
     """Return the indices of the largest angles, one in every run of sharp ones as wide as the lines that fit."""
     found: list[int] = []
     for i in np.flatnonzero(sharp).tolist():
@@ -124,23 +157,31 @@ def _peaks(angle: Array, sharp: np.ndarray, u: Array, width: float, least: int) 
     return found
 
 
-def _located(points: Points, u: Array, i: int, angle: float, width: float, least: int, off: float) -> Corner:
+def _located(
+    points: Points, u: Array, i: int, angle: float, width: float, least: int, off: float
+) -> Corner:
     """Return the corner near a point: the point, or where the straight lines before and after come nearest together.
 
     It is the point where nothing scatters and the points before it, and those after it, lead there, but for `off`, m.
     """
     position, sides = points.position, []
     here = Corner(i, i, i + 1, angle, position[i])
-    from_before, from_after = (_continues(position, u, i, sign, off) for sign in (-1, 1))
+    from_before, from_after = (
+        _continues(position, u, i, sign, off) for sign in (-1, 1)
+    )
     if least == 1 and from_before == from_after:
         return here
     for sign in (-1.0, 1.0):
         away = sign * (u - u[i])
         side = np.flatnonzero((away > _GUARD * width) & (away < 2.0 * width))
         if len(side) <= least:
-            side = np.clip(i + int(sign) * np.arange(1, 1 + max(least, 2)), 0, len(u) - 1)
+            side = np.clip(
+                i + int(sign) * np.arange(1, 1 + max(least, 2)), 0, len(u) - 1
+            )
         along = (
-            np.polyfit(u[side], position[side], 1)[0] if np.ptp(u[side]) else sign * (position[side[0]] - position[i])
+            np.polyfit(u[side], position[side], 1)[0]
+            if np.ptp(u[side])
+            else sign * (position[side[0]] - position[i])
         )
         sides.append((position[side].mean(axis=0), along / np.linalg.norm(along)))
     (one, a), (other, b) = sides
@@ -148,7 +189,9 @@ def _located(points: Points, u: Array, i: int, angle: float, width: float, least
     place = (one + steps[0] * a + other + steps[1] * b) / 2.0
     gap = u[min(i + 1, len(u) - 1)] - u[max(i - 1, 0)]
     after = float((position[i] - place) @ (a + b)) > 0.0
-    if np.linalg.norm(place - position[i]) > max(width, gap) or (least == 1 and after != from_after):
+    if np.linalg.norm(place - position[i]) > max(width, gap) or (
+        least == 1 and after != from_after
+    ):
         return here
     return Corner(i, i + (not after), i + (not after), angle, place)
 
@@ -166,7 +209,10 @@ def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool
     for k in side:
         others = side[side != k]
         foreseen += position[k] * np.prod((u[i] - u[others]) / (u[k] - u[others]))
-    return bool(np.linalg.norm(foreseen - position[i]) <= max(off, _OF_SPACING * abs(u[side[0]] - u[i])))
+    return bool(
+        np.linalg.norm(foreseen - position[i])
+        <= max(off, _OF_SPACING * abs(u[side[0]] - u[i]))
+    )
 
 
 _FEWEST = 20
@@ -181,7 +227,9 @@ def with_gaps_filled(points: Points) -> tuple[Points, tuple[str, ...]]:
     long = chords > _LONG * usual
     if len(points) < _FEWEST or not np.any(long):
         return points, ()
-    counts = np.where(long, np.minimum(np.ceil(chords / (2.0 * usual)), _MOST), 1.0).astype(int)
+    counts = np.where(
+        long, np.minimum(np.ceil(chords / (2.0 * usual)), _MOST), 1.0
+    ).astype(int)
     before = np.repeat(np.arange(len(chords)), counts)
     firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     shares = ((np.arange(len(before)) - firsts[before] + 1) / counts[before])[:, None]
@@ -191,12 +239,22 @@ def with_gaps_filled(points: Points) -> tuple[Points, tuple[str, ...]]:
         return np.concatenate([values[:1], between])
 
     turning = filled(points.turning)
-    speed = None if points.speed is None else np.concatenate([points.speed[:1], points.speed[before + 1]])
+    speed = (
+        None
+        if points.speed is None
+        else np.concatenate([points.speed[:1], points.speed[before + 1]])
+    )
     rows = np.concatenate([points.rows[:1], points.rows[before + 1]])
     turning = with_like_signs(turning) if turning.shape[1] == QUATERNION else turning
     ways = write_count(int(np.count_nonzero(long)), "way")
     told = f"taken as straight: {ways} longer than {_LONG:g} times the usual spacing"
-    return replace(points, position=filled(points.position), turning=turning, speed=speed, rows=rows), (told,)
+    return replace(
+        points,
+        position=filled(points.position),
+        turning=turning,
+        speed=speed,
+        rows=rows,
+    ), (told,)
 
 
 _MIDDLE = 11.0 / 64.0

@@ -15,8 +15,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brachis.errors import TaskError
-from brachis.task.points.checks import of_size, refuse_repetitions, refuse_spikes, without_repetitions
-from brachis.task.points.corners import Corner, blend_size, find_corners, with_gaps_filled
+from brachis.task.points.checks import (
+    of_size,
+    refuse_repetitions,
+    refuse_spikes,
+    without_repetitions,
+)
+from brachis.task.points.corners import (
+    Corner,
+    blend_size,
+    find_corners,
+    with_gaps_filled,
+)
 from brachis.task.points.fit import deviations, fit_points
 from brachis.task.points.least_squares import Fit, Tolerance
 from brachis.task.points.points import Array, Points
@@ -66,7 +76,11 @@ class Stretch:
 
 
 def fit_between(
-    points: Points, corners: tuple[Corner, ...], tolerance: Tolerance, scatter: Scatter, doubt: str | None = None
+    points: Points,
+    corners: tuple[Corner, ...],
+    tolerance: Tolerance,
+    scatter: Scatter,
+    doubt: str | None = None,
 ) -> list[Stretch]:
     """Cut points at their corners and fit a curve to each stretch.
 
@@ -80,13 +94,27 @@ def fit_between(
     for sharp in corners:
         if sharp.angle > _SHARPEST:
             problem = f"the path turns back, by {np.rad2deg(sharp.angle):.4g} degrees"
-            found, hint = points.described(sharp.index), "A path that stops there is for two tasks"
-            raise points.wrong(sharp.index, problem, found=found, allowed="corners up to 150 degrees", hint=hint)
+            found, hint = (
+                points.described(sharp.index),
+                "A path that stops there is for two tasks",
+            )
+            raise points.wrong(
+                sharp.index,
+                problem,
+                found=found,
+                allowed="corners up to 150 degrees",
+                hint=hint,
+            )
     starts, ends = [None, *corners], [*corners, None]
     stretches = []
     for start, end in zip(starts, ends, strict=True):
-        given = np.arange(0 if start is None else start.after, len(points) if end is None else end.before)
-        before, after = ([] if corner is None else [corner.index] for corner in (start, end))
+        given = np.arange(
+            0 if start is None else start.after,
+            len(points) if end is None else end.before,
+        )
+        before, after = (
+            [] if corner is None else [corner.index] for corner in (start, end)
+        )
         whole = points.only(np.concatenate([before, given, after]).astype(int))
         position = whole.position.copy()
         for corner, row in ((start, 0), (end, -1)):
@@ -118,11 +146,15 @@ def _checked(points: Points, fit: Fit, tolerance: Tolerance) -> tuple[Array, Arr
             problem = "the fitted curve does not pass the points within the tolerance"
             hint = "Raise the tolerance, or cut the path into several"
             away = f"{points.described(i)}, {found[i] / per:.4g} {unit} off"
-            raise points.wrong(i, problem, found=away, allowed=f"{allowed / per:.4g} {unit}", hint=hint)
+            raise points.wrong(
+                i, problem, found=away, allowed=f"{allowed / per:.4g} {unit}", hint=hint
+            )
     return distances, angles
 
 
-def blend_between(first: Stretch, second: Stretch, corner: Corner, tolerance: Tolerance) -> float:
+def blend_between(
+    first: Stretch, second: Stretch, corner: Corner, tolerance: Tolerance
+) -> float:
     """Return the size of the blend that keeps all points near a corner within the tolerance, m.
 
     Raises
@@ -143,11 +175,19 @@ def blend_between(first: Stretch, second: Stretch, corner: Corner, tolerance: To
         problem = f"the corner of {np.rad2deg(corner.angle):.4g} degrees cannot be rounded within the tolerance"
         found = f"points {1e3 * taken:.3g} mm from the fit at {corner_at}"
         hint = "Give a larger tolerance.corner"
-        raise wrong(-1, problem, found=found, allowed=f"{1e3 * tolerance.corner:.3g} mm", hint=hint)
+        raise wrong(
+            -1,
+            problem,
+            found=found,
+            allowed=f"{1e3 * tolerance.corner:.3g} mm",
+            hint=hint,
+        )
     return blend_size(corner.angle, left, shortest)
 
 
-def _fitted(points: Points, tolerance: Tolerance, scatter: Scatter, doubt: str | None) -> Fit:
+def _fitted(
+    points: Points, tolerance: Tolerance, scatter: Scatter, doubt: str | None
+) -> Fit:
     """Fit one curve.
 
     Raises
@@ -157,27 +197,50 @@ def _fitted(points: Points, tolerance: Tolerance, scatter: Scatter, doubt: str |
     try:
         fit = fit_points(points, tolerance, scatter)
     except ValueError as error:
-        problem, allowed = "no smooth curve follows these points", "points that move on from each to the next"
+        problem, allowed = (
+            "no smooth curve follows these points",
+            "points that move on from each to the next",
+        )
         hint = doubt or "Does the path turn back, or stand still, near there?"
         raise points.wrong(
-            0, problem, found=f"{error}, from {points.described(0)}", allowed=allowed, hint=hint
+            0,
+            problem,
+            found=f"{error}, from {points.described(0)}",
+            allowed=allowed,
+            hint=hint,
         ) from error
     ratios = fit.ratios(tolerance)
     i = int(np.argmax(ratios))
     if ratios[i] <= 1.0 + _ROUNDING:
         return fit
-    of_turning, hint = bool(fit.position_errors[i] <= tolerance.position), "Is the row as it should be?"
+    of_turning, hint = (
+        bool(fit.position_errors[i] <= tolerance.position),
+        "Is the row as it should be?",
+    )
     if of_turning:
         angles = np.rad2deg([fit.turning_errors[i], tolerance.orientation])
         found, allowed = (f"{angle:.3g} deg" for angle in angles)
         hint = f"The data are {scatter.of_turning()}" if scatter.turning else hint
     else:
-        found, allowed = (f"{1e3 * value:.3g} mm" for value in (fit.position_errors[i], tolerance.position))
+        found, allowed = (
+            f"{1e3 * value:.3g} mm"
+            for value in (fit.position_errors[i], tolerance.position)
+        )
         wanted = _OF_SCATTER * scatter.deviation
-        more = f"; give a tolerance of {1e3 * wanted:.2g} mm or more" if wanted > tolerance.position else ""
+        more = (
+            f"; give a tolerance of {1e3 * wanted:.2g} mm or more"
+            if wanted > tolerance.position
+            else ""
+        )
         hint = f"The data are {scatter}{more}" if scatter.deviation else hint
     problem = f"no smooth curve is within the tolerance of {'orientation' if of_turning else 'position'}"
-    raise points.wrong(i, problem, found=f"{found} at {points.described(i)}", allowed=allowed, hint=doubt or hint)
+    raise points.wrong(
+        i,
+        problem,
+        found=f"{found} at {points.described(i)}",
+        allowed=allowed,
+        hint=doubt or hint,
+    )
 
 
 Run = tuple[tuple[float, float], ...]
@@ -196,12 +259,14 @@ def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
     speed : (n,) ndarray or None
         On the way to them, m/s; NaN where none is prescribed.
     """
-    if speed is None or len(sigma) < 2:  # noqa: PLR2004
+    if speed is None or len(sigma) < 2:
         return ()
     sigma = np.maximum.accumulate(sigma)
     ways = speed[1:]
     given = np.isfinite(ways)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], given, [False]]).astype(int)))
+    edges = np.flatnonzero(
+        np.diff(np.concatenate([[False], given, [False]]).astype(int))
+    )
     runs = []
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         of_way = ways[first:last]
@@ -278,10 +343,17 @@ class Report:
     profile: tuple[tuple[float, float, float], ...] = ()
 
 
-def profile_of(along: Array, distances: Array, angles: Array) -> tuple[tuple[float, float, float], ...]:
+def profile_of(
+    along: Array, distances: Array, angles: Array
+) -> tuple[tuple[float, float, float], ...]:
     """Return the largest errors of successive groups of points, at most a few hundred groups."""
-    starts = np.unique(np.linspace(0, len(along), min(len(along), _MOST), endpoint=False).astype(int))
-    largest = (np.maximum.reduceat(values, starts).tolist() for values in (along, distances, angles))
+    starts = np.unique(
+        np.linspace(0, len(along), min(len(along), _MOST), endpoint=False).astype(int)
+    )
+    largest = (
+        np.maximum.reduceat(values, starts).tolist()
+        for values in (along, distances, angles)
+    )
     return tuple(zip(*largest, strict=True))
 
 
@@ -336,26 +408,53 @@ def fit_curves(
     stretches = fit_between(points, corners, tolerance, scatter, doubt)
     blends = [
         blend_between(first, second, corner, tolerance)
-        for first, second, corner in zip(stretches, stretches[1:], corners, strict=False)
+        for first, second, corner in zip(
+            stretches, stretches[1:], corners, strict=False
+        )
     ]
     curves = tuple(
-        FittedCurve(stretch.fit.spline, blend, speed_runs(stretch.fit.sigma, stretch.points.speed))
+        FittedCurve(
+            stretch.fit.spline,
+            blend,
+            speed_runs(stretch.fit.sigma, stretch.points.speed),
+        )
         for stretch, blend in zip(stretches, [*blends, None], strict=True)
     )
-    report = _report(stretches, tolerance, points=count, source=points.source, doubt=doubt)
-    found = zip(corners, np.cumsum([stretch.length for stretch in stretches]), blends, strict=False)
+    report = _report(
+        stretches, tolerance, points=count, source=points.source, doubt=doubt
+    )
+    found = zip(
+        corners,
+        np.cumsum([stretch.length for stretch in stretches]),
+        blends,
+        strict=False,
+    )
     told = (*told, *repeated, *filled, *((str(scatter),) if scatter.deviation else ()))
     remarks = tuple(
-        CornerRemark(int(points.rows[corner.index]), corner.angle, float(distance), blend)
+        CornerRemark(
+            int(points.rows[corner.index]), corner.angle, float(distance), blend
+        )
         for corner, distance, blend in found
     )
     return curves, replace(report, corners=remarks, told=told)
 
 
-def _report(stretches: list[Stretch], tolerance: Tolerance, *, points: int, source: str, doubt: str | None) -> Report:
+def _report(
+    stretches: list[Stretch],
+    tolerance: Tolerance,
+    *,
+    points: int,
+    source: str,
+    doubt: str | None,
+) -> Report:
     """Report on all stretches, but for their corners and what was told."""
     starts = np.cumsum([0.0, *(stretch.length for stretch in stretches)])
-    along = np.concatenate([start + stretch.sigma for start, stretch in zip(starts, stretches, strict=False)])
+    along = np.concatenate(
+        [
+            start + stretch.sigma
+            for start, stretch in zip(starts, stretches, strict=False)
+        ]
+    )
     distances = np.concatenate([stretch.distances for stretch in stretches])
     angles = np.concatenate([stretch.angles for stretch in stretches])
     return Report(
@@ -396,5 +495,14 @@ def interpolated(points: Points, told: tuple[str, ...] = ()) -> Report:
         hint = f"Give a tolerance, for example tolerance: {{position: {_ROOMY * 1e3 * scatter.deviation:.1g} mm}}"
         found = f"{scatter}, which make a curvature of {scatter.curvature:.2g} 1/m by themselves"
         allowed = f"less than {_ROUGH / length:.2g} 1/m"
-        raise TaskError(problem, found=found, allowed=allowed, where=points.source, hint=hint)
-    return Report(points.source, len(points), length, intervals=len(points) - 1, told=told, doubt=of_size(points))
+        raise TaskError(
+            problem, found=found, allowed=allowed, where=points.source, hint=hint
+        )
+    return Report(
+        points.source,
+        len(points),
+        length,
+        intervals=len(points) - 1,
+        told=told,
+        doubt=of_size(points),
+    )

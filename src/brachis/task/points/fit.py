@@ -65,15 +65,27 @@ def fit_points(points: Points, tolerance: Tolerance, scatter: Scatter) -> Fit:
     every = -(-len(points) // _SAMPLE)
     chosen = np.unique(np.append(np.arange(0, len(points), every), len(points) - 1))
     noisy, dimension = scatter.noisy(tolerance), points.position.shape[1]
-    rough = _with_knots_added(points.only(chosen), sigma[chosen], _first_breaks(points, sigma), tolerance, noisy=noisy)
+    rough = _with_knots_added(
+        points.only(chosen),
+        sigma[chosen],
+        _first_breaks(points, sigma),
+        tolerance,
+        noisy=noisy,
+    )
     if rough is None:
         return _interpolated(points, sigma)
     places, breaks = over_arc_length(rough, dimension)
     sigma = np.interp(sigma, sigma[chosen], np.maximum.accumulate(places))
     fit = _with_knots_added(points, sigma, breaks, tolerance, noisy=noisy)
     if fit is not None and fit.ratios(tolerance).max() <= 1.0:
-        return _with_fewest_knots(points, _with_knots_removed(points, fit, tolerance), tolerance)
-    return _interpolated(points, sigma) if fit is None or (not noisy and len(points) <= _INTERPOLATED) else fit
+        return _with_fewest_knots(
+            points, _with_knots_removed(points, fit, tolerance), tolerance
+        )
+    return (
+        _interpolated(points, sigma)
+        if fit is None or (not noisy and len(points) <= _INTERPOLATED)
+        else fit
+    )
 
 
 def _first_breaks(points: Points, sigma: Array) -> Array:
@@ -83,7 +95,9 @@ def _first_breaks(points: Points, sigma: Array) -> Array:
     return np.linspace(0.0, float(sigma[-1]), count + 1)
 
 
-def _with_knots_added(points: Points, sigma: Array, breaks: Array, tolerance: Tolerance, *, noisy: bool) -> Fit | None:
+def _with_knots_added(
+    points: Points, sigma: Array, breaks: Array, tolerance: Tolerance, *, noisy: bool
+) -> Fit | None:
     """Halve the intervals in which the tolerance is exceeded, until none is or none can be; None where no fit is."""
     least, fit = _NOISY_POINTS if noisy else 1, None
     for _ in range(_MOST_ROUNDS):
@@ -96,7 +110,10 @@ def _with_knots_added(points: Points, sigma: Array, breaks: Array, tolerance: To
         halved = np.flatnonzero(bad & (counts >= 2 * least))
         if not halved.size:
             return fit
-        sigma, breaks = fit.sigma, np.sort(np.append(breaks, (breaks[halved] + breaks[halved + 1]) / 2.0))
+        sigma, breaks = (
+            fit.sigma,
+            np.sort(np.append(breaks, (breaks[halved] + breaks[halved + 1]) / 2.0)),
+        )
     return fit
 
 
@@ -145,7 +162,13 @@ def _with_fewest_knots(points: Points, fit: Fit, tolerance: Tolerance) -> Fit:
     while most - fewest > 1:
         count = (most + fewest) // 2
         trial = fit_over(
-            points, sigma, np.interp(np.linspace(0.0, 1.0, count + 1), np.linspace(0.0, 1.0, len(breaks)), breaks)
+            points,
+            sigma,
+            np.interp(
+                np.linspace(0.0, 1.0, count + 1),
+                np.linspace(0.0, 1.0, len(breaks)),
+                breaks,
+            ),
         )
         if trial.ratios(tolerance).max() <= 1.0:
             most, fit = count, trial
@@ -160,23 +183,32 @@ def _removable(fit: Fit, tolerance: Tolerance, needed: Array) -> Array:
     beside = np.maximum(worst[:-1], worst[1:])
     taken = np.zeros(len(beside) + 2, dtype=bool)
     for i in np.argsort(beside):
-        if beside[i] < _REMOVABLE and not np.any(needed == fit.breaks[i + 1]) and not (taken[i] or taken[i + 2]):
+        if (
+            beside[i] < _REMOVABLE
+            and not np.any(needed == fit.breaks[i + 1])
+            and not (taken[i] or taken[i + 2])
+        ):
             taken[i + 1] = True
     return fit.breaks[1:-1][taken[1:-1]]
 
 
 def _polynomial(points: Points, sigma: Array) -> Fit:
     """Return the polynomial through few points, as a spline without inner knots."""
-    from scipy.interpolate import make_interp_spline  # noqa: PLC0415
+    from scipy.interpolate import make_interp_spline
 
     through = make_interp_spline(sigma, points.columns, k=len(points) - 1)
     at, breaks = np.linspace(0.0, sigma[-1], _FEW), sigma[[0, -1]]
-    return measured(points, make_interp_spline(at, through(at), k=DEGREE, t=clamped(breaks)), breaks, sigma)
+    return measured(
+        points,
+        make_interp_spline(at, through(at), k=DEGREE, t=clamped(breaks)),
+        breaks,
+        sigma,
+    )
 
 
 def _interpolated(points: Points, sigma: Array) -> Fit:
     """Return the spline through all points."""
-    from scipy.interpolate import make_interp_spline  # noqa: PLC0415
+    from scipy.interpolate import make_interp_spline
 
     spline = make_interp_spline(sigma, points.columns, k=DEGREE)
     return measured(points, spline, np.unique(spline.t), sigma)
@@ -202,7 +234,9 @@ def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
     breaks = np.unique(spline.t)
     count = max(_LEAST_SIDES, _SIDES // (len(breaks) - 1))
     sides = np.arange(count) / count
-    sigma = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * sides).ravel(), breaks[-1])
+    sigma = np.append(
+        (breaks[:-1, None] + np.diff(breaks)[:, None] * sides).ravel(), breaks[-1]
+    )
     dimension = points.position.shape[1]
     place = spline(sigma)[:, :dimension]
     nearest = _nearest(points.position, place)
@@ -210,9 +244,13 @@ def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
     for offset in (-1, 0):
         first = np.clip(nearest + offset, 0, len(place) - 2)
         side = place[first + 1] - place[first]
-        share = np.sum((points.position - place[first]) * side, axis=1) / np.maximum(np.sum(side**2, axis=1), 1e-300)
+        share = np.sum((points.position - place[first]) * side, axis=1) / np.maximum(
+            np.sum(side**2, axis=1), 1e-300
+        )
         share = np.clip(share, 0.0, 1.0)
-        away = np.linalg.norm(points.position - place[first] - share[:, None] * side, axis=1)
+        away = np.linalg.norm(
+            points.position - place[first] - share[:, None] * side, axis=1
+        )
         nearer = away < distances
         distances[nearer] = away[nearer]
         at[nearer] = (sigma[first] + share * (sigma[first + 1] - sigma[first]))[nearer]
@@ -223,13 +261,15 @@ def deviations(points: Points, spline: BSpline) -> tuple[Array, Array]:
 
 def _nearest(position: Array, place: Array) -> Array:
     """Return the polygon's nearest corner to each of n points, (n,), in their order."""
-    from scipy.spatial import cKDTree  # noqa: PLC0415
+    from scipy.spatial import cKDTree
 
     along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))
     nearest, reached = np.zeros(len(position), dtype=int), 0.0
     for stretch, length in _stretches(position, along[-1]):
         beyond = _AROUND * along[-1]
-        low, high = np.searchsorted(along, [reached - beyond, reached + length + beyond])
+        low, high = np.searchsorted(
+            along, [reached - beyond, reached + length + beyond]
+        )
         low, high = max(0, low - 1), high + 1
         nearest[stretch] = low + cKDTree(place[low:high]).query(position[stretch])[1]
         reached = along[nearest[stretch][-1]]
@@ -241,12 +281,17 @@ def _stretches(position: Array, total: float) -> Iterator[tuple[slice, float]]:
 
     The points' polygon is no shorter than the path between them, but for the tolerance.
     """
-    lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1)))
+    lengths = np.append(
+        0.0, np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))
+    )
     most = max(1, len(position) // _SHARE_OF_POINTS)
     first = 0
     while first < len(position):
         before = lengths[max(first - 1, 0)]
-        last = min(int(np.searchsorted(lengths, before + _STRETCH * total, side="right")), first + most)
+        last = min(
+            int(np.searchsorted(lengths, before + _STRETCH * total, side="right")),
+            first + most,
+        )
         last = max(last, first + 1)
         yield slice(first, last), float(lengths[last - 1] - before)
         first = last

@@ -55,7 +55,9 @@ class _Machine:
     lines: list[int] = field(default_factory=list)
 
 
-def read_gcode(text: str, rows: tuple[str, ...] | str, source: str) -> tuple[Points, tuple[str, ...]]:
+def read_gcode(
+    text: str, rows: tuple[str, ...] | str, source: str
+) -> tuple[Points, tuple[str, ...]]:
     """Return the points of a program, and what was skipped.
 
     Parameters
@@ -74,7 +76,12 @@ def read_gcode(text: str, rows: tuple[str, ...] | str, source: str) -> tuple[Poi
     """
     names = POSITION if isinstance(rows, str) else rows
     if not set(names) <= set(POSITION):
-        raise TaskError("G-code gives positions alone", found=", ".join(names), allowed="x, y, z", where=source)
+        raise TaskError(
+            "G-code gives positions alone",
+            found=", ".join(names),
+            allowed="x, y, z",
+            where=source,
+        )
     machine = _Machine(at=[None if name in names else 0.0 for name in POSITION])
     for number, line in enumerate(text.removeprefix("\ufeff").split("\n"), 1):
         code = _COMMENT.sub("", line.upper()).strip()
@@ -82,11 +89,19 @@ def read_gcode(text: str, rows: tuple[str, ...] | str, source: str) -> tuple[Poi
             _block(machine, code, f"{source}: line {number}", number)
         if machine.ended:
             break
-    if len(machine.points) < 2:  # noqa: PLR2004
-        never = [name.upper() for name, place in zip(POSITION, machine.at, strict=True) if place is None]
+    if len(machine.points) < 2:
+        never = [
+            name.upper()
+            for name, place in zip(POSITION, machine.at, strict=True)
+            if place is None
+        ]
         hint = f"{', '.join(never)} is never stated" if never else None
         raise TaskError(
-            "no motion", found=write_count(len(machine.points), "place"), allowed="2 or more", where=source, hint=hint
+            "no motion",
+            found=write_count(len(machine.points), "place"),
+            allowed="2 or more",
+            where=source,
+            hint=hint,
         )
     chosen = [POSITION.index(name) for name in names]
     speed = np.array(machine.speeds)
@@ -98,7 +113,11 @@ def read_gcode(text: str, rows: tuple[str, ...] | str, source: str) -> tuple[Poi
         source,
     )
     told = (f"skipped {', '.join(sorted(machine.skipped))}",) if machine.skipped else ()
-    unit = () if machine.unit_stated else ("millimetres, as neither G20 nor G21 says otherwise",)
+    unit = (
+        ()
+        if machine.unit_stated
+        else ("millimetres, as neither G20 nor G21 says otherwise",)
+    )
     return points, ("G-code", *unit, *told)
 
 
@@ -108,7 +127,10 @@ def _block(machine: _Machine, code: str, where: str, number: int) -> None:
     rest = _WORD.sub("", code).strip()
     if rest:
         raise TaskError(
-            "not understood", found=repr(rest[:40]), allowed="G-code words, such as G1 X10 F600", where=where
+            "not understood",
+            found=repr(rest[:40]),
+            allowed="G-code words, such as G1 X10 F600",
+            where=where,
         )
     values: dict[str, float] = {}
     for letter, text in words:
@@ -118,7 +140,12 @@ def _block(machine: _Machine, code: str, where: str, number: int) -> None:
             values[letter] = float(text)
         elif letter in "ABCUVW":
             problem = "axes other than X, Y, Z are not read"
-            raise TaskError(problem, found=letter + text, allowed="X, Y, Z, I, J, K, R, F", where=where)
+            raise TaskError(
+                problem,
+                found=letter + text,
+                allowed="X, Y, Z, I, J, K, R, F",
+                where=where,
+            )
         elif letter == "M":
             _miscellaneous(machine, _plain(text), where)
         elif letter != "N":
@@ -137,13 +164,20 @@ def _plain(text: str) -> str:
 def _feed(machine: _Machine, value: float, where: str) -> None:
     machine.feed = value * machine.unit / 60.0
     if not machine.feed > 0.0:
-        raise TaskError("a feed rate must be positive", found=f"F{value:g}", allowed="more than 0", where=where)
+        raise TaskError(
+            "a feed rate must be positive",
+            found=f"F{value:g}",
+            allowed="more than 0",
+            where=where,
+        )
 
 
 def _miscellaneous(machine: _Machine, code: str, where: str) -> None:
     if code in _CALLS:
         problem = "subprograms are not read"
-        raise TaskError(problem, found=f"M{code}", allowed="a program without calls", where=where)
+        raise TaskError(
+            problem, found=f"M{code}", allowed="a program without calls", where=where
+        )
     machine.ended = code in _ENDS
     machine.skipped.add(f"M{code}")
 
@@ -160,14 +194,20 @@ def _mode(machine: _Machine, code: str, where: str) -> None:
     elif code in _OFFSETS:
         if machine.points and machine.offset != code:
             problem = "the work offset changes within the program: where the tool goes is not known"
-            raise TaskError(problem, found=f"G{code}", allowed="one work offset", where=where)
+            raise TaskError(
+                problem, found=f"G{code}", allowed="one work offset", where=where
+            )
         machine.offset = code
         machine.skipped.add(f"G{code}")
     elif code in _IGNORED:
         machine.skipped.add(f"G{code}")
     else:
-        allowed = "G0 to G3, G17 to G21, G40, G49, G54 to G59, G61, G64, G80, G90, G91, G94"
-        raise TaskError("this code is not read", found=f"G{code}", allowed=allowed, where=where)
+        allowed = (
+            "G0 to G3, G17 to G21, G40, G49, G54 to G59, G61, G64, G80, G90, G91, G94"
+        )
+        raise TaskError(
+            "this code is not read", found=f"G{code}", allowed=allowed, where=where
+        )
 
 
 def _move(machine: _Machine, values: dict[str, float], where: str, number: int) -> None:
@@ -178,7 +218,12 @@ def _move(machine: _Machine, values: dict[str, float], where: str, number: int) 
             base = 0.0 if machine.absolute else start[i] or 0.0
             end[i] = base + values[axis] * machine.unit
     if machine.motion is None:
-        raise TaskError("a move before G0, G1, G2 or G3", found="coordinates", allowed="a motion first", where=where)
+        raise TaskError(
+            "a move before G0, G1, G2 or G3",
+            found="coordinates",
+            allowed="a motion first",
+            where=where,
+        )
     machine.at = end
     if None in end:
         return
@@ -195,7 +240,9 @@ def _move(machine: _Machine, values: dict[str, float], where: str, number: int) 
         machine.lines.append(number)
 
 
-def _line(start: list[float | None], end: list[float | None]) -> list[list[float | None]]:
+def _line(
+    start: list[float | None], end: list[float | None]
+) -> list[list[float | None]]:
     one, other = np.array(start, dtype=float), np.array(end, dtype=float)
     length = float(np.linalg.norm(other - one))
     count = max(_PIECES, ceil(length / max(_PIECE, length / 200.0))) if length else 0
@@ -203,44 +250,72 @@ def _line(start: list[float | None], end: list[float | None]) -> list[list[float
 
 
 def _arc(
-    machine: _Machine, start: list[float | None], end: list[float | None], values: dict[str, float], where: str
+    machine: _Machine,
+    start: list[float | None],
+    end: list[float | None],
+    values: dict[str, float],
+    where: str,
 ) -> list[list[float | None]]:
     one, other = np.array(start, dtype=float), np.array(end, dtype=float)
     a, b, c = machine.plane
     clockwise = machine.motion == "2"
     if "R" in values:
-        centre = _centre(one[[a, b]], other[[a, b]], values["R"] * machine.unit, clockwise=clockwise, where=where)
+        centre = _centre(
+            one[[a, b]],
+            other[[a, b]],
+            values["R"] * machine.unit,
+            clockwise=clockwise,
+            where=where,
+        )
     else:
         offsets = [values.get("IJK"[axis], 0.0) * machine.unit for axis in (a, b)]
         centre = one[[a, b]] + offsets
     radius, at_end = hypot(*(one[[a, b]] - centre)), hypot(*(other[[a, b]] - centre))
     if not radius or abs(radius - at_end) > max(_ROUND * radius, 1e-5):
         found = f"radius {1e3 * radius:.6g} mm at its start and {1e3 * at_end:.6g} mm at its end"
-        raise TaskError("the arc is none", found=found, allowed="one radius; I, J, K from the start", where=where)
+        raise TaskError(
+            "the arc is none",
+            found=found,
+            allowed="one radius; I, J, K from the start",
+            where=where,
+        )
     first = atan2(one[b] - centre[1], one[a] - centre[0])
     swept = (atan2(other[b] - centre[1], other[a] - centre[0]) - first) % (2.0 * pi)
     if clockwise:
         swept -= 2.0 * pi
-    if abs(abs(swept) - 2.0 * pi) < 1e-9 or abs(swept) < 1e-9:  # noqa: PLR2004  (a full turn)
+    if abs(abs(swept) - 2.0 * pi) < 1e-9 or abs(swept) < 1e-9:
         swept = -2.0 * pi if clockwise else 2.0 * pi
-    count = max(_PIECES, ceil(abs(swept) / (2.0 * acos(max(1.0 - _SAGITTA / radius, 0.5)))))
+    count = max(
+        _PIECES, ceil(abs(swept) / (2.0 * acos(max(1.0 - _SAGITTA / radius, 0.5))))
+    )
     places = []
     for k in range(1, count + 1):
         share, place = k / count, other.copy()
-        place[a] = centre[0] + (radius + (at_end - radius) * share) * cos(first + swept * share)
-        place[b] = centre[1] + (radius + (at_end - radius) * share) * sin(first + swept * share)
+        place[a] = centre[0] + (radius + (at_end - radius) * share) * cos(
+            first + swept * share
+        )
+        place[b] = centre[1] + (radius + (at_end - radius) * share) * sin(
+            first + swept * share
+        )
         place[c] = one[c] + (other[c] - one[c]) * share
         places.append(list(place))
     return places
 
 
-def _centre(one: np.ndarray, other: np.ndarray, radius: float, *, clockwise: bool, where: str) -> np.ndarray:
+def _centre(
+    one: np.ndarray, other: np.ndarray, radius: float, *, clockwise: bool, where: str
+) -> np.ndarray:
     """Return the centre, (2,), of an arc of given radius; a negative one is that of more than half a turn."""
     chord = other - one
     length = hypot(*chord)
     if not length or length > 2.0 * abs(radius) * (1.0 + _ROUND):
         found = f"R {1e3 * radius:.6g} mm for ends {1e3 * length:.6g} mm apart"
-        raise TaskError("the arc is none", found=found, allowed="ends at most 2 R apart, and not the same", where=where)
+        raise TaskError(
+            "the arc is none",
+            found=found,
+            allowed="ends at most 2 R apart, and not the same",
+            where=where,
+        )
     away = sqrt(max(radius**2 - length**2 / 4.0, 0.0))
     left = np.array([-chord[1], chord[0]]) / length
     side = -1.0 if clockwise != (radius < 0.0) else 1.0

@@ -80,7 +80,11 @@ class Fit:
     @property
     def intervals(self) -> np.ndarray:
         """The interval of every point, (n,)."""
-        return np.clip(np.searchsorted(self.breaks, self.sigma, side="right") - 1, 0, len(self.breaks) - 2)
+        return np.clip(
+            np.searchsorted(self.breaks, self.sigma, side="right") - 1,
+            0,
+            len(self.breaks) - 2,
+        )
 
 
 def fit_over(points: Points, sigma: Array, breaks: Array) -> Fit:
@@ -99,7 +103,7 @@ def fit_over(points: Points, sigma: Array, breaks: Array) -> Fit:
     ValueError, LinAlgError
         The knots are too dense for the points.
     """
-    from scipy.interpolate import BSpline, make_lsq_spline  # noqa: PLC0415  (imports in half a second)
+    from scipy.interpolate import BSpline, make_lsq_spline
 
     order = np.argsort(sigma, kind="stable")
     columns, weights = points.columns, np.ones(len(points))
@@ -107,17 +111,23 @@ def fit_over(points: Points, sigma: Array, breaks: Array) -> Fit:
     origin, length = columns[0], float(breaks[-1])
     knots = clamped(breaks / length)
     inside = np.clip(sigma[order] / length, 0.0, 1.0)
-    spline = make_lsq_spline(inside, columns[order] - origin, knots, k=DEGREE, w=weights[order])
+    spline = make_lsq_spline(
+        inside, columns[order] - origin, knots, k=DEGREE, w=weights[order]
+    )
     if not np.isfinite(spline.c).all():
         raise ValueError("the knots are too dense for the points")
     control_points = spline.c + origin
     control_points[[0, -1]] = columns[[0, -1]]
-    return measured(points, BSpline(knots * length, control_points, DEGREE), breaks, sigma)
+    return measured(
+        points, BSpline(knots * length, control_points, DEGREE), breaks, sigma
+    )
 
 
 def clamped(breaks: Array) -> Array:
     """Return the knots of a spline of the degree of all fits, with the ends repeated."""
-    return np.concatenate([np.repeat(breaks[0], DEGREE), breaks, np.repeat(breaks[-1], DEGREE)])
+    return np.concatenate(
+        [np.repeat(breaks[0], DEGREE), breaks, np.repeat(breaks[-1], DEGREE)]
+    )
 
 
 def measured(points: Points, spline: BSpline, breaks: Array, sigma: Array) -> Fit:
@@ -136,12 +146,25 @@ def measured(points: Points, spline: BSpline, breaks: Array, sigma: Array) -> Fi
         sigma[[0, -1]] = breaks[[0, -1]]
     values = spline(sigma)
     distances = np.linalg.norm(values[:, :dimension] - points.position, axis=1)
-    return Fit(spline, breaks, sigma, distances, angles_between(values[:, dimension:], points.turning))
+    return Fit(
+        spline,
+        breaks,
+        sigma,
+        distances,
+        angles_between(values[:, dimension:], points.turning),
+    )
 
 
 def over_arc_length(fit: Fit, dimension: int) -> tuple[Array, Array]:
     """Return the points' places and the knots, measured by the arc length of the fitted position instead of sigma."""
-    fine = np.unique(np.concatenate([np.linspace(a, b, 17) for a, b in zip(fit.breaks, fit.breaks[1:], strict=False)]))
+    fine = np.unique(
+        np.concatenate(
+            [
+                np.linspace(a, b, 17)
+                for a, b in zip(fit.breaks, fit.breaks[1:], strict=False)
+            ]
+        )
+    )
     middle = (fine[1:] + fine[:-1]) / 2.0
     position = type(fit.spline)(fit.spline.t, fit.spline.c[:, :dimension], fit.spline.k)
     slope = position.derivative()
@@ -168,14 +191,18 @@ def lengths_along(position: Array, deviation: float) -> Array:
         return np.concatenate([[0.0], np.cumsum(np.maximum(chords, _AT_LEAST))])
     edges = np.arange(0, count + 1, block)
     edges[-1] = count
-    sums = np.concatenate([np.zeros((1, position.shape[1])), np.cumsum(position - position[0], axis=0)])
+    sums = np.concatenate(
+        [np.zeros((1, position.shape[1])), np.cumsum(position - position[0], axis=0)]
+    )
     sizes = np.diff(edges)[:, None]
     means = position[0] + np.diff(sums[edges], axis=0) / sizes
     centres = (edges[:-1] + edges[1:] - 1) / 2.0
     corners = np.concatenate([position[:1], means, position[-1:]])
     chords = np.maximum(np.linalg.norm(np.diff(corners, axis=0), axis=1), _AT_LEAST)
     index = np.concatenate([[-0.5], centres, [count - 0.5]])
-    lengths = np.interp(np.arange(count), index, np.concatenate([[0.0], np.cumsum(chords)]))
+    lengths = np.interp(
+        np.arange(count), index, np.concatenate([[0.0], np.cumsum(chords)])
+    )
     return np.asarray(lengths - lengths[0])
 
 

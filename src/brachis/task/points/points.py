@@ -57,10 +57,14 @@ class Points:
         """Position and turning side by side, (n, p + q)."""
         return np.hstack([self.position, self.turning])
 
-    def only(self, chosen: Any) -> Points:  # noqa: ANN401  (whatever NumPy takes as an index)
+    def only(self, chosen: Any) -> Points:
         """Return some of the points."""
         speed = None if self.speed is None else self.speed[chosen]
-        parts = {"position": self.position[chosen], "turning": self.turning[chosen], "rows": self.rows[chosen]}
+        parts = {
+            "position": self.position[chosen],
+            "turning": self.turning[chosen],
+            "rows": self.rows[chosen],
+        }
         return replace(self, **parts, speed=speed)
 
     def named(self, i: int) -> str:
@@ -72,9 +76,17 @@ class Points:
         place = ", ".join(f"{value:.6g}" for value in self.position[i])
         return f"{self.named(i)}, [{place}] m"
 
-    def wrong(self, i: int, problem: str, *, found: str, allowed: str, hint: str | None = None) -> TaskError:
+    def wrong(
+        self, i: int, problem: str, *, found: str, allowed: str, hint: str | None = None
+    ) -> TaskError:
         """Return the error that something is wrong with a point."""
-        return TaskError(problem, found=found, allowed=allowed, where=f"{self.source}: {self.named(i)}", hint=hint)
+        return TaskError(
+            problem,
+            found=found,
+            allowed=allowed,
+            where=f"{self.source}: {self.named(i)}",
+            hint=hint,
+        )
 
 
 def angles_between(one: Array, other: Array) -> Array:
@@ -82,7 +94,9 @@ def angles_between(one: Array, other: Array) -> Array:
     if one.shape[1] != QUATERNION:
         return np.asarray(np.abs(one - other).sum(axis=1))
     unit = one / np.linalg.norm(one, axis=1)[:, None]
-    apart = np.minimum(np.linalg.norm(unit - other, axis=1), np.linalg.norm(unit + other, axis=1))
+    apart = np.minimum(
+        np.linalg.norm(unit - other, axis=1), np.linalg.norm(unit + other, axis=1)
+    )
     return np.asarray(4.0 * np.arcsin(np.minimum(apart / 2.0, 1.0)))
 
 
@@ -92,7 +106,15 @@ _HOMOGENEOUS = (4, 4)
 _MATRIX = (3, 3)
 
 
-def points_from(points: Any, orientations: Any, speed: Any, units: Units, source: str, *, least: int = 2) -> Points:  # noqa: ANN401
+def points_from(
+    points: Any,
+    orientations: Any,
+    speed: Any,
+    units: Units,
+    source: str,
+    *,
+    least: int = 2,
+) -> Points:
     """Return points from what a program has.
 
     Parameters
@@ -116,29 +138,62 @@ def points_from(points: Any, orientations: Any, speed: Any, units: Units, source
         Arrays of other shapes, or with numbers that are not finite, or that are no rotations; the row is named.
     """
     values = _array(_matrices(points), source, source)
-    if values.ndim == 3 and values.shape[1:] == _HOMOGENEOUS and orientations is None:  # noqa: PLR2004
+    if values.ndim == 3 and values.shape[1:] == _HOMOGENEOUS and orientations is None:
         values, orientations = values[:, :3, 3], values[:, :3, :3]
-    if values.ndim != 2 or not 1 <= values.shape[1] <= _MOST_ROWS or len(values) < least:  # noqa: PLR2004
-        allowed = f"(n, 1 to 3) positions, or (n, 4, 4) matrices, of {least} rows or more"
-        raise TaskError("points of the wrong shape", found=values.shape, allowed=allowed, where=source)
-    turning = np.empty((len(values), 0)) if orientations is None else _turning(orientations, units, source)
+    if (
+        values.ndim != 2
+        or not 1 <= values.shape[1] <= _MOST_ROWS
+        or len(values) < least
+    ):
+        allowed = (
+            f"(n, 1 to 3) positions, or (n, 4, 4) matrices, of {least} rows or more"
+        )
+        raise TaskError(
+            "points of the wrong shape",
+            found=values.shape,
+            allowed=allowed,
+            where=source,
+        )
+    turning = (
+        np.empty((len(values), 0))
+        if orientations is None
+        else _turning(orientations, units, source)
+    )
     speeds = None
     if speed is not None:
         where = f"{source}: speed"
         speeds = _numbers(speed, where) * SPEEDS[units.speed or "m/s"]
         if speeds.ndim != 1:
-            raise TaskError("speeds of the wrong shape", found=speeds.shape, allowed="(n,)", where=where)
+            raise TaskError(
+                "speeds of the wrong shape",
+                found=speeds.shape,
+                allowed="(n,)",
+                where=where,
+            )
         problem = "a speed must be positive and finite, or NaN where there is none"
         _refuse_first((speeds <= 0.0) | np.isinf(speeds), problem, speeds, source)
     for name, one in (("orientations", turning), ("speed", speeds)):
         if one is not None and len(np.atleast_1d(one)) != len(values):
-            raise TaskError(f"as many {name} as points are needed", found=len(np.atleast_1d(one)), allowed=len(values))
-    return Points(values * LENGTHS[units.length or "m"], turning, speeds, np.arange(len(values)), source, "row")
+            raise TaskError(
+                f"as many {name} as points are needed",
+                found=len(np.atleast_1d(one)),
+                allowed=len(values),
+            )
+    return Points(
+        values * LENGTHS[units.length or "m"],
+        turning,
+        speeds,
+        np.arange(len(values)),
+        source,
+        "row",
+    )
 
 
-def _matrices(points: Any) -> Any:  # noqa: ANN401
+def _matrices(points: Any) -> Any:
     """Return the homogeneous matrices of transforms; anything else as it is."""
-    if not isinstance(points, np.ndarray) and callable(getattr(points, "as_matrix", None)):
+    if not isinstance(points, np.ndarray) and callable(
+        getattr(points, "as_matrix", None)
+    ):
         return points.as_matrix()
     if isinstance(points, list | tuple) and points:
         if all(hasattr(one, "homogeneous") for one in points):
@@ -148,9 +203,9 @@ def _matrices(points: Any) -> Any:  # noqa: ANN401
     return points
 
 
-def _turning(orientations: Any, units: Units, source: str) -> Array:  # noqa: ANN401
+def _turning(orientations: Any, units: Units, source: str) -> Array:
     """Return quaternions, (n, 4), or yaw, (n, 1)."""
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415  (imports in 0.2 s)
+    from scipy.spatial.transform import Rotation
 
     where = f"{source}: orientations"
     if isinstance(orientations, Rotation):
@@ -160,8 +215,15 @@ def _turning(orientations: Any, units: Units, source: str) -> Array:  # noqa: AN
         return values[:, None] * ANGLES[units.angle or "rad"]
     if values.shape[1:] == _MATRIX:
         off = np.abs(values @ np.swapaxes(values, 1, 2) - np.eye(3)).max(axis=(1, 2))
-        _refuse_first((off > _ROTATION) | (np.linalg.det(values) < 0.0), "no rotation matrix", values, source)
-        return with_like_signs(np.roll(Rotation.from_matrix(values).as_quat(), 1, axis=1))
+        _refuse_first(
+            (off > _ROTATION) | (np.linalg.det(values) < 0.0),
+            "no rotation matrix",
+            values,
+            source,
+        )
+        return with_like_signs(
+            np.roll(Rotation.from_matrix(values).as_quat(), 1, axis=1)
+        )
     problem = "orientations of the wrong shape"
     if values.shape[1:] == (QUATERNION,):
         problem = "an array of quaternions does not say whether w is first or last"
@@ -169,22 +231,36 @@ def _turning(orientations: Any, units: Units, source: str) -> Array:  # noqa: AN
     raise TaskError(problem, found=values.shape, allowed=allowed, where=where)
 
 
-def _array(values: Any, where: str, source: str) -> Array:  # noqa: ANN401
+def _array(values: Any, where: str, source: str) -> Array:
     array = _numbers(values, where)
     if not array.size:
-        raise TaskError("an array without numbers", found=array.shape, allowed="2 rows or more", where=where)
-    _refuse_first(~np.isfinite(array.reshape(len(array), -1) if array.ndim else array), "not finite", array, source)
+        raise TaskError(
+            "an array without numbers",
+            found=array.shape,
+            allowed="2 rows or more",
+            where=where,
+        )
+    _refuse_first(
+        ~np.isfinite(array.reshape(len(array), -1) if array.ndim else array),
+        "not finite",
+        array,
+        source,
+    )
     return array
 
 
-def _numbers(values: Any, where: str) -> Array:  # noqa: ANN401
+def _numbers(values: Any, where: str) -> Array:
     try:
         return np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
-        raise TaskError("not an array of numbers", found=str(error), where=where) from None
+        raise TaskError(
+            "not an array of numbers", found=str(error), where=where
+        ) from None
 
 
 def _refuse_first(bad: np.ndarray, problem: str, values: Array, source: str) -> None:
     rows = np.flatnonzero(bad.any(axis=1) if bad.ndim > 1 else bad)
     if rows.size:
-        raise TaskError(problem, found=values[rows[0]].tolist(), where=f"{source}: row {rows[0]}")
+        raise TaskError(
+            problem, found=values[rows[0]].tolist(), where=f"{source}: row {rows[0]}"
+        )

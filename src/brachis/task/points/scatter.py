@@ -54,7 +54,11 @@ class Scatter:
     @property
     def curvature(self) -> float:
         """Standard deviation of the curvature of a curve through all points, 1/m, that scatter alone gives it."""
-        return _SECOND_DIFFERENCE * self.deviation / self.spacing**2 if self.deviation else 0.0
+        return (
+            _SECOND_DIFFERENCE * self.deviation / self.spacing**2
+            if self.deviation
+            else 0.0
+        )
 
     def __str__(self) -> str:
         """Say what the scatter looks like."""
@@ -89,7 +93,9 @@ def scatter_of(points: Points) -> Scatter:
     of_turning = 0.0
     if turning.shape[1]:
         # Half the angle for quaternions, whose scatter has three dimensions; the angle itself for yaw.
-        whole, median = (2.0, _IN_SPACE) if turning.shape[1] == QUATERNION else (1.0, _ON_A_LINE)
+        whole, median = (
+            (2.0, _IN_SPACE) if turning.shape[1] == QUATERNION else (1.0, _ON_A_LINE)
+        )
         of_turning = whole * _deviation(_residuals(turning, chords), median)
     return Scatter(deviation, of_turning, spacing, decimals_of(position))
 
@@ -100,7 +106,10 @@ def _deviation(residuals: Array, median_of_one: float) -> float:
     median = float(np.median(sizes))
     if median == 0.0:
         return 0.0
-    clipped = residuals * np.minimum(1.0, _CLIP * median / np.maximum(sizes, _NOTHING))[:, None]
+    clipped = (
+        residuals
+        * np.minimum(1.0, _CLIP * median / np.maximum(sizes, _NOTHING))[:, None]
+    )
     correlation = float(np.sum(clipped[1:] * clipped[:-1]) / np.sum(clipped**2))
     return median / median_of_one if correlation < _WHITE else 0.0
 
@@ -109,7 +118,9 @@ def decimals_of(position: Array) -> int | None:
     """Return the number of decimals to which all values, m, are rounded; None where there are more than twelve."""
     for decimals in range(_MOST_DECIMALS + 1):
         scaled = position * 10.0**decimals
-        if np.all(np.abs(scaled - np.rint(scaled)) < 1e-9 * np.maximum(np.abs(scaled), 1e3)):
+        if np.all(
+            np.abs(scaled - np.rint(scaled)) < 1e-9 * np.maximum(np.abs(scaled), 1e3)
+        ):
             return decimals
     return None
 
@@ -125,5 +136,9 @@ def _residuals(values: Array, chords: Array) -> Array:
         for j in range(len(_NEIGHBOURS)):
             if i != j:
                 weights[i] *= offsets[j] / (offsets[j] - offsets[i])
-    foreseen = sum(weights[i][:, None] * values[inner + k] for i, k in enumerate(_NEIGHBOURS))
-    return np.asarray((values[inner] - foreseen) / np.sqrt(1.0 + np.sum(weights**2, axis=0))[:, None])
+    foreseen = sum(
+        weights[i][:, None] * values[inner + k] for i, k in enumerate(_NEIGHBOURS)
+    )
+    return np.asarray(
+        (values[inner] - foreseen) / np.sqrt(1.0 + np.sum(weights**2, axis=0))[:, None]
+    )

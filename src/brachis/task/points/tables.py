@@ -17,7 +17,15 @@ import numpy as np
 from brachis.common.arrays import with_like_signs
 from brachis.errors import TaskError
 from brachis.task.points.points import Array, Indices, Points
-from brachis.task.points.units import ANGLES, CONVENTIONS, LENGTHS, SPEEDS, Units, choices, rotation_by
+from brachis.task.points.units import (
+    ANGLES,
+    CONVENTIONS,
+    LENGTHS,
+    SPEEDS,
+    Units,
+    choices,
+    rotation_by,
+)
 
 LARGEST = 1e12
 """Of a number in a table: beyond it squares and differences lose their meaning."""
@@ -47,7 +55,12 @@ class Table:
     told: tuple[str, ...]
 
 
-def read_table(text: str, source: str, allowed: str, check: Callable[[tuple[str, ...], str], object]) -> Table:
+def read_table(
+    text: str,
+    source: str,
+    allowed: str,
+    check: Callable[[tuple[str, ...], str], object],
+) -> Table:
     """Read a table whose first line names the columns; lines that are empty or begin with ``#`` are skipped.
 
     Parameters
@@ -78,16 +91,29 @@ def read_table(text: str, source: str, allowed: str, check: Callable[[tuple[str,
     commas = delimiter != "," and any("," in line for _, line in lines[1:])
     if commas:
         _refuse_points_and_commas(lines[1:], source)
-        lines = [lines[0], *((number, line.replace(",", ".")) for number, line in lines[1:])]
-    told += [f"columns separated by {_DELIMITERS[delimiter]}"] * (delimiter != ",") + ["decimal commas"] * commas
+        lines = [
+            lines[0],
+            *((number, line.replace(",", ".")) for number, line in lines[1:]),
+        ]
+    told += [f"columns separated by {_DELIMITERS[delimiter]}"] * (delimiter != ",") + [
+        "decimal commas"
+    ] * commas
     (_, header), *rows = _cells(lines, delimiter, source)
     check(tuple(header), f"{source}: line {lines[0][0]}")
     numbers = np.array([number for number, _ in rows], dtype=int)
-    return Table(tuple(header), lines[0][0], _numbers(rows, header, source), numbers, tuple(told))
+    return Table(
+        tuple(header), lines[0][0], _numbers(rows, header, source), numbers, tuple(told)
+    )
 
 
-def _cells(lines: list[tuple[int, str]], delimiter: str, source: str) -> Iterator[tuple[int, list[str]]]:
-    reader = csv.reader((line.strip(" \r") for _, line in lines), delimiter=delimiter, skipinitialspace=True)
+def _cells(
+    lines: list[tuple[int, str]], delimiter: str, source: str
+) -> Iterator[tuple[int, list[str]]]:
+    reader = csv.reader(
+        (line.strip(" \r") for _, line in lines),
+        delimiter=delimiter,
+        skipinitialspace=True,
+    )
     try:
         for (number, _), cells in zip(lines, reader, strict=False):
             yield number, [cell.strip() for cell in cells]
@@ -96,10 +122,14 @@ def _cells(lines: list[tuple[int, str]], delimiter: str, source: str) -> Iterato
         raise TaskError(f"not a CSV file: {error}", where=where) from None
 
 
-def _numbers(rows: list[tuple[int, list[str]]], header: list[str], source: str) -> Array:
+def _numbers(
+    rows: list[tuple[int, list[str]]], header: list[str], source: str
+) -> Array:
     width = len(header)
     try:
-        values = np.array([[float(cell) for cell in cells] for _, cells in rows]).reshape(len(rows), -1)
+        values = np.array(
+            [[float(cell) for cell in cells] for _, cells in rows]
+        ).reshape(len(rows), -1)
     except ValueError:  # no number, or rows of different lengths
         values = np.empty((0, 0))
     if values.shape != (len(rows), width) or not np.all(np.abs(values) <= LARGEST):
@@ -107,23 +137,38 @@ def _numbers(rows: list[tuple[int, list[str]]], header: list[str], source: str) 
     return values
 
 
-def _refuse(rows: list[tuple[int, list[str]]], header: list[str], source: str) -> NoReturn:
+def _refuse(
+    rows: list[tuple[int, list[str]]], header: list[str], source: str
+) -> NoReturn:
     """Raise the error for the first row that is wrong."""
     for number, cells in rows:
         where = f"{source}: line {number}"
         if len(cells) != len(header):
             problem = "wrong number of values"
-            hint = "Decimal commas need columns separated by semicolons or tabs" if len(cells) > len(header) else None
+            hint = (
+                "Decimal commas need columns separated by semicolons or tabs"
+                if len(cells) > len(header)
+                else None
+            )
             allowed = f"{len(header)}: {', '.join(header)}"
-            raise TaskError(problem, found=len(cells), allowed=allowed, where=where, hint=hint)
+            raise TaskError(
+                problem, found=len(cells), allowed=allowed, where=where, hint=hint
+            )
         for column, cell in zip(header, cells, strict=True):
             value = _number(cell)
             if not math.isfinite(value):
                 problem = f"the value of column {column} is not a finite number"
-                raise TaskError(problem, found=repr(cell), allowed="a number", where=where)
+                raise TaskError(
+                    problem, found=repr(cell), allowed="a number", where=where
+                )
             if abs(value) > LARGEST:
                 problem = f"the value of column {column} is out of range"
-                raise TaskError(problem, found=repr(cell), allowed=f"{-LARGEST:g} to {LARGEST:g}", where=where)
+                raise TaskError(
+                    problem,
+                    found=repr(cell),
+                    allowed=f"{-LARGEST:g} to {LARGEST:g}",
+                    where=where,
+                )
     raise TaskError("no rows of numbers", where=source)
 
 
@@ -140,7 +185,12 @@ def _refuse_points_and_commas(lines: list[tuple[int, str]], source: str) -> None
         if "," in line and "." in line:
             problem = "decimal points and commas in one line"
             hint = "Write numbers without separators of thousands"
-            raise TaskError(problem, found=repr(line.strip()[:60]), where=f"{source}: line {number}", hint=hint)
+            raise TaskError(
+                problem,
+                found=repr(line.strip()[:60]),
+                where=f"{source}: line {number}",
+                hint=hint,
+            )
 
 
 POSITION: Final = ("x", "y", "z")
@@ -156,7 +206,9 @@ _ORIENTATIONS: Final = {
 """Columns of orientations, and the conventions that each may be in: the numbers of a convention are in this order."""
 _SPEED: Final = "feed"
 _SPEED_NAMES: Final = ("feed", "feedrate", "f", "speed", "v")
-_HEADING = re.compile(r"^([a-z]+?|q[1-4])(?:\s*[_ ]\s*([a-z/_]+)|\s*[\[(]\s*([a-z/]+)\s*[\])])?$")
+_HEADING = re.compile(
+    r"^([a-z]+?|q[1-4])(?:\s*[_ ]\s*([a-z/_]+)|\s*[\[(]\s*([a-z/]+)\s*[\])])?$"
+)
 _UNIT_LENGTH = 0.01
 _DEFAULTS = Units(length="m", angle="rad")
 
@@ -167,7 +219,10 @@ def allowed_columns(rows: tuple[str, ...] | str) -> str:
 
 
 def understood(
-    header: tuple[str, ...], where: str, rows: tuple[str, ...] | str, stated: str | None = None
+    header: tuple[str, ...],
+    where: str,
+    rows: tuple[str, ...] | str,
+    stated: str | None = None,
 ) -> tuple[dict[str, tuple[int, str | None]], tuple[str, ...], str | None]:
     """Return what the columns of a table are.
 
@@ -195,14 +250,23 @@ def understood(
     TaskError
         Columns are missing or unknown, or the convention of their orientations is not known.
     """
-    headings = {name: (column, unit) for column, name, unit in map(_heading, range(len(header)), header)}
+    headings = {
+        name: (column, unit)
+        for column, name, unit in map(_heading, range(len(header)), header)
+    }
     names = sorted(name for name in headings if name != _SPEED)
     choice = next((one for one in _choices(rows) if sorted(one) == names), None)
     if choice is None or len(headings) != len(header):
         problem = "wrong columns"
         hint = "The first line names the columns, separated by commas, semicolons, tabs or spaces; units may follow "
         hint += "(x_mm); a column feed may stand beside them"
-        raise TaskError(problem, found=", ".join(header), allowed=allowed_columns(rows), where=where, hint=hint)
+        raise TaskError(
+            problem,
+            found=", ".join(header),
+            allowed=allowed_columns(rows),
+            where=where,
+            hint=hint,
+        )
     return headings, choice, _convention(choice, stated, where)
 
 
@@ -210,23 +274,44 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
     """Return the convention of the orientations: the only one that the columns leave, or the one that is stated."""
     columns = names[len(POSITION) :]
     possible = _ORIENTATIONS.get(columns, ())
-    if stated is None and len(possible) < 2:  # noqa: PLR2004
+    if stated is None and len(possible) < 2:
         return possible[0] if possible else None
     if stated is None:
-        problem = f"the columns {', '.join(columns)} do not say how the orientation is meant"
+        problem = (
+            f"the columns {', '.join(columns)} do not say how the orientation is meant"
+        )
         hint = "State it in the task, csv: {file: ..., orientation: ...}; another choice gives another motion"
-        raise TaskError(problem, allowed=f"csv.orientation: {choices(possible)}", where=where, hint=hint)
+        raise TaskError(
+            problem,
+            allowed=f"csv.orientation: {choices(possible)}",
+            where=where,
+            hint=hint,
+        )
     if stated not in possible:
-        usual = [", ".join(each) for each, conventions in _ORIENTATIONS.items() if stated in conventions]
-        problem = f"csv.orientation is {stated}, which the columns of the file do not have"
+        usual = [
+            ", ".join(each)
+            for each, conventions in _ORIENTATIONS.items()
+            if stated in conventions
+        ]
+        problem = (
+            f"csv.orientation is {stated}, which the columns of the file do not have"
+        )
         found, allowed = ", ".join(names), f"columns {' | '.join(usual)} for {stated}"
-        hint = f"Or csv.orientation: {choices(possible)}" if possible else "Leave csv.orientation away"
+        hint = (
+            f"Or csv.orientation: {choices(possible)}"
+            if possible
+            else "Leave csv.orientation away"
+        )
         raise TaskError(problem, found=found, allowed=allowed, where=where, hint=hint)
     return stated
 
 
 def points_of(
-    table: Table, rows: tuple[str, ...] | str, units: Units, source: str, stated: str | None = None
+    table: Table,
+    rows: tuple[str, ...] | str,
+    units: Units,
+    source: str,
+    stated: str | None = None,
 ) -> tuple[Points, tuple[str, ...]]:
     """Return the points of a table in SI units, and what was found out about the units.
 
@@ -255,7 +340,12 @@ def points_of(
     def column(name: str, kind: str, factors: dict[str, float]) -> Array:
         index, unit = headings[name]
         default = None if kind == "angle" and need_angle else getattr(_DEFAULTS, kind)
-        return table.values[:, index] * factors[_unit(name, unit, kind, factors, units, default, in_header, where)]
+        return (
+            table.values[:, index]
+            * factors[
+                _unit(name, unit, kind, factors, units, default, in_header, where)
+            ]
+        )
 
     position = tuple(name for name in choice if name in POSITION)
     lengths = np.column_stack([column(name, "length", LENGTHS) for name in position])
@@ -270,8 +360,14 @@ def points_of(
         turning = _quaternions(turning, convention, table, source)
     points = Points(lengths, turning, speed, table.lines, source)
     _check_speeds(points)
-    told = [f"{kind} in {' and '.join(units)}, as the header says" for kind, units in in_header.items()]
-    return points, (*told, *([f"orientations: {CONVENTIONS[convention].meaning}"] if convention else []))
+    told = [
+        f"{kind} in {' and '.join(units)}, as the header says"
+        for kind, units in in_header.items()
+    ]
+    return points, (
+        *told,
+        *([f"orientations: {CONVENTIONS[convention].meaning}"] if convention else []),
+    )
 
 
 def _choices(rows: tuple[str, ...] | str) -> tuple[tuple[str, ...], ...]:
@@ -287,7 +383,11 @@ def _heading(index: int, text: str) -> tuple[int, str, str | None]:
         return index, text, None
     unit = match[2] or match[3]
     name = _SPEED if match[1] in _SPEED_NAMES else match[1]
-    return index, name, None if unit is None else unit.replace("_per_", "/").replace("_", "/")
+    return (
+        index,
+        name,
+        None if unit is None else unit.replace("_per_", "/").replace("_", "/"),
+    )
 
 
 def _unit(
@@ -304,15 +404,30 @@ def _unit(
     asked, found = getattr(units, kind), f"{unit} for {name}"
     if unit is not None:
         if unit not in factors:
-            raise TaskError(f"unknown unit of {kind}", found=found, allowed=", ".join(factors), where=where)
+            raise TaskError(
+                f"unknown unit of {kind}",
+                found=found,
+                allowed=", ".join(factors),
+                where=where,
+            )
         if asked is not None and factors[asked] != factors[unit]:
-            raise TaskError("the header contradicts the task's units", found=found, allowed=asked, where=where)
+            raise TaskError(
+                "the header contradicts the task's units",
+                found=found,
+                allowed=asked,
+                where=where,
+            )
         in_header.setdefault(kind, {})[unit] = None
         return unit
     if asked is None and default is None:
         usual = {"speed": "mm/min", "angle": "deg"}[kind]
         hint = f"Write {name}_{usual} in the header, or units: {{{kind}: {usual}}} in the task"
-        raise TaskError(f"the unit of {name} is not stated", allowed=", ".join(factors), where=where, hint=hint)
+        raise TaskError(
+            f"the unit of {name} is not stated",
+            allowed=", ".join(factors),
+            where=where,
+            hint=hint,
+        )
     return str(asked or default)
 
 
@@ -324,8 +439,15 @@ def _quaternions(values: Array, convention: str, table: Table, source: str) -> A
         i = int(np.argmax(off > _UNIT_LENGTH))
         problem = f"the quaternion's length is {np.linalg.norm(values[i]):.6g}"
         where = f"{source}: line {table.lines[i]}"
-        raise TaskError(problem, found=values[i].tolist(), allowed="a quaternion of length 1", where=where)
-    return with_like_signs(np.roll(rotation_by(convention, values).as_quat(), 1, axis=1))
+        raise TaskError(
+            problem,
+            found=values[i].tolist(),
+            allowed="a quaternion of length 1",
+            where=where,
+        )
+    return with_like_signs(
+        np.roll(rotation_by(convention, values).as_quat(), 1, axis=1)
+    )
 
 
 def _check_speeds(points: Points) -> None:
@@ -335,4 +457,6 @@ def _check_speeds(points: Points) -> None:
     if wrong.size:
         i = int(wrong[0])
         problem = "a feed rate must be positive"
-        raise points.wrong(i, problem, found=f"{points.speed[i]:g} m/s", allowed="more than 0")
+        raise points.wrong(
+            i, problem, found=f"{points.speed[i]:g} m/s", allowed="more than 0"
+        )

@@ -15,7 +15,14 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 
-LENGTHS: Final = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "inch": 0.0254}
+LENGTHS: Final = {
+    "m": 1.0,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "in": 0.0254,
+    "inch": 0.0254,
+}
 ANGLES: Final = {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0}
 SPEEDS: Final = {
     "m/s": 1.0,
@@ -25,7 +32,9 @@ SPEEDS: Final = {
     "in/min": 0.0254 / 60.0,
     "inch/min": 0.0254 / 60.0,
 }
-_QUANTITY = re.compile(r"^\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([a-z/]+)\s*$")
+_QUANTITY = re.compile(
+    r"^\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([a-z/]+)\s*$"
+)
 
 
 @dataclass(frozen=True)
@@ -73,16 +82,26 @@ class Convention:
 
 CONVENTIONS: Final = {
     "quaternion_wxyz": Convention("quaternion, w first", "ABB, MuJoCo, Drake"),
-    "quaternion_xyzw": Convention("quaternion, w last", "ROS, SciPy, Pinocchio's vectors"),
+    "quaternion_xyzw": Convention(
+        "quaternion, w last", "ROS, SciPy, Pinocchio's vectors"
+    ),
     "rotation_vector": Convention("axis times angle", "Universal Robots"),
     "rpy": Convention(
-        "roll, pitch, yaw about the fixed x, then y, then z axis", "URDF, Yaskawa, Mitsubishi, UFACTORY", "xyz"
+        "roll, pitch, yaw about the fixed x, then y, then z axis",
+        "URDF, Yaskawa, Mitsubishi, UFACTORY",
+        "xyz",
     ),
-    "kuka_abc": Convention("A about z, B about the new y, C about the new x axis", "KUKA", "ZYX"),
+    "kuka_abc": Convention(
+        "A about z, B about the new y, C about the new x axis", "KUKA", "ZYX"
+    ),
     "staubli_xyz": Convention(
-        "Rx about x, Ry about the new y, Rz about the new z axis", "Staubli, Mecademic, RoboDK's targets", "XYZ"
+        "Rx about x, Ry about the new y, Rz about the new z axis",
+        "Staubli, Mecademic, RoboDK's targets",
+        "XYZ",
     ),
-    "fanuc_wpr": Convention("W, P, R about the fixed x, then y, then z axis", "Fanuc", "xyz"),
+    "fanuc_wpr": Convention(
+        "W, P, R about the fixed x, then y, then z axis", "Fanuc", "xyz"
+    ),
 }
 """Conventions by name."""
 
@@ -90,13 +109,16 @@ CONVENTIONS: Final = {
 def choices(names: tuple[str, ...] = tuple(CONVENTIONS), suffix: str = "") -> str:
     """List conventions with their meaning and who uses them, for messages; `suffix` follows those of angles."""
     listed = ((name, CONVENTIONS[name]) for name in names)
-    return "; ".join(f"{name}{suffix if c.euler else ''} ({c.meaning}: {c.makers})" for name, c in listed)
+    return "; ".join(
+        f"{name}{suffix if c.euler else ''} ({c.meaning}: {c.makers})"
+        for name, c in listed
+    )
 
 
 def rotation_by(convention: str, values: npt.NDArray[Any]) -> Rotation:
     """Return the rotations of orientations, (..., 3) in rad or (..., 4), in one of the `CONVENTIONS`."""
-    import numpy as np  # noqa: PLC0415  (tasks without orientations need neither)
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415
+    import numpy as np
+    from scipy.spatial.transform import Rotation
 
     if convention == "quaternion_xyzw":
         return Rotation.from_quat(values)

@@ -9,7 +9,12 @@ from collections.abc import Sequence
 
 from brachis.robot.custom_limits import LimitModel, custom_limits
 from brachis.verify.limits.custom import check_own
-from brachis.verify.limits.joint import worst_acceleration, worst_jerk, worst_position, worst_velocity
+from brachis.verify.limits.joint import (
+    worst_acceleration,
+    worst_jerk,
+    worst_position,
+    worst_velocity,
+)
 from brachis.verify.limits.protocol import Given, LimitCheck, Worst
 from brachis.verify.limits.tool import (
     worst_least_process_speed,
@@ -47,13 +52,32 @@ TABLE: dict[str, LimitCheck] = {
 }
 
 
-def limit_checks(given: Given, further: Sequence[LimitModel], options: VerifyOptions) -> list[Check]:
+def limit_checks(
+    given: Given, further: Sequence[LimitModel], options: VerifyOptions
+) -> list[Check]:
     """Check every kind of limit that there is, then those of the task's ``custom_limits`` and the `further` ones."""
-    found = [(kind.replace("_", " "), worst) for kind, find in TABLE.items() if (worst := find(given)) is not None]
-    found += [check_own(model, given) for model in (*custom_limits(given.trajectory.task), *further)]
+    found = [
+        (kind.replace("_", " "), worst)
+        for kind, find in TABLE.items()
+        if (worst := find(given)) is not None
+    ]
+    found += [
+        check_own(model, given)
+        for model in (*custom_limits(given.trajectory.task), *further)
+    ]
     allowed = 1.0 + options.ratio_tolerance
     return [
-        Check(f"{name} ratio", ratio, allowed, "-", ratio <= allowed, subject, time, remark, of_limit=True)
+        Check(
+            f"{name} ratio",
+            ratio,
+            allowed,
+            "-",
+            ratio <= allowed,
+            subject,
+            time,
+            remark,
+            of_limit=True,
+        )
         for name, (ratio, subject, time, remark) in found
     ]
 

@@ -26,19 +26,33 @@ def check_own(model: LimitModel, given: Given) -> tuple[str, Worst]:
     def ratios(states: States) -> np.ndarray:
         if independent is None:
             s = given.s_at(states.t)
-            motion = SimpleNamespace(q=states.q, qdot=states.qdot, qddot=states.qddot, qdddot=states.qdddot, s=s)
+            motion = SimpleNamespace(
+                q=states.q,
+                qdot=states.qdot,
+                qddot=states.qddot,
+                qdddot=states.qdddot,
+                s=s,
+            )
             return np.abs(limit.ratios(motion, states.t))
-        found = np.abs(independent(given.robot, states.q, states.qdot, states.qddot, states.tau))
+        found = np.abs(
+            independent(given.robot, states.q, states.qdot, states.qddot, states.tau)
+        )
         if found.shape != (len(states.t), len(limit.labels)):
             allowed = f"{(len(states.t), len(limit.labels))}, a ratio for every moment and label"
             where = f"{type(model).__name__}.check"
-            raise InputError("has the wrong shape", where=where, found=found.shape, allowed=allowed)
+            raise InputError(
+                "has the wrong shape", where=where, found=found.shape, allowed=allowed
+            )
         return found
 
     subjects = [label.subject for label in limit.labels]
     if independent is None and limit.where == "whole":
         whole = ratios(given.states)[0]
-        worst = Worst(float(whole.max()), subjects[int(np.argmax(whole))], float(given.states.t[-1]))
+        worst = Worst(
+            float(whole.max()),
+            subjects[int(np.argmax(whole))],
+            float(given.states.t[-1]),
+        )
     else:
         worst = worst_between(given, ratios, subjects)
     return limit.name, worst if independent else worst._replace(remark=_OWN_FORMULA)

@@ -13,7 +13,9 @@ from brachis.verify.limits.protocol import Given, Worst, largest
 def worst_velocity(given: Given) -> Worst | None:
     """Find the largest velocity ratio, anywhere."""
     limits = given.robot.limits
-    return _worst(given, given.pieces.velocity, limits.velocity_lower, limits.velocity_upper)
+    return _worst(
+        given, given.pieces.velocity, limits.velocity_lower, limits.velocity_upper
+    )
 
 
 def worst_acceleration(given: Given) -> Worst | None:
@@ -28,7 +30,9 @@ def worst_jerk(given: Given) -> Worst | None:
     return _worst(given, given.pieces.jerk, -limit, limit)
 
 
-def _worst(given: Given, rates: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Worst | None:
+def _worst(
+    given: Given, rates: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> Worst | None:
     """Compare polynomials in Bernstein form, (m + 1, L, n), with limits below and above zero, (n,) each."""
     if not np.isfinite(upper).any():
         return None
@@ -54,7 +58,9 @@ def worst_position(given: Given) -> Worst | None:
     beyond = _worst_position(given, np.clip(half, _LEAST_HALF, _LARGEST_HALF))
     if beyond.ratio > 1.0:
         return beyond
-    inside = _worst_position(given, np.where(np.isfinite(half), np.maximum(half, _LEAST_HALF), 1.0))
+    inside = _worst_position(
+        given, np.where(np.isfinite(half), np.maximum(half, _LEAST_HALF), 1.0)
+    )
     return inside._replace(ratio=max(inside.ratio, 0.0), remark=_REMARK)
 
 

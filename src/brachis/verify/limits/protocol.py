@@ -63,11 +63,17 @@ class Given:
 
     def within(self, parts: np.ndarray) -> list[Given]:
         """Return the same for each part of the path, (P, 2), with no states but those in it, its ends included."""
-        more, slack = self.looking_at(parts.ravel()), _SAME_PLACE * self.trajectory.t_end
+        more, slack = (
+            self.looking_at(parts.ravel()),
+            _SAME_PLACE * self.trajectory.t_end,
+        )
         times = self.times_of(parts.ravel()).reshape(parts.shape)
         first = np.searchsorted(more.states.t, times[:, 0] - slack)
         last = np.searchsorted(more.states.t, times[:, 1] + slack, side="right")
-        return [replace(more, states=more.states.only(slice(a, b))) for a, b in zip(first, last, strict=True)]
+        return [
+            replace(more, states=more.states.only(slice(a, b)))
+            for a, b in zip(first, last, strict=True)
+        ]
 
 
 class Worst(NamedTuple):
@@ -106,7 +112,9 @@ _SHORTEST = 1e-6
 """Steps in a piece, as parts of it, that are not halved any more."""
 
 
-def worst_between(given: Given, ratio_at: Callable[[States], np.ndarray], subjects: Sequence[str]) -> Worst:
+def worst_between(
+    given: Given, ratio_at: Callable[[States], np.ndarray], subjects: Sequence[str]
+) -> Worst:
     """Find the largest of ratios that are no polynomials, at the states and wherever between them it may lie.
 
     Steps between states are halved for as long as the largest ratio may lie within one. Over a step of length h a ratio
@@ -134,17 +142,23 @@ def worst_between(given: Given, ratio_at: Callable[[States], np.ndarray], subjec
             k = int(np.argmax(most))
             column = int(np.argmax(ratio[steps[k]]))
             remark = f"not searched to the end: {ratio.max():.6g} was found, and more than this is not possible"
-            return Worst(float(most[k]), subjects[column], float(states.t[steps[k]]), remark)
+            return Worst(
+                float(most[k]), subjects[column], float(states.t[steps[k]]), remark
+            )
         u = states.u[steps]
         middle = u + 0.5 * (states.u[steps + 1] - u)
         new = States.at(given.pieces, given.robot, states.piece[steps], middle)
         states, order = states.merged(new)
         ratio = np.concatenate([ratio, ratio_at(new)])[order]
-    k, column = (int(index) for index in np.unravel_index(np.argmax(ratio), ratio.shape))
+    k, column = (
+        int(index) for index in np.unravel_index(np.argmax(ratio), ratio.shape)
+    )
     return Worst(float(ratio[k, column]), subjects[column], float(states.t[k]))
 
 
-def _may_hold_more(states: States, lengths: np.ndarray, ratio: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _may_hold_more(
+    states: States, lengths: np.ndarray, ratio: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """List the steps within which the largest ratio of all may lie, (S,), and the most that it may be there, (S,)."""
     inside = states.piece[1:] == states.piece[:-1]
     part = np.where(inside, np.diff(states.u), 1.0)
@@ -152,12 +166,16 @@ def _may_hold_more(states: States, lengths: np.ndarray, ratio: np.ndarray) -> tu
     slope = np.diff(ratio, axis=0) / length
     bend = np.zeros_like(ratio)
     both = inside[1:] & inside[:-1]
-    bend[1:-1] = np.where(both[:, None], np.abs(np.diff(slope, axis=0)) / (length[1:] + length[:-1]), 0.0)
+    bend[1:-1] = np.where(
+        both[:, None], np.abs(np.diff(slope, axis=0)) / (length[1:] + length[:-1]), 0.0
+    )
     bend = _SAFETY * np.maximum(bend[1:], bend[:-1])
     climb = np.maximum(bend * length - np.abs(slope), 0.0)
     rise = climb**2 / np.maximum(4.0 * bend, np.finfo(float).tiny)
     most = (np.maximum(ratio[1:], ratio[:-1]) + rise).max(axis=1)
-    steps = np.flatnonzero(inside & (part > _SHORTEST) & (most > ratio.max() + _RESOLUTION))
+    steps = np.flatnonzero(
+        inside & (part > _SHORTEST) & (most > ratio.max() + _RESOLUTION)
+    )
     return steps, most[steps]
 
 

@@ -27,9 +27,13 @@ def worst_tool_acceleration(given: Given) -> Worst | None:
 
     def ratios(states: States) -> np.ndarray:
         found = np.empty((len(states.t), 1))
-        for k, (q, qdot, qddot) in enumerate(zip(states.q, states.qdot, states.qddot, strict=True)):
+        for k, (q, qdot, qddot) in enumerate(
+            zip(states.q, states.qdot, states.qddot, strict=True)
+        ):
             pin.forwardKinematics(model, data, q, qdot, qddot)
-            found[k] = np.linalg.norm(pin.getFrameClassicalAcceleration(model, data, frame, _AXES).linear)
+            found[k] = np.linalg.norm(
+                pin.getFrameClassicalAcceleration(model, data, frame, _AXES).linear
+            )
         return found / limit
 
     return worst_between(given, ratios, ("tool",))
@@ -41,13 +45,19 @@ def worst_tool_angular_speed(given: Given) -> Worst | None:
     if limit is None:
         return None
     model, data, frame = robot.model, robot.model.createData(), robot.frame_id
-    rolls = np.array([robot.rolls_freely and name == ROLL_JOINT for name in robot.joint_names])
+    rolls = np.array(
+        [robot.rolls_freely and name == ROLL_JOINT for name in robot.joint_names]
+    )
 
     def ratios(states: States) -> np.ndarray:
         found = np.empty((len(states.t), 1))
-        for k, (q, qdot) in enumerate(zip(states.q, np.where(rolls, 0.0, states.qdot), strict=True)):
+        for k, (q, qdot) in enumerate(
+            zip(states.q, np.where(rolls, 0.0, states.qdot), strict=True)
+        ):
             pin.forwardKinematics(model, data, q, qdot)
-            found[k] = np.linalg.norm(pin.getFrameVelocity(model, data, frame, _AXES).angular)
+            found[k] = np.linalg.norm(
+                pin.getFrameVelocity(model, data, frame, _AXES).angular
+            )
         return found / limit
 
     return worst_between(given, ratios, ("tool",))
@@ -66,11 +76,16 @@ def worst_tool_speed(given: Given) -> Worst | None:
         allowed = np.full(len(s), stated if isinstance(stated, float) else np.inf)
         for table in tables:
             within = (s >= table.s[0] - _SAME_PLACE) & (s <= table.s[-1] + _SAME_PLACE)
-            allowed = np.minimum(allowed, np.where(within | (table is stated), _allowed(table, s), np.inf))
+            allowed = np.minimum(
+                allowed,
+                np.where(within | (table is stated), _allowed(table, s), np.inf),
+            )
         return speeds(robot, states) / allowed[:, None]
 
     places = np.unique([place for table in tables for place in table.s])
-    return worst_between(given.looking_at(places) if tables else given, ratios, ("tool",))
+    return worst_between(
+        given.looking_at(places) if tables else given, ratios, ("tool",)
+    )
 
 
 _SAME_PLACE = 1e-12
@@ -82,7 +97,9 @@ def _allowed(table: SpeedTable, s: np.ndarray) -> np.ndarray:
     allowed = np.interp(s, places, figures)  # which takes one side of a step
     for step in np.flatnonzero(np.diff(places) == 0.0).tolist():
         at_step = np.abs(s - places[step]) <= _SAME_PLACE
-        allowed = np.where(at_step, np.minimum(allowed, figures[step : step + 2].min()), allowed)
+        allowed = np.where(
+            at_step, np.minimum(allowed, figures[step : step + 2].min()), allowed
+        )
     return np.asarray(allowed)
 
 
@@ -92,7 +109,9 @@ def speeds(robot: Robot, states: States) -> np.ndarray:
     found = np.empty((len(states.t), 1))
     for k, (q, qdot) in enumerate(zip(states.q, states.qdot, strict=True)):
         pin.forwardKinematics(model, data, q, qdot)
-        velocity = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        velocity = pin.getFrameVelocity(
+            model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
         found[k] = np.linalg.norm(velocity.linear)
     return found
 
@@ -111,7 +130,10 @@ def _worst(given: Given, side: float) -> Worst | None:
     """Find the worst part of the path."""
     parts = given.trajectory.task.tool_limits.process_speed
     within = given.within(np.array([part.s for part in parts])) if parts else []
-    found = (_of_part(inside, part, side, alone=len(parts) == 1) for inside, part in zip(within, parts, strict=True))
+    found = (
+        _of_part(inside, part, side, alone=len(parts) == 1)
+        for inside, part in zip(within, parts, strict=True)
+    )
     return max(found, key=lambda worst: worst.ratio, default=None)
 
 
@@ -120,6 +142,10 @@ def _of_part(inside: Given, part: ProcessSpeed, side: float, *, alone: bool) -> 
     subject = "tool" if alone else f"tool, s = {begin:g} to {end:g}"
     return worst_between(
         inside,
-        lambda states: 1.0 - part.tolerance + side * (speeds(inside.robot, states) / part.speed - 1.0),
+        lambda states: (
+            1.0
+            - part.tolerance
+            + side * (speeds(inside.robot, states) / part.speed - 1.0)
+        ),
         (subject,),
     )

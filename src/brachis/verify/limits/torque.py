@@ -20,7 +20,9 @@ def worst_torque(given: Given) -> Worst | None:
     if not np.isfinite(upper).any():
         return None
     return worst_between(
-        given, lambda states: np.maximum(states.tau / upper, states.tau / lower), given.robot.joint_names
+        given,
+        lambda states: np.maximum(states.tau / upper, states.tau / lower),
+        given.robot.joint_names,
     )
 
 
@@ -31,7 +33,12 @@ def worst_torque_rate(given: Given) -> Worst | None:
         return None
 
     def ratios(states: States) -> np.ndarray:
-        return np.abs(torque_rates(robot, states.q, states.qdot, states.qddot, states.qdddot)) / limit
+        return (
+            np.abs(
+                torque_rates(robot, states.q, states.qdot, states.qddot, states.qdddot)
+            )
+            / limit
+        )
 
     return worst_between(given, ratios, robot.joint_names)
 
@@ -46,7 +53,9 @@ def worst_power(given: Given) -> Worst | None:
     if not np.isfinite(limit).any():
         return None
     names = given.robot.joint_names
-    return worst_between(given, lambda states: np.abs(states.tau * states.qdot) / limit, names)
+    return worst_between(
+        given, lambda states: np.abs(states.tau * states.qdot) / limit, names
+    )
 
 
 def worst_total_power(given: Given) -> Worst | None:
@@ -79,7 +88,9 @@ def worst_torque_at_speed(given: Given) -> Worst | None:
             last = (torque[-1] - torque[-2]) / (speed[-1] - speed[-2])
             beyond = last * np.maximum(moving - speed[-1], 0.0)
             allowed = np.maximum(np.interp(moving, speed, torque) + beyond, 0.0)
-            found[:, column] = 1.0 + (np.abs(states.tau[:, joint]) - allowed) / torque[0]
+            found[:, column] = (
+                1.0 + (np.abs(states.tau[:, joint]) - allowed) / torque[0]
+            )
         return found
 
     return worst_between(given, ratios, [robot.joint_names[joint] for joint in curved])
@@ -90,12 +101,18 @@ def worst_rms_torque(given: Given) -> Worst | None:
     limit, states = given.robot.limits.rms_torque, given.states
     if not np.isfinite(limit).any():
         return None
-    steps = np.flatnonzero((np.diff(states.piece) == 0) & (np.diff(states.u) > _NO_STEP))
+    steps = np.flatnonzero(
+        (np.diff(states.piece) == 0) & (np.diff(states.u) > _NO_STEP)
+    )
     middle = 0.5 * (states.u[steps] + states.u[steps + 1])
     between = States.at(given.pieces, given.robot, states.piece[steps], middle)
     lengths = states.t[steps + 1] - states.t[steps]
-    squares = (states.tau[steps] ** 2 + 4.0 * between.tau**2 + states.tau[steps + 1] ** 2) / 6.0
+    squares = (
+        states.tau[steps] ** 2 + 4.0 * between.tau**2 + states.tau[steps + 1] ** 2
+    ) / 6.0
     mean = lengths @ squares / lengths.sum()
     ratios = np.sqrt(mean) / limit
     joint = int(np.argmax(ratios))
-    return Worst(float(ratios[joint]), given.robot.joint_names[joint], float(states.t[-1]))
+    return Worst(
+        float(ratios[joint]), given.robot.joint_names[joint], float(states.t[-1])
+    )
