@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import json
 import os
+import tokenize
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,6 +49,23 @@ _RENAMED = {"quaternion": "quaternion_wxyz"}
 """Keys of tasks in files of schema 2, and what they are called now."""
 _HIGHEST_DEGREE = 7
 """Of splines, as in tasks."""
+_PACKED = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
+"""How NumPy packs members of an archive."""
+_BROKEN = (
+    OSError,
+    ValueError,
+    TypeError,
+    LookupError,
+    EOFError,
+    ArithmeticError,
+    RuntimeError,
+    MemoryError,
+    SyntaxError,
+    tokenize.TokenError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What archives, headers of arrays and JSON raise when they are broken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +134,7 @@ def read_result(path: Path) -> Content:
         raise ResultFileError(
             "the result file does not exist", where=str(path)
         ) from error
-    except Exception as error:  # archives, headers of arrays and JSON fail in every way when they are broken
+    except _BROKEN as error:
         raise ResultFileError(
             "the file is not a brachis result",
             where=str(path),
@@ -147,7 +166,10 @@ def _parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         raise ValueError("no npz archive")
     stream.seek(0)
     with zipfile.ZipFile(stream) as archive:
-        unpacked = sum(member.file_size for member in archive.infolist())
+        members = archive.infolist()
+    if not {member.compress_type for member in members} <= _PACKED:
+        raise ValueError("an archive that NumPy does not write")
+    unpacked = sum(member.file_size for member in members)
     if unpacked > LARGEST:
         raise ValueError(
             f"an archive of {unpacked / 1e6:.3g} MB unpacked, at most {LARGEST / 1e6:g} MB are read"
