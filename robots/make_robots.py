@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from brachis.compose import Rail, elements, on_rail
-from brachis.compose.elements import Element
 from lxml import etree
+
+from brachis.apps.compose import Rail, elements, on_rail
+from brachis.apps.compose.elements import Element
 
 ROBOTS = Path(__file__).parent
 COLOURS = {

@@ -142,7 +142,7 @@ def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path):
 WRITING = """
 import sys, time
 from pathlib import Path
-from brachis.cli.folder import write_files, write_text
+from brachis.apps.cli.folder import write_files, write_text
 
 def slow(path):
     write_text("half", path)
@@ -179,7 +179,7 @@ def test_a_process_that_is_ended_while_it_writes(number, tmp_path):
 FULL = """
 import resource, sys
 from pathlib import Path
-from brachis.cli.folder import write_files, write_text
+from brachis.apps.cli.folder import write_files, write_text
 
 def writer(size):
     return lambda path: write_text(size * "x", path)

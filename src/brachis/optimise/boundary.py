@@ -116,7 +116,8 @@ class BoundarySpline:
 
     def control_points(self, free: np.ndarray, duration: float) -> np.ndarray:
         """Control points (N + d,) from the free variables and the duration, s."""
-        parts = np.where(self.variable >= 0, self.weight * free[self.variable], 0.0)
+        or_none = np.append(free, 0.0)  # which -1 points at
+        parts = self.weight * or_none[self.variable]
         return np.asarray(parts.sum(axis=1) + self.fixed + duration * self.rate)
 
     def free_from(self, control_points: np.ndarray, duration: float) -> np.ndarray:

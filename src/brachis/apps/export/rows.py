@@ -146,6 +146,5 @@ def needed(name: str, what: str) -> ModuleType:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        raise NotInstalledError(
-            what, name.split(".", maxsplit=1)[0], "export"
-        ) from error
+        package = name.split(".", maxsplit=1)[0]
+        raise NotInstalledError(what, package, "export") from error

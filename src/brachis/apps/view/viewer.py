@@ -217,6 +217,15 @@ def view(
         Host or port cannot be listened on.
     NotInstalledError
         viser is not installed.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> result = brachis.plan(brachis.examples.scara_line, redundant_joints=["j1"], effort="single", intervals=8)
+    >>> viewer = brachis.view(result.trajectory, port=0, block=False)
+    >>> viewer.url.startswith("http://127.0.0.1:")
+    True
+    >>> viewer.stop()
     """
     trajectory = motion_of(motion)
     viewer = Viewer(
