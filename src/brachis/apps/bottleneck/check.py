@@ -186,7 +186,8 @@ def _checked(
     """Compare limit by limit."""
     began = time.perf_counter()
     program = refined.program
-    base, t_end = refined.reports[-1].x, program.end_time
+    base = refined.reports[-1].x
+    t_end = program.end_time
     if residual(program, base) > _EXACT or _unbalanced(program, base) > _EXACT:
         base, _ = _solved_again(program, base)
     checked = []
@@ -212,7 +213,8 @@ def _compared(
     linearised = linearised_change(raised, base)
     answer, optimal = _solved_again(raised, base)
     t_end = program.end_time
-    before, off = base, abs(predicted - (t_end(answer) - t_end(base)))
+    before = base
+    off = abs(predicted - (t_end(answer) - t_end(base)))
     if off > _SUSPICIOUS * abs(predicted) and off > _SAME * t_end(base):
         before, sure = _solved_again(program, answer)
         optimal = optimal and sure

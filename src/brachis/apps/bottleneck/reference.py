@@ -45,7 +45,8 @@ from brachis.trajectory import Trajectory
 INTERVALS = 100
 """Number of intervals of the fine mesh for one redundant joint, rounded to a multiple of the answer's own."""
 MEANING = "the same problem with discontinuous torque allowed; the best value known, not a proven bound"
-_CUBICS, _PARABOLAS = 3, 2
+_CUBICS = 3
+_PARABOLAS = 2
 _HIGHEST = 2
 """Highest derivative that is bounded where accelerations jump: limits on a higher one are left out."""
 _POINTS = 3
@@ -141,10 +142,8 @@ def _found(
 ) -> Reference | None:
     """Try one mesh after the other."""
     began = time.perf_counter()
-    (phase,), (motion,) = (
-        refined.program.up_to(_HIGHEST).phases,
-        refined.program.motions(refined.x),
-    )
+    (phase,) = refined.program.up_to(_HIGHEST).phases
+    (motion,) = refined.program.motions(refined.x)
     best: Reference | None = None
     for degree, count in _meshes(phase.intervals, _fine(phase, intervals)):
         if best is not None and time.perf_counter() > began + time_limit:
@@ -204,10 +203,8 @@ def _planned(
 
     It need not be an optimum: any motion within the limits is as good a reference as it is fast.
     """
-    program, t_norm = (
-        Program([phase]),
-        np.linspace(0.0, 1.0, _FIT_DENSITY * len(phase.knots)),
-    )
+    program = Program([phase])
+    t_norm = np.linspace(0.0, 1.0, _FIT_DENSITY * len(phase.knots))
     try:
         x = fitted(phase, motion.t_end, t_norm, motion.at(t_norm * motion.t_end)[0])
         if worst_time_scaling_ratio(program, x) > _AS_GOOD:
@@ -269,7 +266,8 @@ def _violation(answer: Refined) -> float:
 
 _STATIONS = 1001
 _BISECTIONS = 50
-_WITHIN, _MOST = 0.02, 0.01
+_WITHIN = 0.02
+_MOST = 0.01
 """The motion in the phase plane may exceed limits by more than the first fraction for this fraction of its time: at
 the stations beside rest its derivatives are differences, and rough."""
 _JUMPING = 2
@@ -340,11 +338,13 @@ def knot_cost(
 
 def _times_at(trajectory: Trajectory, s: np.ndarray) -> np.ndarray:
     """Find when path coordinates, (S,), are passed, s."""
-    low, high = np.zeros_like(s), np.full_like(s, trajectory.t_end)
+    low = np.zeros_like(s)
+    high = np.full_like(s, trajectory.t_end)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         before = trajectory.path_coordinate(middle) < s
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
+        low = np.where(before, middle, low)
+        high = np.where(before, high, middle)
     return high
 
 

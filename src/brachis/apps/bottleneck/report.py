@@ -147,7 +147,8 @@ def _answers(
 ) -> Iterator[Refined]:
     """Solve and refine with one backend after the other, until one comes back to the motion."""
     task = trajectory.task
-    deadline, settings = Deadline.after(task.search.time_limit), task.refinement
+    deadline = Deadline.after(task.search.time_limit)
+    settings = task.refinement
     options = RefinementOptions(
         settings.tolerance, settings.density, settings.max_rounds, deadline
     )
@@ -287,7 +288,8 @@ def report(
             raise InputError(problem, where=motion.recovered.source, hint=hint)
         return BottleneckReport(motion.t_end, None, saturations(motion))
     if isinstance(motion, Trajectory):
-        trajectory, refined = motion, solved_again(motion)
+        trajectory = motion
+        refined = solved_again(motion)
     elif motion.attempt.refined is None:
         raise InputError(
             "the result holds no solved problem",
@@ -295,8 +297,10 @@ def report(
             allowed="a result of brachis.plan",
         )
     else:
-        trajectory, refined = motion.trajectory, motion.attempt.refined
-    found, tolerance = sensitivities(refined), trajectory.task.refinement.tolerance
+        trajectory = motion.trajectory
+        refined = motion.attempt.refined
+    found = sensitivities(refined)
+    tolerance = trajectory.task.refinement.tolerance
     limits = [
         limit for limit in refined.program.limits if limit.role is not Role.SAFEGUARD
     ]

@@ -94,7 +94,8 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
     from scipy import sparse
 
     rows, jacobian = rows_and_jacobian(program, x)
-    below, above = np.isfinite(program.lower), np.isfinite(program.upper)
+    below = np.isfinite(program.lower)
+    above = np.isfinite(program.upper)
     slopes = sparse.vstack(
         [-jacobian[np.flatnonzero(below)], jacobian[np.flatnonzero(above)]],
         format="csr",
@@ -104,7 +105,8 @@ def linearised_change(program: Program, x: np.ndarray) -> float | None:
     )
     lowest = np.clip(program.x_lower - x, -_LARGEST_STEP, 0.0)
     highest = np.clip(program.x_upper - x, 0.0, _LARGEST_STEP)
-    kept, gradient = room < _NEAR, program.gradient(x)
+    kept = room < _NEAR
+    gradient = program.gradient(x)
     while True:
         step = _solved(
             gradient,
@@ -175,10 +177,8 @@ class ActiveSet(Summary):
         values, jacobian = rows_and_jacobian(program, x)
         low = np.flatnonzero(values <= program.lower + near)
         high = np.flatnonzero(values >= program.upper - near)
-        rows, signs = (
-            np.concatenate([low, high]),
-            np.repeat([1.0, -1.0], [len(low), len(high)]),
-        )
+        rows = np.concatenate([low, high])
+        signs = np.repeat([1.0, -1.0], [len(low), len(high)])
         slopes = signs[:, None] * jacobian[rows].toarray()
         pressing = slopes.any(
             axis=1

@@ -91,7 +91,8 @@ def _costs(found: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
 def _saving(entry: Sensitivity, t_end: float, *, degrees: bool) -> str:
     """Say what more room at one limit saves."""
     saved = -entry.change(_FRACTION)
-    label, end = entry.label, entry.bound.end
+    label = entry.label
+    end = entry.bound.end
     unit, factor = shown_unit(label.unit, degrees=degrees)
     amount = f"{factor * _FRACTION * entry.bound.whole:.3g} {unit}"
     if label.room:

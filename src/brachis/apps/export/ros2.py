@@ -1,23 +1,19 @@
-"""ROS 2's JointTrajectory as YAML, as ``ros2 topic pub`` takes it.
-
-ROS 2's message ``trajectory_msgs/msg/JointTrajectory``, as plain data.
-
-ROS 2's JointTrajectory in an MCAP bag.
-"""
+"""ROS 2's ``JointTrajectory``: YAML for ``ros2 topic pub``, and an MCAP bag."""
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from typing import Any, Final
+
+import numpy as np
+import yaml
 
 from brachis.apps.export.rows import JointRows, needed, rows_of
 from brachis.common.files import atomic_write
 from brachis.trajectory import Trajectory
 
 MESSAGE: Final = "trajectory_msgs/msg/JointTrajectory"
-_NANO = 1_000_000_000
 
 
 def message_of(rows: JointRows) -> dict[str, Any]:
@@ -26,21 +22,17 @@ def message_of(rows: JointRows) -> dict[str, Any]:
     ``effort`` stays empty: `joint_trajectory_controller` refuses trajectories that have it where no joint is driven by
     effort. Times are whole nanoseconds.
     """
-    points = [
-        {
-            "positions": q,
-            "velocities": qdot,
-            "accelerations": qddot,
+    points = []
+    for k, t in enumerate(rows.t.tolist()):
+        seconds, nanoseconds = divmod(round(t * 1e9), 10**9)
+        point = {
+            "positions": rows.q[k].tolist(),
+            "velocities": rows.qdot[k].tolist(),
+            "accelerations": rows.qddot[k].tolist(),
             "effort": [],
-            "time_from_start": dict(
-                zip(("sec", "nanosec"), divmod(round(t * _NANO), _NANO), strict=True)
-            ),
+            "time_from_start": {"sec": seconds, "nanosec": nanoseconds},
         }
-        for t, q, qdot, qddot in zip(
-            *(part.tolist() for part in (rows.t, rows.q, rows.qdot, rows.qddot)),
-            strict=True,
-        )
-    ]
+        points.append(point)
     header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
     return {"header": header, "joint_names": list(rows.joints), "points": points}
 
@@ -55,32 +47,12 @@ def export_ros2_yaml(
 ) -> None:
     """Write one message ``trajectory_msgs/msg/JointTrajectory``; see `brachis.export.write` for the parameters."""
     rows = rows_of(trajectory, dt, last, joints)
-    message = message_of(rows)
-    lines = [f"# {MESSAGE}", *(f"# {sentence}" for sentence in rows.left_out)]
-    lines += [
-        f"header: {_flow(message['header'])}",
-        f"joint_names: {_flow(message['joint_names'])}",
-        "points:",
-    ]
-    for point in message["points"]:
-        first, *others = (f"{name}: {_flow(value)}" for name, value in point.items())
-        lines += [f"- {first}", *(f"  {other}" for other in others)]
+    comments = "".join(f"# {line}\n" for line in (MESSAGE, *rows.left_out))
+    message = yaml.safe_dump(
+        message_of(rows), sort_keys=False, default_flow_style=None, width=np.inf
+    )
     with atomic_write(path) as stream:
-        stream.write(("\n".join(lines) + "\n").encode())
-
-
-def _flow(value: Any) -> str:
-    """Write a value in YAML's flow style, which is JSON's but for floats: those of YAML 1.1 have a point."""
-    if isinstance(value, float):
-        text = repr(value)
-        return text if "." in text else text.replace("e", ".0e")
-    if isinstance(value, list):
-        return f"[{', '.join(map(_flow, value))}]"
-    if isinstance(value, dict):
-        return (
-            f"{{{', '.join(f'{key}: {_flow(each)}' for key, each in value.items())}}}"
-        )
-    return json.dumps(value)
+        stream.write((comments + message).encode())
 
 
 TOPIC: Final = "/joint_trajectory_controller/joint_trajectory"

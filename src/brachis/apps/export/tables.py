@@ -70,10 +70,8 @@ def export_parquet(
     The file's metadata have a key ``brachis``: joints with their units, the end time in s, and sentences about joints
     that move and are left out.
     """
-    pyarrow, parquet = (
-        needed("pyarrow", "a Parquet file"),
-        needed("pyarrow.parquet", "a Parquet file"),
-    )
+    pyarrow = needed("pyarrow", "a Parquet file")
+    parquet = needed("pyarrow.parquet", "a Parquet file")
     rows = rows_of(trajectory, dt, last, joints)
     units = dict(zip(rows.joints, rows.units, strict=True))
     about = {"joints": units, "t_end_s": trajectory.t_end, "left_out": rows.left_out}

@@ -13,7 +13,8 @@ from brachis.errors import InputError
 from brachis.trajectory import Trajectory
 
 _JOINTS = 6
-_LOOKAHEAD, _GAIN = 0.03, 300
+_LOOKAHEAD = 0.03
+_GAIN = 300
 """s, the shortest that servoj takes; proportional gain, the manual's default."""
 _NEAR = 0.005
 """How far from the start posture the arm may be when the program begins, rad."""

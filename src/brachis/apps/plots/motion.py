@@ -41,7 +41,9 @@ def dense_samples(trajectory: Trajectory) -> Samples:
 
 _REACH = 0.3  # of the range of all data
 _LEAST_RANGE = 1e-9
-_JOINT_MM, _PROGRESS_MM, _FRAME_MM = 38.0, 26.0, 17.0
+_JOINT_MM = 38.0
+_PROGRESS_MM = 26.0
+_FRAME_MM = 17.0
 _FEW_JOINTS = 2
 _LOW = 0.6
 

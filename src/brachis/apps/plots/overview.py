@@ -28,9 +28,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.gridspec import SubplotSpec
 
-_MOST, _TALL = 3, 2
+_MOST = 3
+_TALL = 2
 """Kinds of limits; and how many panels are high enough for their titles on one line."""
-_POSTURES, _JOINTS, _PROGRESS, _FRAME = 74.0, 46.0, 34.0, 11.0
+_POSTURES = 74.0
+_JOINTS = 46.0
+_PROGRESS = 34.0
+_FRAME = 11.0
 """Heights of the rows, and of what is around them, mm."""
 
 

@@ -48,8 +48,10 @@ class Skeleton:
 
 def skeleton(robot: Robot, q: np.ndarray) -> Skeleton:
     """Stick figures of the postures `q`, (K, n)."""
-    model, data = robot.model, robot.model.createData()
-    base, n = int(model.getFrameId(robot.base_frame)), robot.n
+    model = robot.model
+    data = robot.model.createData()
+    base = int(model.getFrameId(robot.base_frame))
+    n = robot.n
     bones = np.empty((len(q), 2 * n + 2, 3))
     for points, posture in zip(bones, q, strict=True):
         pin.framesForwardKinematics(model, data, posture)
@@ -81,7 +83,8 @@ def drawing_plane(
         6, robot.n
     )  # (6,) for one joint
     revolute = robot.revolute
-    turning, sliding = columns[3:, revolute], columns[:3, ~revolute]
+    turning = columns[3:, revolute]
+    sliding = columns[:3, ~revolute]
     for normal in (2, 1, 0):
         in_plane = [axis for axis in range(3) if axis != normal]
         turns_about = np.abs(turning[in_plane]).max(initial=0.0) < _AXIS_TOLERANCE
@@ -92,7 +95,8 @@ def drawing_plane(
 
 
 _POSTURES = 7
-_FIRST, _LAST = np.array([0.72, 0.83, 0.91]), np.array([0.03, 0.23, 0.39])
+_FIRST = np.array([0.72, 0.83, 0.91])
+_LAST = np.array([0.03, 0.23, 0.39])
 _PATH_COLOUR = "#D55E00"
 _REDUNDANT_COLOUR = "#E69F00"
 _SHADOW_COLOUR = "#C8C8C8"
@@ -278,7 +282,8 @@ def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
 
 def _draw_floor(ax: Any, z: float) -> None:
     """Draw a grid of the ticks on the floor, up to the edges of the axes."""
-    x, y = ax.get_xlim(), ax.get_ylim()
+    x = ax.get_xlim()
+    y = ax.get_ylim()
     inner = [
         [tick for tick in ticks if low < tick < high]
         for ticks, (low, high) in ((ax.get_xticks(), x), (ax.get_yticks(), y))

@@ -146,7 +146,8 @@ def quantities(
     tuple of Quantity
         One or two.
     """
-    robot, own = trajectory.robot, KINDS[kind]
+    robot = trajectory.robot
+    own = KINDS[kind]
     lower, upper = limits_of(robot.limits, kind)
     values = own.values(trajectory, samples)
     found = []
@@ -157,7 +158,8 @@ def quantities(
         if not len(joints):
             continue
         unit, factor = shown_unit(UNITS[kind][base], degrees=degrees)
-        low, high = factor * lower[joints], factor * upper[joints]
+        low = factor * lower[joints]
+        high = factor * upper[joints]
         ended = np.isfinite(low) & np.isfinite(high) & own.in_range
         centre = 0.5 * np.where(ended, low, 0.0) + 0.5 * np.where(ended, high, 0.0)
         name = own.names[place] if own.names else kind

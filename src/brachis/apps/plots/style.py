@@ -190,7 +190,8 @@ def bar_style(column: int) -> dict[str, Any]:
 
 def limit_dashes(place: int, sharing: int) -> tuple[float, tuple[float, float]]:
     """Line style of a limit that some joints share: the dashes of each lie in the gaps of the others."""
-    dash, gap = 4.0, 2.0
+    dash = 4.0
+    gap = 2.0
     period = (dash + gap) * sharing
     return (period - place * (dash + gap)) % period, (dash, period - dash)
 

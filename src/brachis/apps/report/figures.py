@@ -30,7 +30,10 @@ Figure = dict[str, Any]
 
 _REACH = 0.3
 """Limits are in view where the motion comes as near to them as this part of its range."""
-_PANEL_PX, _SMALL_PX, _ROW_PX, _FRAME_PX = 210, 130, 26, 110
+_PANEL_PX = 210
+_SMALL_PX = 130
+_ROW_PX = 26
+_FRAME_PX = 110
 _FEW_JOINTS = 2
 _SHOWN = 0.5
 """Limits that the motion never comes this near to have no row."""
@@ -50,7 +53,8 @@ def motion_figure(motion: ReportedMotion) -> Figure:
 
     Joints in rad and joints in m have panels of their own; a joint is hidden in all panels at once.
     """
-    trajectory, samples = motion.trajectory, motion.samples
+    trajectory = motion.trajectory
+    samples = motion.samples
     kinds = kinds_of(trajectory)
     panels = [
         [part]
@@ -66,7 +70,9 @@ def motion_figure(motion: ReportedMotion) -> Figure:
         _PANEL_PX if len(parts[0].joints) > _FEW_JOINTS else _SMALL_PX
         for parts in panels
     ] + [_SMALL_PX]
-    data, named, last = [], set(), len(heights)
+    data = []
+    named = set()
+    last = len(heights)
     layout = _layout(trajectory.t_end, sum(heights) + _FRAME_PX)
     for row, (parts, domain) in enumerate(
         zip(panels, _domains(heights), strict=False), start=1
@@ -136,7 +142,8 @@ def _joint_traces(
 ) -> list[dict[str, Any]]:
     """Draw one joint's curve, and its limits as thin straight lines."""
     joint = style.joint_style(int(part.joints[column]))
-    values, levels = part.values[:, column], (part.lower[column], part.upper[column])
+    values = part.values[:, column]
+    levels = (part.lower[column], part.upper[column])
     line = {
         "color": joint["color"],
         "width": 1.8,
@@ -144,7 +151,8 @@ def _joint_traces(
         "simplify": False,
     }
     group = {"name": name, "legendgroup": name, "legendrank": int(part.joints[column])}
-    hover, share = f"%{{y:.4g}} {part.unit}", {}
+    hover = f"%{{y:.4g}} {part.unit}"
+    share = {}
     if np.isfinite(levels).all():
         share = {"customdata": encoded(100.0 * np.abs(part.ratios[:, column]))}
         hover += f", %{{customdata:.1f}} % of {part.of}"
@@ -172,11 +180,13 @@ def _joint_traces(
 
 def timeline_figure(motion: ReportedMotion) -> Figure:
     """Draw how near the motion is to every limit over time, a row each: blue, orange where active, red beyond it."""
-    ratios, tolerance = motion.ratios, motion.trajectory.task.refinement.tolerance
+    ratios = motion.ratios
+    tolerance = motion.trajectory.task.refinement.tolerance
     columns = {label: column for column, label in enumerate(ratios.labels)}
     entries = [entry for entry in motion.saturations if entry.peak > _SHOWN][::-1]
     once = np.append(np.diff(ratios.t) > 0.0, True)
-    t, values = ratios.t[once], np.abs(ratios.values[once])
+    t = ratios.t[once]
+    values = np.abs(ratios.values[once])
     part = np.array([values[:, columns[entry.label]] for entry in entries]).reshape(
         len(entries), len(t)
     )
@@ -185,7 +195,8 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
         for stretch in entry.active:  # ripple included
             inside = (t >= stretch.begin) & (t <= stretch.end)
             colours[row, inside] = np.maximum(colours[row, inside], THRESHOLD)
-    active, beyond = THRESHOLD / _MOST, (1.0 + tolerance) / _MOST
+    active = THRESHOLD / _MOST
+    beyond = (1.0 + tolerance) / _MOST
     layout = _layout(
         motion.trajectory.t_end, _ROW_PX * max(len(entries), 1) + _FRAME_PX
     )
@@ -255,23 +266,23 @@ def _value_axis(
 
 def _view(parts: Sequence[Quantity]) -> tuple[float, float]:
     """Range of values in view: the motion, and the limits that it comes near."""
-    low, high = (
-        min(float(part.values.min()) for part in parts),
-        max(float(part.values.max()) for part in parts),
-    )
+    low = min(float(part.values.min()) for part in parts)
+    high = max(float(part.values.max()) for part in parts)
     reach = _REACH * max(high - low, 1e-9)
     levels = np.concatenate(
         [level for part in parts for level in (part.lower, part.upper)]
     )
     near = levels[(levels > low - reach) & (levels < high + reach)]
-    low, high = min([low, *near.tolist()]), max([high, *near.tolist()])
+    low = min([low, *near.tolist()])
+    high = max([high, *near.tolist()])
     room = 0.06 * max(high - low, 1e-9)
     return low - room, high + room
 
 
 def _domains(heights: list[int]) -> list[tuple[float, float]]:
     """Parts of the figure's height for panels, from the top down."""
-    whole, gap = float(sum(heights)), 0.012
+    whole = float(sum(heights))
+    gap = 0.012
     ends = 1.0 - np.cumsum([0.0, *heights]) / whole
     return [
         (float(low) + gap, float(high) - gap)

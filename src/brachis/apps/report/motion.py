@@ -143,7 +143,8 @@ def _held_back(
 
 def _planned(result: PlannedMotion) -> dict[str, str]:
     """Say how a motion was planned."""
-    report, least = result.solver_report, result.least_motion
+    report = result.solver_report
+    least = result.least_motion
     return {
         "solver": f"{report.solver}, {report.status.value}",
         "collocation points": str(result.attempt.collocation_points),

@@ -25,7 +25,8 @@ from brachis.verify import Check
 _LIBRARIES = ("pin", "numpy", "scipy", "plotly")
 NEAR = 0.9
 """Values that use more of a limit are marked as near it; 1 is the limit itself."""
-_SMALL, _LARGE = 1e-9, 1e4
+_SMALL = 1e-9
+_LARGE = 1e4
 _LISTED = 6
 """Segments of a path, and numbers of one, that are named."""
 
@@ -76,11 +77,9 @@ class JointRow:
 
 def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
     """Say what a person asks first."""
-    trajectory, samples, verification = (
-        motion.trajectory,
-        motion.samples,
-        motion.verification,
-    )
+    trajectory = motion.trajectory
+    samples = motion.samples
+    verification = motion.verification
     boundary = trajectory.task.boundary
     named = trajectory.branch not in {
         "",
@@ -106,7 +105,8 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
 def identity(motion: ReportedMotion) -> dict[str, str]:
     """Say what the motion is of: robot, path, payload and where the robot stands; and when the page was made."""
     trajectory = motion.trajectory
-    urdf, recovered = trajectory.task.robot.urdf, trajectory.recovered
+    urdf = trajectory.task.robot.urdf
+    recovered = trajectory.recovered
     file = "" if urdf is None else f" ({_file_name(urdf)})"
     way = float(
         np.linalg.norm(np.diff(motion.samples.tool_position, axis=0), axis=1).sum()
@@ -198,10 +198,8 @@ def what_limits(motion: ReportedMotion) -> str:
 
 def joint_rows(motion: ReportedMotion) -> list[JointRow]:
     """List what every joint does, in chain order."""
-    trajectory, tolerance = (
-        motion.trajectory,
-        motion.trajectory.task.refinement.tolerance,
-    )
+    trajectory = motion.trajectory
+    tolerance = motion.trajectory.task.refinement.tolerance
     peaks: dict[int, list[Row]] = {joint: [] for joint in range(trajectory.robot.n)}
     positions: dict[int, tuple[np.ndarray, str]] = {}
     for kind in kinds_of(trajectory):
@@ -229,16 +227,15 @@ def joint_rows(motion: ReportedMotion) -> list[JointRow]:
 
 def _peak(part: Quantity, column: int, tolerance: float) -> Row:
     """Find the value of a joint that is nearest to its limit, or the largest one where there is no limit."""
-    values, lower, upper = (
-        part.values[:, column],
-        part.lower[column],
-        part.upper[column],
-    )
+    values = part.values[:, column]
+    lower = part.lower[column]
+    upper = part.upper[column]
     limited = bool(part.is_limited[column])
     ratios = np.abs(part.ratios[:, column]) if limited else np.zeros(1)
     at = int(np.argmax(ratios if limited else np.abs(values)))
     value = values[at] if abs(values[at]) > _SMALL else 0.0
-    low, high = _write_number(lower), _write_number(upper)
+    low = _write_number(lower)
+    high = _write_number(upper)
     limit = f"{high} {part.unit}" if upper == -lower else f"{low} to {high} {part.unit}"
     return Row(
         value=f"{_write_number(value)} {part.unit}",

@@ -60,7 +60,9 @@ def link_shapes(
     unread : list of str
         Of the shapes that cannot be shown, the link and the reason; of missing files one line.
     """
-    tree, shapes, unread = read_tree(urdf, "URDF"), {}, []
+    tree = read_tree(urdf, "URDF")
+    shapes = {}
+    unread = []
     absent: list[str] = []
     room = _LARGEST
     materials = [each for each in tree.robot if each.tag == "material"]
@@ -125,10 +127,8 @@ def _check_size(visual: Element, room: int) -> int:
             )
         size += _size(path)
         if size > room:
-            found, allowed = (
-                f"{size / 1e6:.0f} MB",
-                f"{_LARGEST / 1e6:.0f} MB for all meshes of the robot",
-            )
+            found = f"{size / 1e6:.0f} MB"
+            allowed = f"{_LARGEST / 1e6:.0f} MB for all meshes of the robot"
             raise InputError(
                 "the mesh is too large to be shown",
                 where=path.name,
@@ -243,7 +243,9 @@ class Placements:
 
 def placements(robot: Robot, q: np.ndarray) -> Placements:
     """Forward kinematics of postures `q`, (K, n)."""
-    model, data, frame = robot.model, robot.model.createData(), robot.frame_id
+    model = robot.model
+    data = robot.model.createData()
+    frame = robot.frame_id
     found = Placements(
         np.empty((len(q), robot.n + 2, 3)), np.empty((len(q), robot.n + 2, 4))
     )
@@ -353,7 +355,8 @@ def _skeleton(
 ) -> dict[int, list[trimesh.Trimesh]]:
     """Draw every joint, and the link from it to the next one; along the axis of a prismatic joint where it slides."""
     robot = trajectory.robot
-    model, tool = robot.model, robot.model.frames[robot.frame_id]
+    model = robot.model
+    tool = robot.model.frames[robot.frame_id]
     base = model.frames[
         model.getFrameId(robot.base_frame, pin.FrameType.BODY)
     ].placement.translation
@@ -362,10 +365,8 @@ def _skeleton(
         joint: [] for joint in range(robot.n + 1)
     }
     for joint in range(robot.n):
-        placement, axis = (
-            model.jointPlacements[joint + 1],
-            _axis(model.joints[joint + 1]),
-        )
+        placement = model.jointPlacements[joint + 1]
+        axis = _axis(model.joints[joint + 1])
         drawn[joint] += _rod(begins[joint], placement.translation, radius, _BONE)
         if robot.position_units[joint] == "m":
             low, high = (
@@ -390,8 +391,10 @@ def _axis(joint: Any) -> np.ndarray:
 
 def _range(trajectory: Trajectory, joint: int) -> tuple[float, float]:
     """Positions between which a prismatic joint can move, m; where it has no ends, those of the motion."""
-    limits, q = trajectory.robot.limits, trajectory.q[:, joint]
-    low, high = float(limits.position_lower[joint]), float(limits.position_upper[joint])
+    limits = trajectory.robot.limits
+    q = trajectory.q[:, joint]
+    low = float(limits.position_lower[joint])
+    high = float(limits.position_upper[joint])
     return (
         low if np.isfinite(low) else float(q.min()),
         high if np.isfinite(high) else float(q.max()),

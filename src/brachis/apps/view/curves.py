@@ -82,7 +82,8 @@ def all_curves(
                 _of(trajectory, title, limited, values, (-1.0, 1.0), -top, top)
             )
         for part in free if kind in _SHOWN_FREE else ():
-            low, high = float(part.values.min()), float(part.values.max())
+            low = float(part.values.min())
+            high = float(part.values.max())
             margin = 0.1 * (high - low) or 1.0
             title = f"{part.name} ({part.unit}), no limit"
             plots.append(
@@ -164,10 +165,8 @@ def _largest_ratios(trajectory: Trajectory) -> Curves:
         largest = parts[:, [label.kind == kind for label in ratios.labels]].max(axis=1)
         values[:, column] = np.maximum.reduceat(largest, edges)
     top = _TOP * max(1.0, float(values.max(initial=0.0)))
-    t, values = (
-        np.append(ratios.t[edges], trajectory.t_end),
-        np.vstack([values, values[-1:]]),
-    )
+    t = np.append(ratios.t[edges], trajectory.t_end)
+    values = np.vstack([values, values[-1:]])
     return Curves(
         "largest of every kind / limit",
         kinds,

@@ -25,11 +25,16 @@ if TYPE_CHECKING:
     from viser import uplot
 
 _HEIGHT = 165
-_LEFT, _RIGHT, _ABOVE, _BELOW = 40, 12, 6, 44
+_LEFT = 40
+_RIGHT = 12
+_ABOVE = 6
+_BELOW = 44
 """Of a plot, and what is around its curves; pixels."""
 _LABEL = 16
 """Of the height below, for the label."""
-_EDGE, _EDGES, _GAP = 9.5, 18.5, 12
+_EDGE = 9.5
+_EDGES = 18.5
+_GAP = 12
 """What viser leaves to the left of a plot (less half the line), on both sides and below, pixels; a test measures it."""
 _FONT = "11px sans-serif"
 _NOW = "#D00000"
@@ -103,7 +108,8 @@ class Chart:
 
     def _data(self) -> tuple[np.ndarray, ...]:
         """Columns of the plot."""
-        t, values = self._curves.t, self._curves.values
+        t = self._curves.t
+        values = self._curves.values
         return (
             t,
             *(np.full_like(t, bound) for bound in self._curves.bounds),
@@ -195,10 +201,8 @@ class Playback:
         if not self.playing:
             return self.time
         if self.time < self.t_end:
-            self.time, self._waited = (
-                min(self.time + elapsed * self.rate, self.t_end),
-                0.0,
-            )
+            self.time = min(self.time + elapsed * self.rate, self.t_end)
+            self._waited = 0.0
             return self.time
         if not self.repeats:
             self.playing = False
@@ -222,7 +226,8 @@ class Playback:
 
 _STOPS = 9
 _SLIDER_STEPS = 200
-_CONTROLS_WIDTH, _PLOTS_WIDTH = 400, 350
+_CONTROLS_WIDTH = 400
+_PLOTS_WIDTH = 350
 """Pixels."""
 
 
@@ -262,12 +267,10 @@ class Panel:
         degrees: bool,
     ) -> None:
         self._degrees = degrees
-        self._gui, self._motion, self._playback, self._show = (
-            server.gui,
-            motion,
-            playback,
-            show,
-        )
+        self._gui = server.gui
+        self._motion = motion
+        self._playback = playback
+        self._show = show
         self._gui.configure_theme(show_logo=False, show_share_button=False)
         self._gui.add_html(tables.summary(motion.trajectory, notes, verified=verified))
         self._add_controls()
@@ -368,7 +371,8 @@ class Panel:
 
     def _add_plots(self, candidates: Sequence[Mapping[str, Any]]) -> list[Chart]:
         """Add a panel with the plots and the list of candidates."""
-        motion, panel = self._motion, self._gui.add_panel()
+        motion = self._motion
+        panel = self._gui.add_panel()
         with panel.add_tab("limits"):
             charts = [
                 Chart(self._gui, curves)
